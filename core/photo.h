@@ -1,0 +1,46 @@
+#pragma once
+// Photos: decoding (OpenCV), shooting data (Exiv2), linear light.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <opencv2/core/mat.hpp>
+
+namespace roomtex {
+
+// What EXIF says about the exposure; empty where it does not.
+struct ExposureData {
+  std::optional<double> exposure_time;  // seconds
+  std::optional<double> f_number;
+  std::optional<double> iso;
+  std::string camera;     // make and model, for grouping photos
+  std::string date_time;  // "2008:05:01 12:00:00" or ""
+
+  // Light collected per scene radiance, relative: t * ISO / N^2; f_number and ISO count as 1 when absent.
+  // None without an exposure time.
+  std::optional<double> RelativeExposure() const;
+};
+
+// 8-bit BGR, as stored: an EXIF orientation is NOT applied, because COLMAP's keypoints are not turned
+// either. Throws InputError if the file is missing, not an image or broken.
+cv::Mat ReadPhoto(const std::string& path);
+
+// Width and height without decoding the pixels, from the file's header; {0, 0} if that cannot be told.
+std::array<int, 2> ReadPhotoSize(const std::string& path);
+
+// Missing or broken EXIF is no error: fields stay empty.
+ExposureData ReadExposureData(const std::string& path);
+// Writes the fields that are set into an existing JPEG.
+void WriteExposureData(const std::string& path, const ExposureData& exposure);
+
+// sRGB transfer function (IEC 61966-2-1): value in [0, 1], linear light in [0, 1].
+double LinearFromSrgb(double value);
+double SrgbFromLinear(double linear);
+// The same for bytes: a table of 256 linear values.
+const std::array<float, 256>& LinearFromSrgbByte();
+// Nearest byte; clamps.
+uint8_t SrgbByteFromLinear(float linear);
+
+}  // namespace roomtex

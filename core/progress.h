@@ -1,0 +1,44 @@
+#pragma once
+// Progress and log on stderr: a redrawn bar on a terminal, a line per stage otherwise, nothing when quiet.
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace roomtex {
+
+class Progress {
+ public:
+  // quiet: prints nothing, only measures.
+  explicit Progress(bool quiet);
+  ~Progress();
+
+  // Ends the running stage and starts the next one; `total` steps (0 = cannot be told).
+  // The name, e.g. "read scan", is the key in the report's `seconds`.
+  void Stage(const std::string& name, int total = 0);
+  // One more of the steps is done. Safe from several threads.
+  void Tick();
+  // Ends the running stage.
+  void Finish();
+
+  void Note(const std::string& message);     // "  message"
+  void Warning(const std::string& message);  // "warning: message"
+
+  // Seconds (wall clock) per finished stage, in order.
+  const std::vector<std::pair<std::string, double>>& stage_seconds() const { return stages_; }
+
+ private:
+  void Redraw();
+
+  bool quiet_, terminal_;
+  std::mutex mutex_;
+  std::string stage_;
+  int total_ = 0, done_ = 0;
+  std::chrono::steady_clock::time_point started_, redrawn_;
+  std::vector<std::pair<std::string, double>> stages_;
+};
+
+}  // namespace roomtex

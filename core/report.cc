@@ -1,0 +1,30 @@
+#include "core/report.h"
+
+#include "core/frames.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+
+void Report::SetUntrusted(const std::string& reason) {
+  reason_ += (reason_.empty() ? "" : " ") + reason;
+}
+
+Json ToJson(const Eigen::VectorXd& vector) {
+  return Json(std::vector<double>(vector.data(), vector.data() + vector.size()));
+}
+
+Json ToJson(const Similarity& similarity) {
+  Json json;
+  json["scale"] = similarity.scale;
+  json["rotation_wxyz"] = ToJson(WxyzFromQuaternion(similarity.rotation));
+  json["translation"] = ToJson(similarity.translation);
+  return json;
+}
+
+void WriteJson(const std::string& path, const Json& json) {
+  OutputFile file(path);
+  file.stream() << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  file.Commit();
+}
+
+}  // namespace roomtex

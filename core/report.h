@@ -1,0 +1,47 @@
+#pragma once
+// The JSON report that every command writes with --report_path (docs/commands.md).
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/similarity.h"
+
+namespace roomtex {
+
+// Ordered: keys stand in the file as they were set.
+using Json = nlohmann::ordered_json;
+
+class Report {
+ public:
+  // A key of the command's own, e.g. report["num_vertices"] = 12.
+  Json& operator[](const std::string& key) { return keys_[key]; }
+  const Json& keys() const { return keys_; }
+
+  void AddInput(const std::string& option, const std::string& path) { inputs_[option].push_back(path); }
+  void AddWarning(const std::string& warning) { warnings_.push_back(warning); }
+  // The answer is not to be trusted (exit 4); several reasons are joined.
+  void SetUntrusted(const std::string& reason);
+
+  bool trusted() const { return reason_.empty(); }
+  const std::string& reason() const { return reason_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  const Json& inputs() const { return inputs_; }
+
+ private:
+  Json keys_ = Json::object();
+  Json inputs_ = Json::object();
+  std::vector<std::string> warnings_;
+  std::string reason_;
+};
+
+// Vectors as JSON arrays.
+Json ToJson(const Eigen::VectorXd& vector);
+// {scale, rotation_wxyz, translation}.
+Json ToJson(const Similarity& similarity);
+
+// Written aside and renamed; two-space indent. Numbers that are not finite become null.
+void WriteJson(const std::string& path, const Json& json);
+
+}  // namespace roomtex

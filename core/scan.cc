@@ -1,0 +1,52 @@
+#include "core/scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace roomtex {
+
+int Scan::NumMissing() const {
+  int count = 0;
+  for (size_t i = 0; i < points.size(); ++i) count += IsMissing(static_cast<int>(i));
+  return count;
+}
+
+Bounds FindBounds(const Scan& scan) {
+  Bounds bounds;
+  for (const Eigen::Vector3d& point : scan.points) {
+    if (!(point.x() == point.x())) continue;
+    bounds.min = bounds.min.cwiseMin(point);
+    bounds.max = bounds.max.cwiseMax(point);
+  }
+  return bounds;
+}
+
+std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile,
+                                     double high_percentile) {
+  std::vector<float> measured;
+  measured.reserve(scan.points.size());
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (!scan.IsMissing(static_cast<int>(i)) && std::isfinite(scan.intensity[i])) {
+      measured.push_back(scan.intensity[i]);
+    }
+  }
+  std::vector<uint8_t> grey(scan.points.size(), 0);
+  if (measured.empty()) return grey;
+  const auto percentile = [&measured](double percent) {
+    const size_t rank = static_cast<size_t>(percent / 100.0 * (measured.size() - 1) + 0.5);
+    std::nth_element(measured.begin(), measured.begin() + rank, measured.end());
+    return measured[rank];
+  };
+  const float low = percentile(low_percentile);
+  const float high = percentile(high_percentile);
+  const float range = high > low ? high - low : 1.0f;
+  for (size_t i = 0; i < grey.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i)) || !std::isfinite(scan.intensity[i])) continue;
+    const float value = std::clamp((scan.intensity[i] - low) / range, 0.0f, 1.0f);
+    grey[i] = static_cast<uint8_t>(std::lround(255 * value));
+  }
+  return grey;
+}
+
+}  // namespace roomtex

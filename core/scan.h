@@ -1,0 +1,64 @@
+#pragma once
+// The range scan: measured 3D points with intensity, organised in the grid in which the scanner took them
+// (thesis 5.1.1), or a plain triangle mesh that has no grid.
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/similarity.h"
+
+namespace roomtex {
+
+using Triangle = std::array<int, 3>;  // indices into Scan::points, counter-clockwise seen from outside
+
+struct Scan {
+  std::string path;  // the file it came from, for messages and reports
+
+  // The grid. Sample (column, row) has the index row * num_columns + column; row 0 is the TOP row (largest
+  // elevation), columns keep the order of the file. A mesh without a grid has organised == false,
+  // num_columns == points.size() and num_rows == 1.
+  bool organised = true;
+  int num_columns = 0;
+  int num_rows = 0;
+
+  // One per grid cell. A missing sample is NaN in all three coordinates.
+  std::vector<Eigen::Vector3d> points;  // `scan` frame
+  // One per grid cell, in the unit of the file (RTPI: integers; PTX: 0..1). Missing samples: 0.
+  std::vector<float> intensity;
+
+  // Triangles of a mesh without a grid. Empty when organised: see scan_mesh.h.
+  std::vector<Triangle> triangles;
+
+  // Where the scanner stood: the origin of the `station` frame is the point that all ranges start from.
+  Rigid scan_from_station;
+  // Unit vector of the scan frame that points up (RTPI: y; PTX: z).
+  Eigen::Vector3d up = Eigen::Vector3d::UnitY();
+  bool is_rtpi = false;
+
+  int Index(int column, int row) const { return row * num_columns + column; }
+  bool IsMissing(int index) const { return !(points[index].x() == points[index].x()); }
+  Eigen::Vector3d Station() const { return scan_from_station.translation; }
+  int NumMissing() const;
+
+  static Eigen::Vector3d MissingPoint() {
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+};
+
+// Smallest axis-aligned box around the measured points; min > max when there are none.
+struct Bounds {
+  Eigen::Vector3d min = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector3d max = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
+};
+Bounds FindBounds(const Scan& scan);
+
+// Intensities as grey values 0..255 in grid order: the given percentiles of the measured samples become
+// black and white. Missing samples: 0.
+std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile = 1.0,
+                                     double high_percentile = 99.0);
+
+}  // namespace roomtex

@@ -1,0 +1,176 @@
+#include "core/scan_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+// What the connection tests need of a sample: its direction from the scanner and its range (0 = missing).
+struct Ray {
+  Eigen::Vector3f direction = Eigen::Vector3f::Zero();
+  float range = 0;
+};
+
+class GridConnector {
+ public:
+  GridConnector(const Scan& scan, const ScanMeshOptions& options)
+      : scan_(scan), options_(options), rays_(scan.points.size()) {
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      if (scan.IsMissing(static_cast<int>(i))) continue;
+      const Eigen::Vector3d offset = scan.points[i] - scan.Station();
+      const double range = offset.norm();
+      if (range > 0) rays_[i] = {(offset / range).cast<float>(), static_cast<float>(range)};
+    }
+    closed_ = IsFullTurn();
+  }
+
+  bool closed() const { return closed_; }
+
+  bool IsMeasured(int column, int row) const { return rays_[Index(column, row)].range > 0; }
+
+  // The sample at (column, row) and its neighbour at (column + dc, row + dr), dc and dr 0 or +-1, lie on
+  // one surface.
+  bool AreConnected(int column, int row, int dc, int dr) const {
+    const Ray& a = rays_[Index(column, row)];
+    const Ray& b = rays_[Index(column + dc, row + dr)];
+    if (!(a.range > 0) || !(b.range > 0)) return false;
+    const float chord = (a.direction - b.direction).norm();
+    const float facing_length = chord * std::min(a.range, b.range);
+    const float length = (a.range * a.direction - b.range * b.direction).norm();
+    if (!(facing_length > 0)) return false;
+    const float ratio = length / facing_length;
+    if (ratio > options_.max_edge_ratio) return false;
+    if (ratio <= kFacingRatio) return true;
+    // On a plane the inverse range changes evenly from ray to ray; over a jump it does not.
+    const float step = 1 / b.range - 1 / a.range;
+    return Continues(column - dc, row - dr, 1 / a.range, step, +1) ||
+           Continues(column + 2 * dc, row + 2 * dr, 1 / b.range, step, -1);
+  }
+
+ private:
+  static constexpr float kFacingRatio = 3.0f;
+
+  int Index(int column, int row) const {
+    if (closed_) column = (column + scan_.num_columns) % scan_.num_columns;
+    return scan_.Index(column, row);
+  }
+
+  // The step between the sample at (column, row), just outside the edge, and the end of the edge with
+  // inverse range `end` is about `step` as well. side: +1 before the edge, -1 behind it.
+  bool Continues(int column, int row, float end, float step, int side) const {
+    if (row < 0 || row >= scan_.num_rows) return false;
+    if (!closed_ && (column < 0 || column >= scan_.num_columns)) return false;
+    const Ray& outside = rays_[Index(column, row)];
+    if (!(outside.range > 0)) return false;
+    const float outside_step = side * (end - 1 / outside.range);
+    return std::abs(outside_step - step) <= options_.max_bend * std::abs(step);
+  }
+
+  // The last and the first column are as near as two neighbouring columns (median over the rows).
+  bool IsFullTurn() const {
+    if (scan_.num_columns < 16) return false;
+    std::vector<float> inside, across;
+    for (int row = 0; row < scan_.num_rows; ++row) {
+      const Ray& first = rays_[scan_.Index(0, row)];
+      const Ray& second = rays_[scan_.Index(1, row)];
+      const Ray& last = rays_[scan_.Index(scan_.num_columns - 1, row)];
+      if (first.range > 0 && second.range > 0) {
+        inside.push_back((first.direction - second.direction).norm());
+      }
+      if (first.range > 0 && last.range > 0) {
+        across.push_back((first.direction - last.direction).norm());
+      }
+    }
+    if (inside.size() < 8 || across.size() < 8) return false;
+    const auto median = [](std::vector<float>& values) {
+      std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+      return values[values.size() / 2];
+    };
+    const float inside_chord = median(inside), across_chord = median(across);
+    return across_chord < 1.75f * inside_chord && across_chord > 0.25f * inside_chord;
+  }
+
+  const Scan& scan_;
+  const ScanMeshOptions& options_;
+  std::vector<Ray> rays_;
+  bool closed_ = false;
+};
+
+// Turns the triangle so that its front faces the scanner.
+Triangle FacingStation(const Scan& scan, Triangle triangle) {
+  const Eigen::Vector3d& a = scan.points[triangle[0]];
+  const Eigen::Vector3d normal =
+      (scan.points[triangle[1]] - a).cross(scan.points[triangle[2]] - a);
+  if (normal.dot(scan.Station() - a) < 0) std::swap(triangle[1], triangle[2]);
+  return triangle;
+}
+
+}  // namespace
+
+std::vector<std::string> ScanMeshOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (!(max_edge_ratio > 1)) problems.push_back("--Mesh.max_edge_ratio must be greater than 1");
+  if (!(max_bend >= 0)) problems.push_back("--Mesh.max_bend must not be negative");
+  return problems;
+}
+
+std::vector<Triangle> BuildScanMesh(const Scan& scan, const ScanMeshOptions& options) {
+  if (!scan.organised) return scan.triangles;
+  std::vector<Triangle> triangles;
+  if (scan.num_columns < 2 || scan.num_rows < 2) return triangles;
+  const GridConnector connector(scan, options);
+  const int num_quads = connector.closed() ? scan.num_columns : scan.num_columns - 1;
+  for (int row = 0; row + 1 < scan.num_rows; ++row) {
+    for (int column = 0; column < num_quads; ++column) {
+      const int right = (column + 1) % scan.num_columns;
+      // Corners 0 1 / 3 2 (upper left, upper right, lower right, lower left), edges between neighbours.
+      const int corner[4] = {scan.Index(column, row), scan.Index(right, row),
+                             scan.Index(right, row + 1), scan.Index(column, row + 1)};
+      const bool top = connector.AreConnected(column, row, 1, 0);
+      const bool bottom = connector.AreConnected(column, row + 1, 1, 0);
+      const bool left = connector.AreConnected(column, row, 0, 1);
+      const bool right_side = connector.AreConnected(right, row, 0, 1);
+      const bool down = connector.AreConnected(column, row, 1, 1);     // 0-2
+      const bool up = connector.AreConnected(column, row + 1, 1, -1);  // 3-1
+      const double down_length = (scan.points[corner[0]] - scan.points[corner[2]]).squaredNorm();
+      const double up_length = (scan.points[corner[1]] - scan.points[corner[3]]).squaredNorm();
+      const bool upper_right = top && right_side && down, lower_left = left && bottom && down;
+      const bool upper_left = top && left && up, lower_right = right_side && bottom && up;
+      const int with_down = upper_right + lower_left, with_up = upper_left + lower_right;
+      const bool take_down =
+          with_down != with_up ? with_down > with_up : !(up_length < down_length);
+      const auto add = [&](bool wanted, int a, int b, int c) {
+        if (wanted) triangles.push_back(FacingStation(scan, {corner[a], corner[b], corner[c]}));
+      };
+      if (take_down) {
+        add(upper_right, 0, 2, 1);
+        add(lower_left, 0, 3, 2);
+      } else {
+        add(upper_left, 0, 3, 1);
+        add(lower_right, 1, 3, 2);
+      }
+    }
+  }
+  return triangles;
+}
+
+std::vector<Eigen::Vector3f> VertexNormals(const Scan& scan,
+                                           const std::vector<Triangle>& triangles) {
+  std::vector<Eigen::Vector3f> normals(scan.points.size(), Eigen::Vector3f::Zero());
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d& a = scan.points[t[0]];
+    const Eigen::Vector3f doubled_area =
+        (scan.points[t[1]] - a).cross(scan.points[t[2]] - a).cast<float>();
+    for (int corner : t) normals[corner] += doubled_area;
+  }
+  for (Eigen::Vector3f& normal : normals) {
+    const float length = normal.norm();
+    if (length > 0) normal /= length;
+  }
+  return normals;
+}
+
+}  // namespace roomtex

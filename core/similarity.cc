@@ -1,0 +1,101 @@
+#include "core/similarity.h"
+
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+
+Rigid Rigid::operator*(const Rigid& other) const {
+  return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
+}
+
+Rigid Rigid::Inverse() const {
+  const Eigen::Quaterniond inverse = rotation.conjugate();
+  return {inverse, inverse * -translation};
+}
+
+Eigen::Matrix<double, 3, 4> Rigid::Matrix() const {
+  Eigen::Matrix<double, 3, 4> matrix;
+  matrix << rotation.toRotationMatrix(), translation;
+  return matrix;
+}
+
+Similarity Similarity::operator*(const Similarity& other) const {
+  return {scale * other.scale, (rotation * other.rotation).normalized(), *this * other.translation};
+}
+
+Similarity Similarity::Inverse() const {
+  const Eigen::Quaterniond inverse = rotation.conjugate();
+  return {1.0 / scale, inverse, inverse * -translation / scale};
+}
+
+Eigen::Matrix4d Similarity::Matrix() const {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  matrix.topLeftCorner<3, 3>() = scale * rotation.toRotationMatrix();
+  matrix.topRightCorner<3, 1>() = translation;
+  return matrix;
+}
+
+Rigid CamFromScan(const Rigid& cam_from_sparse, const Similarity& scan_from_sparse) {
+  const Eigen::Quaterniond rotation =
+      (cam_from_sparse.rotation * scan_from_sparse.rotation.conjugate()).normalized();
+  return {rotation, scan_from_sparse.scale * cam_from_sparse.translation -
+                        rotation * scan_from_sparse.translation};
+}
+
+Similarity ScanFromSparse(const Rigid& cam_from_scan, const Rigid& cam_from_sparse, double scale) {
+  // x_scan = R'^T (scale * (R x_sparse + t) - t'), thesis 7.1.3 with s = 1 / scale.
+  const Eigen::Quaterniond scan_from_cam = cam_from_scan.rotation.conjugate();
+  return {scale, (scan_from_cam * cam_from_sparse.rotation).normalized(),
+          scan_from_cam * (scale * cam_from_sparse.translation - cam_from_scan.translation)};
+}
+
+Similarity FitSimilarity(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target) {
+  const Eigen::Matrix4d matrix = Eigen::umeyama(source, target, true);
+  Similarity similarity;
+  similarity.scale = std::cbrt(matrix.topLeftCorner<3, 3>().determinant());
+  similarity.rotation =
+      Eigen::Quaterniond(Eigen::Matrix3d(matrix.topLeftCorner<3, 3>() / similarity.scale))
+          .normalized();
+  similarity.translation = matrix.topRightCorner<3, 1>();
+  return similarity;
+}
+
+double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+  return a.angularDistance(b);
+}
+
+void WriteSimilarity(const std::string& path, const Similarity& target_from_source) {
+  OutputFile file(path);
+  const Eigen::Vector4d wxyz = WxyzFromQuaternion(target_from_source.rotation);
+  file.stream() << std::setprecision(17) << target_from_source.scale;
+  for (int i = 0; i < 4; ++i) file.stream() << ' ' << wxyz[i];
+  for (int i = 0; i < 3; ++i) file.stream() << ' ' << target_from_source.translation[i];
+  file.stream() << '\n';
+  file.Commit();
+}
+
+Similarity ReadSimilarity(const std::string& path) {
+  std::ifstream stream(path);
+  if (!stream) throw InputError(path, "", "cannot be opened", "Check the path");
+  double v[8];
+  for (double& value : v) {
+    if (!(stream >> value) || !std::isfinite(value)) {
+      throw InputError(path, "line 1", "does not hold the eight numbers of a similarity",
+                       "Expected one line: scale qw qx qy qz tx ty tz");
+    }
+  }
+  const Eigen::Quaterniond rotation = QuaternionFromWxyz({v[1], v[2], v[3], v[4]});
+  if (v[0] <= 0 || rotation.norm() < 1e-6) {
+    throw InputError(path, "line 1", "scale or quaternion is zero or negative",
+                     "Expected one line: scale qw qx qy qz tx ty tz");
+  }
+  return {v[0], rotation.normalized(), {v[5], v[6], v[7]}};
+}
+
+}  // namespace roomtex
