@@ -136,7 +136,7 @@ struct Command::Impl {
 
   std::vector<std::string> TakePassedThrough(std::vector<std::string> arguments) const;
   std::vector<std::string> AddProjectFile(std::vector<std::string> arguments) const;
-  void WriteReport(const Report& report, const Progress& progress) const;
+  Json MakeReport(const Report& report, const Progress& progress) const;
   int Parse(int argc, char** argv);
 };
 
@@ -322,7 +322,7 @@ int Command::Impl::Parse(int argc, char** argv) {
   return 0;
 }
 
-void Command::Impl::WriteReport(const Report& report, const Progress& progress) const {
+Json Command::Impl::MakeReport(const Report& report, const Progress& progress) const {
   Json json;
   json["command"] = name;
   json["version"] = Version();
@@ -345,7 +345,7 @@ void Command::Impl::WriteReport(const Report& report, const Progress& progress) 
   json["trusted"] = report.trusted();
   json["reason"] = report.reason();
   for (const auto& [key, value] : report.keys().items()) json[key] = value;
-  WriteJson(common.report_path, json);
+  return json;
 }
 
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
@@ -403,9 +403,13 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     std::cerr << impl_->name << ": " << failure << "\n";
     if (report.trusted()) report.SetUntrusted(failure);
   }
-  if (!common.report_path.empty()) {
+  const bool ran = exit_code == kExitDone || exit_code == kExitUntrusted;
+  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
+  if (!common.report_path.empty()) paths.push_back(common.report_path);
+  if (!paths.empty()) {
     try {
-      impl_->WriteReport(report, progress);
+      const Json json = impl_->MakeReport(report, progress);
+      for (const std::string& path : paths) WriteJson(path, json);
     } catch (const std::exception& error) {
       std::cerr << impl_->name << ": " << error.what() << "\n";
       if (exit_code == kExitDone) exit_code = kExitInput;

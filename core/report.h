@@ -24,15 +24,19 @@ class Report {
   // The answer is not to be trusted (exit 4); several reasons are joined.
   void SetUntrusted(const std::string& reason);
 
+  // Writes the same JSON to `path` as well, once the command has run to its end (exit 0 or 4).
+  void AddCopy(const std::string& path) { copies_.push_back(path); }
+
   bool trusted() const { return reason_.empty(); }
   const std::string& reason() const { return reason_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
   const Json& inputs() const { return inputs_; }
+  const std::vector<std::string>& copies() const { return copies_; }
 
  private:
   Json keys_ = Json::object();
   Json inputs_ = Json::object();
-  std::vector<std::string> warnings_;
+  std::vector<std::string> warnings_, copies_;
   std::string reason_;
 };
 
