@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,24 +24,35 @@ struct DatabaseImage {
 struct DatabasePair {
   uint32_t image_id1 = 0;
   uint32_t image_id2 = 0;
-  int config = 0;  // COLMAP's TwoViewGeometry::ConfigurationType
+  int config = 0;                        // COLMAP's TwoViewGeometry::ConfigurationType
   std::vector<Eigen::Vector2i> matches;  // keypoint rows in image 1 and image 2
 };
 
-// Opens read-only, also in a folder that may not be written and with a WAL file beside it; never changes
-// the user's file. Throws InputError: missing, not SQLite, not COLMAP's, truncated.
+// COLMAP's number of a pair of images, in either order, and back to {smaller id, larger id}.
+uint64_t PairIdFromImages(uint32_t image_id1, uint32_t image_id2);
+std::pair<uint32_t, uint32_t> ImagesFromPairId(uint64_t pair_id);
+
+// Opens read-only, also in a folder that may not be written and with a WAL file beside it (its rows
+// are seen); never changes the user's file or its WAL. Throws InputError: missing, not SQLite, not
+// COLMAP's, truncated; every reading function throws it for rows that contradict each other or
+// their own sizes.
 class Database {
  public:
   explicit Database(const std::string& path);
   ~Database();
 
   // Keyed by id, ordered. Cameras with Problems() make an InputError.
+  // Camera::has_prior_focal_length is the column prior_focal_length.
   std::map<uint32_t, Camera> ReadCameras() const;
+  // Every image has a camera in ReadCameras() and a name of its own.
   std::map<uint32_t, DatabaseImage> ReadImages() const;
+  // Number of keypoints of every image that has a row of them, without reading the keypoints.
+  std::map<uint32_t, size_t> CountKeypoints() const;
   // Positions in `img`, one per keypoint row; empty if the image has none. (2, 4 or 6 columns.)
   std::vector<Eigen::Vector2d> ReadKeypoints(uint32_t image_id) const;
-  // Pairs with at least min_matches verified matches, ordered by pair id. Match rows outside the keypoints
-  // are found by the caller with CheckPair().
+  // Pairs with at least min_matches verified matches, ordered by pair id. All matches lie within
+  // the keypoints of their images, or this is an InputError. Pairs of images that the database no
+  // longer holds are left out, as COLMAP does.
   std::vector<DatabasePair> ReadPairs(int min_matches) const;
 
   const std::string& path() const;

@@ -1,6 +1,6 @@
 #pragma once
-// COLMAP's sparse model: cameras, images, points3D. Read as .bin or .txt, from COLMAP 3.7 to 4.x; written
-// so that COLMAP's own programs read it.
+// COLMAP's sparse model: cameras, images, points3D. Read as .bin or .txt, from COLMAP 3.7 to 4.x;
+// written so that COLMAP's own programs read it.
 
 #include <cstdint>
 #include <map>
@@ -19,8 +19,9 @@ inline constexpr uint64_t kInvalidPoint3dId = UINT64_MAX;
 struct SparseImage {
   uint32_t image_id = 0;
   uint32_t camera_id = 0;
-  std::string name;      // relative to --image_path
-  Rigid cam_from_model;  // model = the `sparse` frame, or the `scan` frame once the model is aligned
+  std::string name;  // relative to --image_path
+  // model = the `sparse` frame, or the `scan` frame once the model is aligned.
+  Rigid cam_from_model;
   std::vector<Eigen::Vector2d> points2d;  // `img`; all keypoints of the database, in row order
   std::vector<uint64_t> point3d_ids;      // one per point2d; kInvalidPoint3dId = none
 };
@@ -47,24 +48,27 @@ struct SparseModel {
   const SparseImage* FindImage(const std::string& name) const;
 };
 
-// Reads the model in a folder: cameras/images/points3D as .bin (preferred) or .txt; rigs and frames files of
-// 4.x are tolerated. Throws InputError: no model there, truncated or impossible counts (checked against
-// the bytes left before anything is allocated), unknown camera model, image without camera, NaN pose,
-// track element out of range ...
+// Reads the model in a folder: cameras/images/points3D as .bin (preferred) or .txt; rigs and frames
+// files of 4.x are tolerated. Throws InputError: no model there, truncated or impossible counts
+// (checked against the bytes left before anything is allocated), unknown camera model, image
+// without camera, NaN pose, track elements and keypoints that do not answer each other, ids or
+// names given twice ...
 SparseModel ReadSparseModel(const std::string& folder);
 
 // Writes cameras.bin, images.bin, points3D.bin (each aside and renamed); makes the folder.
-// rigs.bin and frames.bin of an older 4.x model in the same folder would contradict: refuses with an
-// InputError when `folder` holds them.
+// rigs.bin and frames.bin of an older 4.x model in the same folder would contradict: refuses with
+// an InputError when `folder` holds them.
 void WriteSparseModel(const SparseModel& model, const std::string& folder);
-// The same as cameras.txt, images.txt, points3D.txt, single spaces only (COLMAP 3.8 crashes on padding).
+// The same as cameras.txt, images.txt, points3D.txt, single spaces only (COLMAP 3.8 crashes on
+// padding).
 void WriteSparseModelText(const SparseModel& model, const std::string& folder);
 
 // The model in another frame: points, and poses by CamFromScan (core/similarity.h).
 void TransformModel(const Similarity& target_from_model, SparseModel* model);
 
 // Sets SparsePoint::error of every point and gives the mean and the root mean square over all
-// observations, pixels. Observations behind a camera count as half the image diagonal.
+// observations, pixels. Observations behind a camera, or outside the valid field of its distortion,
+// count as half the image diagonal. Points that nobody sees keep -1.
 struct ReprojectionErrors {
   double mean_px = 0;
   double rms_px = 0;

@@ -1,0 +1,423 @@
+#include "colmap_ext/database.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <tuple>
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kBusyMilliseconds = 5000;
+constexpr uint64_t kMaxNumImages = 2147483647;  // COLMAP's Database::kMaxNumImages
+constexpr char kRemedy[] =
+    "Give the database.db that COLMAP wrote, or make it again with colmap feature_extractor";
+
+// What the first 100 bytes of an SQLite file say (sqlite.org/fileformat.html, section 1.3).
+struct SqliteHeader {
+  bool uses_wal = false;
+  uint64_t num_bytes = 0;  // 0 = not known
+};
+
+SqliteHeader ReadHeader(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  unsigned char header[100] = {};
+  stream.read(reinterpret_cast<char*>(header), sizeof(header));
+  if (stream.gcount() == 0) throw InputError(path, "", "is empty, expected a database", kRemedy);
+  if (stream.gcount() < static_cast<std::streamsize>(sizeof(header)) ||
+      std::memcmp(header, "SQLite format 3", 16) != 0) {
+    throw InputError(path, "byte 0", "is not an SQLite database", kRemedy);
+  }
+  const auto big_endian = [&header](int first, int count) {
+    uint64_t value = 0;
+    for (int i = 0; i < count; ++i) value = value << 8 | header[first + i];
+    return value;
+  };
+  SqliteHeader result;
+  result.uses_wal = header[18] == 2 || header[19] == 2;
+  const uint64_t page_size = big_endian(16, 2) == 1 ? 65536 : big_endian(16, 2);
+  const bool size_is_valid = big_endian(24, 4) == big_endian(92, 4);
+  if (size_is_valid) result.num_bytes = page_size * big_endian(28, 4);
+  return result;
+}
+
+// file: address with the characters that mean something in it escaped.
+std::string SqliteUri(const std::string& path, const std::string& query) {
+  std::string uri = "file:";
+  for (const char c : fs::absolute(path).string()) {
+    if (c == '%' || c == '?' || c == '#') {
+      const char* digits = "0123456789ABCDEF";
+      uri += std::string("%") + digits[c >> 4] + digits[c & 15];
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?" + query;
+}
+
+// A copy of the database and its WAL in a folder of its own, removed at the end.
+class TemporaryCopy {
+ public:
+  explicit TemporaryCopy(const std::string& path) {
+    std::string pattern = (fs::temp_directory_path() / "roomtex-database-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) {
+      throw InputError(path, "", "has a WAL file beside it that needs a copy, but none can be made",
+                       "Set TMPDIR to a folder that may be written");
+    }
+    folder_ = pattern;
+    std::error_code error;
+    fs::copy_file(path, database(), error);
+    if (!error) fs::copy_file(path + "-wal", database() + "-wal", error);
+    if (!error) return;
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+    throw InputError(path, "", "cannot be copied with its WAL file (" + error.message() + ")",
+                     "Set TMPDIR to a folder with space for the database");
+  }
+  ~TemporaryCopy() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  TemporaryCopy(const TemporaryCopy&) = delete;
+  TemporaryCopy& operator=(const TemporaryCopy&) = delete;
+
+  std::string database() const { return (fs::path(folder_) / "database.db").string(); }
+
+ private:
+  std::string folder_;
+};
+
+// What SQLite's result code means to the user.
+InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& error) {
+  const std::string said = std::string(" (SQLite: ") + error.what() + ")";
+  switch (error.getErrorCode()) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return InputError(path, "", "is being written by another program",
+                        "Wait until COLMAP has finished");
+    case SQLITE_NOTADB:
+      return InputError(path, "", "is not an SQLite database", kRemedy);
+    case SQLITE_CORRUPT:
+      return InputError(path, "", "is damaged or cut off" + said, kRemedy);
+    case SQLITE_READONLY:
+      return InputError(path, "", "was left half written by a program that was stopped" + said,
+                        "Open it once with colmap or sqlite3, which restores it");
+    case SQLITE_CANTOPEN:
+    case SQLITE_PERM:
+    case SQLITE_IOERR:
+      return InputError(path, "", "cannot be read" + said, "Check the rights of file and folder");
+    case SQLITE_NOMEM:
+      throw std::bad_alloc();
+    default:
+      return InputError(path, "", "cannot be read as COLMAP's database" + said, kRemedy);
+  }
+}
+
+// Values of the current row of a statement; an InputError that names the row where they are not
+// what COLMAP writes.
+class Row {
+ public:
+  Row(const std::string& path, const char* table, SQLite::Statement& statement)
+      : path_(path), table_(table), statement_(statement) {}
+
+  // Named after its first column, the key.
+  std::string Position() const {
+    return std::string("table ") + table_ + ", " + statement_.getColumnName(0) + " " +
+           statement_.getColumn(0).getString();
+  }
+  [[noreturn]] void Fail(const std::string& finding) const {
+    throw InputError(path_, Position(), finding, kRemedy);
+  }
+
+  int64_t Integer(int column, int64_t least, int64_t largest) const {
+    const SQLite::Column value = statement_.getColumn(column);
+    if (!value.isInteger() || value.getInt64() < least || value.getInt64() > largest) {
+      Fail(std::string(statement_.getColumnName(column)) + " is " +
+           (value.isBlob() ? "a blob" : "\"" + value.getString().substr(0, 40) + "\"") +
+           ", expected a whole number from " + std::to_string(least) + " to " +
+           std::to_string(largest));
+    }
+    return value.getInt64();
+  }
+  uint32_t Id(int column) const {
+    return static_cast<uint32_t>(Integer(column, 0, static_cast<int64_t>(kMaxNumImages)));
+  }
+  std::string Text(int column) const {
+    const SQLite::Column value = statement_.getColumn(column);
+    if (!value.isText() || value.getBytes() == 0) {
+      Fail(std::string(statement_.getColumnName(column)) + " is not a text");
+    }
+    return value.getString();
+  }
+
+  // A blob of rows x columns numbers of type T, in row order; NULL counts as no bytes.
+  template <typename T>
+  std::vector<T> Blob(int column, int64_t num_rows, int64_t num_columns) const {
+    const SQLite::Column value = statement_.getColumn(column);
+    const size_t num_bytes = value.isNull() ? 0 : static_cast<size_t>(value.getBytes());
+    const size_t expected = static_cast<size_t>(num_rows) * static_cast<size_t>(num_columns);
+    if ((!value.isNull() && !value.isBlob()) || num_bytes != expected * sizeof(T)) {
+      Fail(std::string(statement_.getColumnName(column)) + " holds " + std::to_string(num_bytes) +
+           " bytes, expected " + std::to_string(expected * sizeof(T)) + " for " +
+           std::to_string(num_rows) + " x " + std::to_string(num_columns) + " values");
+    }
+    std::vector<T> values(expected);
+    if (expected > 0) std::memcpy(values.data(), value.getBlob(), num_bytes);
+    return values;
+  }
+
+ private:
+  const std::string& path_;
+  const char* table_;
+  SQLite::Statement& statement_;
+};
+
+}  // namespace
+
+uint64_t PairIdFromImages(uint32_t image_id1, uint32_t image_id2) {
+  return kMaxNumImages * std::min(image_id1, image_id2) + std::max(image_id1, image_id2);
+}
+
+std::pair<uint32_t, uint32_t> ImagesFromPairId(uint64_t pair_id) {
+  return {static_cast<uint32_t>(pair_id / kMaxNumImages),
+          static_cast<uint32_t>(pair_id % kMaxNumImages)};
+}
+
+struct Database::Impl {
+  std::string path;
+  std::unique_ptr<TemporaryCopy> copy;
+  std::unique_ptr<SQLite::Database> sqlite;
+
+  // Runs `read` with SQLite's errors told as InputErrors.
+  template <typename Read>
+  auto Guarded(const Read& read) const {
+    try {
+      return read();
+    } catch (const SQLite::Exception& error) {
+      throw ErrorFromSqlite(path, error);
+    }
+  }
+
+  // Calls use(row) for every row of `query`; `table` is for messages.
+  template <typename Use>
+  void ForEachRow(const char* table, const std::string& query, const Use& use,
+                  int64_t parameter = -1) const {
+    Guarded([&] {
+      SQLite::Statement statement(*sqlite, query);
+      if (statement.getBindParameterCount() > 0) statement.bind(1, parameter);
+      const Row row(path, table, statement);
+      while (statement.executeStep()) use(row);
+    });
+  }
+
+  void Open();
+  void RequireColumns(const char* table, const std::vector<std::string>& columns) const;
+};
+
+// A database in WAL mode whose WAL is empty is whole in itself: `immutable` reads it without
+// leaving -shm and -wal files beside it, and in a folder that may not be written. With rows in the
+// WAL, SQLite needs the -shm file; where that is missing it would make one, so a copy is read
+// instead.
+void Database::Impl::Open() {
+  RequireFile(path, "Check --database_path: it is COLMAP's database.db");
+  const SqliteHeader header = ReadHeader(path);
+  std::error_code error;
+  const uintmax_t wal_bytes = fs::file_size(path + "-wal", error);
+  const bool has_wal = header.uses_wal && !error && wal_bytes > 0;
+  const uint64_t num_bytes = fs::file_size(path);
+  if (!has_wal && num_bytes < header.num_bytes) {
+    throw InputError(
+        path, BytePosition(static_cast<long long>(num_bytes)),
+        "is cut off: its header promises " + std::to_string(header.num_bytes) + " bytes", kRemedy);
+  }
+  if (has_wal && !fs::exists(path + "-shm", error)) copy = std::make_unique<TemporaryCopy>(path);
+  const bool immutable = header.uses_wal && !has_wal;
+  const auto open = [&](const std::string& file, const char* query) {
+    sqlite = std::make_unique<SQLite::Database>(
+        SqliteUri(file, query), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyMilliseconds);
+    sqlite->exec("PRAGMA trusted_schema = OFF");
+    sqlite->exec("PRAGMA cell_size_check = ON");
+    sqlite->execAndGet("SELECT COUNT(*) FROM sqlite_master");
+  };
+  Guarded([&] {
+    try {
+      open(copy ? copy->database() : path, immutable ? "mode=ro&immutable=1" : "mode=ro");
+    } catch (const SQLite::Exception& failure) {
+      if (failure.getErrorCode() != SQLITE_CANTOPEN || !has_wal || copy) throw;
+      copy = std::make_unique<TemporaryCopy>(path);
+      open(copy->database(), "mode=ro");
+    }
+  });
+}
+
+void Database::Impl::RequireColumns(const char* table,
+                                    const std::vector<std::string>& columns) const {
+  const std::string quoted = std::string("'") + table + "'";
+  std::set<std::string> present;
+  Guarded([&] {
+    SQLite::Statement tables(
+        *sqlite, "SELECT name FROM sqlite_master WHERE type = 'table' AND name = " + quoted);
+    if (!tables.executeStep()) {
+      throw InputError(
+          path, "",
+          std::string("is an SQLite database, but not COLMAP's: it has no table ") + table,
+          kRemedy);
+    }
+    SQLite::Statement statement(*sqlite, "SELECT name FROM pragma_table_info(" + quoted + ")");
+    while (statement.executeStep()) present.insert(statement.getColumn(0).getString());
+  });
+  for (const std::string& column : columns) {
+    if (present.count(column) > 0) continue;
+    throw InputError(path, std::string("table ") + table,
+                     "is not COLMAP's: it has no column " + column, kRemedy);
+  }
+}
+
+Database::Database(const std::string& path) : impl_(std::make_unique<Impl>()) {
+  impl_->path = path;
+  impl_->Open();
+  impl_->RequireColumns("cameras",
+                        {"camera_id", "model", "width", "height", "params", "prior_focal_length"});
+  impl_->RequireColumns("images", {"image_id", "name", "camera_id"});
+  impl_->RequireColumns("keypoints", {"image_id", "rows", "cols", "data"});
+  impl_->RequireColumns("two_view_geometries", {"pair_id", "rows", "cols", "data", "config"});
+}
+
+Database::~Database() = default;
+
+const std::string& Database::path() const { return impl_->path; }
+
+std::map<uint32_t, Camera> Database::ReadCameras() const {
+  std::map<uint32_t, Camera> cameras;
+  impl_->ForEachRow(
+      "cameras",
+      "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras "
+      "ORDER BY camera_id",
+      [&](const Row& row) {
+        Camera camera;
+        camera.camera_id = row.Id(0);
+        camera.model = static_cast<CameraModel>(row.Integer(1, 0, kNumCameraModels - 1));
+        camera.width = static_cast<int>(row.Integer(2, 1, INT32_MAX));
+        camera.height = static_cast<int>(row.Integer(3, 1, INT32_MAX));
+        camera.params = row.Blob<double>(4, NumCameraParams(static_cast<int>(camera.model)), 1);
+        camera.has_prior_focal_length = row.Integer(5, INT32_MIN, INT32_MAX) != 0;
+        const std::vector<std::string> problems = camera.Problems();
+        if (!problems.empty()) row.Fail(problems[0]);
+        cameras.emplace_hint(cameras.end(), camera.camera_id, std::move(camera));
+      });
+  return cameras;
+}
+
+std::map<uint32_t, DatabaseImage> Database::ReadImages() const {
+  std::set<uint32_t> camera_ids;
+  impl_->ForEachRow("cameras", "SELECT camera_id FROM cameras",
+                    [&](const Row& row) { camera_ids.insert(row.Id(0)); });
+  std::map<uint32_t, DatabaseImage> images;
+  std::set<std::string> names;
+  impl_->ForEachRow("images", "SELECT image_id, camera_id, name FROM images ORDER BY image_id",
+                    [&](const Row& row) {
+                      DatabaseImage image{row.Id(0), row.Id(1), row.Text(2)};
+                      if (camera_ids.count(image.camera_id) == 0) {
+                        row.Fail("names camera " + std::to_string(image.camera_id) +
+                                 ", which the table cameras does not hold");
+                      }
+                      if (!names.insert(image.name).second)
+                        row.Fail("has the name of another image");
+                      images.emplace_hint(images.end(), image.image_id, std::move(image));
+                    });
+  return images;
+}
+
+std::map<uint32_t, size_t> Database::CountKeypoints() const {
+  std::map<uint32_t, size_t> counts;
+  impl_->ForEachRow("keypoints", "SELECT image_id, rows FROM keypoints ORDER BY image_id",
+                    [&](const Row& row) {
+                      counts[row.Id(0)] = static_cast<size_t>(row.Integer(1, 0, INT32_MAX));
+                    });
+  return counts;
+}
+
+std::vector<Eigen::Vector2d> Database::ReadKeypoints(uint32_t image_id) const {
+  std::vector<Eigen::Vector2d> keypoints;
+  impl_->ForEachRow(
+      "keypoints", "SELECT image_id, rows, cols, data FROM keypoints WHERE image_id = ?",
+      [&](const Row& row) {
+        const int64_t num_rows = row.Integer(1, 0, INT32_MAX);
+        const int64_t num_columns = row.Integer(2, 0, INT32_MAX);
+        if (num_rows > 0 && num_columns != 2 && num_columns != 4 && num_columns != 6) {
+          row.Fail("keypoints have " + std::to_string(num_columns) +
+                   " columns, expected 2, 4 or 6");
+        }
+        // COLMAP: x, y in pixels; then scale and orientation, or an affine shape.
+        const std::vector<float> values = row.Blob<float>(3, num_rows, num_columns);
+        keypoints.reserve(static_cast<size_t>(num_rows));
+        for (int64_t i = 0; i < num_rows; ++i) {
+          const Eigen::Vector2d x_in_img(values[i * num_columns], values[i * num_columns + 1]);
+          if (!x_in_img.allFinite()) {
+            row.Fail("keypoint " + std::to_string(i) + " is not a finite position");
+          }
+          keypoints.push_back(x_in_img);
+        }
+      },
+      image_id);
+  return keypoints;
+}
+
+std::vector<DatabasePair> Database::ReadPairs(int min_matches) const {
+  const std::map<uint32_t, DatabaseImage> images = ReadImages();
+  const std::map<uint32_t, size_t> num_keypoints = CountKeypoints();
+  const auto count_of = [&](uint32_t image_id) {
+    const auto found = num_keypoints.find(image_id);
+    return found == num_keypoints.end() ? size_t{0} : found->second;
+  };
+  std::vector<DatabasePair> pairs;
+  impl_->ForEachRow(
+      "two_view_geometries",
+      "SELECT pair_id, rows, cols, data, config FROM two_view_geometries WHERE rows >= ? "
+      "ORDER BY pair_id",
+      [&](const Row& row) {
+        const auto pair_id = static_cast<uint64_t>(row.Integer(0, 0, INT64_MAX));
+        DatabasePair pair;
+        std::tie(pair.image_id1, pair.image_id2) = ImagesFromPairId(pair_id);
+        if (pair_id / kMaxNumImages >= kMaxNumImages || pair.image_id1 >= pair.image_id2) {
+          row.Fail("is not the id of a pair of two images");
+        }
+        if (images.count(pair.image_id1) == 0 || images.count(pair.image_id2) == 0) return;
+        const int64_t num_rows = row.Integer(1, 0, INT32_MAX);
+        const int64_t num_columns = row.Integer(2, 0, INT32_MAX);
+        if (num_rows > 0 && num_columns != 2) {
+          row.Fail("matches have " + std::to_string(num_columns) + " columns, expected 2");
+        }
+        const std::vector<uint32_t> values = row.Blob<uint32_t>(3, num_rows, num_columns);
+        pair.config = static_cast<int>(row.Integer(4, INT32_MIN, INT32_MAX));
+        const size_t limit1 = count_of(pair.image_id1), limit2 = count_of(pair.image_id2);
+        pair.matches.reserve(static_cast<size_t>(num_rows));
+        for (size_t i = 0; i + 1 < values.size(); i += 2) {
+          if (values[i] >= limit1 || values[i + 1] >= limit2) {
+            row.Fail("match " + std::to_string(i / 2) + " joins keypoints " +
+                     std::to_string(values[i]) + " and " + std::to_string(values[i + 1]) +
+                     " of images " + std::to_string(pair.image_id1) + " and " +
+                     std::to_string(pair.image_id2) + ", which have " + std::to_string(limit1) +
+                     " and " + std::to_string(limit2));
+          }
+          pair.matches.emplace_back(static_cast<int>(values[i]), static_cast<int>(values[i + 1]));
+        }
+        pairs.push_back(std::move(pair));
+      },
+      min_matches);
+  return pairs;
+}
+
+}  // namespace roomtex
