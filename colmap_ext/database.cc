@@ -20,7 +20,7 @@ namespace roomtex {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kBusyMilliseconds = 5000;
+constexpr int kBusyMilliseconds = 3000;
 constexpr uint64_t kMaxNumImages = 2147483647;  // COLMAP's Database::kMaxNumImages
 constexpr char kRemedy[] =
     "Give the database.db that COLMAP wrote, or make it again with colmap feature_extractor";

@@ -1,14 +1,39 @@
 #include "core/similarity.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iomanip>
+#include <vector>
 
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
 
 namespace roomtex {
+namespace {
+
+using RowMajor4d = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+
+// InputError unless the matrix is [s R | t], the last row 0 0 0 1.
+Similarity SimilarityFromMatrix(const std::string& path, const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix3d scaled_rotation = matrix.topLeftCorner<3, 3>();
+  Similarity similarity;
+  similarity.scale = std::cbrt(scaled_rotation.determinant());
+  const Eigen::Matrix3d rotation = scaled_rotation / similarity.scale;
+  const double distortion =
+      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(similarity.scale > 0) || !(distortion < 1e-6) ||
+      matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    throw InputError(path, "", "holds a 4 x 4 matrix that is not a similarity",
+                     "Expected scale times rotation, translation, and the last row 0 0 0 1");
+  }
+  similarity.rotation = Eigen::Quaterniond(rotation).normalized();
+  similarity.translation = matrix.topRightCorner<3, 1>();
+  return similarity;
+}
+
+}  // namespace
 
 Rigid Rigid::operator*(const Rigid& other) const {
   return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
@@ -80,20 +105,38 @@ void WriteSimilarity(const std::string& path, const Similarity& target_from_sour
   file.Commit();
 }
 
-Similarity ReadSimilarity(const std::string& path) {
-  std::ifstream stream(path);
-  if (!stream) throw InputError(path, "", "cannot be opened", "Check the path");
-  double v[8];
-  for (double& value : v) {
-    if (!(stream >> value) || !std::isfinite(value)) {
-      throw InputError(path, "line 1", "does not hold the eight numbers of a similarity",
-                       "Expected one line: scale qw qx qy qz tx ty tz");
+void WriteSimilarityMatrix(const std::string& path, const Similarity& target_from_source) {
+  OutputFile file(path);
+  const Eigen::Matrix4d matrix = target_from_source.Matrix();
+  file.stream() << std::setprecision(17);
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      file.stream() << matrix(row, column) << (column < 3 ? ' ' : '\n');
     }
   }
+  file.Commit();
+}
+
+Similarity ReadSimilarity(const std::string& path) {
+  constexpr char kExpected[] = "Expected one line: scale qw qx qy qz tx ty tz";
+  RequireFile(path, kExpected);
+  std::ifstream stream(path);
+  std::vector<double> v;
+  for (std::string word; v.size() <= 16 && stream >> word;) {
+    char* end = nullptr;
+    v.push_back(std::strtod(word.c_str(), &end));
+    if (*end != 0 || !std::isfinite(v.back())) {
+      throw InputError(path, "value " + std::to_string(v.size()),
+                       "\"" + word.substr(0, 40) + "\" is not a finite number", kExpected);
+    }
+  }
+  if (v.size() == 16) return SimilarityFromMatrix(path, Eigen::Map<const RowMajor4d>(v.data()));
+  if (v.size() != 8) {
+    throw InputError(path, "", "does not hold the eight numbers of a similarity", kExpected);
+  }
   const Eigen::Quaterniond rotation = QuaternionFromWxyz({v[1], v[2], v[3], v[4]});
-  if (v[0] <= 0 || rotation.norm() < 1e-6) {
-    throw InputError(path, "line 1", "scale or quaternion is zero or negative",
-                     "Expected one line: scale qw qx qy qz tx ty tz");
+  if (!(v[0] > 0) || !(rotation.norm() > 1e-6)) {
+    throw InputError(path, "line 1", "scale or quaternion is zero or negative", kExpected);
   }
   return {v[0], rotation.normalized(), {v[5], v[6], v[7]}};
 }

@@ -8,7 +8,8 @@
 
 namespace roomtex {
 
-// x_in_target = rotation * x_in_source + translation. COLMAP's image pose is a Rigid cam_from_sparse.
+// x_in_target = rotation * x_in_source + translation. COLMAP's image pose is a Rigid
+// cam_from_sparse.
 struct Rigid {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // unit length
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -21,7 +22,8 @@ struct Rigid {
   Rigid Inverse() const;
   // 3 x 4 matrix [R|t].
   Eigen::Matrix<double, 3, 4> Matrix() const;
-  // The origin of the target frame, in the source frame; of a pose cam_from_scan: the camera's centre.
+  // The origin of the target frame, in the source frame; of a pose cam_from_scan: the camera's
+  // centre.
   Eigen::Vector3d TargetOriginInSource() const { return rotation.conjugate() * -translation; }
 };
 
@@ -39,24 +41,28 @@ struct Similarity {
   Eigen::Matrix4d Matrix() const;
 };
 
-// Pose of a camera after its sparse model was moved by scan_from_sparse (thesis 7.1.3): the camera sees
-// the same directions, its frame is measured in metres.
+// Pose of a camera after its sparse model was moved by scan_from_sparse (thesis 7.1.3): the camera
+// sees the same directions, its frame is measured in metres.
 Rigid CamFromScan(const Rigid& cam_from_sparse, const Similarity& scan_from_sparse);
 
 // The similarity that takes the camera pose cam_from_sparse to cam_from_scan, for a given scale
 // (scan metres per sparse unit).
 Similarity ScanFromSparse(const Rigid& cam_from_scan, const Rigid& cam_from_sparse, double scale);
 
-// Least-squares similarity with target_i ~ S * source_i (Umeyama 1991). Columns are points; at least
-// three, not collinear.
+// Least-squares similarity with target_i ~ S * source_i (Umeyama 1991). Columns are points; at
+// least three, not collinear.
 Similarity FitSimilarity(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target);
 
 // Angle of the rotation between two, radians in [0, pi].
 double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-// One line "scale qw qx qy qz tx ty tz": what `colmap model_transformer --transform_path` reads.
+// One line "scale qw qx qy qz tx ty tz": what `colmap model_transformer --transform_path` reads
+// from COLMAP 3.9 on.
 void WriteSimilarity(const std::string& path, const Similarity& target_from_source);
-// Throws InputError.
+// Four lines, the 4 x 4 matrix: what COLMAP up to 3.8 reads there. (Given the other file it does
+// not complain, but moves the model to a wrong place.)
+void WriteSimilarityMatrix(const std::string& path, const Similarity& target_from_source);
+// Either of the two. Throws InputError.
 Similarity ReadSimilarity(const std::string& path);
 
 }  // namespace roomtex
