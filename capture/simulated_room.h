@@ -1,9 +1,9 @@
 #pragma once
-// A furnished room with known truth: photos, range scans, poses and colours, for trying the commands
-// (roomtex-simulate) and for the tests. Everything follows from the options and the seed.
+// A furnished room with known truth: photos, range scans, poses and colours, for trying the
+// commands (roomtex-simulate) and for the tests. Everything follows from the options and the seed.
 //
-// Frames: `room` (metres, z up, origin in a corner of the floor, x along the width, y along the depth) and,
-// per station, `scan` (RTPI: y up, origin in the scanner).
+// Frames: `room` (metres, z up, origin in a corner of the floor, x along the width, y along the
+// depth) and, per station, `scan` (RTPI: y up, origin in the scanner).
 
 #include <memory>
 #include <string>
@@ -23,7 +23,7 @@ struct SimulatedRoomOptions {
   int random_seed = 0;
   // Room and what stands in it.
   double width = 5.0, depth = 4.0, height = 2.7;  // metres
-  bool furnished = true;    // table, shelf, chairs, pictures ...
+  bool furnished = true;                          // table, shelf, chairs, pictures ...
   bool bare_walls = false;  // plain walls, floor and ceiling: nothing for features to hold on to
   bool shading = false;     // Lambertian shading under ceiling lamps instead of plain albedo
   // Photos.
@@ -41,9 +41,14 @@ struct SimulatedRoomOptions {
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
   double range_noise = 0.002;                 // metres, standard deviation
   bool missing_samples = true;                // window and mirror give no echo; a few random ones
+  double range_noise_growth =
+      0;            // the noise is range_noise * (1 + growth * range), growth per metre
+  double bend = 0;  // ranges are too long or short by up to this fraction, smoothly changing
+  double azimuth_drift_deg = 0;  // error of the azimuth that grows from 0 over the full turn
   // Picks.
   int num_picks = 6;
   double click_noise_px = 1.5;  // standard deviation per coordinate
+  int num_threads = -1;         // -1 = all; changes nothing in the results
 
   std::vector<std::string> Problems() const;
 };
@@ -63,30 +68,31 @@ class SimulatedRoom {
   const Camera& camera() const;  // one for all photos, camera_id 1
 
   int NumPhotos() const;
-  std::string PhotoName(int photo) const;       // "photo_000.jpg"
-  Rigid CamFromRoom(int photo) const;           // truth
-  Rigid CamFromScan(int photo) const;           // truth, frame of station 0 = THE scan frame
-  double ExposureEv(int photo) const;           // truth, 0 = nominal
-  double ExposureTime(int photo) const;         // seconds, as in EXIF
+  std::string PhotoName(int photo) const;  // "photo_000.jpg"
+  Rigid CamFromRoom(int photo) const;      // truth
+  Rigid CamFromScan(int photo) const;      // truth, frame of station 0 = THE scan frame
+  double ExposureEv(int photo) const;      // truth, 0 = nominal
+  double ExposureTime(int photo) const;    // seconds, as in EXIF
   // 8-bit BGR, sRGB-encoded, with distortion, exposure, blur and noise.
   cv::Mat RenderPhoto(int photo) const;
 
-  // station >= 0. The scan in the frame of station 0 (scan_from_station says where station k stood).
-  // Intensity is an infrared reflectance, not the photos' brightness; integers 0..4095.
+  // station >= 0. The scan in the frame of station 0 (scan_from_station says where station k
+  // stood). Intensity is an infrared reflectance, not the photos' brightness; integers 0..4095.
   Scan MakeScan(int station = 0) const;
   Rigid ScanFromRoom() const;
-  // Surface colour, linear light 0..1, RGB, with the exposure of EV 0 (and shading if on), of every sample
-  // of MakeScan(station) in grid order, at the noise-free surface point; zero for missing samples.
+  // Surface colour, linear light 0..1, RGB, with the exposure of EV 0 (and shading if on), of every
+  // sample of MakeScan(station) in grid order, at the noise-free surface point; zero for missing
+  // samples.
   std::vector<Eigen::Vector3f> TrueColors(int station = 0) const;
 
-  // True sparse model in the frame scan * S^-1 for a made-up similarity S = ScanFromSparse(): points on
-  // surfaces with tracks over the photos that really see them, keypoint noise of noise_px. For tests that
-  // do not want to run COLMAP.
+  // True sparse model in the frame scan * S^-1 for a made-up similarity S = ScanFromSparse():
+  // points on surfaces with tracks over the photos that really see them, keypoint noise of
+  // noise_px. For tests that do not want to run COLMAP.
   SparseModel MakeSparseModel(int num_points, double noise_px) const;
   Similarity ScanFromSparse() const;
 
-  // Picks of one photo (scan samples that the photo sees, well spread, at corners of things), with the
-  // click noise of the options.
+  // Picks of one photo (scan samples that the photo sees, well spread, at corners of things), with
+  // the click noise of the options.
   std::vector<SimulatedPick> MakePicks(int photo, int count) const;
   // The photo that sees the most of the scan, spread in depth: where a user would click.
   int BestPhotoForPicks() const;
@@ -96,8 +102,8 @@ class SimulatedRoom {
   std::unique_ptr<Impl> impl_;
 };
 
-// Everything in a folder: photos/, scan.rtpi (scan_1.rtpi ...), picks.csv, cameras.txt, truth/ (poses as a
-// COLMAP text model, scan_from_room, per-photo exposure, true_colors.ply) and README.txt. Deterministic.
-// (Options of the command: roomtex_simulate.cc.)
+// Everything in a folder: photos/, scan.rtpi (scan_1.rtpi ...), picks.csv, cameras.txt, truth/
+// (poses as a COLMAP text model, scan_from_room, per-photo exposure, true_colors.ply) and
+// README.txt. Deterministic. (Options of the command: roomtex_simulate.cc.)
 
 }  // namespace roomtex

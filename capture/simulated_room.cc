@@ -1,0 +1,219 @@
+#include "capture/simulated_room.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+
+#include "capture/photo_renderer.h"
+#include "capture/random_stream.h"
+#include "capture/room_cameras.h"
+#include "capture/room_furniture.h"
+#include "capture/room_scene.h"
+#include "capture/simulated_observations.h"
+#include "capture/simulated_scan.h"
+#include "core/error.h"
+#include "core/parallel.h"
+
+namespace roomtex {
+
+namespace {
+constexpr double kNominalExposureTime = 1.0 / 30;  // seconds at EV 0
+}
+
+std::vector<std::string> SimulatedRoomOptions::Problems() const {
+  std::vector<std::string> problems;
+  const auto require = [&](bool holds, const std::string& problem) {
+    if (!holds) problems.push_back(problem);
+  };
+  const auto within = [](double value, double low, double high) {
+    return value >= low && value <= high;
+  };
+  require(within(width, 4.6, 20), "width must be 4.6 to 20 m: the furniture has to fit in");
+  require(within(depth, 3.8, 20), "depth must be 3.8 to 20 m: the furniture has to fit in");
+  require(within(height, 2.5, 6), "height must be 2.5 to 6 m");
+  require(num_photos >= 1 && num_photos <= 1000, "num_photos must be 1 to 1000");
+  require(photo_width >= 64 && photo_width <= 20000, "photo_width must be 64 to 20000 pixels");
+  require(photo_height >= 64 && photo_height <= 20000, "photo_height must be 64 to 20000 pixels");
+  require(within(field_of_view_deg, 20, 100), "field_of_view_deg must be 20 to 100");
+  require(
+      CameraModelFromName(camera_model).has_value(),
+      "camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
+  require(within(exposure_range_ev, 0, 4), "exposure_range_ev must be 0 to 4");
+  require(within(photo_noise, 0, 64), "photo_noise must be 0 to 64 grey levels");
+  require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
+  require(num_stations >= 1 && num_stations <= 8, "num_stations must be 1 to 8");
+  require(scan_columns >= 16 && scan_columns <= 20000, "scan_columns must be 16 to 20000");
+  require(scan_rows >= 16 && scan_rows <= 20000, "scan_rows must be 16 to 20000");
+  require(within(range_noise, 0, 0.5), "range_noise must be 0 to 0.5 m");
+  require(within(range_noise_growth, 0, 10), "range_noise_growth must be 0 to 10 per metre");
+  require(within(bend, -0.2, 0.2), "bend must be -0.2 to 0.2");
+  require(within(azimuth_drift_deg, -10, 10), "azimuth_drift_deg must be -10 to 10");
+  require(num_picks >= 0 && num_picks <= 1000, "num_picks must be 0 to 1000");
+  require(within(click_noise_px, 0, 100), "click_noise_px must be 0 to 100");
+  return problems;
+}
+
+struct SimulatedRoom::Impl {
+  explicit Impl(const SimulatedRoomOptions& given)
+      : options(given), camera(MakeRoomCamera(given)), projection(camera) {
+    FurnishRoom(options, &scene);
+    scene.Finish(options.shading, options.num_threads);
+    cam_from_room = PlaceCameras(options, scene);
+    room_from_station = PlaceStations(options, scene);
+    exposures = ChooseExposures(options, scene, camera, cam_from_room);
+  }
+
+  RoomScanner Scanner(int station) const {
+    return RoomScanner(options, scene, station, room_from_station.at(station));
+  }
+  RoomPhotos Photos() const { return {options, scene, projection, cam_from_room}; }
+  std::vector<PickCandidate> Candidates(int photo) const {
+    return FindPickCandidates(Photos(), Scanner(0), room_from_station[0], photo);
+  }
+  double PhotoDiagonal() const { return std::hypot(camera.width, camera.height); }
+  const PhotoRenderer& Renderer() const {
+    std::call_once(renderer_made,
+                   [this] { renderer = std::make_unique<PhotoRenderer>(scene, projection); });
+    return *renderer;
+  }
+
+  const SimulatedRoomOptions options;
+  const Camera camera;
+  const CameraProjection projection;
+  RoomScene scene;
+  std::vector<Rigid> cam_from_room, room_from_station;
+  std::vector<double> exposures;
+  mutable std::once_flag renderer_made;
+  mutable std::unique_ptr<PhotoRenderer> renderer;
+};
+
+SimulatedRoom::SimulatedRoom(const SimulatedRoomOptions& options) {
+  ThrowIfProblems(options.Problems());
+  impl_ = std::make_unique<Impl>(options);
+}
+SimulatedRoom::~SimulatedRoom() = default;
+
+const SimulatedRoomOptions& SimulatedRoom::options() const { return impl_->options; }
+const Camera& SimulatedRoom::camera() const { return impl_->camera; }
+int SimulatedRoom::NumPhotos() const { return impl_->options.num_photos; }
+
+std::string SimulatedRoom::PhotoName(int photo) const {
+  char name[32];
+  std::snprintf(name, sizeof(name), "photo_%03d.jpg", photo);
+  return name;
+}
+
+Rigid SimulatedRoom::CamFromRoom(int photo) const { return impl_->cam_from_room.at(photo); }
+Rigid SimulatedRoom::CamFromScan(int photo) const {
+  return impl_->cam_from_room.at(photo) * impl_->room_from_station[0];
+}
+Rigid SimulatedRoom::ScanFromRoom() const { return impl_->room_from_station[0].Inverse(); }
+double SimulatedRoom::ExposureEv(int photo) const { return impl_->exposures.at(photo); }
+double SimulatedRoom::ExposureTime(int photo) const {
+  return kNominalExposureTime * std::exp2(ExposureEv(photo));
+}
+
+cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
+  PhotoSettings settings;
+  settings.exposure_ev = ExposureEv(photo);
+  settings.blur_px = impl_->options.blur_px;
+  settings.noise = impl_->options.photo_noise;
+  settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
+  return impl_->Renderer().Render(impl_->cam_from_room.at(photo), settings,
+                                  impl_->options.num_threads);
+}
+
+Scan SimulatedRoom::MakeScan(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  Scan scan;
+  scan.num_columns = scanner.grid().num_columns;
+  scan.num_rows = scanner.grid().num_rows;
+  scan.is_rtpi = true;
+  scan.path = "simulated scan " + std::to_string(station);
+  if (station > 0) scan.scan_from_station = ScanFromRoom() * impl_->room_from_station[station];
+  scan.points.assign(static_cast<size_t>(scan.num_columns) * scan.num_rows, Scan::MissingPoint());
+  scan.intensity.assign(scan.points.size(), 0);
+  ParallelFor(impl_->options.num_threads, 0, scan.num_rows, [&](int row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      const int index = scan.Index(column, row);
+      const ScanSample sample = scanner.Measure(index);
+      if (sample.missing) continue;
+      scan.points[index] =
+          station > 0 ? scan.scan_from_station * sample.x_in_station : sample.x_in_station;
+      scan.intensity[index] = sample.intensity;
+    }
+  });
+  return scan;
+}
+
+std::vector<Eigen::Vector3f> SimulatedRoom::TrueColors(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  const ScanGrid& grid = scanner.grid();
+  std::vector<Eigen::Vector3f> colors(static_cast<size_t>(grid.num_columns) * grid.num_rows,
+                                      Eigen::Vector3f::Zero());
+  ParallelFor(impl_->options.num_threads, 0, grid.num_rows, [&](int row) {
+    for (int column = 0; column < grid.num_columns; ++column) {
+      const int index = row * grid.num_columns + column;
+      const ScanSample sample = scanner.Measure(index);
+      if (!sample.missing) colors[index] = impl_->scene.Color(sample.hit).cwiseMax(0).cwiseMin(1);
+    }
+  });
+  return colors;
+}
+
+Similarity SimulatedRoom::ScanFromSparse() const {
+  RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 601));
+  Similarity scan_from_sparse;
+  scan_from_sparse.scale = random.Uniform(0.3, 0.6);
+  const Eigen::Vector3d axis(random.Gaussian(), random.Gaussian(), random.Gaussian());
+  scan_from_sparse.rotation = Eigen::AngleAxisd(random.Uniform(0.5, 2.5), axis.normalized());
+  scan_from_sparse.translation << random.Uniform(-2, 2), random.Uniform(-2, 2),
+      random.Uniform(-2, 2);
+  return scan_from_sparse;
+}
+
+SparseModel SimulatedRoom::MakeSparseModel(int num_points, double noise_px) const {
+  const Rigid scan_from_room = ScanFromRoom();
+  const Similarity sparse_from_room =
+      ScanFromSparse().Inverse() *
+      Similarity{1, scan_from_room.rotation, scan_from_room.translation};
+  SparseModel model = MakeRoomSparseModel(impl_->Photos(), sparse_from_room, num_points, noise_px);
+  for (auto& [id, image] : model.images) image.name = PhotoName(static_cast<int>(id) - 1);
+  return model;
+}
+
+std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const {
+  RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 701, photo));
+  std::vector<SimulatedPick> picks;
+  for (const PickCandidate& candidate :
+       SpreadPicks(impl_->Candidates(photo), count, impl_->PhotoDiagonal())) {
+    const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
+    picks.push_back({PhotoName(photo), candidate.x_in_img + impl_->options.click_noise_px * noise,
+                     candidate.x_in_scan});
+  }
+  return picks;
+}
+
+int SimulatedRoom::BestPhotoForPicks() const {
+  int best_photo = 0;
+  double best = -1;
+  for (int photo = 0; photo < NumPhotos(); ++photo) {
+    // How far apart the picks would lie: the smallest spread of the points in space.
+    const auto picks = SpreadPicks(impl_->Candidates(photo), 8, impl_->PhotoDiagonal());
+    if (picks.size() < 6) continue;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const auto& pick : picks) mean += pick.x_in_scan / static_cast<double>(picks.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const auto& pick : picks)
+      spread += (pick.x_in_scan - mean) * (pick.x_in_scan - mean).transpose();
+    const double volume = spread.determinant();
+    if (volume > best) {
+      best = volume;
+      best_photo = photo;
+    }
+  }
+  return best_photo;
+}
+
+}  // namespace roomtex
