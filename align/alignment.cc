@@ -1,0 +1,429 @@
+#include "align/alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/parallel.h"
+
+namespace roomtex {
+namespace {
+
+// Metres from the nearest flat patch of the scan up to which a pick counts as being on the scan:
+// clicks go to corners and edges, which have no flat patch of their own.
+constexpr double kPickReach = 0.25;
+
+std::string Number(double value, int digits) {
+  std::ostringstream text;
+  text.setf(std::ios::fixed);
+  text.precision(digits);
+  text << value;
+  return text.str();
+}
+
+std::string LineOf(const Pick& pick) {
+  return pick.line > 0 ? "line " + std::to_string(pick.line) : "a pick of " + pick.image_name;
+}
+
+std::string MirrorRemedy(const AlignmentInput& input) {
+  const bool is_rtpi = std::any_of(input.scans.begin(), input.scans.end(),
+                                   [](const Scan& scan) { return scan.is_rtpi; });
+  if (!is_rtpi) return "Check the axes of the scan file: its coordinates seem to be left-handed";
+  const std::string other = input.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+  return "Read it with --azimuth " + other +
+         " (in every command, and for picking: picks made on the mirrored scan have the wrong x)";
+}
+
+// The picks of one photo, and what they say.
+struct View {
+  std::string name;
+  const SparseImage* image = nullptr;
+  std::vector<int> picks;  // indices into AlignmentInput::picks
+  PickReview review;
+  ScaleEstimate scale;
+  Rigid cam_from_scan;  // the pose that was chosen among those of the review
+};
+
+PointPairs PairsOf(const std::vector<Pick>& picks, const std::vector<int>& indices) {
+  const int n = static_cast<int>(indices.size());
+  PointPairs pairs{Eigen::Matrix2Xd(2, n), Eigen::Matrix3Xd(3, n)};
+  for (int i = 0; i < n; ++i) {
+    pairs.x_in_img.col(i) = picks[indices[i]].x_in_img;
+    pairs.x_in_scan.col(i) = picks[indices[i]].x_in_scan;
+  }
+  return pairs;
+}
+
+void RefuseMirroredScan(const AlignmentInput& input, const View& view) {
+  const PickReview& review = view.review;
+  if (!review.mirrored) return;
+  if (review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px) return;
+  throw InputError(input.scans[0].path, "",
+                   "the scan is a mirror image of the room: the picks in " + view.name +
+                       " miss by " + Number(review.pose().rms_px, 1) + " pixels (rms), and by " +
+                       Number(review.mirrored_rms_px, 1) + " pixels when the scan is reflected",
+                   MirrorRemedy(input));
+}
+
+// The picks lie on the surface of the scan that was read; if they lie on its mirror image instead,
+// the file was read with the other azimuth sense than the one they were made with.
+void CheckPicksOnScan(const AlignmentInput& input, const ScanSurface& surface) {
+  if (surface.patches().empty()) {
+    throw InputError(input.scans[0].path, "", "holds no surface: no patch of it has enough samples",
+                     "Check the file with roomtex-import");
+  }
+  const Rigid& scan_from_station = input.scans[0].scan_from_station;
+  int on_scan = 0, on_mirrored = 0;
+  const Pick* farthest = nullptr;
+  for (const Pick& pick : input.picks) {
+    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * pick.x_in_scan;
+    x_in_station.x() *= -1;
+    on_mirrored += surface.FindNearest(scan_from_station * x_in_station, kPickReach).has_value();
+    if (surface.FindNearest(pick.x_in_scan, kPickReach)) {
+      ++on_scan;
+    } else if (farthest == nullptr) {
+      farthest = &pick;
+    }
+  }
+  const int n = static_cast<int>(input.picks.size());
+  if (2 * on_scan >= n) return;
+  if (on_mirrored >= on_scan + 3 && 3 * on_mirrored >= 2 * n) {
+    throw InputError(input.scans[0].path, "",
+                     "the scan is a mirror image of the one that the picks were made on: " +
+                         std::to_string(n - on_scan) + " of " + std::to_string(n) +
+                         " picks are not on its surface, but " + std::to_string(on_mirrored) +
+                         " are when it is reflected",
+                     MirrorRemedy(input));
+  }
+  throw InputError(input.picks_path, LinePosition(farthest->line),
+                   std::to_string(n - on_scan) + " of " + std::to_string(n) +
+                       " picks, this one first, are more than " + Number(kPickReach, 2) +
+                       " m away from every surface of the scan",
+                   "Pick on this scan, and give scan_x, scan_y, scan_z in metres in its frame");
+}
+
+// Photos with enough picks, each with its review. Throws InputError if none of them fixes a pose.
+std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOptions& options,
+                              std::vector<std::string>* warnings) {
+  std::map<std::string, std::vector<int>> by_name;
+  for (size_t i = 0; i < input.picks.size(); ++i) {
+    by_name[input.picks[i].image_name].push_back(static_cast<int>(i));
+  }
+  std::vector<View> views;
+  std::string problem;
+  for (const auto& [name, indices] : by_name) {
+    if (static_cast<int>(indices.size()) < kMinPicksPerPhoto) continue;
+    View view{name, input.model.FindImage(name), indices, {}, {}, {}};
+    const Camera& camera = input.model.cameras.at(view.image->camera_id);
+    const PointPairs pairs = PairsOf(input.picks, indices);
+    std::string own_problem = FindLayoutProblem(pairs, camera, options.picks);
+    if (own_problem.empty()) {
+      auto review = ReviewPicks(CameraProjection(camera), pairs, options.picks);
+      if (review) {
+        view.review = std::move(*review);
+        views.push_back(std::move(view));
+        continue;
+      }
+      own_problem =
+          "no camera pose has all picks in front of the camera and inside its lens' field";
+    }
+    own_problem = "in " + name + " " + own_problem;
+    if (problem.empty()) problem = own_problem;
+    warnings->push_back(
+        "The picks of this photo are used with those of the others only: " + own_problem + ".");
+  }
+  if (views.empty()) {
+    throw InputError(input.picks_path, "", problem,
+                     "Pick points that are spread over the photo, in depth, and not on one line");
+  }
+  return views;
+}
+
+// Coplanar picks can have two poses that fit about equally well: the one that also makes sense of
+// the sparse points (one scale for all of them) is right.
+void ChoosePose(const AlignmentInput& input, const std::vector<std::vector<Triangle>>& meshes,
+                const AlignmentOptions& options, View* view) {
+  double best_mad = std::numeric_limits<double>::infinity();
+  const double rms_limit = std::max(1.5 * view->review.pose().rms_px, 1.0);
+  for (size_t i = 0; i < view->review.poses.size(); ++i) {
+    const ViewPose& pose = view->review.poses[i];
+    if (pose.rms_px > rms_limit) break;
+    ScaleOptions scale_options = options.scale;
+    scale_options.edge_px = std::max(scale_options.edge_px, 2 * pose.rms_px);
+    const ScaleEstimate scale = EstimateScale(input.model, *view->image, pose.cam_from_scan,
+                                              input.scans, meshes, scale_options);
+    const double mad =
+        scale.num_features >= options.trust.min_scale_features ? scale.relative_mad : 1e6 + i;
+    if (i > 0 && !(mad < 0.7 * best_mad)) continue;
+    best_mad = mad;
+    view->scale = scale;
+    view->cam_from_scan = pose.cam_from_scan;
+  }
+}
+
+View ChooseView(const AlignmentInput& input, std::vector<View> views,
+                const AlignmentOptions& options) {
+  const auto best = std::min_element(views.begin(), views.end(), [](const View& a, const View& b) {
+    return a.review.pose().PositionSigma() < b.review.pose().PositionSigma();
+  });
+  View view = std::move(*best);
+  std::vector<std::vector<Triangle>> meshes;
+  for (const Scan& scan : input.scans) meshes.push_back(BuildScanMesh(scan, options.mesh));
+  ChoosePose(input, meshes, options, &view);
+  if (view.scale.num_features == 0) {
+    throw InputError(input.picks_path, "",
+                     view.name + " has " + std::to_string(view.scale.num_candidates) +
+                         " features with a sparse point in front of the scan, none of them away "
+                         "from depth edges; so the scale between model and scan cannot be found",
+                     "Check the picks, or pick in a photo with more sparse points");
+  }
+  return view;
+}
+
+void ReportBadPicks(const View& view, Alignment* result) {
+  const PickReview& review = view.review;
+  if (review.exchanged) {
+    const Pick& a = result->picks[view.picks[review.exchanged->first]].pick;
+    const Pick& b = result->picks[view.picks[review.exchanged->second]].pick;
+    result->reasons.push_back(
+        "The picks on " + LineOf(a) + " and " + LineOf(b) + " look exchanged: the picks of " +
+        view.name + " miss by " + Number(review.pose().rms_px, 1) + " pixels (rms), and by " +
+        Number(review.exchanged_rms_px, 1) + " pixels when these two change places.");
+  }
+  for (size_t i = 0; i < view.picks.size(); ++i) {
+    PickOutcome& outcome = result->picks[view.picks[i]];
+    outcome.used = review.used[i];
+    outcome.leave_one_out_px = review.leave_one_out_px[static_cast<int>(i)];
+    if (outcome.used) continue;
+    result->warnings.push_back(
+        "The pick on " + LineOf(outcome.pick) + " (" + outcome.pick.image_name + " at " +
+        Number(outcome.pick.x_in_img.x(), 1) + ", " + Number(outcome.pick.x_in_img.y(), 1) +
+        ") was left out: it is " + Number(outcome.leave_one_out_px, 1) +
+        " pixels away from where the other picks put it.");
+  }
+}
+
+std::vector<bool> UsedPicks(const Alignment& result) {
+  std::vector<bool> used;
+  for (const PickOutcome& outcome : result.picks) used.push_back(outcome.used);
+  return used;
+}
+
+// Root mean square over the used picks.
+double PickRms(const Alignment& result, double PickOutcome::*residual) {
+  double sum = 0;
+  int count = 0;
+  for (const PickOutcome& outcome : result.picks) {
+    if (!outcome.used) continue;
+    sum += std::pow(outcome.*residual, 2);
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+void SetResiduals(const AlignmentInput& input, const Similarity& scan_from_sparse,
+                  double PickOutcome::*residual, Alignment* result) {
+  const Eigen::Matrix2Xd errors = PickErrors(input.model, input.picks, scan_from_sparse);
+  for (size_t i = 0; i < result->picks.size(); ++i) {
+    result->picks[i].*residual = errors.col(static_cast<int>(i)).norm();
+  }
+}
+
+// Picks of several photos as one answer; the ones that then stand far off are left out and named.
+void FitAllPicks(const AlignmentInput& input, double sigma_px, const AlignmentOptions& options,
+                 Alignment* result) {
+  for (int round = 0; round < 2; ++round) {
+    const SimilarityFit fit = FitToPicks(input.model, input.picks, UsedPicks(*result), sigma_px,
+                                         result->scan_from_sparse, options.fit);
+    if (!fit.converged) {
+      result->warnings.push_back("The picks of all photos together gave no solution; those of " +
+                                 result->clicked_image + " alone are used.");
+      return;
+    }
+    result->scan_from_sparse = fit.scan_from_sparse;
+    SetResiduals(input, fit.scan_from_sparse, &PickOutcome::residual_px, result);
+    if (round == 1) return;
+    std::vector<double> residuals;
+    for (const PickOutcome& outcome : result->picks) {
+      if (outcome.used) residuals.push_back(outcome.residual_px);
+    }
+    std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
+    // Median of a Rayleigh distribution: 1.177 sigma; 4.5 sigma is exceeded by 1 click in 25 000.
+    const double limit =
+        std::max(options.picks.min_bad_pick_px, 4.5 / 1.177 * residuals[residuals.size() / 2]);
+    for (PickOutcome& outcome : result->picks) {
+      if (!outcome.used || !(outcome.residual_px > limit)) continue;
+      outcome.used = false;
+      result->warnings.push_back("The pick on " + LineOf(outcome.pick) + " (" +
+                                 outcome.pick.image_name + ") was left out: it is " +
+                                 Number(outcome.residual_px, 1) +
+                                 " pixels away from where the other picks put it.");
+    }
+  }
+}
+
+// A refinement that leaves the basin of the clicks answers another question than the one the user
+// asked.
+void RefineOnSurface(const AlignmentInput& input, double pick_sigma_px, double sigma_px,
+                     const ScanSurface& surface, const AlignmentOptions& options,
+                     Alignment* result) {
+  const std::vector<SurfacePoint> points =
+      FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
+  const double gate = std::clamp(5 * result->position_sigma, 0.1, options.fit.max_gate);
+  const SimilarityFit fit =
+      FitToSurface(input.model, points, surface, input.picks, UsedPicks(*result), pick_sigma_px,
+                   gate, result->scan_from_sparse, options.fit);
+  if (!fit.converged) {
+    result->warnings.push_back(
+        "The alignment was not refined on the scan's surface: too few of the " +
+        std::to_string(points.size()) +
+        " sparse points are near it, or they pull the scale away from the picks.");
+    return;
+  }
+  result->surface_fit = fit;
+  result->refined = true;
+  result->scan_from_sparse = fit.scan_from_sparse;
+}
+
+void JudgePicks(const AlignmentInput& input, const AlignmentOptions& options, Alignment* result) {
+  const SparseImage* image = input.model.FindImage(result->clicked_image);
+  const double limit = options.trust.PickRmsLimit(input.model.cameras.at(image->camera_id));
+  const auto worst = std::max_element(
+      result->picks.begin(), result->picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
+        return (a.used ? a.residual_px : -1) < (b.used ? b.residual_px : -1);
+      });
+  if (!(result->pick_rms_px <= limit)) {
+    result->reasons.push_back("The picks miss by " + Number(result->pick_rms_px, 1) +
+                              " pixels (rms), more than the limit of " + Number(limit, 1) +
+                              "; the worst is on " + LineOf(worst->pick) + " with " +
+                              Number(worst->residual_px, 1) +
+                              " pixels. Pick again, or pick more points so that a bad one shows.");
+  }
+  if (!(result->position_sigma <= options.trust.max_position_sigma)) {
+    result->reasons.push_back(
+        "The picks leave the camera's position open by " + Number(result->position_sigma, 2) +
+        " m (one standard deviation). Spread them more over the photo and in depth.");
+  }
+  if (!result->refined || !result->reasons.empty()) return;
+  const double refined_limit = std::max(limit, 2 * result->pick_rms_px);
+  if (!(result->refined_pick_rms_px <= refined_limit)) {
+    const auto farthest = std::max_element(
+        result->picks.begin(), result->picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
+          return (a.used ? a.refined_residual_px : -1) < (b.used ? b.refined_residual_px : -1);
+        });
+    result->reasons.push_back(
+        "Picks and surface contradict each other: where the sparse points lie on the scan, the "
+        "picks "
+        "miss by " +
+        Number(result->refined_pick_rms_px, 1) + " pixels (rms; limit " + Number(refined_limit, 1) +
+        "), the one on " + LineOf(farthest->pick) + " by " +
+        Number(farthest->refined_residual_px, 1) + " pixels.");
+  }
+}
+
+void JudgeScale(const TrustOptions& trust, Alignment* result) {
+  const ScaleEstimate& scale = result->scale;
+  if (scale.num_features < trust.min_scale_features) {
+    result->reasons.push_back("The scale rests on " + std::to_string(scale.num_features) +
+                              " features of " + result->clicked_image + ", fewer than " +
+                              std::to_string(trust.min_scale_features) + ".");
+  }
+  if (!(scale.relative_mad <= trust.max_scale_mad)) {
+    result->reasons.push_back("The scale differs from feature to feature by " +
+                              Number(100 * scale.relative_mad, 0) + " % (limit " +
+                              Number(100 * trust.max_scale_mad, 0) + " %): the pose of " +
+                              result->clicked_image +
+                              " in the scan does not agree with its pose in the sparse model. "
+                              "Check that the picks name the right photo.");
+  }
+}
+
+void JudgePlacement(const TrustOptions& trust, Alignment* result) {
+  const Placement& placement = result->placement;
+  const int judged = placement.num_on_surface + placement.num_floating + placement.num_hidden;
+  if (judged < 20) {
+    result->reasons.push_back("Only " + std::to_string(judged) +
+                              " sparse points lie where the scanner saw something, too few to "
+                              "tell whether the alignment is right.");
+  } else if (!(placement.SurfaceShare() >= trust.min_surface_share)) {
+    result->reasons.push_back(
+        "Only " + Number(100 * placement.SurfaceShare(), 0) +
+        " % of the sparse points that the scanner could see lie within " +
+        Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
+        Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.");
+  }
+  if (!(placement.CameraShare() >= trust.min_camera_share)) {
+    result->reasons.push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +
+                              " of " + std::to_string(placement.num_cameras) +
+                              " photos would have been taken from behind the surface that the "
+                              "scanner saw.");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> AlignmentOptions::Problems() const {
+  std::vector<std::string> all;
+  for (const auto& some : {picks.Problems(), scale.Problems(), surface.Problems(), fit.Problems(),
+                           trust.Problems(), mesh.Problems()}) {
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSpace& free_space,
+                      const AlignmentOptions& options, Progress* progress) {
+  CheckPicksAgainstModel(input.picks_path, input.picks, input.model);
+  progress->Stage("scan surface");
+  const ScanSurface surface(input.scans, options.surface);
+  CheckPicksOnScan(input, surface);
+
+  progress->Stage("pose from picks");
+  Alignment result;
+  for (const Pick& pick : input.picks) result.picks.push_back({pick});
+  std::vector<View> views = ReviewViews(input, options, &result.warnings);
+  for (const View& view : views) {
+    RefuseMirroredScan(input, view);
+    ReportBadPicks(view, &result);
+  }
+
+  progress->Stage("scale");
+  const View view = ChooseView(input, std::move(views), options);
+  const ViewPose& pose = view.review.pose();
+  result.clicked_image = view.name;
+  result.position_sigma = pose.PositionSigma();
+  result.scale = view.scale;
+  result.scan_from_sparse =
+      ScanFromSparse(view.cam_from_scan, view.image->cam_from_model, view.scale.scale);
+  SetResiduals(input, result.scan_from_sparse, &PickOutcome::residual_px, &result);
+  const double pick_sigma_px = std::max(0.5, pose.sigma_px);
+  if (input.picks.size() > view.picks.size()) {
+    FitAllPicks(input, pick_sigma_px, options, &result);
+  }
+  result.scan_from_sparse_from_picks = result.scan_from_sparse;
+  result.pick_rms_px = PickRms(result, &PickOutcome::residual_px);
+  for (const PickOutcome& outcome : result.picks) {
+    result.pick_max_px = std::max(result.pick_max_px, outcome.residual_px);
+  }
+
+  if (options.plane_constrained) {
+    progress->Stage("surface refinement");
+    RefineOnSurface(input, pick_sigma_px, sigma_px, surface, options, &result);
+  }
+  SetResiduals(input, result.scan_from_sparse, &PickOutcome::refined_residual_px, &result);
+  result.refined_pick_rms_px = PickRms(result, &PickOutcome::refined_residual_px);
+
+  progress->Stage("trust");
+  result.placement =
+      CheckPlacement(input.model, FindSurfacePoints(input.model, options.fit.min_track, sigma_px),
+                     result.scan_from_sparse, surface, free_space, options.trust);
+  JudgePicks(input, options, &result);
+  JudgeScale(options.trust, &result);
+  JudgePlacement(options.trust, &result);
+  return result;
+}
+
+}  // namespace roomtex

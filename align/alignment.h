@@ -1,0 +1,77 @@
+#pragma once
+// From picks to one similarity for the whole sparse model (thesis 7.1), refined on the scan's
+// surface, and judged.
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "align/pick_review.h"
+#include "align/picks.h"
+#include "align/scale.h"
+#include "align/scan_surface.h"
+#include "align/similarity_fit.h"
+#include "align/trust.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/progress.h"
+#include "core/scan.h"
+#include "core/scan_mesh.h"
+
+namespace roomtex {
+
+struct AlignmentOptions {
+  bool plane_constrained = true;  // refine the similarity on the surface of the scan
+  PickReviewOptions picks;
+  ScaleOptions scale;
+  ScanSurfaceOptions surface;
+  SimilarityFitOptions fit;
+  TrustOptions trust;
+  ScanMeshOptions mesh;
+  int num_threads = -1;
+
+  std::vector<std::string> Problems() const;
+};
+
+// What became of one pick. Residuals are distances in pixels.
+struct PickOutcome {
+  Pick pick;
+  bool used = true;
+  double residual_px = 0;  // under the solution from the picks alone
+  double refined_residual_px = std::numeric_limits<double>::quiet_NaN();  // under scan_from_sparse
+  double leave_one_out_px = std::numeric_limits<double>::quiet_NaN();  // NaN where it was not tried
+};
+
+struct Alignment {
+  Similarity scan_from_sparse;             // the answer
+  Similarity scan_from_sparse_from_picks;  // before the refinement on the surface
+  std::string clicked_image;               // the photo whose picks gave the pose
+  double position_sigma = 0;               // metres, of its camera by the picks alone
+  std::vector<PickOutcome> picks;
+  double pick_rms_px = 0;          // of the used picks, by the picks alone
+  double pick_max_px = 0;          // of all picks, by the picks alone
+  double refined_pick_rms_px = 0;  // of the used picks, under the answer
+  ScaleEstimate scale;
+  SimilarityFit surface_fit;  // valid if refined
+  bool refined = false;
+  Placement placement;
+  std::vector<std::string> warnings;
+  // Why the answer is not to be trusted, in sentences; empty = trusted.
+  std::vector<std::string> reasons;
+};
+
+// What was read from where, for the messages.
+struct AlignmentInput {
+  const SparseModel& model;
+  const std::vector<Scan>& scans;
+  const std::vector<Pick>& picks;
+  std::string picks_path;
+  std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
+};
+
+// Throws InputError for picks that cannot fix a pose, are not on the scan, or show that the scan is
+// mirrored. model.points carry the errors of UpdateReprojectionErrors(); sigma_px is their rms /
+// sqrt(2).
+Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSpace& free_space,
+                      const AlignmentOptions& options, Progress* progress);
+
+}  // namespace roomtex

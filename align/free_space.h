@@ -1,0 +1,48 @@
+#pragma once
+// A coarse mesh of the scans for questions that do not need every sample: what the scanner looked
+// through to see the surface behind (free space), and the intensity that a camera would see.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/ray_caster.h"
+#include "core/scan.h"
+
+namespace roomtex {
+
+class FreeSpace {
+ public:
+  // Takes every k-th column and row so that at most max_samples samples remain.
+  FreeSpace(const std::vector<Scan>& scans, int max_samples);
+
+  enum class Place {
+    kUnknown,  // no scanner has a surface in that direction, or there is no scanner (mesh without a
+               // grid)
+    kFloating,  // nearer to a scanner, by more than the tolerance, than the surface it saw there
+    kSurface,   // within the tolerance of a surface, along a scanner's ray
+    kHidden,    // farther from every scanner than the surface
+  };
+  // tolerance: metres.
+  Place Locate(const Eigen::Vector3d& x_in_scan, double tolerance) const;
+
+  struct Sight {
+    Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
+    float grey = 0;  // 0..255, see IntensityAsGrey
+  };
+  // What a ray from `origin` along the unit `direction` meets first.
+  std::optional<Sight> Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+
+ private:
+  std::vector<Eigen::Vector3d> stations_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<Triangle> triangles_;
+  std::vector<uint8_t> grey_;
+  std::unique_ptr<RayCaster> caster_;
+  std::vector<std::unique_ptr<RayCaster>>
+      station_casters_;  // one per station: only what it saw itself
+};
+
+}  // namespace roomtex

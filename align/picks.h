@@ -1,0 +1,37 @@
+#pragma once
+// The picks file: points that a user saw both in a photo and in the scan.
+//
+// CSV with the header image_name,x,y,scan_x,scan_y,scan_z; `#` starts a comment line; a name with a
+// comma stands in double quotes. x, y in `img` of the photo as taken, scan_* in `scan` (metres).
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+struct Pick {
+  std::string image_name;
+  Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
+  Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
+  long line = 0;  // in the picks file; 0 = not from a file
+};
+
+// The fewest picks in one photo that fix its pose (thesis 7.1.1).
+inline constexpr int kMinPicksPerPhoto = 6;
+
+// Throws InputError with the line: no header, wrong number of fields, not a finite number, the same
+// pixel or the same scan point picked twice in one photo.
+std::vector<Pick> ReadPicks(const std::string& path);
+// Written aside and renamed; reading it back gives the same numbers to the last bit.
+void WritePicks(const std::string& path, const std::vector<Pick>& picks);
+
+// Throws InputError: a name that is not in the model (with the nearest one that is), a pixel
+// outside its photo, fewer than kMinPicksPerPhoto picks in every photo.
+void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
+                            const SparseModel& model);
+
+}  // namespace roomtex

@@ -1,0 +1,237 @@
+// roomtex-align: the sparse model into the scan, by picks.
+
+#include <cmath>
+#include <filesystem>
+
+#include "align/agreement.h"
+#include "align/alignment.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "importers/scan_reader.h"
+
+namespace roomtex {
+namespace {
+
+// Samples of the coarse mesh for free space and agreement.
+constexpr int kCoarseSamples = 300000;
+
+struct Arguments {
+  std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
+  std::vector<std::string> scan_paths;
+  ScanReaderOptions scan_reader;
+  AlignmentOptions alignment;
+};
+
+void AddOptions(Arguments* a, Command* command) {
+  command->AddInputPath("input_path", &a->input_path,
+                        "COLMAP's sparse model: a folder, .bin or .txt.");
+  command->AddInputPaths("scan_path", &a->scan_paths,
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
+  command->AddInputPath(
+      "picks_path", &a->picks_path,
+      "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z; at least six in one "
+      "photo; pixels of the photo as taken, metres in the scan frame.",
+      Command::Kind::kOptional);
+  command->AddOutputPath("output_path", &a->output_path,
+                         "Folder for the aligned model, alignment.json and scan_from_sparse.txt.");
+  command->AddInputPath("image_path", &a->image_path,
+                        "Folder of the photos; with it the report says how well photos and scan "
+                        "intensity agree.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("database_path", &a->database_path,
+                        "COLMAP's database; not needed for an alignment by picks.",
+                        Command::Kind::kOptional);
+  command->AddInputPath(
+      "scan_poses", &a->scan_poses,
+      "Poses of several scans: a line each, file name and 4x4 matrix, or file name and "
+      "quaternion w x y z and translation.",
+      Command::Kind::kOptional);
+  AddScanReaderOptions(&a->scan_reader, command);
+  AlignmentOptions& o = a->alignment;
+  command->AddBool("plane_constrained", &o.plane_constrained,
+                   "Refine the similarity on the surface of the scan; 0 = the picks alone.");
+  command->AddDouble(
+      "Picks.max_chance", &o.picks.max_chance,
+      "A pick is left out when chance makes one as bad less often than this; larger = "
+      "leaves out more easily.");
+  command->AddDouble(
+      "Picks.min_bad_pick_px", &o.picks.min_bad_pick_px,
+      "Pixels; a pick nearer than this to where the others put it is never left out.");
+  command->AddDouble(
+      "Picks.min_gain", &o.picks.min_gain,
+      "A mirrored scan or two exchanged picks must fit this many times better to be named.");
+  command->AddDouble(
+      "Scale.edge_px", &o.scale.edge_px,
+      "Pixels; features nearer to a depth edge do not count for the scale (at least twice "
+      "the error of the picks is kept); larger = stricter.");
+  command->AddDouble(
+      "Trust.max_pick_rms_px", &o.trust.max_pick_rms_px,
+      "Pixels; picks that miss by more (rms) are not trusted; 0 = 10, or 0.4 % of the "
+      "photo's diagonal if that is more; larger = more tolerant.");
+  command->AddDouble("Trust.max_scale_mad", &o.trust.max_scale_mad,
+                     "Spread of the scale over the features (relative); larger = more tolerant.");
+  command->AddInt("Trust.min_scale_features", &o.trust.min_scale_features,
+                  "Features that the scale must rest on; larger = stricter.");
+  command->AddDouble(
+      "Trust.surface_tolerance", &o.trust.surface_tolerance,
+      "Metres; sparse points this near to the surface are on it; larger = more tolerant.");
+  command->AddDouble(
+      "Trust.min_surface_share", &o.trust.min_surface_share,
+      "Share of the sparse points visible to the scanner that must be on the surface; "
+      "larger = stricter.");
+  command->AddDouble(
+      "Trust.min_camera_share", &o.trust.min_camera_share,
+      "Share of the photos that must not lie behind the surface; larger = stricter.");
+  command->AddDouble(
+      "Trust.max_position_sigma", &o.trust.max_position_sigma,
+      "Metres; how uncertain the picks may leave the camera's position; larger = more "
+      "tolerant.");
+}
+
+void CheckArguments(const Arguments& a) {
+  if (a.picks_path.empty()) {
+    throw UsageError(
+        "--picks_path is missing: aligning without picks is not available in this version. Make a "
+        "picks file with roomtex-pick, or by hand (image_name,x,y,scan_x,scan_y,scan_z)");
+  }
+  std::vector<std::string> problems = a.scan_reader.Problems();
+  for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
+  ThrowIfProblems(problems);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
+    throw UsageError(
+        "--output_path is the same folder as --input_path: the input model is never "
+        "overwritten");
+  }
+  if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");
+  if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
+}
+
+Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json PicksToJson(const Alignment& alignment) {
+  Json json;
+  int num_used = 0;
+  Json per_pick = Json::array();
+  for (const PickOutcome& outcome : alignment.picks) {
+    num_used += outcome.used;
+    Json one;
+    one["image_name"] = outcome.pick.image_name;
+    one["x"] = outcome.pick.x_in_img.x();
+    one["y"] = outcome.pick.x_in_img.y();
+    one["line"] = outcome.pick.line;
+    one["residual_px"] = NumberOrNull(outcome.residual_px);
+    one["refined_residual_px"] = NumberOrNull(outcome.refined_residual_px);
+    one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
+    one["used"] = outcome.used;
+    per_pick.push_back(one);
+  }
+  json["count"] = alignment.picks.size();
+  json["num_used"] = num_used;
+  json["image_name"] = alignment.clicked_image;
+  json["rms_px"] = NumberOrNull(alignment.pick_rms_px);
+  json["max_px"] = NumberOrNull(alignment.pick_max_px);
+  json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
+  json["position_sigma_m"] = NumberOrNull(alignment.position_sigma);
+  json["per_pick"] = per_pick;
+  return json;
+}
+
+Json PlacementToJson(const Placement& placement) {
+  Json json;
+  json["num_points"] = placement.num_points;
+  json["num_on_surface"] = placement.num_on_surface;
+  json["num_floating"] = placement.num_floating;
+  json["num_hidden"] = placement.num_hidden;
+  json["surface_share"] = placement.SurfaceShare();
+  json["camera_share"] = placement.CameraShare();
+  return json;
+}
+
+Json AgreementToJson(const Agreement& agreement) {
+  Json json;
+  json["num_photos"] = agreement.num_photos;
+  json["num_pixels"] = agreement.num_pixels;
+  json["mutual_information"] = agreement.mutual_information;
+  Json turned = Json::array();
+  for (const Agreement::Turned& one : agreement.turned) {
+    Json entry;
+    entry["turn_deg"] = one.turn_deg;
+    entry["mutual_information"] = one.mutual_information;
+    turned.push_back(entry);
+  }
+  json["mutual_information_turned"] = turned;
+  return json;
+}
+
+// The keys of docs/commands.md. `planes` stays empty until planes are detected (thesis 7.2).
+void FillReport(const Alignment& alignment, double reprojection_rms_before,
+                double reprojection_rms_after, Report* report) {
+  Report& r = *report;
+  r["scan_from_sparse"] = ToJson(alignment.scan_from_sparse);
+  r["scan_from_sparse_from_picks"] = ToJson(alignment.scan_from_sparse_from_picks);
+  r["picks"] = PicksToJson(alignment);
+  r["scale"]["value"] = alignment.scale.scale;
+  r["scale"]["num_features"] = alignment.scale.num_features;
+  r["scale"]["relative_mad"] = alignment.scale.relative_mad;
+  r["planes"] = Json::array();
+  const bool refined = alignment.refined;
+  r["plane_rms_m"]["before"] = refined ? Json(alignment.surface_fit.rms_before) : Json(nullptr);
+  r["plane_rms_m"]["after"] = refined ? Json(alignment.surface_fit.rms_after) : Json(nullptr);
+  r["plane_rms_m"]["num_points"] = refined ? alignment.surface_fit.num_points : 0;
+  r["reprojection_rms_px"]["before"] = reprojection_rms_before;
+  r["reprojection_rms_px"]["after"] = reprojection_rms_after;
+  r["placement"] = PlacementToJson(alignment.placement);
+  r["agreement"] = nullptr;
+}
+
+void Align(const Arguments& a, const Command::Context& context) {
+  CheckArguments(a);
+  context.progress.Stage("read model");
+  SparseModel model = ReadSparseModel(a.input_path);
+  const std::vector<Pick> picks = ReadPicks(a.picks_path);
+  CheckPicksAgainstModel(a.picks_path, picks, model);
+  const ReprojectionErrors before = UpdateReprojectionErrors(&model);
+  context.progress.Stage("read scan");
+  const std::vector<Scan> scans = ReadScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  const FreeSpace free_space(scans, kCoarseSamples);
+
+  AlignmentOptions options = a.alignment;
+  options.num_threads = context.options.num_threads;
+  const double sigma_px = std::max(0.3, before.rms_px / std::sqrt(2.0));
+  const Alignment alignment =
+      AlignToScan({model, scans, picks, a.picks_path, a.scan_reader.azimuth}, sigma_px, free_space,
+                  options, &context.progress);
+  for (const std::string& warning : alignment.warnings) context.Warn(warning);
+  for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
+
+  context.progress.Stage("write");
+  TransformModel(alignment.scan_from_sparse, &model);
+  const ReprojectionErrors after = UpdateReprojectionErrors(&model);
+  FillReport(alignment, before.rms_px, after.rms_px, &context.report);
+  WriteSparseModel(model, a.output_path);
+  WriteSimilarity(a.output_path + "/scan_from_sparse.txt", alignment.scan_from_sparse);
+  context.report.AddCopy(a.output_path + "/alignment.json");
+  if (a.image_path.empty()) return;
+  context.progress.Stage("agreement");
+  std::vector<std::string> warnings;
+  const Agreement agreement = MeasureAgreement(model, a.image_path, free_space, AgreementOptions(),
+                                               context.options.num_threads, &warnings);
+  for (const std::string& warning : warnings) context.Warn(warning);
+  context.report["agreement"] = AgreementToJson(agreement);
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::Arguments arguments;
+  roomtex::Command command(
+      "roomtex-align", "Brings COLMAP's sparse model into the frame of a range scan, by picks.",
+      "roomtex-align --input_path sparse/0 --scan_path room.rtpi --picks_path picks.csv "
+      "--output_path aligned");
+  roomtex::AddOptions(&arguments, &command);
+  return command.Run(argc, argv, [&arguments](const roomtex::Command::Context& context) {
+    roomtex::Align(arguments, context);
+  });
+}

@@ -1,0 +1,64 @@
+#pragma once
+// The scan as small flat patches: a point's nearest patch gives the distance to the surface, with
+// the range noise averaged out.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/scan.h"
+
+namespace roomtex {
+
+struct ScanPatch {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();   // centre of gravity of its samples, `scan`
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit length, towards the scanner
+  double thickness = 0;  // RMS distance of its samples from its plane, metres
+  int num_samples = 0;
+};
+
+struct ScanSurfaceOptions {
+  double cell_size = 0.06;  // metres; edge of the cubes whose samples make one patch
+  int min_samples = 6;      // a cube with fewer samples makes no patch
+  // A cube makes a patch only if its samples are flat: thickness below this share of their second
+  // extent.
+  double max_thickness_share = 0.25;
+
+  std::vector<std::string> Problems() const;
+};
+
+// The flat patches of one or more scans, in a k-d tree.
+class ScanSurface {
+ public:
+  ScanSurface(const std::vector<Scan>& scans, const ScanSurfaceOptions& options);
+
+  const std::vector<ScanPatch>& patches() const { return patches_; }
+  double cell_size() const { return cell_size_; }
+  // Median thickness of the patches: the noise of the scan, metres; 0 without patches.
+  double TypicalThickness() const;
+
+  struct Nearest {
+    int patch = -1;
+    double distance = 0;  // along the normal, metres, positive on the scanner's side
+  };
+  // The patch whose centre is nearest, no farther than max_distance; none if there is none.
+  std::optional<Nearest> FindNearest(const Eigen::Vector3d& x_in_scan, double max_distance) const;
+
+ private:
+  struct Node {
+    int begin = 0, end = 0;  // range of patches_
+    int axis = -1;           // -1 = leaf
+    double split = 0;
+    int left = -1, right = -1;
+  };
+  int BuildTree(int begin, int end);
+  void Search(int node, const Eigen::Vector3d& x, double* best2, int* best) const;
+
+  std::vector<ScanPatch> patches_;  // in the order of the tree's leaves
+  std::vector<Node> nodes_;
+  double cell_size_;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,71 @@
+#pragma once
+// The pose of one photo from clicked points: the seven steps of thesis 7.1.1.
+
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera_model.h"
+#include "core/similarity.h"
+
+namespace roomtex {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// Points seen in one photo and in the scan; column i of both is pick i.
+struct PointPairs {
+  Eigen::Matrix2Xd x_in_img;   // pixels, distorted, as taken
+  Eigen::Matrix3Xd x_in_scan;  // metres
+
+  int size() const { return static_cast<int>(x_in_img.cols()); }
+  PointPairs Without(int index) const;
+  // As if the scan had been read with the other azimuth sense: x -> -x.
+  PointPairs Mirrored() const;
+};
+
+// How the scan points lie: root mean square extents along the principal axes, metres, descending.
+Eigen::Vector3d PrincipalExtents(const Eigen::Matrix3Xd& points);
+
+// Scan points count as coplanar below this share of their largest extent: what lies between is
+// noise of the scan and of the fingers, not depth that a pose could rest on.
+inline constexpr double kCoplanarShare = 0.01;
+
+struct ViewPose {
+  Rigid cam_from_scan;
+  Eigen::VectorXd residual_px;  // distance between click and projection, one per pick
+  double sum_px2 = 0;           // sum of their squares
+  double rms_px = 0;            // root of their mean square
+  // Standard deviation of a click per coordinate, from the residuals: sqrt(sum_px2 / (2 n - 6)).
+  double sigma_px = 0;
+  // Covariance of (w, dt) with x_in_cam = exp(w) R x_in_scan + t + dt: inverse normal matrix of the
+  // last step times sigma_px^2. rad^2, rad m, m^2. Infinite where the picks do not determine the
+  // pose.
+  Matrix6d covariance = Matrix6d::Zero();
+
+  // Standard deviation of the camera's position, metres (root of the trace), from the covariance.
+  double PositionSigma() const;
+};
+
+// Every locally best pose that has all points in front of the camera, best first; empty if there is
+// none. The start is the thesis': projection matrix by linear least squares on undistorted
+// normalised coordinates, det R > 0, singular values set to one, T by linear least squares, then
+// Levenberg-Marquardt on the six unknowns of the reprojection error in real (distorted) pixels,
+// points in front. Departure: a second start is the homography of the best-fitting plane together
+// with its reflected solution, since the projection matrix is not determined by coplanar picks and
+// badly by nearly coplanar ones. `start`: one more pose to start from. pairs: at least 4, not
+// collinear.
+std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const PointPairs& pairs,
+                                     const std::optional<Rigid>& start = std::nullopt);
+
+// Distances in pixels between the clicks and the projections under a pose; infinite for points that
+// are not in front of the camera or outside the valid field of its lens.
+Eigen::VectorXd PickResiduals(const CameraProjection& projection, const PointPairs& pairs,
+                              const Rigid& cam_from_scan);
+
+// Thesis 7.1.1, step 7: the pose reflected about the plane n.x = d of the points (`scan`; n unit
+// length). Points of the plane keep their place in the photo and change sides of the camera.
+Rigid ReflectAboutPlane(const Rigid& cam_from_scan, const Eigen::Vector3d& normal, double offset);
+
+}  // namespace roomtex
