@@ -1,0 +1,171 @@
+// The real kitchen (a neighbour of the checkout, never part of it) through the commands, as a user types
+// them. Label `data`: says why it is skipped when the kitchen is not there.
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "colmap_ext/sparse_model.h"
+#include "core/camera_model.h"
+#include "core/frames.h"
+#include "importers/scan_reader.h"
+#include "tests/e2e/colmap_steps.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+using nlohmann::json;
+
+const char kKitchen[] = ROOMTEX_SOURCE "/../shared/data/kitchen";
+
+json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
+
+Eigen::Matrix4d ReadMatrix(const std::string& path) {
+  std::ifstream stream(path);
+  std::string line;
+  Eigen::Matrix4d matrix;
+  int row = 0;
+  while (row < 4 && std::getline(stream, line)) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream numbers(line);
+    for (int column = 0; column < 4; ++column) numbers >> matrix(row, column);
+    ++row;
+  }
+  return matrix;
+}
+
+// Camera centres of the recording, in the frame of the recording ("reference"), by image name.
+std::map<std::string, Eigen::Vector3d> ReadReferenceCentres() {
+  std::map<std::string, Eigen::Vector3d> centres;
+  std::ifstream stream(std::string(kKitchen) + "/reference_poses.txt");
+  std::string line;
+  while (std::getline(stream, line)) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream fields(line);
+    int image_id = 0, camera_id = 0;
+    Eigen::Vector4d wxyz;
+    Rigid cam_from_reference;
+    std::string name;
+    fields >> image_id >> wxyz[0] >> wxyz[1] >> wxyz[2] >> wxyz[3];
+    for (int i = 0; i < 3; ++i) fields >> cam_from_reference.translation[i];
+    fields >> camera_id >> name;
+    cam_from_reference.rotation = QuaternionFromWxyz(wxyz).normalized();
+    centres[name] = cam_from_reference.TargetOriginInSource();
+  }
+  return centres;
+}
+
+class Kitchen : public testing::Test {
+ protected:
+  // All tests look at one run of the whole chain.
+  static void SetUpTestSuite() {
+    if (!std::filesystem::exists(kKitchen)) return;
+    folder_ = new TempFolder;
+    const std::string images = std::string(kKitchen) + "/images";
+    ExtractAndMatch(*folder_ / "database.db", images, "SIMPLE_RADIAL", "525.9,320,240,-0.025");
+    mapper_ = RunCommandLine("roomtex-mapper --database_path " + (*folder_ / "database.db") +
+                             " --image_path " + images + " --output_path " + (*folder_ / "sparse") +
+                             " --report_path " + (*folder_ / "mapper.json"));
+    align_ = RunCommandLine(AlignLine("counterclockwise", "aligned"));
+    texture_ = RunCommandLine("roomtex-texture --input_path " + (*folder_ / "aligned") +
+                              " --image_path " + images + " --scan_path " + kKitchen +
+                              "/scan.rtpi --azimuth counterclockwise --output_path " +
+                              (*folder_ / "textured"));
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+  void SetUp() override {
+    if (folder_ == nullptr) GTEST_SKIP() << "no kitchen at " << kKitchen;
+  }
+
+  static std::string AlignLine(const std::string& azimuth, const std::string& output) {
+    return "roomtex-align --input_path " + (*folder_ / "sparse/0") + " --scan_path " + kKitchen +
+           "/scan.rtpi --azimuth " + azimuth + " --picks_path " + kKitchen +
+           "/picks.csv --output_path " + (*folder_ / output) + " --report_path " +
+           (*folder_ / (output + ".json"));
+  }
+
+  static TempFolder* folder_;
+  static CommandResult mapper_, align_, texture_;
+};
+
+TempFolder* Kitchen::folder_ = nullptr;
+CommandResult Kitchen::mapper_, Kitchen::align_, Kitchen::texture_;
+
+TEST_F(Kitchen, RegistersEveryPhoto) {
+  ASSERT_EQ(mapper_.exit_code, 0) << mapper_.err;
+  const json report = ReadJson(*folder_ / "mapper.json");
+  EXPECT_EQ(report["num_images"], 36);
+  EXPECT_EQ(report["num_reg_images"], 36);
+  EXPECT_LT(report["mean_reprojection_error_px"], 0.8);
+  EXPECT_EQ(ReadSparseModel(*folder_ / "sparse/0").images.size(), 36u);
+}
+
+TEST_F(Kitchen, AlignsWithHurriedPicks) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  const json report = ReadJson(*folder_ / "aligned.json");
+  EXPECT_TRUE(report["trusted"]);
+  EXPECT_LT(report["picks"]["rms_px"], 8.0);
+  EXPECT_EQ(report["picks"]["count"], 8);
+}
+
+// The recording's own poses are good to a few centimetres, the picks to 6 px: cameras within 10 cm.
+TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  const Eigen::Matrix4d reference_from_scan =
+      ReadMatrix(std::string(kKitchen) + "/scan_to_world.txt");
+  const auto references = ReadReferenceCentres();
+  std::vector<double> distances;
+  const SparseModel aligned = ReadSparseModel(*folder_ / "aligned");
+  for (const auto& [id, image] : aligned.images) {
+    const Eigen::Vector3d centre_in_reference =
+        (reference_from_scan * image.cam_from_model.TargetOriginInSource().homogeneous()).head<3>();
+    ASSERT_TRUE(references.count(image.name)) << image.name;
+    distances.push_back((centre_in_reference - references.at(image.name)).norm());
+  }
+  ASSERT_EQ(distances.size(), 36u);
+  std::sort(distances.begin(), distances.end());
+  EXPECT_LT(distances[distances.size() / 2], 0.10);
+  EXPECT_LT(distances.back(), 0.25);
+}
+
+TEST_F(Kitchen, ScanReadWithTheWrongAzimuthIsNamedAMirror) {
+  const CommandResult wrong = RunCommandLine(AlignLine("clockwise", "mirrored"));
+  EXPECT_TRUE(wrong.exit_code == 3 || wrong.exit_code == 4) << wrong.exit_code;
+  EXPECT_NE(wrong.err.find("--azimuth counterclockwise"), std::string::npos) << wrong.err;
+}
+
+TEST_F(Kitchen, ColoursFourFifthsOfWhatThePhotosSee) {
+  ASSERT_EQ(texture_.exit_code, 0) << texture_.err;
+  const json report = ReadJson(*folder_ / "textured/report.json");
+  ScanReaderOptions options;
+  options.azimuth = "counterclockwise";
+  const Scan scan = ReadScan(std::string(kKitchen) + "/scan.rtpi", options);
+  const SparseModel aligned = ReadSparseModel(*folder_ / "aligned");
+  int num_in_frustum = 0;
+  for (const Eigen::Vector3d& x_in_scan : scan.points) {
+    if (!(x_in_scan.x() == x_in_scan.x())) continue;
+    for (const auto& [id, image] : aligned.images) {
+      static std::map<uint32_t, CameraProjection> projections;
+      const auto projection =
+          projections.try_emplace(image.camera_id, aligned.cameras.at(image.camera_id)).first;
+      const auto x_in_img = projection->second.ImgFromCam(image.cam_from_model * x_in_scan);
+      if (x_in_img && projection->second.InImage(*x_in_img)) {
+        ++num_in_frustum;
+        break;
+      }
+    }
+  }
+  EXPECT_EQ(report["num_vertices"], scan.points.size() - scan.NumMissing());
+  EXPECT_GE(report["num_colored"].get<double>(), 0.8 * num_in_frustum);
+}
+
+}  // namespace
+}  // namespace roomtex
