@@ -1,0 +1,116 @@
+#include "importers/file_reader.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int64_t kBlockSize = 1 << 20;
+
+}  // namespace
+
+FileReader::FileReader(const std::string& path) : path_(path) {
+  RequireFile(path, "Give the path of a scan file");
+  fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status {};
+  if (fd_ < 0 || ::fstat(fd_, &status) != 0) {
+    const std::string reason = std::strerror(errno);
+    if (fd_ >= 0) ::close(fd_);
+    throw InputError(path, "", "cannot be opened (" + reason + ")",
+                     "Check the path and its rights");
+  }
+  size_ = status.st_size;
+}
+
+FileReader::~FileReader() { ::close(fd_); }
+
+void FileReader::Read(int64_t offset, void* target, int64_t num_bytes) const {
+  char* bytes = static_cast<char*>(target);
+  while (num_bytes > 0) {
+    const ssize_t got = ::pread(fd_, bytes, static_cast<size_t>(num_bytes), offset);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) {
+      throw InputError(path_, BytePosition(offset),
+                       std::string("cannot be read (") + std::strerror(errno) + ")",
+                       "Check the disk");
+    }
+    if (got == 0) {
+      throw InputError(path_, BytePosition(offset),
+                       "the file ends, expected " + std::to_string(num_bytes) + " more bytes",
+                       "The file is cut off: copy it again");
+    }
+    bytes += got;
+    offset += got;
+    num_bytes -= got;
+  }
+}
+
+std::string FileReader::ReadSome(int64_t offset, int64_t max_bytes) const {
+  const int64_t num_bytes = std::clamp<int64_t>(size_ - offset, 0, max_bytes);
+  std::string bytes(static_cast<size_t>(num_bytes), '\0');
+  Read(offset, bytes.data(), num_bytes);
+  return bytes;
+}
+
+LineReader::LineReader(const FileReader& file, int64_t offset)
+    : file_(file), block_(kBlockSize), block_offset_(offset) {}
+
+bool LineReader::Refill() {
+  std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
+  block_offset_ += static_cast<int64_t>(begin_);
+  end_ -= begin_;
+  begin_ = 0;
+  const int64_t next = block_offset_ + static_cast<int64_t>(end_);
+  const int64_t space = kBlockSize - static_cast<int64_t>(end_);
+  const int64_t num_bytes = std::min(space, file_.size() - next);
+  if (num_bytes <= 0) return false;
+  file_.Read(next, block_.data() + end_, num_bytes);
+  end_ += static_cast<size_t>(num_bytes);
+  return true;
+}
+
+bool LineReader::Next(std::string_view* line) {
+  size_t searched = begin_;
+  const char* newline = nullptr;
+  while (true) {
+    newline =
+        static_cast<const char*>(std::memchr(block_.data() + searched, '\n', end_ - searched));
+    if (newline != nullptr) break;
+    const size_t pending = end_ - begin_;
+    if (pending == static_cast<size_t>(kBlockSize)) {
+      throw InputError(file_.path(), LinePosition(line_number_ + 1),
+                       "is longer than a megabyte, expected a line of text",
+                       "The file is damaged or of another kind");
+    }
+    const bool more = Refill();
+    if (!more) break;
+    searched = begin_ + pending;
+  }
+  if (newline == nullptr && begin_ == end_) return false;
+  const char* first = block_.data() + begin_;
+  const char* last = newline != nullptr ? newline : block_.data() + end_;
+  begin_ = static_cast<size_t>(last - block_.data()) + (newline != nullptr ? 1 : 0);
+  while (last > first && last[-1] == '\r') --last;
+  *line = std::string_view(first, static_cast<size_t>(last - first));
+  ++line_number_;
+  return true;
+}
+
+std::string Quoted(std::string_view text, size_t max_length) {
+  std::string quoted = "\"";
+  for (const char c : text.substr(0, max_length)) {
+    quoted += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
+  }
+  return quoted + (text.size() > max_length ? "...\"" : "\"");
+}
+
+}  // namespace roomtex

@@ -1,0 +1,62 @@
+#pragma once
+// Bytes and lines of a file, in large blocks and with checked positions: what the readers stand on.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace roomtex {
+
+// A file opened for reading at any position. All errors are InputErrors that name the file.
+class FileReader {
+ public:
+  // Throws when the file is missing, a folder, not a regular file or may not be read.
+  explicit FileReader(const std::string& path);
+  ~FileReader();
+  FileReader(const FileReader&) = delete;
+  FileReader& operator=(const FileReader&) = delete;
+
+  const std::string& path() const { return path_; }
+  int64_t size() const { return size_; }
+
+  // Reads exactly num_bytes at `offset`; throws when they are not there.
+  void Read(int64_t offset, void* target, int64_t num_bytes) const;
+  // At most max_bytes from `offset`, fewer at the end of the file.
+  std::string ReadSome(int64_t offset, int64_t max_bytes) const;
+
+ private:
+  std::string path_;
+  int fd_ = -1;
+  int64_t size_ = 0;
+};
+
+// The lines of a text file one after the other, without their line ends (LF, CR LF or CR CR LF).
+class LineReader {
+ public:
+  // The file must outlive this. `offset` is where line 1 starts.
+  explicit LineReader(const FileReader& file, int64_t offset = 0);
+
+  // Gives the next line, valid until the next call; false at the end of the file.
+  // Throws when a line is longer than a megabyte: that is no text file.
+  bool Next(std::string_view* line);
+  // Of the line given last, from 1.
+  long line_number() const { return line_number_; }
+  // Where the next line starts.
+  int64_t offset() const { return block_offset_ + static_cast<int64_t>(begin_); }
+  int64_t BytesLeft() const { return file_.size() - offset(); }
+
+ private:
+  bool Refill();
+
+  const FileReader& file_;
+  std::vector<char> block_;
+  int64_t block_offset_;  // of block_[0] in the file
+  size_t begin_ = 0, end_ = 0;
+  long line_number_ = 0;
+};
+
+// The text, shortened and with control bytes shown as '?', in double quotes: for messages.
+std::string Quoted(std::string_view text, size_t max_length = 40);
+
+}  // namespace roomtex

@@ -1,0 +1,43 @@
+#include "importers/length_unit.h"
+
+#include <cctype>
+#include <map>
+
+namespace roomtex {
+
+std::optional<double> MetersPerUnit(const std::string& name) {
+  static const std::map<std::string, double> kMeters = {{"m", 1.0},
+                                                        {"meter", 1.0},
+                                                        {"meters", 1.0},
+                                                        {"metre", 1.0},
+                                                        {"metres", 1.0},
+                                                        {"mm", 1e-3},
+                                                        {"millimeter", 1e-3},
+                                                        {"millimeters", 1e-3},
+                                                        {"millimetre", 1e-3},
+                                                        {"millimetres", 1e-3},
+                                                        {"cm", 1e-2},
+                                                        {"centimeter", 1e-2},
+                                                        {"centimeters", 1e-2},
+                                                        {"centimetre", 1e-2},
+                                                        {"centimetres", 1e-2},
+                                                        {"ft", 0.3048},
+                                                        {"foot", 0.3048},
+                                                        {"feet", 0.3048},
+                                                        {"in", 0.0254},
+                                                        {"inch", 0.0254},
+                                                        {"inches", 0.0254}};
+  std::string lower;
+  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto found = kMeters.find(lower);
+  if (found == kMeters.end()) return std::nullopt;
+  return found->second;
+}
+
+const std::vector<std::string>& LengthUnitNames() {
+  static const std::vector<std::string> kNames = {"meters", "millimeters", "centimeters", "feet",
+                                                  "inches"};
+  return kNames;
+}
+
+}  // namespace roomtex

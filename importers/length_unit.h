@@ -1,0 +1,17 @@
+#pragma once
+// Units of length in scan files.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace roomtex {
+
+// Metres per unit of the given name: "inches", "feet", "meters", "mm" ... in any case, singular,
+// plural or abbreviated. None for a name that is not known.
+std::optional<double> MetersPerUnit(const std::string& name);
+
+// The values of --units.
+const std::vector<std::string>& LengthUnitNames();
+
+}  // namespace roomtex

@@ -1,0 +1,400 @@
+#include "importers/pcd.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include <pcl/PCLPointCloud2.h>
+#include <pcl/console/print.h>
+#include <pcl/io/pcd_io.h>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/output_file.h"
+#include "importers/file_reader.h"
+#include "importers/up_axis.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int64_t kLongestHeader = 1 << 16;  // bytes
+constexpr int64_t kLargestPoint = 1 << 16;   // bytes of one point, all fields
+const char kDamaged[] = "The file is damaged: write it again";
+
+struct PcdField {
+  std::string name;
+  int size = 4;     // bytes
+  char type = 'F';  // F, I or U
+  int64_t count = 1;
+  int64_t offset = 0;  // bytes in a point, or columns in a line of an ascii file
+};
+
+struct PcdHeader {
+  std::vector<PcdField> fields;
+  int64_t width = 0, height = 1, points = -1;
+  Rigid viewpoint;
+  std::string data;  // "ascii", "binary" or "binary_compressed"
+  int64_t data_offset = 0, point_size = 0, values_per_point = 0;
+  long size_line = 0, data_line = 0;
+
+  const PcdField* Find(const std::string& name) const {
+    for (const PcdField& field : fields) {
+      if (field.name == name) return &field;
+    }
+    return nullptr;
+  }
+};
+
+std::vector<std::string> Words(std::string_view line) {
+  std::vector<std::string> words;
+  size_t at = 0;
+  while ((at = line.find_first_not_of(" \t", at)) != std::string_view::npos) {
+    const size_t end = std::min(line.find_first_of(" \t", at), line.size());
+    words.emplace_back(line.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+bool ParseWhole(const std::string& word, int64_t low, int64_t high, int64_t* number) {
+  const char* const end = word.data() + word.size();
+  const auto [next, error] = std::from_chars(word.data(), end, *number);
+  return error == std::errc() && next == end && *number >= low && *number <= high;
+}
+
+bool ParseReal(std::string_view word, double* number) {
+  const char* const end = word.data() + word.size();
+  const auto [next, error] = std::from_chars(word.data(), end, *number);
+  return error == std::errc() && next == end;
+}
+
+// PCL reads SIZE, COUNT and POINTS without comparing them with each other or with the bytes that
+// follow, so that a damaged header makes it read beyond its buffers: everything is checked here
+// first.
+class PcdHeaderParser {
+ public:
+  explicit PcdHeaderParser(const FileReader& file) : file_(file), lines_(file) {}
+
+  PcdHeader Parse() {
+    std::string_view line;
+    while (header_.data.empty()) {
+      if (lines_.offset() > kLongestHeader || !lines_.Next(&line)) {
+        throw InputError(file_.path(), BytePosition(lines_.offset()),
+                         "the header does not end: no DATA line up to here", kDamaged);
+      }
+      const std::vector<std::string> words = Words(line);
+      if (words.empty() || words[0][0] == '#') continue;
+      if (!ParseEntry(words))
+        throw Error("is " + Quoted(line) + ", which is no line of a PCD header");
+    }
+    header_.data_offset = lines_.offset();
+    CheckWhole();
+    return std::move(header_);
+  }
+
+ private:
+  InputError Error(const std::string& finding) const {
+    return InputError(file_.path(), LinePosition(lines_.line_number()), finding, kDamaged);
+  }
+
+  bool ParseEntry(const std::vector<std::string>& words) {
+    const std::string& key = words[0];
+    const size_t count = words.size() - 1;
+    if (key == "VERSION") return count == 1;
+    if (key == "FIELDS" || key == "COLUMNS") {
+      for (size_t i = 1; i <= count; ++i) header_.fields.push_back({words[i]});
+      return count > 0 && header_.fields.size() == count;
+    }
+    if (key == "SIZE" || key == "TYPE" || key == "COUNT") return ParsePerField(words);
+    if (key == "WIDTH") return count == 1 && ParseWhole(words[1], 0, 1LL << 40, &header_.width);
+    if (key == "HEIGHT") {
+      header_.size_line = lines_.line_number();
+      return count == 1 && ParseWhole(words[1], 0, 1LL << 40, &header_.height);
+    }
+    if (key == "POINTS") return count == 1 && ParseWhole(words[1], 0, 1LL << 60, &header_.points);
+    if (key == "VIEWPOINT") return ParseViewpoint(words);
+    if (key != "DATA" || count != 1) return false;
+    header_.data = words[1];
+    header_.data_line = lines_.line_number();
+    return words[1] == "ascii" || words[1] == "binary" || words[1] == "binary_compressed";
+  }
+
+  bool ParsePerField(const std::vector<std::string>& words) {
+    if (words.size() - 1 != header_.fields.size()) return false;
+    for (size_t i = 0; i < header_.fields.size(); ++i) {
+      PcdField& field = header_.fields[i];
+      const std::string& word = words[i + 1];
+      int64_t number = 0;
+      if (words[0] == "TYPE") {
+        if (word != "F" && word != "I" && word != "U") return false;
+        field.type = word[0];
+      } else if (words[0] == "SIZE") {
+        if (!ParseWhole(word, 1, 8, &number) || (number & (number - 1)) != 0) return false;
+        field.size = static_cast<int>(number);
+      } else if (!ParseWhole(word, 1, kLargestPoint, &field.count)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  bool ParseViewpoint(const std::vector<std::string>& words) {
+    double v[7];
+    if (words.size() != 8) return false;
+    for (int i = 0; i < 7; ++i) {
+      if (!ParseReal(words[i + 1], &v[i]) || !std::isfinite(v[i])) return false;
+    }
+    const Eigen::Quaterniond rotation = QuaternionFromWxyz({v[3], v[4], v[5], v[6]});
+    if (!(rotation.norm() > 1e-6)) return false;
+    header_.viewpoint = {rotation.normalized(), {v[0], v[1], v[2]}};
+    return true;
+  }
+
+  void CheckWhole() {
+    for (const char* name : {"x", "y", "z"}) {
+      const PcdField* field = header_.Find(name);
+      if (field == nullptr || field->type != 'F' || field->size < 4 || field->count != 1) {
+        throw Error(std::string("the header ends without a float field ") + name);
+      }
+    }
+    for (PcdField& field : header_.fields) {
+      field.offset = header_.data == "ascii" ? header_.values_per_point : header_.point_size;
+      header_.point_size += field.size * field.count;
+      header_.values_per_point += field.count;
+      if (header_.point_size > kLargestPoint || (field.type == 'F' && field.size < 4)) {
+        throw Error("the field " + field.name + " has an impossible size");
+      }
+    }
+    if (header_.height <= 1) {
+      throw InputError(file_.path(), header_.size_line > 0 ? LinePosition(header_.size_line) : "",
+                       "is a cloud without a grid (HEIGHT 1)",
+                       "Export it organised (HEIGHT = number of rows), or as PTX");
+    }
+    const double cells = static_cast<double>(header_.width) * static_cast<double>(header_.height);
+    if (header_.width < 1 || cells > std::numeric_limits<int>::max() ||
+        (header_.points >= 0 && static_cast<double>(header_.points) != cells)) {
+      throw Error("WIDTH " + std::to_string(header_.width) + " x HEIGHT " +
+                  std::to_string(header_.height) + " and POINTS " + std::to_string(header_.points) +
+                  " do not make a grid");
+    }
+    CheckDataSize(static_cast<int64_t>(cells));
+  }
+
+  void CheckDataSize(int64_t num_points) {
+    const int64_t left = file_.size() - header_.data_offset;
+    const int64_t data_size = num_points * header_.point_size;
+    const auto fail = [&](const std::string& expected) {
+      throw InputError(
+          file_.path(), BytePosition(header_.data_offset),
+          std::to_string(left) + " bytes of data follow the header, expected " + expected,
+          left < data_size ? "The file is cut off: copy it again" : kDamaged);
+    };
+    if (header_.data == "ascii") {
+      const int64_t shortest = 2 * header_.values_per_point * num_points - 1;
+      if (left < shortest) fail("at least " + std::to_string(shortest));
+    } else if (header_.data == "binary") {
+      if (left != data_size) fail(std::to_string(data_size));
+    } else {
+      uint32_t sizes[2] = {0, 0};
+      if (left < 8) fail("at least 8");
+      file_.Read(header_.data_offset, sizes, 8);
+      if (sizes[0] != left - 8) fail(std::to_string(8 + static_cast<int64_t>(sizes[0])));
+      // A reference of LZF, 3 bytes, stands for at most 264.
+      if (sizes[1] != data_size || sizes[1] > 100 * static_cast<int64_t>(sizes[0])) {
+        throw InputError(file_.path(), BytePosition(header_.data_offset + 4),
+                         "says " + std::to_string(sizes[1]) + " bytes after decompression of " +
+                             std::to_string(sizes[0]) + ", expected " + std::to_string(data_size),
+                         kDamaged);
+      }
+    }
+  }
+
+  const FileReader& file_;
+  LineReader lines_;
+  PcdHeader header_;
+};
+
+double ValueAt(const uint8_t* bytes, char type, int size) {
+  const auto as = [bytes](auto value) {
+    std::memcpy(&value, bytes, sizeof(value));
+    return static_cast<double>(value);
+  };
+  if (type == 'F') return size == 4 ? as(float{}) : as(double{});
+  if (type == 'I') {
+    return size == 1   ? as(int8_t{})
+           : size == 2 ? as(int16_t{})
+           : size == 4 ? as(int32_t{})
+                       : as(int64_t{});
+  }
+  return size == 1   ? as(uint8_t{})
+         : size == 2 ? as(uint16_t{})
+         : size == 4 ? as(uint32_t{})
+                     : as(uint64_t{});
+}
+
+class PcdFiller {
+ public:
+  PcdFiller(const PcdHeader& header, const PcdOptions& options, Scan* scan)
+      : options_(options), scan_(scan) {
+    scan->num_columns = static_cast<int>(header.width);
+    scan->num_rows = static_cast<int>(header.height);
+    scan->scan_from_station = header.viewpoint;
+    scan->scan_from_station.translation *= options.meters_per_unit;
+    scan->points.resize(static_cast<size_t>(header.width * header.height));
+    scan->intensity.resize(scan->points.size());
+  }
+
+  void Set(int cell, const Eigen::Vector3d& x_in_file, double intensity) {
+    const Eigen::Vector3d point = options_.meters_per_unit * x_in_file;
+    const double range = (point - scan_->Station()).norm();
+    const bool measured = std::isfinite(range) && range > 0 &&
+                          (options_.max_range <= 0 || range <= options_.max_range);
+    scan_->points[cell] = measured ? point : Scan::MissingPoint();
+    scan_->intensity[cell] =
+        measured && std::isfinite(intensity) ? static_cast<float>(intensity) : 0.0f;
+  }
+
+ private:
+  PcdOptions options_;
+  Scan* scan_;
+};
+
+// The lines were counted by value already for their check, so their numbers are taken from here.
+void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* filler) {
+  LineReader lines(file, header.data_offset);
+  const auto error = [&](const std::string& finding) {
+    return InputError(file.path(),
+                      LinePosition(header.data_line + std::max(1L, lines.line_number())), finding,
+                      kDamaged);
+  };
+  const PcdField* const intensity = header.Find("intensity");
+  const int64_t offsets[3] = {header.Find("x")->offset, header.Find("y")->offset,
+                              header.Find("z")->offset};
+  std::vector<double> values(static_cast<size_t>(header.values_per_point));
+  std::string_view line;
+  for (int64_t cell = 0; cell < header.width * header.height;) {
+    if (!lines.Next(&line)) {
+      throw error("the file ends after " + std::to_string(cell) + " of " +
+                  std::to_string(header.width * header.height) + " points");
+    }
+    const std::vector<std::string> words = Words(line);
+    if (words.empty()) continue;
+    bool good = words.size() == values.size();
+    for (size_t i = 0; good && i < words.size(); ++i) good = ParseReal(words[i], &values[i]);
+    if (!good) {
+      throw error("is " + Quoted(line) + ", expected " + std::to_string(values.size()) +
+                  " numbers");
+    }
+    filler->Set(static_cast<int>(cell++),
+                {values[offsets[0]], values[offsets[1]], values[offsets[2]]},
+                intensity != nullptr ? values[intensity->offset] : 0);
+  }
+  while (lines.Next(&line)) {
+    if (!Words(line).empty()) throw error("is " + Quoted(line) + ", expected the end of the file");
+  }
+}
+
+void ReadBinary(const FileReader& file, const PcdHeader& header, PcdFiller* filler) {
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // a library prints nothing
+  pcl::PCLPointCloud2 cloud;
+  bool good = false;
+  try {
+    Eigen::Vector4f origin;
+    Eigen::Quaternionf orientation;
+    int version = 0;
+    good = pcl::PCDReader().read(file.path(), cloud, origin, orientation, version) >= 0;
+  } catch (const std::exception&) {
+    good = false;
+  }
+  const size_t num_points = static_cast<size_t>(header.width * header.height);
+  if (!good || cloud.data.size() < num_points * cloud.point_step || cloud.point_step == 0) {
+    throw InputError(file.path(), BytePosition(header.data_offset), "the data cannot be decoded",
+                     kDamaged);
+  }
+  // PCL may leave out padding fields, so that its offsets are not those of the file.
+  const auto offset_in_cloud = [&](const std::string& name) -> int64_t {
+    for (const auto& field : cloud.fields) {
+      if (field.name == name) return field.offset;
+    }
+    return -1;
+  };
+  const PcdField* fields[4] = {header.Find("x"), header.Find("y"), header.Find("z"),
+                               header.Find("intensity")};
+  int64_t offsets[4] = {-1, -1, -1, -1};
+  for (int k = 0; k < 4; ++k) {
+    if (fields[k] != nullptr) offsets[k] = offset_in_cloud(fields[k]->name);
+    if ((offsets[k] < 0 || offsets[k] + fields[k]->size > cloud.point_step) && k < 3) {
+      throw InputError(file.path(), "", "PCL finds no field " + fields[k]->name, kDamaged);
+    }
+  }
+  for (size_t cell = 0; cell < num_points; ++cell) {
+    const uint8_t* const bytes = cloud.data.data() + cell * cloud.point_step;
+    double values[4] = {0, 0, 0, 0};
+    for (int k = 0; k < 4; ++k) {
+      if (offsets[k] >= 0)
+        values[k] = ValueAt(bytes + offsets[k], fields[k]->type, fields[k]->size);
+    }
+    filler->Set(static_cast<int>(cell), {values[0], values[1], values[2]}, values[3]);
+  }
+}
+
+}  // namespace
+
+Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind) {
+  const FileReader file(path);
+  const PcdHeader header = PcdHeaderParser(file).Parse();
+  Scan scan;
+  scan.path = path;
+  PcdFiller filler(header, options, &scan);
+  if (header.data == "ascii") {
+    ReadAscii(file, header, &filler);
+  } else {
+    ReadBinary(file, header, &filler);
+  }
+  if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
+    throw InputError(path, "", "holds no measured sample",
+                     options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
+  }
+  scan.up = FindUpAxis(scan);
+  if (data_kind != nullptr) *data_kind = header.data;
+  return scan;
+}
+
+bool NeedsDouble(const Scan& scan) {
+  const Bounds bounds = FindBounds(scan);
+  return bounds.min.cwiseAbs().maxCoeff() > kLargeCoordinate ||
+         bounds.max.cwiseAbs().maxCoeff() > kLargeCoordinate;
+}
+
+void WritePcd(const Scan& scan, const std::string& path) {
+  if (!scan.organised) throw std::invalid_argument("WritePcd needs an organised scan");
+  const bool as_double = NeedsDouble(scan);
+  OutputFile output(path);
+  std::ostream& stream = output.stream();
+  const char* const size = as_double ? "8" : "4";
+  stream << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\nSIZE "
+         << size << ' ' << size << ' ' << size << " 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH "
+         << scan.num_columns << "\nHEIGHT " << scan.num_rows << "\nVIEWPOINT";
+  const Eigen::Vector4d wxyz = WxyzFromQuaternion(scan.scan_from_station.rotation);
+  stream.precision(17);
+  for (int i = 0; i < 3; ++i) stream << ' ' << scan.Station()[i];
+  for (int i = 0; i < 4; ++i) stream << ' ' << wxyz[i];
+  stream << "\nPOINTS " << scan.points.size() << "\nDATA binary\n";
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (as_double) {
+      stream.write(reinterpret_cast<const char*>(scan.points[i].data()), 3 * sizeof(double));
+    } else {
+      const Eigen::Vector3f point = scan.points[i].cast<float>();
+      stream.write(reinterpret_cast<const char*>(point.data()), 3 * sizeof(float));
+    }
+    stream.write(reinterpret_cast<const char*>(&scan.intensity[i]), sizeof(float));
+  }
+  output.Commit();
+}
+
+}  // namespace roomtex

@@ -1,0 +1,29 @@
+#pragma once
+// PCD, the point cloud file of PCL: organised clouds only (height > 1), so that the grid is known.
+
+#include <string>
+
+#include "core/scan.h"
+
+namespace roomtex {
+
+struct PcdOptions {
+  double meters_per_unit = 1;
+  double max_range = 0;  // metres from the scanner; 0 = no limit
+};
+
+// Reads ascii, binary and binary_compressed (version 0.6 and 0.7) with fields x, y, z (float or
+// double) and, if there, intensity; other fields are skipped. Row 0 is the top row, NaN = missing,
+// points are in the scan frame and VIEWPOINT is scan_from_station. Throws InputError with line or
+// byte; a cloud without a grid is refused. data_kind: what the DATA line says, may be null.
+Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind = nullptr);
+
+// Binary x, y, z, intensity; x, y, z as double when a coordinate exceeds 10 000 (kLargeCoordinate).
+void WritePcd(const Scan& scan, const std::string& path);
+
+// Beyond this many metres a float is coarser than a millimetre.
+inline constexpr double kLargeCoordinate = 1e4;
+// Whether x, y, z of the scan must be written as double.
+bool NeedsDouble(const Scan& scan);
+
+}  // namespace roomtex

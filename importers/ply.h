@@ -1,0 +1,33 @@
+#pragma once
+// PLY triangle meshes.
+
+#include <string>
+#include <vector>
+
+#include "core/scan.h"
+
+namespace roomtex {
+
+struct PlyOptions {
+  double meters_per_unit = 1;
+  double max_range =
+      0;  // metres from the origin (or the station that our own files name); 0 = no limit
+};
+
+// Reads ascii and binary files of both byte orders: vertices x, y, z and, if there, intensity
+// (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles. Other
+// elements and properties are skipped. The scan is not organised; `up` and station come from our
+// own files' comments, otherwise z and the origin. Throws InputError with line or byte; a cloud
+// without faces is refused. format: "ascii", "little" or "big" endian; may be null.
+Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr);
+
+// Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate, pcd.h), intensity
+// float; faces. triangles index scan.points; missing samples are left out. Several scans become one
+// mesh.
+struct PlyPart {
+  const Scan* scan;
+  const std::vector<Triangle>* triangles;
+};
+void WritePly(const std::vector<PlyPart>& parts, const std::string& path);
+
+}  // namespace roomtex

@@ -1,0 +1,227 @@
+// roomtex-import: a range scan in, mesh, cloud, intensity image or another scan format out.
+
+#include <filesystem>
+#include <iostream>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/scan_mesh.h"
+#include "importers/length_unit.h"
+#include "importers/ply.h"
+#include "importers/ptx.h"
+#include "importers/rtpi.h"
+#include "importers/scan_reader.h"
+#include "importers/scan_writer.h"
+
+namespace fs = std::filesystem;
+namespace roomtex {
+namespace {
+
+struct ImportOptions {
+  std::string input_path;
+  std::vector<std::string> output_paths;
+  ScanReaderOptions reader;
+  ScanMeshOptions mesh;
+};
+
+bool IsSameFile(const std::string& a, const std::string& b) {
+  std::error_code error;
+  if (fs::equivalent(a, b, error) && !error) return true;
+  return fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error) && !error;
+}
+
+void CheckOutputs(const ImportOptions& options) {
+  std::vector<std::string> problems;
+  std::string known;
+  for (const std::string& extension : ScanWriterExtensions()) {
+    known += (known.empty() ? "" : ", ") + extension;
+  }
+  for (size_t i = 0; i < options.output_paths.size(); ++i) {
+    const std::string& path = options.output_paths[i];
+    if (ScanWriterExtension(path).empty()) {
+      problems.push_back("--output_path " + path + ": unknown extension, expected one of " + known);
+    }
+    if (IsSameFile(path, options.input_path)) {
+      problems.push_back("--output_path " + path + " is the input: give another path");
+    }
+    for (size_t k = 0; k < i; ++k) {
+      if (IsSameFile(path, options.output_paths[k])) {
+        problems.push_back("--output_path " + path + " is given twice");
+      }
+    }
+  }
+  for (const std::string& problem : options.reader.Problems()) problems.push_back(problem);
+  for (const std::string& problem : options.mesh.Problems()) problems.push_back(problem);
+  ThrowIfProblems(problems);
+  // An output that cannot be written is better known before a large scan was read.
+  for (const std::string& path : options.output_paths) OutputFile probe(path);
+}
+
+// RTPI to RTPI keeps every sample as it stands, also those that no cell of the grid has.
+void CopyRtpi(const ImportOptions& options, const std::string& output_path) {
+  RtpiFile file = ReadRtpi(options.input_path);
+  file.header.version = 3;
+  if (!options.reader.units.empty()) {
+    file.header.units = options.reader.units;
+  }
+  if (options.reader.max_range > 0) {
+    const double meters = MetersPerUnit(file.header.units).value_or(1);
+    file.header.max_range = options.reader.max_range / meters;
+  }
+  WriteRtpi(file, output_path);
+}
+
+// "room.pcd", 2 -> "room_2.pcd".
+std::string NumberedPath(const std::string& path, size_t number) {
+  const fs::path p(path);
+  return (p.parent_path() /
+          (p.stem().string() + "_" + std::to_string(number) + p.extension().string()))
+      .string();
+}
+
+class Importer {
+ public:
+  Importer(const ImportOptions& options, const Command::Context& context)
+      : options_(options), context_(context) {}
+
+  void Run() {
+    CheckOutputs(options_);
+    context_.progress.Stage("read scan");
+    file_ = ReadScanFile(options_.input_path, options_.reader);
+    for (const std::string& note : file_.notes) context_.Warn(note);
+    CheckGrid();
+    context_.progress.Stage("triangulate");
+    for (const Scan& scan : file_.scans) meshes_.push_back(BuildScanMesh(scan, options_.mesh));
+    FillReport();
+    context_.progress.Stage("write", static_cast<int>(options_.output_paths.size()));
+    std::string answer = Summary();
+    for (const std::string& path : options_.output_paths) {
+      for (const std::string& written : Write(path)) answer += written + "\n";
+      context_.progress.Tick();
+    }
+    context_.progress.Finish();
+    std::cout << answer;
+  }
+
+ private:
+  // Before anything is written: a mesh without a grid has only one way to go.
+  void CheckGrid() const {
+    if (file_.scans.front().organised) return;
+    for (const std::string& path : options_.output_paths) {
+      if (ScanWriterExtension(path) == ".ply") continue;
+      throw InputError(options_.input_path, "",
+                       "is a mesh without a grid, which cannot be written as " + path,
+                       "Write a .ply, or give the scan with its grid (RTPI, PTX or organised PCD)");
+    }
+  }
+
+  // Paths of the files written for one --output_path.
+  std::vector<std::string> Write(const std::string& path) const {
+    const std::string extension = ScanWriterExtension(path);
+    const ScanWriterOptions writer{options_.reader.azimuth == "counterclockwise"};
+    if (extension == ".rtpi" && file_.format == "RTPI") {
+      CopyRtpi(options_, path);
+    } else if (file_.scans.size() == 1) {
+      WriteScan(file_.scans[0], meshes_[0], path, writer);
+    } else if (extension == ".ptx") {
+      WritePtx(file_.scans, path);
+    } else if (extension == ".ply") {
+      std::vector<PlyPart> parts;
+      for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
+      WritePly(parts, path);
+    } else {
+      std::vector<std::string> written;
+      for (size_t i = 0; i < meshes_.size(); ++i) {
+        written.push_back(NumberedPath(path, i + 1));
+        WriteScan(file_.scans[i], meshes_[i], written.back(), writer);
+      }
+      return written;
+    }
+    return {path};
+  }
+
+  static Json ScanReport(const Scan& scan, size_t num_triangles) {
+    const int num_missing = scan.NumMissing();
+    Json json;
+    json["num_columns"] = scan.num_columns;
+    json["num_rows"] = scan.num_rows;
+    json["num_samples"] = static_cast<int>(scan.points.size()) - num_missing;
+    json["num_missing"] = num_missing;
+    json["num_triangles"] = num_triangles;
+    return json;
+  }
+
+  void FillReport() {
+    Json total = ScanReport(file_.scans[0], meshes_[0].size());
+    Json each = Json::array({total});
+    Bounds bounds = FindBounds(file_.scans[0]);
+    for (size_t i = 1; i < file_.scans.size(); ++i) {
+      const Json one = ScanReport(file_.scans[i], meshes_[i].size());
+      each.push_back(one);
+      for (const char* key : {"num_columns", "num_samples", "num_missing", "num_triangles"}) {
+        total[key] = total[key].get<int64_t>() + one[key].get<int64_t>();
+      }
+      total["num_rows"] = std::max(total["num_rows"].get<int>(), one["num_rows"].get<int>());
+      const Bounds more = FindBounds(file_.scans[i]);
+      bounds.min = bounds.min.cwiseMin(more.min);
+      bounds.max = bounds.max.cwiseMax(more.max);
+    }
+    for (const auto& [key, value] : total.items()) context_.report[key] = value;
+    context_.report["format"] = file_.format;
+    context_.report["byte_order"] = file_.byte_order;
+    context_.report["bounds"] = {{"min", ToJson(bounds.min)}, {"max", ToJson(bounds.max)}};
+    if (each.size() > 1) context_.report["scans"] = each;
+    if (each.size() > 1) {
+      context_.progress.Note(std::to_string(each.size()) +
+                             " scans: .ply and .ptx hold all of them, other outputs are numbered");
+    }
+  }
+
+  std::string Summary() const {
+    std::string text = options_.input_path + ": " + file_.format + ", ";
+    if (file_.scans.size() > 1) text += std::to_string(file_.scans.size()) + " scans, ";
+    const Json& keys = context_.report.keys();
+    if (file_.scans.front().organised) {
+      text += keys["num_columns"].dump() + " columns x " + keys["num_rows"].dump() + " rows, ";
+    }
+    return text + keys["num_samples"].dump() + " samples, " + keys["num_missing"].dump() +
+           " missing, " + keys["num_triangles"].dump() + " triangles\n";
+  }
+
+  const ImportOptions& options_;
+  const Command::Context& context_;
+  ScanFile file_;
+  std::vector<std::vector<Triangle>> meshes_;
+};
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  using roomtex::Command;
+  roomtex::ImportOptions options;
+  Command command(
+      "roomtex-import",
+      "Reads a range scan (RTPI, PTX, organised PCD; PLY meshes) and writes it as mesh, "
+      "cloud, intensity image or scan. The content of the input decides its format, "
+      "the extension of an output its own.",
+      "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
+  command.AddInputPath("input_path", &options.input_path,
+                       "The scan. A PTX may hold several: .ply and .ptx outputs then hold all of "
+                       "them, the others are written one per scan as NAME_1, NAME_2 ...");
+  command.AddOutputPaths("output_path", &options.output_paths,
+                         "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
+                         "image, .rtpi (RTPI 3.0) or .ptx.");
+  AddScanReaderOptions(&options.reader, &command);
+  command.AddDouble("Mesh.max_edge_ratio", &options.mesh.max_edge_ratio,
+                    "Neighbouring samples are connected if they are at most this many times as far "
+                    "apart as on a surface that faces the scanner. Larger = connects over larger "
+                    "depth steps.");
+  command.AddDouble("Mesh.max_bend", &options.mesh.max_bend,
+                    "An edge on a slanted surface is kept if the step in inverse range beside it "
+                    "differs by at most this share. Larger = more tolerant.");
+  return command.Run(argc, argv, [&options](const Command::Context& context) {
+    roomtex::Importer(options, context).Run();
+  });
+}

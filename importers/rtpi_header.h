@@ -1,0 +1,48 @@
+#pragma once
+// The ASCII header of an RTPI file (rtpi.h).
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "importers/file_reader.h"
+
+namespace roomtex {
+
+// Numbers are those of the file: angles in degrees, lengths in `units`. Lines are kept without
+// their end.
+struct RtpiHeader {
+  int version = 3;                  // 3 ("RTPI_version_3.0") or 2 ("RTPIv2")
+  std::vector<std::string> device;  // lines before the scan parameters ("# model: deltaSphere3000")
+  bool has_color = false;
+  std::string units;                                                   // "" = not said
+  std::optional<std::array<double, 2>> az_fov, el_fov;                 // degrees, as in the file
+  std::optional<double> samples_per_degree_az, samples_per_degree_el;  // curr_: those of this file
+  std::optional<double> max_range;                                     // largest reliable range
+  std::vector<std::string> parameters;  // all other lines of the scan parameters ("# filter1: ...")
+  std::vector<std::string> comments;    // free lines, "# " included
+};
+
+// What is needed to read the columns that follow the header.
+struct RtpiLayout {
+  RtpiHeader header;
+  int64_t num_columns = 0;
+  std::optional<int64_t> max_samples_per_column;
+  int64_t body_offset = 0;  // byte of the first column count
+  long num_columns_line = 0;
+};
+
+// Whether these first bytes of a file are those of an RTPI file of any version.
+bool LooksLikeRtpi(const std::string& first_bytes);
+
+// Tolerates CR LF, unknown and missing lines, values on the next line, en dashes as minus signs.
+// Throws InputError (not RTPI, version 1, no end of the header, a number that is none).
+RtpiLayout ReadRtpiHeader(const FileReader& file);
+
+// The text of the header, its last newline included.
+std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns,
+                           int64_t max_samples_per_column);
+
+}  // namespace roomtex

@@ -1,0 +1,205 @@
+#include "importers/scan_reader.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "importers/file_reader.h"
+#include "importers/length_unit.h"
+#include "importers/pcd.h"
+#include "importers/ply.h"
+#include "importers/ptx.h"
+#include "importers/rtpi.h"
+#include "importers/scan_poses.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
+const char kKnownFormats[] =
+    "Give an RTPI, a PTX, an organised PCD or a PLY mesh (the content counts, not the name)";
+
+bool StartsWith(std::string_view text, std::string_view start) {
+  return text.substr(0, start.size()) == start;
+}
+
+// The next line of the text, removed from it.
+std::string_view TakeLine(std::string_view* text) {
+  const size_t newline = std::min(text->find('\n'), text->size());
+  std::string_view line = text->substr(0, newline);
+  text->remove_prefix(std::min(newline + 1, text->size()));
+  while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) {
+    line.remove_suffix(1);
+  }
+  while (!line.empty() && std::isspace(static_cast<unsigned char>(line.front()))) {
+    line.remove_prefix(1);
+  }
+  return line;
+}
+
+bool IsWholeNumber(std::string_view line) {
+  return !line.empty() && line.size() < 16 &&
+         std::all_of(line.begin(), line.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+// PCD files begin with comments and then one of the header's keywords.
+bool LooksLikePcd(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const std::string_view line = TakeLine(&bytes);
+    if (line.empty() || StartsWith(line, "#")) continue;
+    for (const char* keyword : {"VERSION", "FIELDS", "COLUMNS"}) {
+      if (StartsWith(line, keyword)) return true;
+    }
+    return false;
+  }
+  return false;
+}
+
+// A PTX begins with two lines of one whole number each (also damaged ones: the reader says what is
+// wrong).
+bool LooksLikePtx(std::string_view bytes) {
+  std::string_view line;
+  while (!bytes.empty() && line.empty()) line = TakeLine(&bytes);
+  if (!IsWholeNumber(line)) return false;
+  line = TakeLine(&bytes);
+  return line.empty() || IsWholeNumber(StartsWith(line, "-") ? line.substr(1) : line);
+}
+
+// The name of a format that users may take for a scan, "" if it is none of these.
+std::string ForeignFormat(std::string_view bytes) {
+  static const std::pair<std::string_view, const char*> kMagics[] = {
+      {"ASTM-E57", "an E57 file"},     {"LASF", "a LAS or LAZ file"},
+      {"PK\x03\x04", "a zip archive"}, {"\x1f\x8b", "a gzip file"},
+      {"\x89PNG", "a PNG image"},      {"\xff\xd8", "a JPEG photo"},
+      {"glTF", "a glTF model"},        {"OFF", "an OFF mesh"},
+      {"solid ", "an STL mesh"},       {"SQLite format", "a database"}};
+  for (const auto& [magic, name] : kMagics) {
+    if (StartsWith(bytes, magic)) return name;
+  }
+  return "";
+}
+
+double MetersPerUnitOr(const std::string& units, double otherwise) {
+  return units.empty() ? otherwise : MetersPerUnit(units).value_or(otherwise);
+}
+
+ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
+  const RtpiFile rtpi = ReadRtpi(path);
+  ScanFile file;
+  file.format = "RTPI";
+  file.byte_order = rtpi.byte_order == ByteOrder::kBig ? "big" : "little";
+  RtpiScanOptions scan_options;
+  scan_options.counterclockwise = options.azimuth == "counterclockwise";
+  scan_options.meters_per_unit = MetersPerUnitOr(options.units, 0);
+  scan_options.max_range = options.max_range;
+  file.scans.push_back(ScanFromRtpi(rtpi, scan_options, &file.notes));
+  return file;
+}
+
+}  // namespace
+
+std::vector<std::string> ScanReaderOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (azimuth != "clockwise" && azimuth != "counterclockwise") {
+    problems.push_back("--azimuth must be clockwise or counterclockwise, is " + azimuth);
+  }
+  if (!units.empty() && !MetersPerUnit(units)) {
+    problems.push_back("--units must be meters, millimeters, centimeters, feet or inches, is " +
+                       units);
+  }
+  if (!(max_range >= 0) || !std::isfinite(max_range)) {
+    problems.push_back("--max_range must be 0 (no limit) or a number of metres");
+  }
+  return problems;
+}
+
+void AddScanReaderOptions(ScanReaderOptions* options, Command* command) {
+  command->AddChoice("azimuth", &options->azimuth, {"clockwise", "counterclockwise"},
+                     "RTPI: sense in which the azimuth grows, seen from above. clockwise is the "
+                     "thesis' formula; files of real scanners are counterclockwise. The wrong one "
+                     "mirrors the room.");
+  command->AddChoice("units", &options->units, LengthUnitNames(),
+                     "Unit of the lengths in the scan file; not given = what the file says, metres "
+                     "if it does not.");
+  command->AddDouble("max_range", &options->max_range,
+                     "Metres; samples farther from the scanner count as missing. 0 = the limit "
+                     "that the file gives, if any.");
+}
+
+ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
+  ThrowIfProblems(options.Problems());
+  std::string start;
+  {
+    const FileReader reader(path);
+    if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
+    start = reader.ReadSome(0, kLookAt);
+  }
+  if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
+  const double meters_per_unit = MetersPerUnitOr(options.units, 1);
+  ScanFile file;
+  if (StartsWith(start, "ply\n") || StartsWith(start, "ply\r")) {
+    file.format = "PLY";
+    file.scans.push_back(ReadPly(path, {meters_per_unit, options.max_range}, &file.byte_order));
+  } else if (LooksLikePcd(start)) {
+    file.format = "PCD";
+    file.scans.push_back(ReadPcd(path, {meters_per_unit, options.max_range}, &file.byte_order));
+    file.byte_order = file.byte_order == "ascii" ? "text" : "little";
+  } else if (LooksLikePtx(start)) {
+    file.format = "PTX";
+    file.byte_order = "text";
+    file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
+  } else {
+    const std::string foreign = ForeignFormat(start);
+    throw InputError(path, BytePosition(0),
+                     foreign.empty()
+                         ? "begins with " + Quoted(start, 16) + ", which is no scan format"
+                         : "is " + foreign + ", expected a range scan",
+                     kKnownFormats);
+  }
+  if (file.byte_order == "ascii") file.byte_order = "text";
+  return file;
+}
+
+Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
+  ScanFile file = ReadScanFile(path, options);
+  if (file.scans.size() > 1) {
+    throw InputError(path, "",
+                     "holds " + std::to_string(file.scans.size()) + " scans, expected one",
+                     "Split it, or use a command that takes several scans");
+  }
+  return std::move(file.scans.front());
+}
+
+std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,
+                            const ScanReaderOptions& options) {
+  if (paths.empty()) throw UsageError("--scan_path is missing");
+  ScanPoses poses(poses_path);
+  std::vector<Scan> scans;
+  std::vector<std::string> without_pose;
+  for (const std::string& path : paths) {
+    ScanFile file = ReadScanFile(path, options);
+    const int count = static_cast<int>(file.scans.size());
+    for (int k = 0; k < count; ++k) {
+      const std::optional<Rigid> pose = poses.Take(path, k, count);
+      if (pose) {
+        PlaceScan(*pose, &file.scans[k]);
+      } else if (file.format != "PTX") {
+        without_pose.push_back(path);
+      }
+      scans.push_back(std::move(file.scans[k]));
+    }
+  }
+  poses.RequireAllTaken();
+  if (scans.size() > 1 && !without_pose.empty()) {
+    throw InputError(without_pose.front(), "",
+                     "has no pose, but there are " + std::to_string(scans.size()) + " scans",
+                     "Give each scan's pose with --scan_poses");
+  }
+  return scans;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,66 @@
+#include "importers/scan_writer.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include <opencv2/core/mat.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/error.h"
+#include "core/output_file.h"
+#include "importers/pcd.h"
+#include "importers/ply.h"
+#include "importers/ptx.h"
+#include "importers/rtpi.h"
+
+namespace roomtex {
+namespace {
+
+void WriteIntensityImage(const Scan& scan, const std::string& path) {
+  std::vector<uint8_t> grey = IntensityAsGrey(scan);
+  const cv::Mat image(scan.num_rows, scan.num_columns, CV_8UC1, grey.data());
+  std::vector<uint8_t> png;
+  if (!cv::imencode(".png", image, png)) {
+    throw InputError(path, "", "the image cannot be encoded", "Decimate the scan");
+  }
+  OutputFile output(path);
+  output.stream().write(reinterpret_cast<const char*>(png.data()),
+                        static_cast<std::streamsize>(png.size()));
+  output.Commit();
+}
+
+}  // namespace
+
+const std::vector<std::string>& ScanWriterExtensions() {
+  static const std::vector<std::string> kExtensions = {".ply", ".pcd", ".png", ".rtpi", ".ptx"};
+  return kExtensions;
+}
+
+std::string ScanWriterExtension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto& known = ScanWriterExtensions();
+  return std::find(known.begin(), known.end(), extension) != known.end() ? extension : "";
+}
+
+void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,
+               const ScanWriterOptions& options) {
+  const std::string extension = ScanWriterExtension(path);
+  if (extension.empty()) {
+    throw UsageError(path +
+                     ": the extension names no known format (.ply, .pcd, .png, .rtpi, .ptx)");
+  }
+  if (!scan.organised && extension != ".ply") {
+    throw InputError(scan.path, "",
+                     "is a mesh without a grid, which cannot be written as " + extension,
+                     "Write a .ply, or give the scan with its grid (RTPI, PTX or organised PCD)");
+  }
+  if (extension == ".ply") WritePly({{&scan, &triangles}}, path);
+  if (extension == ".pcd") WritePcd(scan, path);
+  if (extension == ".png") WriteIntensityImage(scan, path);
+  if (extension == ".rtpi") WriteRtpi(RtpiFromScan(scan, options.counterclockwise), path);
+  if (extension == ".ptx") WritePtx({scan}, path);
+}
+
+}  // namespace roomtex
