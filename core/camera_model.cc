@@ -53,9 +53,9 @@ bool IsDistorted(CameraModel model) {
   return model != CameraModel::kSimplePinhole && model != CameraModel::kPinhole;
 }
 
-// The radius up to which the distortion is one-to-one: along each of 16 directions the first one where its
-// Jacobian is no longer positive definite enough to be inverted; the smallest over the directions.
-// Steps are equal in angle, up to 89.5 degrees off the optical axis.
+// The radius up to which the distortion is one-to-one: along each of 16 directions the first one
+// where its Jacobian is no longer positive definite enough to be inverted; the smallest over the
+// directions. Steps are equal in angle, up to 89.5 degrees off the optical axis.
 double MaxRadius(const Camera& camera) {
   if (!IsDistorted(camera.model)) return std::numeric_limits<double>::infinity();
   constexpr int kNumDirections = 16, kNumSteps = 900;
@@ -127,7 +127,7 @@ CameraProjection::CameraProjection(const Camera& camera)
     : camera_(camera), max_radius_(MaxRadius(camera)) {}
 
 std::optional<Eigen::Vector2d> CameraProjection::ImgFromCam(const Eigen::Vector3d& x_in_cam) const {
-  if (!(x_in_cam.z() > 1e-12)) return std::nullopt;
+  if (!(x_in_cam.z() > 1e-12) || !x_in_cam.allFinite()) return std::nullopt;
   const double x = x_in_cam.x() / x_in_cam.z();
   const double y = x_in_cam.y() / x_in_cam.z();
   if (x * x + y * y > max_radius_ * max_radius_) return std::nullopt;
@@ -138,6 +138,7 @@ std::optional<Eigen::Vector2d> CameraProjection::ImgFromCam(const Eigen::Vector3
 }
 
 std::optional<Eigen::Vector2d> CameraProjection::CamFromImg(const Eigen::Vector2d& x_in_img) const {
+  if (!x_in_img.allFinite()) return std::nullopt;
   const std::vector<double>& p = camera_.params;
   const Eigen::Vector2d target =
       camera_formulas::HasOneFocalLength(camera_.model)
@@ -145,7 +146,8 @@ std::optional<Eigen::Vector2d> CameraProjection::CamFromImg(const Eigen::Vector2
           : Eigen::Vector2d((x_in_img.x() - p[2]) / p[0], (x_in_img.y() - p[3]) / p[1]);
   if (!IsDistorted(camera_.model)) return target;
 
-  // Newton with steps halved while they do not help: the distortion is one-to-one within max_radius_.
+  // Newton with steps halved while they do not help: the distortion is one-to-one within
+  // max_radius_.
   Eigen::Vector2d x = target;
   if (x.norm() > max_radius_) x *= 0.99 * max_radius_ / x.norm();
   Eigen::Vector2d error = DistortPoint(camera_, x) - target;

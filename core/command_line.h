@@ -26,8 +26,8 @@ class Command {
   Command(const std::string& name, const std::string& summary, const std::string& example);
   ~Command();
 
-  // Options. The default is what *value holds; the help shows it. `help` says what, unit and direction.
-  // An input path option is listed among the report's inputs.
+  // Options. The default is what *value holds; the help shows it. `help` says what, unit and
+  // direction. An input path option is listed among the report's inputs.
   enum class Kind { kOptional, kRequired };
   void AddBool(const std::string& name, bool* value, const std::string& help);  // 1|0, alone = 1
   void AddInt(const std::string& name, int* value, const std::string& help);
@@ -44,8 +44,8 @@ class Command {
                      Kind kind = Kind::kRequired);
   void AddOutputPaths(const std::string& name, std::vector<std::string>* values,
                       const std::string& help, Kind kind = Kind::kRequired);
-  // Takes every option whose name starts with `prefix` (e.g. "--Mapper.") together with its value and
-  // hands them on in order: {"--Mapper.x", "1", ...}. For options of another program.
+  // Takes every option whose name starts with `prefix` (e.g. "--Mapper.") together with its value
+  // and hands them on in order: {"--Mapper.x", "1", ...}. For options of another program.
   void PassThrough(const std::string& prefix, std::vector<std::string>* arguments,
                    const std::string& help);
 
@@ -57,9 +57,9 @@ class Command {
     void Warn(const std::string& message) const;
   };
 
-  // Parses, runs `body`, writes the report and gives the exit code for main(). `body` throws UsageError or
-  // InputError; an answer that is not to be trusted is said with report.SetUntrusted(). Every other
-  // exception is an internal error (exit 1) told in one line.
+  // Parses, runs `body`, writes the report and gives the exit code for main(). `body` throws
+  // UsageError or InputError; an answer that is not to be trusted is said with
+  // report.SetUntrusted(). Every other exception is an internal error (exit 1) told in one line.
   int Run(int argc, char** argv, const std::function<void(const Context&)>& body);
 
  private:

@@ -1,0 +1,254 @@
+#include "core/option_list.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <numeric>
+#include <set>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+
+[[noreturn]] void FailValue(const std::string& option, const std::string& text,
+                            const std::string& expected) {
+  throw UsageError("--" + option + " is \"" + text + "\", expected " + expected);
+}
+
+bool StartsWith(const std::string& text, const std::string& start) {
+  return text.compare(0, start.size(), start) == 0;
+}
+
+std::string Trimmed(const std::string& text) {
+  const char* spaces = " \t\r";
+  const size_t first = text.find_first_not_of(spaces);
+  if (first == std::string::npos) return "";
+  return text.substr(first, text.find_last_not_of(spaces) + 1 - first);
+}
+
+// Decimal number, the whole text; NaN if it is none. A leading + is allowed.
+double Number(const std::string& text) {
+  const char* begin = text.data();
+  const char* end = text.data() + text.size();
+  if (begin != end && *begin == '+') ++begin;
+  double value = 0;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  return error == std::errc() && stop == end && begin != end ? value : std::nan("");
+}
+
+// Number of letters to insert, delete or change (Levenshtein).
+size_t Distance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+bool ParseBool(const std::string& option, const std::string& text) {
+  if (text == "1" || text == "true") return true;
+  if (text == "0" || text == "false") return false;
+  FailValue(option, text, "1 or 0");
+}
+
+int ParseInt(const std::string& option, const std::string& text) {
+  const double value = Number(text);
+  if (!(value >= INT32_MIN && value <= INT32_MAX) || value != std::floor(value)) {
+    FailValue(option, text, "a whole number");
+  }
+  return static_cast<int>(value);
+}
+
+double ParseDouble(const std::string& option, const std::string& text) {
+  const double value = Number(text);
+  if (std::isnan(value)) FailValue(option, text, "a number");
+  return value;
+}
+
+// One option as it was given; `where` begins messages about it.
+struct OptionList::Given {
+  std::string name;  // without "--"
+  std::vector<std::string> values;
+  std::string where;
+};
+
+const Option* OptionList::Find(const std::string& name) const {
+  const auto found = std::find_if(options_.begin(), options_.end(),
+                                  [&](const Option& option) { return option.name == name; });
+  return found == options_.end() ? nullptr : &*found;
+}
+
+const PassedThrough* OptionList::FindPassed(const std::string& argument) const {
+  const auto found = std::find_if(passed_.begin(), passed_.end(), [&](const PassedThrough& p) {
+    return StartsWith(argument, p.prefix);
+  });
+  return found == passed_.end() ? nullptr : &*found;
+}
+
+std::string OptionList::Unknown(const std::string& argument) const {
+  std::string text = argument + " is not an option of " + command_;
+  const std::string name = argument.substr(argument.find_first_not_of('-'));
+  const Option* nearest = nullptr;
+  size_t nearest_distance = 3;  // more different names are no slips of the finger
+  for (const Option& option : options_) {
+    const size_t distance = Distance(name, option.name);
+    if (distance < nearest_distance) {
+      nearest = &option;
+      nearest_distance = distance;
+    }
+  }
+  return nearest == nullptr ? text : text + ". Did you mean --" + nearest->name + "?";
+}
+
+std::vector<OptionList::Given> OptionList::ReadArguments(
+    const std::vector<std::string>& arguments) const {
+  std::vector<Given> all;
+  const auto is_value = [&](size_t i) {
+    return i < arguments.size() && !StartsWith(arguments[i], "--");
+  };
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& argument = arguments[i];
+    const size_t equals = argument.find('=');
+    Given given{argument.substr(0, equals), {}, ""};
+    if (!StartsWith(argument, "--") || given.name.size() == 2) {
+      const bool is_option = argument.size() > 1 && argument[0] == '-' && argument != "--";
+      throw UsageError(is_option ? Unknown(argument)
+                                 : "\"" + argument + "\" does not belong to an option");
+    }
+    const Option* option = Find(given.name.substr(2));
+    if (option == nullptr && FindPassed(argument) == nullptr) {
+      throw UsageError(Unknown(given.name));
+    }
+    const bool repeatable = option != nullptr && option->repeatable;
+    if (equals != std::string::npos) {
+      given.values.push_back(argument.substr(equals + 1));
+    } else if (is_value(i + 1)) {
+      do {
+        given.values.push_back(arguments[++i]);
+      } while (repeatable && is_value(i + 1));
+    } else if (option != nullptr && option->may_stand_alone) {
+      given.values.push_back("1");
+    } else {
+      throw UsageError(given.name + " needs a value");
+    }
+    given.name.erase(0, 2);
+    all.push_back(std::move(given));
+  }
+  return all;
+}
+
+// COLMAP's layout: keys before the first section are plain options, [Group] makes the keys below it
+// --Group.key. A value reaches to the end of its line.
+std::vector<OptionList::Given> OptionList::ReadProjectFile(const std::string& path) const {
+  RequireFile(path, "Check --project_path");
+  std::ifstream stream(path);
+  std::vector<Given> all;
+  std::string line, section;
+  for (long number = 1; std::getline(stream, line); ++number) {
+    line = Trimmed(line);
+    if (line.empty() || line[0] == '#' || line[0] == ';') continue;
+    const size_t equals = line.find('=');
+    if (line[0] == '[' && line.back() == ']') {
+      section = Trimmed(line.substr(1, line.size() - 2)) + ".";
+      continue;
+    }
+    if (line[0] == '[' || equals == std::string::npos || equals == 0) {
+      throw InputError(path, LinePosition(number),
+                       "is not a line of an ini file (\"" + line.substr(0, 60) + "\")",
+                       "Expected key=value, [Section] or a line that starts with # or ;");
+    }
+    const std::string name = section + Trimmed(line.substr(0, equals));
+    const std::string where = path + ": " + LinePosition(number) + ": ";
+    if (name == "project_path" || (Find(name) == nullptr && FindPassed("--" + name) == nullptr)) {
+      throw UsageError(where + Unknown(name));
+    }
+    all.push_back({name, {Trimmed(line.substr(equals + 1))}, where});
+  }
+  return all;
+}
+
+void OptionList::Parse(const std::vector<std::string>& arguments) const {
+  std::vector<Given> on_command_line = ReadArguments(arguments);
+  std::set<std::string> names;
+  std::vector<Given> all;
+  for (const Given& given : on_command_line) {
+    names.insert(given.name);
+    if (given.name != "project_path" || given.values.back().empty()) continue;
+    all = ReadProjectFile(given.values.back());
+  }
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const Given& given) { return names.count(given.name) > 0; }),
+            all.end());
+  std::move(on_command_line.begin(), on_command_line.end(), std::back_inserter(all));
+
+  for (const Given& given : all) {
+    if (Find(given.name) != nullptr) continue;
+    std::vector<std::string>* passed = FindPassed("--" + given.name)->arguments;
+    passed->push_back("--" + given.name);
+    passed->push_back(given.values[0]);
+  }
+  std::vector<std::string> missing;
+  for (const Option& option : options_) {
+    std::vector<std::string> values;
+    std::string where;
+    for (const Given& given : all) {
+      if (given.name != option.name) continue;
+      if (!values.empty() && !option.repeatable) {
+        throw UsageError(given.where + "--" + option.name + " is given twice");
+      }
+      values.insert(values.end(), given.values.begin(), given.values.end());
+      where = given.where;
+    }
+    if (values.empty()) {
+      if (option.required) missing.push_back("--" + option.name + " is required");
+      continue;
+    }
+    if (!option.may_be_empty && std::count(values.begin(), values.end(), "") > 0) {
+      throw UsageError(where + "--" + option.name + " needs a value");
+    }
+    try {
+      option.set(values);
+    } catch (const UsageError& error) {
+      throw UsageError(where + error.what());
+    }
+  }
+  ThrowIfProblems(missing);
+}
+
+std::string OptionList::Help() const {
+  std::string text;
+  for (const Option& option : options_) {
+    text += "  --" + option.name;
+    if (!option.type.empty()) text += " " + option.type;
+    if (option.required) {
+      text += " (required)";
+    } else if (!option.default_text.empty()) {
+      text += " (" + option.default_text + ")";
+    }
+    text += "\n      " + option.help + (option.repeatable ? " May be repeated." : "") + "\n";
+  }
+  for (const PassedThrough& p : passed_) text += "  " + p.prefix + "*\n      " + p.help + "\n";
+  return text;
+}
+
+Json OptionList::Effective() const {
+  Json json = Json::object();
+  for (const Option& option : options_) json[option.name] = option.value();
+  for (const PassedThrough& p : passed_) json[p.prefix.substr(2) + "*"] = *p.arguments;
+  return json;
+}
+
+}  // namespace roomtex

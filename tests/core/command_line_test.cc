@@ -1,0 +1,442 @@
+#include "core/command_line.h"
+
+#include <new>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+// A command with one option of every kind, run as main() would.
+struct TestCommand {
+  bool detail = true;
+  int count = 7;
+  double ratio = 0.25;
+  double range = std::numeric_limits<double>::infinity();
+  std::string title = "a title";
+  std::string mode = "exif";
+  std::string input, output;
+  std::vector<std::string> scans, mapper;
+  CommonOptions common;
+  std::string out, err;
+  int num_runs = 0;
+
+  int Run(std::vector<std::string> arguments,
+          const std::function<void(const Command::Context&)>& body = nullptr) {
+    Command command("roomtex-test", "Does nothing.", "roomtex-test --input_path a --output_path b");
+    command.AddInputPath("input_path", &input, "What enters.");
+    command.AddOutputPath("output_path", &output, "What leaves.", Command::Kind::kOptional);
+    command.AddInputPaths("scan_path", &scans, "Scans.", Command::Kind::kOptional);
+    command.AddBool("detail", &detail, "Keep details.");
+    command.AddInt("count", &count, "How many.");
+    command.AddDouble("Group.ratio", &ratio, "How much, metres.");
+    command.AddDouble("range", &range, "How far, metres.");
+    command.AddString("title", &title, "What to call it.");
+    command.AddChoice("mode", &mode, {"exif", "match", "none"}, "Which one.");
+    command.PassThrough("--Mapper.", &mapper, "Handed on to colmap mapper.");
+    arguments.insert(arguments.begin(), "roomtex-test");
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int exit_code = command.Run(static_cast<int>(argv.size()), argv.data(),
+                                      [&](const Command::Context& context) {
+                                        ++num_runs;
+                                        common = context.options;
+                                        if (body) body(context);
+                                      });
+    out = testing::internal::GetCapturedStdout();
+    err = testing::internal::GetCapturedStderr();
+    return exit_code;
+  }
+
+  int RunWithInput(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--input_path", "in"});
+    return Run(arguments);
+  }
+};
+
+// Wrong usage: exit 2, nothing done, nothing on stdout, and `finding` on stderr without any C++.
+void ExpectUsageError(const std::vector<std::string>& arguments, const std::string& finding) {
+  TestCommand test;
+  EXPECT_EQ(test.RunWithInput(arguments), kExitUsage) << testing::PrintToString(arguments);
+  EXPECT_EQ(test.num_runs, 0);
+  EXPECT_THAT(test.out, IsEmpty());
+  EXPECT_THAT(test.err, StartsWith("roomtex-test: "));
+  EXPECT_THAT(test.err, HasSubstr(finding));
+  EXPECT_THAT(test.err, HasSubstr("See roomtex-test --help"));
+}
+
+TEST(CommandLine, HelpStartsWithTheExampleAndShowsUnitsAndDefaults) {
+  for (const char* help : {"--help", "-h"}) {
+    TestCommand test;
+    EXPECT_EQ(test.Run({help}), kExitDone);
+    EXPECT_EQ(test.num_runs, 0);
+    EXPECT_THAT(test.err, IsEmpty());
+    const size_t example = test.out.find("roomtex-test --input_path a --output_path b");
+    ASSERT_NE(example, std::string::npos);
+    EXPECT_LT(example, 20u);
+    for (const char* text :
+         {"Does nothing.", "--input_path PATH (required)", "--detail 1|0 (1)", "--count INT (7)",
+          "--Group.ratio NUMBER (0.25)", "--range NUMBER (inf)", "How much, metres.",
+          "--title TEXT (a title)", "--mode exif|match|none (exif)", "--Mapper.*",
+          "--quiet 1|0 (0)", "--num_threads INT (-1)", "--random_seed INT (0)",
+          "--project_path PATH", "--report_path PATH", "--help", "--version", "May be repeated"}) {
+      EXPECT_THAT(test.out, HasSubstr(text));
+    }
+  }
+}
+
+TEST(CommandLine, VersionIsOneLine) {
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--version"}), kExitDone);
+  EXPECT_EQ(test.out, std::string("roomtex-test ") + Version() + "\n");
+}
+
+TEST(CommandLine, GivesDefaultsWhenNothingIsSaid) {
+  TestCommand test;
+  ASSERT_EQ(test.RunWithInput({}), kExitDone);
+  EXPECT_EQ(test.num_runs, 1);
+  EXPECT_TRUE(test.detail);
+  EXPECT_EQ(test.count, 7);
+  EXPECT_EQ(test.ratio, 0.25);
+  EXPECT_EQ(test.title, "a title");
+  EXPECT_EQ(test.mode, "exif");
+  EXPECT_FALSE(test.common.quiet);
+  EXPECT_EQ(test.common.num_threads, -1);
+  EXPECT_EQ(test.common.random_seed, 0);
+}
+
+TEST(CommandLine, TakesEveryKindOfValueWithSpaceOrEqualsSign) {
+  for (const bool equals : {false, true}) {
+    std::vector<std::string> arguments;
+    for (const auto& [name, value] :
+         {std::pair("--detail", "0"), std::pair("--count", "-12"),
+          std::pair("--Group.ratio", "-2.5e-3"), std::pair("--range", "30"),
+          std::pair("--title", "two words = one"), std::pair("--mode", "match"),
+          std::pair("--output_path", "-odd-name.ply"), std::pair("--random_seed", "42")}) {
+      if (equals) {
+        arguments.push_back(std::string(name) + "=" + value);
+      } else {
+        arguments.insert(arguments.end(), {name, value});
+      }
+    }
+    TestCommand test;
+    ASSERT_EQ(test.RunWithInput(arguments), kExitDone) << test.err;
+    EXPECT_FALSE(test.detail);
+    EXPECT_EQ(test.count, -12);
+    EXPECT_EQ(test.ratio, -2.5e-3);
+    EXPECT_EQ(test.range, 30);
+    EXPECT_EQ(test.title, "two words = one");
+    EXPECT_EQ(test.mode, "match");
+    EXPECT_EQ(test.output, "-odd-name.ply");
+    EXPECT_EQ(test.common.random_seed, 42);
+  }
+}
+
+TEST(CommandLine, QuietMayStandAlone) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--quiet"},
+                                             {"--quiet", "1"},
+                                             {"--quiet=1"},
+                                             {"--quiet", "true"},
+                                             {"--quiet", "--count", "7"}}) {
+    TestCommand test;
+    ASSERT_EQ(test.RunWithInput(arguments), kExitDone) << test.err;
+    EXPECT_TRUE(test.common.quiet);
+    EXPECT_THAT(test.err, IsEmpty());
+  }
+  TestCommand test;
+  ASSERT_EQ(test.RunWithInput({"--quiet", "0"}), kExitDone);
+  EXPECT_FALSE(test.common.quiet);
+  ExpectUsageError({"--quiet", "yes please"}, "--quiet is \"yes please\", expected 1 or 0");
+}
+
+TEST(CommandLine, WholeNumbersAreWhole) {
+  for (const auto& [text, value] : {std::pair("+5", 5), std::pair("1e3", 1000),
+                                    std::pair("010", 10), std::pair("-2147483648", INT32_MIN)}) {
+    TestCommand test;
+    ASSERT_EQ(test.RunWithInput({"--count", text}), kExitDone) << test.err;
+    EXPECT_EQ(test.count, value);
+  }
+  for (const char* text : {"1.5", "abc", "", " ", "5x", "nan", "inf", "1e9999", "2147483648", "5e9",
+                           "0x10", "--", "1 2"}) {
+    ExpectUsageError({std::string("--count=") + text},
+                     std::string("--count is \"") + text + "\", expected a whole number");
+  }
+}
+
+TEST(CommandLine, NumbersAreNumbers) {
+  for (const auto& [text, value] : {std::pair("1e9", 1e9), std::pair("-5", -5.0),
+                                    std::pair("+.5", 0.5), std::pair("3.", 3.0)}) {
+    TestCommand test;
+    ASSERT_EQ(test.RunWithInput({"--Group.ratio", text}), kExitDone) << test.err;
+    EXPECT_EQ(test.ratio, value);
+  }
+  TestCommand test;
+  test.range = 1;
+  ASSERT_EQ(test.RunWithInput({"--range", "inf"}), kExitDone) << test.err;
+  EXPECT_EQ(test.range, std::numeric_limits<double>::infinity());
+  for (const char* text : {"nan", "-nan", "", "abc", "1,5", "5 m", "1e999", "0x10"}) {
+    ExpectUsageError({std::string("--Group.ratio=") + text},
+                     std::string("--Group.ratio is \"") + text + "\", expected a number");
+  }
+}
+
+TEST(CommandLine, ChoicesAreNamed) {
+  ExpectUsageError({"--mode", "off"}, "--mode is \"off\", expected exif, match or none");
+}
+
+TEST(CommandLine, WrongOptionsAreUsageErrors) {
+  ExpectUsageError({"--unknown", "1"}, "--unknown is not an option of roomtex-test");
+  ExpectUsageError({"--unknown=1"}, "--unknown is not an option of roomtex-test");
+  ExpectUsageError({"--conut", "1"}, "Did you mean --count?");
+  ExpectUsageError({"-x"}, "-x is not an option of roomtex-test");
+  ExpectUsageError({"stray"}, "\"stray\" does not belong to an option");
+  ExpectUsageError({"--count"}, "--count needs a value");
+  ExpectUsageError({"--count", "--detail", "1"}, "--count needs a value");
+  ExpectUsageError({"--output_path", "--count", "3"}, "--output_path needs a value");
+  ExpectUsageError({"--count", "3", "--count", "4"}, "--count is given twice");
+  ExpectUsageError({"--input_path", "other"}, "--input_path is given twice");
+  ExpectUsageError({"--output_path="}, "--output_path needs a value");
+  ExpectUsageError({"--num_threads", "0"}, "--num_threads must be -1 (all) or positive");
+  ExpectUsageError({"--num_threads", "-2"}, "--num_threads must be -1 (all) or positive");
+}
+
+TEST(CommandLine, MissingRequiredOptionIsNamed) {
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--count", "3"}), kExitUsage);
+  EXPECT_THAT(test.err, HasSubstr("--input_path is required"));
+}
+
+TEST(CommandLine, EmptyTextIsAValue) {
+  TestCommand test;
+  ASSERT_EQ(test.RunWithInput({"--title", ""}), kExitDone) << test.err;
+  EXPECT_EQ(test.title, "");
+  ASSERT_EQ(TestCommand().RunWithInput({"--title="}), kExitDone);
+}
+
+TEST(CommandLine, PathsMayBeRepeatedOrListed) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--scan_path", "x", "--scan_path", "y"},
+                                             {"--scan_path=x", "--count", "3", "--scan_path=y"},
+                                             {"--scan_path", "x", "y"}}) {
+    TestCommand test;
+    ASSERT_EQ(test.RunWithInput(arguments), kExitDone) << test.err;
+    EXPECT_THAT(test.scans, ElementsAre("x", "y"));
+  }
+}
+
+TEST(CommandLine, HandsOnTheOptionsOfAnotherProgram) {
+  TestCommand test;
+  ASSERT_EQ(
+      test.RunWithInput({"--Mapper.a", "1", "--Mapper.b=x=y", "--count", "3", "--Mapper.c", "-1"}),
+      kExitDone)
+      << test.err;
+  EXPECT_THAT(test.mapper, ElementsAre("--Mapper.a", "1", "--Mapper.b", "x=y", "--Mapper.c", "-1"));
+  EXPECT_EQ(test.count, 3);
+  ExpectUsageError({"--Mapper.a"}, "--Mapper.a needs a value");
+  ExpectUsageError({"--Mapper.a", "--count", "3"}, "--Mapper.a needs a value");
+}
+
+// Project files.
+
+class ProjectFile : public testing::Test {
+ protected:
+  int Run(const std::string& text, std::vector<std::string> arguments = {}) {
+    WriteBytes(path_, text);
+    arguments.insert(arguments.begin(), {"--project_path", path_});
+    return test_.Run(arguments);
+  }
+  TempFolder folder_;
+  const std::string path_ = folder_ / "project.ini";
+  TestCommand test_;
+};
+
+TEST_F(ProjectFile, GivesOptionsAndSections) {
+  ASSERT_EQ(Run("# a comment\r\n; another\r\ninput_path = some folder/in.rtpi\r\n\ncount=3\n  "
+                "detail = 0\n"
+                "scan_path=x\nscan_path=y # z\n[Group]\nratio=0.5\n[Mapper]\nmin_num_matches=10\n"),
+            kExitDone)
+      << test_.err;
+  EXPECT_EQ(test_.input, "some folder/in.rtpi");
+  EXPECT_EQ(test_.count, 3);
+  EXPECT_FALSE(test_.detail);
+  EXPECT_EQ(test_.ratio, 0.5);
+  EXPECT_THAT(test_.scans, ElementsAre("x", "y # z"));
+  EXPECT_THAT(test_.mapper, ElementsAre("--Mapper.min_num_matches", "10"));
+}
+
+TEST_F(ProjectFile, CommandLineWins) {
+  ASSERT_EQ(Run("input_path=in\ncount=3\nscan_path=x\n[Group]\nratio=0.5\n[Mapper]\na=1\nb=2\n",
+                {"--count", "4", "--scan_path", "z", "--Group.ratio=2", "--Mapper.a=5"}),
+            kExitDone)
+      << test_.err;
+  EXPECT_EQ(test_.input, "in");
+  EXPECT_EQ(test_.count, 4);
+  EXPECT_EQ(test_.ratio, 2);
+  EXPECT_THAT(test_.scans, ElementsAre("z"));
+  EXPECT_THAT(test_.mapper, ElementsAre("--Mapper.b", "2", "--Mapper.a", "5"));
+}
+
+TEST_F(ProjectFile, MistakesAreNamedWithTheirLine) {
+  EXPECT_EQ(Run("input_path=in\nconut=3\n"), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr(path_ + ": line 2: conut is not an option of roomtex-test"));
+  EXPECT_EQ(Run("input_path=in\n[Group]\nratios=3\n"), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr("line 3: Group.ratios is not an option"));
+  EXPECT_EQ(Run("input_path=in\nthis is no option\n"), kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr(path_ + ": line 2: is not a line of an ini file"));
+  EXPECT_EQ(Run("input_path=in\n[Group\nratio=1\n"), kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr("line 2"));
+  EXPECT_EQ(Run("input_path=in\ncount=three\n"), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr("--count is \"three\", expected a whole number"));
+  EXPECT_EQ(Run("input_path=in\ncount=3\ncount=4\n"), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr("--count is given twice"));
+  EXPECT_EQ(Run("input_path=in\nproject_path=other.ini\n"), kExitUsage);
+  EXPECT_EQ(test_.num_runs, 0);
+}
+
+TEST_F(ProjectFile, MissingFileIsAnInputError) {
+  EXPECT_EQ(test_.RunWithInput({"--project_path", folder_ / "missing.ini"}), kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr("missing.ini: does not exist"));
+  EXPECT_EQ(test_.RunWithInput({"--project_path=" + folder_.path()}), kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr("is a folder"));
+}
+
+// Exit codes and reports.
+
+class CommandReport : public testing::Test {
+ protected:
+  int Run(const std::function<void(const Command::Context&)>& body) {
+    const int exit_code = test_.Run({"--input_path", "in.rtpi", "--report_path", path_}, body);
+    report_ = Json::parse(ReadBytes(path_));
+    return exit_code;
+  }
+  TempFolder folder_;
+  const std::string path_ = folder_ / "report.json";
+  TestCommand test_;
+  Json report_;
+};
+
+TEST_F(CommandReport, HoldsEveryKeyOfTheContract) {
+  ASSERT_EQ(Run([](const Command::Context& context) {
+              context.progress.Stage("read", 2);
+              context.progress.Tick();
+              context.progress.Stage("write");
+              context.progress.Stage("read");
+              context.Warn("be careful");
+              context.report["num_vertices"] = 12;
+              context.report["nothing"] = std::numeric_limits<double>::quiet_NaN();
+              context.report.AddInput("found_by_itself", "other.bin");
+            }),
+            kExitDone);
+  EXPECT_EQ(report_["command"], "roomtex-test");
+  EXPECT_EQ(report_["version"], Version());
+  EXPECT_EQ(report_["options"]["count"], 7);
+  EXPECT_EQ(report_["options"]["Group.ratio"], 0.25);
+  EXPECT_EQ(report_["options"]["detail"], true);
+  EXPECT_EQ(report_["options"]["random_seed"], 0);
+  EXPECT_EQ(report_["options"]["input_path"], "in.rtpi");
+  EXPECT_EQ(report_["inputs"]["input_path"], "in.rtpi");
+  EXPECT_EQ(report_["inputs"]["found_by_itself"][0], "other.bin");
+  EXPECT_FALSE(report_["inputs"].contains("scan_path"));
+  EXPECT_GE(report_["seconds"]["read"], 0.0);
+  EXPECT_GE(report_["seconds"]["write"], 0.0);
+  EXPECT_GT(report_["peak_memory_bytes"], 1 << 20);
+  EXPECT_EQ(report_["warnings"], Json({"be careful"}));
+  EXPECT_EQ(report_["trusted"], true);
+  EXPECT_EQ(report_["reason"], "");
+  EXPECT_EQ(report_["num_vertices"], 12);
+  EXPECT_TRUE(report_["nothing"].is_null());
+  EXPECT_THAT(test_.out, IsEmpty());
+  EXPECT_THAT(test_.err, HasSubstr("warning: be careful"));
+  EXPECT_THAT(test_.err, HasSubstr("read"));
+}
+
+TEST_F(CommandReport, IsWrittenWithTheExitCodeOfEveryKindOfFailure) {
+  struct Case {
+    std::function<void()> fail;
+    int exit_code;
+    const char* message;
+  };
+  const Case cases[] = {
+      {[] { throw UsageError("--a and --b do not go together"); }, kExitUsage, "--a and --b"},
+      {[] { throw InputError("in.rtpi", "byte 7", "is odd", "Make it even"); }, kExitInput,
+       "in.rtpi: byte 7: is odd. Make it even."},
+      {[] { throw std::runtime_error("surprise"); }, kExitInternalError,
+       "internal error: surprise"},
+      {[] { throw std::bad_alloc(); }, kExitInternalError, "out of memory"},
+      {[] { throw 42; }, kExitInternalError, "internal error"},
+  };
+  for (const Case& c : cases) {
+    EXPECT_EQ(Run([&](const Command::Context& context) {
+                context.progress.Stage("started");
+                context.report["half_done"] = 1;
+                c.fail();
+              }),
+              c.exit_code);
+    EXPECT_EQ(report_["trusted"], false);
+    EXPECT_THAT(report_["reason"].get<std::string>(), HasSubstr(c.message));
+    EXPECT_EQ(report_["half_done"], 1);
+    EXPECT_TRUE(report_["seconds"].contains("started"));
+    EXPECT_THAT(test_.err, HasSubstr(c.message));
+    EXPECT_THAT(test_.out, IsEmpty());
+  }
+}
+
+TEST_F(CommandReport, UntrustedAnswersExitWithFour) {
+  EXPECT_EQ(Run([](const Command::Context& context) {
+              context.report.SetUntrusted("Two views cannot tell.");
+              context.report.SetUntrusted("And it is dark.");
+            }),
+            kExitUntrusted);
+  EXPECT_EQ(report_["trusted"], false);
+  EXPECT_EQ(report_["reason"], "Two views cannot tell. And it is dark.");
+  EXPECT_THAT(test_.err, HasSubstr("not to be trusted: Two views cannot tell."));
+}
+
+TEST_F(CommandReport, CopiesAreWrittenOnlyWhenTheCommandRanToItsEnd) {
+  const std::string copy = folder_ / "alignment.json";
+  EXPECT_EQ(Run([&](const Command::Context& context) {
+              context.report.AddCopy(copy);
+              throw InputError("in", "", "is odd", "");
+            }),
+            kExitInput);
+  EXPECT_FALSE(std::filesystem::exists(copy));
+  EXPECT_EQ(Run([&](const Command::Context& context) { context.report.AddCopy(copy); }), kExitDone);
+  EXPECT_EQ(ReadBytes(copy), ReadBytes(path_));
+}
+
+TEST_F(CommandReport, UnwritableReportIsSaid) {
+  EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", folder_ / "no/such/folder.json"}),
+            kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr("no/such/folder.json: cannot be written"));
+}
+
+TEST(CommandLine, QuietSaysErrorsButNothingElse) {
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--input_path", "in", "--quiet"},
+                     [](const Command::Context& context) {
+                       context.progress.Stage("read", 3);
+                       context.progress.Note("a note");
+                       context.Warn("a warning");
+                     }),
+            kExitDone);
+  EXPECT_THAT(test.err, IsEmpty());
+  EXPECT_EQ(test.Run({"--input_path", "in", "--quiet"},
+                     [](const Command::Context&) { throw InputError("in", "", "is odd", ""); }),
+            kExitInput);
+  EXPECT_EQ(test.err, "roomtex-test: in: is odd.\n");
+}
+
+}  // namespace
+}  // namespace roomtex
