@@ -420,4 +420,57 @@ std::vector<DatabasePair> Database::ReadPairs(int min_matches) const {
   return pairs;
 }
 
+namespace {
+
+void CopyRows(SQLite::Database* from, SQLite::Database* to, const std::string& quoted_table) {
+  SQLite::Statement read(*from, "SELECT * FROM " + quoted_table);
+  const int num_columns = read.getColumnCount();
+  std::string places;
+  for (int i = 0; i < num_columns; ++i) places += i == 0 ? "?" : ", ?";
+  SQLite::Statement insert(*to, "INSERT INTO " + quoted_table + " VALUES (" + places + ")");
+  while (read.executeStep()) {
+    for (int i = 0; i < num_columns; ++i) {
+      const SQLite::Column value = read.getColumn(i);
+      if (value.isNull()) {
+        insert.bind(i + 1);
+      } else if (value.isInteger()) {
+        insert.bind(i + 1, value.getInt64());
+      } else if (value.isFloat()) {
+        insert.bind(i + 1, value.getDouble());
+      } else if (value.isBlob()) {
+        insert.bindNoCopy(i + 1, value.getBlob(), value.getBytes());
+      } else {
+        insert.bind(i + 1, value.getString());
+      }
+    }
+    insert.exec();
+    insert.reset();
+  }
+}
+
+}  // namespace
+
+void Database::CopyForMapper(const std::string& path) const {
+  const std::set<std::string> left_empty = {"descriptors", "matches"};
+  impl_->Guarded([&] {
+    SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    copy.exec("PRAGMA journal_mode = OFF");
+    copy.exec("PRAGMA synchronous = OFF");
+    SQLite::Transaction transaction(copy);
+    SQLite::Statement objects(*impl_->sqlite,
+                              "SELECT type, name, sql FROM sqlite_master WHERE sql IS NOT NULL AND "
+                              "name NOT LIKE 'sqlite_%' AND type IN ('table', 'index') "
+                              "ORDER BY type = 'index'");
+    while (objects.executeStep()) {
+      const std::string name = objects.getColumn(1).getString();
+      copy.exec(objects.getColumn(2).getString());
+      if (objects.getColumn(0).getString() != "table" || left_empty.count(name) > 0) continue;
+      CopyRows(impl_->sqlite.get(), &copy, "\"" + name + "\"");
+    }
+    const int64_t version = impl_->sqlite->execAndGet("PRAGMA user_version").getInt64();
+    copy.exec("PRAGMA user_version = " + std::to_string(version));
+    transaction.commit();
+  });
+}
+
 }  // namespace roomtex

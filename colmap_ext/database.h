@@ -55,6 +55,11 @@ class Database {
   // longer holds are left out, as COLMAP does.
   std::vector<DatabasePair> ReadPairs(int min_matches) const;
 
+  // A database of the same schema at `path` (which must not exist) with everything that COLMAP's
+  // mapper reads, i.e. without the rows of descriptors and raw matches, most of the bytes. COLMAP
+  // opens databases for writing; it gets this one instead of the user's.
+  void CopyForMapper(const std::string& path) const;
+
   const std::string& path() const;
 
  private:

@@ -1,0 +1,71 @@
+#pragma once
+// The program `colmap`: found, asked which options it speaks (3.8 and 4.x differ), and run.
+
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace roomtex {
+
+// Options of one call in order, e.g. {"--Mapper.multiple_models", "0"}.
+using ColmapOptions = std::vector<std::pair<std::string, std::string>>;
+
+struct ColmapRun {
+  bool success = false;
+  std::string failure;  // "ended with exit code 1", "was killed by signal 6"; "" on success
+  std::vector<std::string> last;  // last lines it printed
+  std::string LastLines() const;  // joined by " | "
+};
+
+class ColmapProgram {
+ public:
+  // program: a path, or a name to look for on PATH. Throws InputError if it is not there, cannot be
+  // run or is not COLMAP. All that runs print is appended to the file log_path.
+  ColmapProgram(const std::string& program, const std::string& log_path);
+
+  const std::string& path() const { return path_; }
+  const std::string& version() const { return version_; }  // "COLMAP 3.8 (Commit ...)"
+  const std::string& log_path() const { return log_path_; }
+
+  // The options `colmap COMMAND -h` lists, with their dashes. Throws InputError if it has no such
+  // command.
+  const std::set<std::string>& Options(const std::string& command);
+
+  // Runs `colmap COMMAND OPTIONS` without a shell and without a display, and waits. on_line is
+  // called for every line it prints. Throws Interrupted when a signal stops us: the program is
+  // killed first.
+  ColmapRun Run(const std::string& command, const ColmapOptions& options,
+                const std::function<void(const std::string&)>& on_line = nullptr);
+
+ private:
+  ColmapRun RunArguments(const std::vector<std::string>& arguments,
+                         const std::function<void(const std::string&)>& on_line);
+
+  std::string path_, log_path_, version_;
+  std::map<std::string, std::set<std::string>> options_of_command_;
+};
+
+// Thrown where a signal asks the command to stop, so that destructors tidy up. Not a
+// std::exception: only main() may swallow it.
+struct Interrupted {
+  int signal = 0;
+};
+
+// While this lives, SIGINT, SIGTERM and SIGHUP kill the running program (with all it has started)
+// and become Interrupted at the next ThrowIfInterrupted(). At most one at a time.
+class SignalGuard {
+ public:
+  SignalGuard();
+  ~SignalGuard();
+  SignalGuard(const SignalGuard&) = delete;
+  SignalGuard& operator=(const SignalGuard&) = delete;
+};
+void ThrowIfInterrupted();
+
+// Ends this process the way the signal would have, so that a calling shell sees it.
+[[noreturn]] void DieBySignal(int signal);
+
+}  // namespace roomtex

@@ -1,0 +1,181 @@
+#include "colmap_ext/mapper_run.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+
+void Set(const std::string& name, const std::string& value, ColmapOptions* options) {
+  for (auto& [known, old_value] : *options) {
+    if (known != name) continue;
+    old_value = value;
+    return;
+  }
+  options->emplace_back(name, value);
+}
+
+// The line in which COLMAP refuses an option; "" if it does not.
+std::string OptionRefusal(const ColmapRun& run) {
+  for (const std::string& line : run.last) {
+    if (line.find("Failed to parse options") != std::string::npos ||
+        line.find("nvalid option") != std::string::npos ||
+        line.find("unrecognised option") != std::string::npos ||
+        line.find("Check failed: options") != std::string::npos ||
+        line.find("Check failed: mapper") != std::string::npos) {
+      return line;
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+MapperRun::MapperRun(ColmapProgram* colmap, const std::string& database_path,
+                     const std::string& image_path, const std::string& scratch,
+                     const MapperOptions& options)
+    : colmap_(colmap),
+      database_path_(database_path),
+      image_path_(image_path),
+      scratch_(scratch),
+      options_(options) {
+  const std::set<std::string>& known = colmap_->Options("mapper");
+  colmap_->Options("point_triangulator");
+  colmap_->Options("bundle_adjuster");
+  std::vector<std::string> problems;
+  for (size_t i = 0; i + 1 < options_.mapper_arguments.size(); i += 2) {
+    const std::string& name = options_.mapper_arguments[i];
+    if (known.count(name) == 0) {
+      problems.push_back(name + " is not an option of colmap mapper (" + colmap_->version() +
+                         "); see " + colmap_->path() + " mapper -h");
+    } else if (name == "--Mapper.multiple_models" && options_.mapper_arguments[i + 1] != "0") {
+      problems.push_back(
+          "--Mapper.multiple_models must be 0: with several models COLMAP would throw the seed "
+          "away "
+          "and initialise by itself");
+    }
+  }
+  ThrowIfProblems(problems);
+}
+
+std::string MapperRun::Folder(const std::string& name) const {
+  const std::string folder = scratch_ + "/" + name + "_" + std::to_string(num_runs_);
+  MakeFolder(folder);
+  return folder;
+}
+
+std::string MapperRun::MapperValue(const std::string& name, const std::string& fallback) const {
+  std::string value = fallback;
+  for (size_t i = 0; i + 1 < options_.mapper_arguments.size(); i += 2) {
+    if (options_.mapper_arguments[i] == name) value = options_.mapper_arguments[i + 1];
+  }
+  return value;
+}
+
+void MapperRun::AddGlobals(const std::string& command, ColmapOptions* options) const {
+  const std::set<std::string>& known = colmap_->Options(command);
+  const auto set_if_known = [&](const std::string& name, int value) {
+    if (known.count(name) > 0) Set(name, std::to_string(value), options);
+  };
+  set_if_known("--random_seed", options_.random_seed);
+  set_if_known("--Mapper.random_seed", options_.random_seed);
+  set_if_known("--Mapper.num_threads", options_.num_threads);
+}
+
+ColmapOptions MapperRun::WithMapperOptions(const std::string& command,
+                                           ColmapOptions options) const {
+  const std::string refine = options_.refine_intrinsics ? "1" : "0";
+  Set("--Mapper.ba_refine_focal_length", refine, &options);
+  Set("--Mapper.ba_refine_extra_params", refine, &options);
+  Set("--Mapper.ba_refine_principal_point", "0", &options);
+  AddGlobals(command, &options);
+  for (size_t i = 0; i + 1 < options_.mapper_arguments.size(); i += 2) {
+    Set(options_.mapper_arguments[i], options_.mapper_arguments[i + 1], &options);
+  }
+  const std::set<std::string>& known = colmap_->Options(command);
+  options.erase(std::remove_if(options.begin(), options.end(),
+                               [&](const auto& option) { return known.count(option.first) == 0; }),
+                options.end());
+  return options;
+}
+
+ColmapOptions MapperRun::Paths(const std::string& input, const std::string& output) const {
+  return {{"--database_path", database_path_},
+          {"--image_path", image_path_},
+          {"--input_path", input},
+          {"--output_path", output}};
+}
+
+// "" or what went wrong.
+std::string MapperRun::Call(const std::string& command, const ColmapOptions& options,
+                            const std::function<void(const std::string&)>& on_line) {
+  const ColmapRun run = colmap_->Run(command, options, on_line);
+  if (run.success) return "";
+  const std::string refusal = OptionRefusal(run);
+  if (!refusal.empty()) throw UsageError("colmap " + command + " refuses: " + refusal);
+  return "colmap " + command + " " + run.failure + "; its last lines: " + run.LastLines() +
+         " (all of them in " + colmap_->log_path() + ")";
+}
+
+MapperResult MapperRun::Run(const Seed& seed, int num_images,
+                            const std::function<void()>& on_registered) {
+  ++num_runs_;
+  MapperResult result;
+  const bool only_seed = static_cast<int>(seed.poses.images.size()) >= num_images;
+  const std::string start = Folder("seed"), seeded = Folder("seeded"), mapped = Folder("mapped"),
+                    closed = Folder("closed"), adjusted = Folder("adjusted");
+  WriteSparseModelText(seed.poses, start);
+
+  // Two views make tracks of two views only, which COLMAP ignores unless told otherwise.
+  const ColmapOptions two_view_tracks = {{"--Mapper.tri_ignore_two_view_tracks", "0"}};
+  const auto append = [](ColmapOptions options, const ColmapOptions& more) {
+    options.insert(options.end(), more.begin(), more.end());
+    return options;
+  };
+  result.problem =
+      Call("point_triangulator",
+           WithMapperOptions("point_triangulator", append(Paths(start, seeded), two_view_tracks)),
+           nullptr);
+  if (!result.problem.empty()) return result;
+  std::string last = seeded;
+  if (!only_seed) {
+    const ColmapOptions mapper = append(Paths(seeded, mapped), {{"--Mapper.multiple_models", "0"}});
+    result.problem =
+        Call("mapper", WithMapperOptions("mapper", mapper), [&](const std::string& line) {
+          if (line.find("Registering image #") != std::string::npos) {
+            on_registered();
+          }
+        });
+    if (!result.problem.empty()) return result;
+    last = mapped;
+  }
+  result.problem = Call("point_triangulator",
+                        WithMapperOptions("point_triangulator",
+                                          only_seed ? append(Paths(last, closed), two_view_tracks)
+                                                    : Paths(last, closed)),
+                        nullptr);
+  if (!result.problem.empty()) return result;
+
+  ColmapOptions bundle = {
+      {"--input_path", closed},
+      {"--output_path", adjusted},
+      {"--BundleAdjustment.refine_focal_length",
+       MapperValue("--Mapper.ba_refine_focal_length", options_.refine_intrinsics ? "1" : "0")},
+      {"--BundleAdjustment.refine_extra_params",
+       MapperValue("--Mapper.ba_refine_extra_params", options_.refine_intrinsics ? "1" : "0")},
+      {"--BundleAdjustment.refine_principal_point",
+       MapperValue("--Mapper.ba_refine_principal_point", "0")}};
+  AddGlobals("bundle_adjuster", &bundle);
+  result.problem = Call("bundle_adjuster", bundle, nullptr);
+  if (!result.problem.empty()) return result;
+
+  result.folder = adjusted;
+  result.model = ReadSparseModel(adjusted);
+  result.mean_reprojection_error_px = UpdateReprojectionErrors(&result.model).mean_px;
+  result.grew = result.model.images.size() > seed.poses.images.size();
+  return result;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,59 @@
+#pragma once
+// A seed through COLMAP: triangulated, continued by `colmap mapper`, triangulated and adjusted once
+// more.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/colmap_program.h"
+#include "colmap_ext/initializer.h"
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+struct MapperOptions {
+  // --Mapper.* options of the user: {"--Mapper.min_num_matches", "20", ...}.
+  std::vector<std::string> mapper_arguments;
+  bool refine_intrinsics = false;  // focal length and distortion, never the principal point
+  int num_threads = -1;            // -1 = all
+  int random_seed = 0;
+};
+
+struct MapperResult {
+  std::string folder;  // the finished model as COLMAP wrote it; "" if there is none
+  SparseModel model;
+  double mean_reprojection_error_px = 0;  // over all observations
+  bool grew = false;                      // images beyond the seed's were registered
+  std::string problem;                    // what went wrong; "" if nothing
+};
+
+class MapperRun {
+ public:
+  // database_path: a copy that COLMAP may write to. scratch: an existing folder for models on the
+  // way. Throws UsageError for options that the program does not know or that contradict this way
+  // of mapping.
+  MapperRun(ColmapProgram* colmap, const std::string& database_path, const std::string& image_path,
+            const std::string& scratch, const MapperOptions& options);
+
+  // on_registered is called whenever COLMAP has registered another image. A run that fails is told
+  // in `problem`; COLMAP's refusal of an option's value is thrown as UsageError.
+  MapperResult Run(const Seed& seed, int num_images, const std::function<void()>& on_registered);
+
+ private:
+  std::string Folder(const std::string& name) const;
+  // `options` that `command` knows, with the user's --Mapper.* on top.
+  ColmapOptions WithMapperOptions(const std::string& command, ColmapOptions options) const;
+  ColmapOptions Paths(const std::string& input, const std::string& output) const;
+  void AddGlobals(const std::string& command, ColmapOptions* options) const;
+  std::string Call(const std::string& command, const ColmapOptions& options,
+                   const std::function<void(const std::string&)>& on_line);
+  std::string MapperValue(const std::string& name, const std::string& fallback) const;
+
+  ColmapProgram* colmap_;
+  std::string database_path_, image_path_, scratch_;
+  MapperOptions options_;
+  int num_runs_ = 0;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,332 @@
+// roomtex-mapper: COLMAP's mapper behind an initialiser that is not fooled by walls.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "colmap_ext/mapper_run.h"
+#include "colmap_ext/model_output.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string database_path, image_path, output_path;
+  std::string colmap = "colmap";
+  InitOptions init;
+  MapperOptions mapper;
+};
+
+void AddOptions(Options* options, Command* command) {
+  using Kind = Command::Kind;
+  command->AddInputPath(
+      "database_path", &options->database_path,
+      "COLMAP's database with verified matches (colmap exhaustive_matcher). Only read.");
+  command->AddInputPath("image_path", &options->image_path,
+                        "Folder of the photos, as given to colmap feature_extractor.");
+  command->AddOutputPath(
+      "output_path", &options->output_path,
+      "Folder to write into: 0/ (the model), init/ (the two-view model it started "
+      "from), roomtex-mapper.log (what COLMAP said).");
+  command->AddString("colmap", &options->colmap, "COLMAP's program: a path, or a name on the PATH.",
+                     Kind::kOptional);
+  command->AddBool("refine_intrinsics", &options->mapper.refine_intrinsics,
+                   "Refine focal length and distortion; 0 keeps the calibrated camera as it is.");
+  InitOptions& init = options->init;
+  command->AddInt("Init.min_num_inliers", &init.min_num_inliers,
+                  "Verified matches a pair must have, and points it must keep; larger = stricter.");
+  command->AddDouble(
+      "Init.keypoint_noise_px", &init.keypoint_noise_px,
+      "Standard deviation of a keypoint's coordinates in pixels; larger = more tolerant.");
+  command->AddDouble(
+      "Init.max_error_px", &init.max_error_px,
+      "Largest reprojection error of an inlier in pixels; larger = more tolerant. 0 = 3.03 "
+      "times --Init.keypoint_noise_px, which one true match in a hundred exceeds.");
+  command->AddDouble("Init.min_tri_angle_deg", &init.min_tri_angle_deg,
+                     "Smallest median angle between a pair's rays in degrees; larger = stricter.");
+  command->AddDouble(
+      "Init.degenerate_ratio", &init.degenerate_ratio,
+      "Share of the inliers of F on one homography above which the structure is reported "
+      "as degenerate. Changes the report only: a third view decides.");
+  command->AddDouble(
+      "Init.min_confidence", &init.min_confidence,
+      "How many times better than its rival a solution of the pair must explain the third "
+      "views to be believed; larger = stricter.");
+  command->AddInt("Init.max_third_views", &init.max_third_views,
+                  "Further photos that check a pair and start the model with it; 0 = none.");
+  command->AddInt("Init.max_candidates", &init.max_candidates,
+                  "Pairs that are solved before the best one is taken; larger = slower.");
+  command->AddInt(
+      "Init.max_pairs", &init.max_pairs,
+      "Pairs handed to COLMAP, one after the other, while fewer than half of the photos "
+      "register.");
+  command->AddString("Init.image_name1", &init.image_name1,
+                     "Photo to start from, as named in the database; empty = chosen.");
+  command->AddString("Init.image_name2", &init.image_name2,
+                     "The photo to pair it with; empty = chosen.");
+  command->PassThrough(
+      "--Mapper.", &options->mapper.mapper_arguments,
+      "Handed on to colmap mapper (see colmap mapper -h). --Mapper.init_* have no effect: "
+      "the pair is chosen here, by --Init.*.");
+}
+
+// Everything in the database that would make mapping senseless.
+void CheckDatabase(const MatchedImages& images, const Options& options,
+                   const Command::Context& context) {
+  const std::string& path = options.database_path;
+  if (images.images().empty()) {
+    throw InputError(path, "", "holds no images", "Run colmap feature_extractor first");
+  }
+  if (images.pairs().empty()) {
+    throw InputError(path, "", "holds no verified matches",
+                     "Run colmap exhaustive_matcher (or another matcher) first");
+  }
+  for (const std::string* name : {&options.init.image_name1, &options.init.image_name2}) {
+    if (name->empty() || images.FindImage(*name) != nullptr) continue;
+    throw InputError(path, "", "holds no image " + *name,
+                     "Give --Init.image_name1 and 2 as the database names them, e.g. " +
+                         images.images().begin()->second.name);
+  }
+  std::string missing;
+  int num_missing = 0;
+  for (const auto& [image_id, image] : images.images()) {
+    std::error_code error;
+    if (fs::is_regular_file(fs::path(options.image_path) / image.name, error)) continue;
+    if (num_missing++ == 0) missing = image.name;
+  }
+  if (num_missing > 0) {
+    throw InputError(options.image_path, "",
+                     "lacks " + std::to_string(num_missing) + " of the " +
+                         std::to_string(images.images().size()) + " photos of the database, e.g. " +
+                         missing,
+                     "Give the folder that was given to colmap feature_extractor");
+  }
+  for (const auto& [camera_id, camera] : images.cameras()) {
+    if (camera.has_prior_focal_length) continue;
+    context.Warn(
+        "camera " + std::to_string(camera_id) +
+        " has prior_focal_length = 0: COLMAP guessed its focal length and verified its pairs "
+        "as uncalibrated. Give --ImageReader.camera_params to colmap feature_extractor");
+  }
+}
+
+Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::string& outcome) {
+  Json json;
+  json["pair"] = {images.images().at(trial.image_id1).name,
+                  images.images().at(trial.image_id2).name};
+  json["num_matches"] = trial.num_matches;
+  json["h_ratio"] = trial.analysis.h_ratio;
+  json["num_hypotheses"] = trial.analysis.hypotheses.size();
+  json["outcome"] = outcome;
+  return json;
+}
+
+struct Outcome {
+  Seed seed;
+  MapperResult result;
+};
+
+void FillReport(const Outcome& outcome, const MatchedImages& images, Report* report) {
+  const PairTrial& trial = outcome.seed.trial;
+  const SparseModel& model = outcome.result.model;
+  Report& r = *report;
+  r["pair"] = {images.images().at(trial.image_id1).name, images.images().at(trial.image_id2).name};
+  r["num_f_inliers"] = trial.analysis.num_f_inliers;
+  r["num_h_inliers"] = trial.analysis.num_h_inliers;
+  r["h_ratio"] = trial.analysis.h_ratio;
+  r["degenerate"] = trial.analysis.degenerate;
+  r["num_points"] = model.points.size();
+  r["num_reg_images"] = model.images.size();
+  r["num_images"] = images.images().size();
+  r["mean_reprojection_error_px"] = outcome.result.mean_reprojection_error_px;
+  const ThirdViewDecision& decision = trial.decision;
+  const TwoViewHypothesis& chosen = trial.analysis.hypotheses[decision.best];
+  Json init;
+  init["num_matches"] = trial.num_matches;
+  init["num_points"] = outcome.seed.pair_model.points.size();
+  init["origin"] = chosen.origin;
+  init["median_angle_deg"] = chosen.median_angle_deg;
+  init["num_hypotheses"] = trial.analysis.hypotheses.size();
+  // null: there was no second hypothesis to compare with.
+  init["confidence"] = std::isfinite(decision.confidence) ? Json(decision.confidence) : Json();
+  init["seed_images"] = Json::array();
+  for (const auto& [image_id, image] : outcome.seed.poses.images) {
+    init["seed_images"].push_back(image.name);
+  }
+  r["init"] = init;
+  r["images"] = Json::array();
+  for (const auto& [image_id, image] : images.images()) {
+    const bool in_seed = outcome.seed.poses.images.count(image_id) > 0;
+    Json entry;
+    entry["name"] = image.name;
+    entry["registered"] = model.images.count(image_id) > 0;
+    entry["by"] = !entry["registered"] ? "none" : in_seed ? "seed" : "mapper";
+    r["images"].push_back(entry);
+  }
+}
+
+void JudgeTrust(const Outcome& outcome, const MatchedImages& images, Report* report) {
+  const auto name = [&](uint32_t image_id) { return images.images().at(image_id).name; };
+  const PairTrial& trial = outcome.seed.trial;
+  if (outcome.seed.ambiguous) {
+    char confidence[32];
+    std::snprintf(confidence, sizeof(confidence), "%.2f", trial.decision.confidence);
+    report->SetUntrusted("planar-ambiguous: two camera motions explain " + name(trial.image_id1) +
+                         " and " + name(trial.image_id2) + " about equally well (ratio " +
+                         confidence + ", " + std::to_string(trial.decision.num_views) +
+                         " third views), as happens before a wall. Add a photo that overlaps both "
+                         "from another place "
+                         "and shows something off the wall.");
+  }
+  const size_t num_registered = outcome.result.model.images.size();
+  if (2 * num_registered < images.images().size()) {
+    report->SetUntrusted("only " + std::to_string(num_registered) + " of " +
+                         std::to_string(images.images().size()) +
+                         " photos could be registered. Take more photos between those that are "
+                         "missing, or match them more thoroughly.");
+  }
+}
+
+bool Better(const MapperResult& a, const MapperResult& b) {
+  if (a.model.images.size() != b.model.images.size()) {
+    return a.model.images.size() > b.model.images.size();
+  }
+  return a.model.points.size() > b.model.points.size();
+}
+
+[[noreturn]] void ThrowNothingWorked(const std::string& database_path, const Json& trials) {
+  std::string reasons;
+  constexpr size_t kNumShown = 3;
+  for (size_t i = 0; i < trials.size() && i < kNumShown; ++i) {
+    reasons += "; " + trials[i]["pair"][0].get<std::string>() + " and " +
+               trials[i]["pair"][1].get<std::string>() + ": " +
+               trials[i]["outcome"].get<std::string>();
+  }
+  if (trials.empty()) {
+    reasons = "; no pair has --Init.min_num_inliers verified matches";
+  } else if (trials.size() > kNumShown) {
+    reasons += "; and " + std::to_string(trials.size() - kNumShown) + " more pairs";
+  }
+  throw InputError(database_path, "", "gives no pair to start from" + reasons,
+                   "Add photos from other places that overlap well, or relax --Init.*");
+}
+
+// Seeds one after the other until COLMAP makes something of one.
+std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Options& options,
+                              const Command::Context& context, Json* trials) {
+  const int num_images = static_cast<int>(images->images().size());
+  std::vector<Outcome> best;  // at most one
+  context.progress.Stage("initialise");
+  Initializer initializer(images, options.init, context.options.num_threads,
+                          static_cast<uint64_t>(context.options.random_seed));
+  for (int tried = 0; tried < options.init.max_pairs; ++tried) {
+    context.progress.Stage("initialise");
+    std::optional<Seed> seed = initializer.Next();
+    ThrowIfInterrupted();
+    if (!seed) break;
+    context.progress.Note("pair " + images->images().at(seed->trial.image_id1).name + ", " +
+                          images->images().at(seed->trial.image_id2).name + ": " +
+                          std::to_string(seed->pair_model.points.size()) + " points, " +
+                          std::to_string(seed->poses.images.size() - 2) + " third views agree");
+    context.progress.Stage("colmap mapper", num_images);
+    Outcome outcome;
+    outcome.result = mapper->Run(*seed, num_images, [&] { context.progress.Tick(); });
+    const bool all_in_seed = static_cast<int>(seed->poses.images.size()) == num_images;
+    if (outcome.result.problem.empty() && !outcome.result.grew && !all_in_seed) {
+      outcome.result.problem = "no further photo could be registered";
+    }
+    trials->push_back(
+        TrialJson(seed->trial, *images,
+                  outcome.result.problem.empty()
+                      ? std::to_string(outcome.result.model.images.size()) + " photos registered"
+                      : outcome.result.problem));
+    if (!outcome.result.problem.empty()) {
+      context.Warn("starting from " + images->images().at(seed->trial.image_id1).name + " and " +
+                   images->images().at(seed->trial.image_id2).name + ": " + outcome.result.problem);
+    }
+    outcome.seed = std::move(*seed);
+    if (outcome.result.folder.empty()) continue;
+    const bool enough = 2 * outcome.result.model.images.size() >= images->images().size();
+    if (best.empty() || Better(outcome.result, best[0].result)) {
+      best.clear();
+      best.push_back(std::move(outcome));
+    }
+    if (enough) break;
+  }
+  for (const PairTrial& trial : initializer.Rejected()) {
+    trials->push_back(TrialJson(trial, *images, trial.problem));
+  }
+  return best;
+}
+
+void MapPhotos(const Options& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.init.Problems();
+  ThrowIfProblems(problems);
+  RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
+  context.progress.Stage("read database");
+  const Database database(options.database_path);
+  MatchedImages images(database);
+  CheckDatabase(images, options, context);
+
+  MakeFolder(options.output_path);
+  const std::string model_path = options.output_path + "/0",
+                    init_path = options.output_path + "/init";
+  RequireReplaceableModel(model_path);
+  RequireReplaceableModel(init_path);
+  const SignalGuard signals;
+  const ScratchFolder scratch(options.output_path);
+  const std::string log_path = options.output_path + "/roomtex-mapper.log";
+  std::ofstream(log_path, std::ios::trunc) << "roomtex-mapper " << Version() << "\n";
+  ColmapProgram colmap(options.colmap, log_path);
+  MapperOptions mapper_options = options.mapper;
+  mapper_options.num_threads = context.options.num_threads;
+  mapper_options.random_seed = context.options.random_seed;
+  const std::string database_copy = scratch / "database.db";
+  MapperRun mapper(&colmap, database_copy, options.image_path, scratch.path(), mapper_options);
+  database.CopyForMapper(database_copy);
+
+  Json trials = Json::array();
+  std::vector<Outcome> best = TrySeeds(&images, &mapper, options, context, &trials);
+  context.report["pairs_tried"] = trials.size();
+  context.report["pair_trials"] = trials;
+  if (best.empty()) ThrowNothingWorked(options.database_path, trials);
+  const Outcome& outcome = best[0];
+  FillReport(outcome, images, &context.report);
+  JudgeTrust(outcome, images, &context.report);
+
+  context.progress.Stage("write model");
+  const std::string init_scratch = scratch / "init";
+  WriteSparseModel(outcome.seed.pair_model, init_scratch);
+  ThrowIfInterrupted();
+  ReplaceFolder(init_scratch, init_path, scratch.path());
+  ReplaceFolder(outcome.result.folder, model_path, scratch.path());
+  std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
+              model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
+              outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  using namespace roomtex;
+  Options options;
+  Command command(
+      "roomtex-mapper",
+      "COLMAP's mapper, started from a pair that this command chooses and solves: right also "
+      "before walls, where two photos alone have two solutions.",
+      "roomtex-mapper --database_path database.db --image_path photos --output_path sparse");
+  AddOptions(&options, &command);
+  try {
+    return command.Run(argc, argv,
+                       [&](const Command::Context& context) { MapPhotos(options, context); });
+  } catch (const Interrupted& interrupted) {
+    DieBySignal(interrupted.signal);
+  }
+}
