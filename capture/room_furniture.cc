@@ -189,7 +189,7 @@ void Builder::AddWindow() {
   }
   constexpr double kViewWidth = 24, kViewHeight = 12;
   const int outside =
-      Add(MakePicture(DrawOutside(2400, 1200, NextSeed()), kViewWidth, kViewHeight, 0, 0),
+      Add(MakePicture(DrawOutside(3200, 1600, NextSeed()), kViewWidth, kViewHeight, 0, 0),
           {0.3f, 0, {0, 0, 0}}, Surface::Kind::kOutside, true);
   scene_.AddQuad(outside, {width_ / 2 - kViewWidth / 2, depth_ + 6, 1.4 + 0.45 * kViewHeight},
                  {kViewWidth, 0, 0}, {0, 0, -kViewHeight});

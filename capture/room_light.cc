@@ -61,7 +61,7 @@ LinearRgb LightAt(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
     free += is_free(point, point + kAmbientReach * direction) ? 1 : 0;
     ++count;
   }
-  const LinearRgb ambient(0.42f, 0.40f, 0.37f);
+  const LinearRgb ambient(0.50f, 0.48f, 0.45f);
   return light + ambient * (0.25f + 0.75f * static_cast<float>(free) / static_cast<float>(count));
 }
 

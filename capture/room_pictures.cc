@@ -641,47 +641,70 @@ cv::Mat DrawRug(int width, int height, uint64_t seed) {
 cv::Mat DrawOutside(int width, int height, uint64_t seed) {
   RandomStream random(MixBits(seed, 13));
   cv::Mat image(height, width, CV_8UC3);
-  FillGradient(&image, {0, 0, width, height * 2 / 3}, Bgr(130, 175, 225), Bgr(215, 230, 240));
-  for (int i = 0; i < 60; ++i) {
+  const int meadow = height * 52 / 100;
+  FillGradient(&image, {0, 0, width, meadow}, Bgr(120, 168, 222), Bgr(218, 230, 238));
+  for (int i = 0; i < 90; ++i) {
     cv::ellipse(
-        image, {Round(random.Uniform(0, width)), Round(height * random.Uniform(0.03, 0.35))},
-        {Round(width * random.Uniform(0.02, 0.07)), Round(height * random.Uniform(0.01, 0.03))}, 0,
-        0, 360, Blend(Bgr(200, 215, 230), Bgr(250, 250, 250), random.Uniform()), cv::FILLED,
+        image, {Round(random.Uniform(0, width)), Round(height * random.Uniform(0.03, 0.4))},
+        {Round(width * random.Uniform(0.01, 0.04)), Round(height * random.Uniform(0.005, 0.015))},
+        0, 0, 360, Blend(Bgr(205, 218, 232), Bgr(250, 250, 250), random.Uniform()), cv::FILLED,
         cv::LINE_AA);
   }
-  cv::GaussianBlur(image, image, {0, 0}, width / 250.0);
+  cv::GaussianBlur(image, image, {0, 0}, width / 500.0);
   for (int range = 0; range < 3; ++range) {
-    Polygon(&image, Ridge(width, height, height * (0.42 + 0.07 * range), height * 0.06, &random),
-            FromHsv(150 - 25 * range, 0.25 + 0.1 * range, 0.62 - 0.08 * range));
+    Polygon(&image, Ridge(width, meadow, height * (0.41 + 0.03 * range), height * 0.05, &random),
+            FromHsv(190 - 35 * range, 0.22 + 0.1 * range, 0.66 - 0.09 * range));
   }
-  FillGradient(&image, {0, height * 2 / 3, width, height / 3 + 1}, Bgr(120, 150, 80),
-               Bgr(90, 120, 55));
-  for (int house = 0; house < 6; ++house) {
-    const double wide = width * random.Uniform(0.06, 0.11), x = width * (0.02 + 0.16 * house),
-                 top = height * random.Uniform(0.5, 0.57);
-    cv::rectangle(image, cv::Rect(Round(x), Round(top), Round(wide), Round(height * 0.2)),
-                  AnyColor(&random, 0.1, 0.4, 0.7, 0.95), cv::FILLED);
+  FillGradient(&image, {0, meadow, width, height - meadow}, Bgr(150, 172, 96), Bgr(84, 112, 52));
+  // Fields, a row of houses far off, trees nearer and nearer.
+  for (int i = 0; i < 2500; ++i) {
+    const double y = random.Uniform(meadow, height),
+                 length = (y - meadow + 20) * random.Uniform(0.05, 0.3);
+    const int x = Round(random.Uniform(0, width));
+    cv::line(image, {x, Round(y)}, {x + Round(length), Round(y + random.Uniform(-3, 3))},
+             FromHsv(random.Uniform(60, 110), 0.5, random.Uniform(0.3, 0.7)), 1 + random.Index(3),
+             cv::LINE_AA);
+  }
+  for (int house = 0; house < 16; ++house) {
+    const double wide = width * random.Uniform(0.025, 0.045),
+                 x = width * (0.01 + 0.0625 * house + random.Uniform(0, 0.015));
+    const double top = meadow + height * random.Uniform(-0.03, 0.02);
+    cv::rectangle(image, cv::Rect(Round(x), Round(top), Round(wide), Round(height * 0.06)),
+                  AnyColor(&random, 0.08, 0.4, 0.75, 0.95), cv::FILLED);
     Polygon(&image,
             {{Round(x - wide * 0.1), Round(top)},
-             {Round(x + wide / 2), Round(top - height * 0.09)},
+             {Round(x + wide / 2), Round(top - wide * 0.55)},
              {Round(x + wide * 1.1), Round(top)}},
-            FromHsv(10, 0.6, random.Uniform(0.4, 0.65)));
+            FromHsv(random.Uniform(5, 25), 0.6, random.Uniform(0.4, 0.65)));
     for (int pane = 0; pane < 6; ++pane) {
       cv::rectangle(image,
                     cv::Rect(Round(x + wide * (0.12 + 0.3 * (pane % 3))),
-                             Round(top + height * (0.03 + 0.08 * (pane / 3))), Round(wide * 0.16),
-                             Round(height * 0.05)),
+                             Round(top + height * (0.01 + 0.025 * (pane / 3))), Round(wide * 0.16),
+                             Round(height * 0.014)),
                     Bgr(60, 75, 95), cv::FILLED);
     }
   }
-  for (int i = 0; i < 500; ++i) {
-    const double x = width * (0.08 * (i % 12) + random.Uniform(0, 0.06)),
-                 y = height * random.Uniform(0.5, 0.72);
-    cv::circle(image, {Round(x), Round(y)}, Round(height * random.Uniform(0.01, 0.03)),
-               FromHsv(random.Uniform(80, 120), 0.5, random.Uniform(0.25, 0.6)), cv::FILLED,
-               cv::LINE_AA);
+  for (int tree = 0; tree < 60; ++tree) {
+    const double near = (tree + 1) / 60.0, tall = height * (0.03 + 0.09 * near * near);
+    const double x = random.Uniform(0, width), foot = meadow + height * (0.05 + 0.12 * near);
+    cv::rectangle(image,
+                  cv::Rect(Round(x - tall * 0.04), Round(foot - tall * 0.4), Round(tall * 0.08),
+                           Round(tall * 0.4)),
+                  Bgr(84, 62, 44), cv::FILLED);
+    const double hue = random.Uniform(70, 125);
+    for (int leaf = 0; leaf < 90; ++leaf) {
+      const double angle = random.Uniform(0, 2 * kPi),
+                   reach = tall * 0.36 * std::sqrt(random.Uniform());
+      const cv::Point2d at(x + reach * std::cos(angle),
+                           foot - tall * 0.62 + reach * std::sin(angle));
+      cv::circle(
+          image, {Round(at.x), Round(at.y)}, std::max(2, Round(tall * random.Uniform(0.03, 0.09))),
+          FromHsv(hue + random.Uniform(-12, 12), 0.55,
+                  (0.32 + 0.3 * (foot - tall * 0.3 - at.y) / tall) * random.Uniform(0.8, 1.2)),
+          cv::FILLED, cv::LINE_AA);
+    }
   }
-  Mottle(&image, 5, 0.1, &random);
+  Mottle(&image, 2.5, 0.06, &random);
   return image;
 }
 

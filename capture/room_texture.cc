@@ -89,12 +89,12 @@ class Plaster : public RoomTexture {
 
   LinearRgb Albedo(const Uv& uv, float footprint) const override {
     const float band = Band(footprint);
-    const float rough = Fractal(uv, 0.2f, band, 0.95f, seed_);
+    const float rough = Fractal(uv, 0.1f, band, 0.95f, seed_);
     const float stain = Fractal(uv, 0.9f, std::max(band, 0.2f), 0.7f, seed_ + 1);
     // A stain is a little warmer than the paint around it.
     const LinearRgb tint(1 + 0.3f * contrast_ * stain, 1.0f, 1 - 0.4f * contrast_ * stain);
     return color_.cwiseProduct(tint) *
-           std::clamp(1 + contrast_ * (1.1f * rough + 0.6f * stain), 0.1f, 1.6f);
+           std::clamp(1 + contrast_ * (1.1f * rough + 0.35f * stain), 0.1f, 1.6f);
   }
 
  private:

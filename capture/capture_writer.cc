@@ -1,0 +1,262 @@
+#include "capture/capture_writer.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <set>
+#include <sstream>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "colmap_ext/sparse_model.h"
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/output_file.h"
+#include "core/photo.h"
+#include "importers/rtpi.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kJpegQuality = 95;
+constexpr double kAperture = 8, kIso = 400;
+
+void WriteText(const std::string& path, const std::string& text) {
+  OutputFile file(path);
+  file.stream() << text;
+  file.Commit();
+}
+
+// A stream that prints doubles so that they read back exactly.
+std::ostringstream ExactStream() {
+  std::ostringstream stream;
+  stream.precision(std::numeric_limits<double>::max_digits10);
+  return stream;
+}
+
+std::string ScanName(int station) {
+  return station == 0 ? "scan.rtpi" : "scan_" + std::to_string(station) + ".rtpi";
+}
+
+void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_folder) {
+  std::set<std::string> names;
+  for (int i = 0; i < room.NumPhotos(); ++i) names.insert(room.PhotoName(i));
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(photo_folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() == ".jpg" && names.count(name) == 0) {
+      throw InputError(photo_folder, "", "holds " + name + ", which is not of this capture",
+                       "Give another --output_path, or remove the folder first");
+    }
+  }
+}
+
+void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
+  const cv::Mat image = room.RenderPhoto(photo);
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  OutputFile file(path);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                      static_cast<std::streamsize>(bytes.size()));
+  file.stream().flush();
+  if (room.options().exif) {
+    ExposureData exposure;
+    exposure.exposure_time = room.ExposureTime(photo);
+    exposure.f_number = kAperture;
+    exposure.iso = kIso;
+    exposure.camera = "roomtex simulated camera";
+    char date_time[32];
+    std::snprintf(date_time, sizeof(date_time), "2008:05:01 %02d:%02d:%02d", 12 + photo / 180,
+                  photo / 3 % 60, photo % 3 * 20);
+    exposure.date_time = date_time;
+    WriteExposureData(file.partial_path(), exposure);
+  }
+  file.Commit();
+}
+
+struct TrueVertex {
+  float x, y, z;
+  uint8_t red, green, blue;
+};
+
+void WriteTrueColors(const std::vector<TrueVertex>& vertices, const std::string& path) {
+  OutputFile file(path);
+  file.stream() << "ply\nformat binary_little_endian 1.0\n"
+                   "comment the scan points in grid order with their true colour (sRGB, EV 0)\n"
+                << "element vertex " << vertices.size() << "\n"
+                << "property float x\nproperty float y\nproperty float z\n"
+                   "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  for (const TrueVertex& vertex : vertices) {
+    char bytes[15];
+    std::memcpy(bytes, &vertex, 15);  // three floats and three bytes without padding
+    file.stream().write(bytes, sizeof(bytes));
+  }
+  file.Commit();
+}
+
+std::string PoseLine(const Rigid& pose) {
+  std::ostringstream line = ExactStream();
+  const Eigen::Vector4d q = WxyzFromQuaternion(pose.rotation);
+  line << q[0] << " " << q[1] << " " << q[2] << " " << q[3] << " " << pose.translation.x() << " "
+       << pose.translation.y() << " " << pose.translation.z();
+  return line.str();
+}
+
+void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
+                Progress* progress) {
+  progress->Stage("scans", room.options().num_stations);
+  std::vector<TrueVertex> vertices;
+  std::ostringstream poses = ExactStream();
+  poses << "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
+  for (int station = 0; station < room.options().num_stations; ++station) {
+    const Scan scan = room.MakeScan(station);
+    WriteRtpi(RtpiFromScan(scan), folder + "/" + ScanName(station));
+    poses << ScanName(station) << " " << PoseLine(scan.scan_from_station) << "\n";
+    const std::vector<Eigen::Vector3f> colors = room.TrueColors(station);
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      if (scan.IsMissing(static_cast<int>(i))) continue;
+      const Eigen::Vector3f point = scan.points[i].cast<float>();
+      vertices.push_back({point.x(), point.y(), point.z(), SrgbByteFromLinear(colors[i].x()),
+                          SrgbByteFromLinear(colors[i].y()), SrgbByteFromLinear(colors[i].z())});
+    }
+    summary->num_samples += scan.points.size();
+    summary->num_missing += scan.NumMissing();
+    progress->Tick();
+  }
+  if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses.str());
+  WriteTrueColors(vertices, folder + "/truth/true_colors.ply");
+}
+
+void WritePicks(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary) {
+  std::ostringstream text = ExactStream();
+  text << "# pixel in the photo (centre of the upper-left pixel = 0.5, 0.5), point in the scan "
+          "frame in metres\n"
+       << "image_name,x,y,scan_x,scan_y,scan_z\n";
+  if (room.options().num_picks > 0) {
+    const int photo = room.BestPhotoForPicks();
+    for (const SimulatedPick& pick : room.MakePicks(photo, room.options().num_picks)) {
+      summary->picked_photo = pick.image_name;
+      ++summary->num_picks;
+      char line[200];
+      std::snprintf(line, sizeof(line), "%s,%.2f,%.2f,%.4f,%.4f,%.4f\n", pick.image_name.c_str(),
+                    pick.x_in_img.x(), pick.x_in_img.y(), pick.x_in_scan.x(), pick.x_in_scan.y(),
+                    pick.x_in_scan.z());
+      text << line;
+    }
+  }
+  WriteText(folder + "/picks.csv", text.str());
+}
+
+std::string CameraParams(const Camera& camera) {
+  std::ostringstream params = ExactStream();
+  for (size_t i = 0; i < camera.params.size(); ++i)
+    params << (i > 0 ? "," : "") << camera.params[i];
+  return params.str();
+}
+
+void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
+  const Camera& camera = room.camera();
+  const std::string params = CameraParams(camera);
+  std::ostringstream cameras;
+  cameras << "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
+          << camera.camera_id << " " << CameraModelName(camera.model) << " " << camera.width << " "
+          << camera.height;
+  for (const char c : "," + params) cameras << (c == ',' ? ' ' : c);
+  WriteText(folder + "/cameras.txt", cameras.str() + "\n");
+  WriteText(folder + "/camera_options.txt",
+            std::string("--ImageReader.single_camera 1 --ImageReader.camera_model ") +
+                CameraModelName(camera.model) + " --ImageReader.camera_params " + params + "\n");
+}
+
+void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
+  SparseModel model;
+  model.cameras[1] = room.camera();
+  std::ostringstream exposures = ExactStream();
+  exposures << "image_name,exposure_ev,exposure_time\n";
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    SparseImage& image = model.images[photo + 1];
+    image.image_id = photo + 1;
+    image.camera_id = 1;
+    image.name = room.PhotoName(photo);
+    image.cam_from_model = room.CamFromScan(photo);
+    exposures << image.name << "," << room.ExposureEv(photo) << "," << room.ExposureTime(photo)
+              << "\n";
+  }
+  WriteSparseModelText(model, folder);
+  WriteText(folder + "/exposures.csv", exposures.str());
+  const Rigid scan_from_room = room.ScanFromRoom();
+  WriteSimilarity(folder + "/scan_from_room.txt",
+                  {1, scan_from_room.rotation, scan_from_room.translation});
+}
+
+void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
+  const SimulatedRoomOptions& options = room.options();
+  std::string scans;
+  for (int station = 0; station < options.num_stations; ++station) {
+    scans += " --scan_path " + ScanName(station);
+  }
+  if (options.num_stations > 1) scans += " --scan_poses scan_poses.txt";
+  std::ostringstream text;
+  text << "A simulated room: " << options.num_photos << " photos and " << options.num_stations
+       << (options.num_stations == 1 ? " range scan" : " range scans")
+       << ", made by roomtex-simulate --random_seed " << options.random_seed << "\n\n"
+       << "photos/             the photos"
+       << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
+       << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
+       << (options.num_stations > 1
+               ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
+               : "")
+       << "picks.csv           clicks: a pixel of a photo and the scan point seen there\n"
+       << "cameras.txt         the calibrated camera\n"
+       << "camera_options.txt  the same as options of colmap feature_extractor\n"
+       << "truth/              what the tools have to find out: the true poses in the scan frame "
+          "(a COLMAP\n"
+       << "                    text model), exposures.csv (EV relative to nominal), "
+          "scan_from_room.txt\n"
+       << "                    (scale, quaternion w x y z, translation; room: z up, origin in a "
+          "corner\n"
+       << "                    of the floor) and true_colors.ply (scan points in grid order, "
+          "missing\n"
+       << "                    ones left out, with their true colour)\n\n"
+       << "Type, in this folder:\n\n"
+       << "export QT_QPA_PLATFORM=offscreen\n"
+       << "colmap feature_extractor --database_path database.db --image_path photos "
+          "--SiftExtraction.use_gpu 0 "
+          "$(cat camera_options.txt)\n"
+       << "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"
+       << "roomtex-mapper --database_path database.db --image_path photos --output_path sparse\n"
+       << "roomtex-align --input_path sparse/0" << scans
+       << " --picks_path picks.csv --output_path aligned\n"
+       << "roomtex-texture --input_path aligned --image_path photos" << scans
+       << " --database_path database.db --output_path textured\n";
+  WriteText(folder + "/README.txt", text.str());
+}
+
+}  // namespace
+
+CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
+                            Progress* progress) {
+  const std::string photo_folder = folder + "/photos";
+  RequireNoOtherPhotos(room, photo_folder);
+  MakeFolder(photo_folder);
+  MakeFolder(folder + "/truth");
+  CaptureSummary summary;
+  WriteCamera(room, folder);
+  WriteTruth(room, folder + "/truth");
+  WritePicks(room, folder, &summary);
+  WriteReadme(room, folder);
+  WriteScans(room, folder, &summary, progress);
+  progress->Stage("photos", room.NumPhotos());
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    WritePhoto(room, photo, photo_folder + "/" + room.PhotoName(photo));
+    progress->Tick();
+  }
+  progress->Finish();
+  return summary;
+}
+
+}  // namespace roomtex
