@@ -1,0 +1,137 @@
+#include "texture/blend.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+// Bytes from here on may be clipped; JPEG smears 255 a little.
+constexpr float kClipStart = 244, kClipEnd = 254;
+constexpr float kClippedReliability = 0.02f;
+
+float ReliabilityOfByte(int brightest) {
+  const float share =
+      std::clamp((kClipEnd - static_cast<float>(brightest)) / (kClipEnd - kClipStart), 0.0f, 1.0f);
+  return kClippedReliability + (1 - kClippedReliability) * share;
+}
+
+// Square roots: distances are about even to the eye.
+Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).cwiseSqrt(); }
+
+}  // namespace
+
+std::vector<std::string> BlendOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (max_views < 1 || max_views > 64) problems.push_back("--Blend.max_views must be 1 to 64");
+  if (!(outlier >= 0)) problems.push_back("--Blend.outlier must not be negative");
+  if (!(footprint >= 0) || !(footprint <= 4)) {
+    problems.push_back("--Blend.footprint must be 0 to 4 sample spacings");
+  }
+  return problems;
+}
+
+float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_scanner,
+                  const Eigen::Vector3f& normal) {
+  if (normal.isZero() || to_scanner.isZero()) return 1;
+  const float camera_cosine = std::max(normal.dot(to_camera), 0.05f);
+  const Eigen::Vector3f shift = to_scanner - to_camera * (normal.dot(to_scanner) / camera_cosine);
+  const float slant = 1 / (camera_cosine * camera_cosine) - 1;  // tan^2
+  return 1 / (1 + shift.squaredNorm() + slant);
+}
+
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y) {
+  const std::array<float, 256>& linear = LinearFromSrgbByte();
+  const float px = std::clamp(x - 0.5f, 0.0f, static_cast<float>(photo.cols - 1));
+  const float py = std::clamp(y - 0.5f, 0.0f, static_cast<float>(photo.rows - 1));
+  const int column = static_cast<int>(px), row = static_cast<int>(py);
+  const float fx = px - static_cast<float>(column), fy = py - static_cast<float>(row);
+  const int right = column + 1 < photo.cols ? 3 : 0;
+  const uint8_t* upper = photo.ptr<uint8_t>(row) + 3 * column;
+  const uint8_t* lower = photo.ptr<uint8_t>(std::min(row + 1, photo.rows - 1)) + 3 * column;
+  PhotoColor color{};
+  int brightest = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int a = upper[k], b = upper[right + k], c = lower[k], d = lower[right + k];
+    brightest = std::max({brightest, a, b, c, d});
+    const float top = linear[a] + fx * (linear[b] - linear[a]);
+    const float bottom = linear[c] + fx * (linear[d] - linear[c]);
+    color.linear[2 - k] = top + fy * (bottom - top);  // BGR to r, g, b
+  }
+  color.reliability = ReliabilityOfByte(brightest);
+  return color;
+}
+
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
+  // Bilinear lookups already average over a pixel: as many as the square has pixels, each way.
+  const int count = std::clamp(static_cast<int>(std::lround(side)), 1, 16);
+  if (count == 1) return LookUpPhoto(photo, x, y);
+  PhotoColor mean{Eigen::Vector3f::Zero(), 1};
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j) {
+      const float dx = ((static_cast<float>(j) + 0.5f) / static_cast<float>(count) - 0.5f) * side;
+      const float dy = ((static_cast<float>(i) + 0.5f) / static_cast<float>(count) - 0.5f) * side;
+      const PhotoColor color = LookUpPhoto(photo, x + dx, y + dy);
+      mean.linear += color.linear;
+      mean.reliability = std::min(mean.reliability, color.reliability);
+    }
+  }
+  mean.linear /= static_cast<float>(count * count);
+  return mean;
+}
+
+BlendedSample BlendSample(const Observation* observations, int count,
+                          const std::vector<Eigen::Vector3f>& gains, double outlier) {
+  BlendedSample result;
+  if (count <= 0) return result;
+  constexpr int kMost = 64;  // BlendOptions::Problems
+  std::array<Eigen::Vector3f, kMost> colors, roots;
+  std::array<float, kMost> weights;
+  count = std::min(count, kMost);
+  for (int i = 0; i < count; ++i) {
+    colors[i] = UnpackColor(observations[i].color).cwiseProduct(gains[observations[i].photo]);
+    weights[i] = UnpackWeight(observations[i].weight);
+  }
+  if (outlier > 0 && count > 1) {
+    const auto scale2 = static_cast<float>(outlier * outlier);
+    for (int i = 0; i < count; ++i) roots[i] = Root(colors[i]);
+    const auto agreement = [&](int i, int j) {
+      const float share = 1 + (roots[i] - roots[j]).squaredNorm() / scale2;
+      return 1 / share;
+    };
+    // The observation that most weight agrees with; of equals the heavier one.
+    int central = 0;
+    float most = -1;
+    for (int i = 0; i < count; ++i) {
+      float sum = 0;
+      for (int j = 0; j < count; ++j) sum += weights[j] * agreement(i, j);
+      if (sum > most) {
+        most = sum;
+        central = i;
+      }
+    }
+    std::array<float, kMost> kept = weights;
+    for (int i = 0; i < count; ++i) {
+      const float share = agreement(central, i);
+      kept[i] = weights[i] * share * share;
+    }
+    weights = kept;
+  }
+  float sum = 0, largest = -1;
+  for (int i = 0; i < count; ++i) {
+    sum += weights[i];
+    result.blend += weights[i] * colors[i];
+    if (weights[i] > largest) {
+      largest = weights[i];
+      result.dominant = colors[i];
+      result.dominant_photo = observations[i].photo;
+    }
+  }
+  result.blend /= sum;
+  return result;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,70 @@
+#pragma once
+// Exposure unification (thesis 8.2.1): one factor per photo, in linear light.
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/photo.h"
+#include "texture/observations.h"
+
+namespace roomtex {
+
+struct ExposureOptions {
+  // "exif": the ratio of shutter time * ISO / aperture^2 (thesis 8.2.1); photos without EXIF are
+  // matched. "match": least squares over what several photos see, with EXIF as a prior where there
+  // is any: cameras keep the exposure they note down to about a tenth only, and some programs drop
+  // it. "none": photos are used as they are.
+  std::string mode = "match";
+  // Match red, green and blue on their own: for photos whose white balance changed.
+  bool white_balance = false;
+
+  std::vector<std::string> Problems() const;
+};
+
+// The same sample seen by two photos, well exposed in both.
+struct Overlap {
+  int photo_a = 0, photo_b = 0;
+  int num_samples = 0;
+  // Median over the samples of log(light in a / light in b), per channel r, g, b, and of their sum.
+  Eigen::Vector4f log_ratio = Eigen::Vector4f::Zero();
+  float spread = 0;  // of the sum's: median absolute deviation * 1.4826
+};
+
+// Pairs of photos that share at least min_samples samples, ordered by photo numbers. Looks at an
+// even selection of the samples, so that time stays bounded; reliable, clear observations only.
+std::vector<Overlap> FindOverlaps(const ObservationStore& store, int num_photos,
+                                  int min_samples = 30);
+
+struct ExposureSolution {
+  std::vector<Eigen::Vector3f> gains;  // per photo: r, g, b factors in linear light
+  int reference_photo = -1;            // gain 1 before `output_scale`; the photo of median exposure
+  std::vector<std::string> warnings;   // plain sentences that hold {number} where a photo is meant
+  std::vector<int> unconnected;        // photos that neither EXIF nor an overlap ties to the others
+  std::vector<int> contradicted;       // photos whose EXIF the overlaps contradict
+  int without_exif = 0;                // in mode "exif": photos that had to be matched
+};
+
+// exposures: EXIF per photo. Photos are numbered as in the overlaps.
+ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
+                               const std::vector<Overlap>& overlaps,
+                               const ExposureOptions& options);
+
+// Factor <= 1 for the whole result so that at most one sample in a thousand is lighter than 1 (but
+// never below 1/2): the overall brightness is that of the reference photo, unless this would blow
+// out lights.
+float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector3f>& gains);
+
+// Mean absolute colour difference between the photos that see the same sample, 0-255 in sRGB.
+struct Disagreement {
+  double before = 0, after = 0;  // with gains of 1, with the given gains
+  double at_random = 0;          // after, between photos at two samples that have nothing in common
+  size_t num_pairs = 0;
+};
+Disagreement MeasureDisagreement(const ObservationStore& store,
+                                 const std::vector<Eigen::Vector3f>& gains);
+
+}  // namespace roomtex

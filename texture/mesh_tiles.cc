@@ -1,0 +1,212 @@
+#include "texture/mesh_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace roomtex {
+namespace {
+
+constexpr int kTileEdge = 32;               // quads of the grid
+constexpr size_t kTrianglesPerTile = 2048;  // of a mesh without a grid
+
+// Morton code of a point in a box: 10 bits an axis.
+uint32_t MortonCode(const Eigen::Vector3d& point, const Bounds& bounds) {
+  const double size = std::max(1e-12, (bounds.max - bounds.min).maxCoeff());
+  uint32_t code = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double place = (point[axis] - bounds.min[axis]) / size * 1023;
+    const auto cell = static_cast<uint32_t>(std::clamp(place, 0.0, 1023.0));
+    for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1u) << (3 * bit + axis);
+  }
+  return code;
+}
+
+// Orders the numbers 0 .. keys.size() - 1 by key, equal keys in order.
+std::vector<int> OrderByKey(const std::vector<uint32_t>& keys) {
+  std::vector<int> order(keys.size());
+  const uint32_t max_key = keys.empty() ? 0 : *std::max_element(keys.begin(), keys.end());
+  if (max_key < keys.size() + 4096) {  // few keys: count them
+    std::vector<int> next(max_key + 2, 0);
+    for (uint32_t key : keys) ++next[key + 1];
+    for (uint32_t k = 0; k <= max_key; ++k) next[k + 1] += next[k];
+    for (size_t i = 0; i < keys.size(); ++i) order[next[keys[i]]++] = static_cast<int>(i);
+    return order;
+  }
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return keys[a] < keys[b]; });
+  return order;
+}
+
+// Gives the corners of one tile's triangles local numbers.
+class TileBuilder {
+ public:
+  explicit TileBuilder(const std::vector<Eigen::Vector3d>& points)
+      : points_(points), local_(points.size(), -1) {}
+
+  MeshTile Build(const std::vector<Triangle>& triangles, const int* begin, const int* end) {
+    MeshTile tile;
+    vertices_.clear();
+    tile.triangles.reserve(end - begin);
+    for (const int* t = begin; t != end; ++t) {
+      std::array<uint16_t, 3> corners{};
+      for (int k = 0; k < 3; ++k) {
+        int& local = local_[triangles[*t][k]];
+        if (local < 0) {
+          local = static_cast<int>(vertices_.size());
+          vertices_.push_back(triangles[*t][k]);
+        }
+        corners[k] = static_cast<uint16_t>(local);
+      }
+      tile.triangles.push_back(corners);
+    }
+    Eigen::Vector3d low = points_[vertices_[0]], high = low;
+    for (int v : vertices_) {
+      low = low.cwiseMin(points_[v]);
+      high = high.cwiseMax(points_[v]);
+      local_[v] = -1;
+    }
+    tile.points.origin = 0.5 * (low + high);
+    tile.points.x.reserve(vertices_.size());
+    tile.points.y.reserve(vertices_.size());
+    tile.points.z.reserve(vertices_.size());
+    for (int v : vertices_) tile.points.Add(points_[v]);
+    return tile;
+  }
+
+ private:
+  const std::vector<Eigen::Vector3d>& points_;
+  std::vector<int> local_, vertices_;
+};
+
+// The upper left sample of the quad of a grid that a triangle lies in, also where a full turn
+// closes.
+std::array<int, 2> QuadOf(const Triangle& t, int columns) {
+  int low = columns, high = -1, row = std::numeric_limits<int>::max();
+  for (int corner : t) {
+    low = std::min(low, corner % columns);
+    high = std::max(high, corner % columns);
+    row = std::min(row, corner / columns);
+  }
+  return {high - low > columns / 2 && columns > 2 ? high : low, row};
+}
+
+uint32_t TileKey(int column, int row, int columns) {
+  const int tiles_across = columns / kTileEdge + 1;
+  return static_cast<uint32_t>(row / kTileEdge * tiles_across + column / kTileEdge);
+}
+
+std::vector<MeshTile> TileTriangles(const Scan& scan, const std::vector<Eigen::Vector3d>& points,
+                                    const std::vector<Triangle>& triangles) {
+  std::vector<uint32_t> keys(triangles.size());
+  const Bounds bounds = scan.organised ? Bounds() : FindBounds(scan);
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = triangles[i];
+    if (scan.organised) {
+      const auto [column, row] = QuadOf(t, scan.num_columns);
+      keys[i] = TileKey(column, row, scan.num_columns);
+    } else {
+      keys[i] = MortonCode((points[t[0]] + points[t[1]] + points[t[2]]) / 3, bounds);
+    }
+  }
+  const std::vector<int> order = OrderByKey(keys);
+  std::vector<MeshTile> tiles;
+  TileBuilder builder(points);
+  for (size_t begin = 0; begin < order.size();) {
+    size_t end = begin;
+    while (end < order.size() && (scan.organised ? keys[order[end]] == keys[order[begin]]
+                                                 : end - begin < kTrianglesPerTile)) {
+      ++end;
+    }
+    tiles.push_back(builder.Build(triangles, order.data() + begin, order.data() + end));
+    begin = end;
+  }
+  return tiles;
+}
+
+// Triangles over the quads that the mesh leaves open although their corners were measured.
+std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) {
+  std::vector<Triangle> shadows;
+  if (!scan.organised || scan.num_columns < 2) return shadows;
+  std::vector<uint8_t> filled(scan.points.size(), 0);  // triangles per quad
+  bool closed = false;
+  for (const Triangle& t : surface.triangles) {
+    const auto [column, row] = QuadOf(t, scan.num_columns);
+    ++filled[scan.Index(column, row)];
+    closed = closed || column == scan.num_columns - 1;
+  }
+  const int quads = closed ? scan.num_columns : scan.num_columns - 1;
+  for (int row = 0; row + 1 < scan.num_rows; ++row) {
+    for (int column = 0; column < quads; ++column) {
+      if (filled[scan.Index(column, row)] >= 2) continue;
+      const int right = (column + 1) % scan.num_columns;
+      const int corner[4] = {scan.Index(column, row), scan.Index(right, row),
+                             scan.Index(right, row + 1), scan.Index(column, row + 1)};
+      int measured[4], count = 0;
+      for (int c : corner) {
+        if (!scan.IsMissing(c)) measured[count++] = c;
+      }
+      if (count == 4 || (count == 3 && filled[scan.Index(column, row)] == 0)) {
+        shadows.push_back({measured[0], measured[1], measured[2]});
+      }
+      if (count == 4) shadows.push_back({measured[0], measured[2], measured[3]});
+    }
+  }
+  return shadows;
+}
+
+}  // namespace
+
+OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface) {
+  OccluderTiles tiles;
+  tiles.surface = TileTriangles(scan, surface.points, surface.triangles);
+  tiles.shadows = TileTriangles(scan, surface.points, FindShadows(scan, surface));
+  return tiles;
+}
+
+std::vector<SampleTile> MakeSampleTiles(int columns, int rows,
+                                        const std::vector<Eigen::Vector3d>& points,
+                                        const std::vector<Eigen::Vector3f>& normals,
+                                        const Eigen::Vector3d& station) {
+  std::vector<int> samples;
+  std::vector<uint32_t> keys;
+  Bounds bounds;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!(points[i].x() == points[i].x())) continue;
+    samples.push_back(static_cast<int>(i));
+    bounds.min = bounds.min.cwiseMin(points[i]);
+    bounds.max = bounds.max.cwiseMax(points[i]);
+  }
+  for (int i : samples) {
+    keys.push_back(rows > 1 ? TileKey(i % columns, i / columns, columns)
+                            : MortonCode(points[i], bounds));
+  }
+  const std::vector<int> order = OrderByKey(keys);
+  std::vector<SampleTile> tiles;
+  for (size_t begin = 0; begin < order.size();) {
+    size_t end = begin;
+    while (end < order.size() && (rows > 1 ? keys[order[end]] == keys[order[begin]]
+                                           : end - begin < kTileEdge * kTileEdge)) {
+      ++end;
+    }
+    SampleTile tile;
+    tile.first_slot = static_cast<int>(begin);
+    Eigen::Vector3d low = points[samples[order[begin]]], high = low;
+    for (size_t i = begin; i < end; ++i) {
+      tile.index.push_back(samples[order[i]]);
+      low = low.cwiseMin(points[tile.index.back()]);
+      high = high.cwiseMax(points[tile.index.back()]);
+    }
+    tile.points.origin = 0.5 * (low + high);
+    tile.scanner = (station - tile.points.origin).cast<float>();
+    for (int i : tile.index) {
+      tile.points.Add(points[i]);
+      tile.normals.push_back(normals[i]);
+    }
+    tiles.push_back(std::move(tile));
+    begin = end;
+  }
+  return tiles;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,269 @@
+// roomtex-texture: the scan in colour.
+
+#include <cmath>
+#include <filesystem>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "importers/rtpi.h"
+#include "importers/scan_reader.h"
+#include "texture/colorize.h"
+#include "texture/photo_list.h"
+#include "texture/write_glb.h"
+#include "texture/write_ply.h"
+#include "texture/write_texture.h"
+
+namespace roomtex {
+namespace {
+
+struct TextureOptions {
+  std::string input_path, output_path, scan_poses;
+  std::vector<std::string> scan_paths;
+  PhotoSources sources;
+  ScanReaderOptions scan_reader;
+  ColorizeOptions colorize;
+};
+
+void AddPathOptions(TextureOptions* o, Command* command) {
+  command->AddInputPath(
+      "input_path", &o->input_path,
+      "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
+  command->AddInputPath("image_path", &o->sources.image_path,
+                        "Folder of the photos, as COLMAP was given it.");
+  command->AddInputPaths("scan_path", &o->scan_paths,
+                         "Range scan: .rtpi, .ptx, organised .pcd, or .ply mesh.");
+  command->AddOutputPath("output_path", &o->output_path,
+                         "Folder to write model.ply, model.glb, texture.png, report.json (and "
+                         "model.rtpi) into.");
+  command->AddInputPath("database_path", &o->sources.database_path,
+                        "COLMAP database: its intrinsics are used instead of the model's, by image "
+                        "name.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("associations_path", &o->sources.associations_path,
+                        "CSV of roomtex-associate: colour comes from the plain twin of every "
+                        "registered patterned photo.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("scan_poses", &o->scan_poses, "File with a pose for each of several scans.",
+                        Command::Kind::kOptional);
+  AddScanReaderOptions(&o->scan_reader, command);
+}
+
+void AddColorOptions(ColorizeOptions* o, Command* command) {
+  command->AddChoice(
+      "Texture.unseen", &o->unseen, {"intensity", "black"},
+      "Colour of samples that no photo sees: their scan intensity as grey, or black.");
+  command->AddInt("Texture.scale", &o->texture_scale,
+                  "Texels per sample and direction; above 1 the surface between the samples is "
+                  "coloured, too. Larger = sharper texture, memory grows with its square.");
+  command->AddChoice("Exposure.mode", &o->exposure.mode, {"exif", "match", "none"},
+                     "exif: shutter time, aperture and ISO; match: from what several photos see, "
+                     "with EXIF as a prior; none: photos as they are.");
+  command->AddBool("Exposure.white_balance", &o->exposure.white_balance,
+                   "Match red, green and blue one by one (white balance that changed).");
+  command->AddDouble("Occlusion.depth_tolerance", &o->occlusion.depth_tolerance,
+                     "Share of its depth by which a surface in front hides a sample. Larger = more "
+                     "tolerant.");
+  command->AddDouble("Occlusion.boundary_px", &o->occlusion.boundary_px,
+                     "Width of the untrusted band beside depth boundaries, photo pixels; -1 = one "
+                     "and a half sample spacings.");
+  command->AddDouble("Occlusion.boundary_jump", &o->occlusion.boundary_jump,
+                     "Share of the depth that makes a jump a depth boundary. Larger = fewer.");
+  command->AddBool("Occlusion.shadows", &o->occlusion.shadows,
+                   "Distrust lines of sight through space that the scanner could not see.");
+  command->AddInt("Occlusion.depth_map_size", &o->occlusion.depth_map_size,
+                  "Least length of a depth map's longer side, pixels.");
+  command->AddInt("Blend.max_views", &o->blend.max_views,
+                  "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "
+                  "each.");
+  command->AddBool("Blend.angle_weight", &o->blend.angle_weight,
+                   "Less weight for photos that see a sample at a slant.");
+  command->AddDouble("Blend.outlier", &o->blend.outlier,
+                     "Colour difference (0..1) from the other photos at which half the weight is "
+                     "lost; 0 = never.");
+  command->AddDouble("Blend.footprint", &o->blend.footprint,
+                     "Share of the sample spacing over which photo pixels are averaged. Larger = "
+                     "smoother; 0 = the colour at the sample.");
+  command->AddBool("Blend.detail", &o->blend.detail,
+                   "Put back the detail that blending loses, from the dominant photo.");
+  command->AddDouble("Blend.detail_sigma", &o->detail.sigma,
+                     "What counts as detail: Gaussian sigma in samples. Larger = coarser.");
+  command->AddInt("Blend.detail_border", &o->detail.border,
+                  "Samples beside a change of the dominant photo that get no detail.");
+  command->AddBool("Surface.reduce_range_noise", &o->surface.reduce_range_noise,
+                   "Look colours up at the sample's place on the smoothed surface.");
+  command->AddInt("Surface.smoothing_radius", &o->surface.smoothing_radius,
+                  "Samples on either side used for smoothing.");
+  command->AddDouble("Mesh.max_edge_ratio", &o->mesh.max_edge_ratio,
+                     "An edge longer than this many times what it spans on a facing surface is a "
+                     "depth jump. Larger = more tolerant.");
+}
+
+void CheckScans(const std::vector<Scan>& scans) {
+  for (const Scan& scan : scans) {
+    if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
+    throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
+  }
+}
+
+double RoundedGain(float gain) { return std::round(1e6 * gain) / 1e6; }
+
+void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& options,
+                const ColorizeResult& result, const Command::Context& context) {
+  Report& report = context.report;
+  report["num_photos"] = photos.size();
+  report["num_vertices"] = result.num_vertices;
+  report["num_colored"] = result.num_colored;
+  const double coverage = result.num_vertices > 0 ? static_cast<double>(result.num_colored) /
+                                                        static_cast<double>(result.num_vertices)
+                                                  : 0;
+  report["coverage"] = coverage;
+  report["views_mean"] = result.views_mean;
+  Json gains = Json::object(), seen = Json::object();
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const Eigen::Vector3f& gain = result.exposure.gains[i];
+    gains[photos[i].name] =
+        options.exposure.white_balance
+            ? Json({RoundedGain(gain[0]), RoundedGain(gain[1]), RoundedGain(gain[2])})
+            : Json(RoundedGain(gain[0]));
+    seen[photos[i].name] = result.samples_seen[i];
+  }
+  report["exposure_gain"] = gains;
+  if (result.exposure.reference_photo >= 0) {
+    report["exposure_reference"] = photos[result.exposure.reference_photo].name;
+  }
+  report["samples_seen"] = seen;
+  report["disagreement"] = {{"before", result.disagreement.before},
+                            {"after", result.disagreement.after},
+                            {"at_random", result.disagreement.at_random},
+                            {"num_pairs", result.disagreement.num_pairs}};
+}
+
+std::string NameList(const std::vector<PhotoView>& photos, const std::vector<int>& numbers) {
+  std::string list;
+  for (size_t i = 0; i < numbers.size() && i < 5; ++i) {
+    list += (i > 0 ? ", " : "") + photos[numbers[i]].name;
+  }
+  if (numbers.size() > 5) list += " and " + std::to_string(numbers.size() - 5) + " more";
+  return list;
+}
+
+void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
+           const Command::Context& context) {
+  const ExposureSolution& exposure = result.exposure;
+  if (exposure.without_exif > 0) {
+    context.Warn(std::to_string(exposure.without_exif) + " of " + std::to_string(photos.size()) +
+                 " photos have no exposure in EXIF; they are matched to the others");
+  }
+  if (!exposure.unconnected.empty()) {
+    context.Warn(
+        "neither EXIF nor an overlap ties these photos to the others, they stay as they "
+        "are: " +
+        NameList(photos, exposure.unconnected));
+  }
+  if (!exposure.contradicted.empty()) {
+    context.Warn("the overlaps contradict EXIF by more than half an EV: " +
+                 NameList(photos, exposure.contradicted));
+  }
+  std::vector<int> blind;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (result.samples_seen[i] == 0) blind.push_back(static_cast<int>(i));
+  }
+  if (!blind.empty() && blind.size() < photos.size()) {
+    context.Warn("these photos see no sample of the scan: " + NameList(photos, blind));
+  }
+  const double coverage = static_cast<double>(result.num_colored) /
+                          static_cast<double>(std::max<size_t>(result.num_vertices, 1));
+  if (result.num_colored == 0) {
+    context.report.SetUntrusted(
+        "no photo sees any sample of the scan. Is the model aligned? Run roomtex-align.");
+  } else if (coverage < 0.002) {
+    context.report.SetUntrusted(
+        "the photos see less than 0.2 % of the scan. Is the model aligned? "
+        "Run roomtex-align.");
+  } else if (blind.size() > photos.size() / 2) {
+    context.report.SetUntrusted(
+        "most photos see no sample of the scan. Is the model aligned? Run "
+        "roomtex-align.");
+  }
+  const Disagreement& d = result.disagreement;
+  if (d.num_pairs > 1000 && d.at_random > 15 && d.after > 0.8 * d.at_random) {
+    context.report.SetUntrusted(
+        "photos that see the same sample differ in colour as much as at random. Is the model "
+        "aligned? Run roomtex-align.");
+  }
+}
+
+void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::string& path) {
+  std::vector<Eigen::Matrix<uint8_t, 3, 1>> colors;
+  colors.reserve(colored.samples.rgb.size());
+  for (const auto& [r, g, b] : colored.samples.rgb) colors.emplace_back(r, g, b);
+  WriteColoredRtpi(scan.path, colors, path);
+}
+
+void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+              const std::string& folder) {
+  WriteColoredPly(scans, colored, folder + "/model.ply");
+  WriteColoredGlb(scans, colored, folder + "/model.glb");
+  for (size_t s = 0; s < scans.size(); ++s) {
+    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
+    if (scans[s].organised) {
+      const ColorGrid& grid =
+          colored[s].texture.num_columns > 0 ? colored[s].texture : colored[s].samples;
+      WritePng(ImageOfGrid(grid), folder + "/texture" + number + ".png");
+    }
+    if (scans[s].is_rtpi) {
+      WriteRtpiCopy(scans[s], colored[s], folder + "/model" + number + ".rtpi");
+    }
+  }
+}
+
+void Texture(const TextureOptions& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.scan_reader.Problems();
+  AppendProblems(options.colorize.Problems(), &problems);
+  ThrowIfProblems(problems);
+
+  context.progress.Stage("read model");
+  const SparseModel model = ReadSparseModel(options.input_path);
+  const PhotoList list = ListPhotos(model, options.sources);
+  for (const std::string& warning : list.warnings) context.Warn(warning);
+  if (list.photos.empty()) {
+    throw InputError(options.input_path, "", "holds no registered photo",
+                     "Give the folder that roomtex-align wrote");
+  }
+  if (list.photos.size() > 32767) {
+    throw InputError(options.input_path, "", "holds more than 32767 photos", "Give a part of them");
+  }
+  MakeFolder(options.output_path);
+  context.report.AddCopy(options.output_path + "/report.json");
+
+  context.progress.Stage("read scan");
+  const std::vector<Scan> scans =
+      ReadScans(options.scan_paths, options.scan_poses, options.scan_reader);
+  CheckScans(scans);
+
+  const ColorizeResult result = ColorizeScans(scans, list.photos, options.colorize,
+                                              context.options.num_threads, &context.progress);
+  FillReport(list.photos, options.colorize, result, context);
+  Judge(list.photos, result, context);
+
+  context.progress.Stage("write");
+  WriteAll(scans, result.scans, options.output_path);
+  std::printf("%s\n", (options.output_path + "/model.ply").c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::TextureOptions options;
+  roomtex::Command command(
+      "roomtex-texture", "Colours a range scan from registered photos (thesis chapter 8).",
+      "roomtex-texture --input_path aligned --image_path images --scan_path room.rtpi "
+      "--output_path textured");
+  roomtex::AddPathOptions(&options, &command);
+  roomtex::AddColorOptions(&options.colorize, &command);
+  return command.Run(argc, argv, [&options](const roomtex::Command::Context& context) {
+    roomtex::Texture(options, context);
+  });
+}

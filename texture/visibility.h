@@ -1,0 +1,93 @@
+#pragma once
+// What a photo sees of the scan (thesis 8.1): depth map by an own rasteriser, depth test, normal
+// test, depth-boundary mask.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "texture/mesh_tiles.h"
+#include "texture/photo_view.h"
+
+namespace roomtex {
+
+struct OcclusionOptions {
+  // A sample is hidden when the surface rendered at its pixel is nearer by more than this share of
+  // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008.
+  double depth_tolerance = 0.008;
+  // Width of the band on either side of a depth boundary in which a photo is not trusted, pixels of
+  // the photo. -1 = one and a half times the spacing of the scan's samples, at least 3.
+  double boundary_px = -1;
+  // The inverse depth changes over a depth boundary by more than this share of itself, apart from
+  // the even change of a plane. Larger = fewer boundaries.
+  double boundary_jump = 0.02;
+  // Lines of sight through space that the scanner could not see are not trusted either: what stands
+  // there is not in the scan (departure from the thesis).
+  bool shadows = true;
+  // Smallest length of a depth map's longer side, pixels. Thesis 8.1.1: 1024. A scan finer than
+  // that raises it, up to the photo's size.
+  int depth_map_size = 1024;
+
+  std::vector<std::string> Problems() const;
+};
+
+// Inverse depth along the optical axis (1/metres; 0 = nothing) on a raster over the photo's area.
+// The nearest surface wins, so that the order of drawing does not matter.
+class DepthMap {
+ public:
+  // scale: pixels of the map per pixel of the photo, <= 1.
+  DepthMap(int photo_width, int photo_height, double scale);
+
+  // Draws the tiles that the photo may see.
+  void Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles);
+
+  const cv::Mat1f& inverse_depth() const { return inverse_depth_; }
+  cv::Mat1f& inverse_depth() { return inverse_depth_; }
+  float scale_x() const { return scale_x_; }
+  float scale_y() const { return scale_y_; }
+
+ private:
+  cv::Mat1f inverse_depth_;
+  float scale_x_, scale_y_;
+};
+
+// Depth boundaries of a map (thesis 8.1.3), 255 or 0: where the inverse depth departs from that of
+// a plane by more than `jump` times itself, and the borders of holes wider than twice hole_px;
+// dilated by a square of radius_px. Both in pixels of the map.
+cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radius_px, int hole_px);
+
+// How a photo sees one sample.
+enum class Sight : uint8_t { kHidden, kBoundary, kClear };
+
+class PhotoVisibility {
+ public:
+  // angular_spacing: radians between neighbouring samples of the scans; 0 = not known.
+  PhotoVisibility(const PhotoProjector& projector, const std::vector<OccluderTiles>& occluders,
+                  double angular_spacing, const OcclusionOptions& options);
+
+  // x, y in `img`, inside the photo; depth along the optical axis, metres.
+  // Thesis 8.1.2, made exact at pixel borders: hidden only if all four map pixels around the
+  // position show a nearer surface. kBoundary (B = 1): in the depth-boundary mask, or seen through
+  // a shadow.
+  Sight Look(float x, float y, float depth) const;
+
+  const DepthMap& surface() const { return surface_; }
+  const cv::Mat1b& boundaries() const { return boundaries_; }
+
+ private:
+  DepthMap surface_;
+  cv::Mat1f shadow_;  // inverse depth of the nearest shadow
+  cv::Mat1b boundaries_;
+  float tolerance_;
+};
+
+// Thesis 8.1.2: false when the sample's surface is turned away from the camera, (p - v).n >= 0.
+// A sample without a normal (zero) faces every camera.
+inline bool FacesCamera(const Eigen::Vector3f& camera_from_sample, const Eigen::Vector3f& normal) {
+  return normal.isZero() || camera_from_sample.dot(normal) > 0;
+}
+
+}  // namespace roomtex
