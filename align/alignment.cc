@@ -12,9 +12,11 @@
 namespace roomtex {
 namespace {
 
-// Metres from the nearest flat patch of the scan up to which a pick counts as being on the scan:
-// clicks go to corners and edges, which have no flat patch of their own.
-constexpr double kPickReach = 0.25;
+// Metres from the nearest sample of the scan up to which a pick counts as being on the scan.
+constexpr double kPickReach = 0.06;
+constexpr double kSurfaceSpacing = 0.02;  // metres; of a mesh without a grid
+constexpr size_t kMaxPicksOnScan =
+    100;  // more are not needed to tell whether picks and scan belong together
 
 std::string Number(double value, int digits) {
   std::ostringstream text;
@@ -57,51 +59,90 @@ PointPairs PairsOf(const std::vector<Pick>& picks, const std::vector<int>& indic
   return pairs;
 }
 
-void RefuseMirroredScan(const AlignmentInput& input, const View& view) {
+std::string Miss(double rms_px) {
+  if (!std::isfinite(rms_px)) return "fit no camera pose that has all of them in front";
+  return "miss by " + Number(rms_px, 1) + " pixels (rms)";
+}
+
+// Picks that say what is wrong with them are refused: nothing that follows from them means
+// anything.
+void RefuseMirroredOrExchanged(const AlignmentInput& input, const View& view) {
   const PickReview& review = view.review;
-  if (!review.mirrored) return;
-  if (review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px) return;
-  throw InputError(input.scans[0].path, "",
-                   "the scan is a mirror image of the room: the picks in " + view.name +
-                       " miss by " + Number(review.pose().rms_px, 1) + " pixels (rms), and by " +
-                       Number(review.mirrored_rms_px, 1) + " pixels when the scan is reflected",
-                   MirrorRemedy(input));
+  if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
+    throw InputError(input.scans[0].path, "",
+                     "the scan is a mirror image of the room: the picks in " + view.name + " " +
+                         Miss(review.RmsPx()) + ", but " + Miss(review.mirrored_rms_px) +
+                         " when the scan is reflected",
+                     MirrorRemedy(input));
+  }
+  if (!review.exchanged) return;
+  const Pick& a = input.picks[view.picks[review.exchanged->first]];
+  const Pick& b = input.picks[view.picks[review.exchanged->second]];
+  throw InputError(input.picks_path, LinePosition(a.line),
+                   "this pick and the one on line " + std::to_string(b.line) +
+                       " look exchanged: the picks in " + view.name + " " + Miss(review.RmsPx()) +
+                       ", but " + Miss(review.exchanged_rms_px) +
+                       " when these two change places in the photo",
+                   "Exchange their x,y, or pick them again");
+}
+
+// Distance of each point from the nearest point of the scans' surface, metres.
+std::vector<double> DistancesFromScan(const std::vector<Scan>& scans,
+                                      const std::vector<Eigen::Vector3d>& points) {
+  std::vector<double> distance2(points.size(), std::numeric_limits<double>::infinity());
+  for (const Scan& scan : scans) {
+    VisitSurface(scan, kSurfaceSpacing, [&](const Eigen::Vector3d& x_in_scan) {
+      for (size_t i = 0; i < points.size(); ++i) {
+        distance2[i] = std::min(distance2[i], (points[i] - x_in_scan).squaredNorm());
+      }
+    });
+  }
+  for (double& value : distance2) value = std::sqrt(value);
+  return distance2;
 }
 
 // The picks lie on the surface of the scan that was read; if they lie on its mirror image instead,
 // the file was read with the other azimuth sense than the one they were made with.
-void CheckPicksOnScan(const AlignmentInput& input, const ScanSurface& surface) {
-  if (surface.patches().empty()) {
-    throw InputError(input.scans[0].path, "", "holds no surface: no patch of it has enough samples",
+void CheckPicksOnScan(const AlignmentInput& input, std::vector<std::string>* warnings) {
+  const Rigid& scan_from_station = input.scans[0].scan_from_station;
+  const size_t n = std::min(input.picks.size(), kMaxPicksOnScan);
+  std::vector<Eigen::Vector3d> points(2 * n);
+  for (size_t i = 0; i < n; ++i) {
+    points[i] = input.picks[i].x_in_scan;
+    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * points[i];
+    x_in_station.x() *= -1;
+    points[n + i] = scan_from_station * x_in_station;
+  }
+  const std::vector<double> distance = DistancesFromScan(input.scans, points);
+  if (!std::isfinite(distance[0])) {
+    throw InputError(input.scans[0].path, "", "holds no measured sample",
                      "Check the file with roomtex-import");
   }
-  const Rigid& scan_from_station = input.scans[0].scan_from_station;
-  int on_scan = 0, on_mirrored = 0;
-  const Pick* farthest = nullptr;
-  for (const Pick& pick : input.picks) {
-    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * pick.x_in_scan;
-    x_in_station.x() *= -1;
-    on_mirrored += surface.FindNearest(scan_from_station * x_in_station, kPickReach).has_value();
-    if (surface.FindNearest(pick.x_in_scan, kPickReach)) {
-      ++on_scan;
-    } else if (farthest == nullptr) {
-      farthest = &pick;
-    }
+  size_t off = 0, off_mirrored = 0, farthest = 0;
+  for (size_t i = 0; i < n; ++i) {
+    off += distance[i] > kPickReach;
+    off_mirrored += distance[n + i] > kPickReach;
+    if (distance[i] > distance[farthest]) farthest = i;
   }
-  const int n = static_cast<int>(input.picks.size());
-  if (2 * on_scan >= n) return;
-  if (on_mirrored >= on_scan + 3 && 3 * on_mirrored >= 2 * n) {
+  const std::string of_all = " of " + std::to_string(n) + " picks";
+  if (off >= 2 && 3 * off_mirrored <= off) {
     throw InputError(input.scans[0].path, "",
                      "the scan is a mirror image of the one that the picks were made on: " +
-                         std::to_string(n - on_scan) + " of " + std::to_string(n) +
-                         " picks are not on its surface, but " + std::to_string(on_mirrored) +
-                         " are when it is reflected",
+                         std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
+                         " m off its surface, up to " + Number(distance[farthest], 2) + " m, but " +
+                         std::to_string(off_mirrored) + " when the scan is reflected",
                      MirrorRemedy(input));
   }
-  throw InputError(input.picks_path, LinePosition(farthest->line),
-                   std::to_string(n - on_scan) + " of " + std::to_string(n) +
-                       " picks, this one first, are more than " + Number(kPickReach, 2) +
-                       " m away from every surface of the scan",
+  for (size_t i = 0; i < n && 2 * off < n; ++i) {
+    if (!(distance[i] > kPickReach)) continue;
+    warnings->push_back("The pick on " + LineOf(input.picks[i]) + " lies " +
+                        Number(distance[i], 2) + " m off every surface of the scan.");
+  }
+  if (2 * off < n) return;
+  throw InputError(input.picks_path, LinePosition(input.picks[farthest].line),
+                   std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
+                       " m off every surface of the scan, this one by " +
+                       Number(distance[farthest], 2) + " m",
                    "Pick on this scan, and give scan_x, scan_y, scan_z in metres in its frame");
 }
 
@@ -121,9 +162,9 @@ std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOption
     const PointPairs pairs = PairsOf(input.picks, indices);
     std::string own_problem = FindLayoutProblem(pairs, camera, options.picks);
     if (own_problem.empty()) {
-      auto review = ReviewPicks(CameraProjection(camera), pairs, options.picks);
-      if (review) {
-        view.review = std::move(*review);
+      view.review = ReviewPicks(CameraProjection(camera), pairs, options.picks);
+      RefuseMirroredOrExchanged(input, view);
+      if (view.review.HasPose()) {
         views.push_back(std::move(view));
         continue;
       }
@@ -175,9 +216,12 @@ View ChooseView(const AlignmentInput& input, std::vector<View> views,
   ChoosePose(input, meshes, options, &view);
   if (view.scale.num_features == 0) {
     throw InputError(input.picks_path, "",
-                     view.name + " has " + std::to_string(view.scale.num_candidates) +
-                         " features with a sparse point in front of the scan, none of them away "
-                         "from depth edges; so the scale between model and scan cannot be found",
+                     "the picks in " + view.name + " " + Miss(view.review.RmsPx()) +
+                         ", and with the pose that they give, none of the photo's features with a "
+                         "sparse point (" +
+                         std::to_string(view.scale.num_candidates) +
+                         " of them have the scan behind them) lies on smooth surface; so the scale "
+                         "between model and scan cannot be found",
                      "Check the picks, or pick in a photo with more sparse points");
   }
   return view;
@@ -185,14 +229,6 @@ View ChooseView(const AlignmentInput& input, std::vector<View> views,
 
 void ReportBadPicks(const View& view, Alignment* result) {
   const PickReview& review = view.review;
-  if (review.exchanged) {
-    const Pick& a = result->picks[view.picks[review.exchanged->first]].pick;
-    const Pick& b = result->picks[view.picks[review.exchanged->second]].pick;
-    result->reasons.push_back(
-        "The picks on " + LineOf(a) + " and " + LineOf(b) + " look exchanged: the picks of " +
-        view.name + " miss by " + Number(review.pose().rms_px, 1) + " pixels (rms), and by " +
-        Number(review.exchanged_rms_px, 1) + " pixels when these two change places.");
-  }
   for (size_t i = 0; i < view.picks.size(); ++i) {
     PickOutcome& outcome = result->picks[view.picks[i]];
     outcome.used = review.used[i];
@@ -268,7 +304,7 @@ void FitAllPicks(const AlignmentInput& input, double sigma_px, const AlignmentOp
 // A refinement that leaves the basin of the clicks answers another question than the one the user
 // asked.
 void RefineOnSurface(const AlignmentInput& input, double pick_sigma_px, double sigma_px,
-                     const ScanSurface& surface, const AlignmentOptions& options,
+                     const ScanPatches& surface, const AlignmentOptions& options,
                      Alignment* result) {
   const std::vector<SurfacePoint> points =
       FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
@@ -277,15 +313,43 @@ void RefineOnSurface(const AlignmentInput& input, double pick_sigma_px, double s
       FitToSurface(input.model, points, surface, input.picks, UsedPicks(*result), pick_sigma_px,
                    gate, result->scan_from_sparse, options.fit);
   if (!fit.converged) {
-    result->warnings.push_back(
-        "The alignment was not refined on the scan's surface: too few of the " +
+    result->reasons.push_back(
+        "The alignment could not be refined on the scan's surface: too few of the " +
         std::to_string(points.size()) +
-        " sparse points are near it, or they pull the scale away from the picks.");
+        " sparse points are near it, or they pull the scale away from what the picks give.");
     return;
   }
   result->surface_fit = fit;
   result->refined = true;
   result->scan_from_sparse = fit.scan_from_sparse;
+}
+
+// The refined pose is far more exact than the clicks: a used pick that is off shows there even
+// among six.
+void JudgePicksAgainstSurface(double rms_limit, Alignment* result) {
+  std::vector<double> residuals;
+  const PickOutcome* farthest = nullptr;
+  for (const PickOutcome& outcome : result->picks) {
+    if (!outcome.used) continue;
+    residuals.push_back(outcome.refined_residual_px);
+    if (farthest == nullptr || outcome.refined_residual_px > farthest->refined_residual_px) {
+      farthest = &outcome;
+    }
+  }
+  std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
+  const double median = residuals[residuals.size() / 2];
+  const std::string place = "where the sparse points lie on the scan's surface, ";
+  if (farthest->refined_residual_px > std::max(1.5 * rms_limit, 5 * median)) {
+    result->reasons.push_back(
+        "The pick on " + LineOf(farthest->pick) + " (" + farthest->pick.image_name +
+        ") is far off: " + place + "it misses by " + Number(farthest->refined_residual_px, 1) +
+        " pixels, half of the picks by less than " + Number(median, 1) + ". Correct or remove it.");
+  } else if (!(result->refined_pick_rms_px <= std::max(1.5 * rms_limit, 2 * result->pick_rms_px))) {
+    result->reasons.push_back("Picks and surface contradict each other: " + place +
+                              "the picks miss by " + Number(result->refined_pick_rms_px, 1) +
+                              " pixels (rms), the one on " + LineOf(farthest->pick) + " by " +
+                              Number(farthest->refined_residual_px, 1) + " pixels.");
+  }
 }
 
 void JudgePicks(const AlignmentInput& input, const AlignmentOptions& options, Alignment* result) {
@@ -307,21 +371,7 @@ void JudgePicks(const AlignmentInput& input, const AlignmentOptions& options, Al
         "The picks leave the camera's position open by " + Number(result->position_sigma, 2) +
         " m (one standard deviation). Spread them more over the photo and in depth.");
   }
-  if (!result->refined || !result->reasons.empty()) return;
-  const double refined_limit = std::max(limit, 2 * result->pick_rms_px);
-  if (!(result->refined_pick_rms_px <= refined_limit)) {
-    const auto farthest = std::max_element(
-        result->picks.begin(), result->picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
-          return (a.used ? a.refined_residual_px : -1) < (b.used ? b.refined_residual_px : -1);
-        });
-    result->reasons.push_back(
-        "Picks and surface contradict each other: where the sparse points lie on the scan, the "
-        "picks "
-        "miss by " +
-        Number(result->refined_pick_rms_px, 1) + " pixels (rms; limit " + Number(refined_limit, 1) +
-        "), the one on " + LineOf(farthest->pick) + " by " +
-        Number(farthest->refined_residual_px, 1) + " pixels.");
-  }
+  if (result->refined && result->reasons.empty()) JudgePicksAgainstSurface(limit, result);
 }
 
 void JudgeScale(const TrustOptions& trust, Alignment* result) {
@@ -378,17 +428,14 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
                       const AlignmentOptions& options, Progress* progress) {
   CheckPicksAgainstModel(input.picks_path, input.picks, input.model);
   progress->Stage("scan surface");
-  const ScanSurface surface(input.scans, options.surface);
-  CheckPicksOnScan(input, surface);
+  Alignment result;
+  CheckPicksOnScan(input, &result.warnings);
+  const ScanPatches surface(input.scans, options.surface);
 
   progress->Stage("pose from picks");
-  Alignment result;
   for (const Pick& pick : input.picks) result.picks.push_back({pick});
   std::vector<View> views = ReviewViews(input, options, &result.warnings);
-  for (const View& view : views) {
-    RefuseMirroredScan(input, view);
-    ReportBadPicks(view, &result);
-  }
+  for (const View& view : views) ReportBadPicks(view, &result);
 
   progress->Stage("scale");
   const View view = ChooseView(input, std::move(views), options);
@@ -417,12 +464,18 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
   result.refined_pick_rms_px = PickRms(result, &PickOutcome::refined_residual_px);
 
   progress->Stage("trust");
+  TrustOptions trust = options.trust;
+  if (!result.refined) {
+    // Clicks alone are rough, and say themselves how rough.
+    trust.surface_tolerance =
+        std::max(trust.surface_tolerance, std::min(2 * result.position_sigma, 0.2));
+  }
   result.placement =
       CheckPlacement(input.model, FindSurfacePoints(input.model, options.fit.min_track, sigma_px),
-                     result.scan_from_sparse, surface, free_space, options.trust);
+                     result.scan_from_sparse, surface, free_space, trust);
   JudgePicks(input, options, &result);
   JudgeScale(options.trust, &result);
-  JudgePlacement(options.trust, &result);
+  JudgePlacement(trust, &result);
   return result;
 }
 

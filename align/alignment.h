@@ -9,7 +9,7 @@
 #include "align/pick_review.h"
 #include "align/picks.h"
 #include "align/scale.h"
-#include "align/scan_surface.h"
+#include "align/scan_patches.h"
 #include "align/similarity_fit.h"
 #include "align/trust.h"
 #include "colmap_ext/sparse_model.h"
@@ -23,7 +23,7 @@ struct AlignmentOptions {
   bool plane_constrained = true;  // refine the similarity on the surface of the scan
   PickReviewOptions picks;
   ScaleOptions scale;
-  ScanSurfaceOptions surface;
+  ScanPatchOptions surface;
   SimilarityFitOptions fit;
   TrustOptions trust;
   ScanMeshOptions mesh;

@@ -11,6 +11,15 @@ namespace {
 // With very many picks only the ones with the largest residuals are tried: keeps the search short.
 constexpr int kMaxLeftOut = 40;
 constexpr int kMaxExchanged = 12;
+// An explanation (mirrored, exchanged) explains only if the picks then miss by less than this share
+// of the photo's diagonal.
+constexpr double kMaxExplainedShare = 0.015;
+
+bool IsExplained(double rms_px, double explained_rms_px, const Camera& camera,
+                 const PickReviewOptions& options) {
+  return rms_px > 0.5 * options.min_bad_pick_px && explained_rms_px * options.min_gain < rms_px &&
+         explained_rms_px < kMaxExplainedShare * std::hypot(camera.width, camera.height);
+}
 
 // The largest distance of any point from the line through the two points that are farthest apart
 // along the first principal axis, and the length of that line, metres.
@@ -88,9 +97,10 @@ double ChanceOfGain(double all, double rest, int n) {
 }
 
 void FindExchanged(const CameraProjection& projection, const PointPairs& pairs,
-                   const ViewPose& pose, const PickReviewOptions& options, PickReview* review) {
-  if (pose.rms_px < 0.5 * options.min_bad_pick_px) return;  // nothing to be explained
-  const std::vector<int> candidates = ByResidual(pose.residual_px, kMaxExchanged);
+                   const PickReviewOptions& options, PickReview* review) {
+  const double rms_px = review->RmsPx();
+  if (rms_px < 0.5 * options.min_bad_pick_px) return;  // nothing to be explained
+  const std::vector<int> candidates = ByResidual(review->residual_px, kMaxExchanged);
   for (const int i : candidates) {
     for (const int j : candidates) {
       if (j <= i) continue;
@@ -102,7 +112,31 @@ void FindExchanged(const CameraProjection& projection, const PointPairs& pairs,
       review->exchanged = {i, j};
     }
   }
-  if (!(review->exchanged_rms_px * options.min_gain < pose.rms_px)) review->exchanged.reset();
+  if (!IsExplained(rms_px, review->exchanged_rms_px, projection.camera(), options)) {
+    review->exchanged.reset();
+  }
+}
+
+// Leaves out bad picks one after the other; gives the indices of those that stay.
+std::vector<int> LeaveOutBadPicks(const CameraProjection& projection, const PointPairs& pairs,
+                                  const PickReviewOptions& options, PickReview* review) {
+  std::vector<int> kept(pairs.size());
+  std::iota(kept.begin(), kept.end(), 0);
+  for (int left_out = 0; review->HasPose(); ++left_out) {
+    const PointPairs current = Selected(pairs, kept);
+    const LeaveOneOut trial = TryWithoutEach(projection, current, review->pose(), options);
+    for (size_t k = 0; k < kept.size(); ++k) {
+      review->leave_one_out_px[kept[k]] = trial.distance_px[k];
+    }
+    const int n = current.size();
+    if (review->exchanged || left_out >= pairs.size() / 7 || n < 7 || trial.best < 0) break;
+    if (!(trial.distance_px[trial.best] > options.min_bad_pick_px)) break;
+    if (ChanceOfGain(review->pose().sum_px2, trial.best_sum_px2, n) > options.max_chance) break;
+    review->used[kept[trial.best]] = false;
+    kept.erase(kept.begin() + trial.best);
+    review->poses = SolveViewPoses(projection, Selected(pairs, kept), review->pose().cam_from_scan);
+  }
+  return kept;
 }
 
 }  // namespace
@@ -150,38 +184,25 @@ std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
   return "";
 }
 
-std::optional<PickReview> ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
-                                      const PickReviewOptions& options) {
+PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
+                       const PickReviewOptions& options) {
   PickReview review;
   review.used.assign(pairs.size(), true);
   review.poses = SolveViewPoses(projection, pairs);
-  if (review.poses.empty()) return std::nullopt;
-  FindExchanged(projection, pairs, review.pose(), options, &review);
-
-  std::vector<int> kept(pairs.size());
-  std::iota(kept.begin(), kept.end(), 0);
+  review.residual_px =
+      review.HasPose()
+          ? review.pose().residual_px
+          : Eigen::VectorXd::Constant(pairs.size(), std::numeric_limits<double>::infinity());
   review.leave_one_out_px = Eigen::VectorXd::Constant(pairs.size(), std::nan(""));
-  for (int left_out = 0;; ++left_out) {
-    const PointPairs current = Selected(pairs, kept);
-    const LeaveOneOut trial = TryWithoutEach(projection, current, review.pose(), options);
-    for (size_t k = 0; k < kept.size(); ++k) {
-      review.leave_one_out_px[kept[k]] = trial.distance_px[k];
-    }
-    const int n = current.size();
-    if (review.exchanged || left_out >= pairs.size() / 7 || n < 7 || trial.best < 0) break;
-    if (!(trial.distance_px[trial.best] > options.min_bad_pick_px)) break;
-    if (ChanceOfGain(review.pose().sum_px2, trial.best_sum_px2, n) > options.max_chance) break;
-    review.used[kept[trial.best]] = false;
-    kept.erase(kept.begin() + trial.best);
-    review.poses = SolveViewPoses(projection, Selected(pairs, kept), review.pose().cam_from_scan);
-    if (review.poses.empty()) return std::nullopt;
+  FindExchanged(projection, pairs, options, &review);
+  const std::vector<int> kept = LeaveOutBadPicks(projection, pairs, options, &review);
+  if (review.HasPose()) {
+    review.residual_px = PickResiduals(projection, pairs, review.pose().cam_from_scan);
   }
-  review.residual_px = PickResiduals(projection, pairs, review.pose().cam_from_scan);
-
   const auto mirrored = SolveViewPoses(projection, Selected(pairs, kept).Mirrored());
   if (!mirrored.empty()) review.mirrored_rms_px = mirrored[0].rms_px;
-  review.mirrored = review.pose().rms_px > 0.5 * options.min_bad_pick_px &&
-                    review.mirrored_rms_px * options.min_gain < review.pose().rms_px;
+  review.mirrored =
+      IsExplained(review.RmsPx(), review.mirrored_rms_px, projection.camera(), options);
   return review;
 }
 

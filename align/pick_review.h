@@ -36,7 +36,8 @@ std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
                               const PickReviewOptions& options);
 
 struct PickReview {
-  // Locally best poses from the picks that are used, best first; never empty.
+  // Locally best poses from the picks that are used, best first; empty if no pose has all of them
+  // in front.
   std::vector<ViewPose> poses;
   std::vector<bool> used;       // one per pick
   Eigen::VectorXd residual_px;  // of every pick, under poses[0]
@@ -51,13 +52,16 @@ struct PickReview {
   double mirrored_rms_px = std::numeric_limits<double>::infinity();
   bool mirrored = false;
 
-  const ViewPose& pose() const { return poses.front(); }
+  bool HasPose() const { return !poses.empty(); }
+  const ViewPose& pose() const { return poses.front(); }  // only if HasPose()
+  double RmsPx() const {
+    return HasPose() ? pose().rms_px : std::numeric_limits<double>::infinity();
+  }
 };
 
 // pairs: at least 6 that have no layout problem. From 7 picks on one may be bad (from 14 on two,
-// and so on: one in seven) and is found by leaving out each in turn. Empty if no pose has all
-// points in front.
-std::optional<PickReview> ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
-                                      const PickReviewOptions& options);
+// and so on: one in seven) and is found by leaving out each in turn.
+PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
+                       const PickReviewOptions& options);
 
 }  // namespace roomtex

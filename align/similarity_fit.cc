@@ -153,7 +153,7 @@ struct Match {
   double sigma = 0;     // metres, of that distance
 };
 
-std::vector<Match> FindMatches(const std::vector<SurfacePoint>& points, const ScanSurface& surface,
+std::vector<Match> FindMatches(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
                                const Similarity& s, double gate, double max_gate) {
   const Eigen::Matrix3d linear = s.scale * s.rotation.toRotationMatrix();
   std::vector<Match> matches;
@@ -272,7 +272,7 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
 }
 
 SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                           const ScanSurface& surface, const std::vector<Pick>& picks,
+                           const ScanPatches& surface, const std::vector<Pick>& picks,
                            const std::vector<bool>& used, double sigma_px, double gate,
                            const Similarity& start, const SimilarityFitOptions& options) {
   SimilarityFit fit;

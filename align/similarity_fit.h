@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "align/picks.h"
-#include "align/scan_surface.h"
+#include "align/scan_patches.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
@@ -66,7 +66,7 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
 // The same with point-to-plane distances from the surface; the gate shrinks from `gate` metres. The
 // picks keep what the surface leaves open (one wall, two parallel walls).
 SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                           const ScanSurface& surface, const std::vector<Pick>& picks,
+                           const ScanPatches& surface, const std::vector<Pick>& picks,
                            const std::vector<bool>& used, double sigma_px, double gate,
                            const Similarity& start, const SimilarityFitOptions& options);
 

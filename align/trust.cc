@@ -37,7 +37,7 @@ double Placement::CameraShare() const {
 }
 
 Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                         const Similarity& scan_from_sparse, const ScanSurface& surface,
+                         const Similarity& scan_from_sparse, const ScanPatches& surface,
                          const FreeSpace& free_space, const TrustOptions& options) {
   Placement placement;
   const double tolerance = options.surface_tolerance;

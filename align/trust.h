@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "align/free_space.h"
-#include "align/scan_surface.h"
+#include "align/scan_patches.h"
 #include "align/similarity_fit.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/similarity.h"
@@ -52,7 +52,7 @@ struct Placement {
 };
 
 Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                         const Similarity& scan_from_sparse, const ScanSurface& surface,
+                         const Similarity& scan_from_sparse, const ScanPatches& surface,
                          const FreeSpace& free_space, const TrustOptions& options);
 
 }  // namespace roomtex

@@ -1,4 +1,4 @@
-#include "align/scan_surface.h"
+#include "align/scan_patches.h"
 
 #include <algorithm>
 #include <cmath>
@@ -65,7 +65,7 @@ class CellGrid {
   int last_ = 0;
 };
 
-std::optional<ScanPatch> FitPatch(const Cell& cell, const ScanSurfaceOptions& options) {
+std::optional<ScanPatch> FitPatch(const Cell& cell, const ScanPatchOptions& options) {
   if (cell.count < options.min_samples) return std::nullopt;
   const Eigen::Vector3d mean = cell.sum / cell.count;
   const Eigen::Matrix3d covariance = cell.sum2 / cell.count - mean * mean.transpose();
@@ -85,24 +85,47 @@ std::optional<ScanPatch> FitPatch(const Cell& cell, const ScanSurfaceOptions& op
 
 }  // namespace
 
-std::vector<std::string> ScanSurfaceOptions::Problems() const {
+void VisitSurface(const Scan& scan, double spacing,
+                  const std::function<void(const Eigen::Vector3d& x_in_scan)>& visit) {
+  if (scan.organised || scan.triangles.empty()) {
+    for (const Eigen::Vector3d& point : scan.points) {
+      if (point.x() == point.x()) visit(point);
+    }
+    return;
+  }
+  constexpr int kMaxSteps = 2000;  // along an edge: keeps one absurd triangle from taking hours
+  for (const Triangle& t : scan.triangles) {
+    const Eigen::Vector3d& a = scan.points[t[0]];
+    const Eigen::Vector3d ab = scan.points[t[1]] - a, ac = scan.points[t[2]] - a;
+    const double longest = std::max({ab.norm(), ac.norm(), (ab - ac).norm()});
+    if (!std::isfinite(longest)) continue;
+    const int steps = std::clamp(static_cast<int>(std::ceil(longest / spacing)), 1, kMaxSteps);
+    for (int i = 0; i < steps; ++i) {
+      for (int k = 0; i + k < steps; ++k) {
+        // Centre of a small triangle: no point lies on an edge and is met twice.
+        visit(a + (i + 1.0 / 3) / steps * ab + (k + 1.0 / 3) / steps * ac);
+      }
+    }
+  }
+}
+
+std::vector<std::string> ScanPatchOptions::Problems() const {
   std::vector<std::string> problems;
-  if (!(cell_size > 0)) problems.push_back("--Surface.cell_size must be positive");
-  if (min_samples < 4) problems.push_back("--Surface.min_samples must be at least 4");
+  if (!(cell_size > 0)) problems.push_back("--Patches.cell_size must be positive");
+  if (min_samples < 4) problems.push_back("--Patches.min_samples must be at least 4");
   if (!(max_thickness_share > 0 && max_thickness_share < 1)) {
-    problems.push_back("--Surface.max_thickness_share must lie between 0 and 1");
+    problems.push_back("--Patches.max_thickness_share must lie between 0 and 1");
   }
   return problems;
 }
 
-ScanSurface::ScanSurface(const std::vector<Scan>& scans, const ScanSurfaceOptions& options)
+ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options)
     : cell_size_(options.cell_size) {
   CellGrid grid(options.cell_size);
   for (const Scan& scan : scans) {
     const Eigen::Vector3d station = scan.Station();
-    for (size_t i = 0; i < scan.points.size(); ++i) {
-      if (!scan.IsMissing(static_cast<int>(i))) grid.Add(scan.points[i], station);
-    }
+    VisitSurface(scan, options.cell_size / 4,
+                 [&](const Eigen::Vector3d& x_in_scan) { grid.Add(x_in_scan, station); });
   }
   for (const Cell& cell : grid.cells()) {
     const auto patch = FitPatch(cell, options);
@@ -111,7 +134,7 @@ ScanSurface::ScanSurface(const std::vector<Scan>& scans, const ScanSurfaceOption
   if (!patches_.empty()) BuildTree(0, static_cast<int>(patches_.size()));
 }
 
-double ScanSurface::TypicalThickness() const {
+double ScanPatches::TypicalThickness() const {
   if (patches_.empty()) return 0;
   std::vector<double> thickness;
   for (const ScanPatch& patch : patches_) thickness.push_back(patch.thickness);
@@ -119,7 +142,7 @@ double ScanSurface::TypicalThickness() const {
   return thickness[thickness.size() / 2];
 }
 
-int ScanSurface::BuildTree(int begin, int end) {
+int ScanPatches::BuildTree(int begin, int end) {
   const int index = static_cast<int>(nodes_.size());
   nodes_.emplace_back();
   nodes_[index].begin = begin;
@@ -145,7 +168,7 @@ int ScanSurface::BuildTree(int begin, int end) {
   return index;
 }
 
-void ScanSurface::Search(int node_index, const Eigen::Vector3d& x, double* best2, int* best) const {
+void ScanPatches::Search(int node_index, const Eigen::Vector3d& x, double* best2, int* best) const {
   const Node& node = nodes_[node_index];
   if (node.axis < 0) {
     for (int i = node.begin; i < node.end; ++i) {
@@ -162,7 +185,7 @@ void ScanSurface::Search(int node_index, const Eigen::Vector3d& x, double* best2
   if (side * side < *best2) Search(side < 0 ? node.right : node.left, x, best2, best);
 }
 
-std::optional<ScanSurface::Nearest> ScanSurface::FindNearest(const Eigen::Vector3d& x_in_scan,
+std::optional<ScanPatches::Nearest> ScanPatches::FindNearest(const Eigen::Vector3d& x_in_scan,
                                                              double max_distance) const {
   if (patches_.empty() || !x_in_scan.allFinite()) return std::nullopt;
   double best2 = max_distance * max_distance;

@@ -2,6 +2,7 @@
 // The scan as small flat patches: a point's nearest patch gives the distance to the surface, with
 // the range noise averaged out.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +20,12 @@ struct ScanPatch {
   int num_samples = 0;
 };
 
-struct ScanSurfaceOptions {
+// Calls `visit` with points of the scan's surface: every measured sample of a grid; of a mesh
+// without a grid, points all over its triangles, at most `spacing` metres apart.
+void VisitSurface(const Scan& scan, double spacing,
+                  const std::function<void(const Eigen::Vector3d& x_in_scan)>& visit);
+
+struct ScanPatchOptions {
   double cell_size = 0.06;  // metres; edge of the cubes whose samples make one patch
   int min_samples = 6;      // a cube with fewer samples makes no patch
   // A cube makes a patch only if its samples are flat: thickness below this share of their second
@@ -30,9 +36,9 @@ struct ScanSurfaceOptions {
 };
 
 // The flat patches of one or more scans, in a k-d tree.
-class ScanSurface {
+class ScanPatches {
  public:
-  ScanSurface(const std::vector<Scan>& scans, const ScanSurfaceOptions& options);
+  ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options);
 
   const std::vector<ScanPatch>& patches() const { return patches_; }
   double cell_size() const { return cell_size_; }
