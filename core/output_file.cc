@@ -1,10 +1,10 @@
 #include "core/output_file.h"
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+
+#include <unistd.h>
 
 #include "core/error.h"
 
@@ -12,16 +12,22 @@ namespace roomtex {
 namespace fs = std::filesystem;
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {
-  const fs::path target(path);
   std::error_code error;
+  fs::path target(path);
+  if (fs::is_symlink(target, error)) {
+    const fs::path end_of_link = fs::canonical(target, error);
+    if (!error) target = end_of_link;
+  }
   if (fs::is_directory(target, error)) {
     throw InputError(path, "", "is a folder, expected a file to write",
                      "Give the path of a file that may be written");
   }
   fs::path partial = target.parent_path();
-  partial /= target.stem().string() + ".partial-" + std::to_string(getpid()) +
-             target.extension().string();
-  partial_path_ = partial.string();
+  partial /=
+      target.stem().string() + ".partial-" + std::to_string(getpid()) + target.extension().string();
+  direct_ = fs::exists(target, error) && !fs::is_regular_file(target, error);
+  target_ = target.string();
+  partial_path_ = direct_ ? target_ : partial.string();
   stream_.open(partial_path_, std::ios::binary | std::ios::trunc);
   if (!stream_) {
     throw InputError(path, "", std::string("cannot be written (") + std::strerror(errno) + ")",
@@ -32,6 +38,7 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
 OutputFile::~OutputFile() {
   if (partial_path_.empty()) return;
   stream_.close();
+  if (direct_) return;
   std::error_code ignored;
   fs::remove(partial_path_, ignored);
 }
@@ -45,8 +52,9 @@ void OutputFile::Commit() {
   if (!whole) {
     throw InputError(path_, "", "could not be written to its end", "Check the space on the disk");
   }
+  if (direct_) return;
   std::error_code error;
-  fs::rename(partial_path_, path_, error);
+  fs::rename(partial_path_, target_, error);
   if (error) {
     throw InputError(path_, "", "cannot be replaced (" + error.message() + ")",
                      "Check that you may write this file");

@@ -1,5 +1,6 @@
 #pragma once
-// Outputs are written aside and renamed, so that a killed run leaves the old file or the new one, whole.
+// Outputs are written aside and renamed, so that a killed run leaves the old file or the new one,
+// whole.
 
 #include <fstream>
 #include <string>
@@ -7,7 +8,8 @@
 namespace roomtex {
 
 // A file being written. Writes go to a file beside `path`; Commit() renames it to `path`; without
-// Commit() the file beside is removed and `path` is untouched.
+// Commit() the file beside is removed and `path` is untouched. A link stays a link: the file it
+// leads to is replaced. What is no regular file (/dev/stdout, a pipe) is written to directly.
 class OutputFile {
  public:
   // Throws InputError (path, what hinders, remedy) if the file cannot be written; makes no folders.
@@ -16,7 +18,8 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  // Binary stream to the file beside. For writers that want a path: partial_path() (same extension).
+  // Binary stream to the file beside. For writers that want a path: partial_path() (same
+  // extension).
   std::ostream& stream();
   const std::string& partial_path() const { return partial_path_; }
 
@@ -24,14 +27,17 @@ class OutputFile {
   void Commit();
 
  private:
-  std::string path_, partial_path_;
+  std::string path_, target_, partial_path_;
+  bool direct_ = false;
   std::ofstream stream_;
 };
 
-// Makes the folder and its parents. Throws InputError if that is not possible or a file is in the way.
+// Makes the folder and its parents. Throws InputError if that is not possible or a file is in the
+// way.
 void MakeFolder(const std::string& path);
 
-// The given file must exist and be a regular, readable file; otherwise throws InputError with `remedy`.
+// The given file must exist and be a regular, readable file; otherwise throws InputError with
+// `remedy`.
 void RequireFile(const std::string& path, const std::string& remedy);
 // The same for a folder.
 void RequireFolder(const std::string& path, const std::string& remedy);

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
+
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -24,10 +27,49 @@ std::string Text(const Exiv2::ExifData& exif, const char* key) {
   return found == exif.end() ? "" : found->toString();
 }
 
-// Nearest fraction of the kind cameras write: 1/x below a second, thousandths above.
-Exiv2::Rational RationalOf(double value) {
-  if (value < 1) return {1000000, static_cast<int32_t>(std::lround(1000000 / value))};
-  return {static_cast<int32_t>(std::lround(value * 1000)), 1000};
+// Nearest fraction whose parts fit into EXIF's 32 bits; to at least six digits.
+Exiv2::URational RationalOf(double value) {
+  constexpr double kLargest = 4e9;
+  if (value < 1) {
+    const double numerator = std::floor(std::clamp(kLargest * value, 1.0, 1e6));
+    return {static_cast<uint32_t>(numerator),
+            static_cast<uint32_t>(std::min(kLargest, std::round(numerator / value)))};
+  }
+  const double denominator = std::floor(std::clamp(kLargest / value, 1.0, 1e6));
+  return {static_cast<uint32_t>(std::min(kLargest, std::round(value * denominator))),
+          static_cast<uint32_t>(denominator)};
+}
+
+// A JPEG decoder fills what a cut-off file lacks with grey and calls it a picture. Walks over the
+// segments and the coded data to the end-of-image marker (ITU T.81, annex B); bytes behind it are
+// allowed.
+bool IsWholeJpeg(const std::vector<unsigned char>& bytes) {
+  const auto marker_at = [&](size_t i) { return bytes[i] == 0xff && bytes[i + 1] != 0xff; };
+  size_t i = 2;
+  while (i + 1 < bytes.size()) {
+    if (!marker_at(i)) {
+      ++i;  // fill bytes
+      continue;
+    }
+    const int marker = bytes[i + 1];
+    if (marker == 0xd9) return true;
+    i += 2;
+    const bool stands_alone = marker == 0 || marker == 1 || (marker >= 0xd0 && marker <= 0xd7);
+    if (stands_alone) continue;
+    if (i + 1 >= bytes.size()) return false;
+    i += bytes[i] << 8 | bytes[i + 1];  // length of the segment
+  }
+  return false;
+}
+
+std::vector<unsigned char> ReadBytes(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : -1;
+  std::vector<unsigned char> bytes(size > 0 ? static_cast<size_t>(size) : 0);
+  stream.seekg(0);
+  stream.read(reinterpret_cast<char*>(bytes.data()), size);
+  if (!stream) throw InputError(path, "", "cannot be read to its end", "Check the disk");
+  return bytes;
 }
 
 // Exiv2 prints warnings about files to stderr by default; a library does not print.
@@ -43,9 +85,17 @@ std::optional<double> ExposureData::RelativeExposure() const {
 
 cv::Mat ReadPhoto(const std::string& path) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
+  const std::vector<unsigned char> bytes = ReadBytes(path);
+  const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
+  if (is_jpeg && !IsWholeJpeg(bytes)) {
+    throw InputError(path, BytePosition(static_cast<long long>(bytes.size())),
+                     "the file ends before the picture does", "Copy it again from the camera");
+  }
   cv::Mat image;
   try {
-    image = cv::imread(path, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    if (!bytes.empty()) {
+      image = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    }
   } catch (const cv::Exception&) {
     image.release();
   }
@@ -104,7 +154,8 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure) {
     }
     if (exposure.f_number) exif["Exif.Photo.FNumber"] = RationalOf(*exposure.f_number);
     if (exposure.iso) {
-      exif["Exif.Photo.ISOSpeedRatings"] = static_cast<uint16_t>(std::lround(*exposure.iso));
+      exif["Exif.Photo.ISOSpeedRatings"] =
+          static_cast<uint16_t>(std::lround(std::clamp(*exposure.iso, 0.0, 65535.0)));
     }
     if (!exposure.camera.empty()) exif["Exif.Image.Model"] = exposure.camera;
     if (!exposure.date_time.empty()) exif["Exif.Photo.DateTimeOriginal"] = exposure.date_time;
@@ -141,8 +192,8 @@ uint8_t SrgbByteFromLinear(float linear) {
     return bounds;
   }();
   if (!(linear > 0)) return 0;
-  return static_cast<uint8_t>(
-      std::upper_bound(lower_bounds.begin(), lower_bounds.end(), linear) - lower_bounds.begin() - 1);
+  return static_cast<uint8_t>(std::upper_bound(lower_bounds.begin(), lower_bounds.end(), linear) -
+                              lower_bounds.begin() - 1);
 }
 
 }  // namespace roomtex

@@ -1,8 +1,10 @@
 #include "core/progress.h"
 
-#include <unistd.h>
-
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
+
+#include <unistd.h>
 
 namespace roomtex {
 namespace {
@@ -53,7 +55,8 @@ void Progress::Note(const std::string& message) {
 
 void Progress::Warning(const std::string& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!quiet_) std::fprintf(stderr, "%swarning: %s\n", terminal_ ? "\r\033[K" : "", message.c_str());
+  if (!quiet_)
+    std::fprintf(stderr, "%swarning: %s\n", terminal_ ? "\r\033[K" : "", message.c_str());
 }
 
 void Progress::Redraw() {
@@ -62,7 +65,7 @@ void Progress::Redraw() {
   if (total_ <= 0) {
     std::fprintf(stderr, "\r\033[K%s ...", stage_.c_str());
   } else {
-    const int filled = kBarWidth * done_ / total_;
+    const int filled = static_cast<int>(int64_t{kBarWidth} * std::min(done_, total_) / total_);
     std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %d/%d", stage_.c_str(), filled,
                  "################################", kBarWidth - filled, "", done_, total_);
   }

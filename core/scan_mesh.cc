@@ -8,7 +8,8 @@
 namespace roomtex {
 namespace {
 
-// What the connection tests need of a sample: its direction from the scanner and its range (0 = missing).
+// What the connection tests need of a sample: its direction from the scanner and its range (0 =
+// missing).
 struct Ray {
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();
   float range = 0;
@@ -25,20 +26,25 @@ class GridConnector {
       if (range > 0) rays_[i] = {(offset / range).cast<float>(), static_cast<float>(range)};
     }
     closed_ = IsFullTurn();
+    range_noise_ = EstimateRangeNoise();
   }
 
   bool closed() const { return closed_; }
 
   bool IsMeasured(int column, int row) const { return rays_[Index(column, row)].range > 0; }
 
-  // The sample at (column, row) and its neighbour at (column + dc, row + dr), dc and dr 0 or +-1, lie on
-  // one surface.
+  // The sample at (column, row) and its neighbour at (column + dc, row + dr), dc and dr 0 or +-1,
+  // lie on one surface.
   bool AreConnected(int column, int row, int dc, int dr) const {
     const Ray& a = rays_[Index(column, row)];
     const Ray& b = rays_[Index(column + dc, row + dr)];
     if (!(a.range > 0) || !(b.range > 0)) return false;
+    const float nearer = std::min(a.range, b.range);
+    // Close to the scanner, and around its zenith, neighbouring rays span less than the noise.
+    const float noise = std::min(range_noise_, kLargestNoise * nearer);
+    if (std::abs(a.range - b.range) <= kNoiseOfTwo * noise) return true;
     const float chord = (a.direction - b.direction).norm();
-    const float facing_length = chord * std::min(a.range, b.range);
+    const float facing_length = chord * nearer;
     const float length = (a.range * a.direction - b.range * b.direction).norm();
     if (!(facing_length > 0)) return false;
     const float ratio = length / facing_length;
@@ -46,27 +52,54 @@ class GridConnector {
     if (ratio <= kFacingRatio) return true;
     // On a plane the inverse range changes evenly from ray to ray; over a jump it does not.
     const float step = 1 / b.range - 1 / a.range;
-    return Continues(column - dc, row - dr, 1 / a.range, step, +1) ||
-           Continues(column + 2 * dc, row + 2 * dr, 1 / b.range, step, -1);
+    const float tolerance =
+        options_.max_bend * std::abs(step) + kNoiseOfFour * noise / (nearer * nearer);
+    return Continues(column - dc, row - dr, 1 / a.range, step, +1, tolerance) ||
+           Continues(column + 2 * dc, row + 2 * dr, 1 / b.range, step, -1, tolerance);
   }
 
  private:
   static constexpr float kFacingRatio = 3.0f;
+  // Limits in standard deviations of one range: 4.2 of a difference of two ranges, 3 of a
+  // difference of two such differences (one side of two must hold).
+  static constexpr float kNoiseOfTwo = 6.0f, kNoiseOfFour = 7.0f;
+  static constexpr float kLargestNoise = 0.005f;  // share of the range; rough scenes look noisy
 
   int Index(int column, int row) const {
     if (closed_) column = (column + scan_.num_columns) % scan_.num_columns;
     return scan_.Index(column, row);
   }
 
-  // The step between the sample at (column, row), just outside the edge, and the end of the edge with
-  // inverse range `end` is about `step` as well. side: +1 before the edge, -1 behind it.
-  bool Continues(int column, int row, float end, float step, int side) const {
+  // The step between the sample at (column, row), just outside the edge, and the end of the edge
+  // with inverse range `end` is about `step` as well. side: +1 before the edge, -1 behind it.
+  bool Continues(int column, int row, float end, float step, int side, float tolerance) const {
     if (row < 0 || row >= scan_.num_rows) return false;
     if (!closed_ && (column < 0 || column >= scan_.num_columns)) return false;
     const Ray& outside = rays_[Index(column, row)];
     if (!(outside.range > 0)) return false;
     const float outside_step = side * (end - 1 / outside.range);
-    return std::abs(outside_step - step) <= options_.max_bend * std::abs(step);
+    return std::abs(outside_step - step) <= tolerance;
+  }
+
+  // Standard deviation of one range. On a plane the inverse range of three neighbours in a row
+  // changes almost evenly whatever the angle, so that most second differences are noise (their
+  // median is used).
+  float EstimateRangeNoise() const {
+    std::vector<float> differences;
+    const size_t stride = rays_.size() / 1000000 + 1;
+    for (size_t i = 1; i + 1 < rays_.size(); i += stride) {
+      const size_t column = i % scan_.num_columns;
+      if (column == 0 || column + 1 == static_cast<size_t>(scan_.num_columns)) continue;
+      const float before = rays_[i - 1].range, at = rays_[i].range, behind = rays_[i + 1].range;
+      if (!(before > 0) || !(at > 0) || !(behind > 0)) continue;
+      differences.push_back(std::abs(1 / before - 2 / at + 1 / behind) * at * at);
+    }
+    if (differences.size() < 100) return 0;
+    std::nth_element(differences.begin(), differences.begin() + differences.size() / 2,
+                     differences.end());
+    // Median of the absolute value of a normal variable: 0.6745 deviations; 1 + 4 + 1 = 6
+    // variances.
+    return differences[differences.size() / 2] / 0.6745f / std::sqrt(6.0f);
   }
 
   // The last and the first column are as near as two neighbouring columns (median over the rows).
@@ -97,13 +130,13 @@ class GridConnector {
   const ScanMeshOptions& options_;
   std::vector<Ray> rays_;
   bool closed_ = false;
+  float range_noise_ = 0;  // standard deviation, metres
 };
 
 // Turns the triangle so that its front faces the scanner.
 Triangle FacingStation(const Scan& scan, Triangle triangle) {
   const Eigen::Vector3d& a = scan.points[triangle[0]];
-  const Eigen::Vector3d normal =
-      (scan.points[triangle[1]] - a).cross(scan.points[triangle[2]] - a);
+  const Eigen::Vector3d normal = (scan.points[triangle[1]] - a).cross(scan.points[triangle[2]] - a);
   if (normal.dot(scan.Station() - a) < 0) std::swap(triangle[1], triangle[2]);
   return triangle;
 }
@@ -126,7 +159,8 @@ std::vector<Triangle> BuildScanMesh(const Scan& scan, const ScanMeshOptions& opt
   for (int row = 0; row + 1 < scan.num_rows; ++row) {
     for (int column = 0; column < num_quads; ++column) {
       const int right = (column + 1) % scan.num_columns;
-      // Corners 0 1 / 3 2 (upper left, upper right, lower right, lower left), edges between neighbours.
+      // Corners 0 1 / 3 2 (upper left, upper right, lower right, lower left), edges between
+      // neighbours.
       const int corner[4] = {scan.Index(column, row), scan.Index(right, row),
                              scan.Index(right, row + 1), scan.Index(column, row + 1)};
       const bool top = connector.AreConnected(column, row, 1, 0);

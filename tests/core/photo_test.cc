@@ -1,0 +1,217 @@
+#include "core/photo.h"
+
+#include <cmath>
+
+#include <exiv2/exiv2.hpp>
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/error.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+// Left half one colour, right half another; the corner at the upper left is marked.
+cv::Mat TestImage(int width, int height) {
+  cv::Mat image(height, width, CV_8UC3, cv::Scalar(40, 90, 200));
+  image(cv::Rect(width / 2, 0, width - width / 2, height)).setTo(cv::Scalar(200, 120, 30));
+  image(cv::Rect(0, 0, 8, 8)).setTo(cv::Scalar(255, 255, 255));
+  return image;
+}
+
+class PhotoFile : public testing::Test {
+ protected:
+  void SetUp() override { cv::imwrite(path_, TestImage(64, 48)); }
+  TempFolder folder_;
+  const std::string path_ = folder_ / "photo.jpg";
+};
+
+TEST_F(PhotoFile, IsReadAsStored) {
+  const cv::Mat image = ReadPhoto(path_);
+  ASSERT_EQ(image.type(), CV_8UC3);
+  EXPECT_EQ(image.cols, 64);
+  EXPECT_EQ(image.rows, 48);
+  EXPECT_NEAR(image.at<cv::Vec3b>(40, 5)[2], 200, 8);   // BGR: red on the left
+  EXPECT_NEAR(image.at<cv::Vec3b>(40, 60)[0], 200, 8);  // blue on the right
+  EXPECT_EQ(ReadPhotoSize(path_), (std::array<int, 2>{64, 48}));
+}
+
+TEST_F(PhotoFile, OrientationIsNotApplied) {
+  auto exif_image = Exiv2::ImageFactory::open(path_);
+  exif_image->readMetadata();
+  exif_image->exifData()["Exif.Image.Orientation"] =
+      static_cast<uint16_t>(6);  // turn by 90 degrees
+  exif_image->writeMetadata();
+  const cv::Mat image = ReadPhoto(path_);
+  EXPECT_EQ(image.cols, 64);
+  EXPECT_EQ(image.rows, 48);
+  EXPECT_GT(image.at<cv::Vec3b>(3, 3)[0], 220);  // the mark is still at the upper left
+  EXPECT_EQ(ReadPhotoSize(path_), (std::array<int, 2>{64, 48}));
+}
+
+TEST(ReadPhoto, TakesGreyAlphaAndSixteenBits) {
+  const TempFolder folder;
+  cv::imwrite(folder / "grey.png", cv::Mat(10, 20, CV_8UC1, cv::Scalar(77)));
+  cv::imwrite(folder / "alpha.png", cv::Mat(10, 20, CV_8UC4, cv::Scalar(1, 2, 3, 4)));
+  cv::imwrite(folder / "deep.png", cv::Mat(10, 20, CV_16UC3, cv::Scalar(257, 514, 65535)));
+  EXPECT_EQ(ReadPhoto(folder / "grey.png").at<cv::Vec3b>(5, 5), cv::Vec3b(77, 77, 77));
+  EXPECT_EQ(ReadPhoto(folder / "alpha.png").at<cv::Vec3b>(5, 5), cv::Vec3b(1, 2, 3));
+  EXPECT_EQ(ReadPhoto(folder / "deep.png").at<cv::Vec3b>(5, 5), cv::Vec3b(1, 2, 255));
+}
+
+TEST_F(PhotoFile, BrokenOnesAreRefused) {
+  EXPECT_INPUT_ERROR(ReadPhoto(folder_ / "missing.jpg"), "does not exist");
+  EXPECT_INPUT_ERROR(ReadPhoto(folder_.path()), "is a folder");
+  const std::string bytes = ReadBytes(path_);
+  for (const size_t size :
+       {size_t{3}, size_t{20}, bytes.size() / 2, bytes.size() - 20, bytes.size() - 1}) {
+    WriteBytes(path_, bytes.substr(0, size));
+    EXPECT_INPUT_ERROR(ReadPhoto(path_), "the file ends before the picture does");
+  }
+  for (const std::string& other : {std::string(), std::string("no image at all"),
+                                   std::string(1000, '\0'), std::string("\xff\xd8")}) {
+    WriteBytes(path_, other);
+    EXPECT_INPUT_ERROR(ReadPhoto(path_), path_);
+  }
+  const std::string png = folder_ / "photo.png";
+  cv::imwrite(png, TestImage(64, 48));
+  WriteBytes(png, ReadBytes(png).substr(0, 60));
+  EXPECT_INPUT_ERROR(ReadPhoto(png), "is not an image that can be decoded");
+}
+
+TEST_F(PhotoFile, EveryTruncationIsRefused) {
+  const std::string bytes = ReadBytes(path_);
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    WriteBytes(path_, bytes.substr(0, size));
+    EXPECT_THROW(ReadPhoto(path_), InputError) << size;
+  }
+}
+
+TEST_F(PhotoFile, BytesBehindThePictureAreAllowed) {
+  WriteBytes(path_, ReadBytes(path_) + "a motion photo's film");
+  EXPECT_EQ(ReadPhoto(path_).cols, 64);
+}
+
+TEST(ReadPhotoSize, CannotTellForOtherFiles) {
+  const TempFolder folder;
+  EXPECT_EQ(ReadPhotoSize(folder / "missing"), (std::array<int, 2>{0, 0}));
+  WriteBytes(folder / "text", "text");
+  EXPECT_EQ(ReadPhotoSize(folder / "text"), (std::array<int, 2>{0, 0}));
+  EXPECT_EQ(ReadPhotoSize(folder.path()), (std::array<int, 2>{0, 0}));
+}
+
+// EXIF.
+
+class ExposureTime : public PhotoFile, public testing::WithParamInterface<double> {};
+INSTANTIATE_TEST_SUITE_P(All, ExposureTime,
+                         testing::Values(1.0 / 32000, 1.0 / 8000, 1.0 / 4000, 1.0 / 2000, 1.0 / 125,
+                                         1.0 / 3, 0.5, 0.8, 1.0, 1.6, 30.0, 3600.0));
+
+TEST_P(ExposureTime, GoesRound) {
+  ExposureData written;
+  written.exposure_time = GetParam();
+  WriteExposureData(path_, written);
+  const ExposureData read = ReadExposureData(path_);
+  ASSERT_TRUE(read.exposure_time);
+  EXPECT_NEAR(*read.exposure_time / GetParam(), 1, 1e-6);
+}
+
+TEST_F(PhotoFile, ExposureDataGoesRoundAndKeepsThePicture) {
+  const cv::Mat before = ReadPhoto(path_);
+  const ExposureData written{0.02, 5.6, 400, "Canon EOS 20D", "2008:05:01 12:00:00"};
+  WriteExposureData(path_, written);
+  const ExposureData read = ReadExposureData(path_);
+  EXPECT_NEAR(read.exposure_time.value_or(0), 0.02, 1e-8);
+  EXPECT_NEAR(read.f_number.value_or(0), 5.6, 1e-5);
+  EXPECT_EQ(read.iso.value_or(0), 400);
+  EXPECT_EQ(read.camera, written.camera);
+  EXPECT_EQ(read.date_time, written.date_time);
+  EXPECT_EQ(cv::norm(before, ReadPhoto(path_), cv::NORM_INF), 0);
+}
+
+TEST_F(PhotoFile, ExposureTimeHasTheTypeThatExifDemands) {
+  WriteExposureData(path_, {0.02, 5.6, 400, "", ""});
+  auto image = Exiv2::ImageFactory::open(path_);
+  image->readMetadata();
+  EXPECT_EQ(image->exifData()["Exif.Photo.ExposureTime"].typeId(), Exiv2::unsignedRational);
+  EXPECT_EQ(image->exifData()["Exif.Photo.FNumber"].typeId(), Exiv2::unsignedRational);
+  EXPECT_EQ(image->exifData()["Exif.Photo.ISOSpeedRatings"].typeId(), Exiv2::unsignedShort);
+}
+
+TEST_F(PhotoFile, ShutterSpeedStandsInForTheExposureTime) {
+  auto image = Exiv2::ImageFactory::open(path_);
+  image->exifData()["Exif.Photo.ShutterSpeedValue"] = Exiv2::Rational(5, 1);  // APEX: 1/32 s
+  image->exifData()["Exif.Image.Make"] = "Canon";
+  image->exifData()["Exif.Image.Model"] = "EOS";
+  image->writeMetadata();
+  EXPECT_NEAR(ReadExposureData(path_).exposure_time.value_or(0), 1.0 / 32, 1e-9);
+  EXPECT_EQ(ReadExposureData(path_).camera, "Canon EOS");
+}
+
+TEST_F(PhotoFile, MissingOrBrokenExifIsNoError) {
+  const TempFolder folder;
+  WriteBytes(folder / "text", "text");
+  for (const std::string& path : {path_, folder / "text", folder / "missing", folder.path()}) {
+    const ExposureData data = ReadExposureData(path);
+    EXPECT_FALSE(data.exposure_time) << path;
+    EXPECT_FALSE(data.RelativeExposure());
+    EXPECT_EQ(data.camera, "");
+  }
+  auto image = Exiv2::ImageFactory::open(path_);
+  image->exifData()["Exif.Photo.ExposureTime"] = Exiv2::URational(1, 0);
+  image->exifData()["Exif.Photo.FNumber"] = Exiv2::URational(0, 1);
+  image->writeMetadata();
+  EXPECT_FALSE(ReadExposureData(path_).exposure_time);
+  EXPECT_FALSE(ReadExposureData(path_).f_number);
+}
+
+TEST(WriteExposureData, SaysWhyItCannot) {
+  const TempFolder folder;
+  EXPECT_INPUT_ERROR(WriteExposureData(folder / "missing.jpg", {}), "EXIF cannot be written");
+}
+
+TEST(ExposureData, CollectsLightAsTimeAndIsoOverSquaredAperture) {
+  ExposureData data;
+  EXPECT_FALSE(data.RelativeExposure());
+  data.exposure_time = 0.5;
+  EXPECT_EQ(data.RelativeExposure(), 0.5);
+  data.f_number = 2;
+  data.iso = 100;
+  EXPECT_EQ(data.RelativeExposure(), 0.5 * 100 / 4);
+}
+
+// sRGB.
+
+TEST(Srgb, EveryByteGoesRound) {
+  for (int byte = 0; byte < 256; ++byte) {
+    EXPECT_EQ(SrgbByteFromLinear(LinearFromSrgbByte()[byte]), byte);
+    EXPECT_NEAR(255 * SrgbFromLinear(LinearFromSrgb(byte / 255.0)), byte, 1e-4);
+  }
+}
+
+TEST(Srgb, BytesAreTheNearestOnes) {
+  for (int i = 0; i <= 10000; ++i) {
+    const double linear = i / 10000.0;
+    EXPECT_NEAR(SrgbByteFromLinear(static_cast<float>(linear)), 255 * SrgbFromLinear(linear),
+                0.5001);
+  }
+}
+
+TEST(Srgb, HasTheValuesOfTheStandard) {
+  EXPECT_EQ(LinearFromSrgb(0), 0);
+  EXPECT_NEAR(LinearFromSrgb(1), 1, 1e-12);
+  EXPECT_NEAR(LinearFromSrgb(0.5), 0.21404114, 1e-7);
+  EXPECT_NEAR(LinearFromSrgb(0.04), 0.04 / 12.92, 1e-12);
+  EXPECT_NEAR(SrgbFromLinear(0.18), 0.46135612, 1e-6);
+}
+
+TEST(Srgb, ClampsWhatIsOutside) {
+  EXPECT_EQ(SrgbByteFromLinear(-1), 0);
+  EXPECT_EQ(SrgbByteFromLinear(2), 255);
+  EXPECT_EQ(SrgbByteFromLinear(std::nanf("")), 0);
+  EXPECT_EQ(SrgbByteFromLinear(std::numeric_limits<float>::infinity()), 255);
+}
+
+}  // namespace
+}  // namespace roomtex
