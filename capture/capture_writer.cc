@@ -106,6 +106,14 @@ std::string PoseLine(const Rigid& pose) {
   return line.str();
 }
 
+// As the scanner itself measured it: RTPI knows no pose.
+Scan InItsStation(Scan scan) {
+  const Rigid station_from_scan = scan.scan_from_station.Inverse();
+  for (Eigen::Vector3d& point : scan.points) point = station_from_scan * point;
+  scan.scan_from_station = Rigid();
+  return scan;
+}
+
 void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
                 Progress* progress) {
   progress->Stage("scans", room.options().num_stations);
@@ -114,7 +122,7 @@ void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSum
   poses << "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
   for (int station = 0; station < room.options().num_stations; ++station) {
     const Scan scan = room.MakeScan(station);
-    WriteRtpi(RtpiFromScan(scan), folder + "/" + ScanName(station));
+    WriteRtpi(RtpiFromScan(InItsStation(scan)), folder + "/" + ScanName(station));
     poses << ScanName(station) << " " << PoseLine(scan.scan_from_station) << "\n";
     const std::vector<Eigen::Vector3f> colors = room.TrueColors(station);
     for (size_t i = 0; i < scan.points.size(); ++i) {

@@ -1,6 +1,7 @@
 #include "capture/photo_renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -23,6 +24,31 @@ Eigen::Vector3d OffsetOnPlane(const Eigen::Vector3d& origin, const Eigen::Vector
     return 0.2 * distance * (direction - (point - origin) / distance);
   }
   return origin + along * direction - point;
+}
+
+// 0..255, not rounded; the sRGB curve from a table over the square root, where it is nearly
+// straight.
+float GreyFromLinear(float linear) {
+  constexpr int kNodes = 1024;
+  static const std::array<float, kNodes + 2> table = [] {
+    std::array<float, kNodes + 2> grey{};
+    for (int i = 0; i < kNodes + 2; ++i) {
+      const double root = static_cast<double>(i) / kNodes;
+      grey[i] = static_cast<float>(255 * SrgbFromLinear(root * root));
+    }
+    return grey;
+  }();
+  const float x = kNodes * std::sqrt(std::clamp(linear, 0.0f, 1.0f));
+  const int node = static_cast<int>(x);
+  return table[node] + (x - static_cast<float>(node)) * (table[node + 1] - table[node]);
+}
+
+// Mean 0, standard deviation 1: the sum of four even 16-bit numbers. Its tails end at 3.5, which
+// noise of a few grey levels does not show.
+float NearlyGaussian(uint64_t bits) {
+  const uint64_t sum =
+      (bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48);
+  return (static_cast<float>(sum) / 65536.0f - 2.0f + 2.0f / 65536.0f) * 1.7320508f;
 }
 
 }  // namespace
@@ -51,12 +77,12 @@ Eigen::Vector2d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
          t * ((1 - s) * node[lattice_columns_] + s * node[lattice_columns_ + 1]);
 }
 
-PhotoRenderer::Shot PhotoRenderer::Shoot(const Rigid& room_from_cam, double x_in_img,
+PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_img,
                                          double y_in_img, double pixel_size) const {
   const auto direction_at = [&](double x, double y) -> Eigen::Vector3d {
-    return room_from_cam.rotation * RayAt(x, y).homogeneous().normalized();
+    return room_from_cam.leftCols<3>() * RayAt(x, y).homogeneous().normalized();
   };
-  Eigen::Vector3d origin = room_from_cam.translation;
+  Eigen::Vector3d origin = room_from_cam.col(3);
   Eigen::Vector3d direction = direction_at(x_in_img, y_in_img);
   Shot shot;
   if (!(direction.x() == direction.x())) return shot;
@@ -91,7 +117,7 @@ PhotoRenderer::Shot PhotoRenderer::Shoot(const Rigid& room_from_cam, double x_in
 
 cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& settings,
                               int num_threads) const {
-  const Rigid room_from_cam = cam_from_room.Inverse();
+  const Pose room_from_cam = cam_from_room.Inverse().Matrix();
   cv::Mat linear(height_, width_, CV_32FC3);
   cv::Mat place(height_, width_, CV_32S);
   ParallelFor(num_threads, 0, height_, [&](int y) {
@@ -101,8 +127,8 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
       place.at<int>(y, x) = shot.place;
     }
   });
-  // Where surfaces meet, a pixel is the mean of 4 x 4 rays; elsewhere the texture itself averages.
-  constexpr int kSide = 4;
+  // Where surfaces meet, a pixel is the mean of 3 x 3 rays; elsewhere the texture itself averages.
+  constexpr int kSide = 3;
   ParallelFor(num_threads, 0, height_, [&](int y) {
     for (int x = 0; x < width_; ++x) {
       const int here = place.at<int>(y, x);
@@ -134,15 +160,15 @@ void PhotoRenderer::Develop(const cv::Mat& linear, const PhotoSettings& settings
   if (settings.blur_px > 0) cv::GaussianBlur(linear, light, {0, 0}, settings.blur_px);
   photo->create(height_, width_, CV_8UC3);
   const auto gain = static_cast<float>(std::exp2(settings.exposure_ev));
+  const auto noise = static_cast<float>(settings.noise);
   ParallelFor(num_threads, 0, height_, [&](int y) {
     RandomStream random(MixBits(settings.noise_seed, y));
     for (int x = 0; x < width_; ++x) {
       const cv::Vec3f& value = light.at<cv::Vec3f>(y, x);
       cv::Vec3b& pixel = photo->at<cv::Vec3b>(y, x);
       for (int k = 0; k < 3; ++k) {
-        const float level = std::clamp(gain * value[k], 0.0f, 1.0f);
-        double grey = 255 * SrgbFromLinear(level);
-        if (settings.noise > 0) grey += settings.noise * random.Gaussian();
+        float grey = GreyFromLinear(gain * value[k]);
+        if (noise > 0) grey += noise * NearlyGaussian(random.Bits());
         pixel[k] = cv::saturate_cast<uchar>(grey);
       }
     }

@@ -32,7 +32,8 @@ class PhotoRenderer {
     int place = -1;  // tells surfaces apart
   };
   Eigen::Vector2d RayAt(double x_in_img, double y_in_img) const;
-  Shot Shoot(const Rigid& room_from_cam, double x_in_img, double y_in_img, double pixel_size) const;
+  using Pose = Eigen::Matrix<double, 3, 4>;
+  Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size) const;
   void Develop(const cv::Mat& linear, const PhotoSettings& settings, int num_threads,
                cv::Mat* photo) const;
 

@@ -90,6 +90,7 @@ TEST(SimulatedPhotos, AgreeWithTheTruthForEveryCameraModel) {
     SimulatedRoomOptions options = SmallRoom();
     options.camera_model = CameraModelName(static_cast<CameraModel>(model));
     options.num_photos = 2;
+    options.furnished = false;
     options.scan_columns = 360;
     options.scan_rows = 180;
     options.range_noise = 0;

@@ -356,9 +356,10 @@ TEST(SimulatedSparseModel, EveryPhotoSeesManyPointsAndOverlapsSeveralOthers) {
     for (const auto& [id, image] : model.images) {
       const int own = shared[id][id];
       EXPECT_GT(own, 150) << image.name;
+      // Half of it, of which a sixth are not found again (MakeRoomSparseModel leaves 15 % out).
       int overlapping = 0;
       for (const auto& [other, count] : shared[id])
-        overlapping += other != id && count > 0.5 * own ? 1 : 0;
+        overlapping += other != id && count > 0.5 * 0.85 * own ? 1 : 0;
       EXPECT_GE(overlapping, 2) << image.name << " of " << num_photos;
     }
   }
