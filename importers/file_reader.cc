@@ -62,7 +62,9 @@ std::string FileReader::ReadSome(int64_t offset, int64_t max_bytes) const {
 }
 
 LineReader::LineReader(const FileReader& file, int64_t offset)
-    : file_(file), block_(kBlockSize), block_offset_(offset) {}
+    : file_(file),
+      block_(static_cast<size_t>(std::clamp<int64_t>(file.size() - offset, 1, kBlockSize))),
+      block_offset_(offset) {}
 
 bool LineReader::Refill() {
   std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
@@ -70,7 +72,7 @@ bool LineReader::Refill() {
   end_ -= begin_;
   begin_ = 0;
   const int64_t next = block_offset_ + static_cast<int64_t>(end_);
-  const int64_t space = kBlockSize - static_cast<int64_t>(end_);
+  const int64_t space = static_cast<int64_t>(block_.size() - end_);
   const int64_t num_bytes = std::min(space, file_.size() - next);
   if (num_bytes <= 0) return false;
   file_.Read(next, block_.data() + end_, num_bytes);

@@ -40,9 +40,9 @@ struct Walk {
 Walk WalkColumns(const FileReader& file, const RtpiLayout& layout, ByteOrder order) {
   constexpr int64_t kWindow = 4096;
   const std::string kCutOff = "The file is cut off or damaged: copy it again";
-  const int64_t limit =
-      std::min<int64_t>(layout.max_samples_per_column.value_or(std::numeric_limits<int32_t>::max()),
-                        std::numeric_limits<int32_t>::max());
+  const int64_t limit = std::min<int64_t>(
+      layout.header.max_samples_per_column.value_or(std::numeric_limits<int32_t>::max()),
+      std::numeric_limits<int32_t>::max());
   Walk walk;
   walk.position = layout.body_offset;
   std::string window;
@@ -155,12 +155,14 @@ RtpiFile ReadRtpi(const std::string& path) {
 }
 
 void WriteRtpi(const RtpiFile& file, const std::string& path) {
-  int64_t largest = 0;
+  RtpiHeader header = file.header;
+  int64_t largest = header.max_samples_per_column.value_or(0);
   for (int c = 0; c < file.NumColumns(); ++c) {
     largest = std::max(largest, file.column_begin[c + 1] - file.column_begin[c]);
   }
   OutputFile output(path);
-  output.stream() << RtpiHeaderText(file.header, file.NumColumns(), largest);
+  header.max_samples_per_column = largest;
+  output.stream() << RtpiHeaderText(header, file.NumColumns());
   std::vector<RtpiSample> column;
   for (int c = 0; c < file.NumColumns(); ++c) {
     column.assign(file.samples.begin() + file.column_begin[c],

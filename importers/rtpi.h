@@ -43,14 +43,14 @@ struct RtpiFile {
   int NumColumns() const { return static_cast<int>(column_begin.size()) - 1; }
 };
 
-// All of the file, bit by bit. The byte order is the one in which every column count fits
-// max_samples_per_ column and the columns end where the file ends. Throws InputError with the byte
-// (or header line).
+// All of the file, bit by bit. The byte order is the one in which every column count is at most
+// max_samples_per_column and the columns end where the file ends (a file without any sample counts as
+// little-endian). Throws InputError with the byte or header line.
 RtpiFile ReadRtpi(const std::string& path);
 
-// The header's version (2 or 3) and file.byte_order are written; num_columns and
-// max_samples_per_column follow from the columns. Reading the result gives the same header, samples
-// and order, bit by bit.
+// In the version of the header (2 or 3) and in file.byte_order; num_columns follows from the columns,
+// max_samples_per_column is raised to the longest of them. Reading the result gives the same
+// samples and order bit by bit, and the same header (version 2 can hold its comments only).
 void WriteRtpi(const RtpiFile& file, const std::string& path);
 
 struct RtpiScanOptions {

@@ -11,7 +11,7 @@
 namespace roomtex {
 namespace {
 
-constexpr size_t kEnoughSteps = 200000;  // steps between samples looked at for the spacing
+constexpr size_t kEnoughSamples = 50000;  // looked at for the spacing of the rows
 
 // For messages: where sample number `index` of the file, one of `column`, begins.
 std::string SamplePosition(const RtpiFile& file, int column, int64_t index) {
@@ -57,7 +57,7 @@ PhiRange CheckAngles(const RtpiFile& file) {
 
 // Steps of phi between successive measured samples, from columns spread over the scan.
 std::vector<double> ElevationSteps(const RtpiFile& file) {
-  const int64_t every = 1 + static_cast<int64_t>(file.samples.size() / kEnoughSteps);
+  const int64_t every = 1 + static_cast<int64_t>(file.samples.size() / kEnoughSamples);
   std::vector<double> steps;
   for (int64_t column = 0; column < file.NumColumns(); column += every) {
     double last = std::numeric_limits<double>::quiet_NaN();
@@ -91,10 +91,29 @@ double RefinedSpacing(const std::vector<double>& steps, double spacing) {
   return spacing;
 }
 
-// Row spacing and a row's position (phi = offset + spacing * integer), least squares over the
-// samples.
+// Least-squares line phi = *offset + *spacing * row through the elevations in [begin, end), each
+// taken to the nearest row of the line before. False, and nothing changed, if that is no line of
+// even rows.
+bool FitLine(const double* begin, const double* end, double* offset, double* spacing) {
+  double n = 0, k1 = 0, k2 = 0, p1 = 0, kp = 0;
+  for (const double* phi = begin; phi != end; ++phi) {
+    const double p = *phi - *offset, k = std::round(p / *spacing);
+    n += 1, k1 += k, k2 += k * k, p1 += p, kp += k * p;
+  }
+  const double spread = n * k2 - k1 * k1;
+  if (!(spread > 0)) return false;
+  const double slope = (n * kp - k1 * p1) / spread;
+  if (!(std::abs(slope / *spacing - 1) < 0.05)) return false;
+  *offset += (p1 - slope * k1) / n;
+  *spacing = slope;
+  return true;
+}
+
+// Row spacing and a row's position (phi = offset + spacing * integer). A small error of the first
+// guess adds up to several rows over a column, so the fit begins with a few rows and widens as it
+// gets better.
 void FitRows(const RtpiFile& file, double* spacing, double* offset) {
-  const int64_t every = 1 + static_cast<int64_t>(file.samples.size() / kEnoughSteps);
+  const int64_t every = 1 + static_cast<int64_t>(file.samples.size() / kEnoughSamples);
   std::vector<double> phis;
   for (int64_t column = 0; column < file.NumColumns(); column += every) {
     for (int64_t i = file.column_begin[column]; i < file.column_begin[column + 1]; ++i) {
@@ -102,23 +121,23 @@ void FitRows(const RtpiFile& file, double* spacing, double* offset) {
     }
   }
   if (phis.empty()) return;
-  const double center = Median(phis);
-  std::complex<double> phase = 0;
-  for (const double phi : phis) phase += std::polar(1.0, 2 * kPi * (phi - center) / *spacing);
-  *offset = center + std::arg(phase) / (2 * kPi) * *spacing;
-  for (int round = 0; round < 3; ++round) {
-    double n = 0, k1 = 0, k2 = 0, p1 = 0, kp = 0;
-    for (const double phi : phis) {
-      const double k = std::round((phi - *offset) / *spacing), p = phi - *offset;
-      n += 1, k1 += k, k2 += k * k, p1 += p, kp += k * p;
+  std::sort(phis.begin(), phis.end());
+  const double center = phis[phis.size() / 2];
+  bool have_phase = false;
+  for (double half_width = 3.5;; half_width *= 1.5) {
+    const auto begin = std::lower_bound(phis.begin(), phis.end(), center - half_width * *spacing);
+    const auto end = std::upper_bound(phis.begin(), phis.end(), center + half_width * *spacing);
+    if (!have_phase) {
+      std::complex<double> phase = 0;
+      for (auto phi = begin; phi != end; ++phi) {
+        phase += std::polar(1.0, 2 * kPi * (*phi - center) / *spacing);
+      }
+      *offset = center + std::arg(phase) / (2 * kPi) * *spacing;
+      have_phase = true;
     }
-    const double spread = n * k2 - k1 * k1;
-    if (!(spread > 0)) return;
-    const double slope = (n * kp - k1 * p1) / spread;
-    if (std::abs(slope / *spacing - 1) > 0.05)
-      return;  // rows are not evenly spaced: keep the phase
-    *offset += (p1 - slope * k1) / n;
-    *spacing = slope;
+    for (int round = 0; round < 2; ++round)
+      FitLine(&*begin, &*begin + (end - begin), offset, spacing);
+    if (begin == phis.begin() && end == phis.end()) return;
   }
 }
 
@@ -144,6 +163,22 @@ double GuessSpacing(const RtpiFile& file, RtpiGrid* grid, bool* trust_header) {
   return RefinedSpacing(steps, median);
 }
 
+// Rows from *bottom to *top hold samples. el_fov may name the centres of the outermost samples or
+// their outer edges; in the second case it would add an empty row at either end, which the longest
+// column shows.
+void ExtendToFieldOfView(double fov_bottom, double fov_top, const RtpiFile& file, double* bottom,
+                         double* top) {
+  const double longest =
+      std::max(*top - *bottom + 1, static_cast<double>(file.header.max_samples_per_column.value_or(
+                                       std::numeric_limits<int32_t>::max())));
+  if (fov_top - fov_bottom + 1 - longest <= 2) {
+    if (fov_top - fov_bottom + 1 > longest && fov_top > *top) fov_top -= 1;
+    if (fov_top - fov_bottom + 1 > longest && fov_bottom < *bottom) fov_bottom += 1;
+  }
+  *bottom = fov_bottom;
+  *top = fov_top;
+}
+
 }  // namespace
 
 RtpiGrid FindRtpiGrid(const RtpiFile& file) {
@@ -165,8 +200,7 @@ RtpiGrid FindRtpiGrid(const RtpiFile& file) {
     const double high = RadFromDeg(std::min(90.0, std::max((*fov)[0], (*fov)[1])));
     const double fov_bottom = std::min(bottom, row_at(low)), fov_top = std::max(top, row_at(high));
     if (fov_top - fov_bottom + 1 <= most_rows) {
-      bottom = fov_bottom;
-      top = fov_top;
+      ExtendToFieldOfView(fov_bottom, fov_top, file, &bottom, &top);
     }
   }
   const double num_rows = top - bottom + 1;

@@ -147,7 +147,7 @@ class HeaderParser {
     const long number = lines_.line_number();
     layout_.num_columns_line = number;
     layout_.num_columns = ParseCount(path_, number, "the number of columns", rest.substr(0, end));
-    layout_.max_samples_per_column =
+    layout_.header.max_samples_per_column =
         ParseCount(path_, number, "the largest number of samples", Trimmed(rest.substr(end)));
   }
 
@@ -223,7 +223,7 @@ class HeaderParser {
       return true;
     }
     if (key == "max_samples_per_column") {
-      layout_.max_samples_per_column = ParseCount(path_, number, key, value);
+      layout_.header.max_samples_per_column = ParseCount(path_, number, key, value);
       return true;
     }
     if (key == "has_color") {
@@ -276,8 +276,8 @@ bool LooksLikeRtpi(const std::string& first_bytes) {
 
 RtpiLayout ReadRtpiHeader(const FileReader& file) { return HeaderParser(file).Parse(); }
 
-std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns,
-                           int64_t max_samples_per_column) {
+std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns) {
+  const int64_t max_samples_per_column = header.max_samples_per_column.value_or(0);
   std::string text;
   const auto add_lines = [&text](const std::vector<std::string>& lines) {
     for (const std::string& line : lines) text += line + "\n";

@@ -16,6 +16,8 @@ namespace roomtex {
 struct RtpiHeader {
   int version = 3;                  // 3 ("RTPI_version_3.0") or 2 ("RTPIv2")
   std::vector<std::string> device;  // lines before the scan parameters ("# model: deltaSphere3000")
+  // Largest number of samples in any one column; bounds the rows of the grid, absent = not said.
+  std::optional<int64_t> max_samples_per_column;
   bool has_color = false;
   std::string units;                                                   // "" = not said
   std::optional<std::array<double, 2>> az_fov, el_fov;                 // degrees, as in the file
@@ -29,7 +31,6 @@ struct RtpiHeader {
 struct RtpiLayout {
   RtpiHeader header;
   int64_t num_columns = 0;
-  std::optional<int64_t> max_samples_per_column;
   int64_t body_offset = 0;  // byte of the first column count
   long num_columns_line = 0;
 };
@@ -42,7 +43,7 @@ bool LooksLikeRtpi(const std::string& first_bytes);
 RtpiLayout ReadRtpiHeader(const FileReader& file);
 
 // The text of the header, its last newline included.
-std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns,
-                           int64_t max_samples_per_column);
+// max_samples_per_column must be set.
+std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns);
 
 }  // namespace roomtex

@@ -148,6 +148,7 @@ void DescribeAngles(const std::vector<double>& theta_of_cell,
   const double bottom = top + slope * (scan.num_rows - 1);
   header->el_fov = {DegFromRad(std::min(top, bottom)), DegFromRad(std::max(top, bottom))};
   header->samples_per_degree_el = 1 / std::abs(DegFromRad(slope));
+  header->max_samples_per_column = scan.num_rows;
 }
 
 // Colour samples have one byte of intensity.
