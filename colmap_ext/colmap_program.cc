@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -83,9 +84,25 @@ std::vector<char*> Pointers(std::vector<std::string>* texts) {
   return pointers;
 }
 
+// The first max_processors of those this process may use; all with -1.
+cpu_set_t Processors(int max_processors) {
+  cpu_set_t ours, result;
+  CPU_ZERO(&ours);
+  CPU_ZERO(&result);
+  sched_getaffinity(0, sizeof(ours), &ours);
+  int left = max_processors < 0 ? CPU_SETSIZE : max_processors;
+  for (int i = 0; i < CPU_SETSIZE && left > 0; ++i) {
+    if (!CPU_ISSET(i, &ours)) continue;
+    CPU_SET(i, &result);
+    --left;
+  }
+  return result;
+}
+
 // What the child does between fork and exec: only calls that are safe there.
-[[noreturn]] void BecomeProgram(const char* path, char* const* argv, char* const* envp,
-                                int output) {
+[[noreturn]] void BecomeProgram(const char* path, char* const* argv, char* const* envp, int output,
+                                const cpu_set_t& processors) {
+  sched_setaffinity(0, sizeof(processors), &processors);
   setpgid(0, 0);                     // so that all it starts can be killed together
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // and it does not outlive us
   for (const int signal : kSignals) ::signal(signal, SIG_DFL);
@@ -137,7 +154,7 @@ std::string ColmapRun::LastLines() const {
 
 ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_path)
     : path_(FindProgram(program)), log_path_(log_path) {
-  const ColmapRun help = RunArguments({"help"}, [&](const std::string& line) {
+  const ColmapRun help = RunArguments({"help"}, -1, [&](const std::string& line) {
     if (version_.empty() && line.rfind("COLMAP ", 0) == 0) version_ = line;
   });
   if (!help.success || version_.empty()) {
@@ -150,7 +167,7 @@ const std::set<std::string>& ColmapProgram::Options(const std::string& command) 
   const auto found = options_of_command_.find(command);
   if (found != options_of_command_.end()) return found->second;
   std::set<std::string> options;
-  RunArguments({command, "-h"}, [&](const std::string& line) {
+  RunArguments({command, "-h"}, -1, [&](const std::string& line) {
     const size_t begin = line.find("--");
     if (begin == std::string::npos || line.find_first_not_of(" \t") != begin) return;
     options.insert(line.substr(begin, line.find_first_of(" \t=", begin) - begin));
@@ -163,16 +180,17 @@ const std::set<std::string>& ColmapProgram::Options(const std::string& command) 
 }
 
 ColmapRun ColmapProgram::Run(const std::string& command, const ColmapOptions& options,
+                             int max_processors,
                              const std::function<void(const std::string&)>& on_line) {
   std::vector<std::string> arguments = {command};
   for (const auto& [name, value] : options) {
     arguments.push_back(name);
     arguments.push_back(value);
   }
-  return RunArguments(arguments, on_line);
+  return RunArguments(arguments, max_processors, on_line);
 }
 
-ColmapRun ColmapProgram::RunArguments(const std::vector<std::string>& arguments,
+ColmapRun ColmapProgram::RunArguments(const std::vector<std::string>& arguments, int max_processors,
                                       const std::function<void(const std::string&)>& on_line) {
   ThrowIfInterrupted();
   std::vector<std::string> argument_texts = {path_};
@@ -185,6 +203,7 @@ ColmapRun ColmapProgram::RunArguments(const std::vector<std::string>& arguments,
   for (const std::string& text : argument_texts) log << ' ' << text;
   log << std::endl;
 
+  const cpu_set_t processors = Processors(max_processors);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("no pipe can be made");
   // A signal between fork and the next line would miss the child.
@@ -192,7 +211,7 @@ ColmapRun ColmapProgram::RunArguments(const std::vector<std::string>& arguments,
   sigset_t before;
   sigprocmask(SIG_BLOCK, &guarded, &before);
   const pid_t child = fork();
-  if (child == 0) BecomeProgram(path_.c_str(), argv.data(), envp.data(), ends[1]);
+  if (child == 0) BecomeProgram(path_.c_str(), argv.data(), envp.data(), ends[1], processors);
   if (child > 0) {
     setpgid(child, child);
     running_group = child;

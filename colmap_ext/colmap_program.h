@@ -35,13 +35,14 @@ class ColmapProgram {
   const std::set<std::string>& Options(const std::string& command);
 
   // Runs `colmap COMMAND OPTIONS` without a shell and without a display, and waits. on_line is
-  // called for every line it prints. Throws Interrupted when a signal stops us: the program is
-  // killed first.
-  ColmapRun Run(const std::string& command, const ColmapOptions& options,
+  // called for every line it prints. max_processors: it sees no more than these (-1 = all), for its
+  // commands that have no option for threads. Throws Interrupted when a signal stops us: the
+  // program is killed first.
+  ColmapRun Run(const std::string& command, const ColmapOptions& options, int max_processors = -1,
                 const std::function<void(const std::string&)>& on_line = nullptr);
 
  private:
-  ColmapRun RunArguments(const std::vector<std::string>& arguments,
+  ColmapRun RunArguments(const std::vector<std::string>& arguments, int max_processors,
                          const std::function<void(const std::string&)>& on_line);
 
   std::string path_, log_path_, version_;

@@ -1,12 +1,16 @@
 #include "colmap_ext/mapper_run.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/error.h"
 #include "core/output_file.h"
 
 namespace roomtex {
 namespace {
+
+constexpr char kMultiThreading38[] = "--Mapper.ba_min_num_residuals_for_multi_threading";
+constexpr char kMultiThreading4[] = "--Mapper.ba_min_num_residuals_for_cpu_multi_threading";
 
 void Set(const std::string& name, const std::string& value, ColmapOptions* options) {
   for (auto& [known, old_value] : *options) {
@@ -29,6 +33,14 @@ std::string OptionRefusal(const ColmapRun& run) {
     }
   }
   return "";
+}
+
+// As `colmap model_analyzer` counts: the mean over the points of their mean error.
+double MeanPointError(SparseModel* model) {
+  UpdateReprojectionErrors(model);
+  double sum = 0;
+  for (const auto& [point_id, point] : model->points) sum += point.error;
+  return model->points.empty() ? 0 : sum / static_cast<double>(model->points.size());
 }
 
 }  // namespace
@@ -74,6 +86,14 @@ std::string MapperRun::MapperValue(const std::string& name, const std::string& f
   return value;
 }
 
+// Ceres adds up in the order its threads finish, and RANSAC makes much of the last digits: the same
+// input would give another model. COLMAP lets Ceres use threads from a number of residuals on: out
+// of reach, unless the user sets it. (`bundle_adjuster` has no such option; it comes last, where
+// last digits stay last digits.)
+bool MapperRun::OrderedSums() const {
+  return MapperValue(kMultiThreading38, "").empty() && MapperValue(kMultiThreading4, "").empty();
+}
+
 void MapperRun::AddGlobals(const std::string& command, ColmapOptions* options) const {
   const std::set<std::string>& known = colmap_->Options(command);
   const auto set_if_known = [&](const std::string& name, int value) {
@@ -82,6 +102,10 @@ void MapperRun::AddGlobals(const std::string& command, ColmapOptions* options) c
   set_if_known("--random_seed", options_.random_seed);
   set_if_known("--Mapper.random_seed", options_.random_seed);
   set_if_known("--Mapper.num_threads", options_.num_threads);
+  if (OrderedSums()) {
+    set_if_known(kMultiThreading38, std::numeric_limits<int>::max());
+    set_if_known(kMultiThreading4, std::numeric_limits<int>::max());
+  }
 }
 
 ColmapOptions MapperRun::WithMapperOptions(const std::string& command,
@@ -111,7 +135,7 @@ ColmapOptions MapperRun::Paths(const std::string& input, const std::string& outp
 // "" or what went wrong.
 std::string MapperRun::Call(const std::string& command, const ColmapOptions& options,
                             const std::function<void(const std::string&)>& on_line) {
-  const ColmapRun run = colmap_->Run(command, options, on_line);
+  const ColmapRun run = colmap_->Run(command, options, options_.num_threads, on_line);
   if (run.success) return "";
   const std::string refusal = OptionRefusal(run);
   if (!refusal.empty()) throw UsageError("colmap " + command + " refuses: " + refusal);
@@ -173,7 +197,7 @@ MapperResult MapperRun::Run(const Seed& seed, int num_images,
 
   result.folder = adjusted;
   result.model = ReadSparseModel(adjusted);
-  result.mean_reprojection_error_px = UpdateReprojectionErrors(&result.model).mean_px;
+  result.mean_reprojection_error_px = MeanPointError(&result.model);
   result.grew = result.model.images.size() > seed.poses.images.size();
   return result;
 }

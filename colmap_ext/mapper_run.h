@@ -23,7 +23,7 @@ struct MapperOptions {
 struct MapperResult {
   std::string folder;  // the finished model as COLMAP wrote it; "" if there is none
   SparseModel model;
-  double mean_reprojection_error_px = 0;  // over all observations
+  double mean_reprojection_error_px = 0;  // mean over points, as model_analyzer
   bool grew = false;                      // images beyond the seed's were registered
   std::string problem;                    // what went wrong; "" if nothing
 };
@@ -45,6 +45,7 @@ class MapperRun {
   // `options` that `command` knows, with the user's --Mapper.* on top.
   ColmapOptions WithMapperOptions(const std::string& command, ColmapOptions options) const;
   ColmapOptions Paths(const std::string& input, const std::string& output) const;
+  bool OrderedSums() const;
   void AddGlobals(const std::string& command, ColmapOptions* options) const;
   std::string Call(const std::string& command, const ColmapOptions& options,
                    const std::function<void(const std::string&)>& on_line);

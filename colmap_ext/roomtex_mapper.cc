@@ -222,11 +222,10 @@ std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Op
                               const Command::Context& context, Json* trials) {
   const int num_images = static_cast<int>(images->images().size());
   std::vector<Outcome> best;  // at most one
-  context.progress.Stage("initialise");
   Initializer initializer(images, options.init, context.options.num_threads,
                           static_cast<uint64_t>(context.options.random_seed));
   for (int tried = 0; tried < options.init.max_pairs; ++tried) {
-    context.progress.Stage("initialise");
+    if (tried > 0) context.progress.Stage("initialise");
     std::optional<Seed> seed = initializer.Next();
     ThrowIfInterrupted();
     if (!seed) break;
@@ -266,8 +265,7 @@ std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Op
 }
 
 void MapPhotos(const Options& options, const Command::Context& context) {
-  std::vector<std::string> problems = options.init.Problems();
-  ThrowIfProblems(problems);
+  ThrowIfProblems(options.init.Problems());
   RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
   context.progress.Stage("read database");
   const Database database(options.database_path);
@@ -287,11 +285,17 @@ void MapPhotos(const Options& options, const Command::Context& context) {
   MapperOptions mapper_options = options.mapper;
   mapper_options.num_threads = context.options.num_threads;
   mapper_options.random_seed = context.options.random_seed;
+  const std::vector<std::string>& passed = options.mapper.mapper_arguments;
+  for (size_t i = 0; i < passed.size(); i += 2) {
+    if (passed[i].rfind("--Mapper.init_", 0) != 0) continue;
+    context.Warn(passed[i] + " has no effect: the first pair is chosen here, by --Init.*");
+  }
   const std::string database_copy = scratch / "database.db";
   MapperRun mapper(&colmap, database_copy, options.image_path, scratch.path(), mapper_options);
   database.CopyForMapper(database_copy);
 
   Json trials = Json::array();
+  context.progress.Stage("initialise");
   std::vector<Outcome> best = TrySeeds(&images, &mapper, options, context, &trials);
   context.report["pairs_tried"] = trials.size();
   context.report["pair_trials"] = trials;

@@ -1,0 +1,407 @@
+// roomtex-mapper as users call it, with the installed COLMAP.
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <signal.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "colmap_ext/initializer.h"
+#include "colmap_ext/sparse_model.h"
+#include "tests/colmap_ext/simulated_database.h"
+#include "tests/support/matchers.h"
+#include "tests/support/run_command.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+using Scene = SimulatedViewsOptions::Scene;
+
+class MapperCommand : public ::testing::Test {
+ protected:
+  void Simulate(const SimulatedViewsOptions& options, bool with_pairs = true) {
+    views_ = SimulateViews(options);
+    WriteSimulatedDatabase(views_, folder_.path(), with_pairs);
+  }
+  std::string Arguments() const {
+    return "roomtex-mapper --database_path " + (folder_ / "database.db") + " --image_path " +
+           (folder_ / "photos") + " --output_path " + (folder_ / "sparse") + " --report_path " +
+           (folder_ / "report.json") + " ";
+  }
+  CommandResult Run(const std::string& more = "") const {
+    return RunCommandLine(Arguments() + more);
+  }
+  nlohmann::json Report() const {
+    return nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  }
+  // Centre errors (metres) and rotation errors (radians) after the best similarity onto the truth.
+  void ExpectNearTruth(const SparseModel& model, double metres, double radians) const {
+    Eigen::Matrix3Xd found(3, model.images.size()), truth(3, model.images.size());
+    int column = 0;
+    for (const auto& [image_id, image] : model.images) {
+      found.col(column) = image.cam_from_model.TargetOriginInSource();
+      truth.col(column++) = views_.cam_from_scene.at(image_id).TargetOriginInSource();
+    }
+    const Similarity scene_from_model = FitSimilarity(found, truth);
+    for (const auto& [image_id, image] : model.images) {
+      const Rigid pose = CamFromScan(image.cam_from_model, scene_from_model);
+      const Rigid& expected = views_.cam_from_scene.at(image_id);
+      EXPECT_LE(RotationAngle(pose.rotation, expected.rotation), radians) << image.name;
+      EXPECT_LE((pose.TargetOriginInSource() - expected.TargetOriginInSource()).norm(), metres)
+          << image.name;
+    }
+  }
+  // Nothing of the work on the way is left.
+  void ExpectNoScratch() const {
+    if (!fs::exists(folder_ / "sparse")) return;
+    for (const auto& entry : fs::directory_iterator(folder_ / "sparse")) {
+      EXPECT_EQ(entry.path().filename().string().find(".roomtex"), std::string::npos)
+          << entry.path();
+    }
+  }
+  void WriteScript(const std::string& name, const std::string& body) const {
+    WriteBytes(folder_ / name, "#!/bin/sh\n" + body);
+    fs::permissions(folder_ / name, fs::perms::owner_all);
+  }
+
+  TempFolder folder_;
+  SimulatedViews views_;
+};
+
+SimulatedViewsOptions RoomOptions(int num_views) {
+  SimulatedViewsOptions options;
+  options.num_views = num_views;
+  options.num_points = 500;
+  options.baseline = 0.4;
+  options.distortion = true;
+  return options;
+}
+
+TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
+  SimulatedViewsOptions options = RoomOptions(7);
+  options.two_cameras = true;
+  Simulate(options);
+  const std::string before = ReadBytes(folder_ / "database.db");
+  const auto time_before = fs::last_write_time(folder_ / "database.db");
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("7 of 7"), std::string::npos) << result.out;
+
+  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
+  EXPECT_EQ(model.images.size(), 7u);
+  ExpectNearTruth(model, 0.02, 0.01);
+  const nlohmann::json report = Report();
+  EXPECT_EQ(report["num_reg_images"], 7);
+  EXPECT_EQ(report["num_images"], 7);
+  EXPECT_EQ(report["num_points"], model.points.size());
+  EXPECT_EQ(report["pairs_tried"], 1);
+  EXPECT_EQ(report["pair"].size(), 2u);
+  EXPECT_FALSE(report["degenerate"].get<bool>());
+  EXPECT_TRUE(report["trusted"].get<bool>());
+  EXPECT_GT(report["num_f_inliers"].get<int>(), report["num_h_inliers"].get<int>());
+  EXPECT_GT(report["mean_reprojection_error_px"].get<double>(), 0.2);
+  EXPECT_LT(report["mean_reprojection_error_px"].get<double>(), 0.9);
+
+  // The two-view model holds the pair of the report, with points.
+  const SparseModel init = ReadSparseModel(folder_ / "sparse/init");
+  ASSERT_EQ(init.images.size(), 2u);
+  EXPECT_GT(init.points.size(), 50u);
+  for (const auto& name : report["pair"]) {
+    EXPECT_NE(init.FindImage(name.get<std::string>()), nullptr);
+  }
+  // Intrinsics stay as they were, the user's database byte for byte.
+  for (const auto& [camera_id, camera] : model.cameras) {
+    EXPECT_EQ(camera.params, views_.cameras.at(camera_id).params);
+  }
+  EXPECT_EQ(ReadBytes(folder_ / "database.db"), before);
+  EXPECT_EQ(fs::last_write_time(folder_ / "database.db"), time_before);
+  EXPECT_FALSE(fs::exists(folder_ / "database.db-wal"));
+  ExpectNoScratch();
+}
+
+TEST_F(MapperCommand, IsRightBeforeAWall) {
+  SimulatedViewsOptions options;
+  options.scene = Scene::kWall;
+  options.num_views = 5;
+  options.random_seed = 3;
+  Simulate(options);
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(Report()["degenerate"].get<bool>());
+  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
+  EXPECT_EQ(model.images.size(), 5u);
+  ExpectNearTruth(model, 0.05, 0.02);
+}
+
+TEST_F(MapperCommand, MapsTwoPhotosOfARoom) {
+  Simulate(RoomOptions(2));
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
+  ASSERT_EQ(model.images.size(), 2u);
+  EXPECT_GT(model.points.size(), 100u);
+  const Rigid found =
+      model.images.at(2).cam_from_model * model.images.at(1).cam_from_model.Inverse();
+  const Rigid truth = views_.TrueRelativePose(1, 2);
+  EXPECT_LT(RotationAngle(found.rotation, truth.rotation), 0.01);
+  EXPECT_LT(BaselineAngle(found.translation, truth.translation), 0.05);
+}
+
+TEST_F(MapperCommand, SaysThatTwoPhotosOfAWallAreAmbiguous) {
+  SimulatedViewsOptions options;
+  options.scene = Scene::kWall;
+  for (options.random_seed = 0; options.random_seed < 10; ++options.random_seed) {
+    const SimulatedViews views = SimulateViews(options);
+    MatchedImages images = views.Matched();
+    const auto seed = Initializer(&images, {}, 1, 0).Next();
+    if (seed && seed->ambiguous) break;
+  }
+  ASSERT_LT(options.random_seed, 10);
+  Simulate(options);
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("planar-ambiguous"), std::string::npos) << result.err;
+  EXPECT_FALSE(Report()["trusted"].get<bool>());
+}
+
+TEST_F(MapperCommand, SaysWhenFewerThanHalfOfThePhotosRegister) {
+  Simulate(RoomOptions(4));
+  {  // five photos that nothing is known of
+    SQLite::Database database(folder_ / "database.db", SQLite::OPEN_READWRITE);
+    for (int k = 0; k < 5; ++k) {
+      const std::string name = "lonely_" + std::to_string(k) + ".jpg";
+      database.exec("INSERT INTO images (name, camera_id) VALUES ('" + name + "', 1)");
+      WriteBytes(folder_ / ("photos/" + name), "");
+    }
+  }
+  const CommandResult result = Run("--Init.max_pairs 1");
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("only 4 of 9 photos"), std::string::npos) << result.err;
+  EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").images.size(), 4u);
+}
+
+TEST_F(MapperCommand, TriesTheNextPairWhenTheMapperFails) {
+  Simulate(RoomOptions(5));
+  WriteScript("colmap-once-broken", "if [ \"$1\" = mapper ] && [ \"$2\" != -h ] && [ ! -e " +
+                                        (folder_ / "failed") + " ]; then touch " +
+                                        (folder_ / "failed") +
+                                        "; echo out of luck; exit 1; fi\nexec colmap \"$@\"\n");
+  const CommandResult result = Run("--colmap " + (folder_ / "colmap-once-broken"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("out of luck"), std::string::npos) << result.err;
+  const nlohmann::json report = Report();
+  EXPECT_EQ(report["pairs_tried"], 2);
+  EXPECT_NE(report["pair_trials"][0]["pair"], report["pair_trials"][1]["pair"]);
+  EXPECT_EQ(report["pair"], report["pair_trials"][1]["pair"]);
+  EXPECT_EQ(report["num_reg_images"], 5);
+  ExpectNearTruth(ReadSparseModel(folder_ / "sparse/0"), 0.02, 0.01);
+}
+
+TEST_F(MapperCommand, LeavesTheOldModelWhenEveryPairFails) {
+  Simulate(RoomOptions(3));
+  fs::create_directories(folder_ / "sparse/0");
+  WriteBytes(folder_ / "sparse/0/cameras.bin", "old");
+  WriteScript("colmap-broken",
+              "if [ \"$1\" = mapper ] && [ \"$2\" != -h ]; then echo out of luck; exit 1; fi\nexec "
+              "colmap \"$@\"\n");
+  const CommandResult result =
+      Run("--Init.max_third_views 0 --colmap " + (folder_ / "colmap-broken"));
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("out of luck"), std::string::npos) << result.err;
+  EXPECT_EQ(ReadBytes(folder_ / "sparse/0/cameras.bin"), "old");
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/init"));
+  EXPECT_NE(ReadBytes(folder_ / "sparse/roomtex-mapper.log").find("out of luck"),
+            std::string::npos);
+  ExpectNoScratch();
+}
+
+TEST_F(MapperCommand, ReplacesAnOldModelAsAWhole) {
+  Simulate(RoomOptions(3));
+  fs::create_directories(folder_ / "sparse/0");
+  WriteBytes(folder_ / "sparse/0/rigs.bin", "old");
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/0/rigs.bin"));
+  EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").images.size(), 3u);
+}
+
+TEST_F(MapperCommand, RefusesToReplaceAFolderThatIsNoModel) {
+  Simulate(RoomOptions(3));
+  fs::create_directories(folder_ / "sparse/0");
+  WriteBytes(folder_ / "sparse/0/thesis.tex", "years of work");
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("thesis.tex"), std::string::npos) << result.err;
+  EXPECT_EQ(ReadBytes(folder_ / "sparse/0/thesis.tex"), "years of work");
+}
+
+TEST_F(MapperCommand, HandsMapperOptionsOn) {
+  Simulate(RoomOptions(3));
+  ASSERT_EQ(Run("--Mapper.extract_colors 0 --Init.max_third_views 0").exit_code, 0);
+  for (const auto& [point_id, point] : ReadSparseModel(folder_ / "sparse/0").points) {
+    EXPECT_EQ(point.color.cast<int>().sum(), 0);
+  }
+}
+
+TEST_F(MapperCommand, GivesTheSameTwice) {
+  Simulate(RoomOptions(5));
+  ASSERT_EQ(Run("--num_threads 1").exit_code, 0);
+  const SparseModel once = ReadSparseModel(folder_ / "sparse/0");
+  const std::string init_once = ReadBytes(folder_ / "sparse/init/points3D.bin");
+  ASSERT_EQ(Run("--num_threads 2").exit_code, 0);
+  const SparseModel again = ReadSparseModel(folder_ / "sparse/0");
+  EXPECT_EQ(ReadBytes(folder_ / "sparse/init/points3D.bin"), init_once);
+  ASSERT_EQ(once.points.size(), again.points.size());
+  for (const auto& [image_id, image] : once.images) {
+    EXPECT_THAT(image.cam_from_model,
+                IsNearRigid(again.images.at(image_id).cam_from_model, 1e-7, 1e-7));
+  }
+}
+
+TEST_F(MapperCommand, RefusesOptionsThatColmapDoesNotKnow) {
+  Simulate(RoomOptions(3));
+  CommandResult result = Run("--Mapper.no_such_option 1");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("--Mapper.no_such_option is not an option of colmap mapper"),
+            std::string::npos)
+      << result.err;
+  result = Run("--Mapper.multiple_models 1");
+  EXPECT_EQ(result.exit_code, 2);
+  result = Run("--Mapper.min_num_matches many");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("min_num_matches"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/0"));
+  ExpectNoScratch();
+}
+
+TEST_F(MapperCommand, ListsEveryBadInitOption) {
+  Simulate(RoomOptions(3));
+  const CommandResult result = Run("--Init.min_num_inliers 2 --Init.min_tri_angle_deg -1");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("--Init.min_num_inliers"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("--Init.min_tri_angle_deg"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, SaysWhatIsWrongWithTheDatabase) {
+  CommandResult result = Run();  // nothing there at all
+  EXPECT_EQ(result.exit_code, 3);
+  Simulate(RoomOptions(3), /*with_pairs=*/false);
+  result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("exhaustive_matcher"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(folder_ / "sparse")) << "nothing was to be written";
+
+  fs::remove(folder_ / "database.db");
+  DatabaseMaker(folder_ / "database.db", DatabaseMaker::Schema::k38);
+  result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("holds no images"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, SaysWhichPhotoIsMissing) {
+  Simulate(RoomOptions(3));
+  fs::remove(folder_ / "photos/view_001.jpg");
+  CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("view_001.jpg"), std::string::npos) << result.err;
+  fs::remove_all(folder_ / "photos");
+  result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("photos: does not exist"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, SaysThatAnInitialPhotoIsUnknownOrAPairTooThin) {
+  Simulate(RoomOptions(3));
+  CommandResult result = Run("--Init.image_name1 nobody.jpg");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("holds no image nobody.jpg"), std::string::npos) << result.err;
+  result = Run("--Init.min_num_inliers 100000");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("no pair to start from"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, RefusesAnOutputThatCannotBeWritten) {
+  Simulate(RoomOptions(3));
+  WriteBytes(folder_ / "sparse", "a file");
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("is a file"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, WarnsOfACameraWithoutPriorFocalLength) {
+  SimulatedViewsOptions options = RoomOptions(3);
+  Simulate(options);
+  SQLite::Database(folder_ / "database.db", SQLite::OPEN_READWRITE)
+      .exec("UPDATE cameras SET prior_focal_length = 0");
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  ASSERT_EQ(Report()["warnings"].size(), 1u);
+  EXPECT_NE(Report()["warnings"][0].get<std::string>().find("prior_focal_length"),
+            std::string::npos);
+}
+
+TEST_F(MapperCommand, SaysThatColmapIsNotThere) {
+  Simulate(RoomOptions(3));
+  CommandResult result = Run("--colmap /nowhere/colmap");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("/nowhere/colmap: does not exist"), std::string::npos) << result.err;
+  result = Run("--colmap no-such-program");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("is not on the PATH"), std::string::npos) << result.err;
+  result = Run("--colmap true");  // a program, but not this one
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("as COLMAP does"), std::string::npos) << result.err;
+  ExpectNoScratch();
+}
+
+bool ProcessLives(pid_t pid) {
+  const std::string status = ReadBytes("/proc/" + std::to_string(pid) + "/stat");
+  return !status.empty() && status.find(") Z") == std::string::npos;
+}
+
+// Waits up to ten seconds.
+template <typename Condition>
+bool WaitFor(const Condition& condition) {
+  for (int i = 0; i < 1000 && !condition(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return condition();
+}
+
+TEST_F(MapperCommand, KillsColmapAndTidiesUpWhenStopped) {
+  Simulate(RoomOptions(5));
+  const std::string pid_path = folder_ / "pid";
+  WriteScript("colmap-slow",
+              "if [ \"$1\" = mapper ] && [ \"$2\" != -h ]; then sleep 100 & echo $! >" + pid_path +
+                  ".new; mv " + pid_path + ".new " + pid_path + "; wait; fi\nexec colmap \"$@\"\n");
+  for (const int signal : {SIGTERM, SIGINT}) {
+    fs::remove(pid_path);
+    const pid_t command = fork();
+    if (command == 0) {
+      const std::string line = std::string("exec ") + ROOMTEX_BIN + "/" + Arguments() +
+                               "--quiet --colmap " + (folder_ / "colmap-slow");
+      execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
+      _exit(127);
+    }
+    ASSERT_TRUE(WaitFor([&] { return fs::exists(pid_path); }));
+    const pid_t sleeper = std::stoi(ReadBytes(pid_path));
+    EXPECT_TRUE(ProcessLives(sleeper));
+    kill(command, signal);
+    int status = 0;
+    ASSERT_EQ(waitpid(command, &status, 0), command);
+    EXPECT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(WTERMSIG(status), signal);
+    EXPECT_TRUE(WaitFor([&] { return !ProcessLives(sleeper); }));
+    EXPECT_FALSE(fs::exists(folder_ / "sparse/0"));
+    ExpectNoScratch();
+  }
+}
+
+}  // namespace
+}  // namespace roomtex
