@@ -220,6 +220,12 @@ class Line {
     text_.append(text, result.ptr);
     text_ += after;
   }
+  // The shortest text that reads back as the same number.
+  void Add(double number, char after) {
+    char text[64];
+    text_.append(text, std::to_chars(text, text + sizeof(text), number).ptr);
+    text_ += after;
+  }
   void FlushTo(std::ostream& stream, size_t above = 0) {
     if (text_.size() <= above) return;
     stream << text_;
@@ -231,24 +237,23 @@ class Line {
   std::string text_;
 };
 
-void WriteShortest(std::ostream& stream, double number, char after) {
-  char text[64];
-  stream.write(text, std::to_chars(text, text + sizeof(text), number).ptr - text);
-  stream << after;
-}
-
-void WritePtxHeader(const Scan& scan, std::ostream& stream) {
-  stream << scan.num_columns << '\n' << scan.num_rows << '\n';
-  const Eigen::Matrix3d rotation = scan.scan_from_station.rotation.toRotationMatrix();
+// Rotations with 12 decimals, so that writing what was read gives the same text.
+void WritePtxHeader(const Scan& scan, Line* line) {
+  line->Text(std::to_string(scan.num_columns) + "\n" + std::to_string(scan.num_rows) + "\n");
+  const Eigen::Matrix3d axes_as_rows =
+      scan.scan_from_station.rotation.toRotationMatrix().transpose();
   const Eigen::Vector3d& station = scan.scan_from_station.translation;
-  const auto add_row = [&stream](const Eigen::Vector3d& row, bool in_matrix, int last) {
-    for (int i = 0; i < 3; ++i) WriteShortest(stream, row[i], i < 2 || in_matrix ? ' ' : '\n');
-    if (in_matrix) stream << last << '\n';
+  const auto add_axis = [&](int axis, char last) {
+    for (int i = 0; i < 3; ++i) line->Add(axes_as_rows(axis, i), 12, i < 2 ? ' ' : last);
   };
-  add_row(station, false, 0);
-  for (int i = 0; i < 3; ++i) add_row(rotation.col(i), false, 0);
-  for (int i = 0; i < 3; ++i) add_row(rotation.col(i), true, 0);  // transposed: rows are axes
-  add_row(station, true, 1);
+  for (int i = 0; i < 3; ++i) line->Add(station[i], i < 2 ? ' ' : '\n');
+  for (int axis = 0; axis < 3; ++axis) add_axis(axis, '\n');
+  for (int axis = 0; axis < 3; ++axis) {
+    add_axis(axis, ' ');
+    line->Text("0\n");
+  }
+  for (int i = 0; i < 3; ++i) line->Add(station[i], ' ');
+  line->Text("1\n");
 }
 
 }  // namespace
@@ -289,7 +294,7 @@ void WritePtx(const std::vector<Scan>& scans, const std::string& path) {
   OutputFile output(path);
   Line line;
   for (const Scan& scan : scans) {
-    WritePtxHeader(scan, output.stream());
+    WritePtxHeader(scan, &line);
     double offset = 0;
     const double divisor = IntensityDivisor(scan, &offset);
     const Rigid station_from_scan = scan.scan_from_station.Inverse();

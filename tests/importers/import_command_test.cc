@@ -1,0 +1,197 @@
+// roomtex-import as users type it.
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "importers/ply.h"
+#include "importers/ptx.h"
+#include "importers/rtpi.h"
+#include "tests/importers/rtpi_bytes.h"
+#include "tests/support/matchers.h"
+#include "tests/support/run_command.h"
+
+namespace roomtex {
+namespace {
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+class ImportCommand : public testing::Test {
+ protected:
+  ImportCommand() {
+    columns_ = MakeColumns(12, 9);
+    columns_[3].erase(columns_[3].begin() + 4);
+    columns_[5][2].range = -1;
+    WriteBytes(folder_ / "room.rtpi", Rtpi3Header(12, 9, "", "inches") + RtpiBody(columns_, true));
+  }
+  CommandResult Run(const std::string& arguments) {
+    return RunCommandLine("roomtex-import " + arguments);
+  }
+  CommandResult RunOn(const std::string& input, const std::string& arguments) {
+    return Run("--input_path " + (folder_ / input) + " " + arguments);
+  }
+  std::string Output(const std::string& name) { return " --output_path " + (folder_ / name); }
+  std::string WriteTwoScans() {
+    const std::string samples = "1 2 -1 0.5\n1 2 0 0.5\n1 2.1 -1 0.5\n1 2.1 0 0.5\n";
+    const std::string start = "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+    WriteBytes(folder_ / "two.ptx", start + "0 0 0 1\n" + samples + start + "9 0 0 1\n" + samples);
+    return "two.ptx";
+  }
+  RawColumns columns_;
+  TempFolder folder_;
+};
+
+TEST_F(ImportCommand, WritesEveryFormatAndTheReport) {
+  const CommandResult result = RunOn(
+      "room.rtpi", "--quiet --report_path " + (folder_ / "report.json") + Output("a.ply") +
+                       Output("a.pcd") + Output("a.png") + Output("a.rtpi") + Output("a.ptx"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  EXPECT_THAT(result.out, HasSubstr("12 columns x 9 rows, 106 samples, 2 missing"));
+  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  EXPECT_EQ(report["command"], "roomtex-import");
+  EXPECT_EQ(report["num_columns"], 12);
+  EXPECT_EQ(report["num_rows"], 9);
+  EXPECT_EQ(report["num_samples"], 106);
+  EXPECT_EQ(report["num_missing"], 2);
+  EXPECT_EQ(report["byte_order"], "big");
+  const Scan mesh = ReadPly(folder_ / "a.ply", {});
+  EXPECT_EQ(report["num_triangles"], mesh.triangles.size());
+  const Bounds bounds = FindBounds(mesh);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(report["bounds"]["min"][i].get<double>(), bounds.min[i], 1e-6);
+    EXPECT_NEAR(report["bounds"]["max"][i].get<double>(), bounds.max[i], 1e-6);
+  }
+  const cv::Mat image = cv::imread(folder_ / "a.png", cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(image.type(), CV_8UC1);
+  ASSERT_EQ(image.cols, 12);
+  ASSERT_EQ(image.rows, 9);
+  EXPECT_EQ(image.at<uchar>(8, 0), 0);     // intensity 0, the smallest
+  EXPECT_EQ(image.at<uchar>(0, 11), 255);  // and the largest
+  EXPECT_EQ(image.at<uchar>(4, 3), 0);     // missing
+}
+
+TEST_F(ImportCommand, RtpiToRtpiKeepsEverySample) {
+  ASSERT_EQ(RunOn("room.rtpi", Output("copy.rtpi")).exit_code, 0);
+  const std::string body = RtpiBody(columns_, true), copy = ReadBytes(folder_ / "copy.rtpi");
+  EXPECT_THAT(copy, StartsWith("RTPI_version_3.0\n"));
+  EXPECT_EQ(copy.substr(copy.size() - body.size()), body);
+  WriteBytes(folder_ / "old.rtpi", "RTPIv2 12 9\n" + RtpiBody(columns_, false));
+  ASSERT_EQ(RunOn("old.rtpi", "--units feet --max_range 30.48" + Output("new.rtpi")).exit_code, 0);
+  const RtpiFile file = ReadRtpi(folder_ / "new.rtpi");
+  EXPECT_EQ(file.header.version, 3);
+  EXPECT_EQ(file.header.units, "feet");
+  EXPECT_NEAR(*file.header.max_range, 100, 1e-9);
+  const std::string bytes = ReadBytes(folder_ / "new.rtpi"), old_body = RtpiBody(columns_, false);
+  EXPECT_EQ(bytes.substr(bytes.size() - old_body.size()), old_body);
+}
+
+TEST_F(ImportCommand, AzimuthMirrorsTheRoom) {
+  ASSERT_EQ(RunOn("room.rtpi", Output("a.ply")).exit_code, 0);
+  ASSERT_EQ(RunOn("room.rtpi", "--azimuth counterclockwise" + Output("b.ply")).exit_code, 0);
+  const Scan a = ReadPly(folder_ / "a.ply", {}), b = ReadPly(folder_ / "b.ply", {});
+  ASSERT_EQ(a.points.size(), b.points.size());
+  for (size_t i = 0; i < a.points.size(); ++i) {
+    EXPECT_THAT(
+        b.points[i],
+        IsNearMatrix(Eigen::Vector3d(a.points[i].cwiseProduct(Eigen::Vector3d(-1, 1, 1))), 0));
+  }
+}
+
+TEST_F(ImportCommand, SeveralScansGoIntoOneMeshOnePtxAndNumberedClouds) {
+  const CommandResult result =
+      RunOn(WriteTwoScans(), Output("all.ply") + Output("all.ptx") + Output("all.pcd") +
+                                 " --report_path " + (folder_ / "r.json"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("all_2.pcd"));
+  EXPECT_EQ(ReadPtx(folder_ / "all.ptx", {}).size(), 2u);
+  EXPECT_EQ(ReadPly(folder_ / "all.ply", {}).points.size(), 8u);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "all_1.pcd"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "all.pcd"));
+  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(report["scans"].size(), 2u);
+  EXPECT_EQ(report["num_samples"], 8);
+}
+
+TEST_F(ImportCommand, AMeshGoesToPlyOnly) {
+  ASSERT_EQ(RunOn("room.rtpi", Output("a.ply")).exit_code, 0);
+  ASSERT_EQ(RunOn("a.ply", Output("b.ply")).exit_code, 0);
+  EXPECT_EQ(ReadBytes(folder_ / "a.ply"), ReadBytes(folder_ / "b.ply"));
+  const CommandResult result = RunOn("a.ply", Output("c.ply") + Output("c.pcd"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("mesh without a grid"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.ply"));
+}
+
+TEST_F(ImportCommand, WrongUsageIsToldBeforeTheInputIsRead) {
+  const std::pair<std::string, const char*> cases[] = {
+      {Output("a.xyz"), ".ply, .pcd, .png, .rtpi, .ptx"},
+      {Output("a"), "unknown extension"},
+      {Output("a.ply") + Output("a.ply"), "is given twice"},
+      {Output("a.ply") + " --Mesh.max_edge_ratio 0.5", "--Mesh.max_edge_ratio"},
+      {Output("a.ply") + " --max_range -1", "--max_range"},
+      {Output("a.ply") + " --azimuth left", "--azimuth"},
+      {Output("a.ply") + " --units miles", "--units"},
+      {Output("a.ply") + " --colour 1", "--colour"},
+      {"", "--output_path"}};
+  for (const auto& [arguments, text] : cases) {
+    const CommandResult result = RunOn("no_such_file.rtpi", arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    EXPECT_THAT(result.err, HasSubstr(text));
+    EXPECT_THAT(result.out, IsEmpty());
+  }
+}
+
+TEST_F(ImportCommand, TheInputIsNeverOverwritten) {
+  const std::string before = ReadBytes(folder_ / "room.rtpi");
+  std::filesystem::create_symlink(folder_ / "room.rtpi", folder_ / "link.rtpi");
+  for (const std::string name : {"room.rtpi", "./room.rtpi", "link.rtpi"}) {
+    const CommandResult result = RunOn("room.rtpi", Output(name));
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr("is the input"));
+  }
+  EXPECT_EQ(ReadBytes(folder_ / "room.rtpi"), before);
+}
+
+TEST_F(ImportCommand, UnusableFilesExitWith3AndOneSentence) {
+  WriteBytes(folder_ / "cut.rtpi", ReadBytes(folder_ / "room.rtpi").substr(0, 1000));
+  WriteBytes(folder_ / "empty.rtpi", "");
+  const std::pair<std::string, std::string> cases[] = {{"cut.rtpi", "column 5 has 9 samples"},
+                                                       {"empty.rtpi", "is empty"},
+                                                       {"none.rtpi", "does not exist"},
+                                                       {".", "is a folder"}};
+  for (const auto& [name, text] : cases) {
+    const CommandResult result = RunOn(name, "--quiet" + Output("out.ply"));
+    EXPECT_EQ(result.exit_code, 3) << name;
+    EXPECT_THAT(result.err, HasSubstr(text));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out.ply"));
+  }
+  const CommandResult result = RunOn("room.rtpi", "--quiet" + Output("no/folder/out.ply"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("cannot be written"));
+}
+
+TEST_F(ImportCommand, AssumptionsAreWarnings) {
+  WriteBytes(folder_ / "old.rtpi", "RTPIv2 12 9\n" + RtpiBody(columns_, false));
+  const CommandResult result =
+      RunOn("old.rtpi", Output("a.png") + " --report_path " + (folder_ / "r.json"));
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("metres assumed"));
+  EXPECT_EQ(nlohmann::json::parse(ReadBytes(folder_ / "r.json"))["warnings"].size(), 1u);
+}
+
+TEST_F(ImportCommand, HelpBeginsWithAnExample) {
+  const CommandResult result = Run("--help");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, StartsWith("Example:\n  roomtex-import --input_path room.rtpi"));
+  for (const char* option : {"--azimuth", "--units", "--max_range", "--Mesh.max_edge_ratio"}) {
+    EXPECT_THAT(result.out, HasSubstr(option));
+  }
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,188 @@
+#include "importers/scan_reader.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "importers/scan_writer.h"
+#include "tests/importers/rtpi_bytes.h"
+#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+const char kPose[] = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+
+class ScanReader : public testing::Test {
+ protected:
+  std::string Write(const std::string& name, const std::string& bytes) {
+    WriteBytes(folder_ / name, bytes);
+    return folder_ / name;
+  }
+  std::string WriteGoodRtpi(const std::string& name) {
+    return Write(name, Rtpi3Header(4, 3) + RtpiBody(MakeColumns(4, 3), true));
+  }
+  std::string WriteGoodPtx(const std::string& name, int num_scans = 1) {
+    std::string text;
+    for (int i = 0; i < num_scans; ++i) {
+      text += std::string("1\n2\n") + kPose + "1 2 3 0.5\n1 2 4 0.25\n";
+    }
+    return Write(name, text);
+  }
+  void ExpectError(const std::string& path, const std::string& text) {
+    EXPECT_INPUT_ERROR(ReadScanFile(path, {}), text);
+    EXPECT_INPUT_ERROR(ReadScan(path, {}), path);
+  }
+  TempFolder folder_;
+};
+
+TEST_F(ScanReader, TheContentDecidesNotTheName) {
+  const ScanFile rtpi = ReadScanFile(WriteGoodRtpi("a.ply"), {});
+  EXPECT_EQ(rtpi.format, "RTPI");
+  EXPECT_EQ(rtpi.byte_order, "big");
+  const ScanFile version2 =
+      ReadScanFile(Write("b.pcd", "# x\nRTPIv2 4 3\n" + RtpiBody(MakeColumns(4, 3), false)), {});
+  EXPECT_EQ(version2.format, "RTPI");
+  EXPECT_EQ(version2.byte_order, "little");
+  const ScanFile ptx = ReadScanFile(WriteGoodPtx("c.rtpi"), {});
+  EXPECT_EQ(ptx.format, "PTX");
+  EXPECT_EQ(ptx.byte_order, "text");
+  const Scan scan = ReadScan(WriteGoodRtpi("a.rtpi"), {});
+  WriteScan(scan, {}, folder_ / "x.pcd");
+  std::filesystem::rename(folder_ / "x.pcd", folder_ / "x.ptx");
+  EXPECT_EQ(ReadScanFile(folder_ / "x.ptx", {}).format, "PCD");
+  WriteScan(scan, {{0, 5, 4}}, folder_ / "y.ply");
+  std::filesystem::rename(folder_ / "y.ply", folder_ / "y");
+  EXPECT_EQ(ReadScanFile(folder_ / "y", {}).format, "PLY");
+}
+
+TEST_F(ScanReader, OptionsReachTheFormats) {
+  const std::string path = WriteGoodRtpi("a.rtpi");
+  const Scan plain = ReadScan(path, {});
+  ScanReaderOptions options;
+  options.azimuth = "counterclockwise";
+  options.units = "feet";
+  const Scan other = ReadScan(path, options);
+  EXPECT_THAT(other.points[2],
+              IsNearMatrix(
+                  Eigen::Vector3d(0.3048 * plain.points[2].cwiseProduct(Eigen::Vector3d(-1, 1, 1))),
+                  1e-12));
+  options.max_range = 0.618;  // 2.0276 feet: less than the ranges of the last column
+  EXPECT_EQ(ReadScan(path, options).NumMissing(), 3);
+}
+
+TEST_F(ScanReader, BadOptionsAreUsageErrors) {
+  ScanReaderOptions options;
+  options.azimuth = "left";
+  options.units = "miles";
+  options.max_range = -1;
+  EXPECT_THAT(options.Problems(), SizeIs(3));
+  EXPECT_THROW(ReadScan(WriteGoodRtpi("a.rtpi"), options), UsageError);
+  options.max_range = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(options.Problems(), SizeIs(3));
+}
+
+TEST_F(ScanReader, SaysWhatAFileIsThatIsNoScan) {
+  ExpectError(Write("a", ""), "is empty");
+  ExpectError(Write("a", "hello"), "begins with \"hello\"");
+  ExpectError(Write("a", std::string("\0\1\2\3", 4)), "byte 0: begins with \"????\"");
+  ExpectError(Write("a", "ASTM-E57xxxx"), "E57");
+  ExpectError(Write("a", "\xff\xd8\xff\xe0"), "a JPEG photo");
+  ExpectError(Write("a", "12\nhello\n"), "no scan format");
+  ExpectError(Write("a", "P9 4 3\n"), "version 1");
+  ExpectError(Write("a", "# nothing else\n"), "no scan format");
+  ExpectError(Write("a", "12\n"), "the file ends before the number of rows");
+  ExpectError(Write("a", "plywood"), "no scan format");
+  ExpectError(folder_ / "none", "does not exist");
+  ExpectError(folder_.path(), "is a folder");
+  ExpectError("/dev/null", "is not a regular file");
+  if (geteuid() != 0) {
+    std::filesystem::permissions(WriteGoodRtpi("secret"), std::filesystem::perms::none);
+    ExpectError(folder_ / "secret", "may not be read");
+  }
+}
+
+TEST_F(ScanReader, AFileWithSeveralScansNeedsACommandThatTakesThem) {
+  const std::string path = WriteGoodPtx("three.ptx", 3);
+  EXPECT_THAT(ReadScanFile(path, {}).scans, SizeIs(3));
+  EXPECT_THAT(ReadScans({path}, "", {}), SizeIs(3));
+  EXPECT_INPUT_ERROR(ReadScan(path, {}), "holds 3 scans, expected one");
+}
+
+TEST_F(ScanReader, SeveralScansNeedTheirPoses) {
+  const std::string a = WriteGoodRtpi("a.rtpi"), b = WriteGoodRtpi("b.rtpi"),
+                    c = WriteGoodPtx("c.ptx");
+  EXPECT_THAT(ReadScans({a}, "", {}), SizeIs(1));
+  EXPECT_THAT(ReadScans({c, WriteGoodPtx("d.ptx")}, "", {}), SizeIs(2));
+  EXPECT_INPUT_ERROR(ReadScans({a, c}, "", {}), "--scan_poses");
+  const std::string poses =
+      Write("poses.txt", "# stations\na.rtpi 1 0 0 0  0 0 0\n\n" + b +
+                             " 0 -1 0 10 1 0 0 20 0 0 1 30 0 0 0 1 # turned\n");
+  const std::vector<Scan> scans = ReadScans({a, b, c}, poses, {});
+  ASSERT_THAT(scans, SizeIs(3));
+  const Eigen::Vector3d point = scans[0].points[5];
+  EXPECT_THAT(scans[1].points[5],
+              IsNearMatrix(Eigen::Vector3d(10 - point.y(), 20 + point.x(), 30 + point.z()), 1e-12));
+  EXPECT_THAT(scans[1].up, IsNearMatrix(Eigen::Vector3d(-1, 0, 0), 1e-12));
+  EXPECT_THAT(scans[1].Station(), IsNearMatrix(Eigen::Vector3d(10, 20, 30), 1e-12));
+  EXPECT_THROW(ReadScans({}, "", {}), UsageError);
+}
+
+TEST_F(ScanReader, APoseReplacesThatOfThePtx) {
+  const std::string path = Write(
+      "c.ptx", "1\n1\n5 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 0 0 1\n1 2 3 0.5\n");
+  const std::vector<Scan> scans = ReadScans({path}, Write("p", "c.ptx 1 0 0 0 0 0 7\n"), {});
+  EXPECT_THAT(scans[0].points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 10), 1e-12));
+  const std::string two = WriteGoodPtx("two.ptx", 2);
+  const std::vector<Scan> both =
+      ReadScans({two}, Write("p", "two.ptx#1 1 0 0 0 0 0 7\ntwo.ptx#2 1 0 0 0 0 0 8\n"), {});
+  EXPECT_THAT(both[1].points[1], IsNearMatrix(Eigen::Vector3d(1, 2, 11), 1e-12));
+  EXPECT_INPUT_ERROR(ReadScans({two}, Write("p", "two.ptx 1 0 0 0 0 0 7\n"), {}), "two.ptx#1");
+}
+
+TEST_F(ScanReader, BadPosesAreToldWithTheirLine) {
+  const std::string a = WriteGoodRtpi("a.rtpi");
+  const std::pair<const char*, const char*> cases[] = {
+      {"a.rtpi 1 0 0 0 0 0\n", "line 1: is \"a.rtpi 1 0 0 0 0 0\", which is no pose"},
+      {"\na.rtpi 1 0 0 0 0 0 x\n", "line 2"},
+      {"a.rtpi 1 0 0 0 0 0 nan\n", "line 1"},
+      {"a.rtpi 0 0 0 0 0 0 0\n", "not a rotation"},
+      {"a.rtpi -1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n", "not a rotation"},
+      {"a.rtpi 2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1\n", "not a rotation"},
+      {"a.rtpi 1 0 0 0 0 1 0 0 0 0 1 0 5 0 0 1\n", "not a rotation"},
+      {"a.rtpi 1 0 0 0 0 0 0\na.rtpi 1 0 0 0 0 0 0\n", "line 2: gives a second pose"},
+      {"b.rtpi 1 0 0 0 0 0 0\n", "line 1: b.rtpi is none of the scans"}};
+  for (const auto& [text, message] : cases) {
+    EXPECT_INPUT_ERROR(ReadScans({a}, Write("poses.txt", text), {}), message);
+  }
+  EXPECT_INPUT_ERROR(ReadScans({a}, folder_ / "none.txt", {}), "does not exist");
+}
+
+TEST_F(ScanReader, EveryWriterGivesWhatTheReadersTake) {
+  const Scan scan = ReadScan(WriteGoodRtpi("a.rtpi"), {});
+  for (const std::string extension : {".pcd", ".ptx", ".rtpi"}) {
+    WriteScan(scan, {}, folder_ / "out" + extension);
+    const Scan again = ReadScan(folder_ / "out" + extension, {});
+    ASSERT_EQ(again.num_columns, scan.num_columns) << extension;
+    ASSERT_EQ(again.num_rows, scan.num_rows) << extension;
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      EXPECT_THAT(again.points[i], IsNearMatrix(scan.points[i], 1e-6)) << extension;
+    }
+  }
+  EXPECT_THROW(WriteScan(scan, {}, folder_ / "out.xyz"), UsageError);
+  Scan mesh = scan;
+  mesh.organised = false;
+  EXPECT_INPUT_ERROR(WriteScan(mesh, {}, folder_ / "out.pcd"), "without a grid");
+  EXPECT_EQ(ScanWriterExtension("a.b/ROOM.PlY"), ".ply");
+  EXPECT_EQ(ScanWriterExtension("room"), "");
+}
+
+}  // namespace
+}  // namespace roomtex
