@@ -8,6 +8,10 @@
 #include <numeric>
 #include <set>
 
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
 #include "core/error.h"
 #include "core/output_file.h"
 
@@ -113,45 +117,74 @@ std::string OptionList::Unknown(const std::string& argument) const {
   return nearest == nullptr ? text : text + ". Did you mean --" + nearest->name + "?";
 }
 
+// CLI11 splits the arguments; what it leaves over must be options of another program with their
+// values.
 std::vector<OptionList::Given> OptionList::ReadArguments(
     const std::vector<std::string>& arguments) const {
+  CLI::App app;
+  app.set_help_flag();
+  app.allow_extras();
+  std::vector<Given> all(options_.size());
+  for (size_t i = 0; i < options_.size(); ++i) {
+    all[i].name = options_[i].name;
+    CLI::Option* option = app.add_option("--" + options_[i].name, all[i].values);
+    option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    // A vector takes all that follows; only repeatable options may list their values.
+    if (!options_[i].repeatable) option->expected(1)->allow_extra_args(false);
+  }
+  std::vector<std::string> reversed;  // CLI11 takes them from the back
+  for (size_t i = arguments.size(); i-- > 0;) {
+    const std::string& argument = arguments[i];
+    const bool is_last = i + 1 == arguments.size() || StartsWith(arguments[i + 1], "--");
+    const Option* alone =
+        is_last && StartsWith(argument, "--") ? Find(argument.substr(2)) : nullptr;
+    if (alone != nullptr && !alone->may_stand_alone) throw UsageError(argument + " needs a value");
+    if (StartsWith(argument, "--") && argument.back() == '=') {
+      // To CLI11 "--name=" has no value; to us an empty one.
+      reversed.push_back("");
+      reversed.push_back(argument.substr(0, argument.size() - 1));
+    } else {
+      reversed.push_back(alone != nullptr ? argument + "=1" : argument);
+    }
+  }
+  try {
+    app.parse(reversed);
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(error.what());
+  }
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [](const Given& given) { return given.values.empty(); }),
+            all.end());
+  const std::vector<Given> passed = ReadPassedThrough(app.remaining());
+  all.insert(all.end(), passed.begin(), passed.end());
+  return all;
+}
+
+std::vector<OptionList::Given> OptionList::ReadPassedThrough(
+    const std::vector<std::string>& arguments) const {
   std::vector<Given> all;
-  const auto is_value = [&](size_t i) {
-    return i < arguments.size() && !StartsWith(arguments[i], "--");
-  };
   for (size_t i = 0; i < arguments.size(); ++i) {
     const std::string& argument = arguments[i];
+    if (argument.size() < 2 || argument[0] != '-' || argument == "--") {
+      throw UsageError("\"" + argument + "\" does not belong to an option");
+    }
     const size_t equals = argument.find('=');
-    Given given{argument.substr(0, equals), {}, ""};
-    if (!StartsWith(argument, "--") || given.name.size() == 2) {
-      const bool is_option = argument.size() > 1 && argument[0] == '-' && argument != "--";
-      throw UsageError(is_option ? Unknown(argument)
-                                 : "\"" + argument + "\" does not belong to an option");
-    }
-    const Option* option = Find(given.name.substr(2));
-    if (option == nullptr && FindPassed(argument) == nullptr) {
-      throw UsageError(Unknown(given.name));
-    }
-    const bool repeatable = option != nullptr && option->repeatable;
+    const std::string name = argument.substr(0, equals);
+    if (FindPassed(name) == nullptr) throw UsageError(Unknown(name));
     if (equals != std::string::npos) {
-      given.values.push_back(argument.substr(equals + 1));
-    } else if (is_value(i + 1)) {
-      do {
-        given.values.push_back(arguments[++i]);
-      } while (repeatable && is_value(i + 1));
-    } else if (option != nullptr && option->may_stand_alone) {
-      given.values.push_back("1");
+      all.push_back({name.substr(2), {argument.substr(equals + 1)}, ""});
+    } else if (i + 1 < arguments.size() && !StartsWith(arguments[i + 1], "--")) {
+      all.push_back({name.substr(2), {arguments[++i]}, ""});
     } else {
-      throw UsageError(given.name + " needs a value");
+      throw UsageError(name + " needs a value");
     }
-    given.name.erase(0, 2);
-    all.push_back(std::move(given));
   }
   return all;
 }
 
 // COLMAP's layout: keys before the first section are plain options, [Group] makes the keys below it
-// --Group.key. A value reaches to the end of its line.
+// --Group.key. A value reaches to the end of its line. Read here and not by CLI11 or Boost, because
+// their messages do not name the line of an unknown or broken key.
 std::vector<OptionList::Given> OptionList::ReadProjectFile(const std::string& path) const {
   RequireFile(path, "Check --project_path");
   std::ifstream stream(path);
@@ -206,7 +239,7 @@ void OptionList::Parse(const std::vector<std::string>& arguments) const {
     std::string where;
     for (const Given& given : all) {
       if (given.name != option.name) continue;
-      if (!values.empty() && !option.repeatable) {
+      if (values.size() + given.values.size() > 1 && !option.repeatable) {
         throw UsageError(given.where + "--" + option.name + " is given twice");
       }
       values.insert(values.end(), given.values.begin(), given.values.end());

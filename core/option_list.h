@@ -52,6 +52,7 @@ class OptionList {
   const PassedThrough* FindPassed(const std::string& argument) const;
   std::string Unknown(const std::string& argument) const;
   std::vector<Given> ReadArguments(const std::vector<std::string>& arguments) const;
+  std::vector<Given> ReadPassedThrough(const std::vector<std::string>& arguments) const;
   std::vector<Given> ReadProjectFile(const std::string& path) const;
 
   std::string command_;
