@@ -2,259 +2,13 @@
 
 #include <cmath>
 
-#include "capture/random_stream.h"
-#include "capture/room_pictures.h"
+#include "capture/room_builder.h"
 
 namespace roomtex {
-namespace {
 
 using Eigen::Vector3d;
 
-enum Wall { kSouth, kEast, kNorth, kWest };  // y = 0, x = width, y = depth, x = 0
-
-Rigid Placed(double x, double y, double z, double yaw_deg = 0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(yaw_deg), Vector3d::UnitZ())),
-          Vector3d(x, y, z)};
-}
-
-class Builder {
- public:
-  Builder(const SimulatedRoomOptions& options, RoomScene* scene)
-      : options_(options),
-        scene_(*scene),
-        width_(options.width),
-        depth_(options.depth),
-        height_(options.height) {
-    oak_ = Add(MakeWood(RgbFromSrgb(196, 150, 98), NextSeed()), {0.25f, 0.5f, {0.8f, 0.2f, 0}});
-    walnut_ = Add(MakeWood(RgbFromSrgb(120, 78, 50), NextSeed()), {0.3f, 0.8f, {0.8f, 0.2f, 0}});
-    pine_ = Add(MakeWood(RgbFromSrgb(222, 186, 134), NextSeed()), {0.2f, 0.6f, {0.6f, 0.4f, 0}});
-    white_ = Add(MakePlaster(RgbFromSrgb(236, 233, 225), 0.05f, NextSeed()),
-                 {0.5f, 0.3f, {0.4f, 0.3f, 0.3f}});
-    black_ = Add(MakePlaster(RgbFromSrgb(48, 46, 46), 0.15f, NextSeed()),
-                 {0.05f, 0.6f, {0.4f, 0.3f, 0.3f}});
-    metal_ = Add(MakePlaster(RgbFromSrgb(150, 148, 142), 0.12f, NextSeed()),
-                 {0.55f, 0.3f, {0.3f, 0.3f, 0.3f}});
-  }
-
-  void AddShell();
-  void AddWindow();
-  void AddLights();
-  void AddPictures();
-  void AddFurniture();
-
- private:
-  struct WallFrame {
-    Vector3d top_left, right, inward;  // seen from the room
-    double length;
-  };
-
-  uint32_t NextSeed() {
-    return static_cast<uint32_t>(
-        MixBits(static_cast<uint64_t>(options_.random_seed), 77, ++num_seeds_));
-  }
-  int Add(const TexturePtr& texture, const Infrared& infrared,
-          Surface::Kind kind = Surface::Kind::kOpaque, bool shines = false) {
-    return scene_.AddSurface({texture, infrared, kind, shines});
-  }
-  // A picture of this size in metres, one pixel per millimetre of its longer side.
-  int AddPictureSurface(const cv::Mat& picture, double width, double height, float grain = 0.03f,
-                        const Infrared& infrared = {0.3f, 0.45f, {0.9f, 0.2f, -0.3f}}) {
-    return Add(MakePicture(picture, static_cast<float>(width), static_cast<float>(height), grain,
-                           NextSeed()),
-               infrared);
-  }
-  WallFrame FrameOf(Wall wall) const;
-  // Box in room axes.
-  void Box(int surface, double x, double y, double z, double sx, double sy, double sz,
-           int along = 0) {
-    scene_.AddBox(surface, Placed(x, y, z), {sx, sy, sz}, along);
-  }
-  // Box in the axes of a piece of furniture.
-  void Part(const Rigid& room_from_piece, int surface, double x, double y, double z, double sx,
-            double sy, double sz, int along = 0) {
-    scene_.AddBox(surface, room_from_piece * Placed(x, y, z), {sx, sy, sz}, along);
-  }
-  // Picture on the face of something: corner at the upper left, seen from the front.
-  void Face(const Rigid& room_from_piece, int surface, const Vector3d& corner,
-            const Vector3d& right, const Vector3d& down) {
-    scene_.AddQuad(surface, room_from_piece * corner, room_from_piece.rotation * right,
-                   room_from_piece.rotation * down);
-  }
-  // Centre `from_left` metres along the wall and `z` above the floor.
-  void Hang(Wall wall, double from_left, double z, double width, double height,
-            const cv::Mat& picture, double thickness = 0.004);
-  void AddTable(const Rigid& at);
-  void AddChair(const Rigid& at, int cushion);
-  void AddSofa(const Rigid& at);
-  void AddShelf(const Rigid& at, double width);
-  void AddBookRow(const Rigid& at, double z, double from, double to);
-  void AddSideboard(const Rigid& at);
-  void AddFloorLamp(double x, double y);
-  void AddPlant(double x, double y, double z, double size);
-  void AddParcels(const Rigid& at);
-  void AddCurtain(double x0, double x1, double y, int surface);
-
-  const SimulatedRoomOptions& options_;
-  RoomScene& scene_;
-  double width_, depth_, height_;
-  uint64_t num_seeds_ = 0;
-  int oak_, walnut_, pine_, white_, black_, metal_;
-  // The opening of the window in the north wall.
-  double window_left_ = 0, window_right_ = 0, window_bottom_ = 0.85, window_top_ = 2.15;
-};
-
-Builder::WallFrame Builder::FrameOf(Wall wall) const {
-  switch (wall) {
-    case kSouth:
-      return {{width_, 0, height_}, -Vector3d::UnitX(), Vector3d::UnitY(), width_};
-    case kEast:
-      return {{width_, depth_, height_}, -Vector3d::UnitY(), -Vector3d::UnitX(), depth_};
-    case kNorth:
-      return {{0, depth_, height_}, Vector3d::UnitX(), -Vector3d::UnitY(), width_};
-    case kWest:
-      break;
-  }
-  return {{0, 0, height_}, Vector3d::UnitY(), Vector3d::UnitX(), depth_};
-}
-
-void Builder::AddShell() {
-  int floor, ceiling, walls[4];
-  if (options_.bare_walls) {
-    const Infrared infrared{0.2f, 0.6f, {0.5f, 0.3f, 0.2f}};
-    floor = Add(MakePlain(RgbFromSrgb(150, 140, 128)), infrared);
-    ceiling = Add(MakePlain(RgbFromSrgb(240, 238, 232)), infrared);
-    for (int& wall : walls) wall = Add(MakePlain(RgbFromSrgb(226, 222, 212)), infrared);
-  } else {
-    floor =
-        Add(MakePlanks(RgbFromSrgb(190, 142, 92), NextSeed()), {0.2f, 0.7f, {0.8f, 0.3f, -0.2f}});
-    ceiling = Add(MakePlaster(RgbFromSrgb(238, 234, 224), 0.09f, NextSeed()),
-                  {0.75f, -0.35f, {0.3f, 0.3f, 0.3f}});
-    walls[kSouth] = Add(MakePlaster(RgbFromSrgb(222, 190, 130), 0.1f, NextSeed()),
-                        {0.85f, -0.5f, {0.5f, 0.4f, 0}});
-    walls[kEast] = Add(MakeBrick(RgbFromSrgb(176, 96, 70), RgbFromSrgb(200, 192, 180), NextSeed()),
-                       {0.15f, 0.6f, {0.9f, 0, 0}});
-    walls[kNorth] = Add(MakePlaster(RgbFromSrgb(206, 214, 206), 0.1f, NextSeed()),
-                        {0.3f, 0.5f, {0.2f, 0.6f, 0.2f}});
-    walls[kWest] = Add(MakeWallpaper(RgbFromSrgb(58, 98, 104),
-                                     {RgbFromSrgb(120, 160, 140), RgbFromSrgb(196, 176, 120),
-                                      RgbFromSrgb(84, 138, 140), RgbFromSrgb(214, 206, 184),
-                                      RgbFromSrgb(168, 104, 78)},
-                                     0.11f, NextSeed()),
-                       {0.35f, 0.5f, {-0.3f, 0.6f, 0.6f}});
-  }
-  scene_.AddQuad(floor, {0, depth_, 0}, {width_, 0, 0}, {0, -depth_, 0});
-  scene_.AddQuad(ceiling, {0, 0, height_}, {width_, 0, 0}, {0, depth_, 0});
-  for (const Wall wall : {kSouth, kEast, kNorth, kWest}) {
-    const WallFrame frame = FrameOf(wall);
-    if (wall == kNorth && !options_.bare_walls) continue;  // AddWindow
-    scene_.AddQuad(walls[wall], frame.top_left, frame.length * frame.right,
-                   -height_ * Vector3d::UnitZ());
-  }
-  if (options_.bare_walls) return;
-  window_left_ = 0.5 * width_ - 0.85;
-  window_right_ = 0.5 * width_ + 0.75;
-  const auto piece = [&](double left, double right, double bottom, double top) {
-    scene_.AddQuad(walls[kNorth], {left, depth_, top}, {right - left, 0, 0}, {0, 0, bottom - top},
-                   {static_cast<float>(left), static_cast<float>(height_ - top)});
-  };
-  piece(0, window_left_, 0, height_);
-  piece(window_right_, width_, 0, height_);
-  piece(window_left_, window_right_, window_top_, height_);
-  piece(window_left_, window_right_, 0, window_bottom_);
-  // Skirting boards and two beams.
-  constexpr double kHigh = 0.09, kThick = 0.014;
-  Box(white_, 0, 0, 0, width_ - 1.35, kThick, kHigh);
-  Box(white_, 0, depth_ - kThick, 0, width_, kThick, kHigh);
-  Box(white_, 0, 0, 0, kThick, depth_, kHigh, 1);
-  Box(white_, width_ - kThick, 0, 0, kThick, depth_, kHigh, 1);
-  Box(walnut_, 0.24 * width_, 0, height_ - 0.16, 0.13, depth_, 0.16, 1);
-  Box(walnut_, 0.77 * width_, 0, height_ - 0.16, 0.13, depth_, 0.16, 1);
-}
-
-void Builder::AddWindow() {
-  const double wide = window_right_ - window_left_, tall = window_top_ - window_bottom_;
-  constexpr double kBar = 0.055, kDeep = 0.14;
-  // Reveal, then the frame at its outer end.
-  const double y = depth_;
-  Box(white_, window_left_ - 0.02, y, window_bottom_ - 0.02, 0.02, kDeep, tall + 0.04);
-  Box(white_, window_right_, y, window_bottom_ - 0.02, 0.02, kDeep, tall + 0.04);
-  Box(white_, window_left_ - 0.02, y, window_top_, wide + 0.04, kDeep, 0.02);
-  Box(oak_, window_left_ - 0.08, y - 0.09, window_bottom_ - 0.03, wide + 0.16, kDeep + 0.09, 0.03);
-  const double frame_y = y + kDeep - 0.06;
-  for (const double x : {window_left_, window_left_ + wide / 2 - kBar / 2, window_right_ - kBar}) {
-    Box(white_, x, frame_y, window_bottom_, kBar, 0.05, tall, 2);
-  }
-  for (const double z : {window_bottom_, window_bottom_ + 0.68 * tall, window_top_ - kBar}) {
-    Box(white_, window_left_, frame_y + 0.002, z, wide, 0.045, kBar);
-  }
-  constexpr double kViewWidth = 24, kViewHeight = 12;
-  const int outside =
-      Add(MakePicture(DrawOutside(3200, 1600, NextSeed()), kViewWidth, kViewHeight, 0, 0),
-          {0.3f, 0, {0, 0, 0}}, Surface::Kind::kOutside, true);
-  scene_.AddQuad(outside, {width_ / 2 - kViewWidth / 2, depth_ + 6, 1.4 + 0.45 * kViewHeight},
-                 {kViewWidth, 0, 0}, {0, 0, -kViewHeight});
-}
-
-void Builder::AddLights() {
-  const double x = 0.5 * width_, y = 0.5 * depth_;
-  const int lamp = Add(MakePlaster(RgbFromSrgb(252, 246, 230), 0.03f, NextSeed()),
-                       {0.8f, 0, {0, 0, 0}}, Surface::Kind::kOpaque, true);
-  Box(metal_, x - 0.46, y - 0.26, height_ - 0.035, 0.92, 0.52, 0.035);
-  scene_.AddQuad(lamp, {x - 0.43, y - 0.23, height_ - 0.037}, {0.86, 0, 0}, {0, 0.46, 0});
-  scene_.AddLight({{x - 0.6, y - 0.6, height_ - 0.06},
-                   {1.2, 0, 0},
-                   {0, 1.2, 0},
-                   LinearRgb(2.5f, 2.35f, 2.05f)});
-  if (!options_.bare_walls) {
-    scene_.AddLight({{window_left_, depth_ + 0.02, window_top_},
-                     {window_right_ - window_left_, 0, 0},
-                     {0, 0, window_bottom_ - window_top_},
-                     LinearRgb(1.55f, 1.75f, 2.0f)});
-  }
-}
-
-void Builder::Hang(Wall wall, double from_left, double z, double width, double height,
-                   const cv::Mat& picture, double thickness) {
-  const WallFrame frame = FrameOf(wall);
-  const Vector3d up = Vector3d::UnitZ();
-  const Vector3d corner =
-      frame.top_left + (from_left - width / 2) * frame.right - (height_ - z - height / 2) * up;
-  const int surface = AddPictureSurface(picture, width, height);
-  scene_.AddQuad(surface, corner + thickness * frame.inward, width * frame.right, -height * up);
-  if (thickness < 0.01) return;
-  // The sides of a frame.
-  const int sides = black_;
-  const Vector3d out = thickness * frame.inward, right = width * frame.right, down = -height * up;
-  scene_.AddQuad(sides, corner, out, down);
-  scene_.AddQuad(sides, corner + right + out, -out, down);
-  scene_.AddQuad(sides, corner, right, out);
-  scene_.AddQuad(sides, corner + out + down, right, -out);
-}
-
-void Builder::AddPictures() {
-  const auto mm = [](double metres) { return static_cast<int>(std::lround(1000 * metres)); };
-  const auto seed = [this] { return static_cast<uint64_t>(NextSeed()); };
-  // West wall, above the sofa.
-  Hang(kWest, 0.47 * depth_, 1.62, 1.15, 0.78, DrawLandscape(mm(1.15), mm(0.78), seed()), 0.025);
-  Hang(kWest, 0.17 * depth_, 1.85, 0.4, 0.52, DrawAbstract(mm(0.4), mm(0.52), seed()), 0.02);
-  Hang(kWest, 0.17 * depth_, 1.27, 0.4, 0.3, DrawFlowers(mm(0.4), mm(0.3), seed()), 0.02);
-  Hang(kWest, 0.77 * depth_, 1.72, 0.5, 0.7, DrawCity(mm(0.5), mm(0.7), seed()), 0.02);
-  // South wall, from the left: door (AddFurniture), posters, the sideboard with its mirror.
-  Hang(kSouth, 1.67, 1.55, 0.55, 0.8, DrawTextPoster(mm(0.55), mm(0.8), "RANGE & COLOUR", seed()));
-  Hang(kSouth, 2.42, 1.62, 0.6, 0.85, DrawAbstract(mm(0.6), mm(0.85), seed()), 0.02);
-  Hang(kSouth, width_ - 0.32, 1.62, 0.42, 0.62, DrawCalendar(mm(0.42), mm(0.62), seed()));
-  // North wall, beside the window.
-  Hang(kNorth, 0.62, 1.6, 0.7, 0.95, DrawMap(mm(0.7), mm(0.95), "TERRA NOVA", seed()));
-  Hang(kNorth, width_ - 0.95, 1.75, 0.62, 0.45, DrawLandscape(mm(0.62), mm(0.45), seed()), 0.02);
-  Hang(kNorth, width_ - 0.95, 1.18, 0.5, 0.36, DrawCity(mm(0.5), mm(0.36), seed()), 0.02);
-  // East wall, beside the shelf.
-  Hang(kEast, depth_ - 1.35, 1.62, 0.62, 0.88, DrawFlowers(mm(0.62), mm(0.88), seed()), 0.02);
-  Hang(kEast, depth_ - 0.5, 1.6, 0.55, 0.8,
-       DrawTextPoster(mm(0.55), mm(0.8), "NIGHT TRAINS", seed()));
-  Hang(kEast, depth_ - 0.9, 0.72, 0.9, 0.6, DrawMap(mm(0.9), mm(0.6), "OLD HARBOUR", seed()), 0.01);
-}
-
-void Builder::AddTable(const Rigid& at) {
+void RoomBuilder::AddTable(const Rigid& at) {
   constexpr double kLong = 1.4, kWide = 0.8, kHigh = 0.74;
   Part(at, oak_, -kLong / 2, -kWide / 2, kHigh - 0.032, kLong, kWide, 0.032);
   for (const double x : {-kLong / 2 + 0.04, kLong / 2 - 0.11}) {
@@ -306,7 +60,7 @@ void Builder::AddTable(const Rigid& at) {
   }
 }
 
-void Builder::AddChair(const Rigid& at, int cushion) {
+void RoomBuilder::AddChair(const Rigid& at, int cushion) {
   // Looks along +y; the origin is under the middle of the seat.
   constexpr double kSeat = 0.45, kHalf = 0.21, kLeg = 0.038;
   Part(at, pine_, -kHalf, -kHalf, kSeat - 0.03, 2 * kHalf, 2 * kHalf, 0.03);
@@ -320,7 +74,7 @@ void Builder::AddChair(const Rigid& at, int cushion) {
   }
 }
 
-void Builder::AddSofa(const Rigid& at) {
+void RoomBuilder::AddSofa(const Rigid& at) {
   // Looks along +y; the origin is in the middle of its back.
   constexpr double kLong = 1.9, kDeep = 0.85, kArm = 0.18;
   const int cloth = Add(MakePlaid({RgbFromSrgb(150, 88, 62), RgbFromSrgb(172, 112, 78),
@@ -351,7 +105,7 @@ void Builder::AddSofa(const Rigid& at) {
   }
 }
 
-void Builder::AddBookRow(const Rigid& at, double z, double from, double to) {
+void RoomBuilder::AddBookRow(const Rigid& at, double z, double from, double to) {
   RandomStream random(NextSeed());
   for (double x = from; x < to - 0.03;) {
     const double thick = std::min(random.Uniform(0.02, 0.055), to - x),
@@ -371,7 +125,7 @@ void Builder::AddBookRow(const Rigid& at, double z, double from, double to) {
   }
 }
 
-void Builder::AddShelf(const Rigid& at, double width) {
+void RoomBuilder::AddShelf(const Rigid& at, double width) {
   // Looks along +y; the origin is at the foot of its back, in the middle.
   constexpr double kDeep = 0.32, kHigh = 2.05, kBoard = 0.024;
   const Rigid left = at * Placed(-width / 2, 0, 0);
@@ -406,7 +160,7 @@ void Builder::AddShelf(const Rigid& at, double width) {
        0.24, 0.2);
 }
 
-void Builder::AddSideboard(const Rigid& at) {
+void RoomBuilder::AddSideboard(const Rigid& at) {
   // Looks along +y; the origin is at the foot of its back, in the middle.
   constexpr double kLong = 1.4, kDeep = 0.42, kHigh = 0.82;
   Part(at, oak_, -kLong / 2, 0, 0.08, kLong, kDeep, kHigh - 0.08);
@@ -444,7 +198,7 @@ void Builder::AddSideboard(const Rigid& at) {
   }
 }
 
-void Builder::AddFloorLamp(double x, double y) {
+void RoomBuilder::AddFloorLamp(double x, double y) {
   const int shade = Add(MakePlaid({RgbFromSrgb(244, 226, 180), RgbFromSrgb(238, 210, 150),
                                    RgbFromSrgb(225, 190, 130)},
                                   0.03f, NextSeed()),
@@ -454,7 +208,7 @@ void Builder::AddFloorLamp(double x, double y) {
   scene_.AddFrustum(shade, {x, y, 1.32}, 0.22, 0.14, 0.3, 20, false);
 }
 
-void Builder::AddPlant(double x, double y, double z, double size) {
+void RoomBuilder::AddPlant(double x, double y, double z, double size) {
   RandomStream random(NextSeed());
   const int pot =
       Add(MakeBlotches(RgbFromSrgb(176, 96, 62), RgbFromSrgb(206, 130, 92), 0.08f, NextSeed()),
@@ -506,7 +260,7 @@ void Builder::AddPlant(double x, double y, double z, double size) {
   }
 }
 
-void Builder::AddParcels(const Rigid& at) {
+void RoomBuilder::AddParcels(const Rigid& at) {
   const auto parcel = [&](const Rigid& where, double sx, double sy, double sz) {
     const auto px = [](double metres) { return static_cast<int>(std::lround(1000 * metres)); };
     const int plain = Add(MakePlaster(RgbFromSrgb(176, 138, 92), 0.09f, NextSeed()),
@@ -531,7 +285,7 @@ void Builder::AddParcels(const Rigid& at) {
   parcel(at * Placed(0.62, 0.03, 0, -6), 0.38, 0.34, 0.3);
 }
 
-void Builder::AddCurtain(double x0, double x1, double y, int surface) {
+void RoomBuilder::AddCurtain(double x0, double x1, double y, int surface) {
   constexpr int kStrips = 18;
   const auto at = [&](int i) {
     const double t = static_cast<double>(i) / kStrips;
@@ -554,7 +308,7 @@ void Builder::AddCurtain(double x0, double x1, double y, int surface) {
   }
 }
 
-void Builder::AddFurniture() {
+void RoomBuilder::AddFurniture() {
   const auto cushion = [&](int red, int green, int blue) {
     return Add(MakePlaid({RgbFromSrgb(red, green, blue), RgbFromSrgb(220, 208, 184),
                           RgbFromSrgb(red / 2, green / 2, blue / 2)},
@@ -594,40 +348,16 @@ void Builder::AddFurniture() {
       0.02);
 }
 
-void AddDoorOn(const Rigid& at, int door, int frame, int handle, RoomScene* scene) {
-  // Looks along +y; the origin is at its foot, in the middle.
-  constexpr double kWide = 0.88, kHigh = 2.04;
-  scene->AddQuad(door, at * Vector3d(kWide / 2, 0.012, kHigh), at.rotation * Vector3d(-kWide, 0, 0),
-                 at.rotation * Vector3d(0, 0, -kHigh));
-  for (const double x : {-kWide / 2 - 0.08, kWide / 2}) {
-    scene->AddBox(frame, at * Placed(x, 0, 0), {0.08, 0.03, kHigh + 0.08}, 2);
-  }
-  scene->AddBox(frame, at * Placed(-kWide / 2, 0, kHigh), {kWide, 0.03, 0.08}, 0);
-  scene->AddBox(handle, at * Placed(kWide / 2 - 0.1, 0.012, 0.98), {0.035, 0.01, 0.16}, 2);
-  scene->AddBox(handle, at * Placed(kWide / 2 - 0.18, 0.04, 1.07), {0.11, 0.018, 0.022}, 0);
-  scene->AddBox(handle, at * Placed(kWide / 2 - 0.09, 0.02, 1.072), {0.018, 0.03, 0.018}, 0);
-}
-
-}  // namespace
-
 void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
-  Builder builder(options, scene);
+  RoomBuilder builder(options, scene);
   builder.AddShell();
-  if (!options.bare_walls) builder.AddWindow();
   builder.AddLights();
+  if (!options.bare_walls) {
+    builder.AddWindow();
+    builder.AddDoor();
+  }
   if (options.furnished && !options.bare_walls) builder.AddPictures();
   if (options.furnished) builder.AddFurniture();
-  if (!options.bare_walls) {
-    const auto seed = static_cast<uint64_t>(options.random_seed);
-    const int door = scene->AddSurface(
-        {MakePicture(DrawDoor(880, 2040, MixBits(seed, 78)), 0.88f, 2.04f, 0.05f, 5),
-         {0.5f, 0.3f, {0.2f, 0.5f, 0.2f}}});
-    const int frame = scene->AddSurface(
-        {MakePlaster(RgbFromSrgb(92, 112, 106), 0.1f, 6), {0.5f, 0.3f, {0.2f, 0.5f, 0.2f}}});
-    const int handle = scene->AddSurface(
-        {MakePlaster(RgbFromSrgb(190, 165, 100), 0.1f, 7), {0.5f, 0.3f, {0.4f, 0.3f, 0.1f}}});
-    AddDoorOn(Placed(options.width - 0.75, 0, 0), door, frame, handle, scene);
-  }
 }
 
 }  // namespace roomtex

@@ -341,30 +341,25 @@ class Picture : public RoomTexture {
     if (picture.type() != CV_8UC3) throw std::invalid_argument("a picture is 8-bit BGR");
     scale_ =
         Uv(static_cast<float>(picture.cols) / width, static_cast<float>(picture.rows) / height);
-    levels_.push_back(picture.clone());
+    picture_ = picture.clone();
     // Averages are taken in linear light.
-    cv::Mat linear(picture.size(), CV_32FC3);
     const auto& table = LinearFromSrgbByte();
+    cv::Mat linear(picture.size(), CV_16UC3);
     for (int y = 0; y < picture.rows; ++y) {
+      const auto* const bytes = picture.ptr<cv::Vec3b>(y);
+      auto* const row = linear.ptr<cv::Vec3w>(y);
       for (int x = 0; x < picture.cols; ++x) {
-        const cv::Vec3b& byte = picture.at<cv::Vec3b>(y, x);
-        linear.at<cv::Vec3f>(y, x) = {table[byte[0]], table[byte[1]], table[byte[2]]};
+        for (int k = 0; k < 3; ++k) {
+          row[x][k] = static_cast<uint16_t>(kLinearOne * table[bytes[x][k]] + 0.5f);
+        }
       }
     }
     while (std::min(linear.cols, linear.rows) >= 4) {
       cv::Mat half;
       cv::resize(linear, half, {(linear.cols + 1) / 2, (linear.rows + 1) / 2}, 0, 0,
                  cv::INTER_AREA);
+      coarser_.push_back(half);
       linear = half;
-      cv::Mat bytes(linear.size(), CV_8UC3);
-      for (int y = 0; y < linear.rows; ++y) {
-        for (int x = 0; x < linear.cols; ++x) {
-          const cv::Vec3f& v = linear.at<cv::Vec3f>(y, x);
-          bytes.at<cv::Vec3b>(y, x) = {SrgbByteFromLinear(v[0]), SrgbByteFromLinear(v[1]),
-                                       SrgbByteFromLinear(v[2])};
-        }
-      }
-      levels_.push_back(bytes);
     }
   }
 
@@ -372,10 +367,10 @@ class Picture : public RoomTexture {
     const float band = Band(footprint);
     const Uv p = uv.cwiseProduct(scale_);
     const float level =
-        std::clamp(std::log2(band / texel_), 0.0f, static_cast<float>(levels_.size() - 1) - 0.001f);
+        std::clamp(std::log2(band / texel_), 0.0f, static_cast<float>(coarser_.size()) - 0.001f);
     const int fine = static_cast<int>(level);
     LinearRgb color = Lookup(fine, p);
-    if (fine + 1 < static_cast<int>(levels_.size())) {
+    if (fine < static_cast<int>(coarser_.size())) {
       color = Mix(color, Lookup(fine + 1, p), level - static_cast<float>(fine));
     }
     if (grain_ > 0)
@@ -384,29 +379,36 @@ class Picture : public RoomTexture {
   }
 
  private:
-  // p in pixels of level 0; bilinear, the border repeated.
+  static constexpr float kLinearOne = 65535;
+
+  // p in pixels of the picture; bilinear, the border repeated. Level 0 is the picture itself.
   LinearRgb Lookup(int level, const Uv& p) const {
-    const cv::Mat& image = levels_[level];
-    const float sx = static_cast<float>(image.cols) / static_cast<float>(levels_[0].cols);
-    const float sy = static_cast<float>(image.rows) / static_cast<float>(levels_[0].rows);
+    const cv::Mat& image = level == 0 ? picture_ : coarser_[level - 1];
+    const float sx = static_cast<float>(image.cols) / static_cast<float>(picture_.cols);
+    const float sy = static_cast<float>(image.rows) / static_cast<float>(picture_.rows);
     const float x = std::clamp(p.x() * sx - 0.5f, 0.0f, static_cast<float>(image.cols - 1));
     const float y = std::clamp(p.y() * sy - 0.5f, 0.0f, static_cast<float>(image.rows - 1));
     const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
     const int x1 = std::min(x0 + 1, image.cols - 1), y1 = std::min(y0 + 1, image.rows - 1);
     const float s = x - static_cast<float>(x0), t = y - static_cast<float>(y0);
     const auto& table = LinearFromSrgbByte();
-    const auto at = [&](int row, int column) {
-      const cv::Vec3b& byte = image.at<cv::Vec3b>(row, column);
-      return LinearRgb(table[byte[2]], table[byte[1]], table[byte[0]]);
+    const auto at = [&](int row, int column) -> LinearRgb {
+      if (level == 0) {
+        const auto& byte = image.at<cv::Vec3b>(row, column);
+        return {table[byte[2]], table[byte[1]], table[byte[0]]};
+      }
+      const auto& value = image.at<cv::Vec3w>(row, column);
+      return LinearRgb(value[2], value[1], value[0]) / kLinearOne;
     };
     return Mix(Mix(at(y0, x0), at(y0, x1), s), Mix(at(y1, x0), at(y1, x1), s), t);
   }
 
   float grain_;
   uint32_t seed_;
-  float texel_;  // metres
-  Uv scale_;     // texels per metre
-  std::vector<cv::Mat> levels_;
+  float texel_;                   // metres
+  Uv scale_;                      // texels per metre
+  cv::Mat picture_;               // 8-bit BGR, sRGB
+  std::vector<cv::Mat> coarser_;  // 16-bit BGR, linear; each half the size of the one before
 };
 
 }  // namespace
