@@ -32,8 +32,11 @@ void AddOptions(Arguments* a, Command* command) {
       "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z; at least six in one "
       "photo; pixels of the photo as taken, metres in the scan frame.",
       Command::Kind::kOptional);
-  command->AddOutputPath("output_path", &a->output_path,
-                         "Folder for the aligned model, alignment.json and scan_from_sparse.txt.");
+  command->AddOutputPath(
+      "output_path", &a->output_path,
+      "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
+      "quaternion w x y z, translation: --transform_path of colmap model_transformer) and "
+      "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8).");
   command->AddInputPath("image_path", &a->image_path,
                         "Folder of the photos; with it the report says how well photos and scan "
                         "intensity agree.",
@@ -211,6 +214,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   FillReport(alignment, before.rms_px, after.rms_px, &context.report);
   WriteSparseModel(model, a.output_path);
   WriteSimilarity(a.output_path + "/scan_from_sparse.txt", alignment.scan_from_sparse);
+  WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);
   context.report.AddCopy(a.output_path + "/alignment.json");
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");

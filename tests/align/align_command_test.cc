@@ -1,0 +1,190 @@
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "core/frames.h"
+#include "core/report.h"
+#include "tests/align/case_folder.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+using testing::HasSubstr;
+
+// Exit code and a part of the message on stderr.
+void ExpectFailure(const CommandResult& result, int exit_code, const std::string& text) {
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_THAT(result.err, HasSubstr(text));
+  EXPECT_EQ(result.out, "");
+  // A sentence, and a pointer to the help for an option that does not exist.
+  EXPECT_LE(std::count(result.err.begin(), result.err.end(), '\n'), 2) << result.err;
+}
+
+TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
+  const SimulatedCase& one = MakeCase();
+  const CaseFolder files(one);
+  const CommandResult result = files.Align("--report_path " + (files.folder / "report.json"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report, Json::parse(ReadBytes(files.folder / "report.json")));
+  EXPECT_EQ(report["command"], "roomtex-align");
+  EXPECT_EQ(report["trusted"], true);
+  EXPECT_EQ(report["picks"]["count"], 8);
+  EXPECT_LT(report["picks"]["rms_px"], 4.0);
+  EXPECT_GE(report["picks"]["max_px"], report["picks"]["rms_px"]);
+  EXPECT_EQ(report["picks"]["per_pick"].size(), 8u);
+  EXPECT_EQ(report["picks"]["per_pick"][0]["image_name"], one.picks[0].image_name);
+  EXPECT_GT(report["scale"]["num_features"], 50);
+  EXPECT_LT(report["scale"]["relative_mad"], 0.01);
+  EXPECT_TRUE(report["planes"].is_array());
+  EXPECT_LT(report["plane_rms_m"]["after"], report["plane_rms_m"]["before"]);
+  EXPECT_NEAR(report["reprojection_rms_px"]["before"], report["reprojection_rms_px"]["after"],
+              1e-6);
+  EXPECT_TRUE(report["agreement"].is_null());
+
+  const Similarity written = ReadSimilarity(files.folder / "aligned/scan_from_sparse.txt");
+  EXPECT_NEAR(report["scan_from_sparse"]["scale"], written.scale, 1e-12);
+  SparseModel expected = one.model;
+  TransformModel(written, &expected);
+  const SparseModel aligned = ReadSparseModel(files.folder / "aligned");
+  ASSERT_EQ(aligned.images.size(), expected.images.size());
+  ASSERT_EQ(aligned.points.size(), expected.points.size());
+  for (const auto& [id, image] : aligned.images) {
+    EXPECT_EQ(image.name, expected.images.at(id).name);
+    EXPECT_THAT(image.cam_from_model,
+                IsNearRigid(expected.images.at(id).cam_from_model, 1e-7, 1e-9));
+  }
+  for (const auto& [id, point] : aligned.points) {
+    EXPECT_THAT(point.x_in_model, IsNearMatrix(expected.points.at(id).x_in_model, 1e-9));
+  }
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
+}
+
+TEST(AlignCommand, GivesTheSameForEveryNumberOfThreadsAndForATextModel) {
+  CaseFolder files(MakeCase());
+  WriteSparseModelText(MakeCase().model, files.folder / "text");
+  ASSERT_EQ(files.Align("--num_threads 1").exit_code, 0);
+  const std::string one_thread = ReadBytes(files.folder / "aligned/images.bin");
+  ASSERT_EQ(files.Align("--num_threads 4").exit_code, 0);
+  EXPECT_EQ(ReadBytes(files.folder / "aligned/images.bin"), one_thread);
+  const std::string similarity = ReadBytes(files.folder / "aligned/scan_from_sparse.txt");
+  files.input_path = files.folder / "text";
+  ASSERT_EQ(files.Align().exit_code, 0);
+  EXPECT_EQ(ReadBytes(files.folder / "aligned/scan_from_sparse.txt"), similarity);
+}
+
+TEST(AlignCommand, WithoutRefinementKeepsThePlaneKeysEmpty) {
+  const CaseFolder files(MakeCase());
+  const CommandResult result = files.Align("--plane_constrained 0");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_TRUE(report["plane_rms_m"]["before"].is_null());
+  EXPECT_TRUE(report["plane_rms_m"]["after"].is_null());
+  EXPECT_EQ(report["planes"].size(), 0u);
+}
+
+TEST(AlignCommand, WithoutPicksSaysWhatToDo) {
+  const CaseFolder files(MakeCase());
+  const CommandResult result =
+      RunCommandLine("roomtex-align --input_path " + (files.folder / "sparse") + " --scan_path " +
+                     (files.folder / "room.rtpi") + " --output_path " + (files.folder / "aligned"));
+  ExpectFailure(result, 2, "--picks_path is missing");
+}
+
+TEST(AlignCommand, RefusesToOverwriteItsInput) {
+  CaseFolder files(MakeCase());
+  files.output_path = files.input_path;
+  const std::string before = ReadBytes(files.folder / "sparse/images.bin");
+  ExpectFailure(files.Align(), 2, "never overwritten");
+  EXPECT_EQ(ReadBytes(files.folder / "sparse/images.bin"), before);
+}
+
+TEST(AlignCommand, RefusesOptionsThatMakeNoSense) {
+  const CaseFolder files(MakeCase());
+  ExpectFailure(files.Align("--Trust.max_scale_mad -1"), 2, "--Trust.max_scale_mad");
+  ExpectFailure(files.Align("--Picks.min_gain 0.5"), 2, "--Picks.min_gain");
+  ExpectFailure(files.Align("--no_such_option 1"), 2, "no_such_option");
+}
+
+TEST(AlignCommand, RefusesMissingInputs) {
+  const CaseFolder files(MakeCase());
+  CaseFolder wrong(MakeCase());
+  wrong.picks_path = "/nonexistent.csv";
+  ExpectFailure(wrong.Align(), 3, "/nonexistent.csv");
+  wrong.input_path = "/nonexistent";
+  ExpectFailure(wrong.Align(), 3, "/nonexistent");
+  ExpectFailure(files.Align("--image_path /nonexistent"), 3, "/nonexistent");
+  ExpectFailure(files.Align("--database_path /nonexistent.db"), 3, "/nonexistent.db");
+  EXPECT_FALSE(std::filesystem::exists(files.folder / "aligned"));
+}
+
+TEST(AlignCommand, RefusesFewerThanSixPicks) {
+  SimulatedCase one = MakeCase();
+  one.picks.resize(5);
+  ExpectFailure(CaseFolder(one).Align(), 3, "holds 5 picks");
+}
+
+TEST(AlignCommand, RefusesAnImageNameThatIsNotInTheModel) {
+  SimulatedCase one = MakeCase();
+  const std::string right = one.picks[0].image_name;
+  for (Pick& pick : one.picks) pick.image_name = "x" + right;
+  ExpectFailure(CaseFolder(one).Align(), 3, "nearest name: " + right);
+}
+
+TEST(AlignCommand, RefusesAMirroredScanAndNamesTheOption) {
+  const CaseFolder files(MakeCase());
+  // The picks were made on the scan read clockwise.
+  ExpectFailure(files.Align("--azimuth counterclockwise"), 3, "--azimuth clockwise");
+  // Picks made on the mirrored scan.
+  SimulatedCase one = MakeCase();
+  for (Pick& pick : one.picks) pick.x_in_scan.x() *= -1;
+  ExpectFailure(CaseFolder(one).Align("--azimuth counterclockwise"), 3, "--azimuth clockwise");
+}
+
+TEST(AlignCommand, RefusesExchangedPicks) {
+  SimulatedCase one = MakeCase();
+  one.picks[2].x_in_img.swap(one.picks[5].x_in_img);
+  ExpectFailure(CaseFolder(one).Align(), 3, "line 4: this pick and the one on line 7");
+}
+
+TEST(AlignCommand, WritesAReportButExitsWithFourForPicksOfAnotherPhoto) {
+  SimulatedCase one = MakeCase();
+  const std::string right = one.picks[0].image_name;
+  for (Pick& pick : one.picks)
+    pick.image_name = right == "photo_001.jpg" ? "photo_002.jpg" : "photo_001.jpg";
+  const CaseFolder files(one);
+  const CommandResult result = files.Align();
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_NE(report["reason"], "");
+}
+
+TEST(AlignCommand, RefusesAPicksFileWithTheLineOfTheMistake) {
+  const CaseFolder files(MakeCase());
+  std::string text = ReadBytes(files.folder / "picks.csv");
+  text.insert(text.find('\n', text.find('\n') + 1) + 1, "photo_000.jpg,nan,1,2,3,4\n");
+  WriteBytes(files.folder / "picks.csv", text);
+  ExpectFailure(files.Align(), 3, "line 3: x is \"nan\"");
+}
+
+TEST(AlignCommand, RefusesAScanThatIsNone) {
+  CaseFolder files(MakeCase());
+  files.scan_path = files.picks_path;
+  ExpectFailure(files.Align(), 3, "picks.csv");
+}
+
+TEST(AlignCommand, HelpStartsWithAnExampleAndNamesEveryOption) {
+  const CommandResult result = RunCommandLine("roomtex-align --help");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out.rfind("Example:\n  roomtex-align --input_path", 0), 0u);
+  for (const char* option : {"--picks_path", "--azimuth", "--plane_constrained", "--scan_poses",
+                             "--image_path", "--database_path", "--Trust.max_pick_rms_px"}) {
+    EXPECT_THAT(result.out, HasSubstr(option));
+  }
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,285 @@
+#include "align/alignment.h"
+
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "tests/align/simulated_alignment.h"
+#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::string Reasons(const Alignment& alignment) {
+  std::string all;
+  for (const std::string& reason : alignment.reasons) all += reason + "\n";
+  return all;
+}
+
+Similarity SomeSimilarity() {
+  return {3.7, Eigen::Quaterniond(0.3, -0.5, 0.7, 0.2).normalized(), {12, -40, 5}};
+}
+
+TEST(Alignment, ExactPicksWithoutRefinementGiveTheTruth) {
+  SimulatedCase one = MakeCase();
+  const int photo = one.room->BestPhotoForPicks();
+  const CameraProjection projection(one.room->camera());
+  for (Pick& pick : one.picks) {
+    pick.x_in_img = projection.ImgFromCam(one.room->CamFromScan(photo) * pick.x_in_scan).value();
+  }
+  AlignmentOptions options;
+  options.plane_constrained = false;
+  const Alignment alignment = AlignCase(one, options);
+  EXPECT_THAT(alignment.reasons, IsEmpty());
+  EXPECT_LT(alignment.pick_rms_px, 1e-4);
+  // The pose is exact; the scale rests on hundreds of features with 0.7 pixels of noise.
+  EXPECT_NEAR(alignment.scan_from_sparse.scale / one.room->ScanFromSparse().scale, 1, 5e-4);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position, 2e-3);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).rotation, 1e-6);
+}
+
+TEST(Alignment, SixNoisyPicksAndTheSurfaceGiveMillimetres) {
+  for (int seed = 0; seed < 4; ++seed) {
+    const SimulatedCase& one = MakeCase(seed, 6);
+    const Alignment alignment = AlignCase(one);
+    EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+    EXPECT_TRUE(alignment.refined);
+    const PoseErrors from_picks =
+        WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse_from_picks);
+    const PoseErrors refined = WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse);
+    EXPECT_LT(from_picks.position, 0.06) << seed;
+    EXPECT_LT(refined.position, 0.002) << seed;
+    EXPECT_LT(refined.rotation, RadFromDeg(0.03)) << seed;
+    EXPECT_LT(alignment.surface_fit.rms_after, alignment.surface_fit.rms_before);
+  }
+}
+
+TEST(Alignment, DoesNotDependOnTheFrameOfTheSparseModel) {
+  const SimulatedCase& one = MakeCase();
+  const Alignment before = AlignCase(one);
+  SimulatedCase moved = one;
+  TransformModel(SomeSimilarity(), &moved.model);
+  const Alignment after = AlignCase(moved);
+  const Similarity back = after.scan_from_sparse * SomeSimilarity();
+  EXPECT_NEAR(back.scale / before.scan_from_sparse.scale, 1, 1e-6);
+  for (const auto& [id, image] : one.model.images) {
+    EXPECT_THAT(
+        CamFromScan(moved.model.images.at(id).cam_from_model, after.scan_from_sparse),
+        IsNearRigid(CamFromScan(image.cam_from_model, before.scan_from_sparse), 1e-6, 1e-5));
+  }
+}
+
+TEST(Alignment, MovesWithTheScan) {
+  const SimulatedCase& one = MakeCase();
+  const Alignment before = AlignCase(one);
+  const Rigid moved_from_scan{Eigen::Quaterniond(0.9, 0.1, -0.4, 0.2).normalized(), {4, -2, 1}};
+  SimulatedCase moved = one;
+  for (Eigen::Vector3d& point : moved.scans[0].points) point = moved_from_scan * point;
+  moved.scans[0].scan_from_station = moved_from_scan * moved.scans[0].scan_from_station;
+  for (Pick& pick : moved.picks) pick.x_in_scan = moved_from_scan * pick.x_in_scan;
+  const Alignment after = AlignCase(moved);
+  EXPECT_THAT(after.reasons, IsEmpty()) << Reasons(after);
+  // The patches are cut differently, so the refined answer agrees to a fraction of a millimetre
+  // only.
+  for (const auto& [id, image] : one.model.images) {
+    const Rigid expected =
+        CamFromScan(image.cam_from_model, before.scan_from_sparse) * moved_from_scan.Inverse();
+    EXPECT_THAT(CamFromScan(image.cam_from_model, after.scan_from_sparse),
+                IsNearRigid(expected, RadFromDeg(0.02), 1e-3));
+  }
+}
+
+TEST(Alignment, DoesNotDependOnTheOrderOfThePicks) {
+  SimulatedCase one = MakeCase();
+  const Similarity before = AlignCase(one).scan_from_sparse;
+  std::reverse(one.picks.begin(), one.picks.end());
+  const Similarity after = AlignCase(one).scan_from_sparse;
+  EXPECT_THAT(after.Matrix(), IsNearMatrix(before.Matrix(), 1e-6));
+}
+
+TEST(Alignment, LeavesOutOneBadPickAndNamesItsLine) {
+  SimulatedCase one = MakeCase();
+  const Eigen::Vector2d middle(968, 644);
+  one.picks[3].x_in_img += 70 * (middle - one.picks[3].x_in_img).normalized();
+  const Alignment alignment = AlignCase(one);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_THAT(alignment.warnings, ElementsAre(HasSubstr("The pick on line 5")));
+  EXPECT_FALSE(alignment.picks[3].used);
+  EXPECT_GT(alignment.pick_max_px, 40);
+  EXPECT_LT(alignment.pick_rms_px, 4);
+}
+
+TEST(Alignment, DoesNotTrustSixPicksWithOneFarOff) {
+  for (int bad = 0; bad < 6; ++bad) {
+    SimulatedCase one = MakeCase(0, 6);
+    const Eigen::Vector2d middle(968, 644);
+    one.picks[bad].x_in_img += 50 * (middle - one.picks[bad].x_in_img).normalized();
+    EXPECT_NE(Reasons(AlignCase(one)), "") << bad;
+  }
+}
+
+TEST(Alignment, RefusesExchangedPicksWithTheirLines) {
+  for (int other = 1; other < 6; ++other) {
+    SimulatedCase one = MakeCase(1, 6);
+    one.picks[0].x_in_img.swap(one.picks[other].x_in_img);
+    EXPECT_INPUT_ERROR(AlignCase(one),
+                       "line 2: this pick and the one on line " + std::to_string(other + 2));
+  }
+}
+
+TEST(Alignment, NeverTrustsPicksOfAnotherPhoto) {
+  const SimulatedCase& one = MakeCase();
+  const int clicked = one.room->BestPhotoForPicks();
+  for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+    if (photo == clicked) continue;
+    SimulatedCase wrong = one;
+    for (Pick& pick : wrong.picks) pick.image_name = one.room->PhotoName(photo);
+    try {
+      EXPECT_NE(Reasons(AlignCase(wrong)), "") << photo;
+    } catch (const InputError&) {
+      // Refused: fine as well.
+    }
+  }
+}
+
+TEST(Alignment, RecognisesAScanReadWithTheOtherAzimuthSense) {
+  // Picked on the mirrored scan.
+  SimulatedCase one = MakeCase();
+  for (Eigen::Vector3d& point : one.scans[0].points) point.x() *= -1;
+  SimulatedCase picked_on_it = one;
+  for (Pick& pick : picked_on_it.picks) pick.x_in_scan.x() *= -1;
+  EXPECT_INPUT_ERROR(AlignCase(picked_on_it), "--azimuth counterclockwise");
+  // Picked on the right one.
+  EXPECT_INPUT_ERROR(AlignCase(one), "--azimuth counterclockwise");
+  one.azimuth = "counterclockwise";
+  EXPECT_INPUT_ERROR(AlignCase(one), "--azimuth clockwise");
+  // A PTX scan has no azimuth sense.
+  one.scans[0].is_rtpi = false;
+  EXPECT_INPUT_ERROR(AlignCase(one), "left-handed");
+}
+
+TEST(Alignment, NeverTrustsTheScanOfAnotherRoom) {
+  SimulatedCase one = MakeCase(0);
+  SimulatedRoomOptions options = one.room->options();
+  options.random_seed = 77;
+  options.width = 6.5;
+  options.depth = 4.7;
+  one.scans = {SimulatedRoom(options).MakeScan(0)};
+  try {
+    EXPECT_NE(Reasons(AlignCase(one)), "");
+  } catch (const InputError&) {
+  }
+}
+
+TEST(Alignment, RefusesPicksInMillimetres) {
+  SimulatedCase one = MakeCase();
+  for (Pick& pick : one.picks) pick.x_in_scan *= 1000;
+  EXPECT_INPUT_ERROR(AlignCase(one), "in metres");
+}
+
+TEST(Alignment, RefusesCollinearPicks) {
+  SimulatedCase one = MakeCase();
+  // Samples along one row of the scan where a wall is; where they are in the photo does not matter.
+  const Scan& scan = one.scans[0];
+  const Eigen::Vector3d a = one.picks[0].x_in_scan, b = one.picks[1].x_in_scan;
+  for (size_t i = 0; i < one.picks.size(); ++i) one.picks[i].x_in_scan = a + 0.1 * i * (b - a);
+  SimulatedCase on_line = one;
+  for (Pick& pick : one.picks) on_line.scans[0].points.push_back(pick.x_in_scan);
+  on_line.scans[0].organised = false;  // the points above need not lie on the grid
+  on_line.scans[0].triangles = BuildScanMesh(scan, ScanMeshOptions());
+  for (int i = 0; i < 8; ++i) {
+    const int at = static_cast<int>(scan.points.size()) + i;
+    on_line.scans[0].triangles.push_back({at, at, at});
+  }
+  EXPECT_INPUT_ERROR(AlignCase(on_line), "one straight line");
+}
+
+TEST(Alignment, PicksInSeveralPhotosAreBetterThanInOne) {
+  double one_photo = 0, four_photos = 0;
+  AlignmentOptions options;
+  options.plane_constrained = false;
+  for (int seed = 0; seed < 4; ++seed) {
+    SimulatedCase one = MakeCase(seed, 6);
+    one_photo +=
+        WorstPoseErrors(*one.room, one.model, AlignCase(one, options).scan_from_sparse).position;
+    const int clicked = one.room->BestPhotoForPicks();
+    for (int step = 4; step <= 12; step += 4) {
+      const int photo = (clicked + step) % one.room->NumPhotos();
+      for (const Pick& pick : PicksOfPhoto(*one.room, photo, 6)) one.picks.push_back(pick);
+    }
+    const Alignment joint = AlignCase(one, options);
+    EXPECT_THAT(joint.reasons, IsEmpty()) << Reasons(joint);
+    EXPECT_LT(joint.pick_rms_px, 4);
+    four_photos += WorstPoseErrors(*one.room, one.model, joint.scan_from_sparse).position;
+  }
+  EXPECT_LT(four_photos, 0.7 * one_photo);
+  EXPECT_LT(four_photos / 4, 0.02);
+}
+
+TEST(Alignment, NamesABadPickInAPhotoWithFewPicks) {
+  SimulatedCase one = MakeCase();
+  const int photo = (one.room->BestPhotoForPicks() + 5) % one.room->NumPhotos();
+  const std::vector<Pick> more = PicksOfPhoto(*one.room, photo, 3, 20);
+  one.picks.insert(one.picks.end(), more.begin(), more.end());
+  one.picks.back().x_in_img += Eigen::Vector2d(80, 0);
+  const Alignment alignment = AlignCase(one);
+  EXPECT_FALSE(alignment.picks.back().used);
+  EXPECT_THAT(alignment.warnings, ElementsAre(HasSubstr("line 22")));
+}
+
+TEST(Alignment, ChoosesTheRightSolutionOfCoplanarPicks) {
+  // All picks on one wall: the reflected pose, if there is one, does not agree with the sparse
+  // points.
+  const SimulatedCase& one = MakeCase();
+  int tried = 0;
+  for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+    SimulatedCase flat = one;
+    flat.picks.clear();
+    const CameraProjection projection(one.room->camera());
+    const Rigid cam_from_scan = one.room->CamFromScan(photo);
+    // Scan samples of the wall most of which the photo sees: those whose room x is nearly 0.
+    const Rigid room_from_scan = one.room->ScanFromRoom().Inverse();
+    std::mt19937 random(photo);
+    for (int attempt = 0; attempt < 200000 && flat.picks.size() < 7; ++attempt) {
+      const Eigen::Vector3d p = one.scans[0].points[random() % one.scans[0].points.size()];
+      if (!(std::abs((room_from_scan * p).x()) < 0.01)) continue;
+      const auto x = projection.ImgFromCam(cam_from_scan * p);
+      if (!x || !projection.InImage(*x)) continue;
+      flat.picks.push_back({one.room->PhotoName(photo), *x, p, attempt + 2});
+    }
+    Eigen::Matrix2Xd places(2, flat.picks.size());
+    for (size_t i = 0; i < flat.picks.size(); ++i) places.col(i) = flat.picks[i].x_in_img;
+    if (flat.picks.size() < 7) continue;
+    const Eigen::Vector2d size = places.rowwise().maxCoeff() - places.rowwise().minCoeff();
+    if (size.minCoeff() < 500) continue;
+    ++tried;
+    AlignmentOptions options;
+    options.plane_constrained = false;
+    const Alignment alignment = AlignCase(flat, options);
+    // The picks are exact except for the 2 mm of range noise.
+    EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position, 0.1)
+        << photo;
+  }
+  EXPECT_GE(tried, 2);
+}
+
+TEST(Alignment, FewFeaturesAreNotTrusted) {
+  SimulatedCase one = MakeCase();
+  SparseImage& image = one.model.images.at(one.model.FindImage(one.picks[0].image_name)->image_id);
+  int kept = 0;
+  for (size_t i = 0; i < image.point3d_ids.size(); ++i) {
+    if (image.point3d_ids[i] == kInvalidPoint3dId || kept++ < 8) continue;
+    image.point3d_ids[i] = kInvalidPoint3dId;
+  }
+  EXPECT_THAT(Reasons(AlignCase(one)), HasSubstr("features of"));
+}
+
+}  // namespace
+}  // namespace roomtex

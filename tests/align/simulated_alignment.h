@@ -1,0 +1,76 @@
+#pragma once
+// A simulated room with its scan, sparse model and picks, ready to be aligned. Made once per
+// process.
+
+#include <memory>
+
+#include "align/alignment.h"
+#include "capture/simulated_room.h"
+
+namespace roomtex {
+
+struct SimulatedCase {
+  std::shared_ptr<const SimulatedRoom> room;
+  SparseModel model;
+  std::vector<Scan> scans;
+  std::vector<Pick> picks;
+  std::string azimuth = "clockwise";
+};
+
+inline std::vector<Pick> PicksOfPhoto(const SimulatedRoom& room, int photo, int count,
+                                      long first_line = 2) {
+  std::vector<Pick> picks;
+  for (const SimulatedPick& pick : room.MakePicks(photo, count)) {
+    picks.push_back({pick.image_name, pick.x_in_img, pick.x_in_scan,
+                     first_line + static_cast<long>(picks.size())});
+  }
+  return picks;
+}
+
+// Room `seed` with `num_picks` picks in the best photo: click noise 1.5 pixels, range noise 2 mm,
+// keypoint noise 0.7 pixels.
+inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
+  static std::map<std::pair<int, int>, SimulatedCase> cases;
+  SimulatedCase& one = cases[{seed, num_picks}];
+  if (one.room != nullptr) return one;
+  SimulatedRoomOptions options;
+  options.random_seed = seed;
+  options.num_photos = 16;
+  options.scan_columns = 800;
+  options.scan_rows = 400;
+  one.room = std::make_shared<SimulatedRoom>(options);
+  one.model = one.room->MakeSparseModel(2000, 0.7);
+  one.scans = {one.room->MakeScan(0)};
+  one.scans[0].path = "room.rtpi";
+  one.scans[0].is_rtpi = true;
+  one.picks = PicksOfPhoto(*one.room, one.room->BestPhotoForPicks(), num_picks);
+  return one;
+}
+
+inline Alignment AlignCase(SimulatedCase one, AlignmentOptions options = {}) {
+  const ReprojectionErrors errors = UpdateReprojectionErrors(&one.model);
+  const FreeSpace free_space(one.scans, 100000);
+  Progress progress(true);
+  return AlignToScan({one.model, one.scans, one.picks, "picks.csv", one.azimuth},
+                     std::max(0.3, errors.rms_px / std::sqrt(2.0)), free_space, options, &progress);
+}
+
+// Largest errors over the photos: position in metres, rotation in radians.
+struct PoseErrors {
+  double position = 0, rotation = 0;
+};
+inline PoseErrors WorstPoseErrors(const SimulatedRoom& room, const SparseModel& model,
+                                  const Similarity& scan_from_sparse) {
+  PoseErrors worst;
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const SparseImage* image = model.FindImage(room.PhotoName(photo));
+    const Rigid found = CamFromScan(image->cam_from_model, scan_from_sparse);
+    const Rigid truth = room.CamFromScan(photo);
+    worst.position = std::max(worst.position,
+                              (found.TargetOriginInSource() - truth.TargetOriginInSource()).norm());
+    worst.rotation = std::max(worst.rotation, RotationAngle(found.rotation, truth.rotation));
+  }
+  return worst;
+}
+
+}  // namespace roomtex
