@@ -160,7 +160,7 @@ TEST_F(Pcd, TellsTheLineOrByteOfWhatIsWrong) {
   const std::string points = "1 2 3 4\n2 2 3 4\n3 2 3 4\n4 2 3 4\n";
   ASSERT_EQ(Read(Header(kAscii) + points).NumMissing(), 0);
   ExpectError(Header(kAscii) + "1 2 3 4\n2 2 x 4\n3 2 3 4\n4 2 3 4\n", "line 13: is \"2 2 x 4\"");
-  ExpectError(Header(kAscii) + "1 2 3 4\n2 2 3\n3 2 3 4\n4 2 3 4\n", "line 13");
+  ExpectError(Header(kAscii) + "1 2 3 4\n2 2 3.25\n3 2 3 4\n4 2 3 4\n", "line 13");
   ExpectError(Header(kAscii) + "1 2 3 4 5\n2 2 3\n3 2 3 4\n4 2 3 4\n", "line 12");
   ExpectError(Header(kAscii) + points + "5 5 5 5\n", "line 16: is \"5 5 5 5\", expected the end");
   ExpectError(Header(kAscii) + "1 2 3 4.0000000000000000000000000000000000001\n",
