@@ -120,10 +120,10 @@ void PhotoProjector::FindFrustum() {
               Eigen::Vector3d(0, -1, high.y()).normalized(), Eigen::Vector3d::UnitZ()};
 }
 
-bool PhotoProjector::MaySee(const Eigen::Vector3d& centre, double radius) const {
-  const Eigen::Vector3d in_cam = cam_from_scan_ * centre;
-  return std::all_of(frustum_.begin(), frustum_.end(),
-                     [&](const Eigen::Vector3d& inward) { return inward.dot(in_cam) >= -radius; });
+bool PhotoProjector::MaySeeInCam(const Eigen::Vector3d& centre_in_cam, double radius) const {
+  return std::all_of(frustum_.begin(), frustum_.end(), [&](const Eigen::Vector3d& inward) {
+    return inward.dot(centre_in_cam) >= -radius;
+  });
 }
 
 }  // namespace roomtex

@@ -45,7 +45,10 @@ class PhotoProjector {
 
   void Project(const PointBlock& block, ProjectedBlock* projected) const;
   // False only if no point of the sphere can lie in the image.
-  bool MaySee(const Eigen::Vector3d& centre, double radius) const;
+  bool MaySee(const Eigen::Vector3d& centre, double radius) const {
+    return MaySeeInCam(cam_from_scan_ * centre, radius);
+  }
+  bool MaySeeInCam(const Eigen::Vector3d& centre_in_cam, double radius) const;
   // The camera's centre relative to an origin in the scan frame.
   Eigen::Vector3f CentreFrom(const Eigen::Vector3d& origin) const {
     return (centre_ - origin).cast<float>();

@@ -13,6 +13,7 @@ struct RasterVertex {
 // Every pixel whose centre lies in the triangle or on its border keeps the larger inverse depth of
 // its own and the triangle's, which is linear in the raster (perspective-correct). Parts outside
 // are cut off.
-void DrawTriangle(RasterVertex a, RasterVertex b, RasterVertex c, cv::Mat1f* inverse_depth);
+void DrawTriangle(const RasterVertex& a, const RasterVertex& b, const RasterVertex& c,
+                  cv::Mat1f* inverse_depth);
 
 }  // namespace roomtex

@@ -10,18 +10,24 @@
 namespace roomtex {
 namespace {
 
-// A triangle larger than this on the raster is split, because a lens with distortion bends its
-// sides; one with a corner that has no image is split until the parts have one or are too small to
+// A triangle with a corner that has no image is split until the parts have one or are too small to
 // matter.
-constexpr float kMaxEdgePx = 24;
 constexpr int kMaxSplits = 16;
+constexpr double kMinSize = 0.02;  // radians
+// Shadows need not be exact to the pixel.
+constexpr float kShadowEdgePx = 1e6f;
 // No lens sees nearer; keeps a surface that touches the camera from hiding everything.
 constexpr double kNearDepth = 0.01;
 
 class TriangleSplitter {
  public:
-  TriangleSplitter(const PhotoProjector& projector, float scale_x, float scale_y, cv::Mat1f* out)
-      : projector_(projector), scale_x_(scale_x), scale_y_(scale_y), out_(out) {}
+  TriangleSplitter(const PhotoProjector& projector, float scale_x, float scale_y, float max_edge_px,
+                   cv::Mat1f* out)
+      : projector_(projector),
+        scale_x_(scale_x),
+        scale_y_(scale_y),
+        max_edge_px_(max_edge_px),
+        out_(out) {}
 
   void Draw(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) const {
     const auto in_cam = [this](const Eigen::Vector3d& x_in_scan) {
@@ -48,6 +54,10 @@ class TriangleSplitter {
                   static_cast<float>(1 / corners[k].z())};
     }
     if (num_behind == 3) return;
+    const Eigen::Vector3d centre = (a + b + c) / 3;
+    const double size =
+        2 * std::sqrt(std::max({(a - centre).squaredNorm(), (b - centre).squaredNorm(),
+                                (c - centre).squaredNorm()}));
     if (num_valid == 3) {
       const float low_x = std::min({drawn[0].x, drawn[1].x, drawn[2].x});
       const float high_x = std::max({drawn[0].x, drawn[1].x, drawn[2].x});
@@ -59,11 +69,12 @@ class TriangleSplitter {
           low_y - margin > out_->rows) {
         return;
       }
-      if (margin <= kMaxEdgePx || depth >= kMaxSplits) {
+      if (margin <= max_edge_px_ || depth >= kMaxSplits) {
         DrawTriangle(drawn[0], drawn[1], drawn[2], out_);
         return;
       }
-    } else if (depth >= kMaxSplits) {
+    } else if (depth >= kMaxSplits || size < kMinSize * centre.norm() ||
+               !projector_.MaySeeInCam(centre, size)) {
       return;
     }
     SplitLongestEdge(a, b, c, depth);
@@ -84,7 +95,7 @@ class TriangleSplitter {
   }
 
   const PhotoProjector& projector_;
-  float scale_x_, scale_y_;
+  float scale_x_, scale_y_, max_edge_px_;
   cv::Mat1f* out_;
 };
 
@@ -124,8 +135,9 @@ DepthMap::DepthMap(int photo_width, int photo_height, double scale) {
   scale_y_ = static_cast<float>(height) / static_cast<float>(photo_height);
 }
 
-void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles) {
-  const TriangleSplitter splitter(projector, scale_x_, scale_y_, &inverse_depth_);
+void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
+                    float max_edge_px) {
+  const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &inverse_depth_);
   const auto width = static_cast<float>(inverse_depth_.cols);
   const auto height = static_cast<float>(inverse_depth_.rows);
   ProjectedBlock projected;
@@ -146,7 +158,7 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
         const float low_x = std::min({a.x, b.x, c.x}), high_x = std::max({a.x, b.x, c.x});
         const float low_y = std::min({a.y, b.y, c.y}), high_y = std::max({a.y, b.y, c.y});
         const float size = std::max(high_x - low_x, high_y - low_y);
-        if (size <= kMaxEdgePx) {
+        if (size <= max_edge_px) {
           if (high_x < 0 || high_y < 0 || low_x > width || low_y > height) continue;
           DrawTriangle(a, b, c, &inverse_depth_);
           continue;
@@ -207,7 +219,8 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
   if (options.shadows) {
     DepthMap shadow(projector.width(), projector.height(),
                     MapScale(projector, angular_spacing, options));
-    for (const OccluderTiles& tiles : occluders) shadow.Draw(projector, tiles.shadows);
+    for (const OccluderTiles& tiles : occluders)
+      shadow.Draw(projector, tiles.shadows, kShadowEdgePx);
     shadow_ = shadow.inverse_depth();
   }
   const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();

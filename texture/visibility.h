@@ -41,8 +41,10 @@ class DepthMap {
   // scale: pixels of the map per pixel of the photo, <= 1.
   DepthMap(int photo_width, int photo_height, double scale);
 
-  // Draws the tiles that the photo may see.
-  void Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles);
+  // Draws the tiles that the photo may see. Triangles longer than max_edge_px (map pixels) are
+  // split, because a lens bends their sides.
+  void Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
+            float max_edge_px = 24);
 
   const cv::Mat1f& inverse_depth() const { return inverse_depth_; }
   cv::Mat1f& inverse_depth() { return inverse_depth_; }

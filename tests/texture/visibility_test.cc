@@ -48,6 +48,18 @@ TEST(Rasterizer, LeavesNoCrackBetweenTriangles) {
   EXPECT_EQ(cv::countNonZero(map), 50 * 50);
 }
 
+TEST(Rasterizer, CopesWithCornersFarOutsideAndFlatTriangles) {
+  cv::Mat1f map(10, 10, 0.0f);
+  DrawTriangle({-3e9f, -3e9f, 1}, {3e9f, -3e9f, 1}, {0, 3e9f, 1}, &map);
+  EXPECT_EQ(cv::countNonZero(map), 100);
+  map.setTo(0);
+  DrawTriangle({2e9f, 1, 1}, {3e9f, 2, 1}, {2e9f, 3, 1}, &map);
+  DrawTriangle({1, -2e9f, 1}, {2, -3e9f, 1}, {3, -2e9f, 1}, &map);
+  DrawTriangle({5, 5.2f, 1}, {5, 5.2f, 1}, {5, 5.2f, 1}, &map);
+  DrawTriangle({-5, 5.2f, 1}, {50, 5.2f, 1}, {20, 5.2f, 1}, &map);
+  EXPECT_LE(cv::countNonZero(map), 10);
+}
+
 TEST(Rasterizer, NearerSurfaceWinsInAnyOrder) {
   cv::Mat1f first(8, 8, 0.0f), second(8, 8, 0.0f);
   const RasterVertex near_corners[3] = {{0, 0, 2}, {8, 0, 2}, {0, 8, 2}};
