@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
@@ -163,6 +164,12 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
   }
 }
 
+int ColmapProgram::VersionNumber() const {
+  int major = 0, minor = 0;
+  if (std::sscanf(version_.c_str(), "COLMAP %d.%d", &major, &minor) != 2) return 0;
+  return 100 * major + minor;
+}
+
 const std::set<std::string>& ColmapProgram::Options(const std::string& command) {
   const auto found = options_of_command_.find(command);
   if (found != options_of_command_.end()) return found->second;
@@ -250,7 +257,12 @@ SignalGuard::SignalGuard() {
   struct sigaction action {};
   action.sa_handler = OnSignal;
   sigemptyset(&action.sa_mask);
-  for (int i = 0; i < 3; ++i) sigaction(kSignals[i], &action, &previous_actions[i]);
+  for (int i = 0; i < 3; ++i) {
+    sigaction(kSignals[i], nullptr, &previous_actions[i]);
+    // Who started us under nohup or in the background does not want us to stop.
+    if (previous_actions[i].sa_handler == SIG_IGN) continue;
+    sigaction(kSignals[i], &action, nullptr);
+  }
 }
 
 SignalGuard::~SignalGuard() {

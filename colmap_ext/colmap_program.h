@@ -28,6 +28,8 @@ class ColmapProgram {
 
   const std::string& path() const { return path_; }
   const std::string& version() const { return version_; }  // "COLMAP 3.8 (Commit ...)"
+  // Major * 100 + minor, e.g. 308; 0 if the version cannot be read.
+  int VersionNumber() const;
   const std::string& log_path() const { return log_path_; }
 
   // The options `colmap COMMAND -h` lists, with their dashes. Throws InputError if it has no such

@@ -422,12 +422,44 @@ std::vector<DatabasePair> Database::ReadPairs(int min_matches) const {
 
 namespace {
 
-void CopyRows(SQLite::Database* from, SQLite::Database* to, const std::string& quoted_table) {
-  SQLite::Statement read(*from, "SELECT * FROM " + quoted_table);
-  const int num_columns = read.getColumnCount();
-  std::string places;
-  for (int i = 0; i < num_columns; ++i) places += i == 0 ? "?" : ", ?";
-  SQLite::Statement insert(*to, "INSERT INTO " + quoted_table + " VALUES (" + places + ")");
+// Tables as COLMAP up to 3.9 expects them (its documentation of the database format).
+constexpr const char* kTables39[] = {
+    "CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER NOT "
+    "NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, params BLOB, prior_focal_length "
+    "INTEGER "
+    "NOT NULL)",
+    "CREATE TABLE images (image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, name TEXT NOT NULL "
+    "UNIQUE, camera_id INTEGER NOT NULL, prior_qw REAL, prior_qx REAL, prior_qy REAL, prior_qz "
+    "REAL, prior_tx REAL, prior_ty REAL, prior_tz REAL)",
+    "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols "
+    "INTEGER NOT NULL, data BLOB)",
+    "CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT "
+    "NULL, "
+    "cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB, qvec BLOB, "
+    "tvec BLOB)"};
+
+std::vector<std::string> Columns(const SQLite::Database& sqlite, const std::string& table) {
+  std::vector<std::string> names;
+  SQLite::Statement statement(sqlite, "SELECT name FROM pragma_table_info('" + table + "')");
+  while (statement.executeStep()) names.push_back(statement.getColumn(0).getString());
+  return names;
+}
+
+// Copies the columns that both tables have.
+void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const std::string& table) {
+  const std::vector<std::string> known = Columns(to, table);
+  std::string names, places;
+  int num_columns = 0;
+  for (const std::string& column : Columns(from, table)) {
+    if (std::find(known.begin(), known.end(), column) == known.end()) continue;
+    names += (num_columns == 0 ? "\"" : ", \"") + column + "\"";
+    places += num_columns == 0 ? "?" : ", ?";
+    ++num_columns;
+  }
+  if (num_columns == 0) return;
+  SQLite::Statement read(from, "SELECT " + names + " FROM \"" + table + "\"");
+  SQLite::Statement insert(to,
+                           "INSERT INTO \"" + table + "\" (" + names + ") VALUES (" + places + ")");
   while (read.executeStep()) {
     for (int i = 0; i < num_columns; ++i) {
       const SQLite::Column value = read.getColumn(i);
@@ -448,27 +480,37 @@ void CopyRows(SQLite::Database* from, SQLite::Database* to, const std::string& q
   }
 }
 
+// Makes the tables and indices of `from` in `to`.
+void CopySchema(const SQLite::Database& from, SQLite::Database* to) {
+  SQLite::Statement objects(from,
+                            "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL AND name NOT LIKE "
+                            "'sqlite_%' AND type IN ('table', 'index') ORDER BY type = 'index'");
+  while (objects.executeStep()) to->exec(objects.getColumn(0).getString());
+}
+
 }  // namespace
 
-void Database::CopyForMapper(const std::string& path) const {
-  const std::set<std::string> left_empty = {"descriptors", "matches"};
+void Database::CopyForMapper(const std::string& path, Schema schema) const {
   impl_->Guarded([&] {
+    const SQLite::Database& from = *impl_->sqlite;
     SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     copy.exec("PRAGMA journal_mode = OFF");
     copy.exec("PRAGMA synchronous = OFF");
     SQLite::Transaction transaction(copy);
-    SQLite::Statement objects(*impl_->sqlite,
-                              "SELECT type, name, sql FROM sqlite_master WHERE sql IS NOT NULL AND "
-                              "name NOT LIKE 'sqlite_%' AND type IN ('table', 'index') "
-                              "ORDER BY type = 'index'");
-    while (objects.executeStep()) {
-      const std::string name = objects.getColumn(1).getString();
-      copy.exec(objects.getColumn(2).getString());
-      if (objects.getColumn(0).getString() != "table" || left_empty.count(name) > 0) continue;
-      CopyRows(impl_->sqlite.get(), &copy, "\"" + name + "\"");
+    if (schema == Schema::kColmap39) {
+      for (const char* table : kTables39) copy.exec(table);
+    } else {
+      CopySchema(from, &copy);
+      SQLite::Statement version(from, "PRAGMA user_version");
+      version.executeStep();
+      copy.exec("PRAGMA user_version = " + version.getColumn(0).getString());
     }
-    const int64_t version = impl_->sqlite->execAndGet("PRAGMA user_version").getInt64();
-    copy.exec("PRAGMA user_version = " + std::to_string(version));
+    std::vector<std::string> tables;
+    SQLite::Statement statement(copy,
+                                "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT "
+                                "LIKE 'sqlite_%' AND name NOT IN ('descriptors', 'matches')");
+    while (statement.executeStep()) tables.push_back(statement.getColumn(0).getString());
+    for (const std::string& table : tables) CopyRows(from, copy, table);
     transaction.commit();
   });
 }

@@ -55,10 +55,12 @@ class Database {
   // longer holds are left out, as COLMAP does.
   std::vector<DatabasePair> ReadPairs(int min_matches) const;
 
-  // A database of the same schema at `path` (which must not exist) with everything that COLMAP's
-  // mapper reads, i.e. without the rows of descriptors and raw matches, most of the bytes. COLMAP
-  // opens databases for writing; it gets this one instead of the user's.
-  void CopyForMapper(const std::string& path) const;
+  // Writes at `path` (which must not exist) a database with everything that COLMAP's mapper reads,
+  // i.e. without the rows of descriptors and raw matches, most of the bytes. COLMAP opens databases
+  // for writing; it gets this one instead of the user's. kColmap39: in the tables that COLMAP up to
+  // 3.9 reads, whatever the version of this database.
+  enum class Schema { kAsIs, kColmap39 };
+  void CopyForMapper(const std::string& path, Schema schema) const;
 
   const std::string& path() const;
 

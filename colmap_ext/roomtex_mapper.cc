@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "colmap_ext/mapper_run.h"
 #include "colmap_ext/model_output.h"
@@ -202,11 +203,13 @@ bool Better(const MapperResult& a, const MapperResult& b) {
 
 [[noreturn]] void ThrowNothingWorked(const std::string& database_path, const Json& trials) {
   std::string reasons;
+  std::set<std::string> told;
   constexpr size_t kNumShown = 3;
   for (size_t i = 0; i < trials.size() && i < kNumShown; ++i) {
+    const std::string outcome = trials[i]["outcome"].get<std::string>();
     reasons += "; " + trials[i]["pair"][0].get<std::string>() + " and " +
                trials[i]["pair"][1].get<std::string>() + ": " +
-               trials[i]["outcome"].get<std::string>();
+               (told.insert(outcome).second ? outcome : "the same");
   }
   if (trials.empty()) {
     reasons = "; no pair has --Init.min_num_inliers verified matches";
@@ -292,7 +295,9 @@ void MapPhotos(const Options& options, const Command::Context& context) {
   }
   const std::string database_copy = scratch / "database.db";
   MapperRun mapper(&colmap, database_copy, options.image_path, scratch.path(), mapper_options);
-  database.CopyForMapper(database_copy);
+  const int version = colmap.VersionNumber();
+  database.CopyForMapper(database_copy, version > 0 && version < 310 ? Database::Schema::kColmap39
+                                                                     : Database::Schema::kAsIs);
 
   Json trials = Json::array();
   context.progress.Stage("initialise");
@@ -327,10 +332,11 @@ int main(int argc, char** argv) {
       "before walls, where two photos alone have two solutions.",
       "roomtex-mapper --database_path database.db --image_path photos --output_path sparse");
   AddOptions(&options, &command);
-  try {
-    return command.Run(argc, argv,
-                       [&](const Command::Context& context) { MapPhotos(options, context); });
-  } catch (const Interrupted& interrupted) {
-    DieBySignal(interrupted.signal);
-  }
+  return command.Run(argc, argv, [&](const Command::Context& context) {
+    try {
+      MapPhotos(options, context);
+    } catch (const Interrupted& interrupted) {
+      DieBySignal(interrupted.signal);  // everything on the way is tidied up by now
+    }
+  });
 }
