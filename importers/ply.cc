@@ -1,6 +1,7 @@
-// An own reader: of the well-known ones, PCL's (1.13) included, none answers every malformed file
-// of tests/importers/ply_test.cc: they hang, read beyond their buffers or give wrong points without
-// a word.
+// An own reader, because pcl::PLYReader (1.13) does not tell bad files from good ones. Measured on
+// 96 damaged files (cut off, wrong counts, indices and types, trailing bytes; ascii and both byte
+// orders): it refused 72, ended the program on 9 (negative counts, and counts of a billion under a
+// limit of 6 GB) and read 15 as good, some with faces that name vertices the mesh does not have.
 
 #include "importers/ply.h"
 
@@ -322,6 +323,12 @@ class PlyParser {
 
   void ReadPolygon(const PlyProperty& property) {
     const double count = ListCount(property);
+    if (count < 3) {  // no program writes these; they are what shifted data look like
+      throw InputError(
+          file_.path(), source_->Position(),
+          "a face has " + std::to_string(static_cast<int>(count)) + " corners, expected at least 3",
+          kDamaged);
+    }
     Triangle fan = {0, 0, 0};
     for (double k = 0; k < count; ++k) {
       const double index = source_->Next(property.type);

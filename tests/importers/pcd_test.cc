@@ -195,6 +195,25 @@ TEST_F(Pcd, TellsTheLineOrByteOfWhatIsWrong) {
               "no measured sample");
 }
 
+// pcl::PCDReader takes such data for more header lines; found by tests/fuzz/scan_reader_fuzz.cc.
+TEST_F(Pcd, DataThatSpellHeaderLinesAreData) {
+  for (const std::string words : {"COLUMNS @\n", "WIDTH 900000000\n",
+                                  "FIELDS x\nSIZE 8\nCOUNT 99999\n", "DATA binary_compressed\n"}) {
+    std::string data(64, '\x40');
+    data.replace(0, words.size(), words);
+    const Scan scan =
+        Read(Header("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 4\nDATA binary\n") + data);
+    ASSERT_EQ(scan.num_columns, 2) << words;
+    ASSERT_EQ(scan.num_rows, 2) << words;
+    const double value = 3.0039215087890625;  // the float of four bytes 0x40
+    EXPECT_THAT(scan.points[3], IsNearMatrix(Eigen::Vector3d(value, value, value), 0));
+    EXPECT_EQ(scan.intensity[3], static_cast<float>(value));
+    float first = 0;
+    std::memcpy(&first, data.data(), sizeof(first));
+    EXPECT_EQ(scan.points[0].x(), first);
+  }
+}
+
 TEST_F(Pcd, BinaryFilesAreRefusedWhereverTheyAreCutOff) {
   const auto cloud = PclCloud(MakeScan());
   pcl::PCDWriter writer;

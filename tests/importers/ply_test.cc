@@ -204,6 +204,8 @@ TEST_F(Ply, TellsTheLineOrByteOfWhatIsWrong) {
   ExpectError(with(0, "\n0.5 3 0 2 3", "\n0.5 2000000000 0 2 3"),
               "line 22: a list of 2000000000 items");
   ExpectError(with(0, "1 1.25 1 9", "1 one 1 9"), "line 19");
+  ExpectError(with(0, "\n0.5 3 0 2 3", "\n0.5 2 0 2"), "line 22: a face has 2 corners");
+  ExpectError(with(0, "\n0.5 3 0 2 3", "\n0.5 0"), "line 22: a face has 0 corners");
   const std::string header = HeaderOf("binary_little_endian");
   std::string bytes = header + BinaryBody(false);
   const size_t face = header.size() + 4 * 19;
