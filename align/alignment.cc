@@ -301,27 +301,25 @@ void FitAllPicks(const AlignmentInput& input, double sigma_px, const AlignmentOp
   }
 }
 
-// A refinement that leaves the basin of the clicks answers another question than the one the user
-// asked.
-void RefineOnSurface(const AlignmentInput& input, double pick_sigma_px, double sigma_px,
-                     const ScanPatches& surface, const AlignmentOptions& options,
-                     Alignment* result) {
-  const std::vector<SurfacePoint> points =
-      FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
+void FitOnSurface(const AlignmentInput& input, double pick_sigma_px,
+                  const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                  const AlignmentOptions& options, Alignment* result) {
   const double gate = std::clamp(5 * result->position_sigma, 0.1, options.fit.max_gate);
-  const SimilarityFit fit =
-      FitToSurface(input.model, points, surface, input.picks, UsedPicks(*result), pick_sigma_px,
-                   gate, result->scan_from_sparse, options.fit);
-  if (!fit.converged) {
+  result->surface_fit = FitToSurface(input.model, points, surface, input.picks, UsedPicks(*result),
+                                     pick_sigma_px, gate, result->scan_from_sparse, options.fit);
+  if (!result->surface_fit.converged) {
     result->reasons.push_back(
-        "The alignment could not be refined on the scan's surface: too few of the " +
+        "The sparse points do not settle on the scan's surface: too few of the " +
         std::to_string(points.size()) +
-        " sparse points are near it, or they pull the scale away from what the picks give.");
+        " are near it, or they pull the scale away from what the picks give.");
     return;
   }
-  result->surface_fit = fit;
+  SetResiduals(input, result->surface_fit.scan_from_sparse, &PickOutcome::refined_residual_px,
+               result);
+  result->refined_pick_rms_px = PickRms(*result, &PickOutcome::refined_residual_px);
+  if (!options.plane_constrained) return;
   result->refined = true;
-  result->scan_from_sparse = fit.scan_from_sparse;
+  result->scan_from_sparse = result->surface_fit.scan_from_sparse;
 }
 
 // The refined pose is far more exact than the clicks: a used pick that is off shows there even
@@ -371,7 +369,9 @@ void JudgePicks(const AlignmentInput& input, const AlignmentOptions& options, Al
         "The picks leave the camera's position open by " + Number(result->position_sigma, 2) +
         " m (one standard deviation). Spread them more over the photo and in depth.");
   }
-  if (result->refined && result->reasons.empty()) JudgePicksAgainstSurface(limit, result);
+  if (result->surface_fit.converged && result->reasons.empty()) {
+    JudgePicksAgainstSurface(limit, result);
+  }
 }
 
 void JudgeScale(const TrustOptions& trust, Alignment* result) {
@@ -456,12 +456,10 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
     result.pick_max_px = std::max(result.pick_max_px, outcome.residual_px);
   }
 
-  if (options.plane_constrained) {
-    progress->Stage("surface refinement");
-    RefineOnSurface(input, pick_sigma_px, sigma_px, surface, options, &result);
-  }
-  SetResiduals(input, result.scan_from_sparse, &PickOutcome::refined_residual_px, &result);
-  result.refined_pick_rms_px = PickRms(result, &PickOutcome::refined_residual_px);
+  progress->Stage("surface refinement");
+  const std::vector<SurfacePoint> points =
+      FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
+  FitOnSurface(input, pick_sigma_px, points, surface, options, &result);
 
   progress->Stage("trust");
   TrustOptions trust = options.trust;
@@ -471,8 +469,7 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
         std::max(trust.surface_tolerance, std::min(2 * result.position_sigma, 0.2));
   }
   result.placement =
-      CheckPlacement(input.model, FindSurfacePoints(input.model, options.fit.min_track, sigma_px),
-                     result.scan_from_sparse, surface, free_space, trust);
+      CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
   JudgePicks(input, options, &result);
   JudgeScale(options.trust, &result);
   JudgePlacement(trust, &result);

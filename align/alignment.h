@@ -37,7 +37,8 @@ struct PickOutcome {
   Pick pick;
   bool used = true;
   double residual_px = 0;  // under the solution from the picks alone
-  double refined_residual_px = std::numeric_limits<double>::quiet_NaN();  // under scan_from_sparse
+  // Where the sparse points lie on the surface; NaN if they could not be brought there.
+  double refined_residual_px = std::numeric_limits<double>::quiet_NaN();
   double leave_one_out_px = std::numeric_limits<double>::quiet_NaN();  // NaN where it was not tried
 };
 
@@ -47,11 +48,13 @@ struct Alignment {
   std::string clicked_image;               // the photo whose picks gave the pose
   double position_sigma = 0;               // metres, of its camera by the picks alone
   std::vector<PickOutcome> picks;
-  double pick_rms_px = 0;          // of the used picks, by the picks alone
-  double pick_max_px = 0;          // of all picks, by the picks alone
-  double refined_pick_rms_px = 0;  // of the used picks, under the answer
+  double pick_rms_px = 0;  // of the used picks, by the picks alone
+  double pick_max_px = 0;  // of all picks, by the picks alone
+  double refined_pick_rms_px = std::numeric_limits<double>::quiet_NaN();  // of the used picks
   ScaleEstimate scale;
-  SimilarityFit surface_fit;  // valid if refined
+  // The refinement on the surface. It is made in any case, as a check of the picks; `refined` says
+  // whether it is the answer.
+  SimilarityFit surface_fit;
   bool refined = false;
   Placement placement;
   std::vector<std::string> warnings;

@@ -16,7 +16,7 @@ struct PickReviewOptions {
   // A pick is left out as bad when residuals as large as its own would come by chance less often
   // than this, given the other picks (F test, corrected for the number of picks). Larger = leaves
   // out more easily.
-  double max_chance = 1e-3;
+  double max_chance = 0.01;
   // Pixels; a pick whose distance from the pose of the other picks is smaller than this is never
   // left out.
   double min_bad_pick_px = 4.0;

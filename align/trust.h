@@ -19,7 +19,7 @@ struct TrustOptions {
   double max_pick_rms_px = 0;
   // Spread of the scale from feature to feature (relative median absolute deviation). Larger = more
   // tolerant.
-  double max_scale_mad = 0.10;
+  double max_scale_mad = 0.05;
   int min_scale_features = 10;
   // Metres; a sparse point this near to the scan's surface is on it.
   double surface_tolerance = 0.05;
