@@ -252,6 +252,21 @@ TEST_F(MapperCommand, HandsMapperOptionsOn) {
   EXPECT_LT(strict["num_points"], usual["num_points"]);
 }
 
+TEST_F(MapperCommand, RefinesIntrinsicsOnlyWhenAsked) {
+  SimulatedViewsOptions options = RoomOptions(6);
+  options.distortion = false;
+  views_ = SimulateViews(options);
+  const double true_f = views_.cameras.at(1).params[0];
+  SimulatedViews wrong = views_;  // the database believes a focal length 1 % off
+  wrong.cameras.at(1).params[0] = wrong.cameras.at(1).params[1] = 1.01 * true_f;
+  WriteSimulatedDatabase(wrong, folder_.path());
+  ASSERT_EQ(Run().exit_code, 0);
+  EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], 1.01 * true_f);
+  ASSERT_EQ(Run("--refine_intrinsics 1").exit_code, 0);
+  EXPECT_NEAR(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], true_f,
+              0.003 * true_f);
+}
+
 TEST_F(MapperCommand, GivesTheSameTwice) {
   Simulate(RoomOptions(5));
   ASSERT_EQ(Run("--num_threads 1").exit_code, 0);
