@@ -25,11 +25,10 @@ run_colmap() {
 
 run roomtex-simulate --output_path capture --num_photos 20 --photo_width 1200 --photo_height 800 --shading 1 \
   --scan_columns 1600 --scan_rows 600
-read -r model params <capture/camera.txt
+read -ra camera <capture/camera_options.txt
 
 run_colmap colmap feature_extractor --database_path database.db --image_path capture/photos \
-  --ImageReader.single_camera 1 --ImageReader.camera_model "$model" --ImageReader.camera_params "$params" \
-  --SiftExtraction.use_gpu 0
+  "${camera[@]}" --SiftExtraction.use_gpu 0
 run_colmap colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0
 
 run roomtex-mapper --database_path database.db --image_path capture/photos --output_path sparse
@@ -37,7 +36,7 @@ run roomtex-align --input_path sparse/0 --scan_path capture/scan.rtpi --picks_pa
   --image_path capture/photos --output_path aligned
 run roomtex-texture --input_path aligned --image_path capture/photos --scan_path capture/scan.rtpi \
   --output_path textured
-run roomtex-evaluate --capture_path capture --aligned_path aligned --textured_path textured
+run roomtex-evaluate --truth_path capture/truth --input_path aligned --ply_path textured/model.ply
 
 cat <<EOF
 

@@ -1,5 +1,5 @@
-// The real kitchen (a neighbour of the checkout, never part of it) through the commands, as a user types
-// them. Label `data`: says why it is skipped when the kitchen is not there.
+// The real kitchen (a neighbour of the checkout, never part of it) through the commands, as a user
+// types them. Label `data`: says why it is skipped when the kitchen is not there.
 
 #include <cmath>
 #include <filesystem>
@@ -67,7 +67,9 @@ class Kitchen : public testing::Test {
     if (!std::filesystem::exists(kKitchen)) return;
     folder_ = new TempFolder;
     const std::string images = std::string(kKitchen) + "/images";
-    ExtractAndMatch(*folder_ / "database.db", images, "SIMPLE_RADIAL", "525.9,320,240,-0.025");
+    ExtractAndMatch(*folder_ / "database.db", images,
+                    "--ImageReader.single_camera 1 --ImageReader.camera_model SIMPLE_RADIAL "
+                    "--ImageReader.camera_params 525.9,320,240,-0.025");
     mapper_ = RunCommandLine("roomtex-mapper --database_path " + (*folder_ / "database.db") +
                              " --image_path " + images + " --output_path " + (*folder_ / "sparse") +
                              " --report_path " + (*folder_ / "mapper.json"));
