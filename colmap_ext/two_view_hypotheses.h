@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/seed_bundle.h"
 #include "colmap_ext/ransac.h"
+#include "colmap_ext/seed_bundle.h"
 #include "colmap_ext/view_rays.h"
 #include "core/similarity.h"
 
