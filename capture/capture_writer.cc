@@ -211,7 +211,7 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   std::ostringstream text;
   text << "A simulated room: " << options.num_photos << " photos and " << options.num_stations
        << (options.num_stations == 1 ? " range scan" : " range scans")
-       << ", made by roomtex-simulate --random_seed " << options.random_seed << "\n\n"
+       << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
        << "photos/             the photos"
        << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
        << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"

@@ -44,19 +44,30 @@ float ValueNoise(const Uv& p, uint32_t seed) {
   return 2 * (top + t * (bottom - top)) - 1;
 }
 
-// Octaves of value noise with lattice spacings coarsest, coarsest / 2 ... down to the footprint,
-// the amplitude times `gain` from one to the next. An octave fades out where the footprint averages
-// over it.
-float Fractal(const Uv& p, float coarsest, float footprint, float gain, uint32_t seed) {
-  // Every octave is turned, so that the lattices do not line up (cosine and sine of 37 degrees).
-  constexpr float kCos = 0.7986355f, kSin = 0.6018150f;
+// How much of value noise with lattice spacing `spacing` is left of its mean over a box: fitted to
+// the regression of the mean on the value, and cut where little is left. one_way: the noise is
+// stretched so much along one axis that the box averages along the other one only.
+float KeptOfOctave(float footprint, float spacing, bool one_way) {
+  const float ratio2 = footprint * footprint / (spacing * spacing);
+  if (one_way) return std::max(0.0f, (1 / (1 + 0.138f * ratio2) - 0.25f) / 0.75f);
+  const float a = 0.3f * ratio2;
+  return std::max(0.0f, (1 / (1 + a + 0.13f * a * a) - 0.1f) / 0.9f);
+}
+
+// Octaves of value noise with lattice spacings coarsest, coarsest / 2 ..., the amplitude times
+// `gain` from one to the next, averaged over the footprint.
+float Fractal(const Uv& p, float coarsest, float footprint, float gain, uint32_t seed,
+              bool one_way = false) {
+  // Every octave is turned, so that the lattices do not line up (cosine and sine of 37 degrees);
+  // one that is stretched stays and is only moved.
+  const float cos = one_way ? 1.0f : 0.7986355f, sin = one_way ? 0.0f : 0.6018150f;
   Uv q = p;
   float sum = 0, amplitude = 1, spacing = coarsest;
   for (uint32_t octave = 0; octave < 14; ++octave) {
-    const float kept = std::clamp(spacing / footprint - 0.5f, 0.0f, 1.0f);
+    const float kept = KeptOfOctave(footprint, spacing, one_way);
     if (kept <= 0) break;
     sum += amplitude * kept * ValueNoise(q / spacing, seed + octave * 101u);
-    q = Uv(kCos * q.x() - kSin * q.y() + 3.1f, kSin * q.x() + kCos * q.y() + 7.7f);
+    q = Uv(cos * q.x() - sin * q.y() + 3.1f, sin * q.x() + cos * q.y() + 7.7f);
     amplitude *= gain;
     spacing *= 0.5f;
   }
@@ -153,7 +164,7 @@ class Wallpaper : public RoomTexture {
       if (std::abs(along) >= 1) continue;
       const float across = -leaf.sin * d.x() + leaf.cos * d.y();
       const float half_width = leaf.slender * leaf.half_length * (1 - along * along);
-      const float cover = std::clamp(0.5f + (half_width - std::abs(across)) / soft, 0.0f, 1.0f);
+      const float cover = Line(across, half_width, soft);
       if (cover <= 0) continue;
       const float rib = 0.35f * Line(across, 0.04f * leaf.half_length, soft);
       *color = Mix(*color, leaf.color * (1 - rib + 0.15f * along), cover);
@@ -203,9 +214,9 @@ float Grain(const Uv& uv, float band, uint32_t seed) {
   const float bend = 0.02f * ValueNoise(Uv(uv.x() / 0.7f, uv.y() / 0.15f), seed);
   const float across = uv.y() + bend;
   const Uv stretched(uv.x() / 25, across);
-  const float fibres = Fractal(stretched, 0.012f, band, 0.9f, seed + 1);
+  const float fibres = Fractal(stretched, 0.012f, band, 0.9f, seed + 1, true);
   const float year =
-      Fractal(Uv(uv.x() / 12, across), 0.05f, std::max(band, 0.012f), 0.8f, seed + 2);
+      Fractal(Uv(uv.x() / 12, across), 0.05f, std::max(band, 0.012f), 0.8f, seed + 2, true);
   const float pores = Fractal(Uv(uv.x() / 3, across), 0.02f, band, 0.9f, seed + 3);
   return 1 + 0.12f * fibres + 0.16f * year + 0.07f * pores;
 }
@@ -221,7 +232,9 @@ float Knots(const Uv& uv, float band, uint32_t seed) {
   const float size = 0.006f + 0.009f * UnitOf(hash * 277803737u + 5);
   const float rings =
       0.25f * std::cos(d.norm() / size * 5.0f) * SmoothStep(3 * size, size, d.norm());
-  return SmoothStep(size + band, size * 0.4f, d.norm()) * 0.55f +
+  // Wider but as much paler under a wide footprint.
+  const float paler = size * size / ((size + 0.4f * band) * (size + 0.4f * band));
+  return SmoothStep(size + band, size * 0.4f, d.norm()) * 0.55f * paler +
          (band < size ? rings : 0.0f) * SmoothStep(0, size, d.norm());
 }
 
@@ -283,8 +296,8 @@ class Plaid : public RoomTexture {
   LinearRgb Albedo(const Uv& uv, float footprint) const override {
     const float band = Band(footprint);
     const LinearRgb warp = Stripe(0, uv.x(), band), weft = Stripe(1, uv.y(), band);
-    const float slub = Fractal(Uv(uv.x(), uv.y() / 6), 0.012f, band, 0.9f, seed_ + 1) +
-                       Fractal(Uv(uv.x() / 6, uv.y()), 0.012f, band, 0.9f, seed_ + 2);
+    const float slub = Fractal(Uv(uv.x(), uv.y() / 6), 0.012f, band, 0.9f, seed_ + 1, true) +
+                       Fractal(Uv(uv.x() / 6, uv.y()), 0.012f, band, 0.9f, seed_ + 2, true);
     const float worn = Fractal(uv, 0.25f, std::max(band, 0.03f), 0.8f, seed_ + 3);
     return Mix(warp, weft, 0.5f) * std::clamp(1 + 0.1f * slub + 0.08f * worn, 0.2f, 1.6f);
   }
@@ -366,8 +379,9 @@ class Picture : public RoomTexture {
   LinearRgb Albedo(const Uv& uv, float footprint) const override {
     const float band = Band(footprint);
     const Uv p = uv.cwiseProduct(scale_);
-    const float level =
-        std::clamp(std::log2(band / texel_), 0.0f, static_cast<float>(coarser_.size()) - 0.001f);
+    // Linear interpolation between texels of width t blurs like a box of width 1.73 t.
+    const float level = std::clamp(std::log2(band / texel_) - 0.79f, 0.0f,
+                                   static_cast<float>(coarser_.size()) - 0.001f);
     const int fine = static_cast<int>(level);
     LinearRgb color = Lookup(fine, p);
     if (fine < static_cast<int>(coarser_.size())) {
