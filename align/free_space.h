@@ -18,6 +18,9 @@ class FreeSpace {
   // Takes every k-th column and row so that at most max_samples samples remain.
   FreeSpace(const std::vector<Scan>& scans, int max_samples);
 
+  // False if all scans are meshes without a grid: where they were taken from is not known.
+  bool HasStations() const { return !stations_.empty(); }
+
   enum class Place {
     kUnknown,  // no scanner has a surface in that direction, or there is no scanner (mesh without a
                // grid)

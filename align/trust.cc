@@ -51,7 +51,11 @@ Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoin
     }
     // A point has to stand clear of the surface by its own uncertainty, too, to be called floating.
     const double sigma = scan_from_sparse.scale * std::sqrt(point.covariance.trace());
-    const FreeSpace::Place place = free_space.Locate(x_in_scan, std::max(2 * tolerance, 3 * sigma));
+    // Without a scanner nobody knows what is empty: then every point off the surface counts against
+    // it.
+    const FreeSpace::Place place =
+        free_space.HasStations() ? free_space.Locate(x_in_scan, std::max(2 * tolerance, 3 * sigma))
+                                 : FreeSpace::Place::kFloating;
     placement.num_floating += place == FreeSpace::Place::kFloating;
     placement.num_hidden += place == FreeSpace::Place::kHidden;
   }

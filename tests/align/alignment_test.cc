@@ -223,6 +223,31 @@ TEST(Alignment, PicksInSeveralPhotosAreBetterThanInOne) {
   EXPECT_LT(four_photos / 4, 0.02);
 }
 
+TEST(Alignment, TakesSeveralScansAsOne) {
+  SimulatedRoomOptions options = MakeCase().room->options();
+  options.num_stations = 2;
+  const SimulatedRoom room(options);
+  SimulatedCase two = MakeCase();
+  two.scans = {room.MakeScan(0), room.MakeScan(1)};
+  const Alignment alignment = AlignCase(two);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_LT(WorstPoseErrors(*two.room, two.model, alignment.scan_from_sparse).position, 0.002);
+  EXPECT_GT(alignment.placement.SurfaceShare(), 0.98);
+}
+
+TEST(Alignment, TakesAMeshWithoutAGrid) {
+  SimulatedCase one = MakeCase();
+  Scan& scan = one.scans[0];
+  scan.triangles = BuildScanMesh(scan, ScanMeshOptions());
+  scan.organised = false;
+  scan.is_rtpi = false;
+  scan.num_columns = static_cast<int>(scan.points.size());
+  scan.num_rows = 1;
+  const Alignment alignment = AlignCase(one);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position, 0.004);
+}
+
 TEST(Alignment, NamesABadPickInAPhotoWithFewPicks) {
   SimulatedCase one = MakeCase();
   const int photo = (one.room->BestPhotoForPicks() + 5) % one.room->NumPhotos();
