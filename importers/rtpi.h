@@ -44,13 +44,13 @@ struct RtpiFile {
 };
 
 // All of the file, bit by bit. The byte order is the one in which every column count is at most
-// max_samples_per_column and the columns end where the file ends (a file without any sample counts as
-// little-endian). Throws InputError with the byte or header line.
+// max_samples_per_column and the columns end where the file ends (a file without any sample counts
+// as little-endian). Throws InputError with the byte or header line.
 RtpiFile ReadRtpi(const std::string& path);
 
-// In the version of the header (2 or 3) and in file.byte_order; num_columns follows from the columns,
-// max_samples_per_column is raised to the longest of them. Reading the result gives the same
-// samples and order bit by bit, and the same header (version 2 can hold its comments only).
+// In the version of the header (2 or 3) and in file.byte_order; num_columns follows from the
+// columns, max_samples_per_column is raised to the longest of them. Reading the result gives the
+// same samples and order bit by bit, and the same header (version 2 can hold its comments only).
 void WriteRtpi(const RtpiFile& file, const std::string& path);
 
 struct RtpiScanOptions {
