@@ -147,8 +147,13 @@ std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const Room
     double best = -std::numeric_limits<double>::infinity();
     for (double x = 0.5; x <= options.width - 0.5; x += 0.2) {
       for (double y = 0.5; y <= options.depth - 0.5; y += 0.2) {
-        const double score = std::min(TripodClearance(scene, x, y, height), 0.6) -
-                             0.12 * (Eigen::Vector2d(x, y) - preferred).norm();
+        double score = std::min(TripodClearance(scene, x, y, height), 0.6) -
+                       0.12 * (Eigen::Vector2d(x, y) - preferred).norm();
+        // A second scan from the same place shows nothing new.
+        for (const Rigid& other : stations) {
+          const double apart = (Eigen::Vector2d(x, y) - other.translation.head<2>()).norm();
+          score -= 0.4 * std::max(0.0, 1.3 - apart);
+        }
         if (score > best) {
           best = score;
           place << x, y, height;
