@@ -95,7 +95,8 @@ void CheckArguments(const Arguments& a) {
   if (a.picks_path.empty()) {
     throw UsageError(
         "--picks_path is missing: aligning without picks is not available in this version. Make a "
-        "picks file with roomtex-pick, or by hand (image_name,x,y,scan_x,scan_y,scan_z)");
+        "picks file, a CSV with the header image_name,x,y,scan_x,scan_y,scan_z and six or more "
+        "lines");
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
   for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
