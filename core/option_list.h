@@ -19,8 +19,8 @@ struct Option {
   bool may_be_empty = false;     // an empty value is a value
   bool repeatable = false;
   // Takes all values given; throws UsageError for one that is no value of this option.
-  std::function<void(const std::vector<std::string>&)> set;
-  std::function<Json()> value;  // in effect, for the report
+  std::function<void(const std::vector<std::string>&)> set = {};
+  std::function<Json()> value = {};  // in effect, for the report
 };
 
 // Every option whose name starts with `prefix` ("--Mapper.") goes with its value into `arguments`.
