@@ -19,8 +19,27 @@ float ReliabilityOfByte(int brightest) {
   return kClippedReliability + (1 - kClippedReliability) * share;
 }
 
+// Catmull-Rom spline: weights of the four pixels around a place, t = 0..1 behind the second one.
+std::array<float, 4> CubicWeights(float t) {
+  const float t2 = t * t, t3 = t2 * t;
+  return {-0.5f * t3 + t2 - 0.5f * t, 1.5f * t3 - 2.5f * t2 + 1, -1.5f * t3 + 2 * t2 + 0.5f * t,
+          0.5f * t3 - 0.5f * t2};
+}
+
 // Square roots: distances are about even to the eye.
 Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).cwiseSqrt(); }
+
+// Two photos that look from different places give the same colour only if they see the surface
+// itself and not something in front of it.
+bool TwoAgree(const Eigen::Vector3f* colors, int count) {
+  constexpr float kAlike = 0.1f;
+  for (int i = 0; i < count; ++i) {
+    for (int j = i + 1; j < count; ++j) {
+      if ((Root(colors[i]) - Root(colors[j])).norm() < kAlike) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -32,6 +51,11 @@ std::vector<std::string> BlendOptions::Problems() const {
     problems.push_back("--Blend.footprint must be 0 to 4 sample spacings");
   }
   return problems;
+}
+
+float ResolutionWeight(float pixels_per_sample) {
+  constexpr float kPlenty = 25;
+  return std::max(pixels_per_sample, 1e-3f) / (kPlenty + pixels_per_sample);
 }
 
 float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_scanner,
@@ -48,25 +72,28 @@ PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y) {
   const float px = std::clamp(x - 0.5f, 0.0f, static_cast<float>(photo.cols - 1));
   const float py = std::clamp(y - 0.5f, 0.0f, static_cast<float>(photo.rows - 1));
   const int column = static_cast<int>(px), row = static_cast<int>(py);
-  const float fx = px - static_cast<float>(column), fy = py - static_cast<float>(row);
-  const int right = column + 1 < photo.cols ? 3 : 0;
-  const uint8_t* upper = photo.ptr<uint8_t>(row) + 3 * column;
-  const uint8_t* lower = photo.ptr<uint8_t>(std::min(row + 1, photo.rows - 1)) + 3 * column;
-  PhotoColor color{};
+  const std::array<float, 4> wx = CubicWeights(px - static_cast<float>(column));
+  const std::array<float, 4> wy = CubicWeights(py - static_cast<float>(row));
+  int offset[4];
+  for (int i = 0; i < 4; ++i) offset[i] = 3 * std::clamp(column - 1 + i, 0, photo.cols - 1);
+  float sum[3] = {0, 0, 0};  // b, g, r
   int brightest = 0;
-  for (int k = 0; k < 3; ++k) {
-    const int a = upper[k], b = upper[right + k], c = lower[k], d = lower[right + k];
-    brightest = std::max({brightest, a, b, c, d});
-    const float top = linear[a] + fx * (linear[b] - linear[a]);
-    const float bottom = linear[c] + fx * (linear[d] - linear[c]);
-    color.linear[2 - k] = top + fy * (bottom - top);  // BGR to r, g, b
+  for (int j = 0; j < 4; ++j) {
+    const uint8_t* line = photo.ptr<uint8_t>(std::clamp(row - 1 + j, 0, photo.rows - 1));
+    const bool inner = j == 1 || j == 2;
+    for (int k = 0; k < 3; ++k) {
+      const int a = line[offset[0] + k], b = line[offset[1] + k], c = line[offset[2] + k],
+                d = line[offset[3] + k];
+      if (inner) brightest = std::max({brightest, b, c});
+      sum[k] +=
+          wy[j] * (wx[0] * linear[a] + wx[1] * linear[b] + wx[2] * linear[c] + wx[3] * linear[d]);
+    }
   }
-  color.reliability = ReliabilityOfByte(brightest);
-  return color;
+  return {Eigen::Vector3f(sum[2], sum[1], sum[0]).cwiseMax(0.0f), ReliabilityOfByte(brightest)};
 }
 
 PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
-  // Bilinear lookups already average over a pixel: as many as the square has pixels, each way.
+  // As many lookups as the square has pixels, each way.
   const int count = std::clamp(static_cast<int>(std::lround(side)), 1, 16);
   if (count == 1) return LookUpPhoto(photo, x, y);
   PhotoColor mean{Eigen::Vector3f::Zero(), 1};
@@ -95,6 +122,7 @@ BlendedSample BlendSample(const Observation* observations, int count,
     colors[i] = UnpackColor(observations[i].color).cwiseProduct(gains[observations[i].photo]);
     weights[i] = UnpackWeight(observations[i].weight);
   }
+  if (observations[0].in_doubt != 0 && !TwoAgree(colors.data(), count)) return result;
   if (outlier > 0 && count > 1) {
     const auto scale2 = static_cast<float>(outlier * outlier);
     for (int i = 0; i < count; ++i) roots[i] = Root(colors[i]);

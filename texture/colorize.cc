@@ -73,7 +73,9 @@ ColorGrid EncodeGrid(const GridOfSamples& grid, const PhotoPassInput& input,
     const SampleTile& tile = input.samples[t];
     for (int i = 0; i < tile.points.size(); ++i) {
       const int index = tile.index[i];
-      const int views = store.NumViews(static_cast<size_t>(tile.first_slot) + i);
+      const int views = blended.dominant.photo[index] < 0
+                            ? 0
+                            : store.NumViews(static_cast<size_t>(tile.first_slot) + i);
       result.views[index] = static_cast<uint8_t>(std::min(views, 255));
       if (views == 0) {
         result.rgb[index].fill(unseen_grey.empty() ? 0 : unseen_grey[index]);

@@ -14,7 +14,7 @@ namespace {
 // Light that is neither noise nor near clipping.
 constexpr float kDarkest = 0.02f, kLightest = 0.8f;
 // Observations of less weight lie in a depth-boundary band or are clipped.
-constexpr float kLeastWeight = 0.01f;
+constexpr float kLeastWeight = 0.002f;
 
 // One in this many samples is looked at, so that time stays bounded.
 size_t SampleStride(const ObservationStore& store, size_t num_photos) {

@@ -155,12 +155,74 @@ std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) 
   return shadows;
 }
 
+// Samples that the scanner missed here and there must not be peepholes: gaps of up to kWidestGap
+// samples along a row or a column between samples at about the same range are filled for the
+// occluders only. Gives the triangles that touch a filled cell; `points` gets the filled places.
+std::vector<Triangle> FillGaps(const Scan& scan, std::vector<Eigen::Vector3d>* points) {
+  constexpr int kWidestGap = 3;
+  constexpr double kSameRange = 0.05;  // of the range
+  std::vector<Triangle> triangles;
+  if (!scan.organised) return triangles;
+  std::vector<uint8_t> filled(points->size(), 0);
+  const auto fill = [&](int cell, int steps_before, int before, int steps_after, int after) {
+    const Eigen::Vector3d a = scan.points[before] - scan.Station();
+    const Eigen::Vector3d b = scan.points[after] - scan.Station();
+    const double range_a = a.norm(), range_b = b.norm();
+    if (std::abs(range_a - range_b) > kSameRange * std::max(range_a, range_b)) return false;
+    const double share = static_cast<double>(steps_before) / (steps_before + steps_after);
+    const double inverse_range = (1 - share) / range_a + share / range_b;
+    const Eigen::Vector3d direction = (1 - share) * a / range_a + share * b / range_b;
+    (*points)[cell] = scan.Station() + direction.normalized() / inverse_range;
+    filled[cell] = 1;
+    return true;
+  };
+  // The nearest measured samples before and behind a cell along a line of `length` cells.
+  const auto fill_along = [&](int cell, int place, int length, int step) {
+    int before = 1, after = 1;
+    while (before <= place && scan.IsMissing(cell - before * step)) ++before;
+    while (place + after < length && scan.IsMissing(cell + after * step)) ++after;
+    if (before > place || place + after >= length || before + after > kWidestGap + 1) return false;
+    return fill(cell, before, cell - before * step, after, cell + after * step);
+  };
+  for (int row = 0; row < scan.num_rows; ++row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      const int cell = scan.Index(column, row);
+      if (!scan.IsMissing(cell)) continue;
+      if (!fill_along(cell, column, scan.num_columns, 1)) {
+        fill_along(cell, row, scan.num_rows, scan.num_columns);
+      }
+    }
+  }
+  for (int row = 0; row + 1 < scan.num_rows; ++row) {
+    for (int column = 0; column + 1 < scan.num_columns; ++column) {
+      const int c[4] = {scan.Index(column, row), scan.Index(column + 1, row),
+                        scan.Index(column + 1, row + 1), scan.Index(column, row + 1)};
+      if (filled[c[0]] + filled[c[1]] + filled[c[2]] + filled[c[3]] == 0) continue;
+      double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+      for (int corner : c) {
+        const double range = ((*points)[corner] - scan.Station()).norm();
+        nearest = std::min(nearest, range);
+        farthest = std::max(farthest, range == range ? range : 1e300);
+      }
+      if (farthest - nearest > kSameRange * farthest) continue;
+      triangles.push_back({c[0], c[2], c[1]});
+      triangles.push_back({c[0], c[3], c[2]});
+    }
+  }
+  return triangles;
+}
+
 }  // namespace
 
 OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface) {
   OccluderTiles tiles;
   tiles.surface = TileTriangles(scan, surface.points, surface.triangles);
   tiles.shadows = TileTriangles(scan, surface.points, FindShadows(scan, surface));
+  std::vector<Eigen::Vector3d> points = surface.points;
+  const std::vector<Triangle> fillings = FillGaps(scan, &points);
+  for (MeshTile& tile : TileTriangles(scan, points, fillings)) {
+    tiles.surface.push_back(std::move(tile));
+  }
   return tiles;
 }
 

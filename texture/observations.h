@@ -40,10 +40,13 @@ inline float UnpackWeight(uint16_t code) {
 }
 
 struct Observation {
-  uint32_t color = 0;   // PackColor, as photographed
-  uint16_t weight = 0;  // PackWeight; 0 = empty
-  uint16_t photo = 0;
+  Observation() : photo(0), in_doubt(0) {}
+  uint32_t color = 0;     // PackColor, as photographed
+  uint16_t weight = 0;    // PackWeight; 0 = empty
+  uint16_t photo : 15;    // number of the photo
+  uint16_t in_doubt : 1;  // seen through space that the scanner could not see: Sight::kShadow
 };
+inline constexpr int kMaxPhotos = 1 << 15;
 static_assert(sizeof(Observation) == 8, "memory per sample is counted on this");
 
 // The best observations of every sample: of more than `capacity` photos those with the largest
@@ -75,6 +78,8 @@ class ObservationStore {
 
  private:
   static bool IsBetter(const Observation& a, const Observation& b) {
+    if (b.weight == 0) return true;  // an empty place
+    if (a.in_doubt != b.in_doubt) return a.in_doubt < b.in_doubt;
     return a.weight != b.weight ? a.weight > b.weight : a.photo < b.photo;
   }
 

@@ -66,15 +66,21 @@ class PhotoObserver {
           blend_.footprint > 0
               ? LookUpPhoto(image_, x, y, static_cast<float>(blend_.footprint) * spacing_px)
               : LookUpPhoto(image_, x, y);
-      float weight = ThesisWeight(x, y, width, height, sight == Sight::kBoundary);
-      weight *= color.reliability;
+      const Eigen::Vector3f& normal = tile.normals[i];
+      const Eigen::Vector3f camera_direction = to_camera.normalized();
+      float weight = ThesisWeight(x, y, width, height, sight != Sight::kClear) * color.reliability;
       if (blend_.angle_weight) {
-        weight *= AngleWeight(to_camera.normalized(), to_scanner.normalized(), tile.normals[i]);
+        weight *= AngleWeight(camera_direction, to_scanner.normalized(), normal);
+      }
+      if (blend_.resolution_weight && spacing_px > 0) {
+        const float cosine = normal.isZero() ? 0.3f : normal.dot(camera_direction);
+        weight *= ResolutionWeight(spacing_px * spacing_px * cosine);
       }
       Observation observation;
       observation.color = PackColor(color.linear);
-      observation.weight = PackWeight(std::max(weight, 1e-7f));
-      observation.photo = static_cast<uint16_t>(photo);
+      observation.weight = PackWeight(std::max(weight, 1e-10f));
+      observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
+      observation.in_doubt = sight == Sight::kShadow;
       seen->all.push_back({tile.first_slot + i, observation});
     }
   }

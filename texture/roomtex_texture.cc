@@ -78,6 +78,8 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                   "each.");
   command->AddBool("Blend.angle_weight", &o->blend.angle_weight,
                    "Less weight for photos that see a sample at a slant.");
+  command->AddBool("Blend.resolution_weight", &o->blend.resolution_weight,
+                   "More weight for photos with more pixels per sample.");
   command->AddDouble("Blend.outlier", &o->blend.outlier,
                      "Colour difference (0..1) from the other photos at which half the weight is "
                      "lost; 0 = never.");
@@ -231,8 +233,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     throw InputError(options.input_path, "", "holds no registered photo",
                      "Give the folder that roomtex-align wrote");
   }
-  if (list.photos.size() > 32767) {
-    throw InputError(options.input_path, "", "holds more than 32767 photos", "Give a part of them");
+  if (list.photos.size() >= kMaxPhotos) {
+    throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
   }
   MakeFolder(options.output_path);
   context.report.AddCopy(options.output_path + "/report.json");

@@ -14,10 +14,16 @@ namespace {
 // matter.
 constexpr int kMaxSplits = 16;
 constexpr double kMinSize = 0.02;  // radians
+// Half the widest gap that counts as a crack in the scan and not as a hole, sample spacings.
+constexpr double kGapSpacings = 1.5;
 // Shadows need not be exact to the pixel.
 constexpr float kShadowEdgePx = 1e6f;
 // No lens sees nearer; keeps a surface that touches the camera from hiding everything.
 constexpr double kNearDepth = 0.01;
+
+cv::Mat Square(int radius) {
+  return cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1});
+}
 
 class TriangleSplitter {
  public:
@@ -173,13 +179,22 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
   }
 }
 
+void DepthMap::CloseGaps(int radius_px) {
+  if (radius_px <= 0) return;
+  const cv::Mat square = Square(radius_px);
+  const cv::Mat1b holes = inverse_depth_ == 0;
+  if (cv::countNonZero(holes) == 0) return;
+  cv::Mat1b remaining;
+  cv::morphologyEx(holes, remaining, cv::MORPH_OPEN, square);
+  cv::Mat1f nearest;
+  cv::dilate(inverse_depth_, nearest, square);
+  nearest.copyTo(inverse_depth_, holes & ~remaining);
+}
+
 cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radius_px, int hole_px) {
-  const auto square = [](int radius) {
-    return cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1});
-  };
   // 255 where there is a surface, or a hole too small to matter.
   cv::Mat1b covered = inverse_depth > 0;
-  if (hole_px > 0) cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, square(hole_px));
+  if (hole_px > 0) cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, Square(hole_px));
   const auto threshold = static_cast<float>(jump);
   const auto is_jump = [&](float before, float here, float after) {
     return std::abs(before - 2 * here + after) > threshold * std::max({before, here, after});
@@ -205,7 +220,7 @@ cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radiu
       if (edge) edges(row, column) = 255;
     }
   }
-  if (radius_px > 0) cv::dilate(edges, edges, square(radius_px));
+  if (radius_px > 0) cv::dilate(edges, edges, Square(radius_px));
   return edges;
 }
 
@@ -215,7 +230,12 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
     : surface_(projector.width(), projector.height(),
                MapScale(projector, angular_spacing, options)),
       tolerance_(static_cast<float>(options.depth_tolerance)) {
+  const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
+  const auto map_px = [this](double px) {
+    return static_cast<int>(std::ceil(px * surface_.scale_x()));
+  };
   for (const OccluderTiles& tiles : occluders) surface_.Draw(projector, tiles.surface);
+  surface_.CloseGaps(map_px(kGapSpacings * spacing_px));
   if (options.shadows) {
     DepthMap shadow(projector.width(), projector.height(),
                     MapScale(projector, angular_spacing, options));
@@ -223,14 +243,10 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
       shadow.Draw(projector, tiles.shadows, kShadowEdgePx);
     shadow_ = shadow.inverse_depth();
   }
-  const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
   const double radius =
       options.boundary_px >= 0 ? options.boundary_px : std::max(3.0, 1.5 * spacing_px);
-  const auto map_px = [this](double px) {
-    return static_cast<int>(std::ceil(px * surface_.scale_x()));
-  };
   boundaries_ = DepthBoundaries(surface_.inverse_depth(), options.boundary_jump, map_px(radius),
-                                map_px(2 * spacing_px));
+                                map_px(kGapSpacings * spacing_px));
 }
 
 Sight PhotoVisibility::Look(float x, float y, float depth) const {
@@ -245,12 +261,12 @@ Sight PhotoVisibility::Look(float x, float y, float depth) const {
   if (farthest * depth > 1 / (1 - tolerance_)) return Sight::kHidden;
   const int nearest_column = std::clamp(static_cast<int>(map_x), 0, map.cols - 1);
   const int nearest_row = std::clamp(static_cast<int>(map_y), 0, map.rows - 1);
-  if (boundaries_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
   if (!shadow_.empty()) {
     // The shadow ends at the samples around a depth jump; they are not behind it.
     const float shadow = shadow_(nearest_row, nearest_column);
-    if (shadow * depth > 1 / (1 - 2 * tolerance_)) return Sight::kBoundary;
+    if (shadow * depth > 1 / (1 - 2 * tolerance_)) return Sight::kShadow;
   }
+  if (boundaries_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
   return Sight::kClear;
 }
 

@@ -46,6 +46,11 @@ class DepthMap {
   void Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
             float max_edge_px = 24);
 
+  // Closes gaps of up to 2 * radius_px pixels with the nearest surface around them: single samples
+  // that the scanner missed, and the cracks between a depth jump's two sides. Larger holes stay
+  // (windows).
+  void CloseGaps(int radius_px);
+
   const cv::Mat1f& inverse_depth() const { return inverse_depth_; }
   cv::Mat1f& inverse_depth() { return inverse_depth_; }
   float scale_x() const { return scale_x_; }
@@ -61,8 +66,10 @@ class DepthMap {
 // dilated by a square of radius_px. Both in pixels of the map.
 cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radius_px, int hole_px);
 
-// How a photo sees one sample.
-enum class Sight : uint8_t { kHidden, kBoundary, kClear };
+// How a photo sees one sample: not at all; through a shadow of the scanner, so that something that
+// is not in the scan may stand in front of it; in the depth-boundary mask (B = 1); without any
+// doubt.
+enum class Sight : uint8_t { kHidden, kShadow, kBoundary, kClear };
 
 class PhotoVisibility {
  public:
@@ -72,8 +79,7 @@ class PhotoVisibility {
 
   // x, y in `img`, inside the photo; depth along the optical axis, metres.
   // Thesis 8.1.2, made exact at pixel borders: hidden only if all four map pixels around the
-  // position show a nearer surface. kBoundary (B = 1): in the depth-boundary mask, or seen through
-  // a shadow.
+  // position show a nearer surface.
   Sight Look(float x, float y, float depth) const;
 
   const DepthMap& surface() const { return surface_; }

@@ -121,6 +121,7 @@ TEST(LookUpPhoto, HitsPixelCentresAndMixesLinearLight) {
   EXPECT_NEAR(at.linear[0], LinearFromSrgb(30 / 255.0), 1e-6);
   EXPECT_NEAR(at.linear[2], LinearFromSrgb(10 / 255.0), 1e-6);
   EXPECT_NEAR(at.reliability, 1, 1e-6);
+  // Half way the cubic weights of the two pixels on either side (here the border's) are equal.
   const double middle = (LinearFromSrgb(10 / 255.0) + LinearFromSrgb(200 / 255.0)) / 2;
   EXPECT_NEAR(LookUpPhoto(photo, 1.0f, 1.0f).linear[2], middle, 1e-6);
   // Outside: the border's colour.
@@ -128,6 +129,46 @@ TEST(LookUpPhoto, HitsPixelCentresAndMixesLinearLight) {
   EXPECT_NEAR(LookUpPhoto(photo, 2, 2).linear[2], LinearFromSrgb(200 / 255.0), 1e-6);
   photo(1, 1) = {255, 20, 30};
   EXPECT_LT(LookUpPhoto(photo, 1.5f, 1.5f).reliability, 0.03);
+}
+
+TEST(LookUpPhoto, IsExactOnEvenGradients) {
+  // Linear light that rises evenly; bytes are rounded, so allow half a step.
+  cv::Mat3b photo(5, 30);
+  const auto light = [](float x) { return 0.2f + 0.01f * x; };
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 30; ++x) {
+      const uint8_t value = SrgbByteFromLinear(light(static_cast<float>(x) + 0.5f));
+      photo(y, x) = {value, value, value};
+    }
+  }
+  for (float x = 5; x < 25; x += 0.37f) {
+    EXPECT_NEAR(LookUpPhoto(photo, x, 2.3f).linear[1], light(x), 0.004);
+  }
+}
+
+TEST(BlendSample, TrustsDoubtfulObservationsOnlyIfTwoAgree) {
+  Observation seen[2] = {Seen(0.2f, 0.3f, 0.4f, 1e-3f, 0), Seen(0.6f, 0.1f, 0.1f, 1e-3f, 1)};
+  seen[0].in_doubt = seen[1].in_doubt = 1;
+  EXPECT_EQ(BlendSample(seen, 1, kUnitGains, 0.08).dominant_photo, -1);
+  EXPECT_EQ(BlendSample(seen, 2, kUnitGains, 0.08).dominant_photo, -1);
+  seen[1].color = PackColor({0.21f, 0.3f, 0.39f});
+  EXPECT_EQ(BlendSample(seen, 2, kUnitGains, 0.08).dominant_photo, 0);
+}
+
+TEST(ObservationStore, PutsDoubtLast) {
+  ObservationStore store(1, 2);
+  Observation doubtful = Seen(0.1f, 0.1f, 0.1f, 0.9f, 5);
+  doubtful.in_doubt = 1;
+  store.Add(0, doubtful);
+  store.Add(0, Seen(0.2f, 0.2f, 0.2f, 0.1f, 1));
+  EXPECT_EQ(store.Begin(0)[0].photo, 1);
+  EXPECT_EQ(store.Begin(0)[1].photo, 5);
+}
+
+TEST(ResolutionWeight, GrowsWithThePixels) {
+  EXPECT_NEAR(ResolutionWeight(25), 0.5, 1e-6);
+  EXPECT_LT(ResolutionWeight(4), ResolutionWeight(9));
+  EXPECT_GT(ResolutionWeight(-1), 0);
 }
 
 TEST(LookUpPhoto, AveragesOverAFootprint) {

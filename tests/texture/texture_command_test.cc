@@ -1,0 +1,313 @@
+// roomtex-texture as a user calls it, on a simulated capture with true poses.
+
+#include <cmath>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <tiny_gltf.h>
+
+#include "capture/capture_writer.h"
+#include "capture/simulated_room.h"
+#include "core/photo.h"
+#include "importers/scan_reader.h"
+#include "importers/scan_writer.h"
+#include "tests/support/ply_vertices.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
+
+PlyVertices ReadPly(const std::string& path) { return ParsePlyVertices(ReadBytes(path), path); }
+
+// Decibels between the coloured vertices and the truth, in sRGB, after one gain in linear light.
+double Psnr(const PlyVertices& model, const PlyVertices& truth) {
+  const auto& linear = LinearFromSrgbByte();
+  double cross = 0, square = 0;
+  for (size_t i = 0; i < model.points.size(); ++i) {
+    if (model.views[i] == 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      const double m = linear[model.colors[i][k]], t = linear[truth.colors[i][k]];
+      cross += m * t;
+      square += m * m;
+    }
+  }
+  const double gain = cross / square;
+  double error = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < model.points.size(); ++i) {
+    if (model.views[i] == 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      const double m = SrgbFromLinear(std::min(1.0, gain * linear[model.colors[i][k]]));
+      error += std::pow(m - truth.colors[i][k] / 255.0, 2);
+      ++count;
+    }
+  }
+  return -10 * std::log10(error / static_cast<double>(count));
+}
+
+class TextureCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TempFolder;
+    SimulatedRoomOptions options;
+    options.random_seed = 5;
+    options.num_photos = 12;
+    options.photo_width = 600;
+    options.photo_height = 400;
+    options.scan_columns = 500;
+    options.scan_rows = 190;
+    Progress progress(true);
+    WriteCapture(SimulatedRoom(options), Capture(), &progress);
+    result_ = Texture("textured");
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  static std::string Capture() { return *folder_ / "capture"; }
+  static CommandResult Texture(const std::string& output, const std::string& more = "",
+                               const std::string& scan = "") {
+    return RunCommandLine("roomtex-texture --quiet --input_path " + Capture() +
+                          "/truth --image_path " + Capture() + "/photos --scan_path " +
+                          (scan.empty() ? Capture() + "/scan.rtpi" : scan) + " --output_path " +
+                          (*folder_ / output) + " " + more);
+  }
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+  static Scan ReadCaptureScan() { return ReadScan(Capture() + "/scan.rtpi", {}); }
+
+  static TempFolder* folder_;
+  static CommandResult result_;
+};
+
+TempFolder* TextureCommand::folder_ = nullptr;
+CommandResult TextureCommand::result_;
+
+TEST_F(TextureCommand, WritesTheFilesAndTheReportOfTheContract) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  EXPECT_EQ(result_.err, "");
+  const json report = ReadJson(Path("textured/report.json"));
+  const Scan scan = ReadCaptureScan();
+  EXPECT_EQ(report["num_vertices"], scan.points.size() - scan.NumMissing());
+  EXPECT_GT(report["coverage"], 0.5);
+  EXPECT_GT(report["views_mean"], 1.0);
+  EXPECT_EQ(report["exposure_gain"].size(), 12u);
+  EXPECT_LT(report["disagreement"]["after"], report["disagreement"]["before"]);
+  EXPECT_TRUE(report["trusted"]);
+  const cv::Mat texture = cv::imread(Path("textured/texture.png"));
+  EXPECT_EQ(texture.cols, 500);
+  EXPECT_EQ(texture.rows, 190);
+}
+
+TEST_F(TextureCommand, VerticesAreTheMeasuredSamplesInGridOrder) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const PlyVertices model = ReadPly(Path("textured/model.ply"));
+  const Scan scan = ReadCaptureScan();
+  size_t vertex = 0;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    ASSERT_LT(vertex, model.points.size());
+    ASSERT_LT((model.points[vertex].cast<double>() - scan.points[i]).norm(), 1e-6);
+    ++vertex;
+  }
+  EXPECT_EQ(vertex, model.points.size());
+  size_t num_colored = 0;
+  for (int views : model.views) num_colored += views > 0;
+  EXPECT_EQ(ReadJson(Path("textured/report.json"))["num_colored"], num_colored);
+}
+
+TEST_F(TextureCommand, ColoursAreTheTrueOnes) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
+  const double psnr = Psnr(ReadPly(Path("textured/model.ply")), truth);
+  EXPECT_GT(psnr, 24.0);
+  // Exposures differ by up to an EV either way: without unification the colours are far off.
+  ASSERT_EQ(Texture("plain", "--Exposure.mode none").exit_code, 0);
+  EXPECT_GT(psnr, Psnr(ReadPly(Path("plain/model.ply")), truth) + 3);
+  // EXIF alone, as in the thesis, does nearly as well as matching.
+  ASSERT_EQ(Texture("exif", "--Exposure.mode exif").exit_code, 0);
+  EXPECT_GT(Psnr(ReadPly(Path("exif/model.ply")), truth), psnr - 1.5);
+}
+
+TEST_F(TextureCommand, UnseenSamplesAreGreyOrBlackAsAsked) {
+  ASSERT_EQ(Texture("black", "--Texture.unseen black").exit_code, 0);
+  const PlyVertices grey = ReadPly(Path("textured/model.ply"));
+  const PlyVertices black = ReadPly(Path("black/model.ply"));
+  ASSERT_EQ(grey.points.size(), black.points.size());
+  size_t num_unseen = 0;
+  for (size_t i = 0; i < grey.points.size(); ++i) {
+    ASSERT_EQ(grey.views[i], black.views[i]);
+    if (grey.views[i] > 0) continue;
+    ++num_unseen;
+    ASSERT_EQ(black.colors[i].maxCoeff(), 0);
+    ASSERT_EQ(grey.colors[i].minCoeff(), grey.colors[i].maxCoeff());
+  }
+  EXPECT_GT(num_unseen, 100u);
+}
+
+TEST_F(TextureCommand, GivesTheSameBytesOnOneThreadAndOnThree) {
+  ASSERT_EQ(Texture("one", "--num_threads 1").exit_code, 0);
+  ASSERT_EQ(Texture("three", "--num_threads 3").exit_code, 0);
+  for (const char* name : {"model.ply", "model.glb", "texture.png", "model.rtpi"}) {
+    EXPECT_EQ(ReadBytes(Path("one/") + name), ReadBytes(Path("three/") + name)) << name;
+  }
+}
+
+TEST_F(TextureCommand, GlbLoadsInAStandardReader) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("textured/model.glb")))
+      << error;
+  EXPECT_EQ(warning, "");
+  ASSERT_EQ(model.images.size(), 1u);
+  EXPECT_EQ(model.images[0].width, 500);
+  EXPECT_EQ(model.images[0].height, 190);
+  ASSERT_EQ(model.materials.size(), 1u);
+  EXPECT_EQ(model.materials[0].extensions.count("KHR_materials_unlit"), 1u);
+  ASSERT_EQ(model.scenes.at(model.defaultScene).nodes.size(), 1u);
+  // RTPI is y up already: the root node turns nothing.
+  const tinygltf::Node& root = model.nodes.at(model.scenes[model.defaultScene].nodes[0]);
+  if (!root.rotation.empty()) {
+    EXPECT_NEAR(std::abs(root.rotation.at(3)), 1.0, 1e-9);
+  }
+  const tinygltf::Primitive& primitive = model.meshes.at(0).primitives.at(0);
+  const tinygltf::Accessor& positions = model.accessors.at(primitive.attributes.at("POSITION"));
+  ASSERT_EQ(positions.minValues.size(), 3u);
+  const Bounds bounds = FindBounds(ReadCaptureScan());
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(positions.maxValues[k] - positions.minValues[k], bounds.max[k] - bounds.min[k],
+                0.05);
+  }
+  EXPECT_EQ(primitive.attributes.count("TEXCOORD_0"), 1u);
+}
+
+TEST_F(TextureCommand, RootNodeTurnsAZUpScan) {
+  Scan scan = ReadCaptureScan();
+  for (Eigen::Vector3d& p : scan.points) p = Eigen::Vector3d(p.x(), -p.z(), p.y());
+  scan.up = Eigen::Vector3d::UnitZ();
+  scan.is_rtpi = false;
+  WriteScan(scan, {}, Path("z_up.ptx"));
+  // The photos' poses do not fit the turned scan, so the answer is not trusted; the file is
+  // written.
+  Texture("turned", "", Path("z_up.ptx"));
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("turned/model.glb")))
+      << error;
+  const tinygltf::Node& root = model.nodes.at(model.scenes.at(model.defaultScene).nodes.at(0));
+  ASSERT_EQ(root.rotation.size(), 4u);
+  const Eigen::Quaterniond turn(root.rotation[3], root.rotation[0], root.rotation[1],
+                                root.rotation[2]);
+  EXPECT_LT((turn * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 1e-6);
+  EXPECT_FALSE(fs::exists(Path("turned/model.rtpi")));
+}
+
+TEST_F(TextureCommand, ColouredRtpiHoldsTheSameScan) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const Scan before = ReadCaptureScan();
+  const Scan after = ReadScan(Path("textured/model.rtpi"), {});
+  EXPECT_NE(ReadBytes(Path("textured/model.rtpi")).find("# has_color: yes"), std::string::npos);
+  ASSERT_EQ(after.points.size(), before.points.size());
+  for (size_t i = 0; i < before.points.size(); ++i) {
+    ASSERT_EQ(after.IsMissing(static_cast<int>(i)), before.IsMissing(static_cast<int>(i)));
+    if (before.IsMissing(static_cast<int>(i))) continue;
+    ASSERT_EQ(after.points[i], before.points[i]);
+  }
+}
+
+TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
+  const Scan scan = ReadCaptureScan();
+  WriteScan(scan, BuildScanMesh(scan, {}), Path("room.ply"));
+  const CommandResult result = Texture("mesh", "", Path("room.ply"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(fs::exists(Path("mesh/texture.png")));
+  EXPECT_FALSE(fs::exists(Path("mesh/model.rtpi")));
+  const PlyVertices mesh = ReadPly(Path("mesh/model.ply"));
+  EXPECT_EQ(mesh.points.size(), scan.points.size() - scan.NumMissing());
+  EXPECT_GT(Psnr(mesh, ReadPly(Capture() + "/truth/true_colors.ply")), 23.0);
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("mesh/model.glb"))) << error;
+  EXPECT_EQ(model.meshes.at(0).primitives.at(0).attributes.count("COLOR_0"), 1u);
+}
+
+TEST_F(TextureCommand, ScaleTwoDoublesTheTextureImage) {
+  const CommandResult result = Texture("scaled", "--Texture.scale 2");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const cv::Mat texture = cv::imread(Path("scaled/texture.png"));
+  EXPECT_EQ(texture.cols, 1000);
+  EXPECT_EQ(texture.rows, 380);
+}
+
+// A patterned and a plain photo of each pose: colour comes from the plain ones only.
+TEST_F(TextureCommand, ColoursComeFromThePlainTwins) {
+  fs::create_directories(Path("pairs"));
+  std::ofstream associations(Path("associations.csv"));
+  associations << "patterned_image,plain_image,offset_px,brightness_ratio\n";
+  for (const auto& entry : fs::directory_iterator(Capture() + "/photos")) {
+    const std::string name = entry.path().filename().string();
+    cv::Mat green(400, 600, CV_8UC3, cv::Scalar(0, 255, 0));
+    cv::imwrite(Path("pairs/") + name, green);
+    fs::copy_file(entry.path(), Path("pairs/plain_") + name);
+    associations << name << ",plain_" << name << ",0.1,1.5\n";
+  }
+  associations.close();
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --input_path " + Capture() + "/truth --image_path " + Path("pairs") +
+      " --scan_path " + Capture() + "/scan.rtpi --associations_path " + Path("associations.csv") +
+      " --output_path " + Path("twins"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadPly(Path("twins/model.ply")).colors, ReadPly(Path("textured/model.ply")).colors);
+}
+
+TEST_F(TextureCommand, UnalignedModelIsNotTrusted) {
+  SparseModel model = ReadSparseModel(Capture() + "/truth");
+  TransformModel({0.4, Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {30, 40, 50}}, &model);
+  WriteSparseModel(model, Path("unaligned"));
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --input_path " + Path("unaligned") + " --image_path " + Capture() +
+      "/photos --scan_path " + Capture() + "/scan.rtpi --output_path " + Path("nowhere"));
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_NE(result.err.find("roomtex-align"), std::string::npos) << result.err;
+  EXPECT_FALSE(ReadJson(Path("nowhere/report.json"))["trusted"]);
+}
+
+TEST_F(TextureCommand, BadInputGetsASentence) {
+  const std::string photos = Capture() + "/photos", scan = Capture() + "/scan.rtpi";
+  const auto expect = [](const std::string& line, int exit_code, const std::string& text) {
+    const CommandResult result = RunCommandLine("roomtex-texture --quiet " + line);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  };
+  const std::string model = " --input_path " + Capture() + "/truth";
+  const std::string rest = " --output_path " + Path("bad");
+  expect(model + " --image_path " + Path("none") + " --scan_path " + scan + rest, 3, "none");
+  expect(model + " --image_path " + photos + " --scan_path " + photos + rest, 3, "is a folder");
+  expect(model + " --image_path " + photos + " --scan_path " + photos + "/photo_000.jpg" + rest, 3,
+         "is a JPEG photo");
+  expect(" --input_path " + photos + " --image_path " + photos + " --scan_path " + scan + rest, 3,
+         "no COLMAP model");
+  expect(model + " --image_path " + photos + rest, 2, "--scan_path is required");
+  const std::string all = model + " --image_path " + photos + " --scan_path " + scan;
+  expect(all + " --output_path " + scan, 3, "is a file, expected a folder");
+  expect(all + rest + " --Texture.scale 0", 2, "Texture.scale");
+  expect(all + rest + " --Occlusion.depth_tolerance -1", 2, "Occlusion.depth_tolerance");
+  expect(all + rest + " --Exposure.mode guess", 2, "exif, match or none");
+  expect(all + rest + " --associations_path " + Path("none.csv"), 3, "does not exist");
+  expect(all + rest + " --database_path " + scan, 3, "SQLite");
+}
+
+}  // namespace
+}  // namespace roomtex
