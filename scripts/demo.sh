@@ -28,7 +28,7 @@ run roomtex-simulate --output_path capture --num_photos 20 --photo_width 1200 --
 read -ra camera <capture/camera_options.txt
 
 run_colmap colmap feature_extractor --database_path database.db --image_path capture/photos \
-  "${camera[@]}" --SiftExtraction.use_gpu 0
+  "${camera[@]}" --SiftExtraction.use_gpu 0 --SiftExtraction.max_num_features 4096
 run_colmap colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0
 
 run roomtex-mapper --database_path database.db --image_path capture/photos --output_path sparse

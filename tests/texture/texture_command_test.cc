@@ -60,8 +60,8 @@ class TextureCommand : public testing::Test {
     SimulatedRoomOptions options;
     options.random_seed = 5;
     options.num_photos = 12;
-    options.photo_width = 600;
-    options.photo_height = 400;
+    options.photo_width = 1080;
+    options.photo_height = 720;
     options.scan_columns = 500;
     options.scan_rows = 190;
     Progress progress(true);
@@ -128,7 +128,7 @@ TEST_F(TextureCommand, ColoursAreTheTrueOnes) {
   ASSERT_EQ(result_.exit_code, 0) << result_.err;
   const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
   const double psnr = Psnr(ReadPly(Path("textured/model.ply")), truth);
-  EXPECT_GT(psnr, 24.0);
+  EXPECT_GT(psnr, 24.5);  // 25.3 measured: a photo pixel is 4 mm wide, the texture has 1.5 mm
   // Exposures differ by up to an EV either way: without unification the colours are far off.
   ASSERT_EQ(Texture("plain", "--Exposure.mode none").exit_code, 0);
   EXPECT_GT(psnr, Psnr(ReadPly(Path("plain/model.ply")), truth) + 3);
@@ -170,7 +170,8 @@ TEST_F(TextureCommand, GlbLoadsInAStandardReader) {
       << error;
   EXPECT_EQ(warning, "");
   ASSERT_EQ(model.images.size(), 1u);
-  EXPECT_EQ(model.images[0].width, 500);
+  // The scan is a full turn: the first column stands again behind the last one, to close the seam.
+  EXPECT_EQ(model.images[0].width, 501);
   EXPECT_EQ(model.images[0].height, 190);
   ASSERT_EQ(model.materials.size(), 1u);
   EXPECT_EQ(model.materials[0].extensions.count("KHR_materials_unlit"), 1u);
@@ -228,7 +229,7 @@ TEST_F(TextureCommand, ColouredRtpiHoldsTheSameScan) {
 
 TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const Scan scan = ReadCaptureScan();
-  WriteScan(scan, BuildScanMesh(scan, {}), Path("room.ply"));
+  WriteScan(scan, BuildScanMesh(scan, ScanMeshOptions()), Path("room.ply"));
   const CommandResult result = Texture("mesh", "", Path("room.ply"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(fs::exists(Path("mesh/texture.png")));
@@ -258,7 +259,7 @@ TEST_F(TextureCommand, ColoursComeFromThePlainTwins) {
   associations << "patterned_image,plain_image,offset_px,brightness_ratio\n";
   for (const auto& entry : fs::directory_iterator(Capture() + "/photos")) {
     const std::string name = entry.path().filename().string();
-    cv::Mat green(400, 600, CV_8UC3, cv::Scalar(0, 255, 0));
+    cv::Mat green(720, 1080, CV_8UC3, cv::Scalar(0, 255, 0));
     cv::imwrite(Path("pairs/") + name, green);
     fs::copy_file(entry.path(), Path("pairs/plain_") + name);
     associations << name << ",plain_" << name << ",0.1,1.5\n";

@@ -242,11 +242,11 @@ TEST(DepthBoundaries, AreWhereDepthJumpsNotWhereAPlaneIsSteep) {
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) map(y, x) = 0.05f + 0.02f * static_cast<float>(x);
   }
-  EXPECT_EQ(cv::countNonZero(DepthBoundaries(map, 0.02, 2, 3)), 0);
+  EXPECT_EQ(cv::countNonZero(BoundaryMask(DepthBoundaries(map, 0.02, 3), 2)), 0);
   map.colRange(30, 60) *= 0.5f;
-  const cv::Mat1b edges = DepthBoundaries(map, 0.02, 2, 3);
+  const cv::Mat1b edges = BoundaryMask(DepthBoundaries(map, 0.02, 3), 2);
   EXPECT_EQ(edges(20, 30), 255);
-  EXPECT_EQ(edges(20, 27), 255);  // columns 29 and 30 dilated by 2
+  EXPECT_EQ(edges(20, 27), 255);  // columns 29 and 30 and 2 pixels more
   EXPECT_EQ(edges(20, 26), 0);
   EXPECT_EQ(edges(20, 33), 0);
 }
@@ -255,7 +255,7 @@ TEST(DepthBoundaries, AreAroundLargeHolesOnly) {
   cv::Mat1f map(60, 60, 0.5f);
   map(cv::Rect(10, 10, 4, 4)).setTo(0);
   map(cv::Rect(30, 30, 20, 20)).setTo(0);
-  const cv::Mat1b edges = DepthBoundaries(map, 0.02, 0, 3);
+  const cv::Mat1b edges = DepthBoundaries(map, 0.02, 3);
   EXPECT_EQ(cv::countNonZero(edges(cv::Rect(0, 0, 25, 25))), 0);
   EXPECT_EQ(edges(40, 29), 255);
   EXPECT_EQ(edges(40, 28), 0);
