@@ -110,7 +110,7 @@ double MapScale(const PhotoProjector& projector, double angular_spacing,
   const double photo_size = std::max(projector.width(), projector.height());
   const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
   double size = options.depth_map_size;
-  if (spacing_px > 0) size = std::max(size, 2 * photo_size / spacing_px);  // two pixels a sample
+  if (spacing_px > 0) size = std::max(size, 3 * photo_size / spacing_px);  // three pixels a sample
   return std::min(1.0, size / photo_size);
 }
 
@@ -191,7 +191,7 @@ void DepthMap::CloseGaps(int radius_px) {
   nearest.copyTo(inverse_depth_, holes & ~remaining);
 }
 
-cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radius_px, int hole_px) {
+cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_px) {
   // 255 where there is a surface, or a hole too small to matter.
   cv::Mat1b covered = inverse_depth > 0;
   if (hole_px > 0) cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, Square(hole_px));
@@ -220,8 +220,14 @@ cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radiu
       if (edge) edges(row, column) = 255;
     }
   }
-  if (radius_px > 0) cv::dilate(edges, edges, Square(radius_px));
   return edges;
+}
+
+cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px) {
+  if (cv::countNonZero(boundaries) == 0) return cv::Mat1b(boundaries.size(), uint8_t{0});
+  cv::Mat1f distance;
+  cv::distanceTransform(boundaries == 0, distance, cv::DIST_L2, 3);
+  return distance <= radius_px;
 }
 
 PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
@@ -244,9 +250,10 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
     shadow_ = shadow.inverse_depth();
   }
   const double radius =
-      options.boundary_px >= 0 ? options.boundary_px : std::max(3.0, 1.5 * spacing_px);
-  boundaries_ = DepthBoundaries(surface_.inverse_depth(), options.boundary_jump, map_px(radius),
-                                map_px(kGapSpacings * spacing_px));
+      options.boundary_px >= 0 ? options.boundary_px : std::max(2.5, 0.75 * spacing_px);
+  mask_ = BoundaryMask(DepthBoundaries(surface_.inverse_depth(), options.boundary_jump,
+                                       map_px(kGapSpacings * spacing_px)),
+                       radius * surface_.scale_x());
 }
 
 Sight PhotoVisibility::Look(float x, float y, float depth) const {
@@ -266,7 +273,7 @@ Sight PhotoVisibility::Look(float x, float y, float depth) const {
     const float shadow = shadow_(nearest_row, nearest_column);
     if (shadow * depth > 1 / (1 - 2 * tolerance_)) return Sight::kShadow;
   }
-  if (boundaries_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
+  if (mask_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
   return Sight::kClear;
 }
 

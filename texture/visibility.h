@@ -19,7 +19,8 @@ struct OcclusionOptions {
   // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008.
   double depth_tolerance = 0.008;
   // Width of the band on either side of a depth boundary in which a photo is not trusted, pixels of
-  // the photo. -1 = one and a half times the spacing of the scan's samples, at least 3.
+  // the photo. -1 = three quarters of the spacing of the scan's samples, at least 2.5: narrower is
+  // better with true poses, wider with poses that are off by more.
   double boundary_px = -1;
   // The inverse depth changes over a depth boundary by more than this share of itself, apart from
   // the even change of a plane. Larger = fewer boundaries.
@@ -62,9 +63,13 @@ class DepthMap {
 };
 
 // Depth boundaries of a map (thesis 8.1.3), 255 or 0: where the inverse depth departs from that of
-// a plane by more than `jump` times itself, and the borders of holes wider than twice hole_px;
-// dilated by a square of radius_px. Both in pixels of the map.
-cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int radius_px, int hole_px);
+// a plane by more than `jump` times itself, and the borders of holes wider than twice hole_px
+// (pixels of the map).
+cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_px);
+
+// The mask around them: 255 within radius_px (pixels of the map), 0 elsewhere. A disc where the
+// thesis dilates by a square: as wide in every direction.
+cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px);
 
 // How a photo sees one sample: not at all; through a shadow of the scanner, so that something that
 // is not in the scan may stand in front of it; in the depth-boundary mask (B = 1); without any
@@ -83,12 +88,12 @@ class PhotoVisibility {
   Sight Look(float x, float y, float depth) const;
 
   const DepthMap& surface() const { return surface_; }
-  const cv::Mat1b& boundaries() const { return boundaries_; }
+  const cv::Mat1b& boundary_mask() const { return mask_; }
 
  private:
   DepthMap surface_;
   cv::Mat1f shadow_;  // inverse depth of the nearest shadow
-  cv::Mat1b boundaries_;
+  cv::Mat1b mask_;
   float tolerance_;
 };
 
