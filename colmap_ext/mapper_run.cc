@@ -143,29 +143,26 @@ std::string MapperRun::Call(const std::string& command, const ColmapOptions& opt
          " (all of them in " + colmap_->log_path() + ")";
 }
 
+// Two views make tracks of two views only, which COLMAP ignores unless told otherwise.
+ColmapOptions MapperRun::TriangulatorOptions(const std::string& input, const std::string& output,
+                                             bool two_view_tracks) const {
+  ColmapOptions options = Paths(input, output);
+  if (two_view_tracks) options.emplace_back("--Mapper.tri_ignore_two_view_tracks", "0");
+  return WithMapperOptions("point_triangulator", options);
+}
+
 MapperResult MapperRun::Run(const Seed& seed, int num_images,
                             const std::function<void()>& on_registered) {
   ++num_runs_;
   MapperResult result;
   const bool only_seed = static_cast<int>(seed.poses.images.size()) >= num_images;
-  const std::string start = Folder("seed"), seeded = Folder("seeded"), mapped = Folder("mapped"),
-                    closed = Folder("closed"), adjusted = Folder("adjusted");
+  const std::string start = Folder("seed"), seeded = Folder("seeded"), mapped = Folder("mapped");
   WriteSparseModelText(seed.poses, start);
-
-  // Two views make tracks of two views only, which COLMAP ignores unless told otherwise.
-  const ColmapOptions two_view_tracks = {{"--Mapper.tri_ignore_two_view_tracks", "0"}};
-  const auto append = [](ColmapOptions options, const ColmapOptions& more) {
-    options.insert(options.end(), more.begin(), more.end());
-    return options;
-  };
-  result.problem =
-      Call("point_triangulator",
-           WithMapperOptions("point_triangulator", append(Paths(start, seeded), two_view_tracks)),
-           nullptr);
+  result.problem = Call("point_triangulator", TriangulatorOptions(start, seeded, true), nullptr);
   if (!result.problem.empty()) return result;
-  std::string last = seeded;
   if (!only_seed) {
-    const ColmapOptions mapper = append(Paths(seeded, mapped), {{"--Mapper.multiple_models", "0"}});
+    ColmapOptions mapper = Paths(seeded, mapped);
+    mapper.emplace_back("--Mapper.multiple_models", "0");
     result.problem =
         Call("mapper", WithMapperOptions("mapper", mapper), [&](const std::string& line) {
           if (line.find("Registering image #") != std::string::npos) {
@@ -173,13 +170,24 @@ MapperResult MapperRun::Run(const Seed& seed, int num_images,
           }
         });
     if (!result.problem.empty()) return result;
-    last = mapped;
   }
-  result.problem = Call("point_triangulator",
-                        WithMapperOptions("point_triangulator",
-                                          only_seed ? append(Paths(last, closed), two_view_tracks)
-                                                    : Paths(last, closed)),
-                        nullptr);
+  result = Close(only_seed ? seeded : mapped, only_seed);
+  result.grew = result.model.images.size() > seed.poses.images.size();
+  return result;
+}
+
+MapperResult MapperRun::Adjust(const SparseModel& poses) {
+  ++num_runs_;
+  const std::string start = Folder("chained");
+  WriteSparseModelText(poses, start);
+  return Close(start, true);
+}
+
+MapperResult MapperRun::Close(const std::string& folder, bool two_view_tracks) {
+  MapperResult result;
+  const std::string closed = Folder("closed"), adjusted = Folder("adjusted");
+  result.problem =
+      Call("point_triangulator", TriangulatorOptions(folder, closed, two_view_tracks), nullptr);
   if (!result.problem.empty()) return result;
 
   ColmapOptions bundle = {
@@ -198,7 +206,6 @@ MapperResult MapperRun::Run(const Seed& seed, int num_images,
   result.folder = adjusted;
   result.model = ReadSparseModel(adjusted);
   result.mean_reprojection_error_px = MeanPointError(&result.model);
-  result.grew = result.model.images.size() > seed.poses.images.size();
   return result;
 }
 

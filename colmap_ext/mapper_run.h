@@ -40,6 +40,10 @@ class MapperRun {
   // in `problem`; COLMAP's refusal of an option's value is thrown as UsageError.
   MapperResult Run(const Seed& seed, int num_images, const std::function<void()>& on_registered);
 
+  // The last two steps for a model of poses: triangulates, also points that two views see, and
+  // adjusts. `problem` tells of a failure, as in Run.
+  MapperResult Adjust(const SparseModel& poses);
+
  private:
   std::string Folder(const std::string& name) const;
   // `options` that `command` knows, with the user's --Mapper.* on top.
@@ -49,6 +53,10 @@ class MapperRun {
   void AddGlobals(const std::string& command, ColmapOptions* options) const;
   std::string Call(const std::string& command, const ColmapOptions& options,
                    const std::function<void(const std::string&)>& on_line);
+  ColmapOptions TriangulatorOptions(const std::string& input, const std::string& output,
+                                    bool two_view_tracks) const;
+  // Triangulates and adjusts the model in a folder.
+  MapperResult Close(const std::string& folder, bool two_view_tracks);
   std::string MapperValue(const std::string& name, const std::string& fallback) const;
 
   ColmapProgram* colmap_;

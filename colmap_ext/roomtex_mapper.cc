@@ -9,6 +9,7 @@
 
 #include "colmap_ext/mapper_run.h"
 #include "colmap_ext/model_output.h"
+#include "colmap_ext/view_chaining.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/output_file.h"
@@ -22,7 +23,28 @@ struct Options {
   std::string colmap = "colmap";
   InitOptions init;
   MapperOptions mapper;
+  ChainOptions chain;
 };
+
+void AddChainOptions(ChainOptions* chain, Command* command) {
+  command->AddBool("Chain.enabled", &chain->enabled,
+                   "Register photos that COLMAP's mapper leaves out by their motion relative to a "
+                   "registered neighbour; 0 leaves them out.");
+  command->AddInt(
+      "Chain.min_num_inliers", &chain->min_num_inliers,
+      "Matches with the neighbour that must obey that motion, and points that the photo "
+      "must hold; larger = stricter.");
+  command->AddInt("Chain.min_common_points", &chain->min_common_points,
+                  "Points of the model that give the scale; larger = stricter.");
+  command->AddDouble("Chain.max_scale_spread", &chain->max_scale_spread,
+                     "Largest relative spread of the scale over these points; larger = more "
+                     "tolerant.");
+  command->AddDouble("Chain.min_confidence", &chain->min_confidence,
+                     "How many times better than its rival a pose must explain these points to be "
+                     "believed; larger = stricter.");
+  command->AddInt("Chain.max_neighbors", &chain->max_neighbors,
+                  "Registered neighbours that are tried per photo; larger = slower.");
+}
 
 void AddOptions(Options* options, Command* command) {
   using Kind = Command::Kind;
@@ -71,6 +93,7 @@ void AddOptions(Options* options, Command* command) {
                      "Photo to start from, as named in the database; empty = chosen.");
   command->AddString("Init.image_name2", &init.image_name2,
                      "The photo to pair it with; empty = chosen.");
+  AddChainOptions(&options->chain, command);
   command->PassThrough(
       "--Mapper.", &options->mapper.mapper_arguments,
       "Handed on to colmap mapper (see colmap mapper -h). --Mapper.init_* have no effect: "
@@ -131,7 +154,34 @@ Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::s
 struct Outcome {
   Seed seed;
   MapperResult result;
+  std::map<uint32_t, ChainedView> chained;
+  std::map<uint32_t, std::string> reasons;  // of photos that could not be chained
 };
+
+// How a photo was registered, or why it was not.
+Json ImageJson(const DatabaseImage& image, const Outcome& outcome, const MatchedImages& images) {
+  const bool registered = outcome.result.model.images.count(image.image_id) > 0;
+  const auto chained = outcome.chained.find(image.image_id);
+  Json json;
+  json["name"] = image.name;
+  json["registered"] = registered;
+  json["by"] = !registered                                           ? "none"
+               : chained != outcome.chained.end()                    ? "chained"
+               : outcome.seed.poses.images.count(image.image_id) > 0 ? "seed"
+                                                                     : "mapper";
+  if (registered && chained != outcome.chained.end()) {
+    json["neighbor"] = images.images().at(chained->second.neighbor_id).name;
+    json["num_common_points"] = chained->second.num_common_points;
+    json["scale_spread"] = chained->second.scale_spread;
+  }
+  if (!registered) {
+    const auto reason = outcome.reasons.find(image.image_id);
+    json["reason"] = reason != outcome.reasons.end()
+                         ? reason->second
+                         : "too few points of the model for colmap mapper, and --Chain.enabled 0";
+  }
+  return json;
+}
 
 void FillReport(const Outcome& outcome, const MatchedImages& images, Report* report) {
   const PairTrial& trial = outcome.seed.trial;
@@ -163,12 +213,7 @@ void FillReport(const Outcome& outcome, const MatchedImages& images, Report* rep
   r["init"] = init;
   r["images"] = Json::array();
   for (const auto& [image_id, image] : images.images()) {
-    const bool in_seed = outcome.seed.poses.images.count(image_id) > 0;
-    Json entry;
-    entry["name"] = image.name;
-    entry["registered"] = model.images.count(image_id) > 0;
-    entry["by"] = !entry["registered"] ? "none" : in_seed ? "seed" : "mapper";
-    r["images"].push_back(entry);
+    r["images"].push_back(ImageJson(image, outcome, images));
   }
 }
 
@@ -220,9 +265,35 @@ bool Better(const MapperResult& a, const MapperResult& b) {
                    "Add photos from other places that overlap well, or relax --Init.*");
 }
 
+// Registers what the mapper left out.
+void ChainLeftOut(const Database& database, const MatchedImages& images, MapperRun* mapper,
+                  const Options& options, const Command::Context& context, Outcome* outcome) {
+  // Rays by the intrinsics of the model, which may have been refined.
+  std::map<uint32_t, Camera> cameras = images.cameras();
+  for (const auto& [camera_id, camera] : outcome->result.model.cameras) {
+    cameras[camera_id] = camera;
+  }
+  MatchedImages model_images(cameras, images.images(), images.pairs(),
+                             [&](uint32_t image_id) { return database.ReadKeypoints(image_id); });
+  HypothesisOptions pair;
+  pair.keypoint_noise_px = options.init.keypoint_noise_px;
+  pair.max_error_px = options.init.max_error_px;
+  pair.random_seed = static_cast<uint64_t>(context.options.random_seed);
+  context.progress.Stage("chain photos");
+  ViewChainer chainer(&model_images, options.chain, pair, context.options.num_threads);
+  ChainResult chain = chainer.Run(std::move(outcome->result), [&](const SparseModel& poses) {
+    ThrowIfInterrupted();
+    return mapper->Adjust(poses);
+  });
+  outcome->result = std::move(chain.result);
+  outcome->chained = std::move(chain.chained);
+  outcome->reasons = std::move(chain.reasons);
+}
+
 // Seeds one after the other until COLMAP makes something of one.
-std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Options& options,
-                              const Command::Context& context, Json* trials) {
+std::vector<Outcome> TrySeeds(const Database& database, MatchedImages* images, MapperRun* mapper,
+                              const Options& options, const Command::Context& context,
+                              Json* trials) {
   const int num_images = static_cast<int>(images->images().size());
   std::vector<Outcome> best;  // at most one
   Initializer initializer(images, options.init, context.options.num_threads,
@@ -239,20 +310,25 @@ std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Op
     context.progress.Stage("colmap mapper", num_images);
     Outcome outcome;
     outcome.result = mapper->Run(*seed, num_images, [&] { context.progress.Tick(); });
-    const bool all_in_seed = static_cast<int>(seed->poses.images.size()) == num_images;
+    outcome.seed = std::move(*seed);
+    const int num_mapped = static_cast<int>(outcome.result.model.images.size());
+    if (options.chain.enabled && !outcome.result.folder.empty() && num_mapped < num_images) {
+      ChainLeftOut(database, *images, mapper, options, context, &outcome);
+    }
+    const bool all_in_seed = static_cast<int>(outcome.seed.poses.images.size()) == num_images;
     if (outcome.result.problem.empty() && !outcome.result.grew && !all_in_seed) {
       outcome.result.problem = "no further photo could be registered";
     }
     trials->push_back(
-        TrialJson(seed->trial, *images,
+        TrialJson(outcome.seed.trial, *images,
                   outcome.result.problem.empty()
                       ? std::to_string(outcome.result.model.images.size()) + " photos registered"
                       : outcome.result.problem));
     if (!outcome.result.problem.empty()) {
-      context.Warn("starting from " + images->images().at(seed->trial.image_id1).name + " and " +
-                   images->images().at(seed->trial.image_id2).name + ": " + outcome.result.problem);
+      context.Warn("starting from " + images->images().at(outcome.seed.trial.image_id1).name +
+                   " and " + images->images().at(outcome.seed.trial.image_id2).name + ": " +
+                   outcome.result.problem);
     }
-    outcome.seed = std::move(*seed);
     if (outcome.result.folder.empty()) continue;
     const bool enough = 2 * outcome.result.model.images.size() >= images->images().size();
     if (best.empty() || Better(outcome.result, best[0].result)) {
@@ -268,7 +344,9 @@ std::vector<Outcome> TrySeeds(MatchedImages* images, MapperRun* mapper, const Op
 }
 
 void MapPhotos(const Options& options, const Command::Context& context) {
-  ThrowIfProblems(options.init.Problems());
+  std::vector<std::string> problems = options.init.Problems();
+  for (const std::string& problem : options.chain.Problems()) problems.push_back(problem);
+  ThrowIfProblems(problems);
   RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
   context.progress.Stage("read database");
   const Database database(options.database_path);
@@ -301,7 +379,7 @@ void MapPhotos(const Options& options, const Command::Context& context) {
 
   Json trials = Json::array();
   context.progress.Stage("initialise");
-  std::vector<Outcome> best = TrySeeds(&images, &mapper, options, context, &trials);
+  std::vector<Outcome> best = TrySeeds(database, &images, &mapper, options, context, &trials);
   context.report["pairs_tried"] = trials.size();
   context.report["pair_trials"] = trials;
   if (best.empty()) ThrowNothingWorked(options.database_path, trials);

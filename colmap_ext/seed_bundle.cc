@@ -115,6 +115,11 @@ SeedBundleResult AdjustSeed(const SeedGeometry& start,
     double* q = views[i].rotation.coeffs().data();
     double* t = views[i].translation.data();
     if (!problem.HasParameterBlock(q)) continue;
+    if (static_cast<int>(i) < options.num_fixed_views) {
+      problem.SetParameterBlockConstant(q);
+      problem.SetParameterBlockConstant(t);
+      continue;
+    }
     problem.SetManifold(q, new ceres::EigenQuaternionManifold);
     if (i == 1 && !options.free_baseline) problem.SetManifold(t, new ceres::SphereManifold<3>);
     ordering->AddElementToGroup(q, 1);
@@ -134,7 +139,7 @@ SeedBundleResult AdjustSeed(const SeedGeometry& start,
   }
   const double baseline = views.size() > 1 ? views[1].translation.norm() : 0;
   result.usable = summary.IsSolutionUsable() && baseline > 1e-9 && std::isfinite(baseline);
-  if (!result.usable) return result;
+  if (!result.usable || options.num_fixed_views > 1) return result;
   for (size_t i = 1; i < views.size(); ++i) {
     result.geometry.views_from_left[i].translation /= baseline;
   }

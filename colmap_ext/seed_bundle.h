@@ -33,6 +33,9 @@ struct SeedBundleOptions {
   // Same-pose start (thesis 6.1.3): the second view stands on the first one, so its distance cannot
   // be held at 1; it is freed, and the result is scaled to 1 afterwards.
   bool free_baseline = false;
+  // Leading views that stay where they are. With more than one they hold the scale: the second one
+  // may be at any distance, and nothing is scaled.
+  int num_fixed_views = 1;
 };
 
 struct SeedBundleResult {
