@@ -11,12 +11,14 @@ namespace {
 
 // Bytes from here on may be clipped; JPEG smears 255 a little.
 constexpr float kClipStart = 244, kClipEnd = 254;
-constexpr float kClippedReliability = 0.02f;
+// What is left of the weight of a clipped colour when another photo has it unclipped, and when the
+// best photos of a sample are chosen.
+constexpr float kClippedReliability = 0.04f, kClippedRank = 0.5f;
 
 float ReliabilityOfByte(int brightest) {
   const float share =
       std::clamp((kClipEnd - static_cast<float>(brightest)) / (kClipEnd - kClipStart), 0.0f, 1.0f);
-  return kClippedReliability + (1 - kClippedReliability) * share;
+  return kClippedRank + (1 - kClippedRank) * share;
 }
 
 // Catmull-Rom spline: weights of the four pixels around a place, t = 0..1 behind the second one.
@@ -39,6 +41,30 @@ bool TwoAgree(const Eigen::Vector3f* colors, int count) {
     }
   }
   return false;
+}
+
+// What one photo says about a sample, for weighing it against the others.
+struct Vote {
+  Eigen::Vector3f root;              // of the colour after its gain
+  Eigen::Array<bool, 3, 1> clipped;  // a clipped channel only says "at least this"
+  float weight;  // as if nothing were clipped: a clipped photo is no less of a witness
+};
+
+Vote VoteOf(const Eigen::Vector3f& photographed, const Eigen::Vector3f& color, float weight) {
+  static const float clip_end = LinearFromSrgbByte()[static_cast<int>(kClipEnd)];
+  const int brightest = SrgbByteFromLinear(photographed.maxCoeff());
+  return {Root(color), photographed.array() >= clip_end, weight / ReliabilityOfByte(brightest)};
+}
+
+// 1 for equal colours, 1/2 at the distance `scale`; two values that clipping reconciles are equal.
+float Agreement(const Vote& a, const Vote& b, float scale) {
+  float distance2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float difference = a.root[k] - b.root[k];
+    const bool reconciled = difference < 0 ? a.clipped[k] : b.clipped[k];
+    if (!reconciled) distance2 += difference * difference;
+  }
+  return 1 / (1 + distance2 / (scale * scale));
 }
 
 }  // namespace
@@ -110,51 +136,85 @@ PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
   return mean;
 }
 
-BlendedSample BlendSample(const Observation* observations, int count,
-                          const std::vector<Eigen::Vector3f>& gains, double outlier) {
-  BlendedSample result;
-  if (count <= 0) return result;
-  constexpr int kMost = 64;  // BlendOptions::Problems
-  std::array<Eigen::Vector3f, kMost> colors, roots;
-  std::array<float, kMost> weights;
-  count = std::min(count, kMost);
-  for (int i = 0; i < count; ++i) {
-    colors[i] = UnpackColor(observations[i].color).cwiseProduct(gains[observations[i].photo]);
-    weights[i] = UnpackWeight(observations[i].weight);
+namespace {
+
+constexpr int kMostViews = 64;  // BlendOptions::Problems
+
+// The observations of one sample, brought to one exposure.
+struct SampleViews {
+  int count = 0;
+  std::array<Eigen::Vector3f, kMostViews> colors;
+  std::array<Eigen::Array3i, kMostViews> clipped;  // 1 = the surface is this light or lighter
+  std::array<float, kMostViews> weights;
+
+  // 1 for equal colours, 1/2 at the distance `outlier`. A clipped channel agrees with everything
+  // lighter.
+  float Agreement(int i, int j, float outlier) const {
+    const Eigen::Array3f step = (Root(colors[j]) - Root(colors[i])).array();
+    float square = 0;
+    for (int k = 0; k < 3; ++k) {
+      if ((clipped[i][k] != 0 && step[k] > 0) || (clipped[j][k] != 0 && step[k] < 0)) continue;
+      square += step[k] * step[k];
+    }
+    return 1 / (1 + square / (outlier * outlier));
   }
-  if (observations[0].in_doubt != 0 && !TwoAgree(colors.data(), count)) return result;
-  if (outlier > 0 && count > 1) {
-    const auto scale2 = static_cast<float>(outlier * outlier);
-    for (int i = 0; i < count; ++i) roots[i] = Root(colors[i]);
-    const auto agreement = [&](int i, int j) {
-      const float share = 1 + (roots[i] - roots[j]).squaredNorm() / scale2;
-      return 1 / share;
-    };
-    // The observation that most weight agrees with; of equals the heavier one.
+
+  // The observation that most weight agrees with; of equals the heavier one.
+  int Central(float outlier) const {
     int central = 0;
     float most = -1;
     for (int i = 0; i < count; ++i) {
       float sum = 0;
-      for (int j = 0; j < count; ++j) sum += weights[j] * agreement(i, j);
+      for (int j = 0; j < count; ++j) sum += weights[j] * Agreement(i, j, outlier);
       if (sum > most) {
         most = sum;
         central = i;
       }
     }
-    std::array<float, kMost> kept = weights;
-    for (int i = 0; i < count; ++i) {
-      const float share = agreement(central, i);
-      kept[i] = weights[i] * share * share;
+    return central;
+  }
+};
+
+SampleViews UnpackViews(const Observation* observations, int count,
+                        const std::vector<Eigen::Vector3f>& gains) {
+  constexpr float kClipped = 0.92f;  // linear light of the byte 246
+  SampleViews views;
+  views.count = std::min(count, kMostViews);
+  for (int i = 0; i < views.count; ++i) {
+    const Eigen::Vector3f color = UnpackColor(observations[i].color);
+    views.colors[i] = color.cwiseProduct(gains[observations[i].photo]);
+    views.clipped[i] = (color.array() > kClipped).cast<int>();
+    views.weights[i] = UnpackWeight(observations[i].weight);
+  }
+  return views;
+}
+
+}  // namespace
+
+BlendedSample BlendSample(const Observation* observations, int count,
+                          const std::vector<Eigen::Vector3f>& gains, double outlier) {
+  BlendedSample result;
+  if (count <= 0) return result;
+  SampleViews views = UnpackViews(observations, count, gains);
+  if (observations[0].in_doubt != 0 && !TwoAgree(views.colors.data(), views.count)) return result;
+  if (outlier > 0 && views.count > 1) {
+    const auto scale = static_cast<float>(outlier);
+    const int central = views.Central(scale);
+    for (int i = 0; i < views.count; ++i) {
+      const float share = views.Agreement(central, i, scale);
+      views.weights[i] *= share * share;
     }
-    weights = kept;
   }
   float sum = 0, largest = -1;
-  for (int i = 0; i < count; ++i) {
-    sum += weights[i];
-    result.blend += weights[i] * colors[i];
-    if (weights[i] > largest) {
-      largest = weights[i];
-      result.dominant = colors[i];
+  for (int i = 0; i < views.count; ++i) {
+    // Only now: however light a surface is, those that see it clipped outvote what is no part of
+    // it.
+    if (views.clipped[i].any()) views.weights[i] *= kClippedReliability;
+    sum += views.weights[i];
+    result.blend += views.weights[i] * views.colors[i];
+    if (views.weights[i] > largest) {
+      largest = views.weights[i];
+      result.dominant = views.colors[i];
       result.dominant_photo = observations[i].photo;
     }
   }
