@@ -43,30 +43,6 @@ bool TwoAgree(const Eigen::Vector3f* colors, int count) {
   return false;
 }
 
-// What one photo says about a sample, for weighing it against the others.
-struct Vote {
-  Eigen::Vector3f root;              // of the colour after its gain
-  Eigen::Array<bool, 3, 1> clipped;  // a clipped channel only says "at least this"
-  float weight;  // as if nothing were clipped: a clipped photo is no less of a witness
-};
-
-Vote VoteOf(const Eigen::Vector3f& photographed, const Eigen::Vector3f& color, float weight) {
-  static const float clip_end = LinearFromSrgbByte()[static_cast<int>(kClipEnd)];
-  const int brightest = SrgbByteFromLinear(photographed.maxCoeff());
-  return {Root(color), photographed.array() >= clip_end, weight / ReliabilityOfByte(brightest)};
-}
-
-// 1 for equal colours, 1/2 at the distance `scale`; two values that clipping reconciles are equal.
-float Agreement(const Vote& a, const Vote& b, float scale) {
-  float distance2 = 0;
-  for (int k = 0; k < 3; ++k) {
-    const float difference = a.root[k] - b.root[k];
-    const bool reconciled = difference < 0 ? a.clipped[k] : b.clipped[k];
-    if (!reconciled) distance2 += difference * difference;
-  }
-  return 1 / (1 + distance2 / (scale * scale));
-}
-
 }  // namespace
 
 std::vector<std::string> BlendOptions::Problems() const {
@@ -145,6 +121,7 @@ struct SampleViews {
   int count = 0;
   std::array<Eigen::Vector3f, kMostViews> colors;
   std::array<Eigen::Array3i, kMostViews> clipped;  // 1 = the surface is this light or lighter
+  std::array<float, kMostViews> reliability;       // 1, less towards clipped colours
   std::array<float, kMostViews> weights;
 
   // 1 for equal colours, 1/2 at the distance `outlier`. A clipped channel agrees with everything
@@ -177,13 +154,15 @@ struct SampleViews {
 
 SampleViews UnpackViews(const Observation* observations, int count,
                         const std::vector<Eigen::Vector3f>& gains) {
-  constexpr float kClipped = 0.92f;  // linear light of the byte 246
+  constexpr float kUnclipped = 0.75f, kClipped = 0.92f;  // linear light of the bytes 225 and 246
   SampleViews views;
   views.count = std::min(count, kMostViews);
   for (int i = 0; i < views.count; ++i) {
     const Eigen::Vector3f color = UnpackColor(observations[i].color);
     views.colors[i] = color.cwiseProduct(gains[observations[i].photo]);
     views.clipped[i] = (color.array() > kClipped).cast<int>();
+    const float share = (kClipped - color.maxCoeff()) / (kClipped - kUnclipped);
+    views.reliability[i] = std::clamp(share, kClippedReliability, 1.0f);  // even: no visible step
     views.weights[i] = UnpackWeight(observations[i].weight);
   }
   return views;
@@ -209,7 +188,7 @@ BlendedSample BlendSample(const Observation* observations, int count,
   for (int i = 0; i < views.count; ++i) {
     // Only now: however light a surface is, those that see it clipped outvote what is no part of
     // it.
-    if (views.clipped[i].any()) views.weights[i] *= kClippedReliability;
+    views.weights[i] *= views.reliability[i];
     sum += views.weights[i];
     result.blend += views.weights[i] * views.colors[i];
     if (views.weights[i] > largest) {

@@ -56,7 +56,7 @@ float ResolutionWeight(float pixels_per_sample);
 // of linear light: half a decibel nearer to the truth than bilinear on the simulated room.
 struct PhotoColor {
   Eigen::Vector3f linear;  // r, g, b, 0..1
-  float reliability;  // 1; falls to 0.02 towards pixels whose brightest channel is clipped at 255
+  float reliability;  // 1; falls to 1/2 towards pixels whose brightest channel is clipped at 255
 };
 PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y);
 // Mean over a square of the given side in pixels around the position.

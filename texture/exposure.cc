@@ -8,6 +8,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "texture/blend.h"
+
 namespace roomtex {
 namespace {
 
@@ -284,11 +286,13 @@ float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector
   const size_t stride = SampleStride(store, gains.size());
   for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
     if (store.Count(sample) == 0) continue;
-    const Observation& best = *store.Begin(sample);
-    lightest.push_back(UnpackColor(best.color).cwiseProduct(gains[best.photo]).maxCoeff());
+    const BlendedSample blended =
+        BlendSample(store.Begin(sample), store.Count(sample), gains, BlendOptions().outlier);
+    if (blended.dominant_photo >= 0) lightest.push_back(blended.blend.maxCoeff());
   }
   if (lightest.empty()) return 1;
-  const auto high = lightest.begin() + static_cast<long>(0.999 * (lightest.size() - 1));
+  const auto high =
+      lightest.begin() + static_cast<long>(0.99 * static_cast<double>(lightest.size() - 1));
   std::nth_element(lightest.begin(), high, lightest.end());
   return std::clamp(1 / std::max(*high, 1e-6f), 0.5f, 1.0f);
 }

@@ -53,7 +53,7 @@ ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
                                const std::vector<Overlap>& overlaps,
                                const ExposureOptions& options);
 
-// Factor <= 1 for the whole result so that at most one sample in a thousand is lighter than 1 (but
+// Factor <= 1 for the whole result so that at most one sample in a hundred is lighter than 1 (but
 // never below 1/2): the overall brightness is that of the reference photo, unless this would blow
 // out lights.
 float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector3f>& gains);

@@ -117,7 +117,7 @@ TEST(BlendSample, ClippedPhotosOutvoteOneThatContradictsThem) {
     const bool wrong = i == 0;
     observations[i].color =
         PackColor(wrong ? Eigen::Vector3f(0.1f, 0.01f, 0.02f) : Eigen::Vector3f(1, 1, 1));
-    observations[i].weight = PackWeight(wrong ? 0.8f : 0.8f * 0.02f);
+    observations[i].weight = PackWeight(wrong ? 0.8f : 0.8f * 0.5f);
     observations[i].photo = static_cast<uint16_t>(i);
     gains.emplace_back(
         Eigen::Vector3f::Constant(wrong ? 1.0f : 0.7f + 0.1f * static_cast<float>(i)));
