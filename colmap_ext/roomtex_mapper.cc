@@ -8,6 +8,7 @@
 #include <set>
 
 #include "colmap_ext/mapper_run.h"
+#include "colmap_ext/model_check.h"
 #include "colmap_ext/model_output.h"
 #include "colmap_ext/view_chaining.h"
 #include "core/command_line.h"
@@ -265,22 +266,30 @@ bool Better(const MapperResult& a, const MapperResult& b) {
                    "Add photos from other places that overlap well, or relax --Init.*");
 }
 
-// Registers what the mapper left out.
-void ChainLeftOut(const Database& database, const MatchedImages& images, MapperRun* mapper,
-                  const Options& options, const Command::Context& context, Outcome* outcome) {
-  // Rays by the intrinsics of the model, which may have been refined.
+// The matches as rays by the intrinsics of the model, which may have been refined.
+MatchedImages ImagesOfModel(const Database& database, const MatchedImages& images,
+                            const SparseModel& model) {
   std::map<uint32_t, Camera> cameras = images.cameras();
-  for (const auto& [camera_id, camera] : outcome->result.model.cameras) {
-    cameras[camera_id] = camera;
-  }
-  MatchedImages model_images(cameras, images.images(), images.pairs(),
-                             [&](uint32_t image_id) { return database.ReadKeypoints(image_id); });
+  for (const auto& [camera_id, camera] : model.cameras) cameras[camera_id] = camera;
+  return MatchedImages(cameras, images.images(), images.pairs(),
+                       [&database](uint32_t image_id) { return database.ReadKeypoints(image_id); });
+}
+
+HypothesisOptions PairOptions(const Options& options, const Command::Context& context) {
   HypothesisOptions pair;
   pair.keypoint_noise_px = options.init.keypoint_noise_px;
   pair.max_error_px = options.init.max_error_px;
   pair.random_seed = static_cast<uint64_t>(context.options.random_seed);
+  return pair;
+}
+
+// Registers what the mapper left out.
+void ChainLeftOut(const Database& database, const MatchedImages& images, MapperRun* mapper,
+                  const Options& options, const Command::Context& context, Outcome* outcome) {
+  MatchedImages model_images = ImagesOfModel(database, images, outcome->result.model);
   context.progress.Stage("chain photos");
-  ViewChainer chainer(&model_images, options.chain, pair, context.options.num_threads);
+  ViewChainer chainer(&model_images, options.chain, PairOptions(options, context),
+                      context.options.num_threads);
   ChainResult chain = chainer.Run(std::move(outcome->result), [&](const SparseModel& poses) {
     ThrowIfInterrupted();
     return mapper->Adjust(poses);
@@ -288,6 +297,37 @@ void ChainLeftOut(const Database& database, const MatchedImages& images, MapperR
   outcome->result = std::move(chain.result);
   outcome->chained = std::move(chain.chained);
   outcome->reasons = std::move(chain.reasons);
+}
+
+// The third-view test on pairs that the model was not started from.
+void CheckFinished(const Database& database, const MatchedImages& images, const Options& options,
+                   const Command::Context& context, const Outcome& outcome) {
+  const SparseModel& model = outcome.result.model;
+  MatchedImages model_images = ImagesOfModel(database, images, model);
+  ModelCheckOptions check_options;
+  check_options.pair = PairOptions(options, context);
+  check_options.min_confidence = options.init.min_confidence;
+  context.progress.Stage("check model");
+  const PairTrial& trial = outcome.seed.trial;
+  const ModelCheck check = CheckModel(&model_images, model, {trial.image_id1, trial.image_id2},
+                                      check_options, context.options.num_threads);
+  Json& json = context.report["check"];
+  json["num_pairs"] = check.num_pairs;
+  json["contradicting"] = Json::array();
+  std::string names;
+  for (const auto& [image_id1, image_id2] : check.contradicting) {
+    const std::string name1 = images.images().at(image_id1).name,
+                      name2 = images.images().at(image_id2).name;
+    json["contradicting"].push_back({name1, name2});
+    if (names.empty()) names = name1 + " and " + name2;
+  }
+  if (check.trusted) return;
+  context.report.SetUntrusted(
+      "the model is contradicted by its own photos: for " +
+      std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +
+      " pairs, e.g. " + names +
+      ", a third photo supports another camera motion. Start from another pair "
+      "(--Init.image_name1), or add photos that show something off the wall.");
 }
 
 // Seeds one after the other until COLMAP makes something of one.
@@ -386,6 +426,7 @@ void MapPhotos(const Options& options, const Command::Context& context) {
   const Outcome& outcome = best[0];
   FillReport(outcome, images, &context.report);
   JudgeTrust(outcome, images, &context.report);
+  CheckFinished(database, images, options, context, outcome);
 
   context.progress.Stage("write model");
   const std::string init_scratch = scratch / "init";

@@ -104,6 +104,8 @@ TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
   EXPECT_EQ(report["pair"].size(), 2u);
   EXPECT_FALSE(report["degenerate"].get<bool>());
   EXPECT_TRUE(report["trusted"].get<bool>());
+  EXPECT_GE(report["check"]["num_pairs"].get<int>(), 3);
+  EXPECT_TRUE(report["check"]["contradicting"].empty());
   EXPECT_GT(report["num_f_inliers"].get<int>(), report["num_h_inliers"].get<int>());
   EXPECT_GT(report["mean_reprojection_error_px"].get<double>(), 0.2);
   EXPECT_LT(report["mean_reprojection_error_px"].get<double>(), 0.9);
@@ -168,6 +170,31 @@ TEST_F(MapperCommand, SaysThatTwoPhotosOfAWallAreAmbiguous) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_NE(result.err.find("planar-ambiguous"), std::string::npos) << result.err;
   EXPECT_FALSE(Report()["trusted"].get<bool>());
+}
+
+TEST_F(MapperCommand, DoesNotTrustABentModel) {
+  Simulate(RoomOptions(5));
+  SparseModel bent;  // what COLMAP's last step is made to give: the photos turn more and more
+  bent.cameras = views_.cameras;
+  for (const auto& [image_id, image] : views_.images) {
+    Rigid bend;
+    bend.rotation = Eigen::AngleAxisd(0.12 * image_id, Eigen::Vector3d::UnitY());
+    SparseImage& entry = bent.images[image_id];
+    entry.image_id = image_id;
+    entry.camera_id = image.camera_id;
+    entry.name = image.name;
+    entry.cam_from_model = bend * views_.cam_from_scene.at(image_id);
+  }
+  WriteSparseModel(bent, folder_ / "bent");
+  WriteScript("colmap-bends",
+              "if [ \"$1\" = bundle_adjuster ] && [ \"$2\" != -h ]; then\n"
+              "  while [ \"$1\" != --output_path ]; do shift; done\n"
+              "  cp " +
+                  (folder_ / "bent") + "/* \"$2\"; exit 0\nfi\nexec colmap \"$@\"\n");
+  const CommandResult result = Run("--colmap " + (folder_ / "colmap-bends"));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("contradicted by its own photos"), std::string::npos) << result.err;
+  EXPECT_FALSE(Report()["check"]["contradicting"].empty());
 }
 
 TEST_F(MapperCommand, SaysWhenFewerThanHalfOfThePhotosRegister) {

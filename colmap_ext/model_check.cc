@@ -1,0 +1,116 @@
+#include "colmap_ext/model_check.h"
+
+#include <algorithm>
+#include <set>
+
+#include "colmap_ext/third_view.h"
+#include "core/parallel.h"
+
+namespace roomtex {
+namespace {
+
+struct TestedPair {
+  const DatabasePair* pair = nullptr;
+  std::vector<RayMatch> matches;
+  std::vector<ThirdView> views;
+  TwoViewHypothesis model_motion;
+  bool decided = false, contradicts = false;
+};
+
+// For photos spread evenly over the model, the pair with most matches that is not taken yet.
+std::vector<const DatabasePair*> ChoosePairs(const MatchedImages& images, const SparseModel& model,
+                                             const std::pair<uint32_t, uint32_t>& without,
+                                             const ModelCheckOptions& options) {
+  std::map<uint32_t, std::vector<const DatabasePair*>> pairs_of_image;
+  for (const DatabasePair& pair : images.pairs()) {
+    if (static_cast<int>(pair.matches.size()) < options.pair.min_num_inliers) continue;
+    if (model.images.count(pair.image_id1) == 0 || model.images.count(pair.image_id2) == 0) {
+      continue;
+    }
+    if (std::minmax(without.first, without.second) == std::minmax(pair.image_id1, pair.image_id2)) {
+      continue;
+    }
+    pairs_of_image[pair.image_id1].push_back(&pair);
+    pairs_of_image[pair.image_id2].push_back(&pair);
+  }
+  std::vector<std::vector<const DatabasePair*>> lists;
+  for (auto& [image_id, pairs] : pairs_of_image) {
+    std::stable_sort(pairs.begin(), pairs.end(), [](const DatabasePair* a, const DatabasePair* b) {
+      return a->matches.size() > b->matches.size();
+    });
+    lists.push_back(std::move(pairs));
+  }
+  std::vector<const DatabasePair*> chosen;
+  std::set<const DatabasePair*> taken;
+  const size_t count = std::min(lists.size(), static_cast<size_t>(options.max_pairs));
+  for (size_t k = 0; k < count; ++k) {
+    for (const DatabasePair* pair : lists[k * lists.size() / count]) {
+      if (!taken.insert(pair).second) continue;
+      chosen.push_back(pair);
+      break;
+    }
+  }
+  return chosen;
+}
+
+// Whether another motion explains the third views clearly better than the model's own, both
+// refined from where they are.
+void TestPair(const ModelCheckOptions& options, TestedPair* tested) {
+  HypothesisOptions pair_options = options.pair;
+  pair_options.random_seed += PairIdFromImages(tested->pair->image_id1, tested->pair->image_id2);
+  const TwoViewAnalysis analysis = AnalysePair(tested->matches, pair_options);
+  // By the motion found anew: under a wrong one the rays meet anywhere.
+  if (analysis.hypotheses.empty() ||
+      !(analysis.hypotheses.front().median_angle_deg >= options.min_tri_angle_deg)) {
+    return;
+  }
+  std::vector<TwoViewHypothesis> hypotheses = {tested->model_motion};
+  hypotheses.insert(hypotheses.end(), analysis.hypotheses.begin(), analysis.hypotheses.end());
+  ThirdViewOptions third;
+  third.pair = pair_options;
+  const ThirdViewDecision decision =
+      DecideByThirdViews(tested->matches, hypotheses, tested->views, third);
+  if (decision.num_views == 0) return;
+  tested->decided = true;
+  const double least = decision.verdicts[decision.best].cost;
+  tested->contradicts = decision.verdicts[0].cost > options.min_confidence * least;
+}
+
+}  // namespace
+
+ModelCheck CheckModel(MatchedImages* images, const SparseModel& model,
+                      const std::pair<uint32_t, uint32_t>& without,
+                      const ModelCheckOptions& options, int num_threads) {
+  std::vector<TestedPair> pairs;
+  const int min_sightings = ThirdViewOptions().min_sightings;
+  for (const DatabasePair* pair : ChoosePairs(*images, model, without, options)) {
+    TestedPair tested;
+    tested.pair = pair;
+    tested.matches = images->Matches(*pair);
+    Rigid motion = model.images.at(pair->image_id2).cam_from_model *
+                   model.images.at(pair->image_id1).cam_from_model.Inverse();
+    motion.translation.normalize();
+    tested.model_motion = EvaluatePose(motion, tested.matches, options.pair);
+    const int all = static_cast<int>(images->images().size());
+    for (ThirdView& view : images->FindThirdViews(*pair, tested.matches, min_sightings, all)) {
+      if (model.images.count(view.image_id) == 0) continue;
+      if (static_cast<int>(tested.views.size()) == options.max_third_views) break;
+      tested.views.push_back(std::move(view));
+    }
+    if (!tested.views.empty()) pairs.push_back(std::move(tested));
+  }
+  ParallelFor(num_threads, 0, static_cast<int>(pairs.size()),
+              [&](int i) { TestPair(options, &pairs[i]); });
+  ModelCheck check;
+  for (const TestedPair& tested : pairs) {
+    if (!tested.decided) continue;
+    ++check.num_pairs;
+    if (!tested.contradicts) continue;
+    check.contradicting.emplace_back(tested.pair->image_id1, tested.pair->image_id2);
+  }
+  check.trusted = static_cast<double>(check.contradicting.size()) <=
+                  options.max_contradicting * check.num_pairs;
+  return check;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,40 @@
+#pragma once
+// The third-view test (third_view.h) once more, on a finished model: pairs that it was not started
+// from are solved anew, and other photos of the model decide whether its motion or another one is
+// right. A model that took a wall's second solution, or bent on the way, fails.
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/matched_images.h"
+#include "colmap_ext/sparse_model.h"
+#include "colmap_ext/two_view_hypotheses.h"
+
+namespace roomtex {
+
+struct ModelCheckOptions {
+  HypothesisOptions pair;
+  // Cost of the model's motion / least cost from which on the model is contradicted; larger = more
+  // tolerant.
+  double min_confidence = 1.3;
+  int max_pairs = 12;       // spread over the photos; larger = slower
+  int max_third_views = 2;  // per pair
+  // Smallest median angle between the rays of a pair, degrees: below, its motion is too uncertain.
+  double min_tri_angle_deg = 2;
+  // Share of the tested pairs that must contradict; one pair alone does where fewer are tested.
+  double max_contradicting = 0.25;
+};
+
+struct ModelCheck {
+  int num_pairs = 0;  // that could be tested
+  std::vector<std::pair<uint32_t, uint32_t>> contradicting;
+  bool trusted = true;
+};
+
+// without: the pair that the model was started from. The cameras of `images` are the model's.
+ModelCheck CheckModel(MatchedImages* images, const SparseModel& model,
+                      const std::pair<uint32_t, uint32_t>& without,
+                      const ModelCheckOptions& options, int num_threads);
+
+}  // namespace roomtex
