@@ -114,6 +114,7 @@ PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
 
 namespace {
 
+constexpr float kFits = 0.1f;   // agreement: at three times the distance `outlier`
 constexpr int kMostViews = 64;  // BlendOptions::Problems
 
 // The observations of one sample, brought to one exposure.
@@ -176,26 +177,26 @@ BlendedSample BlendSample(const Observation* observations, int count,
   if (count <= 0) return result;
   SampleViews views = UnpackViews(observations, count, gains);
   if (observations[0].in_doubt != 0 && !TwoAgree(views.colors.data(), views.count)) return result;
+  // S by the geometry alone: it changes where the best photo changes, not from sample to sample.
+  result.dominant = views.colors[0];
+  result.dominant_photo = observations[0].photo;
+  result.dominant_fits = views.reliability[0] > 0.5f;
   if (outlier > 0 && views.count > 1) {
     const auto scale = static_cast<float>(outlier);
     const int central = views.Central(scale);
+    result.dominant_fits = result.dominant_fits && views.Agreement(central, 0, scale) > kFits;
     for (int i = 0; i < views.count; ++i) {
       const float share = views.Agreement(central, i, scale);
       views.weights[i] *= share * share;
     }
   }
-  float sum = 0, largest = -1;
+  float sum = 0;
   for (int i = 0; i < views.count; ++i) {
     // Only now: however light a surface is, those that see it clipped outvote what is no part of
     // it.
     views.weights[i] *= views.reliability[i];
     sum += views.weights[i];
     result.blend += views.weights[i] * views.colors[i];
-    if (views.weights[i] > largest) {
-      largest = views.weights[i];
-      result.dominant = views.colors[i];
-      result.dominant_photo = observations[i].photo;
-    }
   }
   result.blend /= sum;
   return result;

@@ -68,6 +68,8 @@ struct BlendedSample {
   Eigen::Vector3f blend = Eigen::Vector3f::Zero();     // M, linear light
   Eigen::Vector3f dominant = Eigen::Vector3f::Zero();  // C, of the photo with the largest weight
   int dominant_photo = -1;                             // S; -1 = no photo sees the sample
+  bool dominant_fits =
+      false;  // the dominant photo does not contradict the blend: it may give detail
 };
 // gains: linear, one 3-vector (r, g, b) per photo. A sample whose observations are all in doubt has
 // a colour only if two of them agree.

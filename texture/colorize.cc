@@ -46,6 +46,7 @@ BlendedGrid BlendGrid(const GridOfSamples& grid, const PhotoPassInput& input,
   result.blend.assign(count, Eigen::Vector3f::Zero());
   result.dominant.color.assign(count, Eigen::Vector3f::Zero());
   result.dominant.photo.assign(count, -1);
+  result.dominant.fits.assign(count, 0);
   const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
   ParallelFor(num_threads, first, end, [&](int t) {
     const SampleTile& tile = input.samples[t];
@@ -56,6 +57,7 @@ BlendedGrid BlendGrid(const GridOfSamples& grid, const PhotoPassInput& input,
       result.blend[tile.index[i]] = sample.blend;
       result.dominant.color[tile.index[i]] = sample.dominant;
       result.dominant.photo[tile.index[i]] = static_cast<int16_t>(sample.dominant_photo);
+      result.dominant.fits[tile.index[i]] = sample.dominant_fits;
     }
   });
   return result;

@@ -21,7 +21,7 @@ std::vector<float> HalfGaussian(double sigma) {
 
 // One direction of the Gaussian within the runs of connected, coloured samples.
 void BlurAlong(const Scan& scan, const GridLinks& links, bool columns,
-               const std::vector<int16_t>& photo, const std::vector<float>& kernel, int num_threads,
+               const std::vector<uint8_t>& fits, const std::vector<float>& kernel, int num_threads,
                std::vector<Eigen::Vector3f>* values) {
   const int radius = static_cast<int>(kernel.size()) - 1;
   ForEachRun(scan, links, columns, num_threads, [&](const std::vector<int>& run, int) {
@@ -29,10 +29,10 @@ void BlurAlong(const Scan& scan, const GridLinks& links, bool columns,
     std::vector<Eigen::Vector4f> line(n);  // value and whether there is one
     for (int i = 0; i < n; ++i) {
       line[i] << (*values)[run[i]], 1.0f;
-      if (photo[run[i]] < 0) line[i].setZero();
+      if (fits[run[i]] == 0) line[i].setZero();
     }
     for (int i = 0; i < n; ++i) {
-      if (photo[run[i]] < 0) continue;
+      if (fits[run[i]] == 0) continue;
       Eigen::Vector4f sum = kernel[0] * line[i];
       for (int k = 1; k <= std::min(radius, i); ++k) sum += kernel[k] * line[i - k];
       for (int k = 1; k <= std::min(radius, n - 1 - i); ++k) sum += kernel[k] * line[i + k];
@@ -81,10 +81,10 @@ void PreserveDetail(const Scan& scan, const GridLinks& links, const DominantMap&
   std::vector<Eigen::Vector3f> low(blend->size());
   for (size_t i = 0; i < low.size(); ++i) low[i] = dominant.color[i] - (*blend)[i];
   const std::vector<float> kernel = HalfGaussian(options.sigma);
-  BlurAlong(scan, links, false, dominant.photo, kernel, num_threads, &low);
-  BlurAlong(scan, links, true, dominant.photo, kernel, num_threads, &low);
+  BlurAlong(scan, links, false, dominant.fits, kernel, num_threads, &low);
+  BlurAlong(scan, links, true, dominant.fits, kernel, num_threads, &low);
   for (size_t i = 0; i < low.size(); ++i) {
-    if (dominant.photo[i] < 0 || borders[i] != 0) continue;
+    if (dominant.fits[i] == 0 || borders[i] != 0) continue;
     const Eigen::Vector3f detail = dominant.color[i] - (*blend)[i] - low[i];
     (*blend)[i] = ((*blend)[i] + detail).cwiseMax(0);
   }

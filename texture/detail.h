@@ -27,6 +27,7 @@ struct DetailOptions {
 struct DominantMap {
   std::vector<Eigen::Vector3f> color;  // C = M_S
   std::vector<int16_t> photo;          // S
+  std::vector<uint8_t> fits;           // 0 = no detail from this sample
 };
 
 // Adds the detail to `blend` (M, linear light, one per grid cell):

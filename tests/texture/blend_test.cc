@@ -102,7 +102,7 @@ TEST(BlendSample, LeavesOutAColorThatTheOthersContradict) {
                                Seen(0.21f, 0.3f, 0.4f, 0.6f, 2), Seen(0.2f, 0.31f, 0.4f, 0.5f, 3)};
   const BlendedSample robust = BlendSample(seen, 4, kUnitGains, 0.08);
   EXPECT_NEAR(robust.blend[0], 0.205, 0.01);
-  EXPECT_NE(robust.dominant_photo, 0);
+  EXPECT_FALSE(robust.dominant_fits);
   const BlendedSample plain = BlendSample(seen, 4, kUnitGains, 0);
   EXPECT_GT(plain.blend[0], 0.3);
 }
@@ -124,7 +124,7 @@ TEST(BlendSample, ClippedPhotosOutvoteOneThatContradictsThem) {
   }
   const BlendedSample sample = BlendSample(observations.data(), 4, gains, 0.08);
   EXPECT_GT(sample.blend.minCoeff(), 0.7f);
-  EXPECT_NE(sample.dominant_photo, 0);
+  EXPECT_FALSE(sample.dominant_fits);
 }
 
 TEST(BlendSample, WhitePaperThatIsClippedInMostPhotosStaysWhite) {
@@ -138,7 +138,7 @@ TEST(BlendSample, WhitePaperThatIsClippedInMostPhotosStaysWhite) {
   const BlendedSample sample = BlendSample(seen, 5, gains, 0.08);
   EXPECT_NEAR(sample.blend[0], 1.24, 0.06);
   EXPECT_NEAR(sample.blend[1], 1.20, 0.06);
-  EXPECT_EQ(sample.dominant_photo, 3);
+  EXPECT_FALSE(sample.dominant_fits);  // clipped
 }
 
 TEST(BlendSample, HasNoColorWithoutPhotos) {

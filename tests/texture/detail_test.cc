@@ -42,6 +42,7 @@ TEST(PreserveDetail, BringsTheDetailBackOnceHoweverMuchTheBlendKept) {
   for (double kept : {0.0, 0.5, 0.95}) {
     DominantMap dominant;
     dominant.photo.assign(count, 0);
+    dominant.fits.assign(count, 1);
     std::vector<Eigen::Vector3f> blend(count);
     std::vector<double> truth, result;
     for (size_t i = 0; i < count; ++i) {
@@ -64,6 +65,7 @@ TEST(PreserveDetail, BringsTheDetailBackOnceHoweverMuchTheBlendKept) {
 TEST(PreserveDetail, LeavesTheBlendAloneAtSeams) {
   const Scan scan = Grid(40, 10);
   DominantMap dominant;
+  dominant.fits.assign(400, 1);
   for (int i = 0; i < 400; ++i) {
     dominant.photo.push_back(i % 40 < 20 ? 0 : 1);
     dominant.color.push_back(Eigen::Vector3f::Constant(i % 40 < 20 ? 0.2f : 0.6f));
@@ -80,10 +82,12 @@ TEST(PreserveDetail, DoesNotBleedOverDepthEdgesAndHoles) {
   GridLinks links = AllLinked(scan);
   DominantMap dominant;
   dominant.photo.assign(400, 0);
+  dominant.fits.assign(400, 1);
   for (int i = 0; i < 400; ++i) {
     if (i % 40 == 19) links.bits[i] = GridLinks::kDown;  // depth edge between columns 19 and 20
     if (i % 40 == 30) {
       dominant.photo[i] = -1;  // hole
+      dominant.fits[i] = 0;
       dominant.color.push_back(Eigen::Vector3f::Constant(99));
       continue;
     }
@@ -113,6 +117,7 @@ TEST(DominanceBorders, DilateByTheGivenNumberOfSamples) {
 TEST(PreserveDetail, DoesNotDependOnTheNumberOfThreads) {
   const Scan scan = Grid(300, 100);
   DominantMap dominant;
+  dominant.fits.assign(30000, 1);
   std::vector<Eigen::Vector3f> one;
   for (int i = 0; i < 30000; ++i) {
     dominant.photo.push_back(static_cast<int16_t>(i / 7000));
