@@ -41,7 +41,8 @@ struct Camera {
   bool has_prior_focal_length = false;  // known from the database only
 
   double MeanFocalLength() const;  // pixels
-  // Everything that keeps this camera from being used: wrong number of parameters, not finite, f <= 0 ...
+  // Everything that keeps this camera from being used: wrong number of parameters, not finite, f <=
+  // 0 ...
   std::vector<std::string> Problems() const;
 };
 
@@ -51,8 +52,8 @@ class CameraProjection {
   // camera must have no Problems().
   explicit CameraProjection(const Camera& camera);
 
-  // Position in `img`, for a point in `cam`. None if the point is not in front (z <= 0) or lies where the
-  // distortion polynomial no longer is one-to-one (it would fold back into the picture).
+  // Position in `img`, for a point in `cam`. None if the point is not in front (z <= 0) or lies
+  // where the distortion polynomial no longer is one-to-one (it would fold back into the picture).
   // The result may lie outside the image: see InImage().
   std::optional<Eigen::Vector2d> ImgFromCam(const Eigen::Vector3d& x_in_cam) const;
 

@@ -10,17 +10,19 @@ namespace roomtex {
 enum ExitCode {
   kExitDone = 0,
   kExitInternalError = 1,
-  kExitUsage = 2,       // wrong usage or option
-  kExitInput = 3,       // input that cannot be used
-  kExitUntrusted = 4,   // it ran, but the answer is not to be trusted
+  kExitUsage = 2,      // wrong usage or option
+  kExitInput = 3,      // input that cannot be used
+  kExitUntrusted = 4,  // it ran, but the answer is not to be trusted
 };
 
 // Input that cannot be used. Thrown where it is found; only RunCommand (command_line.h) catches.
-// The message reads "PATH: POSITION: FINDING. REMEDY", each part a plain phrase without final full stop.
+// The message reads "PATH: POSITION: FINDING. REMEDY", each part a plain phrase without final full
+// stop.
 class InputError : public std::runtime_error {
  public:
-  // path: file or folder as the user named it. position: "line 12", "byte 4711", or "" for all of it.
-  // finding: what was found and what was expected. remedy: what to do about it ("" if the finding says it).
+  // path: file or folder as the user named it. position: "line 12", "byte 4711", or "" for all of
+  // it. finding: what was found and what was expected. remedy: what to do about it ("" if the
+  // finding says it).
   InputError(const std::string& path, const std::string& position, const std::string& finding,
              const std::string& remedy);
 };

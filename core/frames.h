@@ -6,9 +6,9 @@
 // Frames    `sparse`   COLMAP's reconstruction: right-handed, arbitrary origin, rotation and scale.
 //           `scan`     the range scan: right-handed, metres. RTPI: x right, y up, z backward
 //                      (thesis 5.1.1); PTX: z up, the file's own pose already applied.
-//           `station`  one scanner set-up, its origin in the scanner; the scan frame if there is one only.
-//           `cam`      x right, y down, z forward, as COLMAP.
-//           `img`      pixels of the photo as taken, x right, y down. The CENTRE of the upper-left pixel
+//           `station`  one scanner set-up, its origin in the scanner; the scan frame if there is
+//           one only. `cam`      x right, y down, z forward, as COLMAP. `img`      pixels of the
+//           photo as taken, x right, y down. The CENTRE of the upper-left pixel
 //                      is (0.5, 0.5), as COLMAP; the image covers [0, width] x [0, height].
 //           `enu`      local east-north-up, metres.
 //           There is no `world`: every file that says "world" means one of these.
@@ -34,8 +34,8 @@ inline Eigen::Vector2d ImgFromOpenCv(const Eigen::Vector2d& x_in_opencv) {
   return x_in_opencv + Eigen::Vector2d(0.5, 0.5);
 }
 
-// glTF texture coordinate (origin at the upper-left corner of the image, v down) of a position in an
-// image of width x height pixels that follows the `img` convention.
+// glTF texture coordinate (origin at the upper-left corner of the image, v down) of a position in
+// an image of width x height pixels that follows the `img` convention.
 inline Eigen::Vector2d GltfUvFromImg(const Eigen::Vector2d& x_in_img, int width, int height) {
   return {x_in_img.x() / width, x_in_img.y() / height};
 }

@@ -18,16 +18,17 @@ struct ExposureData {
   std::string camera;     // make and model, for grouping photos
   std::string date_time;  // "2008:05:01 12:00:00" or ""
 
-  // Light collected per scene radiance, relative: t * ISO / N^2; f_number and ISO count as 1 when absent.
-  // None without an exposure time.
+  // Light collected per scene radiance, relative: t * ISO / N^2; f_number and ISO count as 1 when
+  // absent. None without an exposure time.
   std::optional<double> RelativeExposure() const;
 };
 
-// 8-bit BGR, as stored: an EXIF orientation is NOT applied, because COLMAP's keypoints are not turned
-// either. Throws InputError if the file is missing, not an image or broken.
+// 8-bit BGR, as stored: an EXIF orientation is NOT applied, because COLMAP's keypoints are not
+// turned either. Throws InputError if the file is missing, not an image or broken.
 cv::Mat ReadPhoto(const std::string& path);
 
-// Width and height without decoding the pixels, from the file's header; {0, 0} if that cannot be told.
+// Width and height without decoding the pixels, from the file's header; {0, 0} if that cannot be
+// told.
 std::array<int, 2> ReadPhotoSize(const std::string& path);
 
 // Missing or broken EXIF is no error: fields stay empty.

@@ -1,5 +1,6 @@
 #pragma once
-// Progress and log on stderr: a redrawn bar on a terminal, a line per stage otherwise, nothing when quiet.
+// Progress and log on stderr: a redrawn bar on a terminal, a line per stage otherwise, nothing when
+// quiet.
 
 #include <chrono>
 #include <map>

@@ -1,8 +1,8 @@
 #include "core/ray_caster.h"
 
-#include <embree3/rtcore.h>
-
 #include <limits>
+
+#include <embree3/rtcore.h>
 
 namespace roomtex {
 
@@ -34,9 +34,8 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);
   if (!triangles.empty()) {
     RTCGeometry geometry = rtcNewGeometry(scene_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                3 * sizeof(float), points.size()));
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points.size()));
     auto* corners = static_cast<unsigned*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(unsigned), triangles.size()));

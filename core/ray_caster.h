@@ -17,8 +17,8 @@ struct RayHit {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
 };
 
-// A triangle mesh to shoot rays at; safe to use from several threads. Coordinates are recentred on the
-// mesh, so that georeferenced scans keep their millimetres in Embree's floats.
+// A triangle mesh to shoot rays at; safe to use from several threads. Coordinates are recentred on
+// the mesh, so that georeferenced scans keep their millimetres in Embree's floats.
 class RayCaster {
  public:
   // points may hold NaN (missing samples) where no triangle refers to them.
@@ -27,8 +27,8 @@ class RayCaster {
   RayCaster(RayCaster&&) noexcept;
   RayCaster& operator=(RayCaster&&) noexcept;
 
-  // The nearest hit farther than min_distance and nearer than max_distance; both sides of a triangle count.
-  // direction must have unit length.
+  // The nearest hit farther than min_distance and nearer than max_distance; both sides of a
+  // triangle count. direction must have unit length.
   std::optional<RayHit> Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double min_distance = 0,
                              double max_distance = std::numeric_limits<double>::infinity()) const;

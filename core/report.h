@@ -19,7 +19,9 @@ class Report {
   Json& operator[](const std::string& key) { return keys_[key]; }
   const Json& keys() const { return keys_; }
 
-  void AddInput(const std::string& option, const std::string& path) { inputs_[option].push_back(path); }
+  void AddInput(const std::string& option, const std::string& path) {
+    inputs_[option].push_back(path);
+  }
   void AddWarning(const std::string& warning) { warnings_.push_back(warning); }
   // The answer is not to be trusted (exit 4); several reasons are joined.
   void SetUntrusted(const std::string& reason);

@@ -1,6 +1,6 @@
 #pragma once
-// The range scan: measured 3D points with intensity, organised in the grid in which the scanner took them
-// (thesis 5.1.1), or a plain triangle mesh that has no grid.
+// The range scan: measured 3D points with intensity, organised in the grid in which the scanner
+// took them (thesis 5.1.1), or a plain triangle mesh that has no grid.
 
 #include <array>
 #include <limits>
@@ -13,14 +13,15 @@
 
 namespace roomtex {
 
-using Triangle = std::array<int, 3>;  // indices into Scan::points, counter-clockwise seen from outside
+using Triangle =
+    std::array<int, 3>;  // indices into Scan::points, counter-clockwise seen from outside
 
 struct Scan {
   std::string path;  // the file it came from, for messages and reports
 
-  // The grid. Sample (column, row) has the index row * num_columns + column; row 0 is the TOP row (largest
-  // elevation), columns keep the order of the file. A mesh without a grid has organised == false,
-  // num_columns == points.size() and num_rows == 1.
+  // The grid. Sample (column, row) has the index row * num_columns + column; row 0 is the TOP row
+  // (largest elevation), columns keep the order of the file. A mesh without a grid has organised ==
+  // false, num_columns == points.size() and num_rows == 1.
   bool organised = true;
   int num_columns = 0;
   int num_rows = 0;
@@ -33,7 +34,8 @@ struct Scan {
   // Triangles of a mesh without a grid. Empty when organised: see scan_mesh.h.
   std::vector<Triangle> triangles;
 
-  // Where the scanner stood: the origin of the `station` frame is the point that all ranges start from.
+  // Where the scanner stood: the origin of the `station` frame is the point that all ranges start
+  // from.
   Rigid scan_from_station;
   // Unit vector of the scan frame that points up (RTPI: y; PTX: z).
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
@@ -56,8 +58,8 @@ struct Bounds {
 };
 Bounds FindBounds(const Scan& scan);
 
-// Intensities as grey values 0..255 in grid order: the given percentiles of the measured samples become
-// black and white. Missing samples: 0.
+// Intensities as grey values 0..255 in grid order: the given percentiles of the measured samples
+// become black and white. Missing samples: 0.
 std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile = 1.0,
                                      double high_percentile = 99.0);
 

@@ -1,11 +1,11 @@
 #pragma once
 // Runs a built command as a user would.
 
-#include <sys/wait.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+
+#include <sys/wait.h>
 
 #include "tests/support/temp_folder.h"
 
@@ -20,7 +20,8 @@ struct CommandResult {
   std::string out, err;
 };
 
-// arguments as in a shell, e.g. Run("roomtex-import --help"); the command is taken from the build folder.
+// arguments as in a shell, e.g. Run("roomtex-import --help"); the command is taken from the build
+// folder.
 inline CommandResult RunCommandLine(const std::string& line) {
   const TempFolder folder;
   const std::string full = std::string(ROOMTEX_BIN) + "/" + line + " >" + (folder / "out") + " 2>" +

@@ -41,11 +41,11 @@ inline void WriteBytes(const std::string& path, const std::string& bytes) {
 }
 
 // Expects that `statement` throws an InputError whose message holds `text`.
-#define EXPECT_INPUT_ERROR(statement, text)                                            \
-  try {                                                                                \
-    statement;                                                                         \
-    ADD_FAILURE() << "no InputError from " #statement;                                 \
-  } catch (const roomtex::InputError& error) {                                         \
+#define EXPECT_INPUT_ERROR(statement, text)                                             \
+  try {                                                                                 \
+    statement;                                                                          \
+    ADD_FAILURE() << "no InputError from " #statement;                                  \
+  } catch (const roomtex::InputError& error) {                                          \
     EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what(); \
   }
 
