@@ -80,8 +80,8 @@ TEST_F(Pipeline, AlignedPosesAreNearTheTruth) {
   ASSERT_EQ(evaluate_.exit_code, 0) << evaluate_.err;
   const json truth = json::parse(evaluate_.out);
   // Six clicks of 1.5 px in one photo of 960 x 640.
-  EXPECT_LT(truth["poses"]["position_median_mm"], 15.0);
-  EXPECT_LT(truth["poses"]["rotation_median_deg"], 0.3);
+  EXPECT_LT(truth["poses"]["position_median_mm"], 10.0);
+  EXPECT_LT(truth["poses"]["rotation_median_deg"], 0.15);
   EXPECT_EQ(truth["poses"]["num_registered"], 14);
 }
 
