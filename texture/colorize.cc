@@ -144,6 +144,72 @@ std::vector<std::string> ColorizeOptions::Problems() const {
   return problems;
 }
 
+namespace {
+
+// From observations to colours, grid by grid.
+class GridColorizer {
+ public:
+  GridColorizer(const PhotoPassInput& input, const ObservationStore& store,
+                const std::vector<Eigen::Vector3f>& gains, const ColorizeOptions& options,
+                int num_threads)
+      : input_(input), store_(store), gains_(gains), options_(options), num_threads_(num_threads) {}
+
+  // unseen_grey: per grid cell; empty = black.
+  ColorGrid Colorize(const GridOfSamples& grid, bool organised, const GridLinks& links, int scale,
+                     const std::vector<uint8_t>& unseen_grey) const {
+    BlendedGrid blended =
+        BlendGrid(grid, input_, store_, gains_, options_.blend.outlier, num_threads_);
+    if (options_.blend.detail && organised) {
+      Scan shape;
+      shape.num_columns = grid.num_columns;
+      shape.num_rows = grid.num_rows;
+      DetailOptions detail = options_.detail;  // in samples
+      detail.sigma *= scale;
+      detail.border *= scale;
+      PreserveDetail(shape, links, blended.dominant, detail, num_threads_, &blended.blend);
+    }
+    return EncodeGrid(grid, input_, store_, blended, unseen_grey);
+  }
+
+ private:
+  const PhotoPassInput& input_;
+  const ObservationStore& store_;
+  const std::vector<Eigen::Vector3f>& gains_;
+  const ColorizeOptions& options_;
+  int num_threads_;
+};
+
+size_t NumSlots(const PhotoPassInput& input) {
+  if (input.samples.empty()) return 0;
+  const SampleTile& last = input.samples.back();
+  return static_cast<size_t>(last.first_slot) + last.points.size();
+}
+
+ExposureSolution UnifyExposure(const ObservationStore& store, const std::vector<PhotoView>& photos,
+                               const ExposureOptions& options) {
+  std::vector<ExposureData> exposures;
+  for (const PhotoView& photo : photos) exposures.push_back(ReadExposureData(photo.path));
+  if (options.mode == "none") return SolveExposure(exposures, {}, options);
+  ExposureSolution solution =
+      SolveExposure(exposures, FindOverlaps(store, static_cast<int>(photos.size())), options);
+  const float scale = OutputScale(store, solution.gains);
+  for (Eigen::Vector3f& gain : solution.gains) gain *= scale;
+  return solution;
+}
+
+void CountVertices(const std::vector<Scan>& scans, ColorizeResult* result) {
+  for (size_t s = 0; s < scans.size(); ++s) {
+    result->num_vertices += scans[s].points.size() - scans[s].NumMissing();
+    for (uint8_t views : result->scans[s].samples.views) {
+      result->num_colored += views > 0;
+      result->views_mean += views;
+    }
+  }
+  if (result->num_colored > 0) result->views_mean /= static_cast<double>(result->num_colored);
+}
+
+}  // namespace
+
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress) {
   progress->Stage("mesh");
@@ -151,72 +217,36 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<P
   std::vector<GridOfSamples> sample_grids, texture_grids;
   PhotoPassInput input =
       MakeInput(scans, &surfaces, options, num_threads, &sample_grids, &texture_grids);
-  const size_t num_slots = input.samples.empty()
-                               ? 0
-                               : static_cast<size_t>(input.samples.back().first_slot) +
-                                     input.samples.back().points.size();
 
   progress->Stage("photos", static_cast<int>(photos.size()));
   ColorizeResult result;
-  ObservationStore store(num_slots, options.blend.max_views);
+  ObservationStore store(NumSlots(input), options.blend.max_views);
   result.samples_seen =
       ObservePhotos(input, photos, options.occlusion, options.blend, num_threads, progress, &store);
   input.occluders.clear();
 
   progress->Stage("exposure");
-  std::vector<ExposureData> exposures;
-  for (const PhotoView& photo : photos) exposures.push_back(ReadExposureData(photo.path));
-  const auto num_photos = static_cast<int>(photos.size());
-  std::vector<Overlap> overlaps;
-  if (options.exposure.mode != "none") overlaps = FindOverlaps(store, num_photos);
-  result.exposure = SolveExposure(exposures, overlaps, options.exposure);
-  if (options.exposure.mode != "none") {
-    const float scale = OutputScale(store, result.exposure.gains);
-    for (Eigen::Vector3f& gain : result.exposure.gains) gain *= scale;
-  }
+  result.exposure = UnifyExposure(store, photos, options.exposure);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
   progress->Stage("blend");
+  const GridColorizer colorizer(input, store, result.exposure.gains, options, num_threads);
   for (size_t s = 0; s < scans.size(); ++s) {
+    std::vector<uint8_t> grey;
+    if (options.unseen == "intensity") grey = IntensityAsGrey(scans[s]);
     ColoredScan colored;
-    const auto color_grid = [&](const GridOfSamples& grid, bool is_samples) {
-      BlendedGrid blended =
-          BlendGrid(grid, input, store, result.exposure.gains, options.blend.outlier, num_threads);
-      Scan shape;
-      shape.organised = scans[s].organised;
-      shape.num_columns = grid.num_columns;
-      shape.num_rows = grid.num_rows;
-      if (options.blend.detail && shape.organised) {
-        DetailOptions detail = options.detail;
-        if (!is_samples) {
-          detail.sigma *= options.texture_scale;
-          detail.border *= options.texture_scale;
-        }
-        const GridLinks links = is_samples
-                                    ? surfaces[s].links
-                                    : TextureLinks(scans[s], surfaces[s], options.texture_scale);
-        PreserveDetail(shape, links, blended.dominant, detail, num_threads, &blended.blend);
-      }
-      std::vector<uint8_t> grey;
-      if (options.unseen == "intensity") {
-        grey = IntensityAsGrey(scans[s]);
-        if (!is_samples) grey = EnlargeGrey(scans[s], grey, options.texture_scale);
-      }
-      return EncodeGrid(grid, input, store, blended, grey);
-    };
-    colored.samples = color_grid(sample_grids[s], true);
-    if (texture_grids[s].num_columns > 0) colored.texture = color_grid(texture_grids[s], false);
+    colored.samples =
+        colorizer.Colorize(sample_grids[s], scans[s].organised, surfaces[s].links, 1, grey);
+    if (texture_grids[s].num_columns > 0) {
+      const int scale = options.texture_scale;
+      if (!grey.empty()) grey = EnlargeGrey(scans[s], grey, scale);
+      colored.texture = colorizer.Colorize(texture_grids[s], true,
+                                           TextureLinks(scans[s], surfaces[s], scale), scale, grey);
+    }
     colored.triangles = std::move(surfaces[s].triangles);
-    for (size_t i = 0; i < scans[s].points.size(); ++i) {
-      result.num_vertices += !scans[s].IsMissing(static_cast<int>(i));
-    }
-    for (uint8_t views : colored.samples.views) {
-      result.num_colored += views > 0;
-      result.views_mean += views;
-    }
     result.scans.push_back(std::move(colored));
   }
-  if (result.num_colored > 0) result.views_mean /= static_cast<double>(result.num_colored);
+  CountVertices(scans, &result);
   return result;
 }
 

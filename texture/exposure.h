@@ -42,7 +42,6 @@ std::vector<Overlap> FindOverlaps(const ObservationStore& store, int num_photos,
 struct ExposureSolution {
   std::vector<Eigen::Vector3f> gains;  // per photo: r, g, b factors in linear light
   int reference_photo = -1;            // gain 1 before `output_scale`; the photo of median exposure
-  std::vector<std::string> warnings;   // plain sentences that hold {number} where a photo is meant
   std::vector<int> unconnected;        // photos that neither EXIF nor an overlap ties to the others
   std::vector<int> contradicted;       // photos whose EXIF the overlaps contradict
   int without_exif = 0;                // in mode "exif": photos that had to be matched

@@ -66,7 +66,7 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                      "tolerant.");
   command->AddDouble("Occlusion.boundary_px", &o->occlusion.boundary_px,
                      "Width of the untrusted band beside depth boundaries, photo pixels; -1 = "
-                     "three quarters of the sample spacing, at least 2.5.");
+                     "the spacing of the scan's samples, at least 2.5.");
   command->AddDouble("Occlusion.boundary_jump", &o->occlusion.boundary_jump,
                      "Share of the depth that makes a jump a depth boundary. Larger = fewer.");
   command->AddBool("Occlusion.shadows", &o->occlusion.shadows,

@@ -249,8 +249,7 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
       shadow.Draw(projector, tiles.shadows, kShadowEdgePx);
     shadow_ = shadow.inverse_depth();
   }
-  const double radius =
-      options.boundary_px >= 0 ? options.boundary_px : std::max(2.5, 0.75 * spacing_px);
+  const double radius = options.boundary_px >= 0 ? options.boundary_px : std::max(2.5, spacing_px);
   mask_ = BoundaryMask(DepthBoundaries(surface_.inverse_depth(), options.boundary_jump,
                                        map_px(kGapSpacings * spacing_px)),
                        radius * surface_.scale_x());

@@ -19,8 +19,8 @@ struct OcclusionOptions {
   // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008.
   double depth_tolerance = 0.008;
   // Width of the band on either side of a depth boundary in which a photo is not trusted, pixels of
-  // the photo. -1 = three quarters of the spacing of the scan's samples, at least 2.5: narrower is
-  // better with true poses, wider with poses that are off by more.
+  // the photo. -1 = the spacing of the scan's samples, at least 2.5: an object may reach one
+  // spacing beyond its last sample. Poses that are off by more pixels need more.
   double boundary_px = -1;
   // The inverse depth changes over a depth boundary by more than this share of itself, apart from
   // the even change of a plane. Larger = fewer boundaries.

@@ -1,0 +1,187 @@
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <tiny_gltf.h>
+
+#include "core/error.h"
+#include "tests/support/ply_vertices.h"
+#include "tests/support/temp_folder.h"
+#include "tests/texture/two_walls.h"
+#include "texture/write_glb.h"
+#include "texture/write_ply.h"
+#include "texture/write_texture.h"
+
+namespace roomtex {
+namespace {
+
+// A scan whose colours tell their grid cell: red = column, green = row.
+ColoredScan ColorByCell(const Scan& scan) {
+  ColoredScan colored;
+  colored.triangles = BuildScanMesh(scan, ScanMeshOptions());
+  colored.samples.num_columns = scan.num_columns;
+  colored.samples.num_rows = scan.num_rows;
+  for (int row = 0; row < scan.num_rows; ++row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      colored.samples.rgb.push_back(
+          {static_cast<uint8_t>(column), static_cast<uint8_t>(row), uint8_t{77}});
+      colored.samples.views.push_back(static_cast<uint8_t>(1 + column % 3));
+    }
+  }
+  return colored;
+}
+
+Scan WallWithHole() {
+  TwoWalls scene;
+  scene.board_half = 0;
+  Scan scan = scene.MakeScan(60, 40);
+  scan.points[scan.Index(10, 10)] = Scan::MissingPoint();
+  return scan;
+}
+
+tinygltf::Model LoadGlb(const std::string& path) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
+  EXPECT_EQ(error + warning, "");
+  return model;
+}
+
+template <typename T>
+const T* Data(const tinygltf::Model& model, int accessor) {
+  const tinygltf::BufferView& view = model.bufferViews[model.accessors[accessor].bufferView];
+  return reinterpret_cast<const T*>(model.buffers[view.buffer].data.data() + view.byteOffset);
+}
+
+TEST(WriteColoredPly, ConcatenatesScansInGridOrder) {
+  const TempFolder folder;
+  const Scan scan = WallWithHole();
+  const ColoredScan colored = ColorByCell(scan);
+  WriteColoredPly({scan, scan}, {colored, colored}, folder / "two.ply");
+  const std::string bytes = ReadBytes(folder / "two.ply");
+  const PlyVertices ply = ParsePlyVertices(bytes, "two.ply");
+  ASSERT_EQ(ply.points.size(), 2u * (60 * 40 - 1));
+  EXPECT_EQ(ply.colors[59].x(), 59);  // last of the first row
+  const size_t second = 60 * 40 - 1;
+  EXPECT_EQ(ply.points[second], ply.points[0]);
+  EXPECT_EQ(ply.colors[second + 61].y(), 1);
+  EXPECT_EQ(ply.views[second + 61], 2);
+  EXPECT_NE(bytes.find("element face " + std::to_string(2 * colored.triangles.size())),
+            std::string::npos);
+  const size_t header = bytes.find("end_header\n") + 11;
+  EXPECT_EQ(bytes.size(), header + ply.points.size() * 16 + 2 * colored.triangles.size() * 13);
+}
+
+TEST(WriteColoredPly, KeepsMillimetresOfGeoreferencedScans) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  for (Eigen::Vector3d& p : scan.points) p += Eigen::Vector3d(500000, 5000000, 0);
+  WriteColoredPly({scan}, {ColorByCell(scan)}, folder / "far.ply");
+  const std::string bytes = ReadBytes(folder / "far.ply");
+  ASSERT_NE(bytes.find("property double x"), std::string::npos);
+  double x;
+  std::memcpy(&x, bytes.data() + bytes.find("end_header\n") + 11, sizeof x);
+  EXPECT_NEAR(x, scan.points[0].x(), 1e-9);
+}
+
+// Every vertex must find the colour of its own cell in the texture at its own coordinates.
+void ExpectColorsAtVertices(const tinygltf::Model& model, const Scan& scan, size_t num_triangles) {
+  size_t num_corners = 0;
+  for (const tinygltf::Primitive& primitive : model.meshes.at(0).primitives) {
+    const tinygltf::Material& material = model.materials.at(primitive.material);
+    EXPECT_EQ(material.extensions.count("KHR_materials_unlit"), 1u);
+    const tinygltf::Image& image = model.images.at(
+        model.textures.at(material.pbrMetallicRoughness.baseColorTexture.index).source);
+    const tinygltf::Accessor& positions = model.accessors.at(primitive.attributes.at("POSITION"));
+    const float* xyz = Data<float>(model, primitive.attributes.at("POSITION"));
+    const float* uv = Data<float>(model, primitive.attributes.at("TEXCOORD_0"));
+    const uint32_t* corners = Data<uint32_t>(model, primitive.indices);
+    const tinygltf::Accessor& indices = model.accessors.at(primitive.indices);
+    EXPECT_EQ(indices.componentType, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT);
+    for (size_t i = 0; i < indices.count; ++i) ASSERT_LT(corners[i], positions.count);
+    num_corners += indices.count;
+    const tinygltf::Node& node = model.nodes.at(1);
+    const Eigen::Vector3d centre(node.translation[0], node.translation[1], node.translation[2]);
+    for (size_t v = 0; v < positions.count; ++v) {
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_GE(xyz[3 * v + k], positions.minValues[k]);
+        EXPECT_LE(xyz[3 * v + k], positions.maxValues[k]);
+      }
+      const int x = static_cast<int>(uv[2 * v] * static_cast<float>(image.width));
+      const int y = static_cast<int>(uv[2 * v + 1] * static_cast<float>(image.height));
+      ASSERT_TRUE(x >= 0 && y >= 0 && x < image.width && y < image.height);
+      const unsigned char* texel = &image.image[(y * image.width + x) * image.component];
+      const Eigen::Vector3d point =
+          centre + Eigen::Vector3d(xyz[3 * v], xyz[3 * v + 1], xyz[3 * v + 2]);
+      ASSERT_LT((point - scan.points[scan.Index(texel[0], texel[1])]).norm(), 1e-5);
+    }
+  }
+  EXPECT_EQ(num_corners, 3 * num_triangles);
+}
+
+TEST(WriteColoredGlb, VerticesFindTheirColorsInTheTexture) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  const ColoredScan colored = ColorByCell(scan);
+  WriteColoredGlb({scan}, {colored}, folder / "m.glb");
+  const tinygltf::Model model = LoadGlb(folder / "m.glb");
+  EXPECT_EQ(model.images.size(), 1u);
+  ExpectColorsAtVertices(model, scan, colored.triangles.size());
+}
+
+TEST(WriteColoredGlb, SplitsLargeGridsIntoTexturesThatShareTheirBorders) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  const ColoredScan colored = ColorByCell(scan);
+  GlbOptions options;
+  options.max_texture_size = 25;
+  WriteColoredGlb({scan}, {colored}, folder / "m.glb", options);
+  const tinygltf::Model model = LoadGlb(folder / "m.glb");
+  EXPECT_EQ(model.images.size(), 6u);  // 59 quads of 24: 3 across; 39 of 24: 2 down
+  for (const tinygltf::Image& image : model.images) {
+    EXPECT_LE(image.width, 25);
+    EXPECT_LE(image.height, 25);
+  }
+  ExpectColorsAtVertices(model, scan, colored.triangles.size());
+}
+
+TEST(WriteColoredGlb, KeepsMillimetresOfGeoreferencedScans) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  for (Eigen::Vector3d& p : scan.points) p += Eigen::Vector3d(500000, 5000000, 100);
+  scan.scan_from_station.translation = Eigen::Vector3d(500000, 5000000, 100);
+  const ColoredScan colored = ColorByCell(scan);
+  WriteColoredGlb({scan}, {colored}, folder / "m.glb");
+  ExpectColorsAtVertices(LoadGlb(folder / "m.glb"), scan, colored.triangles.size());
+}
+
+TEST(WriteColoredGlb, ScanWithoutTrianglesIsStillAFile) {
+  const TempFolder folder;
+  Scan scan;
+  scan.num_columns = scan.num_rows = 1;
+  scan.points = {Eigen::Vector3d(1, 2, 3)};
+  scan.intensity = {0};
+  WriteColoredGlb({scan}, {ColorByCell(scan)}, folder / "m.glb");
+  EXPECT_TRUE(LoadGlb(folder / "m.glb").meshes.empty());
+}
+
+TEST(PaintGutters, TakesTheNearestKnownColor) {
+  cv::Mat3b picture(5, 9, cv::Vec3b(0, 0, 0));
+  cv::Mat1b known(5, 9, uint8_t{0});
+  picture(2, 2) = {1, 2, 3};
+  picture(2, 6) = {7, 8, 9};
+  known(2, 2) = known(2, 6) = 1;
+  cv::Mat image = picture;
+  PaintGutters(known, 2, &image);
+  EXPECT_EQ(image.at<cv::Vec3b>(2, 3), cv::Vec3b(1, 2, 3));
+  EXPECT_EQ(image.at<cv::Vec3b>(1, 7), cv::Vec3b(7, 8, 9));
+  EXPECT_EQ(image.at<cv::Vec3b>(2, 6), cv::Vec3b(7, 8, 9));
+  EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 0, 0));  // out of reach
+}
+
+TEST(WritePng, RefusesAFolderThatIsNotThere) {
+  const TempFolder folder;
+  EXPECT_INPUT_ERROR(WritePng(cv::Mat3b(2, 2), folder / "none/x.png"), "cannot be written");
+}
+
+}  // namespace
+}  // namespace roomtex
