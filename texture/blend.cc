@@ -33,11 +33,11 @@ Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).
 
 // Two photos that look from different places give the same colour only if they see the surface
 // itself and not something in front of it.
-bool TwoAgree(const Eigen::Vector3f* colors, int count) {
+bool TwoAgree(const Eigen::Vector3f* roots, int count) {
   constexpr float kAlike = 0.1f;
   for (int i = 0; i < count; ++i) {
     for (int j = i + 1; j < count; ++j) {
-      if ((Root(colors[i]) - Root(colors[j])).norm() < kAlike) return true;
+      if ((roots[i] - roots[j]).norm() < kAlike) return true;
     }
   }
   return false;
@@ -120,7 +120,7 @@ constexpr int kMostViews = 64;  // BlendOptions::Problems
 // The observations of one sample, brought to one exposure.
 struct SampleViews {
   int count = 0;
-  std::array<Eigen::Vector3f, kMostViews> colors;
+  std::array<Eigen::Vector3f, kMostViews> colors, roots;
   std::array<Eigen::Array3i, kMostViews> clipped;  // 1 = the surface is this light or lighter
   std::array<float, kMostViews> reliability;       // 1, less towards clipped colours
   std::array<float, kMostViews> weights;
@@ -128,7 +128,7 @@ struct SampleViews {
   // 1 for equal colours, 1/2 at the distance `outlier`. A clipped channel agrees with everything
   // lighter.
   float Agreement(int i, int j, float outlier) const {
-    const Eigen::Array3f step = (Root(colors[j]) - Root(colors[i])).array();
+    const Eigen::Array3f step = (roots[j] - roots[i]).array();
     float square = 0;
     for (int k = 0; k < 3; ++k) {
       if ((clipped[i][k] != 0 && step[k] > 0) || (clipped[j][k] != 0 && step[k] < 0)) continue;
@@ -161,6 +161,7 @@ SampleViews UnpackViews(const Observation* observations, int count,
   for (int i = 0; i < views.count; ++i) {
     const Eigen::Vector3f color = UnpackColor(observations[i].color);
     views.colors[i] = color.cwiseProduct(gains[observations[i].photo]);
+    views.roots[i] = Root(views.colors[i]);
     views.clipped[i] = (color.array() > kClipped).cast<int>();
     const float share = (kClipped - color.maxCoeff()) / (kClipped - kUnclipped);
     views.reliability[i] = std::clamp(share, kClippedReliability, 1.0f);  // even: no visible step
@@ -176,7 +177,7 @@ BlendedSample BlendSample(const Observation* observations, int count,
   BlendedSample result;
   if (count <= 0) return result;
   SampleViews views = UnpackViews(observations, count, gains);
-  if (observations[0].in_doubt != 0 && !TwoAgree(views.colors.data(), views.count)) return result;
+  if (observations[0].in_doubt != 0 && !TwoAgree(views.roots.data(), views.count)) return result;
   // S by the geometry alone: it changes where the best photo changes, not from sample to sample.
   result.dominant = views.colors[0];
   result.dominant_photo = observations[0].photo;
