@@ -83,7 +83,7 @@ std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
     throw InputError(sources.associations_path, "",
                      "names no photo of the model, expected registered images in its column "
                      "patterned_image",
-                     "Make it with roomtex-associate from the same photos");
+                     "Make it from the same photos");
   }
   return file_of;
 }
@@ -162,7 +162,7 @@ std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
       if (patterned < 0 || plain < 0) {
         throw InputError(path, LinePosition(number),
                          "is no header with the columns patterned_image and plain_image",
-                         "Expected the file that roomtex-associate writes");
+                         "Expected a CSV with the header patterned_image,plain_image");
       }
       continue;
     }
@@ -177,7 +177,7 @@ std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
   }
   if (patterned < 0) {
     throw InputError(path, "", "is empty, expected a header and pairs of photos",
-                     "Make it with roomtex-associate");
+                     "Expected lines patterned_image,plain_image");
   }
   return pairs;
 }

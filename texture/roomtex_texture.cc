@@ -40,10 +40,11 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                         "COLMAP database: its intrinsics are used instead of the model's, by image "
                         "name.",
                         Command::Kind::kOptional);
-  command->AddInputPath("associations_path", &o->sources.associations_path,
-                        "CSV of roomtex-associate: colour comes from the plain twin of every "
-                        "registered patterned photo.",
-                        Command::Kind::kOptional);
+  command->AddInputPath(
+      "associations_path", &o->sources.associations_path,
+      "CSV patterned_image,plain_image: colour comes from the plain twin of every "
+      "registered patterned photo.",
+      Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &o->scan_poses, "File with a pose for each of several scans.",
                         Command::Kind::kOptional);
   AddScanReaderOptions(&o->scan_reader, command);
