@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 
 #include "colmap_ext/seed_model.h"
 #include "core/frames.h"
@@ -14,6 +15,9 @@ namespace {
 // Where more parallax no longer makes a pair better, for the quick guess and for solved pairs.
 // COLMAP asks for 16 degrees first and then halves; a soft limit needs no second attempt.
 constexpr double kEnoughParallaxDeg = 3, kEnoughAngleDeg = 8;
+// Matches off the dominant plane that make two views sure of their motion without a third.
+constexpr int kMinOffPlane = 20;
+constexpr double kMinShareOffPlane = 0.1;
 // Matches used to guess a pair's parallax.
 constexpr int kMatchesForParallax = 100;
 // Pairs, by number of matches, whose parallax is guessed at all.
@@ -100,6 +104,18 @@ struct Initializer::Impl {
   Seed MakeSeed(const SolvedPair& solved_pair, const std::vector<ThirdView>& views);
 };
 
+// How sure two views are that no third view sees enough of. Before a wall not at all, even if only
+// one hypothesis is left: noise decides which one that is. What stands off the wall decides.
+double ConfidenceOfTwoViews(const TwoViewAnalysis& analysis) {
+  const std::vector<TwoViewHypothesis>& hypotheses = analysis.hypotheses;
+  const double num_inliers = static_cast<double>(hypotheses.front().inliers.size());
+  if (analysis.num_off_plane < std::max(1.0 * kMinOffPlane, kMinShareOffPlane * num_inliers)) {
+    return 1;
+  }
+  if (hypotheses.size() == 1) return std::numeric_limits<double>::infinity();
+  return hypotheses[1].cost / hypotheses[0].cost;
+}
+
 // Most matches first, weighed down where there is little parallax to build on.
 void Initializer::Impl::RankPairs() {
   std::vector<const DatabasePair*> wanted;
@@ -183,6 +199,8 @@ std::optional<Seed> Initializer::Impl::Decide(SolvedPair solved_pair) {
   const std::vector<ThirdView> views = images->FindThirdViews(
       *solved_pair.pair, solved_pair.matches, third.min_sightings, options.max_third_views);
   trial.decision = DecideByThirdViews(solved_pair.matches, trial.analysis.hypotheses, views, third);
+  if (trial.decision.num_views == 0)
+    trial.decision.confidence = ConfidenceOfTwoViews(trial.analysis);
   Seed seed = MakeSeed(solved_pair, views);
   const double angle = seed.trial.analysis.hypotheses[trial.decision.best].median_angle_deg;
   if (!(angle >= options.min_tri_angle_deg)) {

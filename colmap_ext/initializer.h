@@ -54,7 +54,9 @@ struct PairTrial {
 // Where a reconstruction starts.
 struct Seed {
   PairTrial trial;
-  bool ambiguous = false;  // several hypotheses, and no third view told them apart
+  // Nothing told the pair's hypotheses apart: neither a third view nor, without one, enough points
+  // off the wall.
+  bool ambiguous = false;
   // The pair with its points; the left image stands in the origin, the baseline is 1 long.
   SparseModel pair_model;
   // The pair and the views that validated it: poses, no points.

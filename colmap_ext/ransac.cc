@@ -29,17 +29,16 @@ int SamplesNeeded(double inlier_share, int sample_size, const RansacOptions& opt
 
 }  // namespace
 
-RansacResult RunRansac(
-    int num_data, int sample_size, const RansacOptions& options,
-    const std::function<std::optional<Eigen::Matrix3d>(const std::vector<int>&)>& fit,
-    const std::function<double(const Eigen::Matrix3d&, int)>& squared_error) {
+RansacResult RunRansac(int num_data, int sample_size, const RansacOptions& options,
+                       const RansacFit& fit, const RansacFit& refine,
+                       const std::function<double(const Eigen::Matrix3d&, int)>& squared_error) {
   RansacResult best;
   if (num_data < sample_size) return best;
   const double limit = options.max_error_px * options.max_error_px;
   best.cost = std::numeric_limits<double>::infinity();
 
   // Takes the model if it is better than the best so far.
-  const auto offer = [&](const Eigen::Matrix3d& model) {
+  const auto take_if_better = [&](const Eigen::Matrix3d& model) {
     double cost = 0;
     for (int i = 0; i < num_data && cost < best.cost; ++i) {
       const double error = squared_error(model, i);
@@ -54,6 +53,11 @@ RansacResult RunRansac(
     }
     return true;
   };
+  const auto offer = [&](const std::vector<Eigen::Matrix3d>& models) {
+    bool better = false;
+    for (const Eigen::Matrix3d& model : models) better |= take_if_better(model);
+    return better;
+  };
 
   std::mt19937_64 random(options.random_seed);
   std::vector<int> order(num_data);
@@ -62,12 +66,10 @@ RansacResult RunRansac(
   constexpr int kMaxLocalSteps = 4;
   for (int sample = 0; sample < needed; ++sample) {
     DrawSample(sample_size, &random, &order);
-    const auto model = fit({order.begin(), order.begin() + sample_size});
-    if (!model || !offer(*model)) continue;
+    if (!offer(fit({order.begin(), order.begin() + sample_size}))) continue;
     for (int step = 0; step < kMaxLocalSteps; ++step) {
       if (static_cast<int>(best.inliers.size()) < sample_size) break;
-      const auto refined = fit(best.inliers);
-      if (!refined || !offer(*refined)) break;
+      if (!offer(refine(best.inliers))) break;
     }
     needed = SamplesNeeded(1.0 * best.inliers.size() / num_data, sample_size, options);
   }

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -26,12 +25,14 @@ struct RansacResult {
   bool success = false;
 };
 
-// fit: model from the given data (sample_size of them, or more in the local optimisation), none if
-// they are degenerate. squared_error: px^2 of one datum, for 0 <= i < num_data.
-RansacResult RunRansac(
-    int num_data, int sample_size, const RansacOptions& options,
-    const std::function<std::optional<Eigen::Matrix3d>(const std::vector<int>&)>& fit,
-    const std::function<double(const Eigen::Matrix3d&, int)>& squared_error);
+// The models that a sample allows: several for minimal solvers, none if the sample is degenerate.
+using RansacFit = std::function<std::vector<Eigen::Matrix3d>(const std::vector<int>& sample)>;
+
+// fit: models from sample_size data. refine: the same from more of them, the inliers of a new best
+// model (local optimisation). squared_error: px^2 of one datum, for 0 <= i < num_data.
+RansacResult RunRansac(int num_data, int sample_size, const RansacOptions& options,
+                       const RansacFit& fit, const RansacFit& refine,
+                       const std::function<double(const Eigen::Matrix3d&, int)>& squared_error);
 
 // `count` different numbers below `bound`, ascending; all of them if count >= bound. Deterministic.
 std::vector<int> RandomSubset(int bound, int count, uint64_t random_seed);

@@ -137,7 +137,8 @@ void CheckDatabase(const MatchedImages& images, const Options& options,
     context.Warn(
         "camera " + std::to_string(camera_id) +
         " has prior_focal_length = 0: COLMAP guessed its focal length and verified its pairs "
-        "as uncalibrated. Give --ImageReader.camera_params to colmap feature_extractor");
+        "as uncalibrated. Give --ImageReader.camera_params to colmap feature_extractor, or "
+        "--refine_intrinsics 1 here");
   }
 }
 
@@ -150,6 +151,12 @@ Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::s
   json["num_hypotheses"] = trial.analysis.hypotheses.size();
   json["outcome"] = outcome;
   return json;
+}
+
+std::string Percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.0f %%", 100 * share);
+  return text;
 }
 
 struct Outcome {
@@ -204,6 +211,8 @@ void FillReport(const Outcome& outcome, const MatchedImages& images, Report* rep
   init["num_points"] = outcome.seed.pair_model.points.size();
   init["origin"] = chosen.origin;
   init["median_angle_deg"] = chosen.median_angle_deg;
+  init["num_off_plane"] = trial.analysis.num_off_plane;
+  init["num_third_views"] = decision.num_views;
   init["num_hypotheses"] = trial.analysis.hypotheses.size();
   // null: there was no second hypothesis to compare with.
   init["confidence"] = std::isfinite(decision.confidence) ? Json(decision.confidence) : Json();
@@ -218,18 +227,31 @@ void FillReport(const Outcome& outcome, const MatchedImages& images, Report* rep
   }
 }
 
+// Names the pair, and the photo that would cure it.
+std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& images) {
+  const std::string name1 = images.images().at(trial.image_id1).name,
+                    name2 = images.images().at(trial.image_id2).name;
+  const std::string cure =
+      " Add a photo that overlaps both, taken from another place (not in one "
+      "line with them), best with something that stands off the wall.";
+  if (trial.decision.num_views == 0) {
+    return "planar-ambiguous: " + name1 + " and " + name2 +
+           " show (almost) one plane, which allows two camera motions, and no third photo sees "
+           "enough of what both see to tell which one is right." +
+           cure;
+  }
+  char confidence[32];
+  std::snprintf(confidence, sizeof(confidence), "%.2f", trial.decision.confidence);
+  return "planar-ambiguous: two camera motions explain " + name1 + " and " + name2 +
+         " about equally well (ratio " + confidence + ", " +
+         std::to_string(trial.decision.num_views) + " third views), as happens before a wall." +
+         cure;
+}
+
 void JudgeTrust(const Outcome& outcome, const MatchedImages& images, Report* report) {
-  const auto name = [&](uint32_t image_id) { return images.images().at(image_id).name; };
   const PairTrial& trial = outcome.seed.trial;
   if (outcome.seed.ambiguous) {
-    char confidence[32];
-    std::snprintf(confidence, sizeof(confidence), "%.2f", trial.decision.confidence);
-    report->SetUntrusted("planar-ambiguous: two camera motions explain " + name(trial.image_id1) +
-                         " and " + name(trial.image_id2) + " about equally well (ratio " +
-                         confidence + ", " + std::to_string(trial.decision.num_views) +
-                         " third views), as happens before a wall. Add a photo that overlaps both "
-                         "from another place "
-                         "and shows something off the wall.");
+    report->SetUntrusted(AmbiguousSentence(trial, images));
   }
   const size_t num_registered = outcome.result.model.images.size();
   if (2 * num_registered < images.images().size()) {
@@ -321,7 +343,28 @@ void CheckFinished(const Database& database, const MatchedImages& images, const 
     json["contradicting"].push_back({name1, name2});
     if (names.empty()) names = name1 + " and " + name2;
   }
-  if (check.trusted) return;
+  json["doubtful_images"] = Json::array();
+  std::string doubtful;
+  for (const uint32_t image_id : check.doubtful) {
+    const std::string name = images.images().at(image_id).name;
+    json["doubtful_images"].push_back(name);
+    doubtful +=
+        (doubtful.empty() ? "" : ", ") + name + " (" + Percent(check.support.at(image_id)) + ")";
+  }
+  for (Json& image : context.report["images"]) {
+    const auto found = check.support.find(images.FindImage(image["name"])->image_id);
+    if (found != check.support.end()) image["match_support"] = found->second;
+  }
+  if (!check.doubtful.empty()) {
+    context.report.SetUntrusted(
+        "photos stand where most of their own matches do not put them: " + doubtful +
+        " of the matches obey the model. Take these photos out (they may show a repeated pattern, "
+        "or something that moved) and map again.");
+  }
+  if (static_cast<double>(check.contradicting.size()) <=
+      check_options.max_contradicting * check.num_pairs) {
+    return;
+  }
   context.report.SetUntrusted(
       "the model is contradicted by its own photos: for " +
       std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +

@@ -309,11 +309,7 @@ ThirdViewDecision DecideByThirdViews(const std::vector<RayMatch>& matches,
         return std::any_of(verdict.views_from_left.begin(), verdict.views_from_left.end(),
                            [](const auto& view) { return view.has_value(); });
       });
-  if (hypotheses.size() == 1) {
-    decision.confidence = std::numeric_limits<double>::infinity();
-  } else if (any_view_placed) {
-    decision.confidence = (second + floor) / (best + floor);
-  }
+  if (any_view_placed) decision.confidence = (second + floor) / (best + floor);
   return decision;
 }
 

@@ -39,7 +39,8 @@ struct HypothesisVerdict {
 
 struct ThirdViewDecision {
   int best = -1;  // index of the hypothesis
-  // Second best cost / best cost. Infinite with a single hypothesis; 1 without any third view.
+  // Second best cost / best cost. Infinite with a single hypothesis that a third view confirms; 1
+  // without any third view.
   double confidence = 1;
   int num_views = 0;  // placed under the best hypothesis
   std::vector<HypothesisVerdict> verdicts;

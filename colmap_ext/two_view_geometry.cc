@@ -42,6 +42,11 @@ Eigen::Matrix3d NullMatrix(const Matrix9d& normal, double* gap) {
   return matrix;
 }
 
+std::vector<Eigen::Matrix3d> AsModels(const std::optional<Eigen::Matrix3d>& model) {
+  if (!model) return {};
+  return {*model};
+}
+
 }  // namespace
 
 double EpipolarError2(const Eigen::Matrix3d& right_f_left, const RayMatch& match) {
@@ -141,12 +146,51 @@ std::optional<Eigen::Matrix3d> FitRotation(const std::vector<RayMatch>& matches,
   return Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose());
 }
 
+std::vector<Eigen::Matrix3d> FitEssential(const std::vector<RayMatch>& matches,
+                                          const std::vector<int>& five) {
+  std::vector<cv::Point2d> left, right;
+  for (const int i : five) {
+    left.emplace_back(matches[i].left.x.x(), matches[i].left.x.y());
+    right.emplace_back(matches[i].right.x.x(), matches[i].right.x.y());
+  }
+  std::vector<Eigen::Matrix3d> essentials;
+  cv::Mat stacked;  // 3 rows per solution
+  try {
+    stacked = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F));
+  } catch (const cv::Exception&) {
+    return essentials;
+  }
+  for (int row = 0; row + 3 <= stacked.rows; row += 3) {
+    Eigen::Matrix3d essential;
+    cv::cv2eigen(stacked.rowRange(row, row + 3), essential);
+    if (essential.allFinite() && essential.norm() > 0) {
+      essentials.push_back(essential / essential.norm());
+    }
+  }
+  return essentials;
+}
+
 RansacResult EstimateFundamental(const std::vector<RayMatch>& matches,
                                  const RansacOptions& options) {
+  const auto fit = [&](const std::vector<int>& sample) {
+    return AsModels(FitFundamental(matches, sample));
+  };
+  return RunRansac(static_cast<int>(matches.size()), 8, options, fit, fit,
+                   [&](const Eigen::Matrix3d& f, int i) { return EpipolarError2(f, matches[i]); });
+}
+
+RansacResult EstimateEssential(const std::vector<RayMatch>& matches, const RansacOptions& options) {
+  // Eight points or more by least squares help in a volume and harm nothing on a plane: a worse
+  // model is not taken.
+  const auto refine = [&](const std::vector<int>& inliers) {
+    std::vector<Eigen::Matrix3d> models = AsModels(FitFundamental(matches, inliers));
+    for (Eigen::Matrix3d& model : models) model = EssentialFromFundamental(model);
+    return models;
+  };
   return RunRansac(
-      static_cast<int>(matches.size()), 8, options,
-      [&](const std::vector<int>& sample) { return FitFundamental(matches, sample); },
-      [&](const Eigen::Matrix3d& f, int i) { return EpipolarError2(f, matches[i]); });
+      static_cast<int>(matches.size()), 5, options,
+      [&](const std::vector<int>& sample) { return FitEssential(matches, sample); }, refine,
+      [&](const Eigen::Matrix3d& e, int i) { return EpipolarError2(e, matches[i]); });
 }
 
 RansacResult EstimateHomography(const std::vector<RayMatch>& matches, const std::vector<int>& among,
@@ -154,18 +198,22 @@ RansacResult EstimateHomography(const std::vector<RayMatch>& matches, const std:
   std::vector<RayMatch> chosen;
   chosen.reserve(among.size());
   for (const int i : among) chosen.push_back(matches[i]);
-  RansacResult result = RunRansac(
-      static_cast<int>(chosen.size()), 4, options,
-      [&](const std::vector<int>& sample) { return FitHomography(chosen, sample); },
-      [&](const Eigen::Matrix3d& h, int i) { return HomographyError2(h, chosen[i]); });
+  const auto fit = [&](const std::vector<int>& sample) {
+    return AsModels(FitHomography(chosen, sample));
+  };
+  RansacResult result =
+      RunRansac(static_cast<int>(chosen.size()), 4, options, fit, fit,
+                [&](const Eigen::Matrix3d& h, int i) { return HomographyError2(h, chosen[i]); });
   for (int& i : result.inliers) i = among[i];
   return result;
 }
 
 RansacResult EstimateRotation(const std::vector<RayMatch>& matches, const RansacOptions& options) {
+  const auto fit = [&](const std::vector<int>& sample) {
+    return AsModels(FitRotation(matches, sample));
+  };
   return RunRansac(
-      static_cast<int>(matches.size()), 2, options,
-      [&](const std::vector<int>& sample) { return FitRotation(matches, sample); },
+      static_cast<int>(matches.size()), 2, options, fit, fit,
       [&](const Eigen::Matrix3d& r, int i) { return HomographyError2(r, matches[i]); });
 }
 

@@ -37,6 +37,11 @@ double HomographyError2(const Eigen::Matrix3d& right_from_left, const RayMatch& 
 // enforced. None with fewer than 8.
 std::optional<Eigen::Matrix3d> FitFundamental(const std::vector<RayMatch>& matches,
                                               const std::vector<int>& indices);
+// The essential matrices that five matches allow, up to ten (Nister 2004, through OpenCV). Unlike F
+// they are not left open by a plane: the five-point problem has two solutions there, both of them
+// camera motions. Empty if the matches are degenerate.
+std::vector<Eigen::Matrix3d> FitEssential(const std::vector<RayMatch>& matches,
+                                          const std::vector<int>& five);
 // Normalised DLT (Hartley and Zisserman 2004, algorithm 4.2). Signed so that points stay in front
 // (x_r^T H x_l > 0). None with fewer than 4 or if degenerate.
 std::optional<Eigen::Matrix3d> FitHomography(const std::vector<RayMatch>& matches,
@@ -49,6 +54,7 @@ std::optional<Eigen::Matrix3d> FitRotation(const std::vector<RayMatch>& matches,
 // Inliers are positions in `matches`.
 RansacResult EstimateFundamental(const std::vector<RayMatch>& matches,
                                  const RansacOptions& options);
+RansacResult EstimateEssential(const std::vector<RayMatch>& matches, const RansacOptions& options);
 // `among`: the matches to use, e.g. the inliers of F (thesis 6.1).
 RansacResult EstimateHomography(const std::vector<RayMatch>& matches, const std::vector<int>& among,
                                 const RansacOptions& options);

@@ -60,13 +60,13 @@ class HypothesisMaker {
                   std::vector<TwoViewHypothesis>* hypotheses)
       : matches_(matches), options_(options), hypotheses_(hypotheses) {}
 
-  void FromEssential(const RansacResult& fundamental) {
+  void FromEssential(const RansacResult& essential) {
+    if (!essential.success) return;
     const Rigid* best = nullptr;
-    const std::vector<Rigid> poses =
-        PosesFromEssential(EssentialFromFundamental(fundamental.model));
+    const std::vector<Rigid> poses = PosesFromEssential(essential.model);
     int best_in_front = 0;
     for (const Rigid& pose : poses) {
-      const int in_front = CountInFront(pose, matches_, fundamental.inliers);
+      const int in_front = CountInFront(pose, matches_, essential.inliers);
       if (in_front > best_in_front) {
         best_in_front = in_front;
         best = &pose;
@@ -128,8 +128,24 @@ RansacOptions PositionRansac(const HypothesisOptions& options, int max_samples) 
   ransac.max_samples = max_samples;
   return ransac;
 }
+// A sample of five has several solutions, each of which is scored: 300 find a clean one where half
+// of the matches are wrong.
+RansacOptions EssentialRansac(const HypothesisOptions& options) {
+  RansacOptions ransac = EpipolarRansac(options);
+  ransac.max_samples = 300;
+  return ransac;
+}
 constexpr int kRotationSamples = 40;     // finds half of the matches, and 0.9 are asked for
 constexpr int kHomographySamples = 600;  // finds a third of them
+
+// At 1.5 times the limit of an inlier, so that the plane's own noise does not count.
+int CountOffPlane(const Eigen::Matrix3d& homography, const std::vector<RayMatch>& matches,
+                  const std::vector<int>& among, const HypothesisOptions& options) {
+  const double limit2 = std::pow(1.5 * options.MaxErrorPx(), 2);
+  return static_cast<int>(std::count_if(among.begin(), among.end(), [&](int i) {
+    return HomographyError2(homography, matches[i]) > limit2;
+  }));
+}
 
 }  // namespace
 
@@ -233,7 +249,7 @@ TwoViewAnalysis AnalysePair(const std::vector<RayMatch>& matches,
   if (analysis.pure_rotation) return analysis;
 
   HypothesisMaker maker(matches, options, &analysis.hypotheses);
-  maker.FromEssential(fundamental);
+  maker.FromEssential(EstimateEssential(matches, EssentialRansac(options)));
   // On a plane F is arbitrary and its inliers a random choice: the hypotheses take the plane's own.
   std::vector<int> all(matches.size());
   std::iota(all.begin(), all.end(), 0);
@@ -250,7 +266,12 @@ TwoViewAnalysis AnalysePair(const std::vector<RayMatch>& matches,
          hypotheses.back().cost > kHopelessCostRatio * hypotheses.front().cost) {
     hypotheses.pop_back();
   }
-  if (hypotheses.empty()) analysis.problem = "no relative pose has enough points before both views";
+  if (hypotheses.empty()) {
+    analysis.problem = "no relative pose has enough points before both views";
+  } else {
+    analysis.num_off_plane =
+        CountOffPlane(homography.model, matches, hypotheses.front().inliers, options);
+  }
   return analysis;
 }
 

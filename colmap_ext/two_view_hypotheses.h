@@ -45,14 +45,18 @@ struct TwoViewAnalysis {
   double h_ratio = 0;          // num_h_inliers / num_f_inliers
   bool degenerate = false;     // thesis' verdict: h_ratio above degenerate_ratio
   bool pure_rotation = false;  // the matches show no parallax: no hypotheses
+  // Inliers of the best hypothesis that the best homography does not explain: what two views can
+  // tell its rivals apart by.
+  int num_off_plane = 0;
   // Different from each other, best two-view cost first.
   std::vector<TwoViewHypothesis> hypotheses;
   std::string problem;  // why there are none; "" if there are some
 };
 
-// Thesis 6.1 and the hypotheses of docs/colmap.md: E from F, the homography's poses, and the
-// same-pose start at constant depth, each refined by robust bundle adjustment with inliers chosen
-// anew, equal ones merged.
+// Thesis 6.1 and the hypotheses of docs/colmap.md: the best essential matrix, the homography's
+// poses, and the same-pose start at constant depth, each refined by robust bundle adjustment with
+// inliers chosen anew, equal ones merged. Departure: E comes from five points instead of from F,
+// which a plane leaves open; F serves the thesis' verdict only.
 TwoViewAnalysis AnalysePair(const std::vector<RayMatch>& matches, const HypothesisOptions& options);
 
 // The start of the thesis for a degenerate structure: both views at the same pose, all points at

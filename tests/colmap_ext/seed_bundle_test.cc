@@ -1,5 +1,6 @@
 #include "colmap_ext/seed_bundle.h"
 
+#include <map>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -188,6 +189,40 @@ TEST(SeedBundle, PureRotationGivesNoUsableBaseline) {
   const TwoViewAnalysis analysis = AnalysePair(matches, hypothesis_options);
   EXPECT_TRUE(analysis.pure_rotation);
   EXPECT_TRUE(analysis.hypotheses.empty());
+}
+
+TEST(SeedBundle, FixedViewsStayToTheLastBitAndHoldTheScale) {
+  SimulatedViewsOptions options = MakeOptions(Scene::kRoom, 0, 4);
+  options.num_views = 3;
+  const SimulatedViews views = SimulateViews(options);
+  SeedGeometry truth;
+  std::map<int, int> point_of_index;
+  std::vector<SeedObservation> observations;
+  const CameraProjection projection(views.cameras.at(1));
+  for (uint32_t image_id = 1; image_id <= 3; ++image_id) {
+    truth.views_from_left.push_back(views.TrueRelativePose(1, image_id));  // in metres
+    const std::vector<Ray> rays = RaysFromKeypoints(projection, views.keypoints.at(image_id));
+    for (size_t row = 0; row < rays.size(); ++row) {
+      const int index = views.point_of_keypoint.at(image_id)[row];
+      const Eigen::Vector3d x = views.cam_from_scene.at(1) * views.points_in_scene[index];
+      if (x.z() <= 0.3) continue;
+      const auto [entry, is_new] =
+          point_of_index.emplace(index, static_cast<int>(truth.points.size()));
+      if (is_new) truth.points.emplace_back(x.x() / x.z(), x.y() / x.z(), 1 / x.z());
+      observations.push_back({static_cast<int>(image_id) - 1, entry->second, rays[row]});
+    }
+  }
+  SeedGeometry start = truth;
+  start.views_from_left[2].rotation =
+      Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitX()) * truth.views_from_left[2].rotation;
+  start.views_from_left[2].translation += Eigen::Vector3d(0.08, -0.05, 0.06);
+  SeedBundleOptions bundle;
+  bundle.num_fixed_views = 2;
+  const SeedBundleResult result = AdjustSeed(start, observations, bundle);
+  ASSERT_TRUE(result.usable);
+  EXPECT_THAT(result.geometry.views_from_left[1], IsNearRigid(truth.views_from_left[1], 1e-15, 0));
+  EXPECT_THAT(result.geometry.views_from_left[2],
+              IsNearRigid(truth.views_from_left[2], 1e-6, 1e-5));
 }
 
 TEST(SeedBundle, MovesOneViewOntoItsPoints) {

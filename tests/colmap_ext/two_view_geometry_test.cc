@@ -124,6 +124,44 @@ TEST(TwoViewGeometry, RansacFindsTheTrueMatchesAmongOutliers) {
   }
 }
 
+// On a plane eight points leave F open; five leave two essential matrices, one of them the truth.
+TEST(TwoViewGeometry, FivePointsOfAWallHoldTheTrueEssential) {
+  for (const Scene scene : {Scene::kRoom, Scene::kWall}) {
+    for (int seed = 0; seed < 5; ++seed) {
+      SimulatedViewsOptions options = MakeOptions(scene, 0, 0, seed);
+      options.distortion = options.two_cameras = seed % 2 == 1;
+      const SimulatedViews views = SimulateViews(options);
+      const std::vector<RayMatch> matches = FirstPair(views);
+      const int step = static_cast<int>(matches.size()) / 5;
+      const std::vector<Eigen::Matrix3d> found =
+          FitEssential(matches, {0, step, 2 * step, 3 * step, 4 * step});
+      const Eigen::Matrix3d truth = EssentialFromPose(views.TrueRelativePose(1, 2)).normalized();
+      double least = 10;
+      for (const Eigen::Matrix3d& essential : found) {
+        least = std::min({least, (essential - truth).norm(), (essential + truth).norm()});
+      }
+      EXPECT_LT(least, 1e-4) << "seed " << seed << ", " << found.size() << " solutions";
+    }
+  }
+}
+
+TEST(TwoViewGeometry, EssentialOfAWallObeysTheTrueMatches) {
+  for (const double outliers : {0.0, 0.15, 0.3}) {
+    const SimulatedViews views = SimulateViews(MakeOptions(Scene::kWall, 0.7, outliers, 5));
+    const std::vector<RayMatch> matches = FirstPair(views);
+    RansacOptions ransac;
+    ransac.max_error_px = std::sqrt(kChiSquare1) * 0.7;
+    const RansacResult result = EstimateEssential(matches, ransac);
+    ASSERT_TRUE(result.success);
+    EXPECT_THAT(result.model.jacobiSvd().singularValues().normalized(),
+                IsNearMatrix(Eigen::Vector3d(1, 1, 0).normalized(), 1e-6));
+    int num_true = 0, num_found = 0;
+    for (const RayMatch& match : matches) num_true += IsTrueMatch(views, match);
+    for (const int i : result.inliers) num_found += IsTrueMatch(views, matches[i]);
+    EXPECT_GE(num_found, 0.93 * num_true);
+  }
+}
+
 TEST(TwoViewGeometry, RansacRepeatsItself) {
   const std::vector<RayMatch> matches =
       FirstPair(SimulateViews(MakeOptions(Scene::kRoom, 0.7, 0.3, 2)));
