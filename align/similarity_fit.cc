@@ -13,7 +13,6 @@ namespace {
 
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr size_t kMaxSurfacePoints = 30000;
 // A click farther off than this many standard deviations counts linearly (Huber 1964: 1.345 to 2).
 constexpr double kHuber = 2.0;
 // How well the start's scale is believed, as a share: only speaks where nothing else fixes the
@@ -198,7 +197,7 @@ std::vector<std::string> SimilarityFitOptions::Problems() const {
 }
 
 std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_track,
-                                            double sigma_px) {
+                                            double sigma_px, size_t max_points) {
   struct View {
     Eigen::Matrix3d rotation;
     Rigid pose;
@@ -216,6 +215,7 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     if (static_cast<int>(sparse.track.size()) < min_track) continue;
     SurfacePoint point;
     point.x_in_sparse = sparse.x_in_model;
+    point.point3d_id = id;
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     double mean_distance = 0;
     for (const TrackElement& element : sparse.track) {
@@ -236,8 +236,8 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     point.covariance = sigma_px * sigma_px * information.inverse();
     points.push_back(point);
   }
-  if (points.size() <= kMaxSurfacePoints) return points;
-  const size_t stride = (points.size() + kMaxSurfacePoints - 1) / kMaxSurfacePoints;
+  if (points.size() <= max_points) return points;
+  const size_t stride = (points.size() + max_points - 1) / max_points;
   std::vector<SurfacePoint> thinned;
   for (size_t i = 0; i < points.size(); i += stride) thinned.push_back(points[i]);
   return thinned;

@@ -14,18 +14,21 @@
 
 namespace roomtex {
 
-// A sparse point that takes part, with what its observations say about its own accuracy.
+// A sparse point that takes part, with what its observations say about its own accuracy. (Of a
+// model that is in the scan frame already, read `scan` for `sparse`.)
 struct SurfacePoint {
   Eigen::Vector3d x_in_sparse = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // sparse units^2
   Eigen::Vector3d to_cameras = Eigen::Vector3d::Zero();  // mean direction to its cameras, `sparse`
+  uint64_t point3d_id = kInvalidPoint3dId;
 };
 
 // Points with at least min_track observations; covariance = inverse normal matrix of the
 // triangulation with the poses held, times the residual variance sigma_px^2 of a coordinate. Points
-// that their rays do not fix are left out; of very many points every k-th is taken.
+// that their rays do not fix are left out; of more than max_points every k-th is taken.
+inline constexpr size_t kMaxSurfacePoints = 30000;
 std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_track,
-                                            double sigma_px);
+                                            double sigma_px, size_t max_points = kMaxSurfacePoints);
 
 struct SimilarityFitOptions {
   int min_track = 3;       // observations that a sparse point needs to take part

@@ -1,0 +1,61 @@
+#pragma once
+// The residuals of the plane-constrained bundle adjustment with their derivatives (thesis 7.2,
+// Appendix C). Only plane_bundle.cc and tests use them.
+
+#include <Eigen/Core>
+#include <ceres/cost_function.h>
+#include <ceres/sized_cost_function.h>
+
+#include "core/camera_model.h"
+#include "core/similarity.h"
+
+namespace roomtex {
+
+// beta * n . (q - t), pixels: point q (3 parameters, `scan`, metres) off the plane (t, n); beta in
+// pixels per metre. Jacobian: beta * n^T.
+//
+// Departure: thesis (C.3) has the residual (beta / sqrt 2) * n . (q - t) twice, since its solver
+// knows only residuals of two rows. One row with beta has the same cost, gradient and normal
+// matrix.
+class PlaneCost : public ceres::SizedCostFunction<1, 3> {
+ public:
+  PlaneCost(double beta_px_per_m, const Eigen::Vector3d& point, const Eigen::Vector3d& normal)
+      : beta_(beta_px_per_m), point_(point), normal_(normal) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  double beta_;
+  Eigen::Vector3d point_, normal_;
+};
+
+// A pose near `cam_from_scan`: x_in_cam = exp(w) R (x_in_scan - centre).
+struct PoseParameters {
+  // w (radians), centre (`scan`).
+  double values[6] = {0, 0, 0, 0, 0, 0};
+  Eigen::Quaterniond start_rotation = Eigen::Quaterniond::Identity();  // R
+  Eigen::Matrix3d start_matrix = Eigen::Matrix3d::Identity();          // of R
+
+  explicit PoseParameters(const Rigid& cam_from_scan);
+  Rigid CamFromScan() const;
+};
+
+// weight * (projection - x_in_img), pixels. Parameters: the pose (6, PoseParameters), the point (3,
+// `scan`) and, with refine_intrinsics, those of the camera. Fails for a point that is not in front
+// of the camera. `pose` and `camera` must outlive it.
+class ReprojectionCost : public ceres::CostFunction {
+ public:
+  ReprojectionCost(const PoseParameters& pose, const Camera& camera,
+                   const Eigen::Vector2d& x_in_img, double weight, bool refine_intrinsics);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const PoseParameters& pose_;
+  const Camera& camera_;
+  Eigen::Vector2d x_in_img_;
+  double weight_;
+  bool refine_intrinsics_;
+};
+
+}  // namespace roomtex
