@@ -67,7 +67,7 @@ ceres::Solver::Options SolverOptions(const SeedBundleOptions& options) {
   SilenceCeres();
   ceres::Solver::Options solver;
   solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-8;
+  solver.function_tolerance = 1e-6;
   solver.num_threads = 1;  // pairs run side by side; the answer must not depend on threads
   solver.logging_type = ceres::SILENT;
   return solver;

@@ -20,6 +20,10 @@ constexpr double kMinShareInFront = 0.75;
 constexpr double kPureRotationShare = 0.9;
 // Equal hypotheses: closer than bundle adjustment from different starts ends up.
 constexpr double kEqualRotationDeg = 0.4, kEqualBaselineDeg = 2.5;
+// Points of a first refinement, and the share of an equal one's cost below which the second is
+// worth refining all the same.
+constexpr int kMaxRoughPoints = 80;
+constexpr double kClearlyBetter = 0.9;
 // Hypotheses whose own two views already fit this much worse are no rivals.
 constexpr double kHopelessCostRatio = 3;
 
@@ -85,7 +89,7 @@ class HypothesisMaker {
   void FromSamePose(const RansacResult& homography) {
     std::vector<int> chosen;
     const int num_inliers = static_cast<int>(homography.inliers.size());
-    for (const int k : RandomSubset(num_inliers, options_.max_points, options_.random_seed)) {
+    for (const int k : RandomSubset(num_inliers, kMaxRoughPoints, options_.random_seed)) {
       chosen.push_back(homography.inliers[k]);
     }
     const SeedBundleResult solved = SolveFromSamePose(matches_, chosen);
@@ -93,10 +97,17 @@ class HypothesisMaker {
   }
 
  private:
+  // A few points first: most starts end where another one did, and need no more.
   void Add(const Rigid& right_from_left, const std::string& origin) {
+    const TwoViewHypothesis rough =
+        RefineHypothesis(right_from_left, matches_, kMaxRoughPoints, options_);
+    if (static_cast<int>(rough.inliers.size()) < options_.min_num_inliers) return;
+    for (const TwoViewHypothesis& other : roughs_) {
+      if (Equal(rough, other) && !(rough.cost < kClearlyBetter * other.cost)) return;
+    }
+    roughs_.push_back(rough);
     TwoViewHypothesis hypothesis =
-        RefineHypothesis(right_from_left, matches_, options_.max_points, options_);
-    if (static_cast<int>(hypothesis.inliers.size()) < options_.min_num_inliers) return;
+        RefineHypothesis(rough.right_from_left, matches_, options_.max_points, options_);
     hypothesis.origin = origin;
     for (TwoViewHypothesis& other : *hypotheses_) {
       if (!Equal(hypothesis, other)) continue;
@@ -112,6 +123,7 @@ class HypothesisMaker {
   const std::vector<RayMatch>& matches_;
   const HypothesisOptions& options_;
   std::vector<TwoViewHypothesis>* hypotheses_;
+  std::vector<TwoViewHypothesis> roughs_;  // everything that was refined with all points
 };
 
 RansacOptions EpipolarRansac(const HypothesisOptions& options) {

@@ -159,6 +159,7 @@ TEST_F(MapperCommand, SaysThatTwoPhotosOfAWallAreAmbiguous) {
   SimulatedViewsOptions options;
   options.scene = Scene::kWall;
   for (options.random_seed = 0; options.random_seed < 3; ++options.random_seed) {
+    fs::remove(folder_ / "database.db");
     Simulate(options);
     const CommandResult result = Run();
     EXPECT_EQ(result.exit_code, 4) << result.err;

@@ -13,6 +13,7 @@
 #include "core/frames.h"
 #include "importers/scan_reader.h"
 #include "tests/e2e/colmap_steps.h"
+#include "tests/e2e/kitchen_subsets.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 
@@ -108,6 +109,83 @@ TEST_F(Kitchen, RegistersEveryPhoto) {
   EXPECT_EQ(report["num_reg_images"], 36);
   EXPECT_LT(report["mean_reprojection_error_px"], 0.8);
   EXPECT_EQ(ReadSparseModel(*folder_ / "sparse/0").images.size(), 36u);
+}
+
+// How a model of fewer matches stands against the model of all of them, after the best similarity.
+struct ModelErrors {
+  size_t num_images = 0;
+  double worst_rotation_deg = 0;
+  double worst_centre = 0;  // over the radius of the cameras
+};
+ModelErrors CompareModels(const SparseModel& model, const SparseModel& all) {
+  ModelErrors errors;
+  errors.num_images = model.images.size();
+  Eigen::Matrix3Xd found(3, model.images.size()), expected(3, model.images.size());
+  int column = 0;
+  for (const auto& [image_id, image] : model.images) {
+    found.col(column) = image.cam_from_model.TargetOriginInSource();
+    expected.col(column++) = all.images.at(image_id).cam_from_model.TargetOriginInSource();
+  }
+  const Similarity all_from_model = FitSimilarity(found, expected);
+  const double radius =
+      (expected.colwise() - expected.rowwise().mean()).colwise().norm().maxCoeff();
+  for (const auto& [image_id, image] : model.images) {
+    const Rigid pose = CamFromScan(image.cam_from_model, all_from_model);
+    const Rigid& truth = all.images.at(image_id).cam_from_model;
+    errors.worst_rotation_deg = std::max(errors.worst_rotation_deg,
+                                         DegFromRad(RotationAngle(pose.rotation, truth.rotation)));
+    errors.worst_centre =
+        std::max(errors.worst_centre,
+                 (pose.TargetOriginInSource() - truth.TargetOriginInSource()).norm() / radius);
+  }
+  return errors;
+}
+
+// The notice-board wall, the table, the cupboards: each alone is a plane with two solutions per
+// pair. COLMAP 3.8's own mapper is 165 degrees wrong on the first of them.
+TEST_F(Kitchen, EachOfItsLargePlanesAloneGivesTheSamePosesOrARefusal) {
+  ASSERT_EQ(mapper_.exit_code, 0) << mapper_.err;
+  const SparseModel all = ReadSparseModel(*folder_ / "sparse/0");
+  const std::vector<ModelPlane> planes = LargestPlanes(all, 4);
+  int num_trusted = 0;
+  for (size_t k = 0; k < planes.size(); ++k) {
+    SCOPED_TRACE("plane " + std::to_string(k) + " of " + std::to_string(planes[k].num_points) +
+                 " points");
+    const std::string name = *folder_ / ("plane" + std::to_string(k));
+    const int num_images =
+        WritePlanarSubset(*folder_ / "database.db", all, planes[k], name + ".db");
+    const CommandResult result =
+        RunCommandLine("roomtex-mapper --database_path " + name + ".db --image_path " + kKitchen +
+                       "/images --output_path " + name);
+    if (result.exit_code == 4 || result.exit_code == 3) continue;
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    ++num_trusted;
+    const ModelErrors errors = CompareModels(ReadSparseModel(name + "/0"), all);
+    EXPECT_GE(errors.num_images, 0.9 * num_images);
+    EXPECT_LT(errors.worst_rotation_deg, 3);
+    EXPECT_LT(errors.worst_centre, 0.06);
+  }
+  EXPECT_GE(num_trusted, 3);
+}
+
+// COLMAP 3.8's own mapper registers none of these sixteen.
+TEST_F(Kitchen, AChainOfNeighboursWithFewCommonPointsIsRegisteredPhotoByPhoto) {
+  ASSERT_EQ(mapper_.exit_code, 0) << mapper_.err;
+  const std::string name = *folder_ / "chain";
+  ASSERT_EQ(WriteChainSubset(*folder_ / "database.db", 16, 40, name + ".db"), 16);
+  const CommandResult result =
+      RunCommandLine("roomtex-mapper --database_path " + name + ".db --image_path " + kKitchen +
+                     "/images --output_path " + name + " --report_path " + name + ".json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ModelErrors errors =
+      CompareModels(ReadSparseModel(name + "/0"), ReadSparseModel(*folder_ / "sparse/0"));
+  EXPECT_EQ(errors.num_images, 16u);
+  EXPECT_LT(errors.worst_rotation_deg, 4);
+  EXPECT_LT(errors.worst_centre, 0.05);
+  int num_chained = 0;
+  const json report = ReadJson(name + ".json");
+  for (const auto& image : report["images"]) num_chained += image["by"] == "chained";
+  EXPECT_GE(num_chained, 4);
 }
 
 TEST_F(Kitchen, AlignsWithHurriedPicks) {
