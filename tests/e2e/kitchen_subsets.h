@@ -46,7 +46,7 @@ inline std::vector<ModelPlane> LargestPlanes(const SparseModel& model, int count
       const Eigen::Vector3d& c = points[random() % points.size()];
       ModelPlane plane;
       plane.normal = (b - a).cross(c - a).normalized();
-      if (!plane.normal.allFinite()) continue;
+      if (!(plane.normal.norm() > 0.5)) continue;  // the same point twice
       plane.offset = plane.normal.dot(a);
       for (const Eigen::Vector3d& x : points) {
         plane.num_points += std::abs(plane.normal.dot(x) - plane.offset) < tolerance;

