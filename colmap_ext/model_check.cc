@@ -94,8 +94,11 @@ void CountSupport(MatchedImages* images, const SparseModel& model, const ModelCh
     check->support[image_id] = shares.back();
   }
   if (shares.empty()) return;
-  std::nth_element(shares.begin(), shares.begin() + shares.size() / 2, shares.end());
-  const double limit = std::max(kLeastSupport, options.min_support * shares[shares.size() / 2]);
+  // The better photos tell what the matches are worth; the median may be dragged down by what is
+  // looked for.
+  const size_t upper_quartile = shares.size() * 3 / 4;
+  std::nth_element(shares.begin(), shares.begin() + upper_quartile, shares.end());
+  const double limit = std::max(kLeastSupport, options.min_support * shares[upper_quartile]);
   for (const auto& [image_id, share] : check->support) {
     if (share < limit) check->doubtful.push_back(image_id);
   }

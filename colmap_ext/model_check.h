@@ -28,8 +28,9 @@ struct ModelCheckOptions {
   // Share of the tested pairs that must contradict; one pair alone does where fewer are tested.
   double max_contradicting = 0.25;
   // Of a photo's verified matches with other photos of the model, the share that must obey the
-  // model's poses; larger = stricter.
-  double min_support = 0.5;
+  // model's poses, relative to the upper quartile of all photos; larger = stricter. On a real
+  // kitchen right photos reach 0.94 of it or more, one that stands 42 cm off 0.63.
+  double min_support = 0.75;
 };
 
 struct ModelCheck {
