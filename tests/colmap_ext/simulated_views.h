@@ -18,12 +18,14 @@ namespace roomtex {
 
 struct SimulatedViewsOptions {
   enum class Scene {
-    kRoom,
-    kWall,
-    kRelief
-  };  // points in a volume; on a plane; on a plane + relief
+    kRoom,    // points in a volume
+    kWall,    // on a plane
+    kRelief,  // on a plane + relief
+    kCorner   // on two walls that meet at 90 degrees
+  };
   Scene scene = Scene::kRoom;
   double relief = 0.05;  // kRelief: depth of the relief over the distance
+  double period = 0;     // metres; above 0 the wall repeats along x, see next_in_period
   int num_points = 400;
   int num_views = 2;
   double field_of_view_deg = 58;
@@ -44,6 +46,8 @@ struct SimulatedViews {
   std::vector<DatabasePair> pairs;
   std::map<uint32_t, Rigid> cam_from_scene;  // truth
   std::vector<Eigen::Vector3d> points_in_scene;
+  // With a period: the point that looks like this one, one period to the right; -1 = none.
+  std::vector<int> next_in_period;
 
   MatchedImages Matched() const {
     return MatchedImages(cameras, images, pairs,
@@ -68,6 +72,28 @@ inline Camera SimulatedCamera(uint32_t camera_id, const SimulatedViewsOptions& o
   return camera;
 }
 
+// The points of the leftmost period, copied to the right as often as the scene is wide.
+inline void RepeatAlongX(double period, SimulatedViews* views) {
+  std::vector<Eigen::Vector3d>& points = views->points_in_scene;
+  double low = points[0].x(), high = low;
+  for (const Eigen::Vector3d& x : points) {
+    low = std::min(low, x.x());
+    high = std::max(high, x.x());
+  }
+  const int num_copies = std::max(1, static_cast<int>((high - low) / period));
+  const size_t num_base = points.size() / num_copies;
+  std::vector<Eigen::Vector3d> repeated;
+  for (size_t i = 0; i < num_base; ++i) {
+    const double offset = std::fmod(points[i].x() - low, period);
+    for (int k = 0; k < num_copies; ++k) {
+      views->next_in_period.push_back(k + 1 < num_copies ? static_cast<int>(repeated.size()) + 1
+                                                         : -1);
+      repeated.emplace_back(low + offset + k * period, points[i].y(), points[i].z());
+    }
+  }
+  points = repeated;
+}
+
 inline SimulatedViews SimulateViews(const SimulatedViewsOptions& options) {
   using Scene = SimulatedViewsOptions::Scene;
   std::mt19937_64 random(options.random_seed * 7919 + 17);
@@ -85,8 +111,10 @@ inline SimulatedViews SimulateViews(const SimulatedViewsOptions& options) {
                       uniform(-1, 1) * half, 0);
     if (options.scene == Scene::kRoom) x.z() = uniform(-1.3, 1.3);
     if (options.scene == Scene::kRelief) x.z() = uniform(-0.5, 0.5) * options.relief * distance;
+    if (options.scene == Scene::kCorner) x.z() = 0.65 * half - std::abs(x.x());
     views.points_in_scene.push_back(x);
   }
+  if (options.period > 0) RepeatAlongX(options.period, &views);
   views.cameras[1] = SimulatedCamera(1, options);
   if (options.two_cameras) views.cameras[2] = SimulatedCamera(2, options);
   for (int k = 0; k < options.num_views; ++k) {
@@ -108,7 +136,7 @@ inline SimulatedViews SimulateViews(const SimulatedViewsOptions& options) {
     rotation = Eigen::AngleAxisd(normal(0.05), Eigen::Vector3d::UnitZ()) * rotation;
     views.cam_from_scene[image_id] = {Eigen::Quaterniond(rotation), -rotation * centre};
     const CameraProjection projection(views.cameras.at(camera_id));
-    for (int p = 0; p < options.num_points; ++p) {
+    for (int p = 0; p < static_cast<int>(views.points_in_scene.size()); ++p) {
       const auto x_in_img =
           projection.ImgFromCam(views.cam_from_scene[image_id] * views.points_in_scene[p]);
       if (!x_in_img || !projection.InImage(*x_in_img)) continue;

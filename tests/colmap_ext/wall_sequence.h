@@ -96,4 +96,31 @@ inline SimulatedViews WithGhostView(SimulatedViews views, uint32_t ghost_id) {
   return views;
 }
 
+// On a repeated texture (SimulatedViewsOptions::period): all matches of one pair go one period too
+// far, as consistent among themselves as the right ones.
+inline SimulatedViews WithShiftedPair(SimulatedViews views, uint32_t image_id1,
+                                      uint32_t image_id2) {
+  std::map<int, int> row_of_point;  // in image 2
+  const std::vector<int>& points2 = views.point_of_keypoint.at(image_id2);
+  for (size_t row = 0; row < points2.size(); ++row) {
+    row_of_point[points2[row]] = static_cast<int>(row);
+  }
+  for (DatabasePair& pair : views.pairs) {
+    if (pair.image_id1 != image_id1 || pair.image_id2 != image_id2) continue;
+    pair.matches.clear();
+    const std::vector<int>& points1 = views.point_of_keypoint.at(image_id1);
+    for (size_t row = 0; row < points1.size(); ++row) {
+      const auto found = row_of_point.find(views.next_in_period.at(points1[row]));
+      if (found == row_of_point.end()) continue;
+      pair.matches.emplace_back(static_cast<int>(row), found->second);
+    }
+  }
+  return views;
+}
+
+// Keeps the pairs of neighbours only, each point matched in one of them: what chains up freely.
+inline SimulatedViews WithoutTriples(const SimulatedViews& views, int random_seed) {
+  return ThinOutTriples(views, {}, random_seed);
+}
+
 }  // namespace roomtex

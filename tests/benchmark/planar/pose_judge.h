@@ -1,0 +1,60 @@
+#pragma once
+// Right or wrong, by the simulated truth.
+
+#include "colmap_ext/initializer.h"
+#include "colmap_ext/sparse_model.h"
+#include "tests/colmap_ext/simulated_views.h"
+
+namespace roomtex {
+
+// A pair is right within these of its true motion, or of the least-squares optimum that bundle
+// adjustment reaches from the truth: noise allows no initialiser more.
+inline constexpr double kMaxPairRotationDeg = 3, kMaxPairBaselineDeg = 5;
+
+struct MotionErrors {
+  double rotation_deg = 0, baseline_deg = 0;  // 3D angle, angle of the baselines' directions
+  bool Right() const {
+    return rotation_deg < kMaxPairRotationDeg && baseline_deg < kMaxPairBaselineDeg;
+  }
+};
+MotionErrors CompareMotions(const Rigid& a, const Rigid& b);
+
+struct PairVerdict {
+  MotionErrors from_truth, from_optimum, optimum_from_truth;
+  bool Right() const { return from_truth.Right() || from_optimum.Right(); }
+  // The keypoints tell the truth apart from what the limits call wrong.
+  bool Identifiable() const { return optimum_from_truth.Right(); }
+};
+// The optimum is that of the pair's right matches, and of what up to max_third_views further views
+// see of them (as the initialiser takes its third views).
+PairVerdict JudgePair(const SimulatedViews& views, MatchedImages* images, const DatabasePair& pair,
+                      const Rigid& right_from_left, int max_third_views);
+
+struct ModelVerdict {
+  size_t num_registered = 0;
+  // Every registered view stands and looks right and the points lie where they are.
+  bool poses_right = false;
+  std::vector<double> centre_errors;        // metres, ascending; one per view
+  std::vector<double> rotation_errors_deg;  // degrees, ascending; one per view
+  double median_point_error = 0;            // metres
+  double mean_reprojection_error_px = 0;    // over all observations
+
+  // NaN without views.
+  double MedianCentreError() const;
+  double MedianRotationErrorDeg() const;
+};
+
+// A model is right when ONE similarity brings every view within kMaxCentreError and
+// kMaxViewRotationDeg of the truth and half of the points within kMaxPointError of theirs. Its
+// rotation is the mean of what the views' orientations ask for, scale and translation follow from
+// all centres: nothing of it is left open by cameras in a row, and a mirrored model would need a
+// negative scale, which is wrong.
+inline constexpr double kMaxCentreError = 0.10;   // metres, 3 m from the wall
+inline constexpr double kMaxViewRotationDeg = 3;  // degrees
+inline constexpr double kMaxPointError = 0.10;    // metres
+ModelVerdict JudgeModel(SparseModel model, const SimulatedViews& views);
+
+// The largest of the models that COLMAP left below `folder` (0, 1, ...); empty if there is none.
+SparseModel LargestModel(const std::string& folder);
+
+}  // namespace roomtex
