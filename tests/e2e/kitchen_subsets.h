@@ -67,8 +67,7 @@ inline std::vector<ModelPlane> LargestPlanes(const SparseModel& model, int count
 class SubsetWriter {
  public:
   SubsetWriter(const std::string& database_path, const std::string& subset_path)
-      : database_((std::filesystem::copy_file(database_path, subset_path), subset_path),
-                  SQLite::OPEN_READWRITE) {
+      : database_(Copy(database_path, subset_path), SQLite::OPEN_READWRITE) {
     database_.exec("BEGIN; DELETE FROM matches; DELETE FROM two_view_geometries");
   }
   // rows: of image_id1 and image_id2 in turn, image_id1 < image_id2.
@@ -94,6 +93,10 @@ class SubsetWriter {
   }
 
  private:
+  static std::string Copy(const std::string& from, const std::string& to) {
+    std::filesystem::copy_file(from, to);
+    return to;
+  }
   SQLite::Database database_;
   std::set<uint32_t> images_;
 };
