@@ -13,6 +13,8 @@ namespace {
 constexpr double kMinFacing = 0.15;
 // Planes whose normals differ by less (cosine) lie behind each other rather than meet in an edge.
 constexpr double kParallel = 0.9;
+// A patch farther from the plane than this many standard deviations is another surface.
+constexpr double kLeavesPlane = 2.5;
 // A patch thicker than this many times the typical one is not flat.
 constexpr double kMaxThickness = 3.0;
 
@@ -82,7 +84,14 @@ class Association {
     if ((offset - nearest->distance * patch.normal).norm() > patches_.cell_size()) {
       return std::nullopt;
     }
-    return Judge(point, {0, patch.point, patch.normal, PatchSigma(patch), -1}, gate);
+    return Judge(point, {0, patch.point, patch.normal, PatchSigma(patch), -1, true}, gate);
+  }
+
+  // The patch is off the plane by more than its noise.
+  bool Leaves(const SurfaceConstraint& patch, int plane) const {
+    const double noise = std::sqrt(
+        std::max(0.0, patch.sigma * patch.sigma - options_.surface_noise * options_.surface_noise));
+    return std::abs(planes_[plane].Distance(patch.point)) > kLeavesPlane * noise;
   }
 
  private:
@@ -151,13 +160,18 @@ std::vector<SurfaceConstraint> AssociateWithSurface(const std::vector<SurfacePoi
   std::vector<SurfaceConstraint> constraints;
   for (const SurfacePoint& point : points) {
     const auto on_planes = association.Planes(point, gate);
-    if (!on_planes.empty()) {
-      if (!MeetInAnEdge(on_planes)) constraints.push_back(Best(on_planes).constraint);
-      continue;
+    if (!on_planes.empty() && MeetInAnEdge(on_planes)) continue;
+    std::optional<SurfaceConstraint> best;
+    if (!on_planes.empty()) best = Best(on_planes).constraint;
+    if (options.surface) {
+      const auto on_patch = association.Patch(point, gate);
+      if (on_patch && (!best || association.Leaves(on_patch->constraint, best->plane))) {
+        const int plane = best ? best->plane : -1;
+        best = on_patch->constraint;
+        best->plane = plane;
+      }
     }
-    if (!options.surface) continue;
-    const auto on_patch = association.Patch(point, gate);
-    if (on_patch) constraints.push_back(on_patch->constraint);
+    if (best) constraints.push_back(*best);
   }
   return constraints;
 }

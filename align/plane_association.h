@@ -20,7 +20,8 @@ struct SurfaceConstraint {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit length, towards the scanner
   double sigma = 0;  // metres; how far the true surface may lie from this plane, the sparse point's
                      // own uncertainty not included
-  int plane = -1;    // index of the plane; -1 = a patch
+  int plane = -1;    // index of the plane that the point belongs to; -1 = none
+  bool on_patch = false;  // point and normal are those of a patch, not of the plane
 
   // Signed distance, metres, positive on the scanner's side.
   double Distance(const Eigen::Vector3d& x_in_scan) const { return normal.dot(x_in_scan - point); }
@@ -44,7 +45,8 @@ struct PlaneAssociationOptions {
 //  - the plane has samples there (ScanPlane::Covers);
 //  - the surface faces the cameras that see the point;
 //  - only one plane claims it: at the edge where two meet the point is left out.
-// `planes` come first; of `patches` only flat ones count, and only near their own samples.
+// `planes` come first. With `surface`, a flat patch near the point holds it where no plane does,
+// and where the patch shows that the scan leaves the plane there: a bent wall, a picture on it.
 std::vector<SurfaceConstraint> AssociateWithSurface(const std::vector<SurfacePoint>& points,
                                                     const std::vector<ScanPlane>& planes,
                                                     const ScanPatches& patches,

@@ -13,6 +13,7 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
+#include "align/bent_model.h"
 #include "align/plane_bundle_costs.h"
 #include "core/camera_formulas.h"
 #include "core/frames.h"
@@ -29,7 +30,10 @@ constexpr size_t kMinConstraints = 30;
 // Gates of the rounds, in standard deviations; the last one stays.
 constexpr double kGates[] = {6, 5, 4, 3.5};
 // A round that moves no camera farther is the last.
-constexpr double kSettledMetres = 2e-5, kSettledRadians = 1e-5;
+constexpr double kSettledMetres = 5e-5, kSettledRadians = 2e-5;
+// A round stops when a step lowers the cost by less than this share; what a round leaves the next
+// one finds.
+constexpr double kFunctionTolerance = 1e-5;
 // How well the given intrinsics are believed when they are refined: weak, but keeps parameters that
 // the photos say nothing about. Focal lengths and principal point as a share of the focal length.
 constexpr double kLinearPrior = 0.02, kDistortionPrior = 0.05;
@@ -103,7 +107,7 @@ class Round {
     ceres::Solver::Options o;
     o.linear_solver_type = poses_.size() > 80 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     o.max_num_iterations = options_.max_iterations;
-    o.function_tolerance = 1e-6;
+    o.function_tolerance = kFunctionTolerance;
     o.parameter_tolerance = 1e-9;
     o.gradient_tolerance = 1e-12;
     o.initial_trust_region_radius = 1e6;  // the start is near: almost a Gauss-Newton step
@@ -181,8 +185,9 @@ class Round {
     for (size_t i = 0; i < input_.picks.size(); ++i) {
       const Pick& pick = input_.picks[i];
       const SparseImage* const image = model_.FindImage(pick.image_name);
-      if (!input_.used[i] || image == nullptr || !Sees(*image, pick.x_in_scan)) continue;
-      pick_points_.push_back(pick.x_in_scan);
+      const Eigen::Vector3d x_in_scan = input_.bend.Straighten(pick.x_in_scan);
+      if (!input_.used[i] || image == nullptr || !Sees(*image, x_in_scan)) continue;
+      pick_points_.push_back(x_in_scan);
       double* const point = pick_points_.back().data();
       AddReprojection(image->image_id, point, pick.x_in_img, sigma_px_ / input_.pick_sigma_px);
       problem_->SetParameterBlockConstant(point);
@@ -369,6 +374,27 @@ std::string FindFault(const PlaneBundle& result) {
   return "";
 }
 
+// The points that lie on the surface of the scan as it is.
+std::vector<SurfaceConstraint> FindConstraints(const PlaneBundleInput& input, int min_track,
+                                               const PlaneAssociationOptions& association,
+                                               const PlaneBundle& state) {
+  std::vector<SurfacePoint> points =
+      FindSurfacePoints(state.model, min_track, state.sigma_px, std::numeric_limits<size_t>::max());
+  for (SurfacePoint& point : points) point.x_in_sparse = input.bend.Bend(point.x_in_sparse);
+  return AssociateWithSurface(points, input.planes, input.patches, association);
+}
+
+// The same for the room as it is: every surface moved back by the bend at its point.
+std::vector<SurfaceConstraint> Straightened(std::vector<SurfaceConstraint> constraints,
+                                            const SparseModel& model, const ScanBend& bend) {
+  if (bend.IsNone()) return constraints;
+  for (SurfaceConstraint& c : constraints) {
+    const Eigen::Vector3d& x_in_scan = model.points.at(c.point3d_id).x_in_model;
+    c.point -= bend.Bend(x_in_scan) - x_in_scan;
+  }
+  return constraints;
+}
+
 // Runs the rounds; a sentence if one of them fails.
 std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& options,
                       PlaneBundle* result) {
@@ -378,16 +404,15 @@ std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& o
   association.surface_noise = options.surface_noise;
   for (int round = 0; round < options.num_rounds; ++round) {
     association.gate = kGates[std::min<size_t>(round, std::size(kGates) - 1)];
-    const std::vector<SurfacePoint> points = FindSurfacePoints(
-        result->model, options.min_track, result->sigma_px, std::numeric_limits<size_t>::max());
-    result->constraints = AssociateWithSurface(points, input.planes, input.patches, association);
+    result->constraints = FindConstraints(input, options.min_track, association, *result);
     if (result->constraints.size() < kMinConstraints) {
       return "Only " + std::to_string(result->constraints.size()) +
              " sparse points lie on the scan's planes" +
              (options.surface ? " or flat patches" : "") + ", too few to adjust the poses to them.";
     }
     const SparseModel before = result->model;
-    if (!Round(input, options, result->sigma_px, result->constraints, &result->model).Solve()) {
+    const auto straight = Straightened(result->constraints, result->model, input.bend);
+    if (!Round(input, options, result->sigma_px, straight, &result->model).Solve()) {
       return "The adjustment to the scan's surface found no solution.";
     }
     result->num_rounds = round + 1;
@@ -425,6 +450,7 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
   if (result.reason.empty()) {
     MoveIdlePoints(input.model, result.adjusted_from_input, &result.model);
     result.plane_rms_before = SurfaceRms(input.model, result.constraints);
+    result.model = BendModel(result.model, input.bend);
     result.plane_rms_after = SurfaceRms(result.model, result.constraints);
     result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;
     result.num_points_of_plane.assign(input.planes.size(), 0);

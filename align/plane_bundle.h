@@ -7,6 +7,7 @@
 
 #include "align/picks.h"
 #include "align/plane_association.h"
+#include "align/scan_bend.h"
 #include "align/scan_patches.h"
 #include "align/scan_planes.h"
 #include "colmap_ext/sparse_model.h"
@@ -36,22 +37,25 @@ struct PlaneBundleOptions {
 };
 
 struct PlaneBundleInput {
-  const SparseModel& model;  // in the scan frame, by a similarity
+  // In the scan frame, by a similarity; of a bent scan: where the room really is (BendFit).
+  const SparseModel& model;
   const std::vector<ScanPlane>& planes;
   const ScanPatches& patches;
   const std::vector<Pick>& picks;  // of all photos
   std::vector<bool> used;          // one per pick
   double pick_sigma_px = 1.5;      // click noise, per coordinate
   std::string clicked_image;       // for fix_clicked_view
+  ScanBend bend = ScanBend();      // where the scan has what the photos see
 };
 
 struct PlaneBundle {
   // False: `model` is the input, and `reason` says in a sentence what went wrong.
   bool usable = false;
   std::string reason;
-  SparseModel model;  // adjusted; errors updated
+  SparseModel model;  // adjusted, on the surface of the scan as it is; errors updated
   // The similarity from the input model to the adjusted one (least squares over cameras and points
-  // on the surface), and what it leaves of the cameras: how much the model was bent. Metres.
+  // on the surface), and what it leaves of the cameras: how much the adjustment bent the model.
+  // Metres. Both before the model is put onto a bent scan.
   Similarity adjusted_from_input;
   double max_bending = 0;
 
@@ -68,6 +72,8 @@ struct PlaneBundle {
 // Minimises reprojection errors (Huber) + distances of the points from their surfaces (Cauchy) +
 // errors of the picks (Huber) over all poses and points. Points are given to surfaces anew from
 // round to round. The surfaces hold the gauge; what they leave open (one wall only) the picks hold.
+// A bent scan is straightened for that; in the end the points are bent like the scan and each photo
+// is fitted to them (its own pose cannot be bent, so that its reprojection errors grow).
 // Does not depend on the number of threads: Ceres runs on one.
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options);
 

@@ -67,9 +67,11 @@ void ProjectByParams(const Camera& camera, const double* params, double x, doubl
 bool PlaneCost::Evaluate(double const* const* parameters, double* residuals,
                          double** jacobians) const {
   const Eigen::Map<const Eigen::Vector3d> q(parameters[0]);
-  residuals[0] = beta_ * normal_.dot(q - point_);
+  const double weight = beta_ / std::sqrt(2.0);
+  residuals[0] = residuals[1] = weight * normal_.dot(q - point_);  // Thesis (C.3)
   if (jacobians != nullptr && jacobians[0] != nullptr) {
-    Eigen::Map<Eigen::RowVector3d>{jacobians[0]} = beta_ * normal_.transpose();
+    Eigen::Map<RowMatrix23> by_q(jacobians[0]);
+    by_q.row(0) = by_q.row(1) = weight * normal_.transpose();
   }
   return true;
 }

