@@ -31,9 +31,9 @@ Rigid SeedMotion(const Seed& seed) {
          seed.pair_model.images.at(seed.trial.image_id1).cam_from_model.Inverse();
 }
 
-void JudgeSeed(const SimulatedViews& views, MatchedImages* images, const Seed& seed,
-               SetOutcome* outcome) {
-  const PairVerdict verdict = JudgePair(views, images, FindPair(*images, seed.trial),
+void JudgeSeed(const SimulatedViews& views, double noise_px, MatchedImages* images,
+               const Seed& seed, SetOutcome* outcome) {
+  const PairVerdict verdict = JudgePair(views, noise_px, images, FindPair(*images, seed.trial),
                                         SeedMotion(seed), InitOptions().max_third_views);
   outcome->identifiable = verdict.Identifiable();
   outcome->confidence = seed.trial.decision.confidence;
@@ -46,10 +46,11 @@ void JudgeSeed(const SimulatedViews& views, MatchedImages* images, const Seed& s
   }
 }
 
-bool IsRight(const SimulatedViews& views, MatchedImages* images,
+bool IsRight(const SimulatedViews& views, double noise_px, MatchedImages* images,
              const std::optional<ChosenPair>& chosen) {
   return chosen &&
-         JudgePair(views, images, *chosen->pair, chosen->solution.right_from_left, 0).Right();
+         JudgePair(views, noise_px, images, *chosen->pair, chosen->solution.right_from_left, 0)
+             .Right();
 }
 
 const char* OutcomeText(SeedOutcome outcome) {
@@ -117,11 +118,12 @@ SetOutcome RunInProcess(const PlanarSet& set, int seed, bool rivals) {
   MatchedImages fresh = views.Matched();  // unprojects anew, as roomtex-mapper must
   const std::optional<Seed> found = Initializer(&fresh, InitOptions(), 1, 0).Next();
   outcome.cpu_seconds = ThreadCpuSeconds() - start;
-  if (found) JudgeSeed(views, &images, *found, &outcome);
+  if (found) JudgeSeed(views, set.noise_px, &images, *found, &outcome);
   if (!rivals) return outcome;
-  outcome.thesis_right = IsRight(views, &images, StartByThesisRule(&images, HypothesisOptions()));
+  outcome.thesis_right =
+      IsRight(views, set.noise_px, &images, StartByThesisRule(&images, HypothesisOptions()));
   outcome.lower_cost_right =
-      IsRight(views, &images, StartByLowerCost(&images, HypothesisOptions()));
+      IsRight(views, set.noise_px, &images, StartByLowerCost(&images, HypothesisOptions()));
   return outcome;
 }
 
@@ -196,13 +198,18 @@ void ShowSet(const PlanarSet& set, int seed, std::FILE* out) {
   const PairTrial& trial = found->trial;
   const DatabasePair& pair = FindPair(images, trial);
   SetOutcome outcome;
-  JudgeSeed(views, &images, *found, &outcome);
+  JudgeSeed(views, set.noise_px, &images, *found, &outcome);
+  const MotionUncertainty uncertainty = JudgePair(views, set.noise_px, &images, pair,
+                                                  SeedMotion(*found), InitOptions().max_third_views)
+                                            .uncertainty;
+  std::fprintf(out, "noise alone: %.2f and %.2f deg (one standard deviation)\n",
+               uncertainty.rotation_deg, uncertainty.baseline_deg);
   std::fprintf(out, "seed %u %u: %s, confidence %.3g, %d third views%s\n", trial.image_id1,
                trial.image_id2, OutcomeText(outcome.ours), trial.decision.confidence,
                trial.decision.num_views, outcome.identifiable ? "" : ", not identifiable");
   const auto print = [&](const char* what, const Rigid& motion, double cost) {
     const PairVerdict verdict =
-        JudgePair(views, &images, pair, motion, InitOptions().max_third_views);
+        JudgePair(views, set.noise_px, &images, pair, motion, InitOptions().max_third_views);
     std::fprintf(out,
                  "  %s: cost %.1f; %.2f and %.2f deg from the truth, %.2f and %.2f from the "
                  "optimum\n",
@@ -215,6 +222,17 @@ void ShowSet(const PlanarSet& set, int seed, std::FILE* out) {
   for (const HypothesisVerdict& verdict : trial.decision.verdicts) {
     print("with third views", verdict.right_from_left, verdict.cost);
   }
+  // What the third-view test makes of the truth: a lower cost means that the search fell short.
+  const std::vector<RayMatch> matches = images.Matches(pair);
+  ThirdViewOptions third;
+  Rigid truth = views.TrueRelativePose(pair.image_id1, pair.image_id2);
+  truth.translation.normalize();
+  const ThirdViewDecision of_truth = DecideByThirdViews(
+      matches, {EvaluatePose(truth, matches, third.pair)},
+      images.FindThirdViews(pair, matches, third.min_sightings, InitOptions().max_third_views),
+      third);
+  print("with third views, from the truth", of_truth.verdicts[0].right_from_left,
+        of_truth.verdicts[0].cost);
   print("seed", SeedMotion(*found), 0);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/parallel.h"
 #include "tests/benchmark/planar/in_process_table.h"
 #include "tests/benchmark/planar/pose_judge.h"
 #include "tests/benchmark/planar/wilson_interval.h"
@@ -9,21 +10,40 @@
 namespace roomtex {
 namespace {
 
-// One cell of a row with one seed: every row, outlier share, number of views and of matches is met.
+// Every row, outlier share, number of views and of matches is met.
 TEST(PlanarBenchmark, SeedsAreRightAndNeverWrongWithoutSaying) {
+  constexpr int kSetsPerRow = 2;
+  const std::vector<GridRow> rows = GridRows();
+  std::vector<SetOutcome> outcomes(kSetsPerRow * rows.size());
+  ParallelFor(2, 0, static_cast<int>(outcomes.size()), [&](int i) {
+    const std::vector<PlanarSet>& cells = rows[i / kSetsPerRow].cells;
+    outcomes[i] = RunInProcess(cells[(5 * i) % cells.size()], 100 + i % kSetsPerRow, false);
+  });
   OutcomeCounts counts;
-  int index = 0;
-  for (const GridRow& row : GridRows()) {
-    for (int k = 0; k < 5; ++k, ++index) {
-      const PlanarSet& cell = row.cells[(5 * index) % row.cells.size()];
-      const SetOutcome outcome = RunInProcess(cell, 100 + k, false);
-      counts.Add(outcome);
-      EXPECT_NE(outcome.ours, SeedOutcome::kWrong) << outcome.set << " --seed " << outcome.seed;
-    }
+  for (const SetOutcome& outcome : outcomes) {
+    counts.Add(outcome);
+    EXPECT_NE(outcome.ours, SeedOutcome::kWrong) << outcome.set << " --seed " << outcome.seed;
   }
-  EXPECT_EQ(counts.num_sets, 120);
+  EXPECT_EQ(counts.num_sets, 48);
   EXPECT_GE(counts.identifiable, 0.9 * counts.num_sets);
   EXPECT_GE(counts.identifiable_right, 0.98 * counts.identifiable);
+}
+
+// The scatter of the optimum over many sets is the one that the bound predicts.
+TEST(PlanarBenchmark, UncertaintyIsThatOfTheOptimum) {
+  double error2 = 0, bound2 = 0;
+  const PlanarSet set = FindSet("corner, 28 deg, 1 px, 10 % outliers, 3 views, few");
+  for (int seed = 0; seed < 40; ++seed) {
+    const SimulatedViews views = MakeSet(set, seed);
+    MatchedImages images = views.Matched();
+    const DatabasePair& pair = images.pairs()[0];
+    const PairVerdict verdict = JudgePair(views, set.noise_px, &images, pair, Rigid(), 1);
+    error2 += std::pow(verdict.optimum_from_truth.baseline_deg, 2);
+    bound2 += std::pow(verdict.uncertainty.baseline_deg, 2);
+  }
+  // The error has two components, and the bound is that of the larger one.
+  EXPECT_GT(error2, 0.6 * bound2);
+  EXPECT_LT(error2, 2.4 * bound2);
 }
 
 SparseModel TrueModel(const SimulatedViews& views) {

@@ -17,19 +17,24 @@ double Median(const std::vector<double>& ascending) {
                            : ascending[ascending.size() / 2];
 }
 
-// Where bundle adjustment of the right observations ends when it starts at the truth.
-Rigid OptimumFromTruth(const SimulatedViews& views, const DatabasePair& pair,
-                       const std::vector<RayMatch>& matches, const std::vector<ThirdView>& thirds) {
+// The true motion and its right observations.
+struct TrueSeed {
+  SeedGeometry geometry;
+  std::vector<SeedObservation> observations;
+};
+
+TrueSeed MakeTrueSeed(const SimulatedViews& views, const DatabasePair& pair,
+                      const std::vector<RayMatch>& matches, const std::vector<ThirdView>& thirds) {
+  TrueSeed seed;
+  SeedGeometry& start = seed.geometry;
   const Rigid& left_from_scene = views.cam_from_scene.at(pair.image_id1);
   Rigid truth = views.TrueRelativePose(pair.image_id1, pair.image_id2);
   const double baseline = truth.translation.norm();
-  SeedGeometry start;
   truth.translation /= baseline;
   start.views_from_left = {Rigid(), truth};
   const auto point_at = [&](uint32_t image_id, int row) {
     return views.point_of_keypoint.at(image_id)[row];
   };
-  std::vector<SeedObservation> observations;
   std::vector<int> index_of_match(matches.size(), -1);
   for (size_t m = 0; m < matches.size(); ++m) {
     const int point = point_at(pair.image_id1, matches[m].left_row);
@@ -37,8 +42,8 @@ Rigid OptimumFromTruth(const SimulatedViews& views, const DatabasePair& pair,
     const Eigen::Vector3d x = left_from_scene * views.points_in_scene[point];
     const int index = index_of_match[m] = static_cast<int>(start.points.size());
     start.points.emplace_back(x.x() / x.z(), x.y() / x.z(), baseline / x.z());
-    observations.push_back({0, index, matches[m].left});
-    observations.push_back({1, index, matches[m].right});
+    seed.observations.push_back({0, index, matches[m].left});
+    seed.observations.push_back({1, index, matches[m].right});
   }
   for (const ThirdView& third : thirds) {
     const int view = static_cast<int>(start.views_from_left.size());
@@ -48,14 +53,19 @@ Rigid OptimumFromTruth(const SimulatedViews& views, const DatabasePair& pair,
       const int index = index_of_match[sighting.match];
       const int point = point_at(pair.image_id1, matches[sighting.match].left_row);
       if (index < 0 || point != point_at(third.image_id, sighting.row)) continue;
-      observations.push_back({view, index, sighting.ray});
+      seed.observations.push_back({view, index, sighting.ray});
     }
   }
+  return seed;
+}
+
+// Where bundle adjustment ends when it starts at the truth.
+Rigid OptimumFromTruth(const TrueSeed& seed) {
   SeedBundleOptions options;
   options.loss_scale_px = 0;  // no outliers among them
   options.max_iterations = 100;
-  const SeedBundleResult adjusted = AdjustSeed(start, observations, options);
-  return adjusted.usable ? adjusted.geometry.views_from_left[1] : truth;
+  const SeedBundleResult adjusted = AdjustSeed(seed.geometry, seed.observations, options);
+  return (adjusted.usable ? adjusted.geometry : seed.geometry).views_from_left[1];
 }
 
 // The rotation that the views' orientations ask for on average (Markley et al. 2007).
@@ -121,18 +131,32 @@ MotionErrors CompareMotions(const Rigid& a, const Rigid& b) {
           DegFromRad(BaselineAngle(a.translation, b.translation))};
 }
 
-PairVerdict JudgePair(const SimulatedViews& views, MatchedImages* images, const DatabasePair& pair,
-                      const Rigid& right_from_left, int max_third_views) {
+PairVerdict JudgePair(const SimulatedViews& views, double noise_px, MatchedImages* images,
+                      const DatabasePair& pair, const Rigid& right_from_left, int max_third_views) {
   const std::vector<RayMatch> matches = images->Matches(pair);
   std::vector<ThirdView> thirds;
   if (max_third_views > 0) {
     thirds =
         images->FindThirdViews(pair, matches, ThirdViewOptions().min_sightings, max_third_views);
   }
-  const Rigid truth = views.TrueRelativePose(pair.image_id1, pair.image_id2);
-  const Rigid optimum = OptimumFromTruth(views, pair, matches, thirds);
-  return {CompareMotions(right_from_left, truth), CompareMotions(right_from_left, optimum),
-          CompareMotions(optimum, truth)};
+  const TrueSeed seed = MakeTrueSeed(views, pair, matches, thirds);
+  const Rigid& truth = seed.geometry.views_from_left[1];
+  const Rigid optimum = OptimumFromTruth(seed);
+  PairVerdict verdict;
+  verdict.from_truth = CompareMotions(right_from_left, truth);
+  verdict.from_optimum = CompareMotions(right_from_left, optimum);
+  verdict.optimum_from_truth = CompareMotions(optimum, truth);
+  verdict.uncertainty = PairUncertainty(seed.geometry, seed.observations, noise_px);
+  return verdict;
+}
+
+double PairVerdict::BaselineLimit() const {
+  return std::clamp(3 * uncertainty.baseline_deg, kMaxPairBaselineDeg, kMaxUncertainBaselineDeg);
+}
+
+bool PairVerdict::Identifiable() const {
+  return 3 * uncertainty.rotation_deg <= kMaxPairRotationDeg &&
+         3 * uncertainty.baseline_deg <= kMaxUncertainBaselineDeg && Within(optimum_from_truth);
 }
 
 double ModelVerdict::MedianCentreError() const { return Median(centre_errors); }

@@ -3,32 +3,44 @@
 
 #include "colmap_ext/initializer.h"
 #include "colmap_ext/sparse_model.h"
+#include "tests/benchmark/planar/motion_uncertainty.h"
 #include "tests/colmap_ext/simulated_views.h"
 
 namespace roomtex {
 
-// A pair is right within these of its true motion, or of the least-squares optimum that bundle
-// adjustment reaches from the truth: noise allows no initialiser more.
+// A pair is right within these of its true motion. Where noise allows no estimate to be that good,
+// the limit of the baseline is three standard deviations of the best one (Cramer-Rao bound), up to
+// kMaxUncertainBaselineDeg; the other solution of a wall is several times as far away.
 inline constexpr double kMaxPairRotationDeg = 3, kMaxPairBaselineDeg = 5;
+inline constexpr double kMaxUncertainBaselineDeg = 10;
 
 struct MotionErrors {
   double rotation_deg = 0, baseline_deg = 0;  // 3D angle, angle of the baselines' directions
-  bool Right() const {
-    return rotation_deg < kMaxPairRotationDeg && baseline_deg < kMaxPairBaselineDeg;
-  }
 };
 MotionErrors CompareMotions(const Rigid& a, const Rigid& b);
 
 struct PairVerdict {
-  MotionErrors from_truth, from_optimum, optimum_from_truth;
-  bool Right() const { return from_truth.Right() || from_optimum.Right(); }
-  // The keypoints tell the truth apart from what the limits call wrong.
-  bool Identifiable() const { return optimum_from_truth.Right(); }
+  MotionErrors from_truth;
+  MotionErrors from_optimum;        // where bundle adjustment ends that starts at the truth
+  MotionErrors optimum_from_truth;  // what that one makes of the noise
+  MotionUncertainty uncertainty;    // Cramer-Rao bound at the truth
+
+  // Degrees.
+  double BaselineLimit() const;
+  bool Right() const { return Within(from_truth) || Within(from_optimum); }
+  // The keypoints allow an answer within the limits: three standard deviations are not more, and
+  // the optimum itself holds them.
+  bool Identifiable() const;
+
+ private:
+  bool Within(const MotionErrors& errors) const {
+    return errors.rotation_deg < kMaxPairRotationDeg && errors.baseline_deg < BaselineLimit();
+  }
 };
-// The optimum is that of the pair's right matches, and of what up to max_third_views further views
-// see of them (as the initialiser takes its third views).
-PairVerdict JudgePair(const SimulatedViews& views, MatchedImages* images, const DatabasePair& pair,
-                      const Rigid& right_from_left, int max_third_views);
+// By the pair's right matches, and what up to max_third_views further views see of them (as the
+// initialiser takes its third views). noise_px: of the simulation.
+PairVerdict JudgePair(const SimulatedViews& views, double noise_px, MatchedImages* images,
+                      const DatabasePair& pair, const Rigid& right_from_left, int max_third_views);
 
 struct ModelVerdict {
   size_t num_registered = 0;
