@@ -75,6 +75,30 @@ std::vector<unsigned char> ReadBytes(const std::string& path) {
 // Exiv2 prints warnings about files to stderr by default; a library does not print.
 void SilenceExiv2() { Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute); }
 
+// Degrees of three fractions: degrees, minutes, seconds (cameras may put fractions into any). The
+// sign is that of the reference letter, `negative` = S or W.
+std::optional<double> Angle(const Exiv2::ExifData& exif, const std::string& key, char positive,
+                            char negative, double largest) {
+  const auto found = exif.findKey(Exiv2::ExifKey(key));
+  if (found == exif.end() || found->count() < 1 || found->count() > 3) return std::nullopt;
+  double degrees = 0, unit = 1;
+  for (int i = 0; i < static_cast<int>(found->count()); ++i, unit /= 60) {
+    const Exiv2::Rational part = found->toRational(i);
+    // 0/0 stands for "not given" in the smaller parts.
+    if (i > 0 && part.first == 0 && part.second == 0) continue;
+    if (part.second == 0) return std::nullopt;
+    const double value = static_cast<double>(static_cast<uint32_t>(part.first)) /
+                         static_cast<double>(static_cast<uint32_t>(part.second));
+    if (i > 0 && value > 60) return std::nullopt;
+    degrees += unit * value;
+  }
+  const std::string letter = Text(exif, (key + "Ref").c_str()).substr(0, 1);
+  const bool is_negative = letter == std::string(1, negative);
+  if (!is_negative && letter != std::string(1, positive)) return std::nullopt;
+  if (!(degrees <= largest)) return std::nullopt;
+  return is_negative ? -degrees : degrees;
+}
+
 }  // namespace
 
 std::optional<double> ExposureData::RelativeExposure() const {
@@ -163,6 +187,27 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure) {
   } catch (const std::exception& error) {
     throw InputError(path, "", std::string("EXIF cannot be written (") + error.what() + ")",
                      "Check that the file is a JPEG that may be written");
+  }
+}
+
+std::optional<GpsData> ReadGpsData(const std::string& path) {
+  SilenceExiv2();
+  try {
+    auto image = Exiv2::ImageFactory::open(path);
+    image->readMetadata();
+    const Exiv2::ExifData& exif = image->exifData();
+    const auto latitude = Angle(exif, "Exif.GPSInfo.GPSLatitude", 'N', 'S', 90);
+    const auto longitude = Angle(exif, "Exif.GPSInfo.GPSLongitude", 'E', 'W', 180);
+    if (!latitude || !longitude || (*latitude == 0 && *longitude == 0)) return std::nullopt;
+    if (Text(exif, "Exif.GPSInfo.GPSStatus").substr(0, 1) == "V") return std::nullopt;
+    GpsData gps;
+    gps.latitude_deg = *latitude;
+    gps.longitude_deg = *longitude;
+    gps.horizontal_error = PositiveNumber(exif, "Exif.GPSInfo.GPSHPositioningError");
+    gps.datum = Text(exif, "Exif.GPSInfo.GPSMapDatum");
+    return gps;
+  } catch (const std::exception&) {
+    return std::nullopt;
   }
 }
 

@@ -36,6 +36,17 @@ ExposureData ReadExposureData(const std::string& path);
 // Writes the fields that are set into an existing JPEG.
 void WriteExposureData(const std::string& path, const ExposureData& exposure);
 
+// Where the camera's satellite receiver believed to be (EXIF GPS).
+struct GpsData {
+  double latitude_deg = 0;                 // -90..90, north positive
+  double longitude_deg = 0;                // -180..180, east positive
+  std::optional<double> horizontal_error;  // metres, as the camera states it
+  std::string datum;                       // "WGS-84", "TOKYO" ... or ""
+};
+// None without a position: not written, broken, marked as void, or the 0, 0 of cameras without a
+// fix.
+std::optional<GpsData> ReadGpsData(const std::string& path);
+
 // sRGB transfer function (IEC 61966-2-1): value in [0, 1], linear light in [0, 1].
 double LinearFromSrgb(double value);
 double SrgbFromLinear(double linear);

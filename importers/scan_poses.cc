@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <iomanip>
 #include <sstream>
 #include <string_view>
 
@@ -13,7 +14,13 @@ namespace roomtex {
 namespace {
 
 const char kFormat[] =
-    "Expected \"NAME m00 ... m33\" (4x4, row by row) or \"NAME qw qx qy qz tx ty tz\"";
+    "Expected \"NAME m00 ... m33\" (4x4, row by row), \"NAME qw qx qy qz tx ty tz\" or \"NAME geo "
+    "LATITUDE LONGITUDE HEIGHT HEADING\" (degrees, metres)";
+const char kGeoFormat[] =
+    "Expected \"NAME geo LATITUDE LONGITUDE HEIGHT HEADING\": degrees, metres above the WGS84 "
+    "ellipsoid, degrees clockwise from north";
+// Farther apart no two scans show the same room or street: a number is mistyped.
+constexpr double kLargestSite = 100e3;
 
 std::optional<Rigid> PoseFromMatrix(const std::vector<double>& v) {
   const Eigen::Matrix4d matrix =
@@ -35,6 +42,26 @@ std::optional<Rigid> PoseFromQuaternion(const std::vector<double>& v) {
   return Rigid{rotation.normalized(), {v[4], v[5], v[6]}};
 }
 
+std::optional<double> NumberFrom(const std::string& word) {
+  char* end = nullptr;
+  const double number = std::strtod(word.c_str(), &end);
+  if (end == word.c_str() || *end != '\0' || !std::isfinite(number)) return std::nullopt;
+  return number;
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string text;
+  for (size_t i = 0; i < std::min(kShown, names.size()); ++i) {
+    text += (i > 0 ? ", " : "") + names[i];
+  }
+  return names.size() > kShown ? text + " ..." : text;
+}
+
+std::string FileName(const std::string& path) {
+  return std::filesystem::path(path).filename().string();
+}
+
 }  // namespace
 
 ScanPoses::ScanPoses(const std::string& path) : path_(path) {
@@ -43,65 +70,151 @@ ScanPoses::ScanPoses(const std::string& path) : path_(path) {
   LineReader lines(file);
   std::string_view line;
   while (lines.Next(&line)) {
-    // '#' starts a comment at the beginning of a word; inside a word it is part of a name
-    // ("room.ptx#2").
-    std::istringstream words{std::string(line)};
-    std::string name, word;
-    if (!(words >> name) || name[0] == '#') continue;
-    std::vector<double> numbers;
-    bool good = true;
-    while (good && words >> word && word[0] != '#') {
-      char* end = nullptr;
-      numbers.push_back(std::strtod(word.c_str(), &end));
-      good = *end == '\0' && std::isfinite(numbers.back());
-    }
-    if (!good || (numbers.size() != 16 && numbers.size() != 7)) {
-      throw InputError(path, LinePosition(lines.line_number()),
-                       "is " + Quoted(line, 60) + ", which is no pose", kFormat);
-    }
-    const std::optional<Rigid> pose =
-        numbers.size() == 16 ? PoseFromMatrix(numbers) : PoseFromQuaternion(numbers);
-    if (!pose) {
-      throw InputError(path, LinePosition(lines.line_number()),
-                       "the pose of " + name + " is not a rotation with a translation",
-                       "A mirrored, scaled or sheared pose cannot be used");
-    }
-    for (const Entry& entry : entries_) {
-      if (entry.name == name) {
-        throw InputError(path, LinePosition(lines.line_number()),
-                         "gives a second pose for " + name + ", the first is in line " +
-                             std::to_string(entry.line),
-                         "Remove one of them");
-      }
-    }
-    entries_.push_back({name, lines.line_number(), *pose, false});
+    const size_t first = line.find_first_not_of(" \t");
+    if (first == std::string_view::npos || line[first] == '#') continue;
+    AddEntry(ParseEntry(std::string(line), lines.line_number()));
   }
 }
 
-std::optional<Rigid> ScanPoses::Take(const std::string& scan_path, int index, int count) {
-  const std::string file_name = std::filesystem::path(scan_path).filename().string();
+ScanPoses::Entry ScanPoses::ParseEntry(const std::string& line_text, long line) const {
+  const auto fail = [&](const std::string& finding, const std::string& remedy) {
+    return InputError(path_, LinePosition(line), finding, remedy);
+  };
+  std::istringstream words(line_text);
+  Entry entry;
+  entry.line = line;
+  // A name with spaces stands in double quotes. '#' starts a comment at the beginning of a word;
+  // inside a word it is part of a name ("room.ptx#2").
+  if (!(words >> std::quoted(entry.name)) || entry.name.empty()) {
+    throw fail("is " + Quoted(line_text, 60) + ", which names no scan", kFormat);
+  }
+  std::vector<double> numbers;
+  bool good = true, is_geo = false;
+  for (std::string word; good && words >> word && word[0] != '#';) {
+    if (word == "geo" && !is_geo && numbers.empty()) {
+      is_geo = true;
+      continue;
+    }
+    const std::optional<double> number = NumberFrom(word);
+    good = number.has_value() && numbers.size() < 17;
+    if (good) numbers.push_back(*number);
+  }
+  if (is_geo) {
+    if (!good || numbers.size() != 4) {
+      throw fail("is " + Quoted(line_text, 60) + ", which is no surveyed station", kGeoFormat);
+    }
+    entry.station = SurveyedStation{{numbers[0], numbers[1], numbers[2]}, numbers[3]};
+    std::vector<std::string> problems = entry.station->position.Problems();
+    if (!(std::abs(numbers[3]) <= 360)) {
+      problems.push_back("the heading must lie within -360 and 360 degrees");
+    }
+    if (!problems.empty()) {
+      throw fail("is " + Quoted(line_text, 60) + ", but " + problems[0], kGeoFormat);
+    }
+    return entry;
+  }
+  if (!good || (numbers.size() != 16 && numbers.size() != 7)) {
+    throw fail("is " + Quoted(line_text, 60) + ", which is no pose", kFormat);
+  }
+  const std::optional<Rigid> pose =
+      numbers.size() == 16 ? PoseFromMatrix(numbers) : PoseFromQuaternion(numbers);
+  if (!pose) {
+    throw fail("the pose of " + entry.name + " is not a rotation with a translation",
+               "A mirrored, scaled or sheared pose cannot be used");
+  }
+  entry.scan_from_station = *pose;
+  return entry;
+}
+
+void ScanPoses::AddEntry(Entry entry) {
+  const auto fail = [&](const std::string& finding, const std::string& remedy) {
+    return InputError(path_, LinePosition(entry.line), finding, remedy);
+  };
+  const auto [same_name, is_new] = entry_of_name_.emplace(entry.name, entries_.size());
+  if (!is_new) {
+    throw fail("gives a second pose for " + entry.name + ", the first is in line " +
+                   std::to_string(entries_[same_name->second].line),
+               "Remove one of them");
+  }
+  if (!entries_.empty() && entry.station.has_value() != surveyed()) {
+    const std::string first = std::to_string(entries_[0].line);
+    throw fail(entry.station ? "is a surveyed station, but line " + first + " is a pose"
+                             : "is a pose, but line " + first + " is a surveyed station",
+               "Poses are given in the scan frame, stations on the Earth: write all scans in one "
+               "way");
+  }
+  if (entry.station) {
+    if (!enu_) enu_.emplace(entry.station->position);
+    const double distance = HorizontalDistance(enu_->origin(), entry.station->position);
+    if (!(distance <= kLargestSite)) {
+      throw fail("the station lies " + std::to_string(std::lround(distance / 1000)) +
+                     " km from that in line " + std::to_string(entries_[0].line),
+                 "Check latitude and longitude: stations of one model lie within 100 km");
+    }
+  }
+  entries_.push_back(std::move(entry));
+}
+
+// The path as it was given wins over the file name.
+ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int index, int count) {
   const std::string number = "#" + std::to_string(index + 1);
-  for (Entry& entry : entries_) {
-    const bool bare = entry.name == scan_path || entry.name == file_name;
-    if (bare && count > 1) {
+  for (const std::string& name : {scan_path, FileName(scan_path)}) {
+    const auto numbered = entry_of_name_.find(name + number);
+    if (numbered != entry_of_name_.end()) return &entries_[numbered->second];
+    const auto bare = entry_of_name_.find(name);
+    if (bare == entry_of_name_.end()) continue;
+    Entry& entry = entries_[bare->second];
+    if (count > 1) {
       throw InputError(path_, LinePosition(entry.line),
                        entry.name + " holds " + std::to_string(count) + " scans",
                        "Give a pose per scan: " + entry.name + "#1, " + entry.name + "#2 ...");
     }
-    if (bare || entry.name == scan_path + number || entry.name == file_name + number) {
-      entry.taken = true;
-      return entry.scan_from_station;
-    }
+    return &entry;
   }
-  return std::nullopt;
+  return nullptr;
+}
+
+std::optional<ScanPoses::Placement> ScanPoses::Take(const std::string& scan_path, int index,
+                                                    int count,
+                                                    const Eigen::Vector3d& up_in_station) {
+  asked_for_.push_back(FileName(scan_path));
+  Entry* const entry = Find(scan_path, index, count);
+  if (entry == nullptr) return std::nullopt;
+  if (!entry->taken_by.empty()) {
+    throw InputError(
+        path_, LinePosition(entry->line),
+        entry->name + " is the name of two scans, " + entry->taken_by + " and " + scan_path,
+        "Write their paths, as given with --scan_path");
+  }
+  entry->taken_by = scan_path;
+  if (!entry->station) return Placement{entry->scan_from_station, std::nullopt};
+  return Placement{enu_->EnuFromStation(*entry->station, up_in_station), entry->station};
 }
 
 void ScanPoses::RequireAllTaken() const {
   for (const Entry& entry : entries_) {
-    if (entry.taken) continue;
-    throw InputError(path_, LinePosition(entry.line), entry.name + " is none of the scans given",
-                     "Write the scan's path or file name");
+    if (!entry.taken_by.empty()) continue;
+    throw InputError(path_, LinePosition(entry.line),
+                     entry.name + " is none of the scans given (" + Joined(asked_for_) + ")",
+                     "Write the scan's path or file name, and each scan once");
   }
+}
+
+void ScanPoses::ThrowMissing(const std::string& scan_path, int index, int count,
+                             size_t num_scans) const {
+  const std::string name = FileName(scan_path) + (count > 1 ? "#" + std::to_string(index + 1) : "");
+  if (path_.empty()) {
+    throw InputError(scan_path, "",
+                     "has no pose, but there are " + std::to_string(num_scans) + " scans",
+                     "Give each scan's pose with --scan_poses");
+  }
+  std::vector<std::string> names;
+  for (const Entry& entry : entries_) names.push_back(entry.name);
+  throw InputError(path_, "",
+                   std::string(surveyed() ? "gives no station" : "gives no pose") + " for " + name +
+                       ", one of " + std::to_string(num_scans) + " scans" +
+                       (names.empty() ? "" : "; it names " + Joined(names)),
+                   "Add a line that begins with " + name);
 }
 
 void PlaceScan(const Rigid& scan_from_station, Scan* scan) {

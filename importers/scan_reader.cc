@@ -174,32 +174,57 @@ Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
   return std::move(file.scans.front());
 }
 
-std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,
+PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::string& poses_path,
                             const ScanReaderOptions& options) {
   if (paths.empty()) throw UsageError("--scan_path is missing");
+  for (size_t i = 0; i < paths.size(); ++i) {
+    if (std::count(paths.begin(), paths.begin() + static_cast<long>(i), paths[i]) > 0) {
+      throw UsageError("--scan_path " + paths[i] + " is given twice");
+    }
+  }
   ScanPoses poses(poses_path);
-  std::vector<Scan> scans;
-  std::vector<std::string> without_pose;
+  PlacedScans placed;
+  placed.enu = poses.enu();
+  struct Missing {
+    std::string path;
+    int index, count;
+  };
+  std::vector<Missing> missing;
   for (const std::string& path : paths) {
     ScanFile file = ReadScanFile(path, options);
     const int count = static_cast<int>(file.scans.size());
     for (int k = 0; k < count; ++k) {
-      const std::optional<Rigid> pose = poses.Take(path, k, count);
+      Scan& scan = file.scans[k];
+      const Eigen::Vector3d up_in_station = scan.scan_from_station.rotation.conjugate() * scan.up;
+      const std::optional<ScanPoses::Placement> pose = poses.Take(path, k, count, up_in_station);
       if (pose) {
-        PlaceScan(*pose, &file.scans[k]);
-      } else if (file.format != "PTX") {
-        without_pose.push_back(path);
+        PlaceScan(pose->scan_from_station, &scan);
+        if (pose->station) placed.stations.push_back(*pose->station);
+      } else if (file.format != "PTX" || poses.surveyed()) {
+        missing.push_back({path, k, count});
       }
-      scans.push_back(std::move(file.scans[k]));
+      placed.scans.push_back(std::move(scan));
     }
   }
   poses.RequireAllTaken();
-  if (scans.size() > 1 && !without_pose.empty()) {
-    throw InputError(without_pose.front(), "",
-                     "has no pose, but there are " + std::to_string(scans.size()) + " scans",
-                     "Give each scan's pose with --scan_poses");
+  if (!missing.empty() && (placed.scans.size() > 1 || poses.surveyed())) {
+    poses.ThrowMissing(missing[0].path, missing[0].index, missing[0].count, placed.scans.size());
   }
-  return scans;
+  return placed;
+}
+
+std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,
+                            const ScanReaderOptions& options) {
+  return ReadPlacedScans(paths, poses_path, options).scans;
+}
+
+const char* ScanPosesHelp() {
+  return "Where the scanners stood, a line per scan: NAME and 4x4 matrix (row by row), NAME and "
+         "quaternion w x y z and translation, or surveyed stations NAME geo LATITUDE LONGITUDE "
+         "HEIGHT HEADING (degrees WGS84, metres above the ellipsoid, not above sea level; degrees "
+         "clockwise from north to azimuth 0, the -z axis; of a z-up scan the y axis). NAME is the "
+         "scan's path or file name; # starts a comment. With surveyed stations the scan frame is "
+         "east-north-up about the first one.";
 }
 
 }  // namespace roomtex

@@ -1,11 +1,13 @@
 #pragma once
 // Reads any scan file: the content decides the format, not the extension.
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/command_line.h"
 #include "core/scan.h"
+#include "importers/geo_frame.h"
 
 namespace roomtex {
 
@@ -39,11 +41,28 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options);
 
 // Several scans in one scan frame, all scans of all files. poses_path ("" = none) gives
-// scan_from_station per file, one line each: "NAME m00 ... m33" (4x4, row by row) or "NAME qw qx qy
-// qz tx ty tz"; `#` starts a comment. NAME is the path or the file name; scan k (from 1) of a file
-// with several is NAME#k. A pose here replaces that of a PTX or PCD. Several scans without a pose
-// (PTX carries its own) are an InputError.
+// scan_from_station per scan, one line each:
+//   NAME m00 ... m33                          4x4, row by row, metres
+//   NAME qw qx qy qz tx ty tz                 metres
+//   NAME geo LATITUDE LONGITUDE HEIGHT HEADING    a surveyed station, see SurveyedStation; degrees
+// `#` starts a comment. NAME is the path or the file name (in double quotes if it has spaces); scan
+// k (from 1) of a file with several is NAME#k. A pose here replaces that of a PTX or PCD. Surveyed
+// stations stand alone: then every scan needs one, and the scan frame is east-north-up about the
+// FIRST STATION OF THE FILE (z up, whatever the format of the scans); the scanner was levelled, or
+// the file's own pose says how it leant. Several scans without a pose (PTX carries its own) are an
+// InputError.
+struct PlacedScans {
+  std::vector<Scan> scans;
+  // With surveyed stations: the scan frame, and one station per scan.
+  std::optional<GeoFrame> enu;
+  std::vector<SurveyedStation> stations;
+};
+PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::string& poses_path,
+                            const ScanReaderOptions& options);
+// The scans alone.
 std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,
                             const ScanReaderOptions& options);
+// What --scan_poses takes, for the help of the commands that have it.
+const char* ScanPosesHelp();
 
 }  // namespace roomtex

@@ -181,6 +181,89 @@ TEST(ExposureData, CollectsLightAsTimeAndIsoOverSquaredAperture) {
   EXPECT_EQ(data.RelativeExposure(), 0.5 * 100 / 4);
 }
 
+// GPS.
+
+// Writes EXIF entries as "key value" in exiv2's text form, e.g. {"GPSLatitude", "47/1 30/1 0/1"}.
+void WriteGps(const std::string& path,
+              const std::vector<std::pair<std::string, std::string>>& entries) {
+  auto image = Exiv2::ImageFactory::open(path);
+  image->readMetadata();
+  image->exifData().clear();
+  for (const auto& [key, value] : entries) image->exifData()["Exif.GPSInfo." + key] = value;
+  image->writeMetadata();
+}
+
+TEST_F(PhotoFile, GpsPositionIsRead) {
+  WriteGps(path_, {{"GPSLatitudeRef", "N"},
+                   {"GPSLatitude", "47/1 30/1 3660/100"},
+                   {"GPSLongitudeRef", "E"},
+                   {"GPSLongitude", "8/1 15/1 0/1"}});
+  const std::optional<GpsData> plain = ReadGpsData(path_);
+  ASSERT_TRUE(plain);
+  EXPECT_NEAR(plain->latitude_deg, 47 + 30 / 60.0 + 36.6 / 3600, 1e-12);
+  EXPECT_NEAR(plain->longitude_deg, 8.25, 1e-12);
+  EXPECT_FALSE(plain->horizontal_error);
+  EXPECT_EQ(plain->datum, "");
+  // South and west, fractions of minutes, seconds not given, the error and the datum stated.
+  WriteGps(path_, {{"GPSLatitudeRef", "S"},
+                   {"GPSLatitude", "33/1 545678/10000 0/0"},
+                   {"GPSLongitudeRef", "W"},
+                   {"GPSLongitude", "4000000000/50000000 0/1 0/1"},
+                   {"GPSHPositioningError", "48/10"},
+                   {"GPSMapDatum", "WGS-84"},
+                   {"GPSStatus", "A"}});
+  const std::optional<GpsData> full = ReadGpsData(path_);
+  ASSERT_TRUE(full);
+  EXPECT_NEAR(full->latitude_deg, -(33 + 54.5678 / 60), 1e-12);
+  EXPECT_NEAR(full->longitude_deg, -80, 1e-12);
+  EXPECT_NEAR(full->horizontal_error.value_or(0), 4.8, 1e-6);
+  EXPECT_EQ(full->datum, "WGS-84");
+}
+
+TEST_F(PhotoFile, BrokenGpsIsNone) {
+  using Entries = std::vector<std::pair<std::string, std::string>>;
+  const Entries good = {{"GPSLatitudeRef", "N"},
+                        {"GPSLatitude", "47/1 30/1 0/1"},
+                        {"GPSLongitudeRef", "E"},
+                        {"GPSLongitude", "8/1 15/1 0/1"}};
+  WriteGps(path_, good);
+  EXPECT_TRUE(ReadGpsData(path_));
+  const std::pair<std::string, std::string> bad[] = {{"GPSLatitude", "47/0 30/1 0/1"},
+                                                     {"GPSLatitude", "0/0 0/0 0/0"},
+                                                     {"GPSLatitude", "91/1 0/1 0/1"},
+                                                     {"GPSLatitude", "47/1 61/1 0/1"},
+                                                     {"GPSLongitude", "181/1 0/1 0/1"},
+                                                     {"GPSLongitude", "1/1 0/1 0/1 0/1"},
+                                                     {"GPSLongitudeRef", "X"},
+                                                     {"GPSLatitudeRef", ""},
+                                                     {"GPSStatus", "V"}};
+  for (const auto& [key, value] : bad) {
+    Entries entries = good;
+    for (auto& [good_key, good_value] : entries) {
+      if (good_key == key) good_value = value;
+    }
+    if (key == "GPSStatus") entries.emplace_back(key, value);
+    WriteGps(path_, entries);
+    EXPECT_FALSE(ReadGpsData(path_)) << key << " " << value;
+  }
+  for (const std::string key : {"GPSLatitude", "GPSLongitude", "GPSLatitudeRef"}) {
+    Entries entries;
+    for (const auto& entry : good) {
+      if (entry.first != key) entries.push_back(entry);
+    }
+    WriteGps(path_, entries);
+    EXPECT_FALSE(ReadGpsData(path_)) << key;
+  }
+  WriteGps(path_, {{"GPSLatitudeRef", "N"},
+                   {"GPSLatitude", "0/1 0/1 0/1"},
+                   {"GPSLongitudeRef", "E"},
+                   {"GPSLongitude", "0/1 0/1 0/1"}});
+  EXPECT_FALSE(ReadGpsData(path_));
+  WriteGps(path_, {});
+  EXPECT_FALSE(ReadGpsData(path_));
+  EXPECT_FALSE(ReadGpsData(folder_ / "missing.jpg"));
+}
+
 // sRGB.
 
 TEST(Srgb, EveryByteGoesRound) {
