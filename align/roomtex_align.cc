@@ -5,6 +5,7 @@
 
 #include "align/agreement.h"
 #include "align/alignment.h"
+#include "align/geo_output.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
@@ -17,6 +18,7 @@ constexpr int kCoarseSamples = 300000;
 
 struct Arguments {
   std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
+  std::string geo_origin;
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
@@ -44,11 +46,8 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("database_path", &a->database_path,
                         "COLMAP's database; not needed for an alignment by picks.",
                         Command::Kind::kOptional);
-  command->AddInputPath(
-      "scan_poses", &a->scan_poses,
-      "Poses of several scans: a line each, file name and 4x4 matrix, or file name and "
-      "quaternion w x y z and translation.",
-      Command::Kind::kOptional);
+  command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
+  command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
   AddScanReaderOptions(&a->scan_reader, command);
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
@@ -101,6 +100,7 @@ void CheckArguments(const Arguments& a) {
   std::vector<std::string> problems = a.scan_reader.Problems();
   for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
   ThrowIfProblems(problems);
+  ParseGeoOrigin(a.geo_origin);
   std::error_code ignored;
   if (std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
     throw UsageError(
@@ -189,6 +189,21 @@ void FillReport(const Alignment& alignment, double reprojection_rms_before,
   r["agreement"] = nullptr;
 }
 
+// The model on the Earth, with --geo_origin; the report's `geo`.
+void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans& placed,
+              const std::optional<GeoReference>& geo, const Command::Context& context) {
+  const std::string folder = a.output_path + "/geo";
+  context.report["geo"] = nullptr;
+  if (a.geo_origin.empty() && std::filesystem::exists(folder + "/geo.json")) {
+    context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
+  }
+  if (!geo) return;
+  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, folder);
+  const GpsCheck gps = CheckGps(aligned, *geo, a.image_path);
+  context.report["geo"] = GeoToJson(*geo, placed, gps);
+  for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
@@ -197,7 +212,9 @@ void Align(const Arguments& a, const Command::Context& context) {
   CheckPicksAgainstModel(a.picks_path, picks, model);
   const ReprojectionErrors before = UpdateReprojectionErrors(&model);
   context.progress.Stage("read scan");
-  const std::vector<Scan> scans = ReadScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  const PlacedScans placed = ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  const std::vector<Scan>& scans = placed.scans;
+  const std::optional<GeoReference> geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
   const FreeSpace free_space(scans, kCoarseSamples);
 
   AlignmentOptions options = a.alignment;
@@ -216,6 +233,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   WriteSparseModel(model, a.output_path);
   WriteSimilarity(a.output_path + "/scan_from_sparse.txt", alignment.scan_from_sparse);
   WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);
+  WriteGeo(a, model, placed, geo, context);
   context.report.AddCopy(a.output_path + "/alignment.json");
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");
