@@ -41,9 +41,12 @@ void Judge(const PlanarSet& set, const SimulatedViews& views, SparseModel model,
   // A ghost view belongs in no place; standing at its true one harms nothing.
   const size_t num_wanted = views.images.size() - (set.kind == Kind::kGhost ? 1 : 0);
   outcome->complete = model.images.size() >= num_wanted;
-  outcome->verdict = JudgeModel(std::move(model), views);
+  outcome->verdict = JudgeModel(model, views);
   // Without a baseline there is no right model at all.
   if (set.kind == Kind::kTurnOnly) outcome->verdict.poses_right = false;
+  if (set.kind != Kind::kGrid || outcome->verdict.poses_right) return;
+  outcome->verdict.poses_right =
+      JudgeModel(std::move(model), WholeOptimumFromTruth(views)).poses_right;
 }
 
 MapperOutcome RunColmap(const PlanarSet& set, const SimulatedViews& views, const TempFolder& folder,

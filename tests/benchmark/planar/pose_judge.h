@@ -46,25 +46,31 @@ struct ModelVerdict {
   size_t num_registered = 0;
   // Every registered view stands and looks right and the points lie where they are.
   bool poses_right = false;
-  std::vector<double> centre_errors;        // metres, ascending; one per view
-  std::vector<double> rotation_errors_deg;  // degrees, ascending; one per view
-  double median_point_error = 0;            // metres
-  double mean_reprojection_error_px = 0;    // over all observations
+  std::vector<double> centre_errors;           // metres, ascending; one per view
+  std::vector<double> rotation_errors_deg;     // degrees, ascending; one per view
+  double max_relative_rotation_error_deg = 0;  // degrees, of any two views
+  double median_point_error = 0;               // metres
+  double mean_reprojection_error_px = 0;       // over all observations
 
   // NaN without views.
   double MedianCentreError() const;
   double MedianRotationErrorDeg() const;
 };
 
-// A model is right when ONE similarity brings every view within kMaxCentreError and
-// kMaxViewRotationDeg of the truth and half of the points within kMaxPointError of theirs. Its
-// rotation is the mean of what the views' orientations ask for, scale and translation follow from
-// all centres: nothing of it is left open by cameras in a row, and a mirrored model would need a
-// negative scale, which is wrong.
+// A model is right when the rotation between any two of its views is, within kMaxViewRotationDeg,
+// and ONE similarity brings every view within kMaxCentreError of the truth (and a fifth of the
+// distance between the outermost views) and half of the points within kMaxPointError of theirs. Its
+// rotation is the mean of what the views' orientations ask for; scale and translation follow from
+// all centres and points, which weigh the same. Nothing of it is left open by cameras in a row, and
+// a mirrored model finds no place.
 inline constexpr double kMaxCentreError = 0.10;   // metres, 3 m from the wall
 inline constexpr double kMaxViewRotationDeg = 3;  // degrees
 inline constexpr double kMaxPointError = 0.10;    // metres
 ModelVerdict JudgeModel(SparseModel model, const SimulatedViews& views);
+
+// The views and points where bundle adjustment of all right observations ends when it starts at the
+// truth: what noise makes of the truth. A model within the limits of this one is right, too.
+SimulatedViews WholeOptimumFromTruth(const SimulatedViews& views);
 
 // The largest of the models that COLMAP left below `folder` (0, 1, ...); empty if there is none.
 SparseModel LargestModel(const std::string& folder);
