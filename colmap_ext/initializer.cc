@@ -20,6 +20,9 @@ constexpr int kMinOffPlane = 20;
 constexpr double kMinShareOffPlane = 0.1;
 // Matches used to guess a pair's parallax.
 constexpr int kMatchesForParallax = 100;
+// Solved before the best of them is decided: a good pair is mostly among the first, and solving is
+// what costs.
+constexpr int kPairsPerBatch = 4;
 // Pairs, by number of matches, whose parallax is guessed at all.
 constexpr size_t kMaxRankedPairs = 2000;
 
@@ -74,6 +77,7 @@ struct Initializer::Impl {
     double confidence = 0;
   };
   std::vector<Doubtful> doubtful;  // solved, but no third view could decide
+  int num_solved = 0;              // since the last seed
   std::vector<PairTrial> rejected;
 
   HypothesisOptions PairOptions(const DatabasePair& pair) const {
@@ -138,7 +142,7 @@ void Initializer::Impl::RankPairs() {
 
 void Initializer::Impl::SolveNextPairs() {
   std::vector<SolvedPair> batch;
-  while (!ranked.empty() && static_cast<int>(batch.size()) < options.max_candidates) {
+  while (!ranked.empty() && static_cast<int>(batch.size()) < kPairsPerBatch) {
     SolvedPair next;
     next.pair = ranked.front().pair;
     next.matches = images->Matches(*next.pair);
@@ -151,6 +155,7 @@ void Initializer::Impl::SolveNextPairs() {
   ParallelFor(num_threads, 0, static_cast<int>(batch.size()), [&](int i) {
     batch[i].trial.analysis = AnalysePair(batch[i].matches, PairOptions(*batch[i].pair));
   });
+  num_solved += static_cast<int>(batch.size());
   for (SolvedPair& pair : batch) {
     pair.trial.problem = pair.trial.analysis.problem;
     if (pair.trial.problem.empty()) {
@@ -234,14 +239,17 @@ Initializer::Initializer(MatchedImages* images, const InitOptions& options, int 
 Initializer::~Initializer() = default;
 
 std::optional<Seed> Initializer::Next() {
+  impl_->num_solved = 0;
   while (!impl_->solved.empty() || !impl_->ranked.empty()) {
-    if (impl_->solved.empty()) impl_->SolveNextPairs();
-    if (impl_->solved.empty()) continue;
+    if (impl_->solved.empty()) {
+      // Many pairs of a wall may stay undecided: at some point the most confident is good enough.
+      if (impl_->num_solved >= impl_->options.max_candidates && !impl_->doubtful.empty()) break;
+      impl_->SolveNextPairs();
+      continue;
+    }
     SolvedPair next = std::move(impl_->solved.front());
     impl_->solved.pop_front();
     if (auto seed = impl_->Decide(std::move(next))) return seed;
-    // Many pairs of a wall may stay undecided: the most confident of a batch is good enough then.
-    if (impl_->solved.empty() && !impl_->doubtful.empty()) break;
   }
   if (impl_->doubtful.empty()) return std::nullopt;
   const auto best =

@@ -33,8 +33,10 @@ struct InitOptions {
   // (docs/colmap.md).
   double min_confidence = 1.3;
   int max_third_views = 4;  // per pair; 0 = never look at a third view
-  int max_candidates = 10;  // pairs solved before the best one is taken; larger = slower
-  int max_pairs = 3;        // pairs handed to COLMAP before giving up
+  // Pairs that are solved in search of one that a third view confirms, before the most confident of
+  // the others is taken; larger = slower where nothing is confirmed.
+  int max_candidates = 10;
+  int max_pairs = 3;  // pairs handed to COLMAP before giving up
   // Names of the images to start from; "" = chosen. With one of them set, its best partner is
   // chosen.
   std::string image_name1, image_name2;

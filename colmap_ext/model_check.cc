@@ -6,6 +6,7 @@
 
 #include "colmap_ext/third_view.h"
 #include "colmap_ext/two_view_geometry.h"
+#include "core/frames.h"
 #include "core/parallel.h"
 
 namespace roomtex {
@@ -104,6 +105,12 @@ void CountSupport(MatchedImages* images, const SparseModel& model, const ModelCh
   }
 }
 
+// Turned by more, or its baseline.
+bool Differs(const Rigid& a, const Rigid& b, double rotation_deg, double baseline_deg) {
+  return RotationAngle(a.rotation, b.rotation) > RadFromDeg(rotation_deg) ||
+         a.translation.dot(b.translation) < std::cos(RadFromDeg(baseline_deg));
+}
+
 // Whether another motion explains the third views clearly better than the model's own, both
 // refined from where they are.
 void TestPair(const ModelCheckOptions& options, TestedPair* tested) {
@@ -123,8 +130,16 @@ void TestPair(const ModelCheckOptions& options, TestedPair* tested) {
       DecideByThirdViews(tested->matches, hypotheses, tested->views, third);
   if (decision.num_views == 0) return;
   tested->decided = true;
-  const double least = decision.verdicts[decision.best].cost;
-  tested->contradicts = decision.verdicts[0].cost > options.min_confidence * least;
+  const Rigid& model_motion = tested->model_motion.right_from_left;
+  const HypothesisVerdict& own = decision.verdicts[0];
+  // Left to itself the model's motion goes to another one, farther away than noise takes it.
+  tested->contradicts = Differs(own.right_from_left, model_motion, 3, 25);
+  // The same motion with other mismatches among its inliers may cost much less: only one that would
+  // put the camera elsewhere contradicts. A wall's second solution is farther away than this.
+  for (const HypothesisVerdict& rival : decision.verdicts) {
+    tested->contradicts |= own.cost > options.min_confidence * rival.cost &&
+                           Differs(own.right_from_left, rival.right_from_left, 1.5, 10);
+  }
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ void AddOptions(Options* options, Command* command) {
   command->AddInt("Init.max_third_views", &init.max_third_views,
                   "Further photos that check a pair and start the model with it; 0 = none.");
   command->AddInt("Init.max_candidates", &init.max_candidates,
-                  "Pairs that are solved before the best one is taken; larger = slower.");
+                  "Pairs that are solved in search of one that third photos confirm, before the "
+                  "most confident of the others is taken; larger = slower.");
   command->AddInt(
       "Init.max_pairs", &init.max_pairs,
       "Pairs handed to COLMAP, one after the other, while fewer than half of the photos "
