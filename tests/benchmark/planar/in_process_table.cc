@@ -80,8 +80,8 @@ void PrintHeader(const char* first, std::FILE* out) {
 
 void PrintRow(const std::string& name, const OutcomeCounts& counts, std::FILE* out) {
   std::fprintf(out, "| %s | %d | %s | %s | %s | %d | %d | %d | %d | %s | %.0f |\n", name.c_str(),
-               counts.num_sets, ShareText(counts.thesis, counts.num_sets).c_str(),
-               ShareText(counts.lower_cost, counts.num_sets).c_str(),
+               counts.num_sets, ShareText(counts.thesis, counts.num_rivals).c_str(),
+               ShareText(counts.lower_cost, counts.num_rivals).c_str(),
                ShareText(counts.right, counts.num_sets).c_str(), counts.wrong, counts.ambiguous,
                counts.no_seed, counts.identifiable,
                ShareText(counts.identifiable_right, counts.identifiable).c_str(),
@@ -119,6 +119,7 @@ SetOutcome RunInProcess(const PlanarSet& set, int seed, bool rivals) {
   const std::optional<Seed> found = Initializer(&fresh, InitOptions(), 1, 0).Next();
   outcome.cpu_seconds = ThreadCpuSeconds() - start;
   if (found) JudgeSeed(views, set.noise_px, &images, *found, &outcome);
+  outcome.with_rivals = rivals;
   if (!rivals) return outcome;
   outcome.thesis_right =
       IsRight(views, set.noise_px, &images, StartByThesisRule(&images, HypothesisOptions()));
@@ -129,6 +130,7 @@ SetOutcome RunInProcess(const PlanarSet& set, int seed, bool rivals) {
 
 void OutcomeCounts::Add(const SetOutcome& outcome) {
   ++num_sets;
+  num_rivals += outcome.with_rivals ? 1 : 0;
   thesis += outcome.thesis_right ? 1 : 0;
   lower_cost += outcome.lower_cost_right ? 1 : 0;
   right += outcome.ours == SeedOutcome::kRight ? 1 : 0;
@@ -153,7 +155,7 @@ std::vector<SetOutcome> PrintInProcessTable(const InProcessOptions& options, std
     std::vector<SetOutcome> outcomes(num_sets);
     ParallelFor(options.jobs, 0, num_sets, [&](int i) {
       outcomes[i] = RunInProcess(row.cells[i / options.sets_per_cell], i % options.sets_per_cell,
-                                 options.rivals);
+                                 i % options.sets_per_cell < options.rival_sets_per_cell);
     });
     OutcomeCounts counts;
     for (int i = 0; i < num_sets; ++i) {

@@ -15,7 +15,8 @@ struct InProcessOptions {
   int sets_per_cell = 12;  // a row of the grid has 18 cells
   std::string rows;        // only rows whose name holds this
   int jobs = 1;            // sets side by side; changes the speed only
-  bool rivals = true;      // the thesis' rule and the lower cost as well
+  // The first sets of a cell run the thesis' rule and the lower cost as well, three times the work.
+  int rival_sets_per_cell = 12;
 };
 
 enum class SeedOutcome { kRight, kWrong, kAmbiguousRight, kAmbiguousWrong, kNone };
@@ -23,7 +24,7 @@ enum class SeedOutcome { kRight, kWrong, kAmbiguousRight, kAmbiguousWrong, kNone
 struct SetOutcome {
   std::string set;
   int seed = 0;
-  bool thesis_right = false, lower_cost_right = false;
+  bool with_rivals = false, thesis_right = false, lower_cost_right = false;
   SeedOutcome ours = SeedOutcome::kNone;
   bool identifiable = false;  // of the pair that ours chose
   double confidence = 0;
@@ -34,7 +35,7 @@ struct SetOutcome {
 SetOutcome RunInProcess(const PlanarSet& set, int seed, bool rivals);
 
 struct OutcomeCounts {
-  int num_sets = 0, thesis = 0, lower_cost = 0, right = 0, wrong = 0, ambiguous = 0;
+  int num_sets = 0, num_rivals = 0, thesis = 0, lower_cost = 0, right = 0, wrong = 0, ambiguous = 0;
   int identifiable = 0, identifiable_right = 0, no_seed = 0;
   double cpu_seconds = 0;
 

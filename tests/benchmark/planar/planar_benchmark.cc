@@ -15,15 +15,16 @@ int main(int argc, char** argv) {
   using namespace roomtex;
   CLI::App app("Simulated planar sets against their truth.");
   std::string table = "in_process", rows, show;
-  int sets = 0, jobs = 1, seed = 0;
-  bool rivals = true;
+  int sets = 0, jobs = 1, seed = 0, rival_sets = -1;
   EndToEndOptions programs;
   app.add_option("--table", table, "in_process, mapper, sequences or adversarial")
       ->check(CLI::IsMember({"in_process", "mapper", "sequences", "adversarial"}));
   app.add_option("--sets", sets, "Sets per row (in_process: per cell of a row); 0 = 50 (12)");
   app.add_option("--rows", rows, "Only rows whose name holds this");
   app.add_option("--jobs", jobs, "Sets side by side");
-  app.add_option("--rivals", rivals, "in_process: 0 = roomtex only, three times as fast");
+  app.add_option(
+      "--rival_sets", rival_sets,
+      "in_process: sets per cell that run the thesis' rule and the lower cost; -1 = all");
   app.add_option("--roomtex_mapper", programs.roomtex_mapper, "The program")->capture_default_str();
   app.add_option("--colmap", programs.colmap, "The program")->capture_default_str();
   app.add_option("--show", show,
@@ -39,7 +40,7 @@ int main(int argc, char** argv) {
       if (sets > 0) options.sets_per_cell = sets;
       options.rows = rows;
       options.jobs = jobs;
-      options.rivals = rivals;
+      options.rival_sets_per_cell = rival_sets < 0 ? options.sets_per_cell : rival_sets;
       PrintInProcessTable(options, stdout);
     } else {
       if (sets > 0) programs.sets_per_row = sets;
