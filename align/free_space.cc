@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/scan_mesh.h"
 
@@ -36,6 +37,7 @@ FreeSpace::FreeSpace(const std::vector<Scan>& scans, int max_samples) {
     const std::vector<Triangle> triangles = BuildScanMesh(thin, ScanMeshOptions());
     const std::vector<uint8_t> grey = IntensityAsGrey(thin);
     const int offset = static_cast<int>(points_.size());
+    thinnings_.push_back({scan.organised, offset, stride, thin.num_columns, scan.num_columns});
     points_.insert(points_.end(), thin.points.begin(), thin.points.end());
     grey_.insert(grey_.end(), grey.begin(), grey.end());
     for (const Triangle& t : triangles) {
@@ -78,8 +80,35 @@ std::optional<FreeSpace::Sight> FreeSpace::Look(const Eigen::Vector3d& origin,
   if (!(area2 > 0)) return std::nullopt;
   const double v = std::clamp(ap.cross(ac).dot(normal) / area2, 0.0, 1.0);
   const double w = std::clamp(ab.cross(ap).dot(normal) / area2, 0.0, 1.0 - v);
-  return Sight{hit->point,
-               static_cast<float>((1 - v - w) * grey_[t[0]] + v * grey_[t[1]] + w * grey_[t[2]])};
+  Sight sight;
+  sight.x_in_scan = hit->point;
+  sight.grey = static_cast<float>((1 - v - w) * grey_[t[0]] + v * grey_[t[1]] + w * grey_[t[2]]);
+  LocateInGrid(t, {1 - v - w, v, w}, &sight);
+  return sight;
+}
+
+void FreeSpace::LocateInGrid(const Triangle& triangle, const Eigen::Vector3d& weights,
+                             Sight* sight) const {
+  sight->scan = static_cast<int>(thinnings_.size()) - 1;
+  while (triangle[0] < thinnings_[sight->scan].first_point) --sight->scan;
+  const Thinning& thinning = thinnings_[sight->scan];
+  sight->column = sight->row = 0;
+  if (!thinning.organised) {
+    sight->column = sight->row = std::numeric_limits<double>::quiet_NaN();
+    return;
+  }
+  int first_column = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int index = triangle[k] - thinning.first_point;
+    int column = thinning.stride * (index % thinning.thin_columns);
+    if (k == 0) first_column = column;
+    // A triangle over the seam of a full turn.
+    if (2 * (column - first_column) > thinning.num_columns) column -= thinning.num_columns;
+    if (2 * (first_column - column) > thinning.num_columns) column += thinning.num_columns;
+    sight->column += weights[k] * column;
+    sight->row += weights[k] * thinning.stride * (index / thinning.thin_columns);
+  }
+  if (sight->column < 0) sight->column += thinning.num_columns;
 }
 
 }  // namespace roomtex

@@ -33,12 +33,27 @@ class FreeSpace {
 
   struct Sight {
     Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
-    float grey = 0;  // 0..255, see IntensityAsGrey
+    float grey = 0;  // 0..255, see IntensityAsGrey; between the samples of the coarse mesh
+    int scan = 0;    // index into the scans
+    // Position in that scan's grid, whole numbers at its samples; in a closed grid the column may
+    // lie between the last and num_columns. NaN for a mesh without a grid.
+    double column = 0, row = 0;
   };
   // What a ray from `origin` along the unit `direction` meets first.
   std::optional<Sight> Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
  private:
+  // How the coarse grid of one scan lies in its own.
+  struct Thinning {
+    bool organised = true;
+    int first_point = 0;  // index into points_
+    int stride = 1;
+    int thin_columns = 0;
+    int num_columns = 0;  // of the scan itself
+  };
+  void LocateInGrid(const Triangle& triangle, const Eigen::Vector3d& weights, Sight* sight) const;
+
+  std::vector<Thinning> thinnings_;  // one per scan
   std::vector<Eigen::Vector3d> stations_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Triangle> triangles_;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "align/agreement.h"
+#include "align/agreement_report.h"
 #include "align/alignment.h"
 #include "align/geo_output.h"
 #include "core/error.h"
@@ -152,22 +153,6 @@ Json PlacementToJson(const Placement& placement) {
   return json;
 }
 
-Json AgreementToJson(const Agreement& agreement) {
-  Json json;
-  json["num_photos"] = agreement.num_photos;
-  json["num_pixels"] = agreement.num_pixels;
-  json["mutual_information"] = agreement.mutual_information;
-  Json turned = Json::array();
-  for (const Agreement::Turned& one : agreement.turned) {
-    Json entry;
-    entry["turn_deg"] = one.turn_deg;
-    entry["mutual_information"] = one.mutual_information;
-    turned.push_back(entry);
-  }
-  json["mutual_information_turned"] = turned;
-  return json;
-}
-
 // The keys of docs/commands.md. `planes` stays empty until planes are detected (thesis 7.2).
 void FillReport(const Alignment& alignment, double reprojection_rms_before,
                 double reprojection_rms_after, Report* report) {
@@ -238,10 +223,13 @@ void Align(const Arguments& a, const Command::Context& context) {
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");
   std::vector<std::string> warnings;
-  const Agreement agreement = MeasureAgreement(model, a.image_path, free_space, AgreementOptions(),
-                                               context.options.num_threads, &warnings);
+  const AgreementOptions agreement_options;
+  const Agreement agreement =
+      MeasureAgreement(model, a.image_path, scans, free_space, agreement_options,
+                       context.options.num_threads, &warnings);
   for (const std::string& warning : warnings) context.Warn(warning);
-  context.report["agreement"] = AgreementToJson(agreement);
+  context.report["agreement"] = AgreementToJson(agreement, agreement_options);
+  if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
 }
 
 }  // namespace
