@@ -61,7 +61,9 @@ MapperOutcome RunColmap(const PlanarSet& set, const SimulatedViews& views, const
     arguments.push_back(std::string("--Mapper.") + option);
     arguments.push_back("0");
   }
-  arguments.insert(arguments.end(), {"--Mapper.num_threads", "1"});
+  // One model, kept however small: otherwise COLMAP starts over and over and drops what stays
+  // small.
+  arguments.insert(arguments.end(), {"--Mapper.multiple_models", "0", "--Mapper.num_threads", "1"});
   outcome.run = RunProgram(arguments, folder / "colmap.log");
   Judge(set, views, LargestModel(folder / "colmap"), &outcome);
   return outcome;
