@@ -204,9 +204,10 @@ std::string GeoOriginHelp() {
   return "LATITUDE,LONGITUDE,HEIGHT (degrees WGS84, metres above the ellipsoid, not above sea "
          "level): writes the aligned model also to geo/ in the output folder, east-north-up about "
          "this place, with geo.json (how to get to ECEF and UTM) and cameras.csv (latitude, "
-         "longitude, height, ECEF, UTM). Needs surveyed stations in --scan_poses; without them the "
-         "scan frame's origin is taken to be this place, and a fourth number HEADING is the "
-         "direction of its -z axis (z-up scans: y axis), degrees clockwise from north.";
+         "longitude, height, ECEF, UTM). Where the scans lie is told by surveyed stations in "
+         "--scan_poses. Without them this place is the origin of the scan frame, and a fourth "
+         "number HEADING is the direction of its -z axis (z-up scans: y axis), degrees clockwise "
+         "from north.";
 }
 
 std::optional<GeoReference> FindGeoReference(const PlacedScans& placed,

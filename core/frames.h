@@ -5,7 +5,8 @@
 //
 // Frames    `sparse`   COLMAP's reconstruction: right-handed, arbitrary origin, rotation and scale.
 //           `scan`     the range scan: right-handed, metres. RTPI: x right, y up, z backward
-//                      (thesis 5.1.1); PTX: z up, the file's own pose already applied.
+//                      (thesis 5.1.1); PTX: z up, the file's own pose already applied. With
+//                      surveyed stations: the `enu` frame about the first of them.
 //           `station`  one scanner set-up, its origin in the scanner; the scan frame if there is
 //           one only. `cam`      x right, y down, z forward, as COLMAP. `img`      pixels of the
 //           photo as taken, x right, y down. The CENTRE of the upper-left pixel
