@@ -183,6 +183,28 @@ MapperResult MapperRun::Adjust(const SparseModel& poses) {
   return Close(start, true);
 }
 
+std::string MapperRun::CallBundleAdjuster(const std::string& input, const std::string& output,
+                                          const std::string& refine_focal,
+                                          const std::string& refine_extra,
+                                          const std::string& refine_principal_point) {
+  ColmapOptions bundle = {{"--input_path", input},
+                          {"--output_path", output},
+                          {"--BundleAdjustment.refine_focal_length", refine_focal},
+                          {"--BundleAdjustment.refine_extra_params", refine_extra},
+                          {"--BundleAdjustment.refine_principal_point", refine_principal_point}};
+  AddGlobals("bundle_adjuster", &bundle);
+  return Call("bundle_adjuster", bundle, nullptr);
+}
+
+SparseModel MapperRun::BundleAdjust(const SparseModel& model, bool refine_intrinsics) {
+  ++num_runs_;
+  const std::string start = Folder("start"), adjusted = Folder("adjusted");
+  WriteSparseModel(model, start);
+  const std::string refine = refine_intrinsics ? "1" : "0";
+  const std::string problem = CallBundleAdjuster(start, adjusted, refine, refine, "0");
+  return problem.empty() ? ReadSparseModel(adjusted) : model;
+}
+
 MapperResult MapperRun::Close(const std::string& folder, bool two_view_tracks) {
   MapperResult result;
   const std::string closed = Folder("closed"), adjusted = Folder("adjusted");
@@ -190,17 +212,11 @@ MapperResult MapperRun::Close(const std::string& folder, bool two_view_tracks) {
       Call("point_triangulator", TriangulatorOptions(folder, closed, two_view_tracks), nullptr);
   if (!result.problem.empty()) return result;
 
-  ColmapOptions bundle = {
-      {"--input_path", closed},
-      {"--output_path", adjusted},
-      {"--BundleAdjustment.refine_focal_length",
-       MapperValue("--Mapper.ba_refine_focal_length", options_.refine_intrinsics ? "1" : "0")},
-      {"--BundleAdjustment.refine_extra_params",
-       MapperValue("--Mapper.ba_refine_extra_params", options_.refine_intrinsics ? "1" : "0")},
-      {"--BundleAdjustment.refine_principal_point",
-       MapperValue("--Mapper.ba_refine_principal_point", "0")}};
-  AddGlobals("bundle_adjuster", &bundle);
-  result.problem = Call("bundle_adjuster", bundle, nullptr);
+  const std::string refine = options_.refine_intrinsics ? "1" : "0";
+  result.problem =
+      CallBundleAdjuster(closed, adjusted, MapperValue("--Mapper.ba_refine_focal_length", refine),
+                         MapperValue("--Mapper.ba_refine_extra_params", refine),
+                         MapperValue("--Mapper.ba_refine_principal_point", "0"));
   if (!result.problem.empty()) return result;
 
   result.folder = adjusted;

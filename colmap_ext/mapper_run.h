@@ -44,6 +44,10 @@ class MapperRun {
   // adjusts. `problem` tells of a failure, as in Run.
   MapperResult Adjust(const SparseModel& poses);
 
+  // Bundle adjustment alone, of poses, points and, if asked, focal length and distortion. Gives the
+  // model as it came if COLMAP fails.
+  SparseModel BundleAdjust(const SparseModel& model, bool refine_intrinsics);
+
  private:
   std::string Folder(const std::string& name) const;
   // `options` that `command` knows, with the user's --Mapper.* on top.
@@ -55,6 +59,10 @@ class MapperRun {
                    const std::function<void(const std::string&)>& on_line);
   ColmapOptions TriangulatorOptions(const std::string& input, const std::string& output,
                                     bool two_view_tracks) const;
+  // "" or what went wrong.
+  std::string CallBundleAdjuster(const std::string& input, const std::string& output,
+                                 const std::string& refine_focal, const std::string& refine_extra,
+                                 const std::string& refine_principal_point);
   // Triangulates and adjusts the model in a folder.
   MapperResult Close(const std::string& folder, bool two_view_tracks);
   std::string MapperValue(const std::string& name, const std::string& fallback) const;

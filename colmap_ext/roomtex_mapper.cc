@@ -7,6 +7,7 @@
 #include <fstream>
 #include <set>
 
+#include "colmap_ext/calibration_check.h"
 #include "colmap_ext/mapper_run.h"
 #include "colmap_ext/model_check.h"
 #include "colmap_ext/model_output.h"
@@ -374,6 +375,31 @@ void CheckFinished(const Database& database, const MatchedImages& images, const 
       "(--Init.image_name1), or add photos that show something off the wall.");
 }
 
+// Whether the errors shrink when the lens may change.
+void CheckLens(MapperRun* mapper, const Outcome& outcome, const Options& options,
+               const Command::Context& context) {
+  context.progress.Stage("check calibration");
+  const CalibrationCheck check =
+      CheckCalibration(outcome.result.model, [&](const SparseModel& model, bool refine) {
+        ThrowIfInterrupted();
+        return mapper->BundleAdjust(model, refine);
+      });
+  Json& json = context.report["check"]["calibration"];
+  json["rms_fixed_px"] = check.rms_fixed_px;
+  json["rms_free_px"] = check.rms_free_px;
+  if (check.Fits()) return;
+  char text[160];
+  std::snprintf(text, sizeof(text),
+                "the camera's calibration does not fit the photos: their error falls from %.2f to "
+                "%.2f px when focal length and distortion may change, so the model is bent. ",
+                check.rms_fixed_px, check.rms_free_px);
+  context.report.SetUntrusted(
+      text + std::string(options.mapper.refine_intrinsics
+                             ? "Extract the features with a camera model that can describe the "
+                               "lens (--ImageReader.camera_model OPENCV)."
+                             : "Calibrate the camera, or give --refine_intrinsics 1."));
+}
+
 // Seeds one after the other until COLMAP makes something of one.
 std::vector<Outcome> TrySeeds(const Database& database, MatchedImages* images, MapperRun* mapper,
                               const Options& options, const Command::Context& context,
@@ -471,6 +497,7 @@ void MapPhotos(const Options& options, const Command::Context& context) {
   FillReport(outcome, images, &context.report);
   JudgeTrust(outcome, images, &context.report);
   CheckFinished(database, images, options, context, outcome);
+  CheckLens(&mapper, outcome, options, context);
 
   context.progress.Stage("write model");
   const std::string init_scratch = scratch / "init";

@@ -196,6 +196,33 @@ TEST_F(MapperCommand, DoesNotTrustABentModel) {
   EXPECT_FALSE(Report()["check"]["contradicting"].empty());
 }
 
+// Before a wall poses and points take up a wrong lens, and the model is bent.
+TEST_F(MapperCommand, SaysThatTheCalibrationDoesNotFit) {
+  SimulatedViewsOptions options;
+  options.scene = Scene::kWall;
+  options.num_views = 6;
+  options.distortion = true;
+  views_ = SimulateViews(options);
+  const Camera lens = views_.cameras.at(1);
+  views_.cameras.at(1).model = CameraModel::kPinhole;  // the database knows nothing of k1
+  views_.cameras.at(1).params.resize(4);
+  WriteSimulatedDatabase(views_, folder_.path());
+  CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("calibration does not fit"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("--refine_intrinsics 1"), std::string::npos) << result.err;
+  const nlohmann::json check = Report()["check"]["calibration"];
+  EXPECT_LT(check["rms_free_px"].get<double>(), 0.8 * check["rms_fixed_px"].get<double>());
+
+  fs::remove(folder_ / "database.db");
+  views_.cameras.at(1) = lens;
+  WriteSimulatedDatabase(views_, folder_.path());
+  result = Run();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json right = Report()["check"]["calibration"];
+  EXPECT_GT(right["rms_free_px"].get<double>(), 0.97 * right["rms_fixed_px"].get<double>());
+}
+
 TEST_F(MapperCommand, SaysWhenFewerThanHalfOfThePhotosRegister) {
   Simulate(RoomOptions(4));
   {  // five photos that nothing is known of

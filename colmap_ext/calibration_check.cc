@@ -1,0 +1,78 @@
+#include "colmap_ext/calibration_check.h"
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+namespace roomtex {
+namespace {
+
+constexpr int kPointsPerImage = 60;
+
+// fx, fy, cx, cy, k1, k2, p1, p2; empty for models that are rich already.
+std::vector<double> OpenCvParams(const Camera& camera) {
+  const std::vector<double>& p = camera.params;
+  switch (camera.model) {
+    case CameraModel::kSimplePinhole:
+      return {p[0], p[0], p[1], p[2], 0, 0, 0, 0};
+    case CameraModel::kPinhole:
+      return {p[0], p[1], p[2], p[3], 0, 0, 0, 0};
+    case CameraModel::kSimpleRadial:
+      return {p[0], p[0], p[1], p[2], p[3], 0, 0, 0};
+    case CameraModel::kRadial:
+      return {p[0], p[0], p[1], p[2], p[3], p[4], 0, 0};
+    default:
+      return {};
+  }
+}
+
+}  // namespace
+
+SparseModel WithRicherCameras(const SparseModel& model) {
+  SparseModel result = model;
+  for (auto& [camera_id, camera] : result.cameras) {
+    std::vector<double> params = OpenCvParams(camera);
+    if (params.empty()) continue;
+    camera.model = CameraModel::kOpenCv;
+    camera.params = std::move(params);
+  }
+  return result;
+}
+
+SparseModel ThinnedModel(const SparseModel& model, int per_image) {
+  std::vector<uint64_t> order;
+  for (const auto& [point_id, point] : model.points) order.push_back(point_id);
+  std::stable_sort(order.begin(), order.end(), [&](uint64_t a, uint64_t b) {
+    return model.points.at(a).track.size() > model.points.at(b).track.size();
+  });
+  SparseModel result;
+  result.cameras = model.cameras;
+  result.images = model.images;
+  std::map<uint32_t, int> count;
+  for (const uint64_t point_id : order) {
+    const SparsePoint& point = model.points.at(point_id);
+    const bool wanted = std::any_of(
+        point.track.begin(), point.track.end(),
+        [&](const TrackElement& element) { return count[element.image_id] < per_image; });
+    if (!wanted) continue;
+    for (const TrackElement& element : point.track) ++count[element.image_id];
+    result.points[point_id] = point;
+  }
+  for (auto& [image_id, image] : result.images) {
+    for (uint64_t& point_id : image.point3d_ids) {
+      if (result.points.count(point_id) == 0) point_id = kInvalidPoint3dId;
+    }
+  }
+  return result;
+}
+
+CalibrationCheck CheckCalibration(const SparseModel& model, const AdjustModel& adjust) {
+  const SparseModel start = ThinnedModel(WithRicherCameras(model), kPointsPerImage);
+  SparseModel fixed = adjust(start, false), free = adjust(start, true);
+  CalibrationCheck check;
+  check.rms_fixed_px = UpdateReprojectionErrors(&fixed).rms_px;
+  check.rms_free_px = UpdateReprojectionErrors(&free).rms_px;
+  return check;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,37 @@
+#pragma once
+// Whether the cameras' intrinsics fit their photos. With a wrong lens a room looks bent, and before
+// a wall nothing contradicts it: poses and points take up what the lens leaves over, and the errors
+// only grow a little. They shrink again when the lens may change, and that is measured.
+
+#include <functional>
+#include <string>
+
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+struct CalibrationCheck {
+  // Root mean square reprojection error, pixels, of the same observations after bundle adjustment
+  // with the intrinsics as they are, and with focal length and distortion free.
+  double rms_fixed_px = 0, rms_free_px = 0;
+  // 1 - rms_free / rms_fixed above which the intrinsics do not fit. On a real kitchen, calibrated
+  // to about a pixel, 0.008; for a lens whose distortion of 12 % nobody told, 0.5.
+  static constexpr double kMaxGain = 0.1;
+
+  double Gain() const { return rms_fixed_px > 0 ? 1 - rms_free_px / rms_fixed_px : 0; }
+  bool Fits() const { return Gain() <= kMaxGain; }
+};
+
+// Every camera in a model that can describe what its own cannot: OPENCV for pinholes and for one or
+// two radial parameters; others stay.
+SparseModel WithRicherCameras(const SparseModel& model);
+
+// At least `per_image` points of every image (all of those that see fewer), those of most images
+// first: enough for a few parameters, and as fast for 300 photos as the rest.
+SparseModel ThinnedModel(const SparseModel& model, int per_image);
+
+// adjust: bundle adjustment of poses and points, and of the intrinsics if asked.
+using AdjustModel = std::function<SparseModel(const SparseModel& model, bool refine_intrinsics)>;
+CalibrationCheck CheckCalibration(const SparseModel& model, const AdjustModel& adjust);
+
+}  // namespace roomtex
