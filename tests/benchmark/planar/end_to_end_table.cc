@@ -61,9 +61,12 @@ MapperOutcome RunColmap(const PlanarSet& set, const SimulatedViews& views, const
     arguments.push_back(std::string("--Mapper.") + option);
     arguments.push_back("0");
   }
-  // One model, kept however small: otherwise COLMAP starts over and over and drops what stays
-  // small.
-  arguments.insert(arguments.end(), {"--Mapper.multiple_models", "0", "--Mapper.num_threads", "1"});
+  arguments.insert(arguments.end(), {"--Mapper.num_threads", "1"});
+  // By default COLMAP drops a model that stays small and starts anew, which serves it well where a
+  // good model exists. Along weak triples there is none, and nothing would be left.
+  if (set.kind == Kind::kWeakTriples) {
+    arguments.insert(arguments.end(), {"--Mapper.multiple_models", "0"});
+  }
   outcome.run = RunProgram(arguments, folder / "colmap.log");
   Judge(set, views, LargestModel(folder / "colmap"), &outcome);
   return outcome;
