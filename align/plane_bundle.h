@@ -2,6 +2,7 @@
 // Bundle adjustment of the aligned model with its points held on the surface of the scan (thesis
 // 7.2, Appendix C).
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,10 @@ struct PlaneBundleOptions {
   bool fix_clicked_view = false;
   // Cameras are refined, too, each with one set of parameters for all its photos.
   bool refine_intrinsics = false;
+  // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
+  // metres, rms over the points on the surface. Smaller ones are within the noise.
+  bool bend = true;
+  double min_bend = 0.001;
   int num_rounds = 5;       // points are given to surfaces anew this often, less if nothing changes
   int max_iterations = 25;  // of each round
 
@@ -59,6 +64,10 @@ struct PlaneBundle {
   Similarity adjusted_from_input;
   double max_bending = 0;
 
+  // Photos that took no part, because too few points hold them or because they ran away; they
+  // follow the similarity.
+  std::set<uint32_t> idle_images;
+
   std::vector<SurfaceConstraint> constraints;  // of the last round
   std::vector<int> num_points_of_plane;        // of these, one per plane
   // RMS distance of these points from their surfaces, metres; the same points before and after.
@@ -74,7 +83,7 @@ struct PlaneBundle {
 // round to round. The surfaces hold the gauge; what they leave open (one wall only) the picks hold.
 // A bent scan is straightened for that; in the end the points are bent like the scan and each photo
 // is fitted to them (its own pose cannot be bent, so that its reprojection errors grow).
-// Does not depend on the number of threads: Ceres runs on one.
+// Does not depend on the number of threads: Ceres runs on one thread.
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options);
 
 }  // namespace roomtex

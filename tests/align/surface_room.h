@@ -71,6 +71,9 @@ class SurfaceRoom {
     patches = std::make_unique<ScanPatches>(std::vector<Scan>{scan}, ScanPatchOptions());
     planes = WallPlanes();
     picks = PicksOfPhoto(room, room.BestPhotoForPicks(), 6);
+    const std::vector<Triangle> triangles = BuildScanMesh(true_scan, ScanMeshOptions());
+    caster = std::make_unique<RayCaster>(true_scan.points, triangles);
+    true_normals = VertexNormals(true_scan, triangles);
   }
 
   PlaneBundleInput Input(const SparseModel& model) const {
@@ -88,8 +91,10 @@ class SurfaceRoom {
   Scan true_scan;          // sample by sample where the scanner's rays met the room
   SparseModel true_model;  // scan frame; true poses and points, keypoints with 0.7 pixels of noise
   std::unique_ptr<ScanPatches> patches;
-  std::vector<ScanPlane> planes;  // walls, floor and ceiling
-  std::vector<Pick> picks;        // six in one photo
+  std::vector<ScanPlane> planes;      // walls, floor and ceiling
+  std::vector<Pick> picks;            // six in one photo
+  std::unique_ptr<RayCaster> caster;  // of true_scan
+  std::vector<Eigen::Vector3f> true_normals;
 
  private:
   static Scan MakeTrueScan(SimulatedRoomOptions options) {
@@ -152,6 +157,32 @@ inline SparseModel Reconstructed(SparseModel model) {
   return model;
 }
 
+inline SimulatedRoomOptions SmallRoom(int seed, double bend = 0, double drift_deg = 0) {
+  SimulatedRoomOptions options;
+  options.random_seed = seed;
+  options.num_photos = 20;
+  options.scan_columns = 800;
+  options.scan_rows = 400;
+  options.bend = bend;
+  options.azimuth_drift_deg = drift_deg;
+  return options;
+}
+
+// A room with what a reconstruction makes of its photos.
+struct Reconstruction {
+  explicit Reconstruction(const SimulatedRoomOptions& options)
+      : room(options), model(Reconstructed(room.true_model)) {}
+  SurfaceRoom room;
+  SparseModel model;  // best similarity to the true cameras
+};
+// Made once per seed and process.
+inline const Reconstruction& StraightRoom(int seed = 0) {
+  static std::map<int, std::unique_ptr<Reconstruction>> rooms;
+  auto& room = rooms[seed];
+  if (room == nullptr) room = std::make_unique<Reconstruction>(SmallRoom(seed));
+  return *room;
+}
+
 struct Spread {
   double median = 0, p90 = 0, worst = 0;
 };
@@ -180,9 +211,7 @@ inline PoseSpread PoseErrorsOf(const SimulatedRoom& room, const SparseModel& mod
 // the sample. Over the samples that each photo sees, not flatter than 65 degrees, in front of a
 // smooth surface.
 inline Spread ColourErrors(const SurfaceRoom& one, const SparseModel& model, int stride = 37) {
-  const std::vector<Triangle> triangles = BuildScanMesh(one.true_scan, ScanMeshOptions());
-  const RayCaster caster(one.true_scan.points, triangles);
-  const std::vector<Eigen::Vector3f> normals = VertexNormals(one.true_scan, triangles);
+  const std::vector<Eigen::Vector3f>& normals = one.true_normals;
   const CameraProjection projection(one.room.camera());
   std::vector<double> errors;
   for (int photo = 0; photo < one.room.NumPhotos(); ++photo) {
@@ -197,7 +226,7 @@ inline Spread ColourErrors(const SurfaceRoom& one, const SparseModel& model, int
       const Eigen::Vector3d normal = normals[i].cast<double>();
       const Eigen::Vector3d sight = (one.true_scan.points[i] - centre).normalized();
       if (-sight.dot(normal) < 0.42) continue;
-      if (caster.IsOccluded(centre, one.true_scan.points[i], 0.01)) continue;
+      if (one.caster->IsOccluded(centre, one.true_scan.points[i], 0.01)) continue;
       const Eigen::Vector3d ray =
           found.rotation.conjugate() * Eigen::Vector3d(x_in_cam / x_in_cam.z());
       const Eigen::Vector3d eye = found.TargetOriginInSource();
