@@ -20,6 +20,8 @@ constexpr double kParzenSigma = 2.0;     // thesis A.1.2
 constexpr int kNodeCells = 3;            // cells between the rays that are cast
 constexpr double kMinValidShare = 0.02;  // a photo that sees less of the scan says nothing
 
+constexpr int kMaxSets = 3;  // of photos, see AgreementOptions
+
 // What all photos of one camera share.
 struct CameraSetup {
   explicit CameraSetup(const Camera& camera) : projection(camera) {}
@@ -220,19 +222,35 @@ Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_
                            const std::vector<Scan>& scans, const FreeSpace& free_space,
                            const AgreementOptions& options, int num_threads,
                            std::vector<std::string>* warnings) {
-  const std::vector<const SparseImage*> images = SpreadImages(aligned, options.max_photos);
   const ScanViewer viewer(scans, free_space);
+  // Every num_sets-th of them make a set of its own that is spread over all.
+  const std::vector<const SparseImage*> images =
+      SpreadImages(aligned, kMaxSets * options.num_photos);
+  const int num_images = static_cast<int>(images.size());
+  const int num_sets = std::max(1, (num_images + options.num_photos - 1) / options.num_photos);
   std::map<uint32_t, CameraSetup> setups;
-  for (const SparseImage* image : images) {
-    if (setups.count(image->camera_id)) continue;
-    setups.emplace(image->camera_id,
-                   SetUpCamera(aligned.cameras.at(image->camera_id), viewer, options));
-  }
   std::vector<PhotoAgreement> photos(images.size());
-  ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int i) {
-    photos[i] = MeasurePhoto(aligned, *images[i], image_path, viewer,
-                             setups.at(images[i]->camera_id), options);
-  });
+  long num_patches = 0;
+  for (int set = 0; set < num_sets && num_patches < options.enough_patches; ++set) {
+    std::vector<int> members;
+    for (int i = (set + num_sets / 2) % num_sets; i < num_images; i += num_sets) {
+      members.push_back(i);
+      const uint32_t camera_id = images[i]->camera_id;
+      if (setups.count(camera_id)) continue;
+      setups.emplace(camera_id, SetUpCamera(aligned.cameras.at(camera_id), viewer, options));
+    }
+    ParallelFor(num_threads, 0, static_cast<int>(members.size()), [&](int k) {
+      const int i = members[k];
+      photos[i] = MeasurePhoto(aligned, *images[i], image_path, viewer,
+                               setups.at(images[i]->camera_id), options);
+    });
+    bool any = false;
+    for (const int i : members) {
+      any = any || photos[i].valid;
+      num_patches += photos[i].shifts.at_pose.num;
+    }
+    if (!any) break;
+  }
 
   Agreement agreement;
   GradientShifts shifts;

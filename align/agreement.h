@@ -16,7 +16,10 @@
 namespace roomtex {
 
 struct AgreementOptions {
-  int max_photos = 8;       // evenly taken from all, in the order of their names
+  // Photos are evenly taken from all, in the order of their names: num_photos at first, up to twice
+  // more such sets while there are fewer than enough_patches for gradient_shift.
+  int num_photos = 8;
+  int enough_patches = 400;
   int pixels_across = 320;  // Appendix A compares about this many positions per row of a photo
   // Edge of the patches of the normalised cross correlation, in such positions.
   int ncc_patch = 16;

@@ -24,7 +24,7 @@ Json GradientAgreementToJson(const GradientAgreement& gradient,
   Json json = ShareToJson(shifts.at_pose);
   const bool any = shifts.at_pose.num > 0;
   json["num_photos"] = shifts.num_photos;
-  json["num_busy_photos"] = shifts.num_busy_photos;
+  json["num_unclear_photos"] = shifts.num_unclear_photos;
   json["tolerance_deg"] = any ? Json(shifts.tolerance_deg) : Json(nullptr);
   json["median_shift_px"] = any ? Json(gradient.median_shift_px) : Json(nullptr);
   json["median_shift_deg"] = any ? Json(gradient.median_shift_deg) : Json(nullptr);

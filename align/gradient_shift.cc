@@ -12,9 +12,12 @@
 namespace roomtex {
 namespace {
 
-// Median of the photo's gradients over their 95th percentile above which a photo is busy. Ordinary
-// photos of simulated and real rooms have 0.09 to 0.13, under a projected pattern 0.28 to 0.42.
+// Median of a photo's gradients over their 95th percentile above which its brightness changes
+// nearly everywhere. Ordinary photos of simulated and real rooms have 0.09 to 0.13, under a
+// projected pattern 0.28 to 0.42.
 constexpr double kBusy = 0.2;
+// Grey levels per cell; with a 95th percentile below this a photo is blank. Ordinary: 11 to 22.
+constexpr double kBlank = 1;
 
 // Smallest eigenvalue of a corner's gradients, (grey levels per cell)^2: one grey level over a
 // patch is no structure, even when the scan has no noise at all.
@@ -48,11 +51,11 @@ double Quantile(std::vector<float>* values, double share) {
   return (*values)[rank];
 }
 
-bool IsBusy(const cv::Mat1f& gradient) {
+bool IsClear(const cv::Mat1f& gradient) {
   std::vector<float> values(gradient.begin(), gradient.end());
-  if (values.empty()) return true;
+  if (values.empty()) return false;
   const double high = Quantile(&values, 0.95);
-  return !(Quantile(&values, 0.5) <= kBusy * high);
+  return high >= kBlank && Quantile(&values, 0.5) <= kBusy * high;
 }
 
 // How far the peak lies beside the middle one of three equally spaced values, -0.5 to 0.5
@@ -100,7 +103,7 @@ class PhotoMatcher {
     result.tolerance_deg = DegFromRad(tolerance_ * angle_per_cell_);
     result.turned.resize(options_.turns_deg.size());
     result.moved.resize(options_.moves.size());
-    const bool busy = IsBusy(photo_gradient_);
+    const bool clear = IsClear(photo_gradient_);
     for (size_t i = 0; i < patches_.size(); ++i) {
       const cv::Mat1f pattern = PatternOf(patches_[i]);
       const auto shift = BestShift(pattern, patches_[i].cell.cast<double>());
@@ -109,14 +112,14 @@ class PhotoMatcher {
       result.shifts_deg.push_back(DegFromRad(*shift * angle_per_cell_));
       result.at_pose.Add(*shift <= tolerance_);
       result.ring.Add(*shift > tolerance_ && *shift <= 2 * tolerance_);
-      if (!busy) result.clear.Add(*shift <= tolerance_);
+      if (clear) result.clear.Add(*shift <= tolerance_);
       CompareAtOtherPoses(i, pattern, &result);
       const auto other = OtherPlace(i);
       const auto chance_shift = other ? BestShift(pattern, *other) : std::nullopt;
       if (chance_shift) result.elsewhere.Add(*chance_shift <= tolerance_);
     }
     result.num_photos = result.at_pose.num > 0;
-    result.num_busy_photos = result.at_pose.num > 0 && busy;
+    result.num_unclear_photos = result.at_pose.num > 0 && !clear;
     return result;
   }
 
@@ -275,7 +278,7 @@ double Tally::High(double sigmas) const {
 
 void GradientShifts::Add(const GradientShifts& other) {
   num_photos += other.num_photos;
-  num_busy_photos += other.num_busy_photos;
+  num_unclear_photos += other.num_unclear_photos;
   shifts_px.insert(shifts_px.end(), other.shifts_px.begin(), other.shifts_px.end());
   shifts_deg.insert(shifts_deg.end(), other.shifts_deg.begin(), other.shifts_deg.end());
   at_pose.Add(other.at_pose);

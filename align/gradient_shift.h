@@ -55,12 +55,12 @@ struct Tally {
 // The shifts of the patches of one or more photos.
 struct GradientShifts {
   int num_photos = 0;                // with at least one patch
-  int num_busy_photos = 0;           // of them: changes of brightness nearly everywhere, see below
+  int num_unclear_photos = 0;        // of them: brightness changes nearly everywhere, or nowhere
   std::vector<double> shifts_px;     // one per patch, pixels of the photo
   std::vector<double> shifts_deg;    // the same as angles
   Tally at_pose;                     // patches, and those within the tolerance
   Tally ring;                        // the same patches, and those within one to two tolerances
-  Tally clear;                       // as at_pose, of the photos that are not busy
+  Tally clear;                       // as at_pose, of the photos that are clear
   std::vector<Tally> turned, moved;  // as GradientShiftOptions::turns_deg, moves
   // Of turned and moved together, the patches that come to lie farther than twice the tolerance
   // from where the pose has them: what a wrong pose gives.
@@ -82,9 +82,9 @@ struct GradientAgreement {
   // More patches fit than by chance, than at wrong poses, and than just beside the tolerance, each
   // clearly: the alignment is right to about the tolerance.
   bool supports = false;
-  // Enough patches that should fit, and no more do than by chance: the alignment is wrong. Photos
-  // that are busy do not count: a pattern projected onto the walls (thesis 5.1.2) is not seen by
-  // the scanner and buries what is.
+  // Enough patches that should fit, and no more do than by chance: the alignment is wrong. Unclear
+  // photos do not count: a pattern projected onto the walls (thesis 5.1.2) is not seen by the
+  // scanner and buries what is.
   bool contradicts = false;
   std::string reason;  // a sentence, when it contradicts
 };

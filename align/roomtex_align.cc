@@ -7,6 +7,7 @@
 #include "align/agreement_report.h"
 #include "align/alignment.h"
 #include "align/geo_output.h"
+#include "align/overlay.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
@@ -23,6 +24,7 @@ struct Arguments {
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
+  int overlays = 0;
 };
 
 void AddOptions(Arguments* a, Command* command) {
@@ -41,9 +43,14 @@ void AddOptions(Arguments* a, Command* command) {
       "quaternion w x y z, translation: --transform_path of colmap model_transformer) and "
       "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8).");
   command->AddInputPath("image_path", &a->image_path,
-                        "Folder of the photos; with it the report says how well photos and scan "
-                        "intensity agree.",
+                        "Folder of the photos (the plain ones where a pattern was projected); with "
+                        "it the report says how well photos and scan intensity agree, and an "
+                        "alignment that they contradict is not trusted.",
                         Command::Kind::kOptional);
+  command->AddInt("overlays", &a->overlays,
+                  "Number of photos for which overlays/NAME.jpg is written into --output_path: "
+                  "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
+                  "--image_path.");
   command->AddInputPath("database_path", &a->database_path,
                         "COLMAP's database; not needed for an alignment by picks.",
                         Command::Kind::kOptional);
@@ -100,6 +107,10 @@ void CheckArguments(const Arguments& a) {
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
   for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
+  if (a.overlays < 0) problems.push_back("--overlays must not be negative");
+  if (a.overlays > 0 && a.image_path.empty()) {
+    problems.push_back("--overlays needs the photos: give --image_path");
+  }
   ThrowIfProblems(problems);
   ParseGeoOrigin(a.geo_origin);
   std::error_code ignored;
@@ -189,6 +200,31 @@ void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans&
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
 }
 
+// What photos and scan say about each other; the report's `agreement` and `overlays`.
+void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
+                       const std::vector<Scan>& scans, const FreeSpace& free_space,
+                       const Command::Context& context) {
+  context.report["overlays"] = Json::array();
+  if (a.image_path.empty()) return;
+  context.progress.Stage("agreement");
+  const int num_threads = context.options.num_threads;
+  std::vector<std::string> warnings;
+  const AgreementOptions options;
+  const Agreement agreement =
+      MeasureAgreement(aligned, a.image_path, scans, free_space, options, num_threads, &warnings);
+  context.report["agreement"] = AgreementToJson(agreement, options);
+  if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
+  if (a.overlays > 0) {
+    context.progress.Stage("overlays");
+    for (const std::string& path :
+         WriteOverlays(aligned, a.image_path, a.output_path + "/overlays", scans, free_space,
+                       a.overlays, OverlayOptions(), num_threads, &warnings)) {
+      context.report["overlays"].push_back(path);
+    }
+  }
+  for (const std::string& warning : warnings) context.Warn(warning);
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
@@ -220,16 +256,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);
   WriteGeo(a, model, placed, geo, context);
   context.report.AddCopy(a.output_path + "/alignment.json");
-  if (a.image_path.empty()) return;
-  context.progress.Stage("agreement");
-  std::vector<std::string> warnings;
-  const AgreementOptions agreement_options;
-  const Agreement agreement =
-      MeasureAgreement(model, a.image_path, scans, free_space, agreement_options,
-                       context.options.num_threads, &warnings);
-  for (const std::string& warning : warnings) context.Warn(warning);
-  context.report["agreement"] = AgreementToJson(agreement, agreement_options);
-  if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
+  CompareWithPhotos(a, model, scans, free_space, context);
 }
 
 }  // namespace
