@@ -70,7 +70,11 @@ CalibrationCheck CheckCalibration(const SparseModel& model, const AdjustModel& a
   const SparseModel start = ThinnedModel(WithRicherCameras(model), kPointsPerImage);
   SparseModel fixed = adjust(start, false), free = adjust(start, true);
   CalibrationCheck check;
-  check.rms_fixed_px = UpdateReprojectionErrors(&fixed).rms_px;
+  const ReprojectionErrors errors = UpdateReprojectionErrors(&fixed);
+  check.rms_fixed_px = errors.rms_px;
+  check.redundancy = 2.0 * static_cast<double>(errors.num_observations) -
+                     3.0 * static_cast<double>(fixed.points.size()) -
+                     6.0 * static_cast<double>(fixed.images.size()) + 7;
   check.rms_free_px = UpdateReprojectionErrors(&free).rms_px;
   return check;
 }

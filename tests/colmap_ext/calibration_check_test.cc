@@ -79,5 +79,18 @@ TEST(CalibrationCheck, ThinnedModelKeepsEnoughOfEveryImage) {
   EXPECT_EQ(ThinnedModel(ModelOfTwoKinds(), 100).points.size(), 15u);
 }
 
+TEST(CalibrationCheck, AsksForMoreOfFewObservations) {
+  CalibrationCheck check;
+  check.rms_fixed_px = 0.5;
+  check.rms_free_px = 0.44;
+  check.redundancy = 5000;
+  EXPECT_FALSE(check.Fits());
+  check.redundancy = 100;
+  EXPECT_TRUE(check.Fits());
+  check.rms_free_px = 0.5;
+  check.redundancy = 5000;
+  EXPECT_TRUE(check.Fits());
+}
+
 }  // namespace
 }  // namespace roomtex
