@@ -1,0 +1,50 @@
+#include "align/expected_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace roomtex {
+
+double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan) {
+  const Eigen::Vector3d x = x_in_scan - fit.pivot;
+  Eigen::Matrix<double, 3, 7> jacobian;
+  jacobian.leftCols<3>().setIdentity();
+  jacobian.middleCols<3>(3) << 0, x.z(), -x.y(), -x.z(), 0, x.x(), x.y(), -x.x(), 0;  // -(x)_x
+  jacobian.col(6) = x;
+  const double variance = (jacobian * fit.covariance * jacobian.transpose()).trace();
+  return variance >= 0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity();
+}
+
+ExpectedError PropagateError(const SimilarityFit& fit,
+                             const std::vector<Eigen::Vector3d>& camera_centres,
+                             const std::vector<Scan>& scans) {
+  ExpectedError error;
+  Bounds bounds;
+  for (const Scan& scan : scans) {
+    const Bounds one = FindBounds(scan);
+    bounds.min = bounds.min.cwiseMin(one.min);
+    bounds.max = bounds.max.cwiseMax(one.max);
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d x;
+    for (int k = 0; k < 3; ++k) x[k] = corner >> k & 1 ? bounds.max[k] : bounds.min[k];
+    const double sigma = PositionSigmaAt(fit, x);
+    if (!(sigma > error.at_far_corner)) continue;
+    error.at_far_corner = sigma;
+    error.far_corner = x;
+  }
+  std::vector<double> sigmas;
+  for (const Eigen::Vector3d& centre : camera_centres)
+    sigmas.push_back(PositionSigmaAt(fit, centre));
+  if (!sigmas.empty()) {
+    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
+    error.at_cameras = sigmas[sigmas.size() / 2];
+  }
+  const double rotation2 = fit.covariance.block<3, 3>(3, 3).trace();
+  error.rotation = rotation2 >= 0 ? std::sqrt(rotation2) : std::numeric_limits<double>::infinity();
+  error.scale = std::sqrt(std::max(fit.covariance(6, 6), 0.0));
+  return error;
+}
+
+}  // namespace roomtex

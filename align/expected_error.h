@@ -1,0 +1,31 @@
+#pragma once
+// What an alignment is worth in millimetres: the covariance of the similarity, propagated to where
+// it matters.
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "align/similarity_fit.h"
+#include "core/scan.h"
+
+namespace roomtex {
+
+// Standard deviation of the position of a point that moves with the similarity, metres (root of the
+// trace of J C J^T with J = [I, -(x - c)_x, x - c]); infinite if the fit leaves something open.
+double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan);
+
+struct ExpectedError {
+  double at_cameras = 0;     // median over the photos' centres, metres
+  double at_far_corner = 0;  // the largest over the corners of the scan's bounding box, metres
+  Eigen::Vector3d far_corner = Eigen::Vector3d::Zero();  // `scan`
+  double rotation = 0;                                   // radians, root of the trace
+  double scale = 0;                                      // relative
+};
+
+// camera_centres: `scan`.
+ExpectedError PropagateError(const SimilarityFit& fit,
+                             const std::vector<Eigen::Vector3d>& camera_centres,
+                             const std::vector<Scan>& scans);
+
+}  // namespace roomtex
