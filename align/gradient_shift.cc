@@ -310,8 +310,11 @@ GradientAgreement JudgeGradientShifts(const GradientShifts& shifts) {
                     SigmasAbove(shifts.at_pose, shifts.far) >= kClearly &&
                     shifts.at_pose.Share() >= 2 * shifts.elsewhere.Share() &&
                     shifts.at_pose.Share() > shifts.ring.Share() / 3;
+  // At a wrong pose, the poses far from it are as good as other places, and there are more of them.
+  Tally by_chance = shifts.elsewhere;
+  by_chance.Add(shifts.far);
   result.contradicts = shifts.clear.num >= kMinPatches &&
-                       SigmasAbove(shifts.clear, shifts.elsewhere) < kChanceLike &&
+                       SigmasAbove(shifts.clear, by_chance) < kChanceLike &&
                        shifts.clear.High(3) < kLeastShareWhenRight;
   if (result.contradicts) {
     std::ostringstream text;
@@ -320,7 +323,7 @@ GradientAgreement JudgeGradientShifts(const GradientShifts& shifts) {
     text << "Photos and scan do not show the same at the same place: of " << shifts.clear.num
          << " corners of the scan's intensity, " << 100 * shifts.clear.Share() << " % lie within "
          << shifts.tolerance_deg << " degrees of where the photos have them, and "
-         << 100 * shifts.elsewhere.Share()
+         << 100 * by_chance.Share()
          << " % do so by chance. Check that scan and photos are of the same room, and the picks.";
     result.reason = text.str();
   }

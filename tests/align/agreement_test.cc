@@ -1,10 +1,13 @@
 #include "align/agreement.h"
 
+#include <map>
+#include <memory>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/frames.h"
-#include "tests/align/simulated_alignment.h"
+#include "core/report.h"
+#include "tests/align/case_folder.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -79,7 +82,7 @@ TEST(PatchNcc, LeavesOutWhatIsInvalidFlatOrOpposite) {
 // Photos of a simulated room in a folder, and the aligned model with the true poses.
 struct PhotographedRoom {
   explicit PhotographedRoom(const SimulatedRoomOptions& options) : room(options) {
-    model = room.MakeSparseModel(100, 0.5);
+    sparse = model = room.MakeSparseModel(2000, 0.7);
     TransformModel(room.ScanFromSparse(), &model);
     for (int photo = 0; photo < room.NumPhotos(); ++photo) {
       cv::imwrite(folder / room.PhotoName(photo), room.RenderPhoto(photo));
@@ -98,26 +101,29 @@ struct PhotographedRoom {
 
   TempFolder folder;
   SimulatedRoom room;
-  SparseModel model;
+  SparseModel sparse, model;  // in the sparse frame, in the scan frame
   std::vector<Scan> scans;
 };
 
-const PhotographedRoom& SmallRoom() {
-  static const PhotographedRoom room([] {
+const PhotographedRoom& SmallRoom(int seed = 0) {
+  static std::map<int, std::unique_ptr<PhotographedRoom>> rooms;
+  std::unique_ptr<PhotographedRoom>& room = rooms[seed];
+  if (room == nullptr) {
     SimulatedRoomOptions options;
-    options.num_photos = 4;
-    options.photo_width = 960;
-    options.photo_height = 640;
+    options.random_seed = seed;
+    options.num_photos = 6;
+    options.photo_width = 720;
+    options.photo_height = 480;
     options.scan_columns = 1200;
     options.scan_rows = 600;
-    return options;
-  }());
-  return room;
+    room = std::make_unique<PhotographedRoom>(options);
+  }
+  return *room;
 }
 
 TEST(Agreement, IsHighestAtTheTruePosesAndFallsWithTheTurn) {
   const Agreement agreement = SmallRoom().Measure(SmallRoom().model);
-  EXPECT_EQ(agreement.num_photos, 4);
+  EXPECT_EQ(agreement.num_photos, 6);
   EXPECT_GT(agreement.num_pixels, 100000);
   ASSERT_EQ(agreement.turned.size(), 3u);
   ImageMeasures last = agreement.at_pose;
@@ -153,6 +159,31 @@ TEST(Agreement, NamesPhotosThatAreMissing) {
   EXPECT_EQ(warnings.size(), 8u);
   EXPECT_FALSE(agreement.gradient.supports);
   EXPECT_FALSE(agreement.gradient.contradicts);
+}
+
+// As a user would see it: the photos of this room, and those of another one under the same names.
+TEST(AlignCommand, IsNotTrustedWithThePhotosOfAnotherRoom) {
+  const PhotographedRoom& one = SmallRoom(0);
+  SimulatedCase files_of_case;
+  files_of_case.model = one.sparse;
+  files_of_case.scans = one.scans;
+  files_of_case.picks = PicksOfPhoto(one.room, one.room.BestPhotoForPicks(), 8);
+  const CaseFolder files(files_of_case);
+  const CommandResult right = files.Align("--image_path " + one.folder.path());
+  EXPECT_EQ(right.exit_code, 0) << right.err;
+  Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["agreement"]["gradient_shift"]["supports"], true);
+  EXPECT_EQ(report["agreement"]["gradient_shift"]["turned"].size(), 3u);
+  EXPECT_EQ(report["agreement"]["gradient_shift"]["moved"].size(), 3u);
+  EXPECT_EQ(report["agreement"]["turned"].size(), 3u);
+  EXPECT_EQ(report["overlays"].size(), 0u);
+
+  const CommandResult wrong = files.Align("--image_path " + SmallRoom(1).folder.path());
+  EXPECT_EQ(wrong.exit_code, 4);
+  EXPECT_NE(wrong.err.find("Photos and scan do not show the same"), std::string::npos) << wrong.err;
+  report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_EQ(report["agreement"]["gradient_shift"]["contradicts"], true);
 }
 
 TEST(FreeSpace, KnowsWhatFloatsWhatIsHiddenAndWhatIsOnTheSurface) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "align/agreement.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
@@ -91,8 +92,8 @@ class Kitchen : public testing::Test {
   static std::string AlignLine(const std::string& azimuth, const std::string& output) {
     return "roomtex-align --input_path " + (*folder_ / "sparse/0") + " --scan_path " + kKitchen +
            "/scan.rtpi --azimuth " + azimuth + " --picks_path " + kKitchen +
-           "/picks.csv --output_path " + (*folder_ / output) + " --report_path " +
-           (*folder_ / (output + ".json"));
+           "/picks.csv --output_path " + (*folder_ / output) + " --image_path " + kKitchen +
+           "/images --report_path " + (*folder_ / (output + ".json"));
   }
 
   static TempFolder* folder_;
@@ -214,6 +215,40 @@ TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
   std::sort(distances.begin(), distances.end());
   EXPECT_LT(distances[distances.size() / 2], 0.10);
   EXPECT_LT(distances.back(), 0.25);
+}
+
+// Blurred photos and drifting poses: far fewer corners fit than in a simulated room, but clearly
+// more than by chance.
+TEST_F(Kitchen, PhotosSupportTheAlignment) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  const json gradient = ReadJson(*folder_ / "aligned.json")["agreement"]["gradient_shift"];
+  EXPECT_TRUE(gradient["supports"]) << gradient;
+  EXPECT_FALSE(gradient["contradicts"]) << gradient;
+  EXPECT_GT(gradient["share"], 0.06);
+  EXPECT_LT(gradient["chance"]["share"], 0.04);
+}
+
+TEST_F(Kitchen, PhotosContradictWrongAlignments) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  ScanReaderOptions reader;
+  reader.azimuth = "counterclockwise";
+  const std::vector<Scan> scans = {ReadScan(std::string(kKitchen) + "/scan.rtpi", reader)};
+  const FreeSpace free_space(scans, 300000);
+  int contradictions = 0;
+  for (int k = 0; k < 6; ++k) {
+    Similarity wrong;
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k % 3);
+    if (k < 3) wrong.rotation = Eigen::AngleAxisd(RadFromDeg(k == 1 ? 3 : -3), axis);
+    if (k >= 3) wrong.translation = 0.2 * axis;
+    SparseModel model = ReadSparseModel(*folder_ / "aligned");
+    TransformModel(wrong, &model);
+    std::vector<std::string> warnings;
+    const Agreement agreement = MeasureAgreement(model, std::string(kKitchen) + "/images", scans,
+                                                 free_space, AgreementOptions(), -1, &warnings);
+    EXPECT_FALSE(agreement.gradient.supports) << k;
+    contradictions += agreement.gradient.contradicts;
+  }
+  EXPECT_GE(contradictions, 4);
 }
 
 TEST_F(Kitchen, ScanReadWithTheWrongAzimuthIsNamedAMirror) {
