@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "core/command_line.h"
 #include "core/scan.h"
 
 namespace roomtex {
@@ -22,14 +23,51 @@ struct ScanPlane {
   // with the normal; cell (i, j) covers cell_size * [i, i + 1) x [j, j + 1) of (u, v) coordinates
   // relative to `point`, shifted by min_cell.
   Eigen::Vector3d u = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero();
-  double cell_size = 0;                                // metres
-  Eigen::Vector2i min_cell = Eigen::Vector2i::Zero();  // cell of covered(0, 0)
+  double cell_size = 0;                                           // metres
+  Eigen::Vector2i min_cell = Eigen::Vector2i::Zero();             // cell of covered(0, 0)
   Eigen::Array<uint8_t, Eigen::Dynamic, Eigen::Dynamic> covered;  // rows along u, columns along v
 
   // Signed distance, metres, positive on the scanner's side.
   double Distance(const Eigen::Vector3d& x_in_scan) const { return normal.dot(x_in_scan - point); }
+  // The covered cell below x; outside of `covered` if there is none.
+  Eigen::Vector2i CellOf(const Eigen::Vector3d& x_in_scan) const;
   // Whether the foot of x on the plane lies on a covered cell or at most one cell beside one.
   bool Covers(const Eigen::Vector3d& x_in_scan) const;
 };
+
+// Defaults: chosen on simulated rooms (flat, noisy, bent by 1 %) and on a real kitchen.
+struct ScanPlaneOptions {
+  double min_area_m2 = 0.2;  // smaller planes are not given; larger = fewer planes
+  // Metres; how far the surface, its noise averaged out, may lie from its plane: what a wall may be
+  // wavy and the scan bent. Larger = more tolerant. Steps are found however large this is.
+  double max_distance = 0.01;
+  double max_angle_deg = 3;  // between the local normal, its noise apart, and the plane's; larger =
+                             // more tolerant. A surface whose ends turn by 3/4 of it is no plane.
+  double min_step = 0.0015;  // metres; smaller steps between surfaces are never seen; larger = two
+                             // surfaces so near are one
+  double max_noise = 3;      // standard deviations up to which a sample belongs; larger = more do
+  double min_window = 0.04;  // metres; smallest window for a local normal; it grows with the noise
+  double max_incidence_deg = 80;  // samples seen at a flatter angle are left out; 90 = none
+
+  std::vector<std::string> Problems() const;
+};
+
+// Registers --Plane.min_area_m2 and so on.
+void AddScanPlaneOptions(ScanPlaneOptions* options, Command* command);
+
+// The planes of all scans, largest area first; the same for every number of threads. Local normals
+// by PCA over windows of the grid, regions grown over it, joined across what stands in front where
+// they agree within their uncertainty, fitted by weighted total least squares without outliers,
+// samples beside depth edges weighing little. A mesh without a grid: the same over cubes of space.
+std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
+                                      const ScanPlaneOptions& options, int num_threads);
+
+// Binary PLY point cloud of all measured samples (grid order; a mesh: its vertices): x y z, red
+// green blue (a colour per plane, grey = none), nx ny nz (of the plane, 0 = none) and `plane`, the
+// index into planes (int, -1 = none). Coordinates are relative to the first scan's station where
+// they are too large for float; a comment in the header says so. Throws InputError (cannot be
+// written).
+void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
+                     const std::vector<ScanPlane>& planes, int num_threads);
 
 }  // namespace roomtex
