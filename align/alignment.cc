@@ -322,6 +322,49 @@ void FitOnSurface(const AlignmentInput& input, double pick_sigma_px,
   result->scan_from_sparse = result->surface_fit.scan_from_sparse;
 }
 
+// Thesis 7.2. What speaks against the result is a warning: the similarity remains.
+void AdjustPoses(const AlignmentInput& input, double pick_sigma_px,
+                 const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                 const AlignmentOptions& options, Alignment* result) {
+  const std::vector<bool> used = UsedPicks(*result);
+  const bool fixed = options.bundle.fix_clicked_view;
+  // The clicked view keeps the pose of its clicks, so that the model starts there, too.
+  Similarity start = fixed ? result->scan_from_sparse_from_picks : result->scan_from_sparse;
+  if (options.bundle.bend && !fixed) {
+    result->bend = FitScanBend(input.model, points, input.scans, surface, input.picks, used,
+                               pick_sigma_px, start, options.bundle.min_bend);
+    if (result->bend) start = result->bend->scan_from_sparse;
+  }
+  SparseModel model = input.model;
+  TransformModel(start, &model);
+  result->bundle =
+      AdjustToSurface({model, input.planes, surface, input.picks, used, pick_sigma_px,
+                       result->clicked_image, result->bend ? result->bend->bend : ScanBend()},
+                      options.bundle);
+  if (!result->bundle.usable) {
+    result->bend.reset();
+    result->warnings.push_back(result->bundle.reason + " One similarity for all photos is used.");
+    return;
+  }
+  result->adjusted = true;
+  result->scan_from_sparse = result->bundle.adjusted_from_input * start;
+  const Eigen::Matrix2Xd errors = PickErrors(result->bundle.model, input.picks, Similarity());
+  for (size_t i = 0; i < result->picks.size(); ++i) {
+    result->picks[i].refined_residual_px = errors.col(static_cast<int>(i)).norm();
+  }
+  result->refined_pick_rms_px = PickRms(*result, &PickOutcome::refined_residual_px);
+  if (result->bend) {
+    result->warnings.push_back("The scan is bent by " + Number(1000 * result->bend->bend_rms, 1) +
+                               " mm (rms over the sparse points): the photos were fitted to it as "
+                               "it is, so that their reprojection errors grow.");
+  }
+  for (const uint32_t id : result->bundle.idle_images) {
+    result->warnings.push_back(input.model.images.at(id).name +
+                               " was not adjusted to the scan's surface: too few sparse points "
+                               "hold it. It follows the other photos.");
+  }
+}
+
 // The refined pose is far more exact than the clicks: a used pick that is off shows there even
 // among six.
 void JudgePicksAgainstSurface(double rms_limit, Alignment* result) {
@@ -418,7 +461,7 @@ void JudgePlacement(const TrustOptions& trust, Alignment* result) {
 std::vector<std::string> AlignmentOptions::Problems() const {
   std::vector<std::string> all;
   for (const auto& some : {picks.Problems(), scale.Problems(), surface.Problems(), fit.Problems(),
-                           trust.Problems(), mesh.Problems()}) {
+                           bundle.Problems(), trust.Problems(), mesh.Problems()}) {
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;
@@ -461,6 +504,11 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
       FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
   FitOnSurface(input, pick_sigma_px, points, surface, options, &result);
 
+  if (result.refined) {
+    progress->Stage("bundle adjustment");
+    AdjustPoses(input, pick_sigma_px, points, surface, options, &result);
+  }
+
   progress->Stage("trust");
   TrustOptions trust = options.trust;
   if (!result.refined) {
@@ -468,8 +516,15 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
     trust.surface_tolerance =
         std::max(trust.surface_tolerance, std::min(2 * result.position_sigma, 0.2));
   }
-  result.placement =
-      CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
+  if (result.adjusted) {
+    const std::vector<SurfacePoint> adjusted =
+        FindSurfacePoints(result.bundle.model, options.fit.min_track, sigma_px);
+    result.placement =
+        CheckPlacement(result.bundle.model, adjusted, Similarity(), surface, free_space, trust);
+  } else {
+    result.placement =
+        CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
+  }
   JudgePicks(input, options, &result);
   JudgeScale(options.trust, &result);
   JudgePlacement(trust, &result);

@@ -3,13 +3,17 @@
 // surface, and judged.
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "align/pick_review.h"
 #include "align/picks.h"
+#include "align/plane_bundle.h"
 #include "align/scale.h"
+#include "align/scan_bend.h"
 #include "align/scan_patches.h"
+#include "align/scan_planes.h"
 #include "align/similarity_fit.h"
 #include "align/trust.h"
 #include "colmap_ext/sparse_model.h"
@@ -20,11 +24,13 @@
 namespace roomtex {
 
 struct AlignmentOptions {
-  bool plane_constrained = true;  // refine the similarity on the surface of the scan
+  // Refine the similarity on the surface of the scan, and adjust poses and points to it.
+  bool plane_constrained = true;
   PickReviewOptions picks;
   ScaleOptions scale;
   ScanPatchOptions surface;
   SimilarityFitOptions fit;
+  PlaneBundleOptions bundle;
   TrustOptions trust;
   ScanMeshOptions mesh;
   int num_threads = -1;
@@ -37,13 +43,16 @@ struct PickOutcome {
   Pick pick;
   bool used = true;
   double residual_px = 0;  // under the solution from the picks alone
-  // Where the sparse points lie on the surface; NaN if they could not be brought there.
+  // Where the sparse points lie on the surface (in the adjusted model, if there is one); NaN if
+  // they could not be brought there.
   double refined_residual_px = std::numeric_limits<double>::quiet_NaN();
   double leave_one_out_px = std::numeric_limits<double>::quiet_NaN();  // NaN where it was not tried
 };
 
 struct Alignment {
-  Similarity scan_from_sparse;             // the answer
+  // The answer: from the input model to the aligned one, and of an adjusted model the best
+  // similarity there is. Of a bent scan: to where the room really is.
+  Similarity scan_from_sparse;
   Similarity scan_from_sparse_from_picks;  // before the refinement on the surface
   std::string clicked_image;               // the photo whose picks gave the pose
   double position_sigma = 0;               // metres, of its camera by the picks alone
@@ -56,6 +65,11 @@ struct Alignment {
   // whether it is the answer.
   SimilarityFit surface_fit;
   bool refined = false;
+  // The adjustment to the surface; not tried without refinement. `adjusted` says whether
+  // bundle.model is the answer.
+  PlaneBundle bundle;
+  bool adjusted = false;
+  std::optional<BendFit> bend;  // of a bent scan
   Placement placement;
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted, in sentences; empty = trusted.
@@ -68,7 +82,8 @@ struct AlignmentInput {
   const std::vector<Scan>& scans;
   const std::vector<Pick>& picks;
   std::string picks_path;
-  std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
+  std::string azimuth;                 // as the scans were read: "clockwise" or "counterclockwise"
+  std::vector<ScanPlane> planes = {};  // of the scans, for the adjustment to the surface
 };
 
 // Throws InputError for picks that cannot fix a pose, are not on the scan, or show that the scan is

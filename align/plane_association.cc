@@ -81,10 +81,9 @@ class Association {
     const ScanPatch& patch = patches_.patches()[nearest->patch];
     if (patch.thickness > kMaxThickness * typical_thickness_) return std::nullopt;
     const Eigen::Vector3d offset = point.x_in_sparse - patch.point;
-    if ((offset - nearest->distance * patch.normal).norm() > patches_.cell_size()) {
-      return std::nullopt;
-    }
-    return Judge(point, {0, patch.point, patch.normal, PatchSigma(patch), -1, true}, gate);
+    const double beside = (offset - nearest->distance * patch.normal).norm();
+    if (beside > patches_.cell_size()) return std::nullopt;
+    return Judge(point, {0, patch.point, patch.normal, PatchSigma(patch, beside), -1, true}, gate);
   }
 
   // The patch is off the plane by more than its noise.
@@ -95,11 +94,15 @@ class Association {
   }
 
  private:
-  double PatchSigma(const ScanPatch& patch) const {
+  // Of the patch's distance `beside` metres from its middle: its samples' noise turns its normal,
+  // too, the more the smaller it is.
+  double PatchSigma(const ScanPatch& patch, double beside) const {
     const double curved2 =
         patch.thickness * patch.thickness - typical_thickness_ * typical_thickness_;
-    return std::sqrt(options_.surface_noise * options_.surface_noise +
-                     patch.thickness * patch.thickness / patch.num_samples +
+    const double extent2 = patches_.cell_size() * patches_.cell_size() / 12;
+    const double noise2 =
+        patch.thickness * patch.thickness / patch.num_samples * (1 + beside * beside / extent2);
+    return std::sqrt(options_.surface_noise * options_.surface_noise + noise2 +
                      std::max(0.0, curved2));
   }
 

@@ -213,9 +213,14 @@ class BendSolver {
       const ScanPatch& patch = surface_.patches()[nearest->patch];
       const Eigen::Vector3d normal = linear.transpose() * patch.normal;
       if (!(normal.dot(points_[i].to_cameras) > 0)) continue;
-      const double variance = normal.dot(points_[i].covariance * normal) +
-                              patch.thickness * patch.thickness / patch.num_samples +
-                              kSurfaceNoise * kSurfaceNoise;
+      // The noise of the samples turns the patch, too.
+      const double beside2 =
+          std::max(0.0, (x - patch.point).squaredNorm() - nearest->distance * nearest->distance);
+      const double extent2 = surface_.cell_size() * surface_.cell_size() / 12;
+      const double variance =
+          normal.dot(points_[i].covariance * normal) +
+          patch.thickness * patch.thickness / patch.num_samples * (1 + beside2 / extent2) +
+          kSurfaceNoise * kSurfaceNoise;
       matches_.push_back(
           {static_cast<int>(i), nearest->patch, nearest->distance, std::sqrt(variance)});
       deviations.push_back(std::abs(nearest->distance) / matches_.back().sigma);
