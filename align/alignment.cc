@@ -504,11 +504,6 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
       FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
   FitOnSurface(input, pick_sigma_px, points, surface, options, &result);
 
-  if (result.refined) {
-    progress->Stage("bundle adjustment");
-    AdjustPoses(input, pick_sigma_px, points, surface, options, &result);
-  }
-
   progress->Stage("trust");
   TrustOptions trust = options.trust;
   if (!result.refined) {
@@ -516,18 +511,16 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
     trust.surface_tolerance =
         std::max(trust.surface_tolerance, std::min(2 * result.position_sigma, 0.2));
   }
-  if (result.adjusted) {
-    const std::vector<SurfacePoint> adjusted =
-        FindSurfacePoints(result.bundle.model, options.fit.min_track, sigma_px);
-    result.placement =
-        CheckPlacement(result.bundle.model, adjusted, Similarity(), surface, free_space, trust);
-  } else {
-    result.placement =
-        CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
-  }
+  result.placement =
+      CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
   JudgePicks(input, options, &result);
   JudgeScale(options.trust, &result);
   JudgePlacement(trust, &result);
+  // After the checks: an adjustment brings points to the surface that do not belong there, too.
+  if (result.refined && result.reasons.empty()) {
+    progress->Stage("bundle adjustment");
+    AdjustPoses(input, pick_sigma_px, points, surface, options, &result);
+  }
   return result;
 }
 

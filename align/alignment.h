@@ -65,8 +65,8 @@ struct Alignment {
   // whether it is the answer.
   SimilarityFit surface_fit;
   bool refined = false;
-  // The adjustment to the surface; not tried without refinement. `adjusted` says whether
-  // bundle.model is the answer.
+  // The adjustment to the surface, tried where the similarity is refined and trusted. `adjusted`
+  // says whether bundle.model is the answer.
   PlaneBundle bundle;
   bool adjusted = false;
   std::optional<BendFit> bend;  // of a bent scan

@@ -61,8 +61,8 @@ Json BendToJson(const Alignment& alignment) {
 }  // namespace
 
 Json PlaneBundleToJson(const Alignment& alignment) {
-  if (!alignment.refined) return nullptr;
   const PlaneBundle& bundle = alignment.bundle;
+  if (bundle.model.images.empty()) return nullptr;
   Json json;
   json["used"] = alignment.adjusted;
   json["reason"] = bundle.reason;
@@ -78,6 +78,13 @@ Json PlaneBundleToJson(const Alignment& alignment) {
   }
   json["scan_bend"] = BendToJson(alignment);
   return json;
+}
+
+void SetNumPointsOfPlanes(const Alignment& alignment, Json* planes) {
+  const std::vector<int>& counts = alignment.bundle.num_points_of_plane;
+  for (size_t i = 0; alignment.adjusted && i < counts.size() && i < planes->size(); ++i) {
+    (*planes)[i]["num_points"] = counts[i];
+  }
 }
 
 }  // namespace roomtex

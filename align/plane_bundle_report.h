@@ -16,4 +16,7 @@ void AddPlaneBundleOptions(PlaneBundleOptions* options, Command* command);
 // max_range_share, max_azimuth_deg} or null}.
 Json PlaneBundleToJson(const Alignment& alignment);
 
+// num_points of the report's `planes`: the points that the adjustment gave to each.
+void SetNumPointsOfPlanes(const Alignment& alignment, Json* planes);
+
 }  // namespace roomtex

@@ -8,6 +8,7 @@
 #include "align/alignment.h"
 #include "align/geo_output.h"
 #include "align/overlay.h"
+#include "align/plane_bundle_report.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
@@ -59,7 +60,9 @@ void AddOptions(Arguments* a, Command* command) {
   AddScanReaderOptions(&a->scan_reader, command);
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
-                   "Refine the similarity on the surface of the scan; 0 = the picks alone.");
+                   "Refine the similarity on the surface of the scan, and adjust poses and points "
+                   "to it; 0 = one similarity by the picks alone.");
+  AddPlaneBundleOptions(&o.bundle, command);
   command->AddDouble(
       "Picks.max_chance", &o.picks.max_chance,
       "A pick is left out when chance makes one as bad less often than this; larger = "
@@ -179,6 +182,13 @@ void FillReport(const Alignment& alignment, double reprojection_rms_before,
   r["plane_rms_m"]["before"] = refined ? Json(alignment.surface_fit.rms_before) : Json(nullptr);
   r["plane_rms_m"]["after"] = refined ? Json(alignment.surface_fit.rms_after) : Json(nullptr);
   r["plane_rms_m"]["num_points"] = refined ? alignment.surface_fit.num_points : 0;
+  const PlaneBundle& bundle = alignment.bundle;
+  if (alignment.adjusted) {
+    r["plane_rms_m"]["before"] = bundle.plane_rms_before;
+    r["plane_rms_m"]["after"] = bundle.plane_rms_after;
+    r["plane_rms_m"]["num_points"] = bundle.constraints.size();
+  }
+  r["plane_bundle"] = PlaneBundleToJson(alignment);
   r["reprojection_rms_px"]["before"] = reprojection_rms_before;
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
   r["placement"] = PlacementToJson(alignment.placement);
@@ -248,7 +258,11 @@ void Align(const Arguments& a, const Command::Context& context) {
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
 
   context.progress.Stage("write");
-  TransformModel(alignment.scan_from_sparse, &model);
+  if (alignment.adjusted) {
+    model = alignment.bundle.model;
+  } else {
+    TransformModel(alignment.scan_from_sparse, &model);
+  }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, before.rms_px, after.rms_px, &context.report);
   WriteSparseModel(model, a.output_path);

@@ -28,6 +28,8 @@ constexpr double kScalePrior = 0.05;
 // Standard deviations of the coefficients to start from: larger than any that is expected.
 constexpr double kStartSigma = 0.005;
 constexpr double kLeastSigma = 1e-6;
+// A bend of more than this share of the ranges (rms) is no bend but a wrong alignment.
+constexpr double kMaxBend = 0.05;
 
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -332,13 +334,14 @@ std::optional<BendFit> FitScanBend(const SparseModel& model,
   BendSolver solver(model, points, surface, picks, used, pick_sigma_px, start);
   if (!solver.Solve(&state)) return std::nullopt;
   BendFit fit{state.scan_from_sparse, state.bend};
-  double sum_bend = 0, sum_straight = 0, sum_bent = 0;
+  double sum_bend = 0, sum_straight = 0, sum_bent = 0, sum_range2 = 0;
   for (const auto& match : solver.matches()) {
     const ScanPatch& patch = surface.patches()[match.patch];
     if (std::abs(match.distance) > kGate * match.sigma) continue;
     const Eigen::Vector3d& x_in_sparse = points[match.point].x_in_sparse;
     const Eigen::Vector3d x_in_scan = fit.scan_from_sparse * x_in_sparse;
     sum_bend += (fit.bend.Bend(x_in_scan) - x_in_scan).squaredNorm();
+    sum_range2 += (x_in_scan - scans[0].Station()).squaredNorm();
     sum_bent += match.distance * match.distance;
     sum_straight += std::pow(patch.normal.dot(start * x_in_sparse - patch.point), 2);
     ++fit.num_points;
@@ -347,7 +350,9 @@ std::optional<BendFit> FitScanBend(const SparseModel& model,
   fit.bend_rms = std::sqrt(sum_bend / fit.num_points);
   fit.rms_bent = std::sqrt(sum_bent / fit.num_points);
   fit.rms_straight = std::sqrt(sum_straight / fit.num_points);
-  if (!(fit.bend_rms > min_bend)) return std::nullopt;
+  if (!(fit.bend_rms > min_bend) || !(sum_bend <= kMaxBend * kMaxBend * sum_range2)) {
+    return std::nullopt;
+  }
   return fit;
 }
 

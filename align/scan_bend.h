@@ -65,8 +65,8 @@ struct BendFit {
 // Similarity and bend together, from the distances of the points from the surface and from the
 // picks. How large coefficients may be follows from the data (their variance is the one that makes
 // the data most likely, by expectation maximisation), so that a straight scan stays straight. None
-// if the scan is not bent by more than min_bend (rms, metres), or has no grid, or there are
-// several scans.
+// if the scan is not bent by more than min_bend (rms, metres) or by more than any scanner does (5 %
+// of the ranges), or has no grid, or there are several scans.
 std::optional<BendFit> FitScanBend(const SparseModel& model,
                                    const std::vector<SurfacePoint>& points,
                                    const std::vector<Scan>& scans, const ScanPatches& surface,

@@ -21,6 +21,18 @@ void ExpectFailure(const CommandResult& result, int exit_code, const std::string
   EXPECT_LE(std::count(result.err.begin(), result.err.end(), '\n'), 2) << result.err;
 }
 
+// The files are fine, but no alignment is to be believed: the report says why, and no model is
+// written.
+void ExpectContradiction(const CaseFolder& files, const CommandResult& result,
+                         const std::string& text) {
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_NE(report["reason"].get<std::string>().find(text), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(files.folder / "aligned/images.bin"));
+}
+
 TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   const SimulatedCase& one = MakeCase();
   const CaseFolder files(one);
@@ -40,8 +52,17 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   EXPECT_LT(report["scale"]["relative_mad"], 0.01);
   EXPECT_TRUE(report["planes"].is_array());
   EXPECT_LT(report["plane_rms_m"]["after"], report["plane_rms_m"]["before"]);
-  EXPECT_NEAR(report["reprojection_rms_px"]["before"], report["reprojection_rms_px"]["after"],
-              1e-6);
+  EXPECT_LT(report["plane_rms_m"]["after"], 0.003);
+  EXPECT_GT(report["plane_rms_m"]["num_points"], 1000);
+  EXPECT_LT(report["reprojection_rms_px"]["after"],
+            1.2 * report["reprojection_rms_px"]["before"].get<double>());
+  EXPECT_EQ(report["plane_bundle"]["used"], true);
+  EXPECT_EQ(report["plane_bundle"]["reason"], "");
+  EXPECT_TRUE(report["plane_bundle"]["scan_bend"].is_null());
+  ASSERT_GE(report["planes"].size(), 6u);
+  int num_on_planes = 0;
+  for (const Json& plane : report["planes"]) num_on_planes += plane["num_points"].get<int>();
+  EXPECT_GT(num_on_planes, 800);
   EXPECT_TRUE(report["agreement"].is_null());
 
   const Similarity written = ReadSimilarity(files.folder / "aligned/scan_from_sparse.txt");
@@ -51,15 +72,90 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   const SparseModel aligned = ReadSparseModel(files.folder / "aligned");
   ASSERT_EQ(aligned.images.size(), expected.images.size());
   ASSERT_EQ(aligned.points.size(), expected.points.size());
+  // Adjusted by a little, tracks and keypoints kept.
   for (const auto& [id, image] : aligned.images) {
     EXPECT_EQ(image.name, expected.images.at(id).name);
+    EXPECT_EQ(image.point3d_ids, expected.images.at(id).point3d_ids);
+    EXPECT_THAT(image.cam_from_model,
+                IsNearRigid(expected.images.at(id).cam_from_model, 2e-3, 5e-3));
+  }
+  SparseModel errors = aligned;
+  UpdateReprojectionErrors(&errors);
+  for (const auto& [id, point] : aligned.points) {
+    EXPECT_EQ(point.track.size(), expected.points.at(id).track.size());
+    EXPECT_NEAR(point.error, errors.points.at(id).error, 1e-9);
+  }
+  EXPECT_LT(WorstPoseErrors(*one.room, aligned, Similarity()).position, 0.003);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
+}
+
+TEST(AlignCommand, WithoutTheAdjustmentTheModelIsMovedByTheSimilarity) {
+  const SimulatedCase& one = MakeCase();
+  const CaseFolder files(one);
+  const CommandResult result = files.Align("--plane_constrained 0");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  SparseModel expected = one.model;
+  TransformModel(ReadSimilarity(files.folder / "aligned/scan_from_sparse.txt"), &expected);
+  const SparseModel aligned = ReadSparseModel(files.folder / "aligned");
+  ASSERT_EQ(aligned.points.size(), expected.points.size());
+  for (const auto& [id, image] : aligned.images) {
     EXPECT_THAT(image.cam_from_model,
                 IsNearRigid(expected.images.at(id).cam_from_model, 1e-7, 1e-9));
   }
   for (const auto& [id, point] : aligned.points) {
     EXPECT_THAT(point.x_in_model, IsNearMatrix(expected.points.at(id).x_in_model, 1e-9));
   }
-  EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_NEAR(report["reprojection_rms_px"]["before"], report["reprojection_rms_px"]["after"],
+              1e-6);
+  EXPECT_TRUE(report["plane_bundle"].is_null());
+}
+
+TEST(AlignCommand, AFixedClickedViewKeepsThePoseOfItsPicks) {
+  const SimulatedCase& one = MakeCase();
+  const CaseFolder files(one);
+  const CommandResult result = files.Align("--PlaneBA.fix_clicked_view 1");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  ASSERT_EQ(report["plane_bundle"]["used"], true) << report["plane_bundle"]["reason"];
+  const Json& from_picks = report["scan_from_sparse_from_picks"];
+  Similarity similarity;
+  similarity.scale = from_picks["scale"];
+  for (int k = 0; k < 3; ++k) similarity.translation[k] = from_picks["translation"][k];
+  similarity.rotation =
+      Eigen::Quaterniond(from_picks["rotation_wxyz"][0], from_picks["rotation_wxyz"][1],
+                         from_picks["rotation_wxyz"][2], from_picks["rotation_wxyz"][3]);
+  const std::string name = report["picks"]["image_name"];
+  const SparseModel aligned = ReadSparseModel(files.folder / "aligned");
+  EXPECT_THAT(
+      aligned.FindImage(name)->cam_from_model,
+      IsNearRigid(CamFromScan(one.model.FindImage(name)->cam_from_model, similarity), 1e-7, 1e-9));
+}
+
+TEST(AlignCommand, ABentScanIsSaidAndThePhotosFollowIt) {
+  SimulatedCase one = MakeCase();
+  SimulatedRoomOptions options = one.room->options();
+  options.bend = 0.01;
+  const SimulatedRoom bent(options);
+  one.scans = {bent.MakeScan()};
+  one.scans[0].path = "room.rtpi";
+  one.scans[0].is_rtpi = true;
+  one.picks = PicksOfPhoto(bent, bent.BestPhotoForPicks(), 8);
+  const CaseFolder files(one);
+  const CommandResult result = files.Align();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  ASSERT_EQ(report["warnings"].size(), 1u);
+  EXPECT_THAT(report["warnings"][0].get<std::string>(), HasSubstr("The scan is bent by"));
+  EXPECT_GT(report["plane_bundle"]["scan_bend"]["rms_m"], 0.005);
+  EXPECT_NEAR(report["plane_bundle"]["scan_bend"]["max_range_share"], 0.01, 0.002);
+  // The similarity is that of the room, not of the bent walls.
+  const Similarity written = ReadSimilarity(files.folder / "aligned/scan_from_sparse.txt");
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.004);
+  ASSERT_EQ(files.Align("--PlaneBA.bend 0").exit_code, 0);
+  EXPECT_TRUE(
+      Json::parse(ReadBytes(files.folder / "aligned/alignment.json"))["plane_bundle"]["scan_bend"]
+          .is_null());
 }
 
 TEST(AlignCommand, GivesTheSameForEveryNumberOfThreadsAndForATextModel) {
@@ -105,6 +201,8 @@ TEST(AlignCommand, RefusesOptionsThatMakeNoSense) {
   const CaseFolder files(MakeCase());
   ExpectFailure(files.Align("--Trust.max_scale_mad -1"), 2, "--Trust.max_scale_mad");
   ExpectFailure(files.Align("--Picks.min_gain 0.5"), 2, "--Picks.min_gain");
+  ExpectFailure(files.Align("--PlaneBA.beta -1"), 2, "--PlaneBA.beta");
+  ExpectFailure(files.Align("--PlaneBA.num_rounds 0"), 2, "--PlaneBA.num_rounds");
   ExpectFailure(files.Align("--no_such_option 1"), 2, "no_such_option");
 }
 
@@ -136,17 +234,20 @@ TEST(AlignCommand, RefusesAnImageNameThatIsNotInTheModel) {
 TEST(AlignCommand, RefusesAMirroredScanAndNamesTheOption) {
   const CaseFolder files(MakeCase());
   // The picks were made on the scan read clockwise.
-  ExpectFailure(files.Align("--azimuth counterclockwise"), 3, "--azimuth clockwise");
+  ExpectContradiction(files, files.Align("--azimuth counterclockwise"), "--azimuth clockwise");
   // Picks made on the mirrored scan.
   SimulatedCase one = MakeCase();
   for (Pick& pick : one.picks) pick.x_in_scan.x() *= -1;
-  ExpectFailure(CaseFolder(one).Align("--azimuth counterclockwise"), 3, "--azimuth clockwise");
+  const CaseFolder mirrored(one);
+  ExpectContradiction(mirrored, mirrored.Align("--azimuth counterclockwise"),
+                      "--azimuth clockwise");
 }
 
 TEST(AlignCommand, RefusesExchangedPicks) {
   SimulatedCase one = MakeCase();
   one.picks[2].x_in_img.swap(one.picks[5].x_in_img);
-  ExpectFailure(CaseFolder(one).Align(), 3, "line 4: this pick and the one on line 7");
+  const CaseFolder files(one);
+  ExpectContradiction(files, files.Align(), "line 4: this pick and the one on line 7");
 }
 
 TEST(AlignCommand, WritesAReportButExitsWithFourForPicksOfAnotherPhoto) {
