@@ -36,6 +36,7 @@ void JudgeSeed(const SimulatedViews& views, double noise_px, MatchedImages* imag
   const PairVerdict verdict = JudgePair(views, noise_px, images, FindPair(*images, seed.trial),
                                         SeedMotion(seed), InitOptions().max_third_views);
   outcome->identifiable = verdict.Identifiable();
+  outcome->strictly_right = verdict.StrictlyRight();
   outcome->confidence = seed.trial.decision.confidence;
   outcome->rotation_deg = verdict.from_truth.rotation_deg;
   outcome->baseline_deg = verdict.from_truth.baseline_deg;
@@ -73,18 +74,21 @@ void PrintHeader(const char* first, std::FILE* out) {
   std::fprintf(
       out,
       "\n| %s | sets | thesis' rule | lower two-view cost | roomtex right | wrong, trusted "
-      "| said ambiguous | no seed | identifiable | right where identifiable | CPU ms |\n"
+      "| said ambiguous | no seed | identifiable | right where identifiable | within 3 and 5 deg "
+      "of the truth, trusted "
+      "| beyond, trusted | CPU ms |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n",
       first);
 }
 
 void PrintRow(const std::string& name, const OutcomeCounts& counts, std::FILE* out) {
-  std::fprintf(out, "| %s | %d | %s | %s | %s | %d | %d | %d | %d | %s | %.0f |\n", name.c_str(),
-               counts.num_sets, ShareText(counts.thesis, counts.num_rivals).c_str(),
+  std::fprintf(out, "| %s | %d | %s | %s | %s | %d | %d | %d | %d | %s | %s | %d | %.0f |\n",
+               name.c_str(), counts.num_sets, ShareText(counts.thesis, counts.num_rivals).c_str(),
                ShareText(counts.lower_cost, counts.num_rivals).c_str(),
                ShareText(counts.right, counts.num_sets).c_str(), counts.wrong, counts.ambiguous,
                counts.no_seed, counts.identifiable,
                ShareText(counts.identifiable_right, counts.identifiable).c_str(),
+               ShareText(counts.strictly_right, counts.num_sets).c_str(), counts.strictly_wrong,
                1000 * counts.cpu_seconds / std::max(1, counts.num_sets));
   std::fflush(out);
 }
@@ -134,6 +138,9 @@ void OutcomeCounts::Add(const SetOutcome& outcome) {
   thesis += outcome.thesis_right ? 1 : 0;
   lower_cost += outcome.lower_cost_right ? 1 : 0;
   right += outcome.ours == SeedOutcome::kRight ? 1 : 0;
+  const bool trusted = outcome.ours == SeedOutcome::kRight || outcome.ours == SeedOutcome::kWrong;
+  strictly_right += trusted && outcome.strictly_right ? 1 : 0;
+  strictly_wrong += trusted && !outcome.strictly_right ? 1 : 0;
   wrong += outcome.ours == SeedOutcome::kWrong ? 1 : 0;
   ambiguous +=
       outcome.ours == SeedOutcome::kAmbiguousRight || outcome.ours == SeedOutcome::kAmbiguousWrong

@@ -26,7 +26,8 @@ struct SetOutcome {
   int seed = 0;
   bool with_rivals = false, thesis_right = false, lower_cost_right = false;
   SeedOutcome ours = SeedOutcome::kNone;
-  bool identifiable = false;  // of the pair that ours chose
+  bool identifiable = false;    // of the pair that ours chose
+  bool strictly_right = false;  // PairVerdict::StrictlyRight, trusted or not
   double confidence = 0;
   double rotation_deg = 0, baseline_deg = 0;  // errors of ours
   double cpu_seconds = 0;                     // of ours
@@ -37,6 +38,7 @@ SetOutcome RunInProcess(const PlanarSet& set, int seed, bool rivals);
 struct OutcomeCounts {
   int num_sets = 0, num_rivals = 0, thesis = 0, lower_cost = 0, right = 0, wrong = 0, ambiguous = 0;
   int identifiable = 0, identifiable_right = 0, no_seed = 0;
+  int strictly_right = 0, strictly_wrong = 0;  // of the trusted ones
   double cpu_seconds = 0;
 
   void Add(const SetOutcome& outcome);

@@ -28,6 +28,11 @@ struct PairVerdict {
   // Degrees.
   double BaselineLimit() const;
   bool Right() const { return Within(from_truth) || Within(from_optimum); }
+  // By the fixed limits and the truth alone, whatever noise allows.
+  bool StrictlyRight() const {
+    return from_truth.rotation_deg < kMaxPairRotationDeg &&
+           from_truth.baseline_deg < kMaxPairBaselineDeg;
+  }
   // The keypoints allow an answer within the limits: three standard deviations are not more, and
   // the optimum itself holds them.
   bool Identifiable() const;
