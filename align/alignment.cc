@@ -69,21 +69,21 @@ std::string Miss(double rms_px) {
 void RefuseMirroredOrExchanged(const AlignmentInput& input, const View& view) {
   const PickReview& review = view.review;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
-    throw InputError(input.scans[0].path, "",
-                     "the scan is a mirror image of the room: the picks in " + view.name + " " +
-                         Miss(review.RmsPx()) + ", but " + Miss(review.mirrored_rms_px) +
-                         " when the scan is reflected",
-                     MirrorRemedy(input));
+    throw Contradiction(input.scans[0].path, "",
+                        "the scan is a mirror image of the room: the picks in " + view.name + " " +
+                            Miss(review.RmsPx()) + ", but " + Miss(review.mirrored_rms_px) +
+                            " when the scan is reflected",
+                        MirrorRemedy(input));
   }
   if (!review.exchanged) return;
   const Pick& a = input.picks[view.picks[review.exchanged->first]];
   const Pick& b = input.picks[view.picks[review.exchanged->second]];
-  throw InputError(input.picks_path, LinePosition(a.line),
-                   "this pick and the one on line " + std::to_string(b.line) +
-                       " look exchanged: the picks in " + view.name + " " + Miss(review.RmsPx()) +
-                       ", but " + Miss(review.exchanged_rms_px) +
-                       " when these two change places in the photo",
-                   "Exchange their x,y, or pick them again");
+  throw Contradiction(input.picks_path, LinePosition(a.line),
+                      "this pick and the one on line " + std::to_string(b.line) +
+                          " look exchanged: the picks in " + view.name + " " +
+                          Miss(review.RmsPx()) + ", but " + Miss(review.exchanged_rms_px) +
+                          " when these two change places in the photo",
+                      "Exchange their x,y, or pick them again");
 }
 
 // Distance of each point from the nearest point of the scans' surface, metres.
@@ -126,12 +126,13 @@ void CheckPicksOnScan(const AlignmentInput& input, std::vector<std::string>* war
   }
   const std::string of_all = " of " + std::to_string(n) + " picks";
   if (off >= 2 && 3 * off_mirrored <= off) {
-    throw InputError(input.scans[0].path, "",
-                     "the scan is a mirror image of the one that the picks were made on: " +
-                         std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
-                         " m off its surface, up to " + Number(distance[farthest], 2) + " m, but " +
-                         std::to_string(off_mirrored) + " when the scan is reflected",
-                     MirrorRemedy(input));
+    throw Contradiction(input.scans[0].path, "",
+                        "the scan is a mirror image of the one that the picks were made on: " +
+                            std::to_string(off) + of_all + " lie more than " +
+                            Number(kPickReach, 2) + " m off its surface, up to " +
+                            Number(distance[farthest], 2) + " m, but " +
+                            std::to_string(off_mirrored) + " when the scan is reflected",
+                        MirrorRemedy(input));
   }
   for (size_t i = 0; i < n && 2 * off < n; ++i) {
     if (!(distance[i] > kPickReach)) continue;
@@ -139,11 +140,11 @@ void CheckPicksOnScan(const AlignmentInput& input, std::vector<std::string>* war
                         Number(distance[i], 2) + " m off every surface of the scan.");
   }
   if (2 * off < n) return;
-  throw InputError(input.picks_path, LinePosition(input.picks[farthest].line),
-                   std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
-                       " m off every surface of the scan, this one by " +
-                       Number(distance[farthest], 2) + " m",
-                   "Pick on this scan, and give scan_x, scan_y, scan_z in metres in its frame");
+  throw Contradiction(input.picks_path, LinePosition(input.picks[farthest].line),
+                      std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
+                          " m off every surface of the scan, this one by " +
+                          Number(distance[farthest], 2) + " m",
+                      "Pick on this scan, and give scan_x, scan_y, scan_z in metres in its frame");
 }
 
 // Photos with enough picks, each with its review. Throws InputError if none of them fixes a pose.
@@ -155,12 +156,14 @@ std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOption
   }
   std::vector<View> views;
   std::string problem;
+  bool layout_problem = false;
   for (const auto& [name, indices] : by_name) {
     if (static_cast<int>(indices.size()) < kMinPicksPerPhoto) continue;
     View view{name, input.model.FindImage(name), indices, {}, {}, {}};
     const Camera& camera = input.model.cameras.at(view.image->camera_id);
     const PointPairs pairs = PairsOf(input.picks, indices);
     std::string own_problem = FindLayoutProblem(pairs, camera, options.picks);
+    layout_problem |= !own_problem.empty();
     if (own_problem.empty()) {
       view.review = ReviewPicks(CameraProjection(camera), pairs, options.picks);
       RefuseMirroredOrExchanged(input, view);
@@ -176,9 +179,13 @@ std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOption
     warnings->push_back(
         "The picks of this photo are used with those of the others only: " + own_problem + ".");
   }
-  if (views.empty()) {
+  if (views.empty() && layout_problem) {
     throw InputError(input.picks_path, "", problem,
                      "Pick points that are spread over the photo, in depth, and not on one line");
+  }
+  if (views.empty()) {
+    throw Contradiction(input.picks_path, "", problem,
+                        "Check that the picks name the right photo, and pick again");
   }
   return views;
 }
@@ -215,14 +222,15 @@ View ChooseView(const AlignmentInput& input, std::vector<View> views,
   for (const Scan& scan : input.scans) meshes.push_back(BuildScanMesh(scan, options.mesh));
   ChoosePose(input, meshes, options, &view);
   if (view.scale.num_features == 0) {
-    throw InputError(input.picks_path, "",
-                     "the picks in " + view.name + " " + Miss(view.review.RmsPx()) +
-                         ", and with the pose that they give, none of the photo's features with a "
-                         "sparse point (" +
-                         std::to_string(view.scale.num_candidates) +
-                         " of them have the scan behind them) lies on smooth surface; so the scale "
-                         "between model and scan cannot be found",
-                     "Check the picks, or pick in a photo with more sparse points");
+    throw Contradiction(
+        input.picks_path, "",
+        "the picks in " + view.name + " " + Miss(view.review.RmsPx()) +
+            ", and with the pose that they give, none of the photo's features with a "
+            "sparse point (" +
+            std::to_string(view.scale.num_candidates) +
+            " of them have the scan behind them) lies on smooth surface; so the scale "
+            "between model and scan cannot be found",
+        "Check the picks, or pick in a photo with more sparse points");
   }
   return view;
 }
@@ -365,6 +373,19 @@ void AdjustPoses(const AlignmentInput& input, double pick_sigma_px,
   }
 }
 
+ExpectedError ExpectedErrorOf(const AlignmentInput& input, double pick_sigma_px,
+                              const AlignmentOptions& options, const Alignment& result) {
+  const SimilarityFit by_picks =
+      result.refined ? SimilarityFit()
+                     : FitToPicks(input.model, input.picks, UsedPicks(result), pick_sigma_px,
+                                  result.scan_from_sparse, options.fit);
+  std::vector<Eigen::Vector3d> centres;
+  for (const auto& [image_id, image] : input.model.images) {
+    centres.push_back(result.scan_from_sparse * image.cam_from_model.TargetOriginInSource());
+  }
+  return PropagateError(result.refined ? result.surface_fit : by_picks, centres, input.scans);
+}
+
 // The refined pose is far more exact than the clicks: a used pick that is off shows there even
 // among six.
 void JudgePicksAgainstSurface(double rms_limit, Alignment* result) {
@@ -505,6 +526,7 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
   FitOnSurface(input, pick_sigma_px, points, surface, options, &result);
 
   progress->Stage("trust");
+  result.expected_error = ExpectedErrorOf(input, pick_sigma_px, options, result);
   TrustOptions trust = options.trust;
   if (!result.refined) {
     // Clicks alone are rough, and say themselves how rough.

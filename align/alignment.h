@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "align/expected_error.h"
 #include "align/pick_review.h"
 #include "align/picks.h"
 #include "align/plane_bundle.h"
@@ -17,6 +18,7 @@
 #include "align/similarity_fit.h"
 #include "align/trust.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/error.h"
 #include "core/progress.h"
 #include "core/scan.h"
 #include "core/scan_mesh.h"
@@ -70,6 +72,8 @@ struct Alignment {
   PlaneBundle bundle;
   bool adjusted = false;
   std::optional<BendFit> bend;  // of a bent scan
+  // Of the similarity: by the surface where it was refined, else by the picks.
+  ExpectedError expected_error;
   Placement placement;
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted, in sentences; empty = trusted.
@@ -86,9 +90,16 @@ struct AlignmentInput {
   std::vector<ScanPlane> planes = {};  // of the scans, for the adjustment to the surface
 };
 
-// Throws InputError for picks that cannot fix a pose, are not on the scan, or show that the scan is
-// mirrored. model.points carry the errors of UpdateReprojectionErrors(); sigma_px is their rms /
-// sqrt(2).
+// The files are fine, but what they say contradicts each other so plainly that there is no
+// alignment: exit 4.
+class Contradiction : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+// Throws InputError for picks that cannot fix a pose, Contradiction for picks that are exchanged,
+// not on the scan, of another photo, or show that the scan is mirrored. model.points carry the
+// errors of UpdateReprojectionErrors(); sigma_px is their rms / sqrt(2).
 Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSpace& free_space,
                       const AlignmentOptions& options, Progress* progress);
 

@@ -19,11 +19,15 @@ namespace {
 // nearer to each other share them.
 constexpr double kWaveLength = 0.2;
 constexpr double kLeastWaves = 0.0002;  // metres; no surface is known to be flatter
+constexpr double kEdgeShift = 0.15;     // of the noise of a sample
 constexpr double kGates = 2.5;          // standard deviations that noise may add to a limit
-constexpr double kMostCurved = 0.75;    // of the largest angle: how far ends may turn
+constexpr double kMostCurved = 0.6;     // of the largest angle: how far ends may turn
 constexpr int kRounds = 12;             // of growing and fitting
 constexpr double kRefitGrowth = 1.3;  // the plane is fitted anew when the region has grown by this
 constexpr double kHysteresis = 1.3;   // a cell leaves its region beyond this many times the limits
+// A cell that was in so many refused regions lies on a curved surface.
+constexpr uint8_t kMostTries = 6;
+constexpr double kLeastAmid = 0.2;  // share of a region's cells
 constexpr int kFewestCells = 12;
 constexpr double kMostCells = 1500;
 // Only this many regions are tried for joining: a forest has no walls.
@@ -68,7 +72,7 @@ class RegionGrower {
     Moments moments;
     const auto take = [&](int cell) {
       region_of_[cell] = region;
-      tried_[cell] = 1;
+      tried_[cell] = std::max<uint8_t>(tried_[cell], 1);
       members.push_back(cell);
       moments.Add(cells_[cell].point, cells_[cell].area);
     };
@@ -83,8 +87,8 @@ class RegionGrower {
       for (; at < members.size(); ++at) {
         const int cell = members[at];
         surface_.ForNeighbours(cell, [&](int other) {
-          if (region_of_[other] < 0 && cells_[other].flat && Belongs(other, 1) &&
-              Continues(cell, other)) {
+          if (region_of_[other] < 0 && cells_[other].flat && tried_[other] < kMostTries &&
+              Belongs(other, 1) && Continues(cell, other)) {
             take(other);
           }
         });
@@ -116,9 +120,13 @@ class RegionGrower {
   }
 
   void Release(const std::vector<int>& members) {
-    for (int cell : members) region_of_[cell] = -1;
+    for (int cell : members) {
+      region_of_[cell] = -1;
+      ++tried_[cell];
+    }
   }
 
+  const std::vector<int>& region_of() const { return region_of_; }
   std::vector<int> TakeRegions() { return std::move(region_of_); }
 
  private:
@@ -148,7 +156,10 @@ class RegionGrower {
   // A surface that leaked in over a step (a thin poster) is farther from the plane than the
   // region's own waves, and draws the plane to itself: without what is far off the plane fits the
   // rest far better. A bend is no such case, it gains little.
-  void SetLimit(const std::vector<int>& members) {
+  void SetLimit(const std::vector<int>& all_members) {
+    std::vector<int> members;  // enough of them
+    const size_t stride = all_members.size() / 2000 + 1;
+    for (size_t i = 0; i < all_members.size(); i += stride) members.push_back(all_members[i]);
     const Eigen::Vector3d normal = normal_, mean = mean_;
     const double median = MedianDistance(members);
     double trimmed = median;
@@ -202,7 +213,8 @@ class RegionGrower {
   const ScanPlaneOptions& options_;
   const double max_angle_;
   std::vector<int> region_of_;
-  std::vector<uint8_t> tried_;     // has been in a region: starts none
+  // In how many regions each cell has been; one that was in any starts none of its own.
+  std::vector<uint8_t> tried_;
   Eigen::Vector3d normal_, mean_;  // of the region that grows
   double limit_ = 0;               // of the distance from its plane
 };
@@ -214,7 +226,7 @@ PlaneRegion MakeRegion(const ScanSurface& surface, const std::vector<int>& membe
   const double size = std::sqrt(area / kMostCells);
   struct Piece {
     Moments moments;
-    double inverse_variance = 0;
+    double inverse_variance = 0, noise = 0;
   };
   std::map<std::array<int, 3>, Piece> pieces;
   for (int index : members) {
@@ -223,12 +235,14 @@ PlaneRegion MakeRegion(const ScanSurface& surface, const std::vector<int>& membe
     Piece& piece = pieces[{cube[0], cube[1], cube[2]}];
     piece.moments.Add(cell.point, cell.area);
     piece.inverse_variance += cell.count / std::pow(cell.noise, 2);
+    piece.noise += cell.area * cell.noise;
   }
   PlaneRegion region;
   for (const auto& [cube, piece] : pieces) {
     region.cells.push_back({piece.moments.sums.segment<3>(1).matrix() / piece.moments.weight(),
                             static_cast<float>(piece.moments.weight()),
-                            static_cast<float>(1 / piece.inverse_variance)});
+                            static_cast<float>(1 / piece.inverse_variance),
+                            static_cast<float>(piece.noise / piece.moments.weight())});
   }
   SummariseRegion(surface.station(), &region);
   return region;
@@ -256,6 +270,43 @@ double FindEndSlope(const PlaneRegion& region) {
                         std::hypot(2 * quadric[5], quadric[4]) / region.extent_v);
 }
 
+// How far the local normals turn from the middle of the region to its end, radians: shows the
+// curvature of a strip too narrow for its heights to tell.
+double FindTurn(const ScanSurface& surface, const std::vector<int>& members,
+                const PlaneRegion& region) {
+  Eigen::Matrix2d turn = Eigen::Matrix2d::Zero();
+  for (int index : members) {
+    const SurfaceCell& cell = surface.cells()[index];
+    const Eigen::Vector3d offset = cell.point - region.mean, normal = cell.normal.cast<double>();
+    const Eigen::Vector2d place(offset.dot(region.u) / region.extent_u,
+                                offset.dot(region.v) / region.extent_v);
+    turn +=
+        cell.area * Eigen::Vector2d(normal.dot(region.u), normal.dot(region.v)) * place.transpose();
+  }
+  return std::sqrt(3.0) * (turn / region.area).colwise().norm().maxCoeff();
+}
+
+// Most of a region has cells of it on all four sides. One or two columns of samples, seen at the
+// rim of a pillar, are always flat.
+bool IsWide(const ScanSurface& surface, const std::vector<int>& members,
+            const std::vector<int>& region_of, int region) {
+  const auto has = [&](int cell, int columns, int rows) {
+    for (int far = 1; far <= 2; ++far) {
+      for (int side = -1; side <= 1; ++side) {
+        const int other = surface.CellBeside(cell, columns != 0 ? far * columns : side,
+                                             rows != 0 ? far * rows : side);
+        if (other >= 0 && region_of[other] == region) return true;
+      }
+    }
+    return false;
+  };
+  int amid = 0;
+  for (int cell : members) {
+    amid += has(cell, -1, 0) && has(cell, 1, 0) && has(cell, 0, -1) && has(cell, 0, 1);
+  }
+  return !surface.is_grid() || amid >= kLeastAmid * static_cast<double>(members.size());
+}
+
 // The ends turn with the surface: a strip of a cylinder, not a plane. What windows of a noisy scan
 // deviate by, its planes may be bent by.
 bool IsCurved(const ScanSurface& surface, const std::vector<int>& members,
@@ -264,7 +315,7 @@ bool IsCurved(const ScanSurface& surface, const std::vector<int>& members,
   for (int cell : members) sigma += surface.cells()[cell].normal_sigma;
   const double limit = kMostCurved * RadFromDeg(options.max_angle_deg) +
                        0.5 * sigma / static_cast<double>(members.size());
-  return region.end_slope > limit;
+  return std::max(region.end_slope, FindTurn(surface, members, region)) > limit;
 }
 
 // Steps between regions that lie beside each other in the grid, at most a few cells apart (cells
@@ -332,9 +383,11 @@ void SummariseRegion(const Eigen::Vector3d& station, PlaneRegion* region) {
   region->extent_u = std::sqrt(std::max(fit.variances[2], 1e-8));
   region->extent_v = std::sqrt(std::max(fit.variances[1], 1e-8));
   double square = 0, noise = 0;
+  region->noise = 0;
   for (const RegionCell& cell : region->cells) {
     square += cell.area * std::pow(region->Distance(cell.point), 2);
     noise += cell.area * cell.variance;
+    region->noise += cell.area / region->area * cell.noise;
   }
   region->waviness = std::sqrt(std::max(square - noise, 0.0) / region->area);
   const double wave_area = kWaveLength * kWaveLength;
@@ -359,7 +412,9 @@ GrownRegions GrowRegions(const ScanSurface& surface, const ScanPlaneOptions& opt
     const std::vector<int> members = grower.Grow(seed, static_cast<int>(grown.regions.size()));
     PlaneRegion region;
     if (static_cast<int>(members.size()) >= kFewestCells) region = MakeRegion(surface, members);
-    if (region.area < min_area || IsCurved(surface, members, region, options)) {
+    const int index = static_cast<int>(grown.regions.size());
+    if (region.area < min_area || IsCurved(surface, members, region, options) ||
+        !IsWide(surface, members, grower.region_of(), index)) {
       grower.Release(members);
     } else {
       grown.regions.push_back(std::move(region));
@@ -380,7 +435,8 @@ class RegionJoiner {
     joined_of_.resize(regions_.size());
     std::iota(joined_of_.begin(), joined_of_.end(), 0);
     for (const RegionStep& step : steps) {
-      if (std::abs(step.height) > options.min_step + 3 * step.sigma) {
+      const double edges = kEdgeShift * std::max(regions_[step.a].noise, regions_[step.b].noise);
+      if (std::abs(step.height) > options.min_step + 2 * edges + 3 * step.sigma) {
         apart_.emplace_back(std::min(step.a, step.b), std::max(step.a, step.b));
       }
     }
@@ -446,9 +502,13 @@ class RegionJoiner {
          {Eigen::Vector3d(0, 0, 0), u, Eigen::Vector3d(-u), v, Eigen::Vector3d(-v)}) {
       const Eigen::Vector3d x = small.mean + offset;
       const double sigma = std::hypot(large.Sigma(x), small.Sigma(x));
-      // Agreement within a large uncertainty says nothing.
-      if (3 * sigma > options_.max_distance) return false;
-      const double limit = 3 * sigma + poses + 0.5 * options_.min_step +
+      // Agreement within a large uncertainty says nothing; least of all far from the larger one.
+      if (3 * sigma > options_.max_distance || 3 * large.Sigma(x) > 2 * options_.min_step) {
+        return false;
+      }
+      // Windows that reach over an edge unnoticed in the noise shift their surface.
+      const double edges = kEdgeShift * std::max(large.noise, small.noise);
+      const double limit = 3 * sigma + edges + poses + 0.5 * options_.min_step +
                            1.5 * std::max(large.waviness, small.waviness);
       if (std::abs(large.Distance(x)) > std::min(limit, options_.max_distance + poses)) {
         return false;

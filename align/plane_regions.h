@@ -16,6 +16,7 @@ struct RegionCell {
   Eigen::Vector3d point;  // relative to the origin of the ScanSurface
   float area = 0;         // m2
   float variance = 0;     // of the point along the normal by the noise alone, m2
+  float noise = 0;        // of one sample across the surface, metres
 };
 
 struct PlaneRegion {
@@ -27,6 +28,7 @@ struct PlaneRegion {
   double area = 0;                     // m2
   double extent_u = 0, extent_v = 0;   // standard deviations along u and v
   double waviness = 0;   // RMS distance of the surface from the plane, noise taken out, metres
+  double noise = 0;      // of one sample, metres
   double end_slope = 0;  // radians; how far its ends are turned against its plane: curvature
   Eigen::Matrix3d covariance;  // of height and slopes (1, u, v) at the mean
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "align/agreement.h"
 #include "align/agreement_report.h"
@@ -9,7 +10,9 @@
 #include "align/geo_output.h"
 #include "align/overlay.h"
 #include "align/plane_bundle_report.h"
+#include "align/scan_planes_report.h"
 #include "core/error.h"
+#include "core/frames.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
 
@@ -25,6 +28,8 @@ struct Arguments {
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
+  ScanPlaneOptions planes;
+  std::string planes_path;
   int overlays = 0;
 };
 
@@ -63,6 +68,11 @@ void AddOptions(Arguments* a, Command* command) {
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
                    "to it; 0 = one similarity by the picks alone.");
   AddPlaneBundleOptions(&o.bundle, command);
+  AddScanPlaneOptions(&a->planes, command);
+  command->AddOutputPath("Plane.output_path", &a->planes_path,
+                         "Point cloud of the scan, a colour for each of its planes and grey where "
+                         "there is none: a .ply for CloudCompare or MeshLab.",
+                         Command::Kind::kOptional);
   command->AddDouble(
       "Picks.max_chance", &o.picks.max_chance,
       "A pick is left out when chance makes one as bad less often than this; larger = "
@@ -110,6 +120,7 @@ void CheckArguments(const Arguments& a) {
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
   for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
+  for (const std::string& problem : a.planes.Problems()) problems.push_back(problem);
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {
     problems.push_back("--overlays needs the photos: give --image_path");
@@ -156,6 +167,17 @@ Json PicksToJson(const Alignment& alignment) {
   return json;
 }
 
+// One standard deviation, by what clicks, keypoints and the scan's noise leave open.
+Json ExpectedErrorToJson(const ExpectedError& error) {
+  Json json;
+  json["at_cameras_mm"] = NumberOrNull(1000 * error.at_cameras);
+  json["at_far_corner_mm"] = NumberOrNull(1000 * error.at_far_corner);
+  json["far_corner"] = {error.far_corner.x(), error.far_corner.y(), error.far_corner.z()};
+  json["rotation_deg"] = NumberOrNull(DegFromRad(error.rotation));
+  json["scale"] = NumberOrNull(error.scale);
+  return json;
+}
+
 Json PlacementToJson(const Placement& placement) {
   Json json;
   json["num_points"] = placement.num_points;
@@ -167,7 +189,7 @@ Json PlacementToJson(const Placement& placement) {
   return json;
 }
 
-// The keys of docs/commands.md. `planes` stays empty until planes are detected (thesis 7.2).
+// The keys of docs/commands.md; `planes` and those of the photos follow in Align().
 void FillReport(const Alignment& alignment, double reprojection_rms_before,
                 double reprojection_rms_after, Report* report) {
   Report& r = *report;
@@ -179,6 +201,7 @@ void FillReport(const Alignment& alignment, double reprojection_rms_before,
   r["scale"]["relative_mad"] = alignment.scale.relative_mad;
   r["planes"] = Json::array();
   const bool refined = alignment.refined;
+  // Of the similarity by the picks and the refined one; the adjustment has its own below.
   r["plane_rms_m"]["before"] = refined ? Json(alignment.surface_fit.rms_before) : Json(nullptr);
   r["plane_rms_m"]["after"] = refined ? Json(alignment.surface_fit.rms_after) : Json(nullptr);
   r["plane_rms_m"]["num_points"] = refined ? alignment.surface_fit.num_points : 0;
@@ -192,6 +215,7 @@ void FillReport(const Alignment& alignment, double reprojection_rms_before,
   r["reprojection_rms_px"]["before"] = reprojection_rms_before;
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
   r["placement"] = PlacementToJson(alignment.placement);
+  r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
   r["agreement"] = nullptr;
 }
 
@@ -235,6 +259,18 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
   for (const std::string& warning : warnings) context.Warn(warning);
 }
 
+// The planes of the scans (thesis 7.2), where they are asked for.
+std::vector<ScanPlane> DetectPlanes(const Arguments& a, const std::vector<Scan>& scans,
+                                    const Command::Context& context) {
+  if (!a.alignment.plane_constrained && a.planes_path.empty()) return {};
+  context.progress.Stage("planes");
+  std::vector<ScanPlane> planes = FindScanPlanes(scans, a.planes, context.options.num_threads);
+  if (!a.planes_path.empty()) {
+    WriteScanPlanes(a.planes_path, scans, planes, context.options.num_threads);
+  }
+  return planes;
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
@@ -247,13 +283,23 @@ void Align(const Arguments& a, const Command::Context& context) {
   const std::vector<Scan>& scans = placed.scans;
   const std::optional<GeoReference> geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
   const FreeSpace free_space(scans, kCoarseSamples);
+  const std::vector<ScanPlane> planes = DetectPlanes(a, scans, context);
 
   AlignmentOptions options = a.alignment;
   options.num_threads = context.options.num_threads;
   const double sigma_px = std::max(0.3, before.rms_px / std::sqrt(2.0));
-  const Alignment alignment =
-      AlignToScan({model, scans, picks, a.picks_path, a.scan_reader.azimuth}, sigma_px, free_space,
-                  options, &context.progress);
+  std::optional<Alignment> found;
+  try {
+    found = AlignToScan({model, scans, picks, a.picks_path, a.scan_reader.azimuth, planes},
+                        sigma_px, free_space, options, &context.progress);
+  } catch (const Contradiction& contradiction) {
+    context.report.SetUntrusted(contradiction.what());
+    context.report["scan_from_sparse"] = nullptr;
+    MakeFolder(a.output_path);
+    context.report.AddCopy(a.output_path + "/alignment.json");
+    return;
+  }
+  const Alignment& alignment = *found;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
 
@@ -265,6 +311,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, before.rms_px, after.rms_px, &context.report);
+  context.report["planes"] = ScanPlanesToJson(planes, model);
+  SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   WriteSparseModel(model, a.output_path);
   WriteSimilarity(a.output_path + "/scan_from_sparse.txt", alignment.scan_from_sparse);
   WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include <Eigen/Geometry>
 
@@ -18,27 +19,47 @@ namespace {
 
 constexpr double kFragmentShare = 0.1;  // of min_area_m2: what may still join a plane
 constexpr double kWaveArea = 0.04;      // m2; samples nearer to each other share the waves
-constexpr double kEdgeWeight = 0.05;    // of samples beside others: they may be mixed
+constexpr double kEdgeWeight =
+    0.05;  // of samples beside an edge or another plane: they may be mixed
 constexpr double kLeastCell = 0.02, kMostCells = 4000;  // metres; along a plane
 constexpr int kNumChunks = 64;  // sums are made per chunk, whatever the number of threads
 
-// The region of each sample (-1 = none): that of its cell; near the rim of a region the one whose
-// local plane suits it best.
-std::vector<int> LabelSamples(const ScanSurface& surface, const std::vector<int>& region_of_cell,
-                              double max_noise, int num_threads) {
-  const std::vector<SurfaceCell>& cells = surface.cells();
-  const int num_samples = surface.NumSamples();
-  std::vector<uint8_t> is_inside(cells.size(), 0);
-  for (size_t i = 0; i < cells.size(); ++i) {
-    if (region_of_cell[i] < 0) continue;
-    is_inside[i] = 1;
+// A scan with the plane (index into the planes being built, -1 = none) of every sample.
+struct LabelledScan {
+  std::unique_ptr<ScanSurface> surface;
+  std::vector<int> labels;
+  std::vector<uint8_t> is_amid;  // nothing else is near: no edge, no other plane
+};
+
+// How deep a cell lies in its region: 2 = all cells around belong to it, 1 = none of them belongs
+// to another one.
+std::vector<uint8_t> FindDepths(const ScanSurface& surface,
+                                const std::vector<int>& region_of_cell) {
+  std::vector<uint8_t> depths(region_of_cell.size(), 0);
+  for (size_t i = 0; i < depths.size(); ++i) {
+    const int own = region_of_cell[i];
+    if (own < 0) continue;
+    depths[i] = 2;
     surface.ForNeighbours(static_cast<int>(i), [&](int other) {
-      if (region_of_cell[other] >= 0 && region_of_cell[other] != region_of_cell[i]) {
-        is_inside[i] = 0;
-      }
+      const int region = region_of_cell[other];
+      if (region >= 0 && region != own) depths[i] = 0;
+      if (region < 0 && surface.cells()[other].count > 0)
+        depths[i] = std::min<uint8_t>(depths[i], 1);
     });
   }
-  std::vector<int> labels(num_samples, -1);
+  return depths;
+}
+
+// The region of each sample: that of its cell; near the rim of a region the one whose local plane
+// suits it best.
+void LabelSamples(const std::vector<int>& region_of_cell, double max_noise, int num_threads,
+                  LabelledScan* scan) {
+  const ScanSurface& surface = *scan->surface;
+  const std::vector<SurfaceCell>& cells = surface.cells();
+  const std::vector<uint8_t> depths = FindDepths(surface, region_of_cell);
+  const int num_samples = surface.NumSamples();
+  scan->labels.assign(num_samples, -1);
+  scan->is_amid.assign(num_samples, 0);
   ParallelFor(num_threads, 0, kNumChunks, [&](int chunk) {
     const auto begin = static_cast<int64_t>(num_samples) * chunk / kNumChunks;
     const auto end = static_cast<int64_t>(num_samples) * (chunk + 1) / kNumChunks;
@@ -54,20 +75,14 @@ std::vector<int> LabelSamples(const ScanSurface& surface, const std::vector<int>
             std::abs(c.normal.cast<double>().dot(x - c.point)) / std::max(c.noise, 1e-6f);
         if (!(deviations < best)) return;
         best = deviations;
-        labels[i] = region_of_cell[cell];
+        scan->labels[i] = region_of_cell[cell];
       };
       consider(own);
-      if (!is_inside[own]) surface.ForNeighbours(own, consider);
+      if (depths[own] == 0) surface.ForNeighbours(own, consider);
+      scan->is_amid[i] = depths[own] == 2;
     }
   });
-  return labels;
 }
-
-// A scan with the plane (index into the planes being built, -1 = none) of every sample.
-struct LabelledScan {
-  std::unique_ptr<ScanSurface> surface;
-  std::vector<int> labels;
-};
 
 struct Histogram {
   std::array<int, 256> counts{};
@@ -192,9 +207,7 @@ class PlaneFitter {
       const double footprint = surface.Footprint(i, x, plane.normal);
       const double share = footprint > 0 ? std::max(1.0, kWaveArea / footprint) : 1;
       double weight = 1 / (noise * noise + plane.waviness * plane.waviness * share);
-      bool beside_other = false;
-      surface.ForBeside(i, [&](int other) { beside_other |= one.labels[other] != one.labels[i]; });
-      if (beside_other) weight *= kEdgeWeight;
+      if (!one.is_amid[i]) weight *= kEdgeWeight;
       sum->moments.Add(x, weight);
     });
     for (PlaneInWork& plane : planes_) {
@@ -261,6 +274,30 @@ class PlaneFitter {
     return result;
   }
 
+  // A sample that is missing, or an outlier, amid those of a plane: no hole.
+  struct Gap {
+    int label;
+    Eigen::Vector3d x;
+  };
+  static std::optional<Gap> FindGap(const LabelledScan& one, int sample) {
+    Gap gap{-1, Eigen::Vector3d::Zero()};
+    int count = 0, others = 0;
+    one.surface->ForAround(sample, [&](int other) {
+      const int label = one.labels[other];
+      if (label < 0) return;
+      if (gap.label < 0) gap.label = label;
+      if (label != gap.label) {
+        ++others;
+        return;
+      }
+      gap.x += one.surface->Point(other);
+      ++count;
+    });
+    if (count < 4 || others > 0) return std::nullopt;
+    gap.x /= count;
+    return gap;
+  }
+
   // Adds what the samples of one scan cover. What two scans see counts once.
   void Cover(const LabelledScan& one, std::vector<ScanPlane>* planes) {
     const size_t num_planes = planes->size();
@@ -270,23 +307,26 @@ class PlaneFitter {
       areas[k].setZero((*planes)[k].covered.rows(), (*planes)[k].covered.cols());
       if (best_areas_[k].size() == 0) best_areas_[k] = areas[k];
     }
-    for (int i = 0; i < one.surface->NumSamples(); ++i) {
-      const int label = one.labels[i];
-      if (label < 0) continue;
-      const Eigen::Vector3d x = one.surface->Point(i);
-      if (IsOutlier(one, x, planes_[label])) continue;
+    const auto cover = [&](int i, int label, const Eigen::Vector3d& x) {
       ScanPlane& plane = (*planes)[label];
       const Eigen::Vector3d offset = x + (origin_ - plane.point);
-      const auto row = static_cast<int>(std::floor(plane.u.dot(offset) / plane.cell_size));
-      const auto column = static_cast<int>(std::floor(plane.v.dot(offset) / plane.cell_size));
-      const int at_row =
-          std::clamp<int>(row - plane.min_cell[0], 0, static_cast<int>(plane.covered.rows()) - 1);
-      const int at_column = std::clamp<int>(column - plane.min_cell[1], 0,
-                                            static_cast<int>(plane.covered.cols()) - 1);
-      plane.covered(at_row, at_column) = 1;
+      const Eigen::Array2d place(plane.u.dot(offset), plane.v.dot(offset));
+      const Eigen::Array2i last(plane.covered.rows() - 1, plane.covered.cols() - 1);
+      const Eigen::Array2i cell =
+          ((place / plane.cell_size).floor().cast<int>() - plane.min_cell.array()).max(0).min(last);
+      plane.covered(cell[0], cell[1]) = 1;
       const Eigen::Vector3d foot = x - planes_[label].Distance(x) * plane.normal;
-      areas[label](at_row, at_column) +=
+      areas[label](cell[0], cell[1]) +=
           static_cast<float>(one.surface->Footprint(i, foot, plane.normal));
+    };
+    for (int i = 0; i < one.surface->NumSamples(); ++i) {
+      const int label = one.labels[i];
+      if (label >= 0) {
+        const Eigen::Vector3d x = one.surface->Point(i);
+        if (!IsOutlier(one, x, planes_[label])) cover(i, label, x);
+      } else if (const auto gap = FindGap(one, i)) {
+        cover(i, gap->label, gap->x);
+      }
     }
     for (size_t k = 0; k < num_planes; ++k) {
       best_areas_[k] = best_areas_[k].max(areas[k]);
@@ -353,9 +393,10 @@ void AddScanPlaneOptions(ScanPlaneOptions* options, Command* command) {
   command->AddDouble("Plane.max_distance", &options->max_distance,
                      "Metres; how far a surface, its noise averaged out, may lie from its plane "
                      "(wavy walls, bent scans); larger = more tolerant.");
-  command->AddDouble("Plane.max_angle_deg", &options->max_angle_deg,
-                     "Degrees between a surface's local normal and its plane's; a surface whose ends "
-                     "turn by 3/4 of this is no plane; larger = more tolerant.");
+  command->AddDouble(
+      "Plane.max_angle_deg", &options->max_angle_deg,
+      "Degrees between a surface's local normal and its plane's; a surface whose ends "
+      "turn by 0.6 of this is no plane; larger = more tolerant.");
   command->AddDouble("Plane.min_step", &options->min_step,
                      "Metres; parallel surfaces nearer to each other than this are one plane; "
                      "larger = fewer planes.");
@@ -389,7 +430,7 @@ std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
     for (RegionStep& step : grown.steps) {
       steps.push_back({step.a + first, step.b + first, step.height, step.sigma});
     }
-    one.labels = LabelSamples(*one.surface, grown.region_of_cell, options.max_noise, num_threads);
+    LabelSamples(grown.region_of_cell, options.max_noise, num_threads, &one);
     for (int& label : one.labels) label = label < 0 ? -1 : label + first;
     one.surface->ForgetCells();
     stations.push_back(one.surface->station());

@@ -42,7 +42,7 @@ struct ScanPlaneOptions {
   // wavy and the scan bent. Larger = more tolerant. Steps are found however large this is.
   double max_distance = 0.01;
   double max_angle_deg = 3;  // between the local normal, its noise apart, and the plane's; larger =
-                             // more tolerant. A surface whose ends turn by 3/4 of it is no plane.
+                             // more tolerant. A surface whose ends turn by 0.6 of it is no plane.
   double min_step = 0.0015;  // metres; smaller steps between surfaces are never seen; larger = two
                              // surfaces so near are one
   double max_noise = 3;      // standard deviations up to which a sample belongs; larger = more do

@@ -3,6 +3,7 @@
 // (scan_planes.h) grows its regions from. Frame: `scan`, relative to an origin near the scan, so
 // that large coordinates keep their precision.
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -63,6 +64,7 @@ class ScanSurface {
               int num_threads);
 
   const Scan& scan() const { return scan_; }
+  bool is_grid() const { return is_grid_; }
   Eigen::Vector3d station() const { return scan_.Station() - origin_; }
   const RangeNoise& noise() const { return noise_; }
   const std::vector<SurfaceCell>& cells() const { return cells_; }
@@ -78,9 +80,9 @@ class ScanSurface {
   // Longest distance between neighbouring samples there, metres.
   double Spacing(int sample, const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const;
   double NoiseAcross(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const;
-  // The samples beside this one in the grid that were measured; none without a grid.
+  // The samples beside this one in the grid (up to 8), measured or not; none without a grid.
   template <typename Function>
-  void ForBeside(int sample, const Function& function) const;
+  void ForAround(int sample, const Function& function) const;
 
   // The cells around one.
   template <typename Function>
@@ -126,16 +128,14 @@ void ScanSurface::ForNeighbours(int cell, const Function& function) const {
 }
 
 template <typename Function>
-void ScanSurface::ForBeside(int sample, const Function& function) const {
+void ScanSurface::ForAround(int sample, const Function& function) const {
   if (!is_grid_) return;
-  const int column = sample % scan_.num_columns;
-  const auto visit = [&](bool inside, int other) {
-    if (inside && !scan_.IsMissing(other)) function(other);
-  };
-  visit(column > 0, sample - 1);
-  visit(column + 1 < scan_.num_columns, sample + 1);
-  visit(sample >= scan_.num_columns, sample - scan_.num_columns);
-  visit(sample + scan_.num_columns < NumSamples(), sample + scan_.num_columns);
+  const int column = sample % scan_.num_columns, row = sample / scan_.num_columns;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, scan_.num_rows - 1); ++r) {
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, scan_.num_columns - 1); ++c) {
+      if (r != row || c != column) function(scan_.Index(c, r));
+    }
+  }
 }
 
 }  // namespace roomtex

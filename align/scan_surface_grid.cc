@@ -370,9 +370,9 @@ void ScanSurface::BuildGrid(const ScanPlaneOptions& options, int num_threads) {
       const int index = row * num_columns_ + column;
       SurfaceCell& cell = cells_[index];
       cell = planes.MakeCell(column, row, noise_);
-      if (cell.count == 0) continue;
       solid_angle_[index] =
           SolidAngle(sums, steps, cell_size_, num_columns_, num_rows_, column, row);
+      if (cell.count == 0) continue;
       const double range = cell.point.norm();
       const double cosine = std::max(0.05, -cell.normal.cast<double>().dot(cell.point) / range);
       cell.area = static_cast<float>(cell.count * solid_angle_[index] * range * range / cosine);

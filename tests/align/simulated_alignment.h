@@ -51,7 +51,8 @@ inline Alignment AlignCase(SimulatedCase one, AlignmentOptions options = {}) {
   const ReprojectionErrors errors = UpdateReprojectionErrors(&one.model);
   const FreeSpace free_space(one.scans, 100000);
   Progress progress(true);
-  return AlignToScan({one.model, one.scans, one.picks, "picks.csv", one.azimuth},
+  const std::vector<ScanPlane> planes = FindScanPlanes(one.scans, ScanPlaneOptions(), 2);
+  return AlignToScan({one.model, one.scans, one.picks, "picks.csv", one.azimuth, planes},
                      std::max(0.3, errors.rms_px / std::sqrt(2.0)), free_space, options, &progress);
 }
 
