@@ -64,7 +64,6 @@ struct JoinedRegions {
   std::vector<int> joined_of_region;
 };
 JoinedRegions JoinRegions(std::vector<PlaneRegion> regions, const std::vector<RegionStep>& steps,
-                          const std::vector<Eigen::Vector3d>& stations,
                           const ScanPlaneOptions& options);
 
 }  // namespace roomtex

@@ -247,7 +247,16 @@ class PlaneFitter {
     });
     std::vector<ScanPlane> result;
     for (PlaneInWork& plane : planes_) result.push_back(Place(plane));
-    for (const LabelledScan& one : scans_) Cover(one, &result);
+    std::vector<std::vector<Eigen::ArrayXXf>> areas;
+    for (const LabelledScan& one : scans_) areas.push_back(Cover(one, &result));
+    for (size_t k = 0; k < result.size(); ++k) {
+      ScanPlane& plane = result[k];
+      plane.area_m2 = TotalArea(areas, k, plane.cell_size);
+      // Points without triangles do not say how much surface they stand for.
+      if (plane.area_m2 == 0) {
+        plane.area_m2 = plane.covered.cast<double>().sum() * plane.cell_size * plane.cell_size;
+      }
+    }
     return result;
   }
 
@@ -298,14 +307,11 @@ class PlaneFitter {
     return gap;
   }
 
-  // Adds what the samples of one scan cover. What two scans see counts once.
-  void Cover(const LabelledScan& one, std::vector<ScanPlane>* planes) {
-    const size_t num_planes = planes->size();
-    best_areas_.resize(num_planes);
-    std::vector<Eigen::ArrayXXf> areas(num_planes);
-    for (size_t k = 0; k < num_planes; ++k) {
-      areas[k].setZero((*planes)[k].covered.rows(), (*planes)[k].covered.cols());
-      if (best_areas_[k].size() == 0) best_areas_[k] = areas[k];
+  // What the samples of one scan cover: marks the cells, gives the area in each, per plane.
+  std::vector<Eigen::ArrayXXf> Cover(const LabelledScan& one, std::vector<ScanPlane>* planes) {
+    std::vector<Eigen::ArrayXXf> areas;
+    for (const ScanPlane& plane : *planes) {
+      areas.push_back(Eigen::ArrayXXf::Zero(plane.covered.rows(), plane.covered.cols()));
     }
     const auto cover = [&](int i, int label, const Eigen::Vector3d& x) {
       ScanPlane& plane = (*planes)[label];
@@ -328,15 +334,35 @@ class PlaneFitter {
         cover(i, gap->label, gap->x);
       }
     }
-    for (size_t k = 0; k < num_planes; ++k) {
-      best_areas_[k] = best_areas_[k].max(areas[k]);
-      ScanPlane& plane = (*planes)[k];
-      plane.area_m2 = best_areas_[k].cast<double>().sum();
-      // Points without triangles do not say how much surface they stand for.
-      if (plane.area_m2 == 0) {
-        plane.area_m2 = plane.covered.cast<double>().sum() * plane.cell_size * plane.cell_size;
+    return areas;
+  }
+
+  // What several scans see counts once: in every cell that of the scan which covers its
+  // surroundings best.
+  static double TotalArea(const std::vector<std::vector<Eigen::ArrayXXf>>& areas, size_t plane,
+                          double cell_size) {
+    if (areas.size() == 1) return areas[0][plane].cast<double>().sum();
+    const Eigen::Index rows = areas[0][plane].rows(), columns = areas[0][plane].cols();
+    const auto full = static_cast<float>(0.8 * 9 * cell_size * cell_size);
+    double total = 0;
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      for (Eigen::Index k = 0; k < columns; ++k) {
+        const Eigen::Index top = std::max<Eigen::Index>(i - 1, 0);
+        const Eigen::Index left = std::max<Eigen::Index>(k - 1, 0);
+        float best = 0, area = 0;
+        for (const auto& of_scan : areas) {
+          const float around =
+              of_scan[plane]
+                  .block(top, left, std::min(i + 2, rows) - top, std::min(k + 2, columns) - left)
+                  .sum();
+          if (std::min(around, full) <= best) continue;
+          best = std::min(around, full);
+          area = of_scan[plane](i, k);
+        }
+        total += area;
       }
     }
+    return total;
   }
 
   const std::vector<LabelledScan>& scans_;
@@ -344,7 +370,6 @@ class PlaneFitter {
   const ScanPlaneOptions& options_;
   const int num_threads_;
   std::vector<PlaneInWork> planes_;
-  std::vector<Eigen::ArrayXXf> best_areas_;
 };
 
 bool Precedes(const ScanPlane& a, const ScanPlane& b) {
@@ -417,7 +442,6 @@ std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
   std::vector<LabelledScan> labelled;
   std::vector<PlaneRegion> regions;
   std::vector<RegionStep> steps;
-  std::vector<Eigen::Vector3d> stations;
   for (const Scan& scan : scans) {
     LabelledScan one;
     one.surface = std::make_unique<ScanSurface>(scan, origin, options, num_threads);
@@ -433,10 +457,9 @@ std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
     LabelSamples(grown.region_of_cell, options.max_noise, num_threads, &one);
     for (int& label : one.labels) label = label < 0 ? -1 : label + first;
     one.surface->ForgetCells();
-    stations.push_back(one.surface->station());
     labelled.push_back(std::move(one));
   }
-  JoinedRegions joined = JoinRegions(std::move(regions), steps, stations, options);
+  JoinedRegions joined = JoinRegions(std::move(regions), steps, options);
   // The footprints give the area more exactly later: keep what is nearly large enough.
   while (!joined.regions.empty() && joined.regions.back().area < 0.7 * options.min_area_m2) {
     joined.regions.pop_back();
