@@ -438,7 +438,10 @@ void AddScanPlaneOptions(ScanPlaneOptions* options, Command* command) {
 std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
                                       const ScanPlaneOptions& options, int num_threads) {
   if (scans.empty()) return {};
-  const Eigen::Vector3d origin = scans[0].Station();
+  const Bounds bounds = FindBounds(scans[0]);
+  const bool has_samples = bounds.min.x() <= bounds.max.x();
+  const Eigen::Vector3d origin =
+      has_samples ? Eigen::Vector3d((bounds.min + bounds.max) / 2) : scans[0].Station();
   std::vector<LabelledScan> labelled;
   std::vector<PlaneRegion> regions;
   std::vector<RegionStep> steps;

@@ -81,8 +81,10 @@ void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
   std::vector<std::vector<std::string>> rows;
   size_t count = 0;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-  if (!scans.empty() && scans[0].Station().cwiseAbs().maxCoeff() > kLargestFloat) {
-    shift = scans[0].Station();
+  if (!scans.empty()) {
+    const Bounds bounds = FindBounds(scans[0]);
+    const Eigen::Vector3d middle = (bounds.min + bounds.max) / 2;
+    if (middle.cwiseAbs().maxCoeff() > kLargestFloat) shift = middle.array().round();
   }
   for (const Scan& scan : scans) {
     rows.emplace_back(scan.num_rows);

@@ -551,6 +551,28 @@ TEST(ScanPlanesPly, ColoursEverySampleByItsPlane) {
   EXPECT_LT(num_wrong, 0.02 * num_on_floor);
 }
 
+TEST(ScanPlanesPly, KeepsMillimetresOfGeoreferencedScans) {
+  Scan mesh;
+  mesh.organised = false;
+  mesh.num_rows = 1;
+  mesh.points = {
+      {500000.001, 4000000.002, 100.003}, {500002, 4000000, 100}, {500000, 4000002, 100}};
+  mesh.num_columns = 3;
+  mesh.triangles = {{0, 1, 2}};
+  const std::vector<ScanPlane> planes = FindScanPlanes({mesh}, ScanPlaneOptions(), -1);
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_NEAR(planes[0].area_m2, 2, 0.05);
+  EXPECT_NEAR(std::abs(planes[0].normal.z()), 1, 1e-5);
+  EXPECT_NEAR(planes[0].Distance(mesh.points[0]), 0, 1e-5);
+  const TempFolder folder;
+  WriteScanPlanes(folder / "planes.ply", {mesh}, planes, -1);
+  const std::string bytes = ReadBytes(folder / "planes.ply");
+  ASSERT_THAT(bytes, testing::HasSubstr("comment add 500001 4000001 100 for the scan frame\n"));
+  const PlyVertices vertices = ParsePlyVertices(bytes, "planes.ply");
+  const Vector3d x = vertices.points[0].cast<double>() + Vector3d(500001, 4000001, 100);
+  EXPECT_THAT(x, IsNearMatrix(mesh.points[0], 1e-6));
+}
+
 TEST(ScanPlanesPly, RefusesAFolderThatDoesNotExist) {
   EXPECT_INPUT_ERROR(WriteScanPlanes("/nonexistent/planes.ply", {}, {}, -1), "cannot be written");
 }
