@@ -11,7 +11,8 @@ namespace {
 TEST(InstalledColmap, ModelTransformerGivesTheSameModelFromOurSimilarity) {
   ASSERT_EQ(std::system("colmap help >/dev/null 2>&1"), 0) << "run scripts/setup.sh";
   const CaseFolder files(MakeCase());
-  ASSERT_EQ(files.Align().exit_code, 0);
+  // The adjustment to the surface moves poses and points one by one: no similarity gives that.
+  ASSERT_EQ(files.Align("--plane_constrained 0").exit_code, 0);
   MakeFolder(files.folder / "transformed");
   // COLMAP up to 3.8 reads a 4 x 4 matrix there, later ones the line with scale, quaternion,
   // translation.
