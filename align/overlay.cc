@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <opencv2/imgcodecs.hpp>
@@ -170,7 +171,7 @@ void DrawCaptions(const std::string& name, int panel_width, cv::Mat* sheet) {
       {"crease", ColorOf(ScanEdge::Kind::kCrease)},
       {"intensity", ColorOf(ScanEdge::Kind::kIntensity)},
       {"rim", ColorOf(ScanEdge::Kind::kDepth)},
-      {"(rims and steps of intensity lie anywhere between two samples)", white}};
+      {"(these two: to a sample)", white}};
   for (const auto& [text, color] : legend) {
     Write(text, x, 18, color, sheet);
     x += TextWidth(text) + 14;
@@ -178,6 +179,27 @@ void DrawCaptions(const std::string& name, int panel_width, cv::Mat* sheet) {
 }
 
 }  // namespace
+
+Scan ScanFromPhoto(const FreeSpace& free_space, const RayLattice& lattice, const Camera& camera,
+                   const Rigid& cam_from_scan) {
+  Scan scan;
+  scan.num_columns = std::max(1, static_cast<int>(camera.width / lattice.step()));
+  scan.num_rows = std::max(1, static_cast<int>(camera.height / lattice.step()));
+  scan.scan_from_station = cam_from_scan.Inverse();
+  const Eigen::Vector3d centre = scan.Station();
+  for (int row = 0; row < scan.num_rows; ++row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      const Eigen::Vector2d x_in_img = lattice.step() * Eigen::Vector2d(column + 0.5, row + 0.5);
+      const Eigen::Vector3d ray = lattice.RayAt(x_in_img).homogeneous().normalized();
+      const auto sight = ray.allFinite()
+                             ? free_space.Look(centre, scan.scan_from_station.rotation * ray)
+                             : std::nullopt;
+      scan.points.push_back(sight ? sight->x_in_scan : Scan::MissingPoint());
+      scan.intensity.push_back(sight ? sight->grey : 0.0f);
+    }
+  }
+  return scan;
+}
 
 std::vector<ImgEdge> SeeEdges(const std::vector<ScanEdge>& edges, const FreeSpace& free_space,
                               const CameraProjection& projection, const Rigid& cam_from_scan) {
@@ -269,6 +291,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
   const ScanViewer viewer(scans, free_space);
   std::vector<ScanEdge> edges;
   for (const Scan& scan : scans) {
+    if (!scan.organised) continue;
     for (ScanEdge& edge : FindScanEdges(scan, options.edges)) edges.push_back(std::move(edge));
   }
   const std::vector<const SparseImage*> images = SpreadImages(aligned, count);

@@ -30,6 +30,11 @@ struct ImgEdge {
   std::vector<Eigen::Vector2d> points;
 };
 
+// What a scanner in the photo's place would measure, a sample per cell of the lattice: gives a mesh
+// without a grid the grid that FindScanEdges asks for.
+Scan ScanFromPhoto(const FreeSpace& free_space, const RayLattice& lattice, const Camera& camera,
+                   const Rigid& cam_from_scan);
+
 // What the photo sees of the edges: not hidden behind the scan's surface, inside the photo. Edges
 // are cut where they disappear.
 std::vector<ImgEdge> SeeEdges(const std::vector<ScanEdge>& edges, const FreeSpace& free_space,

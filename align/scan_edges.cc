@@ -1,7 +1,6 @@
 #include "align/scan_edges.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -326,48 +325,10 @@ class GridEdgeFinder {
   double grey_noise_ = 0;
 };
 
-std::vector<ScanEdge> FindMeshEdges(const Scan& scan, const ScanEdgeOptions& options) {
-  struct Side {
-    int a, b, triangle;
-  };
-  std::vector<Side> sides;
-  sides.reserve(3 * scan.triangles.size());
-  for (size_t t = 0; t < scan.triangles.size(); ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(scan.triangles[t][k], scan.triangles[t][(k + 1) % 3]);
-      sides.push_back({a, b, static_cast<int>(t)});
-    }
-  }
-  std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
-    return std::array{x.a, x.b, x.triangle} < std::array{y.a, y.b, y.triangle};
-  });
-  const auto normal = [&](int t) -> Eigen::Vector3d {
-    const Triangle& corner = scan.triangles[t];
-    const Eigen::Vector3d& a = scan.points[corner[0]];
-    return (scan.points[corner[1]] - a).cross(scan.points[corner[2]] - a).normalized();
-  };
-  const double limit = std::cos(RadFromDeg(options.min_crease_deg));
-  std::vector<ScanEdge> edges;
-  for (size_t i = 0; i < sides.size();) {
-    size_t end = i + 1;
-    while (end < sides.size() && sides[end].a == sides[i].a && sides[end].b == sides[i].b) ++end;
-    const bool is_border = end == i + 1;
-    const bool is_crease =
-        end == i + 2 && normal(sides[i].triangle).dot(normal(sides[i + 1].triangle)) < limit;
-    if (is_border || is_crease) {
-      edges.push_back({is_border ? Kind::kDepth : Kind::kCrease,
-                       {scan.points[sides[i].a], scan.points[sides[i].b]}});
-    }
-    i = end;
-  }
-  return edges;
-}
-
 }  // namespace
 
 std::vector<ScanEdge> FindScanEdges(const Scan& scan, const ScanEdgeOptions& options) {
-  if (!scan.organised) return FindMeshEdges(scan, options);
-  if (scan.num_columns < 3 || scan.num_rows < 3) return {};
+  if (!scan.organised || scan.num_columns < 3 || scan.num_rows < 3) return {};
   return GridEdgeFinder(scan, options).Find();
 }
 

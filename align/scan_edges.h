@@ -31,8 +31,7 @@ struct ScanEdgeOptions {
 };
 
 // Along every row and every column of the grid the edges that cross it, linked from line to line
-// and smoothed along the link. In a mesh without a grid: its borders and its creases, triangle edge
-// by triangle edge; its intensity has no edges here.
+// and smoothed along the link. None in a mesh without a grid (see ScanFromPhoto in overlay.h).
 std::vector<ScanEdge> FindScanEdges(const Scan& scan, const ScanEdgeOptions& options);
 
 }  // namespace roomtex
