@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <set>
@@ -10,6 +9,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "capture/true_colors.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -78,26 +78,6 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
   file.Commit();
 }
 
-struct TrueVertex {
-  float x, y, z;
-  uint8_t red, green, blue;
-};
-
-void WriteTrueColors(const std::vector<TrueVertex>& vertices, const std::string& path) {
-  OutputFile file(path);
-  file.stream() << "ply\nformat binary_little_endian 1.0\n"
-                   "comment the scan points in grid order with their true colour (sRGB, EV 0)\n"
-                << "element vertex " << vertices.size() << "\n"
-                << "property float x\nproperty float y\nproperty float z\n"
-                   "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-  for (const TrueVertex& vertex : vertices) {
-    char bytes[15];
-    std::memcpy(bytes, &vertex, 15);  // three floats and three bytes without padding
-    file.stream().write(bytes, sizeof(bytes));
-  }
-  file.Commit();
-}
-
 std::string PoseLine(const Rigid& pose) {
   std::ostringstream line = ExactStream();
   const Eigen::Vector4d q = WxyzFromQuaternion(pose.rotation);
@@ -117,26 +97,17 @@ Scan InItsStation(Scan scan) {
 void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
                 Progress* progress) {
   progress->Stage("scans", room.options().num_stations);
-  std::vector<TrueVertex> vertices;
   std::ostringstream poses = ExactStream();
   poses << "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
   for (int station = 0; station < room.options().num_stations; ++station) {
     const Scan scan = room.MakeScan(station);
     WriteRtpi(RtpiFromScan(InItsStation(scan)), folder + "/" + ScanName(station));
     poses << ScanName(station) << " " << PoseLine(scan.scan_from_station) << "\n";
-    const std::vector<Eigen::Vector3f> colors = room.TrueColors(station);
-    for (size_t i = 0; i < scan.points.size(); ++i) {
-      if (scan.IsMissing(static_cast<int>(i))) continue;
-      const Eigen::Vector3f point = scan.points[i].cast<float>();
-      vertices.push_back({point.x(), point.y(), point.z(), SrgbByteFromLinear(colors[i].x()),
-                          SrgbByteFromLinear(colors[i].y()), SrgbByteFromLinear(colors[i].z())});
-    }
     summary->num_samples += scan.points.size();
     summary->num_missing += scan.NumMissing();
     progress->Tick();
   }
   if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses.str());
-  WriteTrueColors(vertices, folder + "/truth/true_colors.ply");
 }
 
 void WritePicks(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary) {
@@ -247,7 +218,7 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
 }  // namespace
 
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
-                            Progress* progress) {
+                            Progress* progress, bool reachable) {
   const std::string photo_folder = folder + "/photos";
   RequireNoOtherPhotos(room, photo_folder);
   MakeFolder(photo_folder);
@@ -263,6 +234,7 @@ CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder
     WritePhoto(room, photo, photo_folder + "/" + room.PhotoName(photo));
     progress->Tick();
   }
+  WriteTrueColors(room, photo_folder, reachable, folder + "/truth", progress);
   progress->Finish();
   return summary;
 }

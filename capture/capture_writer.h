@@ -25,11 +25,9 @@ struct CaptureSummary {
 //   points),
 //                     scan_from_room.txt, exposures.csv, true_colors.ply
 //   README.txt        what is what, and the commands to type
-// true_colors.ply: the scan points as measured, in grid order, station after station, missing
-// samples left out; x y z (scan frame) and red green blue (sRGB bytes, EV 0):
-// SimulatedRoom::TrueColors. Throws InputError if the folder cannot be written or its photos/ holds
-// JPEGs of another capture.
+// true_colors.ply, and reachable.ply if asked for: true_colors.h. Throws InputError if the folder
+// cannot be written or its photos/ holds JPEGs of another capture.
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
-                            Progress* progress);
+                            Progress* progress, bool reachable = false);
 
 }  // namespace roomtex

@@ -14,18 +14,6 @@
 namespace roomtex {
 namespace {
 
-// Where the ray meets the plane through `point`, relative to `point`; kept short when it runs flat.
-Eigen::Vector3d OffsetOnPlane(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                              const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
-  const double slope = normal.dot(direction);
-  const double distance = (point - origin).norm();
-  const double along = normal.dot(point - origin) / slope;
-  if (!(along > 0) || along > 1.5 * distance) {
-    return 0.2 * distance * (direction - (point - origin) / distance);
-  }
-  return origin + along * direction - point;
-}
-
 // 0..255, not rounded; the sRGB curve from a table over the square root, where it is nearly
 // straight.
 float GreyFromLinear(float linear) {

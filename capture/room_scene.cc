@@ -147,6 +147,17 @@ void RoomScene::Finish(bool shading, int num_threads) {
   light_.reset(new Light{LightMap(patches_, lights_, is_free, num_threads)});
 }
 
+Eigen::Vector3d OffsetOnPlane(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                              const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
+  const double slope = normal.dot(direction);
+  const double distance = (point - origin).norm();
+  const double along = normal.dot(point - origin) / slope;
+  if (!(along > 0) || along > 1.5 * distance) {
+    return 0.2 * distance * (direction - (point - origin) / distance);
+  }
+  return origin + along * direction - point;
+}
+
 std::optional<SceneHit> RoomScene::Cast(const Eigen::Vector3d& origin,
                                         const Eigen::Vector3d& direction,
                                         double min_distance) const {

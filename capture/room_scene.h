@@ -63,6 +63,10 @@ struct AreaLight {
   LinearRgb power;                         // irradiance that it gives at 1 m in front, times 1 m2
 };
 
+// Where the ray meets the plane through `point`, relative to `point`; kept short when it runs flat.
+Eigen::Vector3d OffsetOnPlane(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                              const Eigen::Vector3d& point, const Eigen::Vector3d& normal);
+
 class RoomScene {
  public:
   RoomScene();

@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
   options.shading = true;  // the command makes pictures to look at; tests want plain albedo
   std::string output_path;
   int seed = -1;
+  bool reachable = false;
   Command command(
       "roomtex-simulate",
       "Makes a capture of a simulated room: photos, a range scan, picks, and the truth.",
@@ -86,13 +87,16 @@ int main(int argc, char** argv) {
                         "folder for the capture; its README.txt says what is what");
   command.AddInt("seed", &seed, "the same as --random_seed; -1 = take that one");
   AddOptions(&options, &command);
+  command.AddBool("reachable", &reachable,
+                  "write truth/reachable.ply too: the mean of the photos with true places, "
+                  "visibility and exposure");
   return command.Run(argc, argv, [&](const Command::Context& context) {
     options.random_seed = seed >= 0 ? seed : context.options.random_seed;
     options.num_threads = context.options.num_threads;
     ThrowIfProblems(options.Problems());
     context.progress.Stage("room");
     const SimulatedRoom room(options);
-    const CaptureSummary summary = WriteCapture(room, output_path, &context.progress);
+    const CaptureSummary summary = WriteCapture(room, output_path, &context.progress, reachable);
     Describe(room, summary, &context.report);
     if (options.num_picks > 0 && summary.num_picks < options.num_picks) {
       context.Warn("only " + std::to_string(summary.num_picks) + " places to click were found");

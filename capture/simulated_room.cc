@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <mutex>
 
 #include "capture/photo_renderer.h"
@@ -160,6 +161,64 @@ std::vector<Eigen::Vector3f> SimulatedRoom::TrueColors(int station) const {
     }
   });
   return colors;
+}
+
+TrueSamples SimulatedRoom::MakeTrueSamples(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  const ScanGrid& grid = scanner.grid();
+  const size_t count = static_cast<size_t>(grid.num_columns) * grid.num_rows;
+  TrueSamples samples;
+  samples.points.assign(count, Scan::MissingPoint());
+  samples.normals.assign(count, Eigen::Vector3f::Zero());
+  samples.cell_colors.assign(count, Eigen::Vector3f::Zero());
+  const Rigid& room_from_station = impl_->room_from_station.at(station);
+  const Eigen::Vector3d& origin = room_from_station.translation;
+  ParallelFor(impl_->options.num_threads, 0, grid.num_rows, [&](int row) {
+    for (int column = 0; column < grid.num_columns; ++column) {
+      const int index = row * grid.num_columns + column;
+      const ScanSample sample = scanner.Measure(index);
+      if (sample.missing) continue;
+      const SceneHit& hit = sample.hit;
+      const Eigen::Vector3d normal = impl_->scene.patches()[hit.patch].Normal();
+      const auto side = [&](int next_column, int next_row) {
+        const Eigen::Vector3d direction =
+            room_from_station.rotation *
+            ScanGrid::Direction(grid.Theta(next_column), grid.Phi(next_row));
+        return OffsetOnPlane(origin, direction, hit.point, normal);
+      };
+      samples.points[index] = hit.point;
+      const double facing = normal.dot(origin - hit.point) < 0 ? -1 : 1;
+      samples.normals[index] = (facing * normal).cast<float>();
+      samples.cell_colors[index] =
+          impl_->scene.Color(hit, side(column + 1, row), side(column, row + 1))
+              .cwiseMax(0)
+              .cwiseMin(1);
+    }
+  });
+  return samples;
+}
+
+std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& samples,
+                                                          int photo) const {
+  constexpr double kFlattest = 0.05;
+  constexpr int kAtOnce = 4096;
+  const Rigid& cam_from_room = impl_->cam_from_room.at(photo);
+  const Eigen::Vector3d centre = cam_from_room.TargetOriginInSource();
+  const int count = static_cast<int>(samples.points.size());
+  std::vector<Eigen::Vector2f> sightings(
+      count, Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  ParallelFor(impl_->options.num_threads, 0, (count + kAtOnce - 1) / kAtOnce, [&](int block) {
+    for (int i = block * kAtOnce; i < std::min(count, (block + 1) * kAtOnce); ++i) {
+      const Eigen::Vector3d& point = samples.points[i];
+      const Eigen::Vector3d to_camera = (centre - point).normalized();
+      if (!(to_camera.dot(samples.normals[i].cast<double>()) > kFlattest)) continue;
+      const auto position = impl_->projection.ImgFromCam(cam_from_room * point);
+      if (!position || !impl_->projection.InImage(*position)) continue;
+      if (impl_->scene.IsOccluded(centre, point)) continue;
+      sightings[i] = position->cast<float>();
+    }
+  });
+  return sightings;
 }
 
 Similarity SimulatedRoom::ScanFromSparse() const {

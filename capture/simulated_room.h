@@ -53,6 +53,13 @@ struct SimulatedRoomOptions {
   std::vector<std::string> Problems() const;
 };
 
+// What is true of the samples of a scan, in grid order; missing ones are NaN in `points`.
+struct TrueSamples {
+  std::vector<Eigen::Vector3d> points;       // `room` frame, where the rays met it, without noise
+  std::vector<Eigen::Vector3f> normals;      // `room` frame, unit, towards the scanner
+  std::vector<Eigen::Vector3f> cell_colors;  // as TrueColors, averaged over the sample's cell
+};
+
 struct SimulatedPick {
   std::string image_name;
   Eigen::Vector2d x_in_img;
@@ -84,6 +91,11 @@ class SimulatedRoom {
   // sample of MakeScan(station) in grid order, at the noise-free surface point; zero for missing
   // samples.
   std::vector<Eigen::Vector3f> TrueColors(int station = 0) const;
+
+  // The samples without noise, and how a photo really sees them: positions in `img`, NaN for those
+  // that it does not see (hidden, outside, from behind, flatter than 87 degrees).
+  TrueSamples MakeTrueSamples(int station = 0) const;
+  std::vector<Eigen::Vector2f> TrueSightings(const TrueSamples& samples, int photo) const;
 
   // True sparse model in the frame scan * S^-1 for a made-up similarity S = ScanFromSparse():
   // points on surfaces with tracks over the photos that really see them, keypoint noise of

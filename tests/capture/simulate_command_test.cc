@@ -160,6 +160,31 @@ TEST(SimulateCommand, TruthAgainstItselfIsPerfect) {
   EXPECT_EQ(answer["color"]["gain"].get<double>(), 1);
 }
 
+TEST(SimulateCommand, MeanOfPhotosWithTrueVisibilityIsNearTheTruth) {
+  const TempFolder folder;
+  ASSERT_EQ(RunCommandLine("roomtex-simulate --reachable 1 --num_photos 6 --photo_width 480 "
+                           "--photo_height 320 --scan_columns 480 --scan_rows 240 --output_path " +
+                           (folder / "a"))
+                .exit_code,
+            0);
+  const CommandResult result = RunCommandLine(
+      "roomtex-evaluate --truth_path " + (folder / "a/truth") + " --scan_path " +
+      (folder / "a/scan.rtpi") + " --ply_path " + (folder / "a/truth/reachable.ply"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json answer = Json::parse(result.out);
+  const Json& points = answer["color"];
+  const Json& cells = answer["color_of_cells"];
+  EXPECT_EQ(points["coverage_of_seen"].get<double>(), 1);
+  EXPECT_EQ(points["colored_but_unseen"].get<double>(), 0);
+  EXPECT_GT(points["coverage"].get<double>(), 0.3);
+  EXPECT_NEAR(points["gain"].get<double>(), 1, 0.02);
+  EXPECT_LT(points["low_frequency_error"].get<double>(), 0.02);
+  EXPECT_GT(points["edge_share"].get<double>(), 0.02);
+  // Photos of few pixels see about the mean over a sample's cell.
+  EXPECT_GT(cells["psnr_db"].get<double>(), points["psnr_db"].get<double>());
+  EXPECT_GT(cells["psnr_db"].get<double>(), 26);
+}
+
 TEST(SimulateCommand, SaysWhatIsWrong) {
   const TempFolder folder;
   const auto expect = [&](const std::string& arguments, int exit_code, const std::string& text) {

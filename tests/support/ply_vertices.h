@@ -17,6 +17,8 @@ struct PlyVertices {
   std::vector<Eigen::Vector3f> points;
   std::vector<Eigen::Matrix<uint8_t, 3, 1>> colors;  // red, green, blue; empty without colours
   std::vector<int> views;                            // empty without the property
+  // Averaged over a sample's cell (truth/true_colors.ply); empty without the properties.
+  std::vector<Eigen::Matrix<uint8_t, 3, 1>> cell_colors;
 };
 
 // bytes: the whole file. path: for messages. Throws InputError unless it is a little-endian PLY
@@ -65,7 +67,8 @@ inline PlyVertices ParsePlyVertices(const std::string& bytes, const std::string&
     }
     return -1;
   };
-  const long x = offset_of("x"), red = offset_of("red"), views = offset_of("views");
+  const long x = offset_of("x"), red = offset_of("red"), views = offset_of("views"),
+             cell = offset_of("cell_red");
   if (x < 0) throw fail("has no vertex property x");
   PlyVertices vertices;
   for (size_t i = 0; i < count; ++i) {
@@ -77,6 +80,11 @@ inline PlyVertices ParsePlyVertices(const std::string& bytes, const std::string&
       Eigen::Matrix<uint8_t, 3, 1> color;
       std::memcpy(color.data(), vertex + red, 3);
       vertices.colors.push_back(color);
+    }
+    if (cell >= 0) {
+      Eigen::Matrix<uint8_t, 3, 1> color;
+      std::memcpy(color.data(), vertex + cell, 3);
+      vertices.cell_colors.push_back(color);
     }
     if (views >= 0) vertices.views.push_back(static_cast<uint8_t>(vertex[views]));
   }
