@@ -2,7 +2,6 @@
 // Colours range scans from registered photos: visibility, exposure, blend and detail (thesis
 // chapter 8).
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "texture/blend.h"
 #include "texture/detail.h"
 #include "texture/exposure.h"
+#include "texture/grid_colors.h"
 #include "texture/photo_view.h"
 #include "texture/scan_surface.h"
 #include "texture/visibility.h"
@@ -28,17 +28,13 @@ struct ColorizeOptions {
   std::string unseen =
       "intensity";  // colour of samples that no photo sees: "intensity" (grey) or "black"
   // Texels per sample and direction of the texture image. 1 = one texel a sample; more colour the
-  // surface between the samples as well.
+  // surface between the samples as well. 0 = by the photos' resolution, see ChooseTextureScale.
   int texture_scale = 1;
+  // Working memory for texture images finer than the samples, megabytes (1e6 bytes); the finished
+  // image adds 7 bytes a texel. Less = more passes over the photos.
+  double texture_memory_mb = 2000;
 
   std::vector<std::string> Problems() const;
-};
-
-// Colours on a grid, row by row.
-struct ColorGrid {
-  int num_columns = 0, num_rows = 0;
-  std::vector<std::array<uint8_t, 3>> rgb;  // sRGB; {0, 0, 0} where there is no sample
-  std::vector<uint8_t> views;               // photos that see the sample, at most 255
 };
 
 struct ColoredScan {
@@ -56,6 +52,9 @@ struct ColorizeResult {
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
   std::vector<size_t> samples_seen;  // per photo
+  // Photo pixels per sample and direction, median over the samples; 0 = not known.
+  double pixels_per_sample = 0;
+  int texture_scale = 1;  // in effect
 };
 
 // Photos are decoded once each, num_threads of them at a time. The result does not depend on

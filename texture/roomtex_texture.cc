@@ -5,11 +5,13 @@
 
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_list.h"
 #include "core/output_file.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "texture/colorize.h"
 #include "texture/photo_list.h"
+#include "texture/texture_scale.h"
 #include "texture/write_glb.h"
 #include "texture/write_ply.h"
 #include "texture/write_texture.h"
@@ -23,6 +25,7 @@ struct TextureOptions {
   PhotoSources sources;
   ScanReaderOptions scan_reader;
   ColorizeOptions colorize;
+  std::string texture_scale = "auto";  // or a whole number
 };
 
 void AddPathOptions(TextureOptions* o, Command* command) {
@@ -50,13 +53,35 @@ void AddPathOptions(TextureOptions* o, Command* command) {
   AddScanReaderOptions(&o->scan_reader, command);
 }
 
+void AddTextureOptions(TextureOptions* o, Command* command) {
+  command->AddString(
+      "Texture.scale", &o->texture_scale,
+      "Texels per sample and direction of texture.png and model.glb, 1 to " +
+          std::to_string(kMaxTextureScale) +
+          "; above 1 the surface between the samples is coloured, too. auto (or 0): as fine as the "
+          "photos, pixels per sample rounded, but at most " +
+          std::to_string(kMaxAutoScale) + ", " +
+          std::to_string(static_cast<int>(kMaxAutoTexels / 1e6)) +
+          " million texels, and what --Texture.max_memory_mb lets do in " +
+          std::to_string(kMaxAutoBands) +
+          " passes over the photos. Larger = sharper; time and memory grow with its square. "
+          "model.ply does not depend on it.");
+  command->AddDouble("Texture.max_memory_mb", &o->colorize.texture_memory_mb,
+                     "Working memory for texture images with a scale above 1, megabytes, beside "
+                     "the scan and 7 bytes a texel. Less = more passes over the photos, same "
+                     "result.");
+}
+
+// Throws UsageError.
+int TextureScale(const std::string& text) {
+  if (text == "auto") return 0;
+  return ParseInt("Texture.scale", text);
+}
+
 void AddColorOptions(ColorizeOptions* o, Command* command) {
   command->AddChoice(
       "Texture.unseen", &o->unseen, {"intensity", "black"},
       "Colour of samples that no photo sees: their scan intensity as grey, or black.");
-  command->AddInt("Texture.scale", &o->texture_scale,
-                  "Texels per sample and direction; above 1 the surface between the samples is "
-                  "coloured, too. Larger = sharper texture, memory grows with its square.");
   command->AddChoice("Exposure.mode", &o->exposure.mode, {"exif", "match", "none"},
                      "exif: shutter time, aperture and ISO; match: from what several photos see, "
                      "with EXIF as a prior; none: photos as they are.");
@@ -122,6 +147,8 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
                                                   : 0;
   report["coverage"] = coverage;
   report["views_mean"] = result.views_mean;
+  report["pixels_per_sample"] = result.pixels_per_sample;
+  report["texture_scale"] = result.texture_scale;
   Json gains = Json::object(), seen = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const Eigen::Vector3f& gain = result.exposure.gains[i];
@@ -222,8 +249,10 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
 }
 
 void Texture(const TextureOptions& options, const Command::Context& context) {
+  ColorizeOptions colorize = options.colorize;
+  colorize.texture_scale = TextureScale(options.texture_scale);
   std::vector<std::string> problems = options.scan_reader.Problems();
-  AppendProblems(options.colorize.Problems(), &problems);
+  AppendProblems(colorize.Problems(), &problems);
   ThrowIfProblems(problems);
 
   context.progress.Stage("read model");
@@ -245,9 +274,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
       ReadScans(options.scan_paths, options.scan_poses, options.scan_reader);
   CheckScans(scans);
 
-  const ColorizeResult result = ColorizeScans(scans, list.photos, options.colorize,
-                                              context.options.num_threads, &context.progress);
-  FillReport(list.photos, options.colorize, result, context);
+  const ColorizeResult result =
+      ColorizeScans(scans, list.photos, colorize, context.options.num_threads, &context.progress);
+  FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
 
   context.progress.Stage("write");
@@ -265,6 +294,7 @@ int main(int argc, char** argv) {
       "roomtex-texture --input_path aligned --image_path images --scan_path room.rtpi "
       "--output_path textured");
   roomtex::AddPathOptions(&options, &command);
+  roomtex::AddTextureOptions(&options, &command);
   roomtex::AddColorOptions(&options.colorize, &command);
   return command.Run(argc, argv, [&options](const roomtex::Command::Context& context) {
     roomtex::Texture(options, context);

@@ -4,92 +4,92 @@
 #include <cmath>
 
 namespace roomtex {
-namespace {
 
 // The sample nearest to a texel, and the next one on the texel's side (-1 or +1), with the share of
 // it.
-struct Place {
+struct ScanTexels::Place {
   int nearest, side;
   float share;  // 0 .. 0.5
 };
 
-Place PlaceOf(int texel, int scale) {
-  const int nearest = texel / scale;
+ScanTexels::Place ScanTexels::PlaceOf(int texel) const {
+  const int nearest = texel / scale_;
   const float offset =
-      (static_cast<float>(texel % scale) + 0.5f) / static_cast<float>(scale) - 0.5f;
+      (static_cast<float>(texel % scale_) + 0.5f) / static_cast<float>(scale_) - 0.5f;
   return {nearest, offset < 0 ? -1 : 1, std::abs(offset)};
 }
 
-bool IsLinkedRight(const Scan& scan, const GridLinks& links, int column, int row) {
-  return column >= 0 && column + 1 < scan.num_columns &&
-         (links.bits[scan.Index(column, row)] & GridLinks::kRight) != 0;
-}
-bool IsLinkedDown(const Scan& scan, const GridLinks& links, int column, int row) {
-  return row >= 0 && row + 1 < scan.num_rows &&
-         (links.bits[scan.Index(column, row)] & GridLinks::kDown) != 0;
+// The sample beside, if it is connected; -1 otherwise. A full turn is closed.
+int ScanTexels::Neighbour(int index, int step_columns, int step_rows) const {
+  const int columns = scan_.num_columns;
+  const int column = index % columns, row = index / columns;
+  const auto linked = [this](int i, uint8_t link) { return (surface_.links.bits[i] & link) != 0; };
+  if (step_columns != 0) {
+    const int other = scan_.Index((column + step_columns + columns) % columns, row);
+    return linked(step_columns > 0 ? index : other, GridLinks::kRight) ? other : -1;
+  }
+  const int other_row = row + step_rows;
+  if (other_row < 0 || other_row >= scan_.num_rows) return -1;
+  const int other = scan_.Index(column, other_row);
+  return linked(step_rows > 0 ? index : other, GridLinks::kDown) ? other : -1;
 }
 
-}  // namespace
+void ScanTexels::SetTexel(size_t texel, const Place& x, const Place& y, TexelBlock* block) const {
+  const int index = scan_.Index(x.nearest, y.nearest);
+  const Eigen::Vector3d& here = surface_.points[index];
+  Eigen::Vector3d point = here;
+  Eigen::Vector3f normal = surface_.normals[index];
+  const int beside = x.share > 0 ? Neighbour(index, x.side, 0) : -1;
+  const int below = y.share > 0 ? Neighbour(index, 0, y.side) : -1;
+  const int across = beside >= 0 && below >= 0 ? Neighbour(beside, 0, y.side) : -1;
+  if (across >= 0 && Neighbour(below, x.side, 0) == across) {
+    const double sx = x.share, sy = y.share;
+    point = (1 - sy) * ((1 - sx) * here + sx * surface_.points[beside]) +
+            sy * ((1 - sx) * surface_.points[below] + sx * surface_.points[across]);
+    const std::vector<Eigen::Vector3f>& normals = surface_.normals;
+    normal = (1 - y.share) * ((1 - x.share) * normals[index] + x.share * normals[beside]) +
+             y.share * ((1 - x.share) * normals[below] + x.share * normals[across]);
+  } else {
+    const auto step = [&](int next, int opposite, float share) {
+      if (next >= 0) {
+        point += share * (surface_.points[next] - here);
+        normal += share * (surface_.normals[next] - surface_.normals[index]);
+      } else if (opposite >= 0) {
+        point += share * (here - surface_.points[opposite]);
+      }
+    };
+    if (x.share > 0) step(beside, Neighbour(index, -x.side, 0), x.share);
+    if (y.share > 0) step(below, Neighbour(index, 0, -y.side), y.share);
+  }
+  block->points[texel] = point;
+  block->normals[texel] = normal.isZero() ? normal : normal.normalized();
+}
 
-TextureGrid MakeTextureGrid(const Scan& scan, const ScanSurface& surface, int scale) {
-  TextureGrid grid;
-  grid.num_columns = scan.num_columns * scale;
-  grid.num_rows = scan.num_rows * scale;
-  grid.points.assign(static_cast<size_t>(grid.num_columns) * grid.num_rows, Scan::MissingPoint());
-  grid.normals.assign(grid.points.size(), Eigen::Vector3f::Zero());
+TexelBlock ScanTexels::Rows(int first, int end) const {
+  TexelBlock block;
+  const size_t count = static_cast<size_t>(num_columns()) * (end - first);
+  block.points.assign(count, Scan::MissingPoint());
+  block.normals.assign(count, Eigen::Vector3f::Zero());
+  block.links.bits.assign(count, 0);
+  block.unseen.assign(count, Rgb{0, 0, 0});
   size_t texel = 0;
-  for (int r = 0; r < grid.num_rows; ++r) {
-    const Place y = PlaceOf(r, scale);
-    for (int c = 0; c < grid.num_columns; ++c, ++texel) {
-      const Place x = PlaceOf(c, scale);
-      const int index = scan.Index(x.nearest, y.nearest);
-      if (scan.IsMissing(index)) continue;
-      const bool beside =
-          IsLinkedRight(scan, surface.links, std::min(x.nearest, x.nearest + x.side), y.nearest);
-      const bool below =
-          IsLinkedDown(scan, surface.links, x.nearest, std::min(y.nearest, y.nearest + y.side));
-      const float sx = beside ? x.share : 0, sy = below ? y.share : 0;
-      Eigen::Vector3d point = (1 - sx - sy) * surface.points[index];
-      Eigen::Vector3f normal = (1 - sx - sy) * surface.normals[index];
-      const auto add = [&](int column, int row, float share) {
-        point += share * surface.points[scan.Index(column, row)];
-        normal += share * surface.normals[scan.Index(column, row)];
-      };
-      if (sx > 0) add(x.nearest + x.side, y.nearest, sx);
-      if (sy > 0) add(x.nearest, y.nearest + y.side, sy);
-      grid.points[texel] = point;
-      grid.normals[texel] = normal.isZero() ? normal : normal.normalized();
+  for (int r = first; r < end; ++r) {
+    const Place y = PlaceOf(r);
+    for (int c = 0; c < num_columns(); ++c, ++texel) {
+      const Place x = PlaceOf(c);
+      const int index = scan_.Index(x.nearest, y.nearest);
+      if (scan_.IsMissing(index)) continue;
+      SetTexel(texel, x, y, &block);
+      block.unseen[texel] = colors_.rgb[index];
+      // Runs do not close full turns (grid_runs.h).
+      const uint8_t links = surface_.links.bits[index];
+      const bool right = (c + 1) % scale_ != 0 || (links & GridLinks::kRight) != 0;
+      const bool down = (r + 1) % scale_ != 0 || (links & GridLinks::kDown) != 0;
+      block.links.bits[texel] =
+          static_cast<uint8_t>((right ? GridLinks::kRight : 0) | (down ? GridLinks::kDown : 0));
     }
   }
-  return grid;
-}
-
-GridLinks TextureLinks(const Scan& scan, const ScanSurface& surface, int scale) {
-  GridLinks links;
-  const int columns = scan.num_columns * scale, rows = scan.num_rows * scale;
-  links.bits.assign(static_cast<size_t>(columns) * rows, 0);
-  size_t texel = 0;
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < columns; ++c, ++texel) {
-      const int column = c / scale, row = r / scale;
-      if (scan.IsMissing(scan.Index(column, row))) continue;
-      const bool right = (c + 1) % scale != 0 || IsLinkedRight(scan, surface.links, column, row);
-      const bool down = (r + 1) % scale != 0 || IsLinkedDown(scan, surface.links, column, row);
-      links.bits[texel] = (right ? GridLinks::kRight : 0) | (down ? GridLinks::kDown : 0);
-    }
-  }
-  return links;
-}
-
-std::vector<uint8_t> EnlargeGrey(const Scan& scan, const std::vector<uint8_t>& grey, int scale) {
-  std::vector<uint8_t> large;
-  large.reserve(grey.size() * scale * scale);
-  for (int r = 0; r < scan.num_rows * scale; ++r) {
-    for (int c = 0; c < scan.num_columns * scale; ++c) {
-      large.push_back(grey[scan.Index(c / scale, r / scale)]);
-    }
-  }
-  return large;
+  return block;
 }
 
 }  // namespace roomtex
