@@ -7,6 +7,7 @@
 #include "texture/photo_pass.h"
 #include "texture/texture_grid.h"
 #include "texture/texture_scale.h"
+#include "texture/unify_exposure.h"
 
 namespace roomtex {
 namespace {
@@ -64,18 +65,6 @@ std::vector<std::string> ColorizeOptions::Problems() const {
 
 namespace {
 
-ExposureSolution UnifyExposure(const ObservationStore& store, const std::vector<PhotoView>& photos,
-                               const ExposureOptions& options) {
-  std::vector<ExposureData> exposures;
-  for (const PhotoView& photo : photos) exposures.push_back(ReadExposureData(photo.path));
-  if (options.mode == "none") return SolveExposure(exposures, {}, options);
-  ExposureSolution solution =
-      SolveExposure(exposures, FindOverlaps(store, static_cast<int>(photos.size())), options);
-  const float scale = OutputScale(store, solution.gains);
-  for (Eigen::Vector3f& gain : solution.gains) gain *= scale;
-  return solution;
-}
-
 void CountVertices(const std::vector<Scan>& scans, ColorizeResult* result) {
   for (size_t s = 0; s < scans.size(); ++s) {
     result->num_vertices += scans[s].points.size() - scans[s].NumMissing();
@@ -126,7 +115,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<P
   if (options.texture_scale == 1) input.occluders.clear();
 
   progress->Stage("exposure");
-  result.exposure = UnifyExposure(store, photos, options.exposure);
+  result.exposure = UnifyExposure(input.samples, photos, options.exposure, num_threads, &store);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
   progress->Stage("blend");

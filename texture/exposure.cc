@@ -1,7 +1,6 @@
 #include "texture/exposure.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -9,92 +8,108 @@
 #include <Eigen/Cholesky>
 
 #include "texture/blend.h"
+#include "texture/exposure_prior.h"
 
 namespace roomtex {
 namespace {
 
-// Light that is neither noise nor near clipping.
-constexpr float kDarkest = 0.02f, kLightest = 0.8f;
-// Observations of less weight lie in a depth-boundary band or are clipped.
-constexpr float kLeastWeight = 0.002f;
-
-// One in this many samples is looked at, so that time stays bounded.
-size_t SampleStride(const ObservationStore& store, size_t num_photos) {
-  const size_t wanted = std::max<size_t>(60000, 1000 * num_photos);
-  return store.num_samples() / wanted + 1;
-}
-
-// What two statements about log exposure are trusted to (standard deviations). A camera's nominal
-// exposure is true to about a tenth; the median ratio of an overlap to a hundredth, because
-// materials shine differently into different directions.
-constexpr double kExifSigma = 0.1, kOverlapSigma = 0.01;
+// Standard deviation of the median log ratio of an overlap, because materials shine differently
+// into different directions.
+constexpr double kOverlapSigma = 0.01;
+// Cameras of two kinds compare to this.
+constexpr double kKindSigma = 0.5;
 // Beyond this many standard deviations a statement loses its weight.
 constexpr double kRobustScale = 3.0;
-
-bool IsWellExposed(const Eigen::Vector3f& color) {
-  return color.minCoeff() >= kDarkest && color.maxCoeff() <= kLightest;
-}
-
-float MedianInPlace(std::vector<float>* values) {
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
+// EXIF that is off by more (a third of an EV, robust standard deviation) says nothing.
+constexpr double kUselessExif = 0.23;
+constexpr double kBestExif = 0.03;
+// Half an EV.
+constexpr double kContradiction = 0.35;
 
 struct LogRatio {
   uint32_t pair;  // photo_a * num_photos + photo_b
+  float trust;
   Eigen::Vector4f value;
 };
 
-Overlap SummariseOverlap(const LogRatio* begin, const LogRatio* end, int num_photos) {
-  Overlap overlap;
-  overlap.photo_a = static_cast<int>(begin->pair) / num_photos;
-  overlap.photo_b = static_cast<int>(begin->pair) % num_photos;
-  overlap.num_samples = static_cast<int>(end - begin);
-  std::vector<float> values(end - begin);
-  for (int channel = 0; channel < 4; ++channel) {
-    std::transform(begin, end, values.begin(),
-                   [channel](const LogRatio& ratio) { return ratio.value[channel]; });
-    overlap.log_ratio[channel] = MedianInPlace(&values);
+// The value at which half of the trust lies below; reorders.
+float WeightedMedian(std::vector<std::pair<float, float>>* values_and_trust) {
+  std::sort(values_and_trust->begin(), values_and_trust->end());
+  double total = 0, sum = 0;
+  for (const auto& [value, trust] : *values_and_trust) total += trust;
+  for (const auto& [value, trust] : *values_and_trust) {
+    sum += trust;
+    if (sum >= total / 2) return value;
   }
-  for (float& value : values) value = std::abs(value - overlap.log_ratio[3]);
-  overlap.spread = 1.4826f * MedianInPlace(&values);
+  return values_and_trust->back().first;
+}
+
+Overlap SummariseOverlap(const std::vector<LogRatio>& ratios, int num_photos) {
+  Overlap overlap;
+  overlap.photo_a = static_cast<int>(ratios[0].pair) / num_photos;
+  overlap.photo_b = static_cast<int>(ratios[0].pair) % num_photos;
+  for (const LogRatio& ratio : ratios) overlap.num_samples += ratio.trust;
+  std::vector<std::pair<float, float>> values(ratios.size());
+  for (int channel = 0; channel < 4; ++channel) {
+    for (size_t i = 0; i < ratios.size(); ++i)
+      values[i] = {ratios[i].value[channel], ratios[i].trust};
+    overlap.log_ratio[channel] = WeightedMedian(&values);
+  }
+  for (auto& [value, trust] : values) value = std::abs(value - overlap.log_ratio[3]);
+  overlap.spread = 1.4826f * WeightedMedian(&values);
   return overlap;
 }
 
-// One statement: coefficients * x = value, known to sigma.
-struct Equation {
-  int plus, minus;  // unknowns with the coefficients +1 and -1; minus < 0 = none
-  int third;        // unknown with the coefficient -1; < 0 = none
-  double value, sigma;
-  bool robust;
-};
-
-double Residual(const Equation& e, const Eigen::VectorXd& x) {
-  return x[e.plus] - (e.minus >= 0 ? x[e.minus] : 0) - (e.third >= 0 ? x[e.third] : 0) - e.value;
+Eigen::Vector4f LogsOf(const Eigen::Vector3f& light) {
+  Eigen::Vector4f logs;
+  logs << light.array().log().matrix(), std::log(light.sum());
+  return logs;
 }
+
+std::vector<LogRatio> ListRatios(const ExposureSamples& samples) {
+  std::vector<LogRatio> ratios;
+  std::vector<Eigen::Vector4f> logs;
+  for (size_t k = 0; k < samples.size(); ++k) {
+    const size_t begin = samples.begin[k], end = samples.begin[k + 1];
+    logs.clear();
+    for (size_t i = begin; i < end; ++i) logs.push_back(LogsOf(samples.views[i].light));
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t j = begin; j < end; ++j) {
+        const ExposureView &a = samples.views[i], &b = samples.views[j];
+        if (a.photo >= b.photo) continue;
+        const auto pair = static_cast<uint32_t>(a.photo * samples.num_photos + b.photo);
+        ratios.push_back({pair, std::min(a.trust, b.trust), logs[i - begin] - logs[j - begin]});
+      }
+    }
+  }
+  return ratios;
+}
+
+// One statement: x[plus] - x[minus] = value, known to sigma.
+struct Equation {
+  int plus, minus;
+  double value, sigma;
+};
 
 // Iteratively reweighted least squares with Cauchy weights.
 Eigen::VectorXd SolveRobust(const std::vector<Equation>& equations, int num_unknowns) {
   Eigen::VectorXd x = Eigen::VectorXd::Zero(num_unknowns);
   for (int iteration = 0; iteration < 30; ++iteration) {
+    // What nothing ties down stays near 0.
     Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(num_unknowns, num_unknowns) * 1e-6;
     Eigen::VectorXd right = Eigen::VectorXd::Zero(num_unknowns);
     for (const Equation& e : equations) {
       double weight = 1 / (e.sigma * e.sigma);
-      if (e.robust && iteration > 0) {
-        const double r = Residual(e, x) / e.sigma / kRobustScale;
+      if (iteration > 0) {
+        const double r = (x[e.plus] - x[e.minus] - e.value) / e.sigma / kRobustScale;
         weight /= 1 + r * r;
       }
-      const int index[3] = {e.plus, e.minus, e.third};
-      const double sign[3] = {1, -1, -1};
-      for (int i = 0; i < 3; ++i) {
-        if (index[i] < 0) continue;
-        right[index[i]] += weight * sign[i] * e.value;
-        for (int j = 0; j < 3; ++j) {
-          if (index[j] >= 0) normal(index[i], index[j]) += weight * sign[i] * sign[j];
-        }
-      }
+      right[e.plus] += weight * e.value;
+      right[e.minus] -= weight * e.value;
+      normal(e.plus, e.plus) += weight;
+      normal(e.minus, e.minus) += weight;
+      normal(e.plus, e.minus) -= weight;
+      normal(e.minus, e.plus) -= weight;
     }
     const Eigen::VectorXd next = normal.ldlt().solve(right);
     const double change = (next - x).cwiseAbs().maxCoeff();
@@ -104,72 +119,45 @@ Eigen::VectorXd SolveRobust(const std::vector<Equation>& equations, int num_unkn
   return x;
 }
 
-// log factor that undoes the exposure in EXIF; none without EXIF.
-std::vector<std::optional<double>> ExifLogGains(const std::vector<ExposureData>& exposures) {
-  std::vector<std::optional<double>> gains;
-  for (const ExposureData& data : exposures) {
-    const auto exposure = data.RelativeExposure();
-    gains.push_back(exposure ? std::optional<double>(-std::log(*exposure)) : std::nullopt);
-  }
-  return gains;
-}
-
-// Photos that EXIF or a chain of overlaps ties to the largest group.
-std::vector<int> FindUnconnected(const std::vector<std::optional<double>>& exif,
-                                 const std::vector<Overlap>& overlaps) {
-  const int n = static_cast<int>(exif.size());
-  std::vector<int> group(n + 1);
-  std::iota(group.begin(), group.end(), 0);
-  const auto root = [&group](int i) {
-    while (group[i] != i) i = group[i] = group[group[i]];
-    return i;
-  };
-  for (const Overlap& overlap : overlaps) group[root(overlap.photo_a)] = root(overlap.photo_b);
-  for (int i = 0; i < n; ++i) {
-    if (exif[i]) group[root(i)] = root(n);
-  }
-  std::map<int, int> sizes;
-  for (int i = 0; i < n; ++i) ++sizes[root(i)];
-  int largest = root(0);
-  for (const auto& [g, size] : sizes) {
-    if (size > sizes[largest]) largest = g;
-  }
-  std::vector<int> unconnected;
-  for (int i = 0; i < n; ++i) {
-    if (root(i) != largest) unconnected.push_back(i);
-  }
-  return unconnected;
-}
-
 // Log gains of one channel (0..2) or of the sum (3). Unknowns: one per photo and one per kind of
-// camera, because shutter times of two makes do not compare.
-std::vector<double> SolveChannel(const std::vector<ExposureData>& exposures,
-                                 const std::vector<std::optional<double>>& exif,
-                                 const std::vector<Overlap>& overlaps, int channel,
-                                 bool exif_rules) {
-  const int n = static_cast<int>(exif.size());
-  std::map<std::string, int> camera_unknown;
+// EXIF.
+std::vector<double> SolveChannel(const ExposurePrior& prior, const std::vector<Overlap>& overlaps,
+                                 int channel) {
+  const int n = static_cast<int>(prior.kind.size());
   std::vector<Equation> equations;
   for (int i = 0; i < n; ++i) {
-    if (!exif[i]) continue;
-    const int next = n + static_cast<int>(camera_unknown.size());
-    const int camera =
-        camera_unknown.emplace(exif_rules ? "" : exposures[i].camera, next).first->second;
-    equations.push_back({i, camera, -1, *exif[i], exif_rules ? 1e-5 : kExifSigma, !exif_rules});
+    if (prior.log_gain[i]) {
+      equations.push_back({i, n + prior.kind[i], *prior.log_gain[i], prior.sigma});
+    }
   }
-  // Cameras compare loosely; the unknown of the first one stays free, the gains' common factor is
-  // set later.
-  for (const auto& [name, unknown] : camera_unknown) {
-    if (unknown != n) equations.push_back({unknown, n, -1, 0.0, 0.5, true});
+  for (int kind = 1; kind < prior.num_kinds; ++kind) {
+    equations.push_back({n + kind, n, 0.0, kKindSigma});
   }
   for (const Overlap& overlap : overlaps) {
-    const double sigma2 =
-        kOverlapSigma * kOverlapSigma + overlap.spread * overlap.spread * 2.0 / overlap.num_samples;
-    equations.push_back({overlap.photo_a, overlap.photo_b, -1, -overlap.log_ratio[channel],
-                         std::sqrt(sigma2), true});
+    const double noise2 = overlap.spread * overlap.spread * 2.0 / overlap.num_samples;
+    equations.push_back({overlap.photo_a, overlap.photo_b, -overlap.log_ratio[channel],
+                         std::sqrt(kOverlapSigma * kOverlapSigma + noise2)});
   }
-  const Eigen::VectorXd x = SolveRobust(equations, n + static_cast<int>(camera_unknown.size()));
+  const Eigen::VectorXd x = SolveRobust(equations, n + prior.num_kinds);
   return {x.data(), x.data() + n};
+}
+
+void FindContradictions(const ExposurePrior& prior, const std::vector<double>& log_gains,
+                        ExposureSolution* solution) {
+  for (int kind = 0; kind < prior.num_kinds; ++kind) {
+    std::vector<double> departures;
+    for (size_t i = 0; i < log_gains.size(); ++i) {
+      if (prior.kind[i] == kind) departures.push_back(log_gains[i] - *prior.log_gain[i]);
+    }
+    const double middle = Median(departures);
+    for (size_t i = 0; i < log_gains.size(); ++i) {
+      if (prior.kind[i] != kind) continue;
+      if (std::abs(log_gains[i] - *prior.log_gain[i] - middle) > kContradiction) {
+        solution->contradicted.push_back(static_cast<int>(i));
+      }
+    }
+  }
+  std::sort(solution->contradicted.begin(), solution->contradicted.end());
 }
 
 }  // namespace
@@ -181,30 +169,8 @@ std::vector<std::string> ExposureOptions::Problems() const {
   return {};
 }
 
-std::vector<Overlap> FindOverlaps(const ObservationStore& store, int num_photos, int min_samples) {
-  std::vector<LogRatio> ratios;
-  const size_t stride = SampleStride(store, num_photos);
-  for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
-    const Observation* observations = store.Begin(sample);
-    std::array<std::pair<int, Eigen::Vector4f>, 64> usable;
-    int count = 0;
-    for (int i = 0; i < store.Count(sample) && count < 64; ++i) {
-      if (UnpackWeight(observations[i].weight) < kLeastWeight) continue;
-      const Eigen::Vector3f color = UnpackColor(observations[i].color);
-      if (!IsWellExposed(color)) continue;
-      Eigen::Vector4f logs;
-      for (int k = 0; k < 3; ++k) logs[k] = std::log(color[k]);
-      logs[3] = std::log(color.sum());
-      usable[count++] = {observations[i].photo, logs};
-    }
-    for (int i = 0; i < count; ++i) {
-      for (int j = 0; j < count; ++j) {
-        if (usable[i].first >= usable[j].first) continue;
-        const auto pair = static_cast<uint32_t>(usable[i].first * num_photos + usable[j].first);
-        ratios.push_back({pair, usable[i].second - usable[j].second});
-      }
-    }
-  }
+std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_samples) {
+  const std::vector<LogRatio> ratios = ListRatios(samples);
   std::vector<uint32_t> order(ratios.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -218,66 +184,92 @@ std::vector<Overlap> FindOverlaps(const ObservationStore& store, int num_photos,
     while (end < order.size() && ratios[order[end]].pair == ratios[order[begin]].pair) {
       of_pair.push_back(ratios[order[end++]]);
     }
-    if (static_cast<int>(of_pair.size()) >= min_samples) {
-      overlaps.push_back(
-          SummariseOverlap(of_pair.data(), of_pair.data() + of_pair.size(), num_photos));
-    }
+    const Overlap overlap = SummariseOverlap(of_pair, samples.num_photos);
+    if (overlap.num_samples >= min_samples) overlaps.push_back(overlap);
     begin = end;
   }
   return overlaps;
 }
 
-ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
-                               const std::vector<Overlap>& overlaps,
-                               const ExposureOptions& options) {
+ExposureTies TieExposures(const std::vector<ExposureData>& exposures,
+                          const std::vector<Overlap>& overlaps, const ExposureOptions& options,
+                          ExposureSolution* solution) {
   const int n = static_cast<int>(exposures.size());
-  ExposureSolution solution;
-  solution.gains.assign(n, Eigen::Vector3f::Ones());
-  if (options.mode == "none" || n == 0) return solution;
-  const std::vector<std::optional<double>> exif = ExifLogGains(exposures);
   const bool exif_rules = options.mode == "exif";
-  for (const auto& gain : exif) solution.without_exif += exif_rules && !gain;
-  solution.unconnected = FindUnconnected(exif, overlaps);
-
-  const std::vector<double> log_gains = SolveChannel(exposures, exif, overlaps, 3, exif_rules);
-  std::vector<int> order(n);
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    return log_gains[a] != log_gains[b] ? log_gains[a] < log_gains[b] : a < b;
-  });
-  solution.reference_photo = order[(n - 1) / 2];
-  const double reference = log_gains[solution.reference_photo];
-
-  std::vector<double> exif_offsets;
-  for (int i = 0; i < n; ++i) {
-    if (exif[i]) exif_offsets.push_back(log_gains[i] - *exif[i]);
+  ExposureTies ties;
+  ties.prior = PriorFromExif(exposures, exif_rules);
+  ties.overlap_groups = GroupPhotos(n, overlaps, nullptr);
+  if (exif_rules) {
+    ties.prior.sigma = 1e-5;
+    for (const auto& gain : ties.prior.log_gain) solution->without_exif += !gain;
+  } else {
+    ExposurePrior none = ties.prior;
+    none.Forget();
+    solution->exif_scatter =
+        ExifScatter(ties.prior, ties.overlap_groups, SolveChannel(none, overlaps, 3));
+    if (solution->exif_scatter) {
+      ties.prior.sigma = std::max(*solution->exif_scatter, kBestExif);
+      solution->exif_ignored = ties.prior.sigma > kUselessExif;
+      if (solution->exif_ignored) ties.prior.Forget();
+    }
   }
-  if (!exif_offsets.empty()) {
-    const auto middle = exif_offsets.begin() + exif_offsets.size() / 2;
-    std::nth_element(exif_offsets.begin(), middle, exif_offsets.end());
-    for (int i = 0; i < n; ++i) {
-      if (exif[i] && std::abs(log_gains[i] - *exif[i] - *middle) > 0.35) {
-        solution.contradicted.push_back(i);
+  ties.groups = GroupPhotos(n, overlaps, &ties.prior);
+  const int largest_overlap = LargestGroup(ties.overlap_groups),
+            largest = LargestGroup(ties.groups);
+  for (int i = 0; i < n; ++i) {
+    if (ties.groups[i] != largest) {
+      solution->unconnected.push_back(i);
+    } else if (ties.overlap_groups[i] != largest_overlap && !exif_rules) {
+      solution->by_exif.push_back(i);
+    }
+  }
+  return ties;
+}
+
+void FinishGains(const ExposureTies& ties, const std::array<std::vector<double>, 3>& log_gains,
+                 ExposureSolution* solution) {
+  const int n = static_cast<int>(ties.groups.size());
+  const auto brightness = [&](int i) {
+    return (log_gains[0][i] + log_gains[1][i] + log_gains[2][i]) / 3;
+  };
+  std::map<int, std::vector<int>> photos_of;
+  for (int i = 0; i < n; ++i) photos_of[ties.groups[i]].push_back(i);
+  solution->gains.assign(n, Eigen::Vector3f::Ones());
+  for (auto& [group, photos] : photos_of) {
+    std::sort(photos.begin(), photos.end(), [&](int a, int b) {
+      return brightness(a) != brightness(b) ? brightness(a) < brightness(b) : a < b;
+    });
+    // The photo of median exposure sets the brightness, the median over all photos the balance of
+    // the colours: one tinted photo must not tint the result.
+    const int reference = photos[(photos.size() - 1) / 2];
+    if (group == LargestGroup(ties.groups)) solution->reference_photo = reference;
+    for (int k = 0; k < 3; ++k) {
+      std::vector<double> tints;
+      for (const int i : photos) tints.push_back(log_gains[k][i] - brightness(i));
+      const double from = brightness(reference) + Median(tints);
+      for (const int i : photos) {
+        solution->gains[i][k] = static_cast<float>(std::exp(log_gains[k][i] - from));
       }
     }
   }
+}
+
+ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
+                               const std::vector<Overlap>& overlaps,
+                               const ExposureOptions& options) {
+  ExposureSolution solution;
+  solution.gains.assign(exposures.size(), Eigen::Vector3f::Ones());
+  if (options.mode == "none" || exposures.empty()) return solution;
+  const ExposureTies ties = TieExposures(exposures, overlaps, options, &solution);
+  const std::vector<double> log_gains = SolveChannel(ties.prior, overlaps, 3);
+  if (!solution.exif_ignored) FindContradictions(ties.prior, log_gains, &solution);
   std::array<std::vector<double>, 3> channels = {log_gains, log_gains, log_gains};
-  Eigen::Vector3d references = Eigen::Vector3d::Constant(reference);
   if (options.white_balance) {
-    for (int k = 0; k < 3; ++k) {
-      channels[k] = SolveChannel(exposures, exif, overlaps, k, false);
-      references[k] = channels[k][solution.reference_photo];
-    }
+    ExposurePrior prior = ties.prior;
+    prior.sigma = std::max(prior.sigma, kBestExif);  // EXIF knows nothing of the channels
+    for (int k = 0; k < 3; ++k) channels[k] = SolveChannel(prior, overlaps, k);
   }
-  for (int i = 0; i < n; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      // A photo that nothing ties to the others stays as it is.
-      const bool tied =
-          !std::binary_search(solution.unconnected.begin(), solution.unconnected.end(), i);
-      solution.gains[i][k] =
-          tied ? static_cast<float>(std::exp(channels[k][i] - references[k])) : 1.0f;
-    }
-  }
+  FinishGains(ties, channels, &solution);
   return solution;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-// Exposure unification (thesis 8.2.1): one factor per photo, in linear light.
+// Exposure unification (thesis 8.2.1): one factor per photo (and channel), in linear light.
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/photo.h"
+#include "texture/exposure_samples.h"
 #include "texture/observations.h"
 
 namespace roomtex {
@@ -25,26 +27,31 @@ struct ExposureOptions {
   std::vector<std::string> Problems() const;
 };
 
-// The same sample seen by two photos, well exposed in both.
+// The same samples seen by two photos, well exposed in both.
 struct Overlap {
   int photo_a = 0, photo_b = 0;
-  int num_samples = 0;
-  // Median over the samples of log(light in a / light in b), per channel r, g, b, and of their sum.
+  double num_samples = 0;  // counted by trust
+  // Weighted median over the samples of log(light in a / light in b), per channel r, g, b, and of
+  // their sum.
   Eigen::Vector4f log_ratio = Eigen::Vector4f::Zero();
   float spread = 0;  // of the sum's: median absolute deviation * 1.4826
 };
 
-// Pairs of photos that share at least min_samples samples, ordered by photo numbers. Looks at an
-// even selection of the samples, so that time stays bounded; reliable, clear observations only.
-std::vector<Overlap> FindOverlaps(const ObservationStore& store, int num_photos,
-                                  int min_samples = 30);
+// Pairs of photos that share at least min_samples samples, ordered by photo numbers.
+std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_samples = 30);
 
 struct ExposureSolution {
   std::vector<Eigen::Vector3f> gains;  // per photo: r, g, b factors in linear light
   int reference_photo = -1;            // gain 1 before `output_scale`; the photo of median exposure
-  std::vector<int> unconnected;        // photos that neither EXIF nor an overlap ties to the others
-  std::vector<int> contradicted;       // photos whose EXIF the overlaps contradict
-  int without_exif = 0;                // in mode "exif": photos that had to be matched
+  // Photos that overlap none of the largest group that overlaps hold together ...
+  std::vector<int> by_exif;      // ... but EXIF ties them to it
+  std::vector<int> unconnected;  // ... and EXIF says nothing: their median gain is that of the rest
+  std::vector<int> contradicted;  // photos whose EXIF the overlaps contradict by half an EV
+  bool exif_ignored = false;      // EXIF as a whole contradicts the overlaps and was left out
+  int without_exif = 0;           // in mode "exif": photos that had to be matched
+  // Scatter of EXIF about the overlaps (robust standard deviation of the log); none without enough
+  // of both.
+  std::optional<double> exif_scatter;
 };
 
 // exposures: EXIF per photo. Photos are numbered as in the overlaps.

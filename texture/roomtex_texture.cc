@@ -185,11 +185,18 @@ void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
     context.Warn(std::to_string(exposure.without_exif) + " of " + std::to_string(photos.size()) +
                  " photos have no exposure in EXIF; they are matched to the others");
   }
+  if (!exposure.by_exif.empty()) {
+    context.Warn("these photos overlap none of the others, their exposure comes from EXIF alone: " +
+                 NameList(photos, exposure.by_exif));
+  }
   if (!exposure.unconnected.empty()) {
     context.Warn(
-        "neither EXIF nor an overlap ties these photos to the others, they stay as they "
-        "are: " +
+        "neither EXIF nor an overlap ties these photos to the others, they get the median "
+        "exposure: " +
         NameList(photos, exposure.unconnected));
+  }
+  if (exposure.exif_ignored) {
+    context.Warn("the exposures in EXIF contradict what the photos show and are not used");
   }
   if (!exposure.contradicted.empty()) {
     context.Warn("the overlaps contradict EXIF by more than half an EV: " +

@@ -38,7 +38,8 @@ struct Capture {
   ExposureSolution Solve(const std::string& mode) const {
     ExposureOptions options;
     options.mode = mode;
-    return SolveExposure(exif, FindOverlaps(store, static_cast<int>(exposure.size())), options);
+    return SolveExposure(
+        exif, FindOverlaps(SelectSamples(store, static_cast<int>(exposure.size()))), options);
   }
   // Largest error of log(gain * exposure) after the common factor.
   double LargestError(const ExposureSolution& solution) const {
@@ -88,6 +89,7 @@ TEST(Exposure, OfAPhotoWithoutOverlapComesFromExif) {
   const ExposureSolution solution = capture.Solve("match");
   EXPECT_LT(capture.LargestError(solution), 0.02);
   EXPECT_TRUE(solution.unconnected.empty());
+  EXPECT_EQ(solution.by_exif, std::vector<int>{4});
 }
 
 TEST(Exposure, OfAPhotoWithNothingAtAllStaysAndIsNamed) {
@@ -98,6 +100,88 @@ TEST(Exposure, OfAPhotoWithNothingAtAllStaysAndIsNamed) {
   const ExposureSolution solution = capture.Solve("match");
   EXPECT_EQ(solution.unconnected, std::vector<int>{4});
   EXPECT_FLOAT_EQ(solution.gains[4][0], 1);
+}
+
+TEST(Exposure, IsFoundInSpiteOfTheSameNonsenseInEveryExif) {
+  Capture capture({0.5, 1, 2, 1.26, 0.79, 1.6, 0.63}, 8000, 0.02, Chain);
+  for (ExposureData& exif : capture.exif) exif.exposure_time = 1.0 / 60;
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_LT(capture.LargestError(solution), 0.01);
+  EXPECT_TRUE(solution.exif_ignored);
+}
+
+TEST(Exposure, IsFoundInSpiteOfRoundedExif) {
+  Capture capture({0.5, 1, 2, 1.26, 0.79, 1.6, 0.63}, 8000, 0.02, Chain);
+  for (size_t p = 0; p < capture.exif.size(); ++p) {
+    *capture.exif[p].exposure_time *= p % 2 == 0 ? 1.08 : 0.93;
+  }
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_LT(capture.LargestError(solution), 0.01);
+  EXPECT_FALSE(solution.exif_ignored);
+  ASSERT_TRUE(solution.exif_scatter);
+  EXPECT_NEAR(*solution.exif_scatter, 0.1, 0.06);
+}
+
+// Photos 0-2 and 3-4 see two rooms.
+bool TwoRooms(int photo, int sample) { return (photo < 3) == (sample < 3000); }
+
+TEST(Exposure, OfTwoGroupsThatDoNotOverlapIsTiedByExif) {
+  Capture capture(kExposures, 6000, 0.02, TwoRooms);
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_LT(capture.LargestError(solution), 0.02);
+  EXPECT_EQ(solution.by_exif, (std::vector<int>{3, 4}));
+}
+
+TEST(Exposure, OfAGroupThatNothingTiesIsEvenWithinAndAtTheMedian) {
+  Capture capture({0.5, 1, 2, 1.26, 0.6}, 6000, 0.02, TwoRooms);
+  capture.DropExif();
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_EQ(solution.unconnected, (std::vector<int>{3, 4}));
+  EXPECT_NEAR(std::log(solution.gains[4][1] / solution.gains[3][1]), std::log(1.26 / 0.6), 0.02);
+  EXPECT_NEAR(solution.gains[0][1] * 0.5, solution.gains[2][1] * 2, 0.02);
+  EXPECT_FLOAT_EQ(solution.gains[3][1], 1);  // the lower median of two
+}
+
+TEST(Exposure, OfOnePhotoOnlyIsLeftAlone) {
+  Capture capture({2.0}, 500, 0.02, [](int, int) { return true; });
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_EQ(solution.gains[0], Eigen::Vector3f::Ones());
+  EXPECT_EQ(solution.reference_photo, 0);
+  EXPECT_TRUE(solution.unconnected.empty());
+  EXPECT_TRUE(solution.by_exif.empty());
+}
+
+TEST(Exposure, ComparesExifOfTheSameFieldsOnly) {
+  // Photos 3 and 4 were taken with a lens without contacts: no aperture in EXIF.
+  Capture capture(kExposures, 6000, 0.02, Chain);
+  for (int p = 0; p < 5; ++p) {
+    if (p < 3) capture.exif[p].f_number = 8;
+  }
+  const ExposureSolution solution = capture.Solve("match");
+  EXPECT_LT(capture.LargestError(solution), 0.01);
+  EXPECT_TRUE(solution.contradicted.empty());
+}
+
+TEST(Exposure, TrustsNeitherClippedNorNearlyBlackLight) {
+  // Two photos, one four times as long: a third of its samples is clipped, a third of the other's
+  // is black.
+  ObservationStore store(3000, 2);
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 0.003f);
+  for (int i = 0; i < 3000; ++i) {
+    const float truth = i % 3 == 0 ? 0.5f : i % 3 == 1 ? 0.1f : 0.003f;
+    for (int p = 0; p < 2; ++p) {
+      const float light = std::clamp(truth * (p == 0 ? 1.0f : 4.0f) + noise(random), 0.0f, 1.0f);
+      Observation o;
+      o.color = PackColor(Eigen::Vector3f::Constant(light));
+      o.weight = PackWeight(0.5f);
+      o.photo = static_cast<uint16_t>(p);
+      store.Add(i, o);
+    }
+  }
+  const std::vector<Overlap> overlaps = FindOverlaps(SelectSamples(store, 2));
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_NEAR(overlaps[0].log_ratio[3], -std::log(4), 0.01);
 }
 
 TEST(Exposure, ModeExifMatchesPhotosWithoutExif) {
@@ -140,7 +224,7 @@ TEST(Exposure, WhiteBalanceIsMatchedPerChannel) {
   ExposureOptions options;
   options.white_balance = true;
   const ExposureSolution solution =
-      SolveExposure(std::vector<ExposureData>(3), FindOverlaps(store, 3), options);
+      SolveExposure(std::vector<ExposureData>(3), FindOverlaps(SelectSamples(store, 3)), options);
   const Eigen::Vector3f relative = solution.gains[2].cwiseQuotient(solution.gains[0]);
   EXPECT_NEAR(relative[0], 1 / 1.5, 0.01);
   EXPECT_NEAR(relative[1], 1, 0.01);
