@@ -11,6 +11,10 @@ struct Band {
   int first_read, end_read;  // with the rows beside them that filters reach for
 };
 
+// Bands begin and end where tiles of samples do (mesh_tiles.cc), so that the numbers are the same
+// to the last bit with any bands.
+constexpr int kTileRows = 32;
+
 std::vector<Band> SplitIntoBands(const TexelSource& source, const TexelPassOptions& options) {
   const int rows = source.num_rows();
   // Three sigmas of the Gaussian, the borders of dominance and their neighbours.
@@ -25,7 +29,8 @@ std::vector<Band> SplitIntoBands(const TexelSource& source, const TexelPassOptio
   for (int i = 0; i < count; ++i) {
     const int first = static_cast<int>(static_cast<int64_t>(rows) * i / count);
     const int end = static_cast<int>(static_cast<int64_t>(rows) * (i + 1) / count);
-    bands.push_back({first, end, std::max(0, first - halo), std::min(rows, end + halo)});
+    bands.push_back({first, end, std::max(0, (first - halo) / kTileRows * kTileRows),
+                     std::min(rows, (end + halo + kTileRows - 1) / kTileRows * kTileRows)});
   }
   return bands;
 }

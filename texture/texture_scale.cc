@@ -41,7 +41,8 @@ int ChooseTextureScale(const std::vector<Scan>& scans, double pixels_per_sample,
   const double most_texels =
       std::min(kMaxAutoTexels, kMaxAutoBands * max_bytes / BytesPerTexel(blend));
   const double bound = std::min<double>(kMaxAutoScale, std::floor(std::sqrt(most_texels / cells)));
-  return static_cast<int>(std::clamp(std::round(pixels_per_sample), 1.0, std::max(1.0, bound)));
+  return static_cast<int>(
+      std::clamp(std::ceil(pixels_per_sample - 1e-9), 1.0, std::max(1.0, bound)));
 }
 
 }  // namespace roomtex

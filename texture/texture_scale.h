@@ -18,9 +18,10 @@ double MedianPixelsPerSample(const PhotoPassInput& input, const ObservationStore
 
 inline constexpr int kMaxTextureScale = 16;
 
-// Texels per sample and direction, the --Texture.scale 0 of roomtex-texture: the nearest whole
-// number of pixels per sample, but no more than kMaxAutoScale, than fit into max_bytes in
-// kMaxAutoBands bands, and than kMaxAutoTexels in all: an ordinary run stays one of about a minute.
+// Texels per sample and direction, the --Texture.scale 0 of roomtex-texture: pixels per sample,
+// rounded up, so that half of the samples lose nothing of the photos; but no more than
+// kMaxAutoScale, than fit into max_bytes in kMaxAutoBands bands, and than kMaxAutoTexels in all: an
+// ordinary run stays one of about a minute.
 inline constexpr int kMaxAutoScale = 4, kMaxAutoBands = 4;
 inline constexpr double kMaxAutoTexels = 40e6;
 int ChooseTextureScale(const std::vector<Scan>& scans, double pixels_per_sample,

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <tiny_gltf.h>
 
 #include "capture/capture_writer.h"
@@ -57,15 +58,8 @@ class TextureCommand : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TempFolder;
-    SimulatedRoomOptions options;
-    options.random_seed = 5;
-    options.num_photos = 12;
-    options.photo_width = 1080;
-    options.photo_height = 720;
-    options.scan_columns = 500;
-    options.scan_rows = 190;
     Progress progress(true);
-    WriteCapture(SimulatedRoom(options), Capture(), &progress);
+    WriteCapture(SimulatedRoom(RoomOptions()), Capture(), &progress);
     result_ = Texture("textured");
   }
   static void TearDownTestSuite() {
@@ -73,13 +67,24 @@ class TextureCommand : public testing::Test {
     folder_ = nullptr;
   }
 
+  static SimulatedRoomOptions RoomOptions() {
+    SimulatedRoomOptions options;
+    options.random_seed = 5;
+    options.num_photos = 12;
+    options.photo_width = 1080;
+    options.photo_height = 720;
+    options.scan_columns = 500;
+    options.scan_rows = 190;
+    return options;
+  }
   static std::string Capture() { return *folder_ / "capture"; }
   static CommandResult Texture(const std::string& output, const std::string& more = "",
                                const std::string& scan = "") {
+    const bool scale_given = more.find("--Texture.scale") != std::string::npos;
     return RunCommandLine("roomtex-texture --quiet --input_path " + Capture() +
                           "/truth --image_path " + Capture() + "/photos --scan_path " +
                           (scan.empty() ? Capture() + "/scan.rtpi" : scan) + " --output_path " +
-                          (*folder_ / output) + " " + more);
+                          (*folder_ / output) + (scale_given ? " " : " --Texture.scale 1 ") + more);
   }
   static std::string Path(const std::string& name) { return *folder_ / name; }
   static Scan ReadCaptureScan() { return ReadScan(Capture() + "/scan.rtpi", {}); }
@@ -244,12 +249,61 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   EXPECT_EQ(model.meshes.at(0).primitives.at(0).attributes.count("COLOR_0"), 1u);
 }
 
-TEST_F(TextureCommand, ScaleTwoDoublesTheTextureImage) {
-  const CommandResult result = Texture("scaled", "--Texture.scale 2");
+// The true colours between the samples: the same room, scanned more finely.
+double TexturePsnr(const cv::Mat3b& texture, SimulatedRoomOptions room) {
+  room.scan_columns = texture.cols;
+  room.scan_rows = texture.rows;
+  room.missing_samples = false;
+  const std::vector<Eigen::Vector3f> truth = SimulatedRoom(room).TrueColors();
+  const auto& linear = LinearFromSrgbByte();
+  double cross = 0, square = 0, error = 0, count = 0;
+  for (const bool measure : {false, true}) {
+    for (size_t i = 0; i < truth.size(); ++i) {
+      const cv::Vec3b& c =
+          texture(static_cast<int>(i) / texture.cols, static_cast<int>(i) % texture.cols);
+      if (c[0] + c[1] + c[2] == 0) continue;
+      for (int k = 0; k < 3; ++k) {
+        const double have = linear[c[2 - k]], want = truth[i][k];
+        if (measure) {
+          const double light = std::min(1.0, cross / square * have);
+          error += std::pow(SrgbFromLinear(light) - SrgbFromLinear(want), 2);
+          ++count;
+        } else {
+          cross += have * want;
+          square += have * have;
+        }
+      }
+    }
+  }
+  return -10 * std::log10(error / count);
+}
+
+TEST_F(TextureCommand, ALargerScaleShowsTheRoomBetweenTheSamples) {
+  ASSERT_EQ(Texture("coarse", "--Texture.unseen black").exit_code, 0);
+  const CommandResult result = Texture("fine", "--Texture.scale 3 --Texture.unseen black");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const cv::Mat texture = cv::imread(Path("scaled/texture.png"));
-  EXPECT_EQ(texture.cols, 1000);
-  EXPECT_EQ(texture.rows, 380);
+  const cv::Mat3b coarse = cv::imread(Path("coarse/texture.png"));
+  const cv::Mat3b fine = cv::imread(Path("fine/texture.png"));
+  ASSERT_EQ(fine.size(), cv::Size(1500, 570));
+  EXPECT_EQ(ReadJson(Path("fine/report.json"))["texture_scale"], 3);
+  cv::Mat3b enlarged;
+  cv::resize(coarse, enlarged, fine.size(), 0, 0, cv::INTER_NEAREST);
+  const double psnr = TexturePsnr(fine, RoomOptions());
+  EXPECT_GT(psnr, 23.5);
+  EXPECT_GT(psnr, TexturePsnr(enlarged, RoomOptions()) + 3);
+  // The vertices are the same ones.
+  EXPECT_EQ(ReadBytes(Path("fine/model.ply")), ReadBytes(Path("coarse/model.ply")));
+}
+
+TEST_F(TextureCommand, ChoosesTheScaleByThePhotosAndTheMemory) {
+  ASSERT_EQ(Texture("auto", "--Texture.scale auto").exit_code, 0);
+  const json report = ReadJson(Path("auto/report.json"));
+  const int scale = report["texture_scale"];
+  EXPECT_EQ(scale, std::min(4.0, std::ceil(report["pixels_per_sample"].get<double>())));
+  EXPECT_GT(scale, 1);
+  EXPECT_EQ(cv::imread(Path("auto/texture.png")).cols, 500 * scale);
+  ASSERT_EQ(Texture("zero", "--Texture.scale 0").exit_code, 0);
+  EXPECT_EQ(ReadBytes(Path("zero/texture.png")), ReadBytes(Path("auto/texture.png")));
 }
 
 // A patterned and a plain photo of each pose: colour comes from the plain ones only.
@@ -303,7 +357,9 @@ TEST_F(TextureCommand, BadInputGetsASentence) {
   expect(model + " --image_path " + photos + rest, 2, "--scan_path is required");
   const std::string all = model + " --image_path " + photos + " --scan_path " + scan;
   expect(all + " --output_path " + scan, 3, "is a file, expected a folder");
-  expect(all + rest + " --Texture.scale 0", 2, "Texture.scale");
+  expect(all + rest + " --Texture.scale -1", 2, "Texture.scale must be 1 to 16");
+  expect(all + rest + " --Texture.scale fine", 2, "Texture.scale");
+  expect(all + rest + " --Texture.max_memory_mb 1", 2, "Texture.max_memory_mb");
   expect(all + rest + " --Occlusion.depth_tolerance -1", 2, "Occlusion.depth_tolerance");
   expect(all + rest + " --Exposure.mode guess", 2, "exif, match or none");
   expect(all + rest + " --associations_path " + Path("none.csv"), 3, "does not exist");
