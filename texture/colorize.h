@@ -12,6 +12,7 @@
 #include "texture/detail.h"
 #include "texture/exposure.h"
 #include "texture/grid_colors.h"
+#include "texture/mesh_atlas.h"
 #include "texture/photo_view.h"
 #include "texture/scan_surface.h"
 #include "texture/visibility.h"
@@ -43,6 +44,7 @@ struct ColoredScan {
   // texture_scale times as many columns and rows; empty when that is 1 or the scan has no grid.
   // Texel (c, r) lies at the sample coordinates ((c + 0.5) / scale - 0.5, (r + 0.5) / scale - 0.5).
   ColorGrid texture;
+  MeshAtlas atlas;  // of a mesh without a grid, where it is worth one
 };
 
 struct ColorizeResult {

@@ -1,29 +1,18 @@
 #include "texture/write_glb.h"
 
 #include <algorithm>
-#include <cstring>
-#include <map>
+#include <limits>
 
 #include <opencv2/imgcodecs.hpp>
 #include <tiny_gltf.h>
 
 #include "core/error.h"
-#include "core/frames.h"
 #include "core/output_file.h"
 #include "core/photo.h"
-#include "texture/write_texture.h"
+#include "texture/textured_parts.h"
 
 namespace roomtex {
 namespace {
-
-// A part of a scan that shares one texture image.
-struct Part {
-  int first_column = 0, first_row = 0;    // samples
-  int num_columns = 0, num_rows = 0;      // samples, the last ones shared with the next part
-  std::vector<int> vertices;              // grid index
-  std::vector<std::array<int, 2>> cells;  // column and row of each vertex within the part
-  std::vector<uint32_t> corners;          // three per triangle, into vertices
-};
 
 class GlbBuilder {
  public:
@@ -55,13 +44,12 @@ class GlbBuilder {
     const Bounds bounds = FindBounds(scan);
     centre_ = 0.5 * (bounds.min + bounds.max);
     tinygltf::Mesh mesh;
-    if (scan.organised) {
-      for (const Part& part : SplitGrid(scan, colored)) {
-        mesh.primitives.push_back(TexturedPrimitive(scan, colored, part));
-      }
-    } else {
-      mesh.primitives.push_back(VertexColorPrimitive(scan, colored));
+    const bool textured = scan.organised || !colored.atlas.empty();
+    for (const TexturedPart& part : MakeTexturedParts(scan, colored, options_.max_texture_size)) {
+      mesh.primitives.push_back(TexturedPrimitive(scan, colored, part));
     }
+    if (!textured) mesh.primitives.push_back(VertexColorPrimitive(scan, colored));
+    if (mesh.primitives.empty()) return;  // triangles without an area
     tinygltf::Node node;
     node.name = "scan " + std::to_string(model_.meshes.size());
     node.mesh = static_cast<int>(model_.meshes.size());
@@ -85,10 +73,8 @@ class GlbBuilder {
   }
 
  private:
-  std::vector<Part> SplitGrid(const Scan& scan, const ColoredScan& colored) const;
-  cv::Mat PartImage(const Scan& scan, const ColoredScan& colored, const Part& part) const;
   tinygltf::Primitive TexturedPrimitive(const Scan& scan, const ColoredScan& colored,
-                                        const Part& part);
+                                        const TexturedPart& part);
   tinygltf::Primitive VertexColorPrimitive(const Scan& scan, const ColoredScan& colored);
 
   // Appends bytes to the buffer, aligned to 4; gives the number of the new view.
@@ -165,86 +151,18 @@ class GlbBuilder {
   tinygltf::Model model_;
 };
 
-// Corner columns of a triangle, unrolled: where a full turn closes, column 0 becomes num_columns.
-std::array<int, 3> UnrolledColumns(const Triangle& t, int num_columns) {
-  std::array<int, 3> columns{t[0] % num_columns, t[1] % num_columns, t[2] % num_columns};
-  const int low = std::min({columns[0], columns[1], columns[2]});
-  const int high = std::max({columns[0], columns[1], columns[2]});
-  if (high - low > 1 && num_columns > 2) {
-    for (int& column : columns) column += column == 0 ? num_columns : 0;
-  }
-  return columns;
-}
-
-std::vector<Part> GlbBuilder::SplitGrid(const Scan& scan, const ColoredScan& colored) const {
-  const int scale =
-      colored.texture.num_columns > 0 ? colored.texture.num_columns / scan.num_columns : 1;
-  const int samples = std::max(2, options_.max_texture_size / scale);
-  const int quads = samples - 1;
-  std::map<std::pair<int, int>, Part> parts;  // by row and column of the part
-  std::map<std::pair<int, int>, std::vector<int>> local_of;
-  for (const Triangle& t : colored.triangles) {
-    const std::array<int, 3> columns = UnrolledColumns(t, scan.num_columns);
-    const std::array<int, 3> rows{t[0] / scan.num_columns, t[1] / scan.num_columns,
-                                  t[2] / scan.num_columns};
-    const std::pair<int, int> key{*std::min_element(rows.begin(), rows.end()) / quads,
-                                  *std::min_element(columns.begin(), columns.end()) / quads};
-    Part& part = parts[key];
-    std::vector<int>& local = local_of[key];
-    if (part.num_columns == 0) {
-      part.first_row = key.first * quads;
-      part.first_column = key.second * quads;
-      part.num_rows = std::min(samples, scan.num_rows - part.first_row);
-      part.num_columns = std::min(samples, scan.num_columns + 1 - part.first_column);
-      local.assign(static_cast<size_t>(part.num_rows) * part.num_columns, -1);
-    }
-    for (int k = 0; k < 3; ++k) {
-      const int column = columns[k] - part.first_column, row = rows[k] - part.first_row;
-      int& number = local[row * part.num_columns + column];
-      if (number < 0) {
-        number = static_cast<int>(part.vertices.size());
-        part.vertices.push_back(t[k]);
-        part.cells.push_back({column, row});
-      }
-      part.corners.push_back(static_cast<uint32_t>(number));
-    }
-  }
-  std::vector<Part> list;
-  for (auto& [key, part] : parts) list.push_back(std::move(part));
-  return list;
-}
-
-cv::Mat GlbBuilder::PartImage(const Scan& scan, const ColoredScan& colored,
-                              const Part& part) const {
-  const bool fine = colored.texture.num_columns > 0;
-  const ColorGrid& grid = fine ? colored.texture : colored.samples;
-  const int scale = fine ? colored.texture.num_columns / scan.num_columns : 1;
-  cv::Mat3b image(part.num_rows * scale, part.num_columns * scale, cv::Vec3b(0, 0, 0));
-  cv::Mat1b known(image.size(), uint8_t{0});
-  for (int row = 0; row < image.rows; ++row) {
-    for (int column = 0; column < image.cols; ++column) {
-      const int grid_column = (part.first_column * scale + column) % grid.num_columns;
-      const int grid_row = part.first_row * scale + row;
-      const int sample = scan.Index(grid_column / scale, grid_row / scale);
-      if (scan.IsMissing(sample)) continue;
-      const auto& [r, g, b] =
-          grid.rgb[static_cast<size_t>(grid_row) * grid.num_columns + grid_column];
-      image(row, column) = {b, g, r};
-      known(row, column) = 1;
-    }
-  }
-  cv::Mat painted = image;
-  PaintGutters(known, 16 * scale, &painted);
-  return painted;
-}
-
 tinygltf::Primitive GlbBuilder::TexturedPrimitive(const Scan& scan, const ColoredScan& colored,
-                                                  const Part& part) {
-  std::vector<unsigned char> png;
-  cv::imencode(".png", PartImage(scan, colored, part), png, {cv::IMWRITE_PNG_COMPRESSION, 2});
+                                                  const TexturedPart& part) {
+  std::vector<unsigned char> bytes;
   tinygltf::Image image;
-  image.mimeType = "image/png";
-  image.bufferView = AddView(png.data(), png.size(), 0);
+  if (options_.jpeg) {
+    cv::imencode(".jpg", PartImage(scan, colored, part), bytes, {cv::IMWRITE_JPEG_QUALITY, 95});
+    image.mimeType = "image/jpeg";
+  } else {
+    cv::imencode(".png", PartImage(scan, colored, part), bytes, {cv::IMWRITE_PNG_COMPRESSION, 2});
+    image.mimeType = "image/png";
+  }
+  image.bufferView = AddView(bytes.data(), bytes.size(), 0);
   model_.images.push_back(image);
   tinygltf::Texture texture;
   texture.sampler = 0;
@@ -252,12 +170,8 @@ tinygltf::Primitive GlbBuilder::TexturedPrimitive(const Scan& scan, const Colore
   model_.textures.push_back(texture);
 
   std::vector<float> uv;
-  uv.reserve(2 * part.cells.size());
-  for (const auto& [column, row] : part.cells) {
-    const Eigen::Vector2d at =
-        GltfUvFromImg({column + 0.5, row + 0.5}, part.num_columns, part.num_rows);
-    uv.insert(uv.end(), {static_cast<float>(at.x()), static_cast<float>(at.y())});
-  }
+  uv.reserve(2 * part.uv.size());
+  for (const Eigen::Vector2f& at : part.uv) uv.insert(uv.end(), {at.x(), at.y()});
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.attributes["POSITION"] = AddPositions(scan, part.vertices);
@@ -293,6 +207,11 @@ tinygltf::Primitive GlbBuilder::VertexColorPrimitive(const Scan& scan, const Col
 }
 
 }  // namespace
+
+std::vector<std::string> GlbOptions::Problems() const {
+  if (max_texture_size >= 256 && max_texture_size <= 16384) return {};
+  return {"--Texture.max_size must be 256 to 16384 texels"};
+}
 
 void WriteColoredGlb(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
                      const std::string& path, const GlbOptions& options) {

@@ -6,6 +6,7 @@
 #include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/two_walls.h"
+#include "texture/textured_parts.h"
 #include "texture/write_glb.h"
 #include "texture/write_ply.h"
 #include "texture/write_texture.h"
@@ -142,6 +143,80 @@ TEST(WriteColoredGlb, SplitsLargeGridsIntoTexturesThatShareTheirBorders) {
     EXPECT_LE(image.height, 25);
   }
   ExpectColorsAtVertices(model, scan, colored.triangles.size());
+}
+
+// A wall of 400 x 150 samples whose colours tell their cell; every cell as 2 x 2 texels.
+struct LargeWall {
+  Scan scan;
+  ColoredScan colored;
+  static Rgb ColorOf(int column, int row) {
+    return {static_cast<uint8_t>(column % 200), static_cast<uint8_t>(row),
+            static_cast<uint8_t>(100 + column / 200)};
+  }
+  LargeWall() {
+    TwoWalls scene;
+    scene.board_half = 0;
+    scan = scene.MakeScan(400, 150);
+    scan.points[scan.Index(130, 70)] = Scan::MissingPoint();
+    colored.triangles = BuildScanMesh(scan, ScanMeshOptions());
+    colored.texture.num_columns = 800;
+    colored.texture.num_rows = 300;
+    for (int row = 0; row < 300; ++row) {
+      for (int column = 0; column < 800; ++column) {
+        colored.texture.rgb.push_back(ColorOf(column / 2, row / 2));
+      }
+    }
+  }
+};
+
+TEST(TexturedParts, NeighboursOverlapInStepsOfSixteenTexels) {
+  const LargeWall wall;
+  const std::vector<TexturedPart> parts = MakeTexturedParts(wall.scan, wall.colored, 256);
+  EXPECT_EQ(parts.size(), 10u);  // 96 or fewer quads each: 5 across, 2 down
+  size_t num_corners = 0;
+  for (const TexturedPart& part : parts) {
+    num_corners += part.corners.size();
+    EXPECT_LE(part.width, 256);
+    EXPECT_LE(part.height, 256);
+    for (const int length : {part.width, part.height, part.first_column, part.first_row}) {
+      EXPECT_EQ(length % 16, 0);
+    }
+    const cv::Mat3b image = PartImage(wall.scan, wall.colored, part);
+    ASSERT_EQ(image.size(), cv::Size(part.width, part.height));
+    for (size_t v = 0; v < part.vertices.size(); ++v) {
+      const int column = part.vertices[v] % 400, row = part.vertices[v] / 400;
+      // A sample's centre lies on the corner that its four texels share.
+      const auto x = static_cast<int>(std::lround(part.uv[v].x() * part.width));
+      const auto y = static_cast<int>(std::lround(part.uv[v].y() * part.height));
+      const Rgb want = LargeWall::ColorOf(column, row);
+      // Sixteen samples around it are there for filters, as far as the grid reaches.
+      for (const int far : {-1, 0, -30, 30}) {
+        const int ix = x + far, iy = y + far;
+        ASSERT_TRUE(ix >= 0 && iy >= 0 && ix < part.width && iy < part.height) << far;
+        const cv::Vec3b have = image(iy, ix);
+        if (far == 0 || far == -1) {
+          ASSERT_EQ(have, cv::Vec3b(want[2], want[1], want[0]));
+        } else if (row > 16 && row < 132) {
+          ASSERT_NEAR(have[1], row + far / 2, 1);  // 1: at the hole
+        }
+      }
+    }
+  }
+  EXPECT_EQ(num_corners, 3 * wall.colored.triangles.size());
+}
+
+TEST(TexturedParts, HolesArePaintedLikeTheirNeighbours) {
+  const LargeWall wall;
+  for (const TexturedPart& part : MakeTexturedParts(wall.scan, wall.colored, 4096)) {
+    EXPECT_EQ(part.width, 802);  // room for the first column to stand again behind the last
+    const cv::Mat3b image = PartImage(wall.scan, wall.colored, part);
+    for (int y = 140; y < 142; ++y) {
+      for (int x = 260; x < 262; ++x) {
+        EXPECT_NEAR(image(y, x)[2], 130, 1);
+        EXPECT_NEAR(image(y, x)[1], 70, 1);
+      }
+    }
+  }
 }
 
 TEST(WriteColoredGlb, KeepsMillimetresOfGeoreferencedScans) {
