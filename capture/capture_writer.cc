@@ -65,7 +65,7 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
   file.stream().flush();
   if (room.options().exif) {
     ExposureData exposure;
-    exposure.exposure_time = room.ExposureTime(photo);
+    exposure.exposure_time = room.NotedTime(photo);
     exposure.f_number = kAperture;
     exposure.iso = kIso;
     exposure.camera = "roomtex simulated camera";
@@ -155,7 +155,7 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   SparseModel model;
   model.cameras[1] = room.camera();
   std::ostringstream exposures = ExactStream();
-  exposures << "image_name,exposure_ev,exposure_time\n";
+  exposures << "image_name,exposure_ev,exposure_time,red_gain,blue_gain\n";
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
     SparseImage& image = model.images[photo + 1];
     image.image_id = photo + 1;
@@ -163,7 +163,7 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
     image.name = room.PhotoName(photo);
     image.cam_from_model = room.CamFromScan(photo);
     exposures << image.name << "," << room.ExposureEv(photo) << "," << room.ExposureTime(photo)
-              << "\n";
+              << "," << room.WhiteBalance(photo)[0] << "," << room.WhiteBalance(photo)[2] << "\n";
   }
   WriteSparseModelText(model, folder);
   WriteText(folder + "/exposures.csv", exposures.str());

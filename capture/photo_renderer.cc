@@ -7,29 +7,13 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "capture/camera_faults.h"
 #include "capture/random_stream.h"
 #include "core/parallel.h"
 #include "core/photo.h"
 
 namespace roomtex {
 namespace {
-
-// 0..255, not rounded; the sRGB curve from a table over the square root, where it is nearly
-// straight.
-float GreyFromLinear(float linear) {
-  constexpr int kNodes = 1024;
-  static const std::array<float, kNodes + 2> table = [] {
-    std::array<float, kNodes + 2> grey{};
-    for (int i = 0; i < kNodes + 2; ++i) {
-      const double root = static_cast<double>(i) / kNodes;
-      grey[i] = static_cast<float>(255 * SrgbFromLinear(root * root));
-    }
-    return grey;
-  }();
-  const float x = kNodes * std::sqrt(std::clamp(linear, 0.0f, 1.0f));
-  const int node = static_cast<int>(x);
-  return table[node] + (x - static_cast<float>(node)) * (table[node + 1] - table[node]);
-}
 
 // Mean 0, standard deviation 1: the sum of four even 16-bit numbers. Its tails end at 3.5, which
 // noise of a few grey levels does not show.
@@ -45,6 +29,8 @@ PhotoRenderer::PhotoRenderer(const RoomScene& scene, const CameraProjection& cam
     : scene_(scene),
       width_(camera.camera().width),
       height_(camera.camera().height),
+      principal_point_(camera.ImgFromCam(Eigen::Vector3d::UnitZ())
+                           .value_or(Eigen::Vector2d(width_ / 2.0, height_ / 2.0))),
       lattice_columns_((width_ + kStep - 1) / kStep + 2) {
   const int rows = (height_ + kStep - 1) / kStep + 2;
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -147,15 +133,21 @@ void PhotoRenderer::Develop(const cv::Mat& linear, const PhotoSettings& settings
   cv::Mat light = linear;
   if (settings.blur_px > 0) cv::GaussianBlur(linear, light, {0, 0}, settings.blur_px);
   photo->create(height_, width_, CV_8UC3);
-  const auto gain = static_cast<float>(std::exp2(settings.exposure_ev));
+  const Eigen::Vector3f gain =
+      static_cast<float>(std::exp2(settings.exposure_ev)) * settings.white_balance;
+  const ResponseTable response(settings.response);
+  const double diagonal2 = (width_ * width_ + height_ * height_) / 4.0;
   const auto noise = static_cast<float>(settings.noise);
   ParallelFor(num_threads, 0, height_, [&](int y) {
     RandomStream random(MixBits(settings.noise_seed, y));
     for (int x = 0; x < width_; ++x) {
       const cv::Vec3f& value = light.at<cv::Vec3f>(y, x);
+      const double radius2 =
+          (Eigen::Vector2d(x + 0.5, y + 0.5) - principal_point_).squaredNorm() / diagonal2;
+      const auto lens = static_cast<float>(VignettingAt(radius2, settings.vignetting));
       cv::Vec3b& pixel = photo->at<cv::Vec3b>(y, x);
       for (int k = 0; k < 3; ++k) {
-        float grey = GreyFromLinear(gain * value[k]);
+        float grey = response.Grey(lens * gain[2 - k] * value[k]);
         if (noise > 0) grey += noise * NearlyGaussian(random.Bits());
         pixel[k] = cv::saturate_cast<uchar>(grey);
       }

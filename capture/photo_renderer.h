@@ -1,6 +1,7 @@
 #pragma once
 // Photos of the simulated room. Frames: `room`, `cam`, `img`.
 
+#include <string>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -16,6 +17,10 @@ struct PhotoSettings {
   double blur_px = 0;       // Gaussian sigma
   double noise = 0;         // grey levels of 255, standard deviation
   uint64_t noise_seed = 0;  // one per photo
+  // See camera_faults.h.
+  std::string response = "srgb";
+  double vignetting = 0;
+  Eigen::Vector3f white_balance = Eigen::Vector3f::Ones();  // factors on red, green, blue
 };
 
 class PhotoRenderer {
@@ -23,7 +28,7 @@ class PhotoRenderer {
   // Both must outlive the renderer.
   PhotoRenderer(const RoomScene& scene, const CameraProjection& camera);
 
-  // 8-bit BGR, sRGB. Rows side by side; the same for every number of threads.
+  // 8-bit BGR. Rows side by side; the same for every number of threads.
   cv::Mat Render(const Rigid& cam_from_room, const PhotoSettings& settings, int num_threads) const;
 
  private:
@@ -39,6 +44,7 @@ class PhotoRenderer {
 
   const RoomScene& scene_;
   int width_, height_;
+  Eigen::Vector2d principal_point_;
   // (x/z, y/z) of the rays through a lattice of kStep pixels, linear between: exact to 0.001 px.
   static constexpr int kStep = 4;
   int lattice_columns_;

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "capture/camera_faults.h"
 #include "capture/capture_writer.h"
 #include "capture/simulated_room.h"
 #include "core/command_line.h"
@@ -35,6 +36,16 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddDouble("blur_px", &options->blur_px, "blur of the photos, Gaussian sigma in pixels");
   command->AddInt("num_stations", &options->num_stations, "number of scans");
   command->AddInt("scan_columns", &options->scan_columns, "samples over the full turn");
+  command->AddChoice("response", &options->response, ResponseTable::Names(),
+                     "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
+                     "shoulder");
+  command->AddDouble("vignetting", &options->vignetting,
+                     "share of the light that the lens loses in the corners");
+  command->AddDouble("white_balance_ev", &options->white_balance_ev,
+                     "red and blue vary from photo to photo by up to plus or minus this, EV");
+  command->AddChoice("wrong_exif", &options->wrong_exif, {"none", "one", "all"},
+                     "one: the middle photo notes a quarter of its exposure time; all: every photo "
+                     "notes the same");
   command->AddInt("scan_rows", &options->scan_rows, "samples from -60 to +75 degrees of elevation");
   command->AddDouble("range_noise", &options->range_noise,
                      "noise of the ranges, standard deviation in metres");

@@ -37,6 +37,12 @@ struct SimulatedRoomOptions {
   double photo_noise = 1.5;        // grey levels (of 255), standard deviation
   double blur_px = 0.0;            // Gaussian sigma
   // Scans.
+  std::string response = "srgb";   // or "film", see camera_faults.h
+  double vignetting = 0;           // share of the light lost in the corners
+  double white_balance_ev = 0;     // red and blue vary by up to +- this from photo to photo
+  // "one": the middle photo's EXIF notes a quarter of the time; "all": every photo's notes the same
+  // time.
+  std::string wrong_exif = "none";
   int num_stations = 1;
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
   double range_noise = 0.002;                 // metres, standard deviation
@@ -75,11 +81,13 @@ class SimulatedRoom {
   const Camera& camera() const;  // one for all photos, camera_id 1
 
   int NumPhotos() const;
-  std::string PhotoName(int photo) const;  // "photo_000.jpg"
-  Rigid CamFromRoom(int photo) const;      // truth
-  Rigid CamFromScan(int photo) const;      // truth, frame of station 0 = THE scan frame
-  double ExposureEv(int photo) const;      // truth, 0 = nominal
-  double ExposureTime(int photo) const;    // seconds, as in EXIF
+  std::string PhotoName(int photo) const;         // "photo_000.jpg"
+  Rigid CamFromRoom(int photo) const;             // truth
+  Rigid CamFromScan(int photo) const;             // truth, frame of station 0 = THE scan frame
+  double ExposureEv(int photo) const;             // truth, 0 = nominal
+  double ExposureTime(int photo) const;           // seconds, truth
+  double NotedTime(int photo) const;              // seconds, as in EXIF
+  Eigen::Vector3f WhiteBalance(int photo) const;  // factors on red, green, blue
   // 8-bit BGR, sRGB-encoded, with distortion, exposure, blur and noise.
   cv::Mat RenderPhoto(int photo) const;
 

@@ -100,8 +100,11 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
 
 }  // namespace
 
-ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
+ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
+                             const std::vector<PhotoView>& given_photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress) {
+  std::vector<PhotoView> photos = given_photos;  // their tones are found here
+  SetResponse(options.exposure, &photos);
   progress->Stage("mesh");
   std::vector<ScanSurface> surfaces;
   std::vector<GridOfSamples> grids;
@@ -115,7 +118,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<P
   if (options.texture_scale == 1) input.occluders.clear();
 
   progress->Stage("exposure");
-  result.exposure = UnifyExposure(input.samples, photos, options.exposure, num_threads, &store);
+  result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
   progress->Stage("blend");

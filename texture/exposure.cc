@@ -163,10 +163,17 @@ void FindContradictions(const ExposurePrior& prior, const std::vector<double>& l
 }  // namespace
 
 std::vector<std::string> ExposureOptions::Problems() const {
+  std::vector<std::string> problems;
   if (mode != "exif" && mode != "match" && mode != "none") {
-    return {"--Exposure.mode must be exif, match or none"};
+    problems.push_back("--Exposure.mode must be exif, match or none");
   }
-  return {};
+  if (response.empty()) problems.push_back("--Exposure.response must be srgb, estimate or a file");
+  if (!bracket_path.empty() && response != "srgb") {
+    problems.push_back(
+        "--Exposure.bracket_path and --Exposure.response are two sources of one "
+        "curve: give one of them");
+  }
+  return problems;
 }
 
 std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_samples) {

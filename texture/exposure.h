@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "core/photo.h"
 #include "texture/exposure_samples.h"
 #include "texture/observations.h"
+#include "texture/photo_tone.h"
 
 namespace roomtex {
 
@@ -23,6 +25,14 @@ struct ExposureOptions {
   std::string mode = "match";
   // Match red, green and blue on their own: for photos whose white balance changed.
   bool white_balance = false;
+  // Find the light that the lens loses towards the corners, one even polynomial per camera.
+  bool vignetting = false;
+  // How bytes become light: "srgb", a file (ResponseCurve::Read), or "estimate": from the overlaps
+  // of photos whose exposure differs.
+  std::string response = "srgb";
+  // A folder with a bracket, photos of one still scene exposed differently, to find the response
+  // from; "" = none.
+  std::string bracket_path;
 
   std::vector<std::string> Problems() const;
 };
@@ -48,7 +58,11 @@ struct ExposureSolution {
   std::vector<int> unconnected;  // ... and EXIF says nothing: their median gain is that of the rest
   std::vector<int> contradicted;  // photos whose EXIF the overlaps contradict by half an EV
   bool exif_ignored = false;      // EXIF as a whole contradicts the overlaps and was left out
-  int without_exif = 0;           // in mode "exif": photos that had to be matched
+  // How each photo's bytes become light; none = sRGB without vignetting.
+  std::vector<std::shared_ptr<const PhotoTone>> tones;
+  std::string response = "srgb";  // or "file", "bracket", "estimate": where it comes from
+  std::string response_problem;  // why it could not be estimated; "" = it was, or was not asked for
+  int without_exif = 0;          // in mode "exif": photos that had to be matched
   // Scatter of EXIF about the overlaps (robust standard deviation of the log); none without enough
   // of both.
   std::optional<double> exif_scatter;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "texture/photo_tone.h"
 
 namespace roomtex {
 namespace {
@@ -83,13 +84,6 @@ class RadiusFinder {
 
 float ExposureTrust(const Eigen::Vector3f& light) {
   return Ramp(light.minCoeff(), 0.0024f, 0.02f) * Ramp(light.maxCoeff(), 0.92f, 0.8f);
-}
-
-LensRadius::LensRadius(const CameraProjection& camera) {
-  const double width = camera.camera().width, height = camera.camera().height;
-  const auto centre = camera.ImgFromCam(Eigen::Vector3d::UnitZ());
-  centre_ = (centre ? *centre : Eigen::Vector2d(width / 2, height / 2)).cast<float>();
-  scale_ = static_cast<float>(4 / (width * width + height * height));
 }
 
 size_t SampleStride(const ObservationStore& store, size_t num_photos) {

@@ -42,20 +42,6 @@ ExposureSamples SelectSamples(const ObservationStore& store, int num_photos);
 ExposureSamples SelectSamples(const ObservationStore& store, const std::vector<SampleTile>& tiles,
                               const std::vector<PhotoView>& photos, int num_threads);
 
-// Squared distances of a photo's positions from its principal point; 1 = half its diagonal.
-class LensRadius {
- public:
-  explicit LensRadius(const CameraProjection& camera);
-  float Squared(float x_in_img, float y_in_img) const {
-    const float dx = x_in_img - centre_.x(), dy = y_in_img - centre_.y();
-    return (dx * dx + dy * dy) * scale_;
-  }
-
- private:
-  Eigen::Vector2f centre_;
-  float scale_;
-};
-
 // One in this many samples is looked at.
 size_t SampleStride(const ObservationStore& store, size_t num_photos);
 

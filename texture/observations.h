@@ -69,6 +69,8 @@ class ObservationStore {
     first[place] = observation;
   }
 
+  // To correct colours in place; the weights stay.
+  Observation* MutableBegin(size_t sample) { return &kept_[sample * capacity_]; }
   // Best first; Count() of them.
   const Observation* Begin(size_t sample) const { return &kept_[sample * capacity_]; }
   int Count(size_t sample) const { return std::min<int>(num_views_[sample], capacity_); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/parallel.h"
 #include "core/photo.h"
@@ -28,7 +29,13 @@ class PhotoObserver {
         blend_(blend),
         projector_(view),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
-        image_(ReadPhoto(view.path)) {}
+        image_(ReadPhoto(view.path)) {
+    if (!view.tone) return;
+    view.tone->response.ToSrgb(&image_);
+    if (!view.tone->vignetting.is_none()) {
+      vignetting_.emplace(view.tone->vignetting, projector_.camera());
+    }
+  }
 
   PhotoObservations Observe(int photo) {
     PhotoObservations seen;
@@ -77,7 +84,8 @@ class PhotoObserver {
         weight *= ResolutionWeight(spacing_px * spacing_px * cosine);
       }
       Observation observation;
-      observation.color = PackColor(color.linear);
+      observation.color =
+          PackColor(vignetting_ ? color.linear * vignetting_->At(x, y) : color.linear);
       observation.weight = PackWeight(std::max(weight, 1e-10f));
       observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
       observation.in_doubt = sight == Sight::kShadow;
@@ -89,7 +97,8 @@ class PhotoObserver {
   const BlendOptions& blend_;
   PhotoProjector projector_;
   PhotoVisibility visibility_;
-  cv::Mat image_;
+  cv::Mat image_;  // sRGB
+  std::optional<VignettingFactor> vignetting_;
   ProjectedBlock projected_;
 };
 

@@ -2,6 +2,7 @@
 // One photo on the scan: where its file is, where it was taken, and fast projection into it.
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 
 #include "core/camera_model.h"
 #include "core/similarity.h"
+#include "texture/photo_tone.h"
 
 namespace roomtex {
 
@@ -17,6 +19,7 @@ struct PhotoView {
   std::string path;  // the file that gives the colour
   Camera camera;     // of the size of that file
   Rigid cam_from_scan;
+  std::shared_ptr<const PhotoTone> tone;  // how its bytes become light; none = sRGB
 
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }
 };

@@ -99,6 +99,16 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                    "Distrust lines of sight through space that the scanner could not see.");
   command->AddInt("Occlusion.depth_map_size", &o->occlusion.depth_map_size,
                   "Least length of a depth map's longer side, pixels.");
+  command->AddBool("Exposure.vignetting", &o->exposure.vignetting,
+                   "Find and undo the darkening towards the photos' corners.");
+  command->AddString("Exposure.response", &o->exposure.response,
+                     "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
+                     "exposures that differ by an EV); or a file with a line per level 0-255: its "
+                     "linear light, one number or three (red green blue).");
+  command->AddInputPath("Exposure.bracket_path", &o->exposure.bracket_path,
+                        "Folder with photos of one still scene, exposed differently (EXIF): the "
+                        "response is found from them.",
+                        Command::Kind::kOptional);
   command->AddInt("Blend.max_views", &o->blend.max_views,
                   "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "
                   "each.");
@@ -148,6 +158,20 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
   report["coverage"] = coverage;
   report["views_mean"] = result.views_mean;
   report["pixels_per_sample"] = result.pixels_per_sample;
+// What was found of the camera: response curve, light in the corners, how true EXIF is.
+void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution& exposure,
+                    Report* report) {
+  (*report)["response"] = exposure.response;
+  Json corners = Json::object();
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto& tone = exposure.tones[i];
+    const double corner = tone ? std::exp(-tone->vignetting.LogFactor(1)) : 1;
+    corners[photos[i].name] = std::round(1e4 * corner) / 1e4;
+  }
+  (*report)["corner_light"] = corners;
+  if (exposure.exif_scatter) (*report)["exif_scatter_ev"] = *exposure.exif_scatter / std::log(2.0);
+}
+
   report["texture_scale"] = result.texture_scale;
   Json gains = Json::object(), seen = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -175,6 +199,7 @@ std::string NameList(const std::vector<PhotoView>& photos, const std::vector<int
     list += (i > 0 ? ", " : "") + photos[numbers[i]].name;
   }
   if (numbers.size() > 5) list += " and " + std::to_string(numbers.size() - 5) + " more";
+  FillToneReport(photos, result.exposure, &report);
   return list;
 }
 
@@ -207,6 +232,10 @@ void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
     if (result.samples_seen[i] == 0) blind.push_back(static_cast<int>(i));
   }
   if (!blind.empty() && blind.size() < photos.size()) {
+  if (!exposure.response_problem.empty()) {
+    context.Warn("the response curve cannot be estimated: " + exposure.response_problem +
+                 ". The photos are taken for sRGB");
+  }
     context.Warn("these photos see no sample of the scan: " + NameList(photos, blind));
   }
   const double coverage = static_cast<double>(result.num_colored) /
@@ -298,6 +327,9 @@ int main(int argc, char** argv) {
   roomtex::TextureOptions options;
   roomtex::Command command(
       "roomtex-texture", "Colours a range scan from registered photos (thesis chapter 8).",
+  if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
+    result.exposure.tones[0]->response.Write(options.output_path + "/response.txt");
+  }
       "roomtex-texture --input_path aligned --image_path images --scan_path room.rtpi "
       "--output_path textured");
   roomtex::AddPathOptions(&options, &command);

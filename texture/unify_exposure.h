@@ -10,10 +10,15 @@
 
 namespace roomtex {
 
+// The response curve that the options name, on every photo. With "estimate" photos are taken for
+// sRGB until UnifyExposure. Throws InputError for a curve or a bracket that cannot be used.
+void SetResponse(const ExposureOptions& options, std::vector<PhotoView>* photos);
+
 // tiles: the samples that the store's slots come from. Gains are as to be applied: the output scale
-// is in them.
-ExposureSolution UnifyExposure(const std::vector<SampleTile>& tiles,
-                               const std::vector<PhotoView>& photos, const ExposureOptions& options,
-                               int num_threads, ObservationStore* store);
+// is in them. A response curve or vignetting that is found goes into the photos' tones, and the
+// store's colours are corrected by it.
+ExposureSolution UnifyExposure(const std::vector<SampleTile>& tiles, const ExposureOptions& options,
+                               int num_threads, std::vector<PhotoView>* photos,
+                               ObservationStore* store);
 
 }  // namespace roomtex
