@@ -34,8 +34,6 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddDouble("photo_noise", &options->photo_noise,
                      "noise of the photos, standard deviation in grey levels of 255");
   command->AddDouble("blur_px", &options->blur_px, "blur of the photos, Gaussian sigma in pixels");
-  command->AddInt("num_stations", &options->num_stations, "number of scans");
-  command->AddInt("scan_columns", &options->scan_columns, "samples over the full turn");
   command->AddChoice("response", &options->response, ResponseTable::Names(),
                      "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
                      "shoulder");
@@ -46,6 +44,8 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddChoice("wrong_exif", &options->wrong_exif, {"none", "one", "all"},
                      "one: the middle photo notes a quarter of its exposure time; all: every photo "
                      "notes the same");
+  command->AddInt("num_stations", &options->num_stations, "number of scans");
+  command->AddInt("scan_columns", &options->scan_columns, "samples over the full turn");
   command->AddInt("scan_rows", &options->scan_rows, "samples from -60 to +75 degrees of elevation");
   command->AddDouble("range_noise", &options->range_noise,
                      "noise of the ranges, standard deviation in metres");

@@ -43,7 +43,6 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
       "camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
   require(within(exposure_range_ev, 0, 4), "exposure_range_ev must be 0 to 4");
   require(within(photo_noise, 0, 64), "photo_noise must be 0 to 64 grey levels");
-  require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
   const std::vector<std::string>& responses = ResponseTable::Names();
   require(std::count(responses.begin(), responses.end(), response) > 0,
           "response must be srgb or film");
@@ -51,6 +50,7 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   require(within(white_balance_ev, 0, 2), "white_balance_ev must be 0 to 2");
   require(wrong_exif == "none" || wrong_exif == "one" || wrong_exif == "all",
           "wrong_exif must be none, one or all");
+  require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
   require(num_stations >= 1 && num_stations <= 8, "num_stations must be 1 to 8");
   require(scan_columns >= 16 && scan_columns <= 20000, "scan_columns must be 16 to 20000");
   require(scan_rows >= 16 && scan_rows <= 20000, "scan_rows must be 16 to 20000");
@@ -123,8 +123,6 @@ double SimulatedRoom::ExposureTime(int photo) const {
   return kNominalExposureTime * std::exp2(ExposureEv(photo));
 }
 
-cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
-  PhotoSettings settings;
 double SimulatedRoom::NotedTime(int photo) const {
   const std::string& wrong = impl_->options.wrong_exif;
   if (wrong == "all") return kNominalExposureTime;
@@ -134,13 +132,15 @@ Eigen::Vector3f SimulatedRoom::WhiteBalance(int photo) const {
   return WhiteBalanceOf(photo, impl_->options.random_seed, impl_->options.white_balance_ev);
 }
 
+cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
+  PhotoSettings settings;
   settings.exposure_ev = ExposureEv(photo);
   settings.blur_px = impl_->options.blur_px;
-  settings.noise = impl_->options.photo_noise;
-  settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
   settings.response = impl_->options.response;
   settings.vignetting = impl_->options.vignetting;
   settings.white_balance = WhiteBalance(photo);
+  settings.noise = impl_->options.photo_noise;
+  settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
   return impl_->Renderer().Render(impl_->cam_from_room.at(photo), settings,
                                   impl_->options.num_threads);
 }

@@ -36,13 +36,13 @@ struct SimulatedRoomOptions {
   bool exif = true;                // exposure time, aperture, ISO
   double photo_noise = 1.5;        // grey levels (of 255), standard deviation
   double blur_px = 0.0;            // Gaussian sigma
-  // Scans.
   std::string response = "srgb";   // or "film", see camera_faults.h
   double vignetting = 0;           // share of the light lost in the corners
   double white_balance_ev = 0;     // red and blue vary by up to +- this from photo to photo
   // "one": the middle photo's EXIF notes a quarter of the time; "all": every photo's notes the same
   // time.
   std::string wrong_exif = "none";
+  // Scans.
   int num_stations = 1;
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
   double range_noise = 0.002;                 // metres, standard deviation

@@ -87,6 +87,16 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                      "with EXIF as a prior; none: photos as they are.");
   command->AddBool("Exposure.white_balance", &o->exposure.white_balance,
                    "Match red, green and blue one by one (white balance that changed).");
+  command->AddBool("Exposure.vignetting", &o->exposure.vignetting,
+                   "Find and undo the darkening towards the photos' corners.");
+  command->AddString("Exposure.response", &o->exposure.response,
+                     "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
+                     "exposures that differ by an EV); or a file with a line per level 0-255: its "
+                     "linear light, one number or three (red green blue).");
+  command->AddInputPath("Exposure.bracket_path", &o->exposure.bracket_path,
+                        "Folder with photos of one still scene, exposed differently (EXIF): the "
+                        "response is found from them.",
+                        Command::Kind::kOptional);
   command->AddDouble("Occlusion.depth_tolerance", &o->occlusion.depth_tolerance,
                      "Share of its depth by which a surface in front hides a sample. Larger = more "
                      "tolerant.");
@@ -99,16 +109,6 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                    "Distrust lines of sight through space that the scanner could not see.");
   command->AddInt("Occlusion.depth_map_size", &o->occlusion.depth_map_size,
                   "Least length of a depth map's longer side, pixels.");
-  command->AddBool("Exposure.vignetting", &o->exposure.vignetting,
-                   "Find and undo the darkening towards the photos' corners.");
-  command->AddString("Exposure.response", &o->exposure.response,
-                     "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
-                     "exposures that differ by an EV); or a file with a line per level 0-255: its "
-                     "linear light, one number or three (red green blue).");
-  command->AddInputPath("Exposure.bracket_path", &o->exposure.bracket_path,
-                        "Folder with photos of one still scene, exposed differently (EXIF): the "
-                        "response is found from them.",
-                        Command::Kind::kOptional);
   command->AddInt("Blend.max_views", &o->blend.max_views,
                   "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "
                   "each.");
@@ -146,18 +146,6 @@ void CheckScans(const std::vector<Scan>& scans) {
 
 double RoundedGain(float gain) { return std::round(1e6 * gain) / 1e6; }
 
-void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& options,
-                const ColorizeResult& result, const Command::Context& context) {
-  Report& report = context.report;
-  report["num_photos"] = photos.size();
-  report["num_vertices"] = result.num_vertices;
-  report["num_colored"] = result.num_colored;
-  const double coverage = result.num_vertices > 0 ? static_cast<double>(result.num_colored) /
-                                                        static_cast<double>(result.num_vertices)
-                                                  : 0;
-  report["coverage"] = coverage;
-  report["views_mean"] = result.views_mean;
-  report["pixels_per_sample"] = result.pixels_per_sample;
 // What was found of the camera: response curve, light in the corners, how true EXIF is.
 void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution& exposure,
                     Report* report) {
@@ -172,6 +160,18 @@ void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution
   if (exposure.exif_scatter) (*report)["exif_scatter_ev"] = *exposure.exif_scatter / std::log(2.0);
 }
 
+void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& options,
+                const ColorizeResult& result, const Command::Context& context) {
+  Report& report = context.report;
+  report["num_photos"] = photos.size();
+  report["num_vertices"] = result.num_vertices;
+  report["num_colored"] = result.num_colored;
+  const double coverage = result.num_vertices > 0 ? static_cast<double>(result.num_colored) /
+                                                        static_cast<double>(result.num_vertices)
+                                                  : 0;
+  report["coverage"] = coverage;
+  report["views_mean"] = result.views_mean;
+  report["pixels_per_sample"] = result.pixels_per_sample;
   report["texture_scale"] = result.texture_scale;
   Json gains = Json::object(), seen = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -187,6 +187,7 @@ void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution
     report["exposure_reference"] = photos[result.exposure.reference_photo].name;
   }
   report["samples_seen"] = seen;
+  FillToneReport(photos, result.exposure, &report);
   report["disagreement"] = {{"before", result.disagreement.before},
                             {"after", result.disagreement.after},
                             {"at_random", result.disagreement.at_random},
@@ -199,7 +200,6 @@ std::string NameList(const std::vector<PhotoView>& photos, const std::vector<int
     list += (i > 0 ? ", " : "") + photos[numbers[i]].name;
   }
   if (numbers.size() > 5) list += " and " + std::to_string(numbers.size() - 5) + " more";
-  FillToneReport(photos, result.exposure, &report);
   return list;
 }
 
@@ -220,6 +220,10 @@ void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
         "exposure: " +
         NameList(photos, exposure.unconnected));
   }
+  if (!exposure.response_problem.empty()) {
+    context.Warn("the response curve cannot be estimated: " + exposure.response_problem +
+                 ". The photos are taken for sRGB");
+  }
   if (exposure.exif_ignored) {
     context.Warn("the exposures in EXIF contradict what the photos show and are not used");
   }
@@ -232,10 +236,6 @@ void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
     if (result.samples_seen[i] == 0) blind.push_back(static_cast<int>(i));
   }
   if (!blind.empty() && blind.size() < photos.size()) {
-  if (!exposure.response_problem.empty()) {
-    context.Warn("the response curve cannot be estimated: " + exposure.response_problem +
-                 ". The photos are taken for sRGB");
-  }
     context.Warn("these photos see no sample of the scan: " + NameList(photos, blind));
   }
   const double coverage = static_cast<double>(result.num_colored) /
@@ -314,6 +314,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
       ColorizeScans(scans, list.photos, colorize, context.options.num_threads, &context.progress);
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
+  if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
+    result.exposure.tones[0]->response.Write(options.output_path + "/response.txt");
+  }
 
   context.progress.Stage("write");
   WriteAll(scans, result.scans, options.output_path);
@@ -327,9 +330,6 @@ int main(int argc, char** argv) {
   roomtex::TextureOptions options;
   roomtex::Command command(
       "roomtex-texture", "Colours a range scan from registered photos (thesis chapter 8).",
-  if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
-    result.exposure.tones[0]->response.Write(options.output_path + "/response.txt");
-  }
       "roomtex-texture --input_path aligned --image_path images --scan_path room.rtpi "
       "--output_path textured");
   roomtex::AddPathOptions(&options, &command);
