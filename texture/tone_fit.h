@@ -12,8 +12,9 @@ namespace roomtex {
 
 // The logarithm of the light at a sample is the same in all photos once corrected: log light + log
 // gain of the photo + vignetting(radius) is linear in what is not known, so is a response curve
-// given as (1 + b0) log light + b1 (u - 1) + b2 (u^2 - 1) + ... over the level u, 0..1. Least
-// squares with Cauchy weights over all samples; the light of each sample is eliminated.
+// given as log light + b0 log srgb(u) + b1 log u + b2 (u - 1) + b3 (u^2 - 1) + ... over the level
+// u, 0..1. Least squares with Cauchy weights over all samples; the light of each sample is
+// eliminated.
 
 // lens: number of the lens per photo, 0 .. num_lenses - 1. log_gains: start values per photo. A
 // lens whose views do not show it (too few, or less than 1 % in the corners) gets none.
