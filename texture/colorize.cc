@@ -83,6 +83,30 @@ std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) 
   return colors;
 }
 
+// Atlases of the meshes without a grid. Probes on their surfaces are added to what the photos are
+// asked about: few vertices would say little about exposures.
+std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
+                                   const std::vector<PhotoView>& photos,
+                                   const std::vector<ScanSurface>& surfaces,
+                                   const ColorizeOptions& options, PhotoPassInput* input) {
+  constexpr int kNumProbes = 200000;
+  const double max_texels =
+      std::min(kMaxAutoTexels,
+               kMaxAutoBands * 1e6 * options.texture_memory_mb / BytesPerTexel(options.blend));
+  std::vector<MeshAtlas> atlases(scans.size());
+  for (size_t s = 0; s < scans.size(); ++s) {
+    if (scans[s].organised || options.atlas.mode == "0") continue;
+    const std::vector<Triangle>& triangles = surfaces[s].triangles;
+    const SurfaceProbes probes = SpreadProbes(scans[s].points, triangles, kNumProbes);
+    atlases[s] = LayOutAtlas(scans[s].points, triangles, PixelOnSurface(probes, photos), max_texels,
+                             options.atlas);
+    if (atlases[s].empty()) continue;
+    AddGrid(static_cast<int>(probes.points.size()), 1, probes.points, probes.normals,
+            Scan::MissingPoint(), input);
+  }
+  return atlases;
+}
+
 // Texture images finer than the samples, from the exposures found on the samples.
 void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                       const std::vector<ScanSurface>& surfaces, const ColorizeOptions& options,
@@ -91,7 +115,15 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
   const TexelPassOptions texels{options.occlusion, options.blend, options.detail,
                                 1e6 * options.texture_memory_mb};
   for (size_t s = 0; s < scans.size(); ++s) {
-    if (!scans[s].organised) continue;
+    MeshAtlas& atlas = result->scans[s].atlas;
+    for (int page = 0; page < atlas.num_pages; ++page) {
+      const AtlasTexels source(scans[s].points, result->scans[s].triangles, atlas,
+                               result->scans[s].samples.rgb, page);
+      atlas.pages.push_back(ColorizeTexels(source, photos, result->exposure.gains, texels,
+                                           num_threads, input, progress));
+      FinishPage(source, &atlas.pages.back(), &atlas.num_texels, &atlas.num_seen);
+    }
+    if (!scans[s].organised || result->texture_scale == 1) continue;
     const ScanTexels source(scans[s], surfaces[s], result->scans[s].samples, result->texture_scale);
     result->scans[s].texture = ColorizeTexels(source, photos, result->exposure.gains, texels,
                                               num_threads, input, progress);
@@ -109,13 +141,16 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   std::vector<ScanSurface> surfaces;
   std::vector<GridOfSamples> grids;
   PhotoPassInput input = MakeInput(scans, &surfaces, options, num_threads, &grids);
+  std::vector<MeshAtlas> atlases = PlanAtlases(scans, photos, surfaces, options, &input);
+  const bool has_atlas = std::any_of(atlases.begin(), atlases.end(),
+                                     [](const MeshAtlas& atlas) { return !atlas.empty(); });
 
   progress->Stage("photos", static_cast<int>(photos.size()));
   ColorizeResult result;
   ObservationStore store(NumSlots(input), options.blend.max_views);
   result.samples_seen =
       ObservePhotos(input, photos, options.occlusion, options.blend, num_threads, progress, &store);
-  if (options.texture_scale == 1) input.occluders.clear();
+  if (options.texture_scale == 1 && !has_atlas) input.occluders.clear();
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
@@ -128,6 +163,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
                                     options.detail, num_threads)
                           .Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
     colored.triangles = std::move(surfaces[s].triangles);
+    colored.atlas = std::move(atlases[s]);
     result.scans.push_back(std::move(colored));
   }
   CountVertices(scans, &result);
@@ -137,7 +173,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
                              ? options.texture_scale
                              : ChooseTextureScale(scans, result.pixels_per_sample, options.blend,
                                                   1e6 * options.texture_memory_mb);
-  if (result.texture_scale > 1) {
+  if (result.texture_scale > 1 || has_atlas) {
     store = ObservationStore(0, 1);
     input.samples = {};
     progress->Stage("texture");

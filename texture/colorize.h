@@ -34,6 +34,7 @@ struct ColorizeOptions {
   // Working memory for texture images finer than the samples, megabytes (1e6 bytes); the finished
   // image adds 7 bytes a texel. Less = more passes over the photos.
   double texture_memory_mb = 2000;
+  AtlasOptions atlas;  // of meshes without a grid
 
   std::vector<std::string> Problems() const;
 };

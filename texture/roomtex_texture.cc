@@ -26,6 +26,9 @@ struct TextureOptions {
   ScanReaderOptions scan_reader;
   ColorizeOptions colorize;
   std::string texture_scale = "auto";  // or a whole number
+  GlbOptions glb;
+  std::string glb_image = "png";
+  double texel_mm = 0;
 };
 
 void AddPathOptions(TextureOptions* o, Command* command) {
@@ -59,17 +62,33 @@ void AddTextureOptions(TextureOptions* o, Command* command) {
       "Texels per sample and direction of texture.png and model.glb, 1 to " +
           std::to_string(kMaxTextureScale) +
           "; above 1 the surface between the samples is coloured, too. auto (or 0): as fine as the "
-          "photos, pixels per sample rounded, but at most " +
+          "photos, pixels per sample rounded up, but at most " +
           std::to_string(kMaxAutoScale) + ", " +
           std::to_string(static_cast<int>(kMaxAutoTexels / 1e6)) +
           " million texels, and what --Texture.max_memory_mb lets do in " +
           std::to_string(kMaxAutoBands) +
           " passes over the photos. Larger = sharper; time and memory grow with its square. "
           "model.ply does not depend on it.");
+  command->AddChoice("Texture.atlas", &o->colorize.atlas.mode, {"auto", "1", "0"},
+                     "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
+                     "colours. auto: where the photos show more than the vertices can hold.");
+  command->AddDouble("Texture.texel_mm", &o->texel_mm,
+                     "Millimetres a texel of that atlas; 0 = what a photo's pixel covers on the "
+                     "surface (median), within the bounds of --Texture.scale auto.");
   command->AddDouble("Texture.max_memory_mb", &o->colorize.texture_memory_mb,
                      "Working memory for texture images with a scale above 1, megabytes, beside "
                      "the scan and 7 bytes a texel. Less = more passes over the photos, same "
                      "result.");
+}
+
+void AddWriteOptions(TextureOptions* o, Command* command) {
+  command->AddChoice("Texture.glb_image", &o->glb_image, {"png", "jpeg"},
+                     "Texture images in model.glb. png keeps every texel and draws no rings around "
+                     "print; jpeg (quality 95) takes a fourth of its room. The mesh mostly weighs "
+                     "more than either.");
+  command->AddInt("Texture.max_size", &o->glb.max_texture_size,
+                  "Longest side of one texture image in model.glb, 256 to 16384; a larger texture "
+                  "is tiled. Larger = fewer images; not every viewer loads more than 4096.");
 }
 
 // Throws UsageError.
@@ -174,6 +193,17 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
   report["views_mean"] = result.views_mean;
   report["pixels_per_sample"] = result.pixels_per_sample;
   report["texture_scale"] = result.texture_scale;
+  Json atlases = Json::array();
+  for (const ColoredScan& scan : result.scans) {
+    const MeshAtlas& atlas = scan.atlas;
+    if (atlas.empty()) continue;
+    atlases.push_back({{"texel_mm", 1000 * atlas.texel_size},
+                       {"num_charts", atlas.charts.size()},
+                       {"num_pages", atlas.num_pages},
+                       {"page_size", atlas.page_size},
+                       {"coverage", atlas.num_seen / std::max(1.0, atlas.num_texels)}});
+  }
+  if (!atlases.empty()) report["atlas"] = atlases;
   Json gains = Json::object(), balance = Json::object(), seen = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const Eigen::Vector3f& gain = result.exposure.gains[i];
@@ -268,9 +298,9 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
 }
 
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-              const std::string& folder) {
+              const GlbOptions& glb, const std::string& folder) {
   WriteColoredPly(scans, colored, folder + "/model.ply");
-  WriteColoredGlb(scans, colored, folder + "/model.glb");
+  WriteColoredGlb(scans, colored, folder + "/model.glb", glb);
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     if (scans[s].organised) {
@@ -287,8 +317,11 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   colorize.texture_scale = TextureScale(options.texture_scale);
+  colorize.atlas.texel_size = options.texel_mm / 1000;
+  colorize.atlas.max_page_size = options.glb.max_texture_size;
   std::vector<std::string> problems = options.scan_reader.Problems();
   AppendProblems(colorize.Problems(), &problems);
+  AppendProblems(options.glb.Problems(), &problems);
   ThrowIfProblems(problems);
 
   context.progress.Stage("read model");
@@ -319,7 +352,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("write");
-  WriteAll(scans, result.scans, options.output_path);
+  GlbOptions glb = options.glb;
+  glb.jpeg = options.glb_image == "jpeg";
+  WriteAll(scans, result.scans, glb, options.output_path);
   std::printf("%s\n", (options.output_path + "/model.ply").c_str());
 }
 
@@ -334,6 +369,7 @@ int main(int argc, char** argv) {
       "--output_path textured");
   roomtex::AddPathOptions(&options, &command);
   roomtex::AddTextureOptions(&options, &command);
+  roomtex::AddWriteOptions(&options, &command);
   roomtex::AddColorOptions(&options.colorize, &command);
   return command.Run(argc, argv, [&options](const roomtex::Command::Context& context) {
     roomtex::Texture(options, context);

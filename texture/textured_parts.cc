@@ -116,7 +116,7 @@ std::vector<TexturedPart> PartsOfAtlas(const Scan& scan, const ColoredScan& colo
       if (is_new) {
         part.vertices.push_back(corner);
         part.uv.push_back(
-            GltfUvFromImg(chart.InPage(scan.points[corner]), atlas.page_width, atlas.page_height)
+            GltfUvFromImg(chart.InPage(scan.points[corner]), atlas.page_size, atlas.page_size)
                 .cast<float>());
       }
       part.corners.push_back(entry->second);
@@ -124,8 +124,8 @@ std::vector<TexturedPart> PartsOfAtlas(const Scan& scan, const ColoredScan& colo
   }
   for (int page = 0; page < atlas.num_pages; ++page) {
     parts[page].page = page;
-    parts[page].width = atlas.page_width;
-    parts[page].height = atlas.page_height;
+    parts[page].width = atlas.page_size;
+    parts[page].height = atlas.page_size;
   }
   return parts;
 }
