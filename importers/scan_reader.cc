@@ -10,6 +10,7 @@
 #include "core/frames.h"
 #include "importers/file_reader.h"
 #include "importers/length_unit.h"
+#include "importers/obj.h"
 #include "importers/pcd.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
@@ -21,7 +22,8 @@ namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an organised PCD or a PLY mesh (the content counts, not the name)";
+    "Give an RTPI, a PTX, an organised PCD, a PLY or an OBJ mesh (the content counts, not the "
+    "name)";
 
 bool StartsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
@@ -152,6 +154,10 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
     file.format = "PTX";
     file.byte_order = "text";
     file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
+  } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
+    file.format = "OBJ";
+    file.byte_order = "text";
+    file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),

@@ -15,8 +15,8 @@ struct ScanReaderOptions {
   // RTPI: sense of the azimuth seen from above. "clockwise" is the thesis' formula (5.1.1), files
   // of real scanners are "counterclockwise"; the wrong one mirrors the room.
   std::string azimuth = "clockwise";
-  // RTPI, PTX, PCD, PLY: unit of the coordinates in the file; "" = what the file says, metres if it
-  // does not. One of "", "meters", "millimeters", "centimeters", "feet", "inches".
+  // RTPI, PTX, PCD, PLY, OBJ: unit of the coordinates in the file; "" = what the file says, metres
+  // if it does not. One of "", "meters", "millimeters", "centimeters", "feet", "inches".
   std::string units;
   // Metres; samples farther away count as missing. 0 = the limit that the file gives, if any.
   double max_range = 0;
@@ -30,7 +30,7 @@ void AddScanReaderOptions(ScanReaderOptions* options, Command* command);
 // All scans of one file (a PTX may hold several), and what the file is.
 struct ScanFile {
   std::vector<Scan> scans;         // at least one
-  std::string format;              // "RTPI", "PTX", "PCD" or "PLY"
+  std::string format;              // "RTPI", "PTX", "PCD", "PLY" or "OBJ"
   std::string byte_order;          // "little", "big" or "text"
   std::vector<std::string> notes;  // assumptions about the file that a user should know
 };
