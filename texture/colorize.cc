@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/photo.h"
+#include "texture/cpu_stages.h"
 #include "texture/photo_pass.h"
 #include "texture/texture_grid.h"
 #include "texture/texture_scale.h"
@@ -15,6 +16,7 @@ namespace {
 PhotoPassInput MakeInput(const std::vector<Scan>& scans, std::vector<ScanSurface>* surfaces,
                          const ColorizeOptions& options, int num_threads,
                          std::vector<GridOfSamples>* grids) {
+  const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
   PhotoPassInput input;
   for (const Scan& scan : scans) {
     ScanSurface surface = MakeScanSurface(scan, options.mesh, options.surface, num_threads);

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "texture/blend.h"
+#include "texture/cpu_stages.h"
 #include "texture/exposure_prior.h"
 
 namespace roomtex {
@@ -316,6 +317,7 @@ float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector
 
 Disagreement MeasureDisagreement(const ObservationStore& store,
                                  const std::vector<Eigen::Vector3f>& gains) {
+  const CpuTimer timer(CpuStage::kExposure, CpuTimer::Scope::kProcess);
   Disagreement result;
   const auto byte_difference = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
     int sum = 0;

@@ -4,6 +4,7 @@
 
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "texture/cpu_stages.h"
 
 namespace roomtex {
 
@@ -33,6 +34,7 @@ struct GridColorizer::BlendedGrid {
 };
 
 GridColorizer::BlendedGrid GridColorizer::Blend(const GridOfSamples& grid) const {
+  const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
   const size_t count = static_cast<size_t>(grid.num_columns) * grid.num_rows;
   BlendedGrid result;
   result.blend.assign(count, Eigen::Vector3f::Zero());
@@ -57,6 +59,7 @@ GridColorizer::BlendedGrid GridColorizer::Blend(const GridOfSamples& grid) const
 
 ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& blended,
                                 const std::vector<Rgb>& unseen) const {
+  const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
   ColorGrid result;
   result.num_columns = grid.num_columns;
   result.num_rows = grid.num_rows;
@@ -87,6 +90,7 @@ ColorGrid GridColorizer::Colorize(const GridOfSamples& grid, const GridLinks& li
                                   const std::vector<Rgb>& unseen) const {
   BlendedGrid blended = Blend(grid);
   if (blend_.detail && grid.num_rows > 1) {
+    const CpuTimer timer(CpuStage::kDetail, CpuTimer::Scope::kProcess);
     Scan shape;
     shape.num_columns = grid.num_columns;
     shape.num_rows = grid.num_rows;

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "texture/cpu_stages.h"
 
 namespace roomtex {
 namespace {
@@ -29,15 +30,14 @@ class PhotoObserver {
         blend_(blend),
         projector_(view),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
-        image_(ReadPhoto(view.path)) {
-    if (!view.tone) return;
-    view.tone->response.ToSrgb(&image_);
-    if (!view.tone->vignetting.is_none()) {
+        image_(Decode(view)) {
+    if (view.tone && !view.tone->vignetting.is_none()) {
       vignetting_.emplace(view.tone->vignetting, projector_.camera());
     }
   }
 
   PhotoObservations Observe(int photo) {
+    const CpuTimer timer(CpuStage::kSamples);
     PhotoObservations seen;
     for (const SampleTile& tile : input_.samples) {
       if (projector_.MaySee(tile.points.origin, tile.points.radius))
@@ -48,6 +48,13 @@ class PhotoObserver {
   }
 
  private:
+  static cv::Mat Decode(const PhotoView& view) {
+    const CpuTimer timer(CpuStage::kDecode);
+    cv::Mat photo = ReadPhoto(view.path);
+    if (view.tone) view.tone->response.ToSrgb(&photo);
+    return photo;
+  }
+
   void ObserveTile(const SampleTile& tile, int photo, PhotoObservations* seen) {
     projector_.Project(tile.points, &projected_);
     const Eigen::Vector3f camera = projector_.CentreFrom(tile.points.origin);
@@ -123,6 +130,7 @@ std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector
     constexpr int kTilesAtOnce = 64;
     const int num_blocks = (num_tiles + kTilesAtOnce - 1) / kTilesAtOnce;
     ParallelFor(num_threads, 0, num_blocks, [&](int block) {
+      const CpuTimer timer(CpuStage::kMerge);
       const int begin_tile = block * kTilesAtOnce;
       const int end_tile = std::min(num_tiles, begin_tile + kTilesAtOnce);
       for (int i = 0; i < count; ++i) {

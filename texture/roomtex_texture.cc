@@ -10,6 +10,7 @@
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "texture/colorize.h"
+#include "texture/cpu_stages.h"
 #include "texture/photo_list.h"
 #include "texture/texture_scale.h"
 #include "texture/write_glb.h"
@@ -299,6 +300,7 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
 
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const GlbOptions& glb, const std::string& folder) {
+  const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   WriteColoredPly(scans, colored, folder + "/model.ply");
   WriteColoredGlb(scans, colored, folder + "/model.glb", glb);
   for (size_t s = 0; s < scans.size(); ++s) {
@@ -355,6 +357,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   GlbOptions glb = options.glb;
   glb.jpeg = options.glb_image == "jpeg";
   WriteAll(scans, result.scans, glb, options.output_path);
+  Json cpu = Json::object();
+  for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
+  context.report["cpu_seconds"] = cpu;
   std::printf("%s\n", (options.output_path + "/model.ply").c_str());
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "texture/cpu_stages.h"
 #include "texture/response_bracket.h"
 #include "texture/tone_fit.h"
 
@@ -153,6 +154,7 @@ void SetResponse(const ExposureOptions& options, std::vector<PhotoView>* photos)
 ExposureSolution UnifyExposure(const std::vector<SampleTile>& tiles, const ExposureOptions& options,
                                int num_threads, std::vector<PhotoView>* photos,
                                ObservationStore* store) {
+  const CpuTimer timer(CpuStage::kExposure, CpuTimer::Scope::kProcess);
   std::vector<ExposureData> exposures;
   for (const PhotoView& photo : *photos) exposures.push_back(ReadExposureData(photo.path));
   ExposureSolution tones, solution;

@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "texture/cpu_stages.h"
 #include "texture/rasterizer.h"
 
 namespace roomtex {
@@ -143,6 +144,7 @@ DepthMap::DepthMap(int photo_width, int photo_height, double scale) {
 
 void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
                     float max_edge_px) {
+  const CpuTimer timer(CpuStage::kDepthMap);
   const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &inverse_depth_);
   const auto width = static_cast<float>(inverse_depth_.cols);
   const auto height = static_cast<float>(inverse_depth_.rows);
@@ -181,6 +183,7 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
 
 void DepthMap::CloseGaps(int radius_px) {
   if (radius_px <= 0) return;
+  const CpuTimer timer(CpuStage::kBoundaries);
   const cv::Mat square = Square(radius_px);
   const cv::Mat1b holes = inverse_depth_ == 0;
   if (cv::countNonZero(holes) == 0) return;
@@ -192,6 +195,7 @@ void DepthMap::CloseGaps(int radius_px) {
 }
 
 cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_px) {
+  const CpuTimer timer(CpuStage::kBoundaries);
   // 255 where there is a surface, or a hole too small to matter.
   cv::Mat1b covered = inverse_depth > 0;
   if (hole_px > 0) cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, Square(hole_px));
@@ -224,6 +228,7 @@ cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_
 }
 
 cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px) {
+  const CpuTimer timer(CpuStage::kBoundaries);
   if (cv::countNonZero(boundaries) == 0) return cv::Mat1b(boundaries.size(), uint8_t{0});
   cv::Mat1f distance;
   cv::distanceTransform(boundaries == 0, distance, cv::DIST_L2, 3);
