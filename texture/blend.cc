@@ -34,7 +34,7 @@ Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).
 // Two photos that look from different places give the same colour only if they see the surface
 // itself and not something in front of it.
 bool TwoAgree(const Eigen::Vector3f* roots, int count) {
-  constexpr float kAlike = 0.1f;
+  constexpr float kAlike = 0.05f;
   for (int i = 0; i < count; ++i) {
     for (int j = i + 1; j < count; ++j) {
       if ((roots[i] - roots[j]).norm() < kAlike) return true;
@@ -176,6 +176,10 @@ BlendedSample BlendSample(const Observation* observations, int count,
                           const std::vector<Eigen::Vector3f>& gains, double outlier) {
   BlendedSample result;
   if (count <= 0) return result;
+  // What is in doubt comes last and counts only where there is nothing else.
+  if (observations[0].in_doubt == 0) {
+    while (observations[count - 1].in_doubt != 0) --count;
+  }
   SampleViews views = UnpackViews(observations, count, gains);
   if (observations[0].in_doubt != 0 && !TwoAgree(views.roots.data(), views.count)) return result;
   // S by the geometry alone: it changes where the best photo changes, not from sample to sample.

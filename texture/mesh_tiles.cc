@@ -96,13 +96,15 @@ uint32_t TileKey(int column, int row, int columns) {
   return static_cast<uint32_t>(row / kTileEdge * tiles_across + column / kTileEdge);
 }
 
-std::vector<MeshTile> TileTriangles(const Scan& scan, const std::vector<Eigen::Vector3d>& points,
+// on_grid: the corners are samples of the scan's grid.
+std::vector<MeshTile> TileTriangles(const Scan& scan, bool on_grid,
+                                    const std::vector<Eigen::Vector3d>& points,
                                     const std::vector<Triangle>& triangles) {
   std::vector<uint32_t> keys(triangles.size());
-  const Bounds bounds = scan.organised ? Bounds() : FindBounds(scan);
+  const Bounds bounds = on_grid ? Bounds() : FindBounds(scan);
   for (size_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = triangles[i];
-    if (scan.organised) {
+    if (on_grid) {
       const auto [column, row] = QuadOf(t, scan.num_columns);
       keys[i] = TileKey(column, row, scan.num_columns);
     } else {
@@ -114,8 +116,8 @@ std::vector<MeshTile> TileTriangles(const Scan& scan, const std::vector<Eigen::V
   TileBuilder builder(points);
   for (size_t begin = 0; begin < order.size();) {
     size_t end = begin;
-    while (end < order.size() && (scan.organised ? keys[order[end]] == keys[order[begin]]
-                                                 : end - begin < kTrianglesPerTile)) {
+    while (end < order.size() &&
+           (on_grid ? keys[order[end]] == keys[order[begin]] : end - begin < kTrianglesPerTile)) {
       ++end;
     }
     tiles.push_back(builder.Build(triangles, order.data() + begin, order.data() + end));
@@ -124,10 +126,11 @@ std::vector<MeshTile> TileTriangles(const Scan& scan, const std::vector<Eigen::V
   return tiles;
 }
 
-// Triangles over the quads that the mesh leaves open although their corners were measured.
-std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) {
-  std::vector<Triangle> shadows;
-  if (!scan.organised || scan.num_columns < 2) return shadows;
+// Calls body(corners, count) for every quad that the mesh leaves open although at least three of
+// its corners were measured; only those are given.
+template <typename Body>
+void ForEachOpenQuad(const Scan& scan, const ScanSurface& surface, const Body& body) {
+  if (!scan.organised || scan.num_columns < 2) return;
   std::vector<uint8_t> filled(scan.points.size(), 0);  // triangles per quad
   bool closed = false;
   for (const Triangle& t : surface.triangles) {
@@ -146,13 +149,42 @@ std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) 
       for (int c : corner) {
         if (!scan.IsMissing(c)) measured[count++] = c;
       }
-      if (count == 4 || (count == 3 && filled[scan.Index(column, row)] == 0)) {
-        shadows.push_back({measured[0], measured[1], measured[2]});
-      }
-      if (count == 4) shadows.push_back({measured[0], measured[2], measured[3]});
+      if (count == 4 || (count == 3 && filled[scan.Index(column, row)] == 0)) body(measured, count);
     }
   }
+}
+
+// Triangles over the open quads.
+std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) {
+  std::vector<Triangle> shadows;
+  ForEachOpenQuad(scan, surface, [&](const int* corner, int count) {
+    shadows.push_back({corner[0], corner[1], corner[2]});
+    if (count == 4) shadows.push_back({corner[0], corner[2], corner[3]});
+  });
   return shadows;
+}
+
+// The open quads at the range of their nearest corner; `points` gets their corners.
+std::vector<Triangle> FindFringes(const Scan& scan, const ScanSurface& surface,
+                                  std::vector<Eigen::Vector3d>* points) {
+  constexpr double kSameSurface = 0.01;  // of the range
+  std::vector<Triangle> fringes;
+  ForEachOpenQuad(scan, surface, [&](const int* corner, int count) {
+    double range[4], nearest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < count; ++k) {
+      range[k] = (surface.points[corner[k]] - scan.Station()).norm();
+      nearest = std::min(nearest, range[k]);
+    }
+    const int first = static_cast<int>(points->size());
+    for (int k = 0; k < count; ++k) {
+      const Eigen::Vector3d& point = surface.points[corner[k]];
+      const double share = range[k] > (1 + kSameSurface) * nearest ? nearest / range[k] : 1;
+      points->push_back(scan.Station() + share * (point - scan.Station()));
+    }
+    fringes.push_back({first, first + 1, first + 2});
+    if (count == 4) fringes.push_back({first, first + 2, first + 3});
+  });
+  return fringes;
 }
 
 // Samples that the scanner missed here and there must not be peepholes: gaps of up to kWidestGap
@@ -216,11 +248,16 @@ std::vector<Triangle> FillGaps(const Scan& scan, std::vector<Eigen::Vector3d>* p
 
 OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface) {
   OccluderTiles tiles;
-  tiles.surface = TileTriangles(scan, surface.points, surface.triangles);
-  tiles.shadows = TileTriangles(scan, surface.points, FindShadows(scan, surface));
+  tiles.range_noise = surface.range_noise;
+  tiles.surface = TileTriangles(scan, scan.organised, surface.points, surface.triangles);
+  if (!scan.organised) return tiles;
+  tiles.shadows = TileTriangles(scan, true, surface.points, FindShadows(scan, surface));
+  std::vector<Eigen::Vector3d> corners;
+  const std::vector<Triangle> fringes = FindFringes(scan, surface, &corners);
+  tiles.fringes = TileTriangles(scan, false, corners, fringes);
   std::vector<Eigen::Vector3d> points = surface.points;
   const std::vector<Triangle> fillings = FillGaps(scan, &points);
-  for (MeshTile& tile : TileTriangles(scan, points, fillings)) {
+  for (MeshTile& tile : TileTriangles(scan, true, points, fillings)) {
     tiles.surface.push_back(std::move(tile));
   }
   return tiles;

@@ -44,7 +44,7 @@ struct Observation {
   uint32_t color = 0;     // PackColor, as photographed
   uint16_t weight = 0;    // PackWeight; 0 = empty
   uint16_t photo : 15;    // number of the photo
-  uint16_t in_doubt : 1;  // seen through space that the scanner could not see: Sight::kShadow
+  uint16_t in_doubt : 1;  // something unseen may stand in front: Sight::kShadow or kFringe
 };
 inline constexpr int kMaxPhotos = 1 << 15;
 static_assert(sizeof(Observation) == 8, "memory per sample is counted on this");

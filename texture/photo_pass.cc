@@ -71,7 +71,7 @@ class PhotoObserver {
       Sight sight = visibility_.Look(x, y, depth);
       if (sight == Sight::kHidden) continue;
       // A sample without a triangle is a stray one at a depth jump.
-      if (tile.normals[i].isZero()) sight = Sight::kBoundary;
+      if (tile.normals[i].isZero()) sight = std::min(sight, Sight::kBoundary);
       const Eigen::Vector3f to_scanner =
           scanner_known ? Eigen::Vector3f(tile.scanner - point) : Eigen::Vector3f(to_camera);
       const float spacing_px =
@@ -95,7 +95,7 @@ class PhotoObserver {
           PackColor(vignetting_ ? color.linear * vignetting_->At(x, y) : color.linear);
       observation.weight = PackWeight(std::max(weight, 1e-10f));
       observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
-      observation.in_doubt = sight == Sight::kShadow;
+      observation.in_doubt = sight < Sight::kBoundary;
       seen->all.push_back({tile.first_slot + i, observation});
     }
   }

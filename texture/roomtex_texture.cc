@@ -119,11 +119,11 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                         "response is found from them.",
                         Command::Kind::kOptional);
   command->AddDouble("Occlusion.depth_tolerance", &o->occlusion.depth_tolerance,
-                     "Share of its depth by which a surface in front hides a sample. Larger = more "
-                     "tolerant.");
+                     "Share of its depth by which a surface in front hides a sample; -1 = by the "
+                     "range noise of the scan. Larger = more tolerant.");
   command->AddDouble("Occlusion.boundary_px", &o->occlusion.boundary_px,
-                     "Width of the untrusted band beside depth boundaries, photo pixels; -1 = "
-                     "the spacing of the scan's samples, at least 2.5.");
+                     "Width of the untrusted band beside depth boundaries, photo pixels; -1 = 2. "
+                     "Poses that are off by more need more.");
   command->AddDouble("Occlusion.boundary_jump", &o->occlusion.boundary_jump,
                      "Share of the depth that makes a jump a depth boundary. Larger = fewer.");
   command->AddBool("Occlusion.shadows", &o->occlusion.shadows,

@@ -19,8 +19,10 @@ struct ScanSurfaceOptions {
   // scanner's place. Departure from the thesis, which uses the measured points. The written
   // vertices stay measured.
   bool reduce_range_noise = true;
-  // Samples on either side that the plane is fitted to. Larger = smoother.
-  int smoothing_radius = 3;
+  // Samples on either side that lines are fitted to, along rows and columns; fewer, or those of one
+  // side only, where that many do not lie straight within the noise (corners, steps, round things).
+  // Larger = smoother.
+  int smoothing_radius = 6;
 
   std::vector<std::string> Problems() const;
 };

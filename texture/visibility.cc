@@ -21,6 +21,10 @@ constexpr double kGapSpacings = 1.5;
 constexpr float kShadowEdgePx = 1e6f;
 // No lens sees nearer; keeps a surface that touches the camera from hiding everything.
 constexpr double kNearDepth = 0.01;
+// Automatic depth tolerance, shares of the depth.
+constexpr float kNearlyExact = 0.001f, kUnknownNoise = 0.004f;
+// Automatic width of the band beside depth boundaries, pixels of the photo.
+constexpr double kBoundaryPx = 2;
 
 cv::Mat Square(int radius) {
   return cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1});
@@ -119,9 +123,10 @@ double MapScale(const PhotoProjector& projector, double angular_spacing,
 
 std::vector<std::string> OcclusionOptions::Problems() const {
   std::vector<std::string> problems;
-  if (!(depth_tolerance > 0) || !(depth_tolerance < 1)) {
+  if (depth_tolerance != -1 && (!(depth_tolerance > 0) || !(depth_tolerance < 1))) {
     problems.push_back(
-        "--Occlusion.depth_tolerance must lie between 0 and 1 (a share of the depth)");
+        "--Occlusion.depth_tolerance must be -1 (automatic) or lie between 0 and 1 (a share of the "
+        "depth)");
   }
   if (!(boundary_px >= 0) && boundary_px != -1) {
     problems.push_back("--Occlusion.boundary_px must be -1 (automatic) or not negative");
@@ -240,7 +245,13 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
                                  double angular_spacing, const OcclusionOptions& options)
     : surface_(projector.width(), projector.height(),
                MapScale(projector, angular_spacing, options)),
-      tolerance_(static_cast<float>(options.depth_tolerance)) {
+      share_(static_cast<float>(options.depth_tolerance)) {
+  if (options.depth_tolerance < 0) {
+    double noise = 0;
+    for (const OccluderTiles& tiles : occluders) noise = std::max(noise, tiles.range_noise);
+    share_ = noise > 0 ? kNearlyExact : kUnknownNoise;
+    distance_ = static_cast<float>(3 * noise);
+  }
   const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
   const auto map_px = [this](double px) {
     return static_cast<int>(std::ceil(px * surface_.scale_x()));
@@ -253,8 +264,13 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
     for (const OccluderTiles& tiles : occluders)
       shadow.Draw(projector, tiles.shadows, kShadowEdgePx);
     shadow_ = shadow.inverse_depth();
+    DepthMap fringe(projector.width(), projector.height(),
+                    MapScale(projector, angular_spacing, options));
+    for (const OccluderTiles& tiles : occluders)
+      fringe.Draw(projector, tiles.fringes, kShadowEdgePx);
+    fringe_ = fringe.inverse_depth();
   }
-  const double radius = options.boundary_px >= 0 ? options.boundary_px : std::max(2.5, spacing_px);
+  const double radius = options.boundary_px >= 0 ? options.boundary_px : kBoundaryPx;
   mask_ = BoundaryMask(DepthBoundaries(surface_.inverse_depth(), options.boundary_jump,
                                        map_px(kGapSpacings * spacing_px)),
                        radius * surface_.scale_x());
@@ -269,13 +285,13 @@ Sight PhotoVisibility::Look(float x, float y, float depth) const {
   const float farthest =
       std::min({map(row, column), map(row, right), map(below, column), map(below, right)});
   // Thesis (8.4): |z_r / z - 1| < tau, for the surface in front of the sample.
-  if (farthest * depth > 1 / (1 - tolerance_)) return Sight::kHidden;
+  if (IsBehind(farthest, depth, 1)) return Sight::kHidden;
   const int nearest_column = std::clamp(static_cast<int>(map_x), 0, map.cols - 1);
   const int nearest_row = std::clamp(static_cast<int>(map_y), 0, map.rows - 1);
   if (!shadow_.empty()) {
-    // The shadow ends at the samples around a depth jump; they are not behind it.
-    const float shadow = shadow_(nearest_row, nearest_column);
-    if (shadow * depth > 1 / (1 - 2 * tolerance_)) return Sight::kShadow;
+    // They end at the samples around a depth jump, which are not behind them.
+    if (IsBehind(shadow_(nearest_row, nearest_column), depth, 2)) return Sight::kShadow;
+    if (IsBehind(fringe_(nearest_row, nearest_column), depth, 2)) return Sight::kFringe;
   }
   if (mask_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
   return Sight::kClear;

@@ -16,17 +16,20 @@ namespace roomtex {
 
 struct OcclusionOptions {
   // A sample is hidden when the surface rendered at its pixel is nearer by more than this share of
-  // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008.
-  double depth_tolerance = 0.008;
+  // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008. -1 = three standard deviations of the
+  // scan's range noise and 0.1 % of the depth (0.4 % when the noise is not known): 0.8 % would let
+  // what stands 2 cm in front of a wall paint it.
+  double depth_tolerance = -1;
   // Width of the band on either side of a depth boundary in which a photo is not trusted, pixels of
-  // the photo. -1 = the spacing of the scan's samples, at least 2.5: an object may reach one
-  // spacing beyond its last sample. Poses that are off by more pixels need more.
+  // the photo; pixels there mix both sides, and poses are off by a little. Poses that are off by
+  // more pixels need more. -1 = 2 pixels.
   double boundary_px = -1;
   // The inverse depth changes over a depth boundary by more than this share of itself, apart from
   // the even change of a plane. Larger = fewer boundaries.
-  double boundary_jump = 0.02;
+  double boundary_jump = 0.005;
   // Lines of sight through space that the scanner could not see are not trusted either: what stands
-  // there is not in the scan (departure from the thesis).
+  // there is not in the scan (departure from the thesis). Nor are those that pass the last sample
+  // of something by less than the spacing of the samples, because it may reach that far.
   bool shadows = true;
   // Smallest length of a depth map's longer side, pixels. Thesis 8.1.1: 1024. A scan finer than
   // that raises it, up to the photo's size.
@@ -72,9 +75,9 @@ cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_
 cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px);
 
 // How a photo sees one sample: not at all; through a shadow of the scanner, so that something that
-// is not in the scan may stand in front of it; in the depth-boundary mask (B = 1); without any
-// doubt.
-enum class Sight : uint8_t { kHidden, kShadow, kBoundary, kClear };
+// is not in the scan may stand in front of it; past the last sample of something nearer, closer
+// than it may reach; in the depth-boundary mask (B = 1); without any doubt.
+enum class Sight : uint8_t { kHidden, kShadow, kFringe, kBoundary, kClear };
 
 class PhotoVisibility {
  public:
@@ -93,8 +96,13 @@ class PhotoVisibility {
  private:
   DepthMap surface_;
   cv::Mat1f shadow_;  // inverse depth of the nearest shadow
+  cv::Mat1f fringe_;  // and of the nearest fringe
   cv::Mat1b mask_;
-  float tolerance_;
+  // Hidden when farther than 1 / w by more than share * depth + distance.
+  float share_ = 0, distance_ = 0;
+  bool IsBehind(float inverse_depth, float depth, float times) const {
+    return depth * (1 - times * share_) - times * distance_ > 1 / inverse_depth;
+  }
 };
 
 // Thesis 8.1.2: false when the sample's surface is turned away from the camera, (p - v).n >= 0.

@@ -36,7 +36,7 @@ TEST(ScanSurface, TakesMostOfTheRangeNoiseOut) {
   // Along the ray, and never far: depth edges stay sharp.
   for (size_t i = 0; i < truth.points.size(); ++i) {
     ASSERT_LT(surface.points[i].normalized().cross(noisy.points[i].normalized()).norm(), 1e-9);
-    ASSERT_LT((surface.points[i] - noisy.points[i]).norm(), 3.01 * surface.range_noise);
+    ASSERT_LT((surface.points[i] - noisy.points[i]).norm(), 6 * surface.range_noise);
   }
 }
 

@@ -360,7 +360,7 @@ TEST_F(TextureCommand, BadInputGetsASentence) {
   expect(all + rest + " --Texture.scale -1", 2, "Texture.scale must be 1 to 16");
   expect(all + rest + " --Texture.scale fine", 2, "Texture.scale");
   expect(all + rest + " --Texture.max_memory_mb 1", 2, "Texture.max_memory_mb");
-  expect(all + rest + " --Occlusion.depth_tolerance -1", 2, "Occlusion.depth_tolerance");
+  expect(all + rest + " --Occlusion.depth_tolerance -2", 2, "Occlusion.depth_tolerance");
   expect(all + rest + " --Exposure.mode guess", 2, "exif, match or none");
   expect(all + rest + " --associations_path " + Path("none.csv"), 3, "does not exist");
   expect(all + rest + " --database_path " + scan, 3, "SQLite");
