@@ -1,12 +1,12 @@
-// roomtex-render: a coloured model.ply as a photo of a COLMAP model sees it, to look at results.
-// Not installed. Triangles carry the colours of their corners; with --image_path the photo stands
-// to the left of the picture.
+// roomtex-render: pictures of a coloured model.ply, to look at results. Not installed.
+//   one picture: from the pose of a photo of a COLMAP model, the photo beside it
+//   --folder_path: a set of them from photos' poses, from new viewpoints in the room and from
+//   outside, and a contact sheet of all
+// Triangles carry the colours of their corners.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -16,121 +16,266 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
-#include "core/parallel.h"
 #include "core/photo.h"
-#include "core/ray_caster.h"
-#include "tests/support/ply_vertices.h"
+#include "tests/support/mesh_renderer.h"
 
 namespace roomtex {
 namespace {
 
 struct RenderOptions {
-  std::string ply_path, input_path, image_path, output_path, image_name;
+  std::string ply_path, input_path, image_path, output_path, folder_path, image_name;
   double turn_deg = 0, back = 0, up = 0;
   int width = 0;
+  int num_photos = 4, num_ring = 4;
 };
 
-struct ColoredMesh {
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Matrix<uint8_t, 3, 1>> colors;
-  std::vector<Triangle> triangles;
-};
-
-ColoredMesh ReadColoredMesh(const std::string& path) {
-  RequireFile(path, "Give a model.ply of roomtex-texture");
-  std::ifstream stream(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  PlyVertices vertices = ParsePlyVertices(bytes, path);
-  if (vertices.colors.empty()) throw InputError(path, "", "has no colours", "");
-  ColoredMesh mesh;
-  for (const Eigen::Vector3f& point : vertices.points) mesh.points.push_back(point.cast<double>());
-  mesh.colors = std::move(vertices.colors);
-  // The faces are the last element: 1 + 3 * 4 bytes each.
-  const size_t at = bytes.find("element face ");
-  const size_t count = at == std::string::npos ? 0 : std::stoull(bytes.substr(at + 13, 20));
-  if (count * 13 > bytes.size()) throw InputError(path, "", "is truncated", "");
-  const char* face = bytes.data() + bytes.size() - count * 13;
-  for (size_t i = 0; i < count; ++i, face += 13) {
-    Triangle triangle;
-    std::memcpy(triangle.data(), face + 1, 12);
-    for (int corner : triangle) {
-      if (corner < 0 || corner >= static_cast<int>(mesh.points.size())) {
-        throw InputError(path, "", "has a face that names no vertex", "");
-      }
-    }
-    mesh.triangles.push_back(triangle);
+void WritePicture(const std::string& path, const cv::Mat& picture) {
+  OutputFile file(path);
+  if (!cv::imwrite(file.partial_path(), picture)) {
+    throw InputError(path, "", "cannot be written", "Give a .png or .jpg");
   }
-  return mesh;
+  file.Commit();
 }
 
-cv::Vec3b ColorAt(const ColoredMesh& mesh, const RayHit& hit) {
-  const Triangle& t = mesh.triangles[hit.triangle];
-  const Eigen::Vector3d a = mesh.points[t[0]], b = mesh.points[t[1]], c = mesh.points[t[2]];
-  const Eigen::Vector3d normal = (b - a).cross(c - a);
-  const double area = normal.squaredNorm();
-  double share[3] = {1, 0, 0};
-  if (area > 0) {
-    share[0] = normal.dot((c - b).cross(hit.point - b)) / area;
-    share[1] = normal.dot((a - c).cross(hit.point - c)) / area;
-    share[2] = 1 - share[0] - share[1];
-  }
-  cv::Vec3b bgr;
-  for (int k = 0; k < 3; ++k) {
-    double value = 0;
-    for (int i = 0; i < 3; ++i) value += share[i] * mesh.colors[t[i]][2 - k];
-    bgr[k] = cv::saturate_cast<uchar>(value);
-  }
-  return bgr;
+// The photo to the left of the picture.
+cv::Mat Beside(const std::string& photo_path, const cv::Mat& picture) {
+  cv::Mat photo = ReadPhoto(photo_path), both;
+  cv::resize(photo, photo, picture.size(), 0, 0, cv::INTER_AREA);
+  cv::hconcat(photo, picture, both);
+  return both;
 }
 
-cv::Mat Render(const ColoredMesh& mesh, const Camera& camera, const Rigid& cam_from_scan, int width,
-               int num_threads) {
-  const RayCaster caster(mesh.points, mesh.triangles);
-  const CameraProjection projection(camera);
-  const double scale = static_cast<double>(width) / camera.width;
-  cv::Mat3b picture(static_cast<int>(std::lround(camera.height * scale)), width);
-  const Rigid scan_from_cam = cam_from_scan.Inverse();
-  ParallelFor(num_threads, 0, picture.rows, [&](int y) {
-    for (int x = 0; x < picture.cols; ++x) {
-      picture(y, x) = {255, 0, 255};
-      const auto ray = projection.CamFromImg({(x + 0.5) / scale, (y + 0.5) / scale});
-      if (!ray) continue;
-      const Eigen::Vector3d direction =
-          (scan_from_cam.rotation * Eigen::Vector3d(ray->x(), ray->y(), 1)).normalized();
-      const auto hit = caster.Cast(scan_from_cam.translation, direction, 0.01);
-      if (hit) picture(y, x) = ColorAt(mesh, *hit);
-    }
-  });
-  return picture;
-}
-
-void RenderModel(const RenderOptions& options, const Command::Context& context) {
-  context.progress.Stage("read");
-  const SparseModel model = ReadSparseModel(options.input_path);
-  const SparseImage* const image = options.image_name.empty() && !model.images.empty()
-                                       ? &model.images.begin()->second
-                                       : model.FindImage(options.image_name);
+void RenderOne(const RenderOptions& options, const SparseModel& model, const ColoredMesh& mesh,
+               const Command::Context& context) {
+  const SparseImage* const image = options.image_name.empty() ? &model.images.begin()->second
+                                                              : model.FindImage(options.image_name);
   if (image == nullptr)
     throw UsageError("--image_name " + options.image_name + " is not in the model");
-  const ColoredMesh mesh = ReadColoredMesh(options.ply_path);
-  const Camera& camera = model.cameras.at(image->camera_id);
   Rigid new_from_cam;  // a viewpoint of its own: turned, and moved in the camera's frame
   new_from_cam.rotation = Eigen::AngleAxisd(RadFromDeg(options.turn_deg), Eigen::Vector3d::UnitY());
   new_from_cam.translation = Eigen::Vector3d(0, options.up, options.back);
-  const int width = options.width > 0 ? options.width : camera.width;
+  RenderSettings settings;
+  settings.width = options.width;
+  settings.num_threads = context.options.num_threads;
+  settings.empty = {255, 0, 255};
   context.progress.Stage("render");
-  cv::Mat picture = Render(mesh, camera, new_from_cam * image->cam_from_model, width,
-                           context.options.num_threads);
+  cv::Mat picture = MeshRenderer(mesh).Render(model.cameras.at(image->camera_id),
+                                              new_from_cam * image->cam_from_model, settings);
   if (!options.image_path.empty()) {
-    cv::Mat photo = ReadPhoto(options.image_path + "/" + image->name);
-    cv::resize(photo, photo, picture.size(), 0, 0, cv::INTER_AREA);
-    cv::hconcat(photo, picture, picture);
+    picture = Beside(options.image_path + "/" + image->name, picture);
   }
-  OutputFile file(options.output_path);
-  if (!cv::imwrite(file.partial_path(), picture)) {
-    throw InputError(options.output_path, "", "cannot be written", "Give a .png or .jpg");
+  WritePicture(options.output_path, picture);
+}
+
+// The axis of the scan frame that is up, from the way photos are held.
+Eigen::Vector3d FindUp(const SparseModel& model) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& [id, image] : model.images) {
+    sum += image.cam_from_model.rotation.conjugate() * -Eigen::Vector3d::UnitY();
   }
-  file.Commit();
+  int axis = 0;
+  sum.cwiseAbs().maxCoeff(&axis);
+  return (sum[axis] < 0 ? -1 : 1) * Eigen::Vector3d::Unit(axis);
+}
+
+// Median height of the photos along `up`.
+double EyeHeight(const SparseModel& model, const Eigen::Vector3d& up) {
+  std::vector<double> heights;
+  for (const auto& [id, image] : model.images) {
+    heights.push_back(up.dot(image.cam_from_model.TargetOriginInSource()));
+  }
+  std::nth_element(heights.begin(), heights.begin() + heights.size() / 2, heights.end());
+  return heights[heights.size() / 2];
+}
+
+Camera PlainCamera(int width, int height, double field_of_view_deg) {
+  Camera camera;
+  camera.model = CameraModel::kSimplePinhole;
+  camera.width = width;
+  camera.height = height;
+  const double focal_length = width / 2.0 / std::tan(RadFromDeg(field_of_view_deg) / 2);
+  camera.params = {focal_length, width / 2.0, height / 2.0};
+  return camera;
+}
+
+// The pictures of one contact sheet.
+class PictureSet {
+ public:
+  PictureSet(const RenderOptions& options, const Command::Context& context)
+      : options_(options), context_(context) {
+    settings_.num_threads = context.options.num_threads;
+    settings_.width = options.width > 0 ? options.width : 960;
+    MakeFolder(options.folder_path);
+  }
+
+  void FromPhotos(const SparseModel& model, const MeshRenderer& renderer) {
+    std::vector<const SparseImage*> images;
+    for (const auto& [id, image] : model.images) images.push_back(&image);
+    std::sort(images.begin(), images.end(),
+              [](const SparseImage* a, const SparseImage* b) { return a->name < b->name; });
+    const int count = std::min<int>(options_.num_photos, static_cast<int>(images.size()));
+    for (int i = 0; i < count; ++i) {
+      const SparseImage& image = *images[i * images.size() / count];
+      cv::Mat picture =
+          renderer.Render(model.cameras.at(image.camera_id), image.cam_from_model, settings_);
+      if (!options_.image_path.empty()) {
+        const cv::Mat both = Beside(options_.image_path + "/" + image.name, picture);
+        pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
+        WritePicture(FileOf("photo_" + std::to_string(i + 1)), both);
+        pictures_.emplace_back("the scan from there", picture);
+      } else {
+        Add("photo_" + std::to_string(i + 1), "from " + image.name, picture);
+      }
+    }
+  }
+
+  // Viewpoints on a ring in the room, as high as the photos, that look over the middle at the other
+  // side; nearer to the middle where that shows more. A scan that is no room around them is looked
+  // at from beside the photos.
+  void FromRing(const SparseModel& model, const RoomBox& box, const Eigen::Vector3d& up,
+                const MeshRenderer& renderer) {
+    const Camera camera = PlainCamera(settings_.width, settings_.width * 2 / 3, 75);
+    const Eigen::Vector3d side = up.unitOrthogonal(), other = up.cross(side);
+    const Eigen::Vector3d half = (box.high - box.low) / 2;
+    const Eigen::Vector3d middle =
+        box.Centre() + up * (EyeHeight(model, up) - up.dot(box.Centre()));
+    for (int i = 0; i < options_.num_ring; ++i) {
+      const double angle = 2 * kPi * (i + 0.5) / options_.num_ring;
+      const Eigen::Vector3d out = std::cos(angle) * side + std::sin(angle) * other;
+      const Eigen::Vector3d to_wall = out.cwiseProduct(half);
+      Rigid best;
+      double most = -1;
+      for (const double share : {0.6, 0.4, 0.2, 0.0, -0.2}) {
+        const Rigid pose = LookAt(middle + share * to_wall, middle - to_wall - 0.4 * up, up);
+        const double in_sight = renderer.ShareInSight(camera, pose);
+        if (in_sight > most + 0.1) {
+          most = in_sight;
+          best = pose;
+        }
+      }
+      constexpr double kRoomAround = 0.8;
+      if (most < kRoomAround) best = BesideAPhoto(model, i, up);
+      Add("ring_" + std::to_string(i + 1), "new viewpoint " + std::to_string(i + 1),
+          renderer.Render(camera, best, settings_));
+    }
+  }
+
+  // Half a metre above a photo's place and aside, looking at what the photo shows.
+  Rigid BesideAPhoto(const SparseModel& model, int number, const Eigen::Vector3d& up) const {
+    auto image = model.images.begin();
+    std::advance(image, number * model.images.size() / options_.num_ring);
+    const Rigid scan_from_cam = image->second.cam_from_model.Inverse();
+    const Eigen::Vector3d aside(number % 2 == 0 ? 0.4 : -0.4, 0, 0);
+    return LookAt(scan_from_cam * aside + 0.35 * up, scan_from_cam * Eigen::Vector3d(0, 0, 2), up);
+  }
+
+  // Without the ceiling: straight from above, and from two corners at a slant, through the walls
+  // that turn their back.
+  void FromOutside(const RoomBox& box, const Eigen::Vector3d& up, const ColoredMesh& mesh) {
+    const double height = (box.high - box.low).dot(up.cwiseAbs());
+    const Eigen::Vector3d centre = box.Centre();
+    const ColoredMesh open = CutBeyond(mesh, up, centre.dot(up) + 0.38 * height);
+    const MeshRenderer renderer(open);
+    RenderSettings settings = settings_;
+    settings.front_only = true;
+    constexpr double kFieldOfView = 50;
+    const Camera camera = PlainCamera(settings.width, settings.width * 2 / 3, kFieldOfView);
+    const Eigen::Vector3d extent = box.high - box.low - up.cwiseAbs() * height;
+    const double radius = extent.norm() / 2;
+    int long_axis = 0;
+    extent.maxCoeff(&long_axis);
+    const Eigen::Vector3d away = up.cross(Eigen::Vector3d::Unit(long_axis));
+    const double distance = 0.8 * radius / std::tan(RadFromDeg(kFieldOfView) / 2) + height / 2;
+    Add("above", "from above",
+        renderer.Render(camera, LookAt(centre + distance * up, centre, away), settings));
+    const Eigen::Vector3d side = up.cross(away);
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector3d direction =
+          (up + (i == 0 ? 1 : -1) * (0.9 * away + 0.5 * side)).normalized();
+      Add("open_" + std::to_string(i + 1), "open room " + std::to_string(i + 1),
+          renderer.Render(camera, LookAt(centre + 1.1 * distance * direction, centre, up),
+                          settings));
+    }
+  }
+
+  void WriteContactSheet() const {
+    constexpr int kWidth = 480, kHeight = 320, kCaption = 26, kColumns = 4;
+    std::vector<cv::Mat> cells;
+    for (const auto& [caption, picture] : pictures_) {
+      const double scale = std::min(static_cast<double>(kWidth) / picture.cols,
+                                    static_cast<double>(kHeight) / picture.rows);
+      cv::Mat small, cell(kHeight + kCaption, kWidth, CV_8UC3, cv::Scalar::all(24));
+      cv::resize(picture, small, {}, scale, scale, cv::INTER_AREA);
+      small.copyTo(cell(
+          cv::Rect((kWidth - small.cols) / 2, (kHeight - small.rows) / 2, small.cols, small.rows)));
+      cv::putText(cell, caption, {8, kHeight + 18}, cv::FONT_HERSHEY_SIMPLEX, 0.5,
+                  cv::Scalar::all(220), 1, cv::LINE_AA);
+      cells.push_back(cell);
+    }
+    while (cells.size() % kColumns != 0) {
+      cells.emplace_back(kHeight + kCaption, kWidth, CV_8UC3, cv::Scalar::all(24));
+    }
+    std::vector<cv::Mat> rows;
+    for (size_t i = 0; i < cells.size(); i += kColumns) {
+      cv::Mat row;
+      cv::hconcat(&cells[i], kColumns, row);
+      rows.push_back(row);
+    }
+    cv::Mat sheet;
+    cv::vconcat(rows, sheet);
+    WritePicture(options_.folder_path + "/contact_sheet.png", sheet);
+  }
+
+ private:
+  std::string FileOf(const std::string& name) const {
+    return options_.folder_path + "/" + name + ".png";
+  }
+  void Add(const std::string& file, const std::string& caption, const cv::Mat& picture) {
+    WritePicture(FileOf(file), picture);
+    pictures_.emplace_back(caption, picture);
+    context_.progress.Tick();
+  }
+
+  const RenderOptions& options_;
+  const Command::Context& context_;
+  RenderSettings settings_;
+  std::vector<std::pair<std::string, cv::Mat>> pictures_;
+};
+
+void RenderSet(const RenderOptions& options, const SparseModel& model, const ColoredMesh& mesh,
+               const Command::Context& context) {
+  context.progress.Stage("render", options.num_photos + options.num_ring + 3);
+  const RoomBox box = FindRoomBox(mesh);
+  const Eigen::Vector3d up = FindUp(model);
+  PictureSet set(options, context);
+  {
+    const MeshRenderer renderer(mesh);
+    set.FromPhotos(model, renderer);
+    set.FromRing(model, box, up, renderer);
+  }
+  set.FromOutside(box, up, mesh);
+  set.WriteContactSheet();
+  std::printf("%s\n", (options.folder_path + "/contact_sheet.png").c_str());
+}
+
+void RenderModel(const RenderOptions& options, const Command::Context& context) {
+  if (options.output_path.empty() == options.folder_path.empty()) {
+    throw UsageError("give --output_path for one picture or --folder_path for a set of them");
+  }
+  if (options.num_photos < 0 || options.num_ring < 0) {
+    throw UsageError("--num_photos and --num_ring must not be negative");
+  }
+  context.progress.Stage("read");
+  const SparseModel model = ReadSparseModel(options.input_path);
+  if (model.images.empty()) {
+    throw InputError(options.input_path, "", "holds no registered photo", "Give an aligned model");
+  }
+  const ColoredMesh mesh = ReadColoredMesh(options.ply_path);
+  if (options.folder_path.empty()) {
+    RenderOne(options, model, mesh, context);
+  } else {
+    RenderSet(options, model, mesh, context);
+  }
 }
 
 }  // namespace
@@ -139,19 +284,27 @@ void RenderModel(const RenderOptions& options, const Command::Context& context) 
 int main(int argc, char** argv) {
   using namespace roomtex;
   RenderOptions o;
-  Command command("roomtex-render", "Renders a coloured model.ply from the pose of a photo.",
+  Command command("roomtex-render", "Renders a coloured model.ply, to look at results.",
                   "roomtex-render --ply_path textured/model.ply --input_path aligned --image_path "
-                  "images --image_name IMG_1.jpg --output_path beside.png");
+                  "images --folder_path pictures");
   command.AddInputPath("ply_path", &o.ply_path, "coloured mesh");
   command.AddInputPath("input_path", &o.input_path, "COLMAP model in the scan frame");
-  command.AddOutputPath("output_path", &o.output_path, "picture to write; magenta = no surface");
+  command.AddOutputPath("folder_path", &o.folder_path,
+                        "folder for a set of pictures and contact_sheet.png",
+                        Command::Kind::kOptional);
+  command.AddInt("num_photos", &o.num_photos, "of the set: pictures from photos' poses");
+  command.AddInt("num_ring", &o.num_ring, "of the set: pictures from new viewpoints in the room");
+  command.AddOutputPath("output_path", &o.output_path,
+                        "one picture to write instead; magenta = no surface",
+                        Command::Kind::kOptional);
   command.AddString("image_name", &o.image_name, "photo whose pose is taken; first one by default");
   command.AddInputPath("image_path", &o.image_path, "folder of the photos: puts the photo beside",
                        Command::Kind::kOptional);
-  command.AddInt("width", &o.width, "width of the picture in pixels; 0 = the camera's");
-  command.AddDouble("turn_deg", &o.turn_deg, "turns the view to the left, degrees");
-  command.AddDouble("back", &o.back, "moves the view back, metres");
-  command.AddDouble("up", &o.up, "moves the view up, metres");
+  command.AddInt("width", &o.width,
+                 "width of a picture in pixels; 0 = the camera's, 960 for a set");
+  command.AddDouble("turn_deg", &o.turn_deg, "one picture: turns the view to the left, degrees");
+  command.AddDouble("back", &o.back, "one picture: moves the view back, metres");
+  command.AddDouble("up", &o.up, "one picture: moves the view up, metres");
   return command.Run(argc, argv,
                      [&o](const Command::Context& context) { RenderModel(o, context); });
 }

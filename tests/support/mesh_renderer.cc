@@ -1,0 +1,179 @@
+#include "tests/support/mesh_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/parallel.h"
+#include "tests/support/ply_vertices.h"
+
+namespace roomtex {
+namespace {
+
+cv::Vec3f ColorAt(const ColoredMesh& mesh, const RayHit& hit) {
+  const Triangle& t = mesh.triangles[hit.triangle];
+  const Eigen::Vector3d &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+  const Eigen::Vector3d normal = (b - a).cross(c - a);
+  const double area = normal.squaredNorm();
+  double share[3] = {1, 0, 0};
+  if (area > 0) {
+    share[0] = normal.dot((c - b).cross(hit.point - b)) / area;
+    share[1] = normal.dot((a - c).cross(hit.point - c)) / area;
+    share[2] = 1 - share[0] - share[1];
+  }
+  cv::Vec3f bgr;
+  for (int k = 0; k < 3; ++k) {
+    double value = 0;
+    for (int i = 0; i < 3; ++i) value += share[i] * mesh.colors[t[i]][2 - k];
+    bgr[k] = static_cast<float>(std::clamp(value, 0.0, 255.0));
+  }
+  return bgr;
+}
+
+}  // namespace
+
+ColoredMesh ReadColoredMesh(const std::string& path) {
+  RequireFile(path, "Give a model.ply of roomtex-texture");
+  std::ifstream stream(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  PlyVertices vertices = ParsePlyVertices(bytes, path);
+  if (vertices.colors.empty()) throw InputError(path, "", "has no colours", "");
+  ColoredMesh mesh;
+  for (const Eigen::Vector3f& point : vertices.points) mesh.points.push_back(point.cast<double>());
+  mesh.colors = std::move(vertices.colors);
+  // The faces are the last element: 1 + 3 * 4 bytes each.
+  const size_t at = bytes.find("element face ");
+  const size_t count = at == std::string::npos ? 0 : std::stoull(bytes.substr(at + 13, 20));
+  if (count * 13 > bytes.size()) throw InputError(path, "", "is truncated", "");
+  const char* face = bytes.data() + bytes.size() - count * 13;
+  for (size_t i = 0; i < count; ++i, face += 13) {
+    Triangle triangle;
+    std::memcpy(triangle.data(), face + 1, 12);
+    for (const int corner : triangle) {
+      if (corner < 0 || corner >= static_cast<int>(mesh.points.size())) {
+        throw InputError(path, "", "has a face that names no vertex", "");
+      }
+    }
+    mesh.triangles.push_back(triangle);
+  }
+  if (mesh.triangles.empty()) throw InputError(path, "", "has no faces", "");
+  return mesh;
+}
+
+RoomBox FindRoomBox(const ColoredMesh& mesh) {
+  RoomBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& point : mesh.points) values.push_back(point[axis]);
+    const auto rank = [&](double share) {
+      const auto place =
+          values.begin() + static_cast<long>(share * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), place, values.end());
+      return *place;
+    };
+    box.low[axis] = rank(0.01);
+    box.high[axis] = rank(0.99);
+  }
+  return box;
+}
+
+ColoredMesh CutBeyond(const ColoredMesh& mesh, const Eigen::Vector3d& axis, double limit) {
+  ColoredMesh cut;
+  cut.points = mesh.points;
+  cut.colors = mesh.colors;
+  for (const Triangle& t : mesh.triangles) {
+    const bool beyond = std::any_of(
+        t.begin(), t.end(), [&](int corner) { return axis.dot(mesh.points[corner]) > limit; });
+    if (!beyond) cut.triangles.push_back(t);
+  }
+  return cut;
+}
+
+MeshRenderer::MeshRenderer(const ColoredMesh& mesh)
+    : mesh_(mesh), caster_(mesh.points, mesh.triangles) {}
+
+cv::Vec3f MeshRenderer::ColorAlong(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                   const RenderSettings& settings) const {
+  constexpr int kMostSurfaces = 12;
+  constexpr double kStep = 1e-4;
+  double from = 0.01;
+  for (int i = 0; i < kMostSurfaces; ++i) {
+    const auto hit = caster_.Cast(origin, direction, from);
+    if (!hit) break;
+    const Triangle& t = mesh_.triangles[hit->triangle];
+    const Eigen::Vector3d normal =
+        (mesh_.points[t[1]] - mesh_.points[t[0]]).cross(mesh_.points[t[2]] - mesh_.points[t[0]]);
+    if (!settings.front_only || normal.dot(direction) < 0) return ColorAt(mesh_, *hit);
+    from = hit->distance + kStep;
+  }
+  return settings.empty;
+}
+
+cv::Mat MeshRenderer::Render(const Camera& camera, const Rigid& cam_from_scan,
+                             const RenderSettings& settings) const {
+  const CameraProjection projection(camera);
+  const int width = settings.width > 0 ? settings.width : camera.width;
+  const double scale = static_cast<double>(width) / camera.width;
+  cv::Mat3b picture(static_cast<int>(std::lround(camera.height * scale)), width);
+  const Rigid scan_from_cam = cam_from_scan.Inverse();
+  const int side = settings.rays_per_side;
+  ParallelFor(settings.num_threads, 0, picture.rows, [&](int y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      cv::Vec3f sum(0, 0, 0);
+      for (int k = 0; k < side * side; ++k) {
+        const double dx = (k % side + 0.5) / side, dy = (k / side + 0.5) / side;
+        const auto ray = projection.CamFromImg({(x + dx) / scale, (y + dy) / scale});
+        if (!ray) {
+          sum += settings.empty;
+          continue;
+        }
+        const Eigen::Vector3d direction =
+            (scan_from_cam.rotation * Eigen::Vector3d(ray->x(), ray->y(), 1)).normalized();
+        sum += ColorAlong(scan_from_cam.translation, direction, settings);
+      }
+      picture(y, x) = cv::Vec3b(sum / static_cast<float>(side * side));
+    }
+  });
+  return picture;
+}
+
+double MeshRenderer::ShareInSight(const Camera& camera, const Rigid& cam_from_scan) const {
+  constexpr int kColumns = 24, kRows = 16;
+  constexpr double kNearest = 0.5;
+  const CameraProjection projection(camera);
+  const Rigid scan_from_cam = cam_from_scan.Inverse();
+  int count = 0;
+  for (int k = 0; k < kColumns * kRows; ++k) {
+    const auto ray = projection.CamFromImg({(k % kColumns + 0.5) / kColumns * camera.width,
+                                            (k / kColumns + 0.5) / kRows * camera.height});
+    if (!ray) continue;
+    const Eigen::Vector3d direction =
+        (scan_from_cam.rotation * Eigen::Vector3d(ray->x(), ray->y(), 1)).normalized();
+    const auto hit = caster_.Cast(scan_from_cam.translation, direction, 0.01);
+    if (!hit || hit->distance < kNearest) continue;
+    const Triangle& t = mesh_.triangles[hit->triangle];
+    const Eigen::Vector3d normal =
+        (mesh_.points[t[1]] - mesh_.points[t[0]]).cross(mesh_.points[t[2]] - mesh_.points[t[0]]);
+    count += normal.dot(direction) < 0;
+  }
+  return static_cast<double>(count) / (kColumns * kRows);
+}
+
+Rigid LookAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, const Eigen::Vector3d& up) {
+  const Eigen::Vector3d forward = (target - eye).normalized();
+  const Eigen::Vector3d right = forward.cross(up).normalized();
+  Eigen::Matrix3d rotation;
+  rotation.row(0) = right;
+  rotation.row(1) = forward.cross(right);  // down
+  rotation.row(2) = forward;
+  Rigid cam_from_scan;
+  cam_from_scan.rotation = Eigen::Quaterniond(rotation);
+  cam_from_scan.translation = -(cam_from_scan.rotation * eye);
+  return cam_from_scan;
+}
+
+}  // namespace roomtex

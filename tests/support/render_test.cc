@@ -1,0 +1,92 @@
+// scripts/render.sh as a user calls it, and the renderer under it.
+
+#include <cstdlib>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/capture_writer.h"
+#include "capture/simulated_room.h"
+#include "tests/support/mesh_renderer.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+int RunScript(const std::string& arguments) {
+  const std::string line =
+      std::string(ROOMTEX_SOURCE) + "/scripts/render.sh " + arguments + " >/dev/null 2>&1";
+  const int status = std::system(line.c_str());
+  return status < 0 ? -1 : status >> 8;
+}
+
+TEST(RenderScript, MakesPicturesOfACapture) {
+  const TempFolder folder;
+  SimulatedRoomOptions options;
+  options.num_photos = 6;
+  options.photo_width = 420;
+  options.photo_height = 280;
+  options.scan_columns = 500;
+  options.scan_rows = 200;
+  Progress quiet(true);
+  WriteCapture(SimulatedRoom(options), folder / "capture", &quiet);
+  ASSERT_EQ(RunScript(folder / "capture" + " " + (folder / "pictures") +
+                      " -- --num_photos 2 --num_ring 2 --width 240"),
+            0);
+  for (const char* name : {"photo_1", "photo_2", "ring_1", "ring_2", "above", "open_1", "open_2",
+                           "contact_sheet", "textured/texture"}) {
+    const cv::Mat picture = cv::imread(folder / ("pictures/" + std::string(name) + ".png"));
+    ASSERT_FALSE(picture.empty()) << name;
+    EXPECT_GE(picture.cols, 240) << name;
+  }
+  // The photo and the scan from there show the same, apart from exposure and what is not scanned.
+  const cv::Mat both = cv::imread(folder / "pictures/photo_1.png", cv::IMREAD_GRAYSCALE);
+  ASSERT_EQ(both.cols, 480);
+  std::vector<double> photo, scan;
+  for (int y = 0; y < both.rows; ++y) {
+    for (int x = 0; x < 240; ++x) {
+      if (both.at<uint8_t>(y, x + 240) == 48) continue;  // no surface
+      photo.push_back(both.at<uint8_t>(y, x));
+      scan.push_back(both.at<uint8_t>(y, x + 240));
+    }
+  }
+  ASSERT_GT(photo.size(), 10000u);
+  const cv::Mat a = cv::Mat(photo) - cv::mean(cv::Mat(photo));
+  const cv::Mat b = cv::Mat(scan) - cv::mean(cv::Mat(scan));
+  EXPECT_GT(a.dot(b) / (cv::norm(a) * cv::norm(b)), 0.7);
+}
+
+TEST(RenderScript, SaysWhatIsMissing) {
+  const TempFolder folder;
+  EXPECT_EQ(RunScript(""), 2);
+  EXPECT_EQ(RunScript(folder / "nowhere"), 3);
+  EXPECT_EQ(RunScript(folder.path()), 2);  // nothing in it, nothing given
+}
+
+TEST(MeshRenderer, ShowsATriangleWhereItIs) {
+  ColoredMesh mesh;
+  mesh.points = {{-1, -1, -2}, {1, -1, -2}, {0, 1, -2}};
+  mesh.colors.assign(3, {10, 200, 30});
+  mesh.triangles = {{0, 1, 2}};
+  Camera camera;
+  camera.model = CameraModel::kSimplePinhole;
+  camera.width = camera.height = 40;
+  camera.params = {20, 20, 20};
+  const Rigid pose = LookAt({0, 0, 0}, {0, 0, -1}, {0, 1, 0});
+  EXPECT_NEAR((pose * Eigen::Vector3d(0.5, 0.25, -2) - Eigen::Vector3d(0.5, -0.25, 2)).norm(), 0,
+              1e-12);
+  RenderSettings settings;
+  const MeshRenderer renderer(mesh);
+  const cv::Mat picture = renderer.Render(camera, pose, settings);
+  EXPECT_EQ(picture.at<cv::Vec3b>(20, 20), cv::Vec3b(30, 200, 10));
+  EXPECT_EQ(picture.at<cv::Vec3b>(2, 2), settings.empty);
+  // From behind it is looked through, if asked for.
+  settings.front_only = true;
+  const Rigid behind = LookAt({0, 0, -4}, {0, 0, -1}, {0, 1, 0});
+  EXPECT_EQ(renderer.Render(camera, behind, settings).at<cv::Vec3b>(20, 20), settings.empty);
+  EXPECT_EQ(renderer.Render(camera, pose, settings).at<cv::Vec3b>(20, 20), cv::Vec3b(30, 200, 10));
+}
+
+}  // namespace
+}  // namespace roomtex
