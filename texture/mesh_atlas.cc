@@ -16,7 +16,7 @@ namespace {
 
 // Texels around a chart, and the grid that charts begin on: no mixing in the first three mipmaps.
 constexpr int kGutter = 8;
-constexpr double kWorthTexels = 3;  // from vertex to vertex, in mode "auto"
+constexpr double kWorthTexels = 8;  // from vertex to vertex, in mode "auto"
 
 int RoundUp(double length) {
   return static_cast<int>(std::ceil(length / kGutter - 1e-9)) * kGutter;

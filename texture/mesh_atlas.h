@@ -40,7 +40,7 @@ struct MeshAtlas {
 };
 
 struct AtlasOptions {
-  // "auto": where the photos show more than the vertices can hold (three texels or more from vertex
+  // "auto": where the photos show more than the vertices can hold (eight texels or more from vertex
   // to vertex); "1": always; "0": never.
   std::string mode = "auto";
   // Metres a texel; 0 = what a photo's pixel covers on the surface, median.

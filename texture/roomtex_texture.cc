@@ -1,5 +1,6 @@
 // roomtex-texture: the scan in colour.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -11,9 +12,11 @@
 #include "importers/scan_reader.h"
 #include "texture/colorize.h"
 #include "texture/cpu_stages.h"
+#include "texture/output_set.h"
 #include "texture/photo_list.h"
 #include "texture/texture_scale.h"
 #include "texture/write_glb.h"
+#include "texture/write_obj.h"
 #include "texture/write_ply.h"
 #include "texture/write_texture.h"
 
@@ -28,7 +31,8 @@ struct TextureOptions {
   ColorizeOptions colorize;
   std::string texture_scale = "auto";  // or a whole number
   GlbOptions glb;
-  std::string glb_image = "png";
+  std::string image_format = "png";
+  bool output_obj = false;
   double texel_mm = 0;
 };
 
@@ -39,7 +43,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
   command->AddInputPath("image_path", &o->sources.image_path,
                         "Folder of the photos, as COLMAP was given it.");
   command->AddInputPaths("scan_path", &o->scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or .ply mesh.");
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a mesh, .ply or .obj.");
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write model.ply, model.glb, texture.png, report.json (and "
                          "model.rtpi) into.");
@@ -70,9 +74,11 @@ void AddTextureOptions(TextureOptions* o, Command* command) {
           std::to_string(kMaxAutoBands) +
           " passes over the photos. Larger = sharper; time and memory grow with its square. "
           "model.ply does not depend on it.");
-  command->AddChoice("Texture.atlas", &o->colorize.atlas.mode, {"auto", "1", "0"},
-                     "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
-                     "colours. auto: where the photos show more than the vertices can hold.");
+  command->AddChoice(
+      "Texture.atlas", &o->colorize.atlas.mode, {"auto", "1", "0"},
+      "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
+      "colours. auto: unless --Texture.scale is 1, where the photos show more than the "
+      "vertices can hold (eight texels from one to the next).");
   command->AddDouble("Texture.texel_mm", &o->texel_mm,
                      "Millimetres a texel of that atlas; 0 = what a photo's pixel covers on the "
                      "surface (median), within the bounds of --Texture.scale auto.");
@@ -83,12 +89,17 @@ void AddTextureOptions(TextureOptions* o, Command* command) {
 }
 
 void AddWriteOptions(TextureOptions* o, Command* command) {
-  command->AddChoice("Texture.glb_image", &o->glb_image, {"png", "jpeg"},
-                     "Texture images in model.glb. png keeps every texel and draws no rings around "
-                     "print; jpeg (quality 95) takes a fourth of its room. The mesh mostly weighs "
-                     "more than either.");
+  command->AddBool("output_obj", &o->output_obj,
+                   "Also write model.obj, model.mtl and their texture images model_0.png ... into "
+                   "the output folder; the up axis stays the scan's.");
+  command->AddChoice(
+      "Texture.image_format", &o->image_format, {"png", "jpeg"},
+      "Texture images of model.glb and model.obj. png keeps every texel and draws no "
+      "rings around print; jpeg (quality 95) takes a fourth of its room. The mesh "
+      "mostly weighs more than either.");
   command->AddInt("Texture.max_size", &o->glb.max_texture_size,
-                  "Longest side of one texture image in model.glb, 256 to 16384; a larger texture "
+                  "Longest side of one texture image of model.glb and model.obj, 256 to 16384; a "
+                  "larger texture "
                   "is tiled. Larger = fewer images; not every viewer loads more than 4096.");
 }
 
@@ -298,27 +309,70 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
   WriteColoredRtpi(scan.path, colors, path);
 }
 
+// Inputs are never written over: a scan must not be one of the files that are to be written.
+void ProtectInputs(const TextureOptions& options) {
+  namespace fs = std::filesystem;
+  for (const std::string& scan : options.scan_paths) {
+    const fs::path path(scan);
+    std::error_code error;
+    const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    const std::string stem = path.stem().string();
+    const bool like_ours = stem.rfind("model", 0) == 0 || stem.rfind("texture", 0) == 0;
+    if (like_ours && fs::equivalent(parent, options.output_path, error)) {
+      throw UsageError("--scan_path " + scan +
+                       " lies in the output folder and might be written over. Give another "
+                       "--output_path");
+    }
+  }
+}
+
+// Files of an earlier run that this one does not write would be taken for its own.
+void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& folder,
+                      const Command::Context& context) {
+  std::string older;
+  for (const char* name : {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi",
+                           "model.obj", "model.mtl", "model_0.png", "model_0.jpg"}) {
+    const bool written = std::find(names.begin(), names.end(), name) != names.end();
+    if (written || !std::filesystem::exists(folder + "/" + name)) continue;
+    older += (older.empty() ? "" : ", ") + std::string(name);
+  }
+  if (!older.empty()) {
+    context.Warn(folder + " also holds what this run did not write: " + older);
+  }
+}
+
+// The files appear together, or none of them.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-              const GlbOptions& glb, const std::string& folder) {
-  const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
-  WriteColoredPly(scans, colored, folder + "/model.ply");
-  WriteColoredGlb(scans, colored, folder + "/model.glb", glb);
+              const TextureOptions& options, const Command::Context& context) {
+  GlbOptions glb = options.glb;
+  glb.jpeg = options.image_format == "jpeg";
+  OutputSet set(options.output_path);
+  WriteColoredPly(scans, colored, set.Path("model.ply"));
+  WriteColoredGlb(scans, colored, set.Path("model.glb"), glb);
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     if (scans[s].organised) {
       const ColorGrid& grid =
           colored[s].texture.num_columns > 0 ? colored[s].texture : colored[s].samples;
-      WritePng(ImageOfGrid(grid), folder + "/texture" + number + ".png");
+      WritePng(ImageOfGrid(grid), set.Path("texture" + number + ".png"));
     }
     if (scans[s].is_rtpi) {
-      WriteRtpiCopy(scans[s], colored[s], folder + "/model" + number + ".rtpi");
+      WriteRtpiCopy(scans[s], colored[s], set.Path("model" + number + ".rtpi"));
     }
   }
+  if (options.output_obj) {
+    WriteColoredObj(scans, colored, glb,
+                    [&set](const std::string& name) { return set.Path(name); });
+  }
+  context.report["files"] = set.names();
+  WarnOfOlderFiles(set.names(), options.output_path, context);
+  set.Commit();
 }
 
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   colorize.texture_scale = TextureScale(options.texture_scale);
+  if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
   colorize.atlas.texel_size = options.texel_mm / 1000;
   colorize.atlas.max_page_size = options.glb.max_texture_size;
   std::vector<std::string> problems = options.scan_reader.Problems();
@@ -337,6 +391,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   if (list.photos.size() >= kMaxPhotos) {
     throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
   }
+  ProtectInputs(options);
   MakeFolder(options.output_path);
   context.report.AddCopy(options.output_path + "/report.json");
 
@@ -354,9 +409,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("write");
-  GlbOptions glb = options.glb;
-  glb.jpeg = options.glb_image == "jpeg";
-  WriteAll(scans, result.scans, glb, options.output_path);
+  WriteAll(scans, result.scans, options, context);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
   context.report["cpu_seconds"] = cpu;

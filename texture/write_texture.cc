@@ -36,12 +36,25 @@ void PaintGutters(const cv::Mat1b& known, int reach, cv::Mat* image) {
   }
 }
 
-void WritePng(const cv::Mat& image, const std::string& path) {
+namespace {
+
+void WriteImage(const cv::Mat& image, const std::string& path, const std::string& format,
+                const std::vector<int>& parameters) {
   OutputFile file(path);
-  if (!cv::imwrite(file.partial_path(), image, {cv::IMWRITE_PNG_COMPRESSION, 2})) {
-    throw InputError(path, "", "cannot be written as PNG", "Check the space on the disk");
+  if (!cv::imwrite(file.partial_path(), image, parameters)) {
+    throw InputError(path, "", "cannot be written as " + format, "Check the space on the disk");
   }
   file.Commit();
+}
+
+}  // namespace
+
+void WritePng(const cv::Mat& image, const std::string& path) {
+  WriteImage(image, path, "PNG", {cv::IMWRITE_PNG_COMPRESSION, 2});
+}
+
+void WriteJpeg(const cv::Mat& image, const std::string& path) {
+  WriteImage(image, path, "JPEG", {cv::IMWRITE_JPEG_QUALITY, 95});
 }
 
 }  // namespace roomtex

@@ -16,5 +16,7 @@ void PaintGutters(const cv::Mat1b& known, int reach, cv::Mat* image);
 
 // PNG, written aside and renamed.
 void WritePng(const cv::Mat& image, const std::string& path);
+// The same as JPEG of quality 95.
+void WriteJpeg(const cv::Mat& image, const std::string& path);
 
 }  // namespace roomtex

@@ -306,6 +306,132 @@ TEST_F(TextureCommand, ChoosesTheScaleByThePhotosAndTheMemory) {
   EXPECT_EQ(ReadBytes(Path("zero/texture.png")), ReadBytes(Path("auto/texture.png")));
 }
 
+tinygltf::Model LoadGlb(const std::string& path) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
+  EXPECT_EQ(error + warning, "");
+  return model;
+}
+
+// The bare walls of the room as a mesh of twelve triangles that look inwards.
+std::string BoxOfRoom(const SimulatedRoom& room) {
+  const SimulatedRoomOptions& o = room.options();
+  std::ostringstream obj;
+  obj << "# roomtex up 0 1 0\n";
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner(o.width * (i & 1), o.depth * (i >> 1 & 1), o.height * (i >> 2));
+    obj << "v " << (room.ScanFromRoom() * corner).transpose() << "\n";
+  }
+  obj << "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\nf 1 1 2\n";
+  return obj.str();
+}
+
+TEST_F(TextureCommand, AMeshOfFewTrianglesGetsAnAtlasFromThePhotos) {
+  SimulatedRoomOptions bare = RoomOptions();
+  bare.furnished = false;
+  bare.num_photos = 8;
+  Progress progress(true);
+  const SimulatedRoom room(bare);
+  WriteCapture(room, Path("bare"), &progress);
+  WriteBytes(Path("box.obj"), BoxOfRoom(room));
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --input_path " + Path("bare/truth") + " --image_path " +
+      Path("bare/photos") + " --scan_path " + Path("box.obj") + " --Texture.texel_mm 8 " +
+      "--output_obj 1 --output_path '" + Path("box of the room") + "'");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ReadJson(Path("box of the room/report.json"));
+  ASSERT_EQ(report["atlas"].size(), 1u);
+  EXPECT_EQ(report["atlas"][0]["num_charts"], 6);
+  EXPECT_NEAR(report["atlas"][0]["texel_mm"], 8, 1e-9);
+  EXPECT_GT(report["atlas"][0]["coverage"], 0.5);
+  const tinygltf::Model model = LoadGlb(Path("box of the room/model.glb"));
+  ASSERT_EQ(model.meshes.at(0).primitives.size(), model.images.size());
+  for (const tinygltf::Image& image : model.images) EXPECT_LE(image.width, 4096);
+  for (const std::string& name : report["files"].get<std::vector<std::string>>()) {
+    EXPECT_TRUE(fs::exists(Path("box of the room/") + name)) << name;
+  }
+  EXPECT_TRUE(fs::exists(Path("box of the room/model_0.png")));
+  EXPECT_FALSE(fs::exists(Path("box of the room/texture.png")));
+  // The photos of one wall disagree little: exposures were found without vertices to speak of.
+  EXPECT_LT(report["disagreement"]["after"], 0.4 * report["disagreement"]["before"].get<double>());
+}
+
+TEST_F(TextureCommand, SeveralScansShareOneSolutionAndOneModel) {
+  SimulatedRoomOptions options = RoomOptions();
+  options.num_stations = 2;
+  options.scan_columns = 300;
+  options.scan_rows = 114;
+  options.num_photos = 8;
+  Progress progress(true);
+  const SimulatedRoom room(options);
+  WriteCapture(room, Path("two"), &progress);
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --input_path " + Path("two/truth") + " --image_path " +
+      Path("two/photos") + " --scan_path " + Path("two/scan.rtpi") + " --scan_path " +
+      Path("two/scan_1.rtpi") + " --scan_poses " + Path("two/scan_poses.txt") +
+      " --Texture.scale 2 --output_path " + Path("merged"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ReadJson(Path("merged/report.json"));
+  const Scan first = room.MakeScan(0), second = room.MakeScan(1);
+  const size_t in_first = first.points.size() - first.NumMissing();
+  const PlyVertices model = ReadPly(Path("merged/model.ply"));
+  EXPECT_EQ(model.points.size(), in_first + second.points.size() - second.NumMissing());
+  EXPECT_EQ(report["num_vertices"], model.points.size());
+  EXPECT_EQ(report["exposure_gain"].size(), 8u);
+  for (const char* name : {"texture.png", "texture_1.png"}) {
+    EXPECT_EQ(cv::imread(Path("merged/") + name).size(), cv::Size(600, 228)) << name;
+  }
+  EXPECT_TRUE(fs::exists(Path("merged/model_1.rtpi")));
+  // A node per scan below the one that turns the up axis.
+  const tinygltf::Model glb = LoadGlb(Path("merged/model.glb"));
+  EXPECT_EQ(glb.meshes.size(), 2u);
+  EXPECT_EQ(glb.nodes.at(glb.scenes.at(0).nodes.at(0)).children.size(), 2u);
+  // Both scans have the true colours with the same gain.
+  const std::vector<Eigen::Vector3f> truth[2] = {room.TrueColors(0), room.TrueColors(1)};
+  const auto& linear = LinearFromSrgbByte();
+  double gain[2];
+  size_t vertex = 0;
+  for (int s = 0; s < 2; ++s) {
+    double cross = 0, square = 0;
+    const Scan& scan = s == 0 ? first : second;
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      if (scan.IsMissing(static_cast<int>(i))) continue;
+      if (model.views[vertex] > 0) {
+        for (int k = 0; k < 3; ++k) {
+          const double have = linear[model.colors[vertex][k]];
+          cross += have * truth[s][i][k];
+          square += have * have;
+        }
+      }
+      ++vertex;
+    }
+    gain[s] = cross / square;
+  }
+  EXPECT_NEAR(gain[0] / gain[1], 1, 0.01);
+}
+
+TEST_F(TextureCommand, WritesObjFilesBesideTheOthers) {
+  const CommandResult result = Texture("obj", "--output_obj 1 --Texture.image_format jpeg");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Scan mesh = ReadScan(Path("obj/model.obj"), {});
+  const PlyVertices ply = ReadPly(Path("obj/model.ply"));
+  ASSERT_EQ(mesh.points.size(), ply.points.size());
+  EXPECT_EQ(mesh.up, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(cv::imread(Path("obj/model_0.jpg")).cols, 501);
+  EXPECT_EQ(LoadGlb(Path("obj/model.glb")).images.at(0).mimeType, "image/jpeg");
+}
+
+TEST_F(TextureCommand, DoesNotWriteOverTheScanItReads) {
+  fs::create_directories(Path("own"));
+  fs::copy_file(Capture() + "/scan.rtpi", Path("own/model.rtpi"));
+  const CommandResult result = Texture("own", "", Path("own/model.rtpi"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("written over"), std::string::npos) << result.err;
+  EXPECT_EQ(ReadBytes(Path("own/model.rtpi")), ReadBytes(Capture() + "/scan.rtpi"));
+}
+
 // A patterned and a plain photo of each pose: colour comes from the plain ones only.
 TEST_F(TextureCommand, ColoursComeFromThePlainTwins) {
   fs::create_directories(Path("pairs"));
@@ -360,7 +486,7 @@ TEST_F(TextureCommand, BadInputGetsASentence) {
   expect(all + rest + " --Texture.scale -1", 2, "Texture.scale must be 1 to 16");
   expect(all + rest + " --Texture.scale fine", 2, "Texture.scale");
   expect(all + rest + " --Texture.max_memory_mb 1", 2, "Texture.max_memory_mb");
-  expect(all + rest + " --Occlusion.depth_tolerance -2", 2, "Occlusion.depth_tolerance");
+  expect(all + rest + " --Occlusion.depth_tolerance 2", 2, "Occlusion.depth_tolerance");
   expect(all + rest + " --Exposure.mode guess", 2, "exif, match or none");
   expect(all + rest + " --associations_path " + Path("none.csv"), 3, "does not exist");
   expect(all + rest + " --database_path " + scan, 3, "SQLite");

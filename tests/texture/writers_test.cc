@@ -1,13 +1,24 @@
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <sstream>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <sys/wait.h>
 #include <tiny_gltf.h>
+#include <unistd.h>
 
 #include "core/error.h"
+#include "importers/obj.h"
 #include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/two_walls.h"
+#include "texture/output_set.h"
 #include "texture/textured_parts.h"
 #include "texture/write_glb.h"
+#include "texture/write_obj.h"
 #include "texture/write_ply.h"
 #include "texture/write_texture.h"
 
@@ -237,6 +248,145 @@ TEST(WriteColoredGlb, ScanWithoutTrianglesIsStillAFile) {
   scan.intensity = {0};
   WriteColoredGlb({scan}, {ColorByCell(scan)}, folder / "m.glb");
   EXPECT_TRUE(LoadGlb(folder / "m.glb").meshes.empty());
+}
+
+// Every corner of every face must find the colour of its own cell in the image of its material.
+TEST(WriteColoredObj, CornersFindTheirColorsAndTheMeshIsTheSame) {
+  const TempFolder folder;
+  std::filesystem::create_directories(folder / "with spaces");
+  const LargeWall wall;
+  GlbOptions options;
+  options.max_texture_size = 512;
+  WriteColoredObj({wall.scan}, {wall.colored}, options,
+                  [&](const std::string& name) { return folder / ("with spaces/" + name); });
+  const std::string obj = ReadBytes(folder / "with spaces/model.obj");
+  EXPECT_NE(obj.find("the up axis stays the scan's"), std::string::npos);
+  std::map<std::string, cv::Mat3b> images;  // by material
+  std::istringstream mtl(ReadBytes(folder / "with spaces/model.mtl"));
+  std::string word, material;
+  while (mtl >> word) {
+    if (word == "newmtl") mtl >> material;
+    if (word != "map_Kd") continue;
+    mtl >> word;
+    images[material] = cv::imread(folder / ("with spaces/" + word));
+  }
+  EXPECT_EQ(images.size(), 2u);
+  std::vector<int> cell_of;  // measured samples in grid order
+  for (int i = 0; i < static_cast<int>(wall.scan.points.size()); ++i) {
+    if (!wall.scan.IsMissing(i)) cell_of.push_back(i);
+  }
+  std::vector<Eigen::Vector2d> uv;
+  std::istringstream lines(obj);
+  std::string line;
+  size_t num_faces = 0;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    words >> word;
+    if (word == "usemtl") words >> material;
+    if (word == "vt") {
+      Eigen::Vector2d at;
+      words >> at[0] >> at[1];
+      uv.push_back(at);
+    }
+    if (word != "f") continue;
+    ++num_faces;
+    const cv::Mat3b& image = images.at(material);
+    for (int k = 0; k < 3; ++k) {
+      size_t vertex, number;
+      char slash;
+      words >> vertex >> slash >> number;
+      const Eigen::Vector2d at = uv.at(number - 1);
+      const auto x = static_cast<int>(std::lround(at.x() * image.cols));
+      const auto y = static_cast<int>(std::lround((1 - at.y()) * image.rows));
+      const int cell = cell_of.at(vertex - 1);
+      const Rgb want = LargeWall::ColorOf(cell % 400, cell / 400);
+      ASSERT_EQ(image(y, x), cv::Vec3b(want[2], want[1], want[0])) << line;
+    }
+  }
+  EXPECT_EQ(num_faces, wall.colored.triangles.size());
+  const Scan again = ReadObj(folder / "with spaces/model.obj", {});
+  EXPECT_EQ(again.up, wall.scan.up);
+  ASSERT_EQ(again.points.size(), cell_of.size());
+  for (size_t i = 0; i < cell_of.size(); ++i) {
+    ASSERT_LT((again.points[i] - wall.scan.points[cell_of[i]]).norm(), 2e-6);
+  }
+}
+
+TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
+  const TempFolder folder;
+  Scan mesh;
+  mesh.organised = false;
+  mesh.num_columns = 3;
+  mesh.num_rows = 1;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.up = Eigen::Vector3d::UnitZ();
+  ColoredScan colored;
+  colored.triangles = {{0, 1, 2}};
+  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  WriteColoredObj({mesh, mesh}, {colored, colored}, {},
+                  [&](const std::string& name) { return folder / name; });
+  const std::string obj = ReadBytes(folder / "model.obj");
+  EXPECT_NE(obj.find("v 0.000000 0.000000 0.000000 1.0000 0.0000 0.2000\n"), std::string::npos);
+  EXPECT_NE(obj.find("f 1 2 3\n"), std::string::npos);
+  EXPECT_NE(obj.find("f 4 5 6\n"), std::string::npos);  // the second scan
+  EXPECT_EQ(obj.find("usemtl"), std::string::npos);
+}
+
+TEST(OutputSet, FilesAppearTogetherOrNotAtAll) {
+  const TempFolder folder;
+  WriteBytes(folder / "a", "old");
+  {
+    OutputSet set(folder.path());
+    WriteBytes(set.Path("a"), "new");
+    WriteBytes(set.Path("b"), "new");
+    EXPECT_EQ(ReadBytes(folder / "a"), "old");
+    EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+  }  // given up
+  EXPECT_EQ(ReadBytes(folder / "a"), "old");
+  EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+  OutputSet set(folder.path());
+  WriteBytes(set.Path("a"), "new");
+  WriteBytes(set.Path("b"), "new");
+  set.Commit();
+  EXPECT_EQ(ReadBytes(folder / "a") + ReadBytes(folder / "b"), "newnew");
+}
+
+TEST(OutputSet, RemovesWhatAKilledRunLeft) {
+  const TempFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {
+    OutputSet set(folder.path());
+    WriteBytes(set.Path("a"), "half");
+    raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const auto count = [&] {
+    return std::distance(std::filesystem::directory_iterator(folder.path()), {});
+  };
+  EXPECT_EQ(count(), 1);
+  { OutputSet set(folder.path()); }
+  EXPECT_EQ(count(), 0);
+}
+
+TEST(OutputSet, KeepsLinksAndRefusesFolders) {
+  const TempFolder folder;
+  WriteBytes(folder / "real", "old");
+  std::filesystem::create_symlink("real", folder / "link");
+  std::filesystem::create_directory(folder / "dir");
+  {
+    OutputSet set(folder.path());
+    WriteBytes(set.Path("link"), "new");
+    set.Commit();
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(ReadBytes(folder / "real"), "new");
+  OutputSet set(folder.path());
+  WriteBytes(set.Path("real"), "newer");
+  WriteBytes(set.Path("dir"), "x");
+  EXPECT_INPUT_ERROR(set.Commit(), "is a folder");
+  EXPECT_EQ(ReadBytes(folder / "real"), "new");
 }
 
 TEST(PaintGutters, TakesTheNearestKnownColor) {
