@@ -344,6 +344,7 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
 // The files appear together, or none of them.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const TextureOptions& options, const Command::Context& context) {
+  const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
   OutputSet set(options.output_path);
