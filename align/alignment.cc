@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 
+#include "align/judgement.h"
 #include "core/error.h"
 #include "core/parallel.h"
 
@@ -15,20 +16,10 @@ namespace {
 // Metres from the nearest sample of the scan up to which a pick counts as being on the scan.
 constexpr double kPickReach = 0.06;
 constexpr double kSurfaceSpacing = 0.02;  // metres; of a mesh without a grid
+// Metres, rms; a scanner that measures 1 % wrong (the worst that the thesis speaks of) at 2 to 3 m.
+constexpr double kMaxLaserBend = 0.025;
 constexpr size_t kMaxPicksOnScan =
     100;  // more are not needed to tell whether picks and scan belong together
-
-std::string Number(double value, int digits) {
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
-}
-
-std::string LineOf(const Pick& pick) {
-  return pick.line > 0 ? "line " + std::to_string(pick.line) : "a pick of " + pick.image_name;
-}
 
 std::string MirrorRemedy(const AlignmentInput& input) {
   const bool is_rtpi = std::any_of(input.scans.begin(), input.scans.end(),
@@ -51,10 +42,11 @@ struct View {
 
 PointPairs PairsOf(const std::vector<Pick>& picks, const std::vector<int>& indices) {
   const int n = static_cast<int>(indices.size());
-  PointPairs pairs{Eigen::Matrix2Xd(2, n), Eigen::Matrix3Xd(3, n)};
+  PointPairs pairs{Eigen::Matrix2Xd(2, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n)};
   for (int i = 0; i < n; ++i) {
     pairs.x_in_img.col(i) = picks[indices[i]].x_in_img;
     pairs.x_in_scan.col(i) = picks[indices[i]].x_in_scan;
+    pairs.weight[i] = picks[indices[i]].weight;
   }
   return pairs;
 }
@@ -105,10 +97,14 @@ std::vector<double> DistancesFromScan(const std::vector<Scan>& scans,
 // the file was read with the other azimuth sense than the one they were made with.
 void CheckPicksOnScan(const AlignmentInput& input, std::vector<std::string>* warnings) {
   const Rigid& scan_from_station = input.scans[0].scan_from_station;
-  const size_t n = std::min(input.picks.size(), kMaxPicksOnScan);
+  std::vector<const Pick*> picks;
+  for (const Pick& pick : input.picks) {
+    if (pick.weight > 0 && picks.size() < kMaxPicksOnScan) picks.push_back(&pick);
+  }
+  const size_t n = picks.size();
   std::vector<Eigen::Vector3d> points(2 * n);
   for (size_t i = 0; i < n; ++i) {
-    points[i] = input.picks[i].x_in_scan;
+    points[i] = picks[i]->x_in_scan;
     Eigen::Vector3d x_in_station = scan_from_station.Inverse() * points[i];
     x_in_station.x() *= -1;
     points[n + i] = scan_from_station * x_in_station;
@@ -136,11 +132,11 @@ void CheckPicksOnScan(const AlignmentInput& input, std::vector<std::string>* war
   }
   for (size_t i = 0; i < n && 2 * off < n; ++i) {
     if (!(distance[i] > kPickReach)) continue;
-    warnings->push_back("The pick on " + LineOf(input.picks[i]) + " lies " +
-                        Number(distance[i], 2) + " m off every surface of the scan.");
+    warnings->push_back("The pick on " + LineOf(*picks[i]) + " lies " + Number(distance[i], 2) +
+                        " m off every surface of the scan.");
   }
   if (2 * off < n) return;
-  throw Contradiction(input.picks_path, LinePosition(input.picks[farthest].line),
+  throw Contradiction(input.picks_path, LinePosition(picks[farthest]->line),
                       std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
                           " m off every surface of the scan, this one by " +
                           Number(distance[farthest], 2) + " m",
@@ -152,6 +148,7 @@ std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOption
                               std::vector<std::string>* warnings) {
   std::map<std::string, std::vector<int>> by_name;
   for (size_t i = 0; i < input.picks.size(); ++i) {
+    if (!(input.picks[i].weight > 0)) continue;
     by_name[input.picks[i].image_name].push_back(static_cast<int>(i));
   }
   std::vector<View> views;
@@ -256,16 +253,15 @@ std::vector<bool> UsedPicks(const Alignment& result) {
   return used;
 }
 
-// Root mean square over the used picks.
+// Weighted root mean square over the used picks.
 double PickRms(const Alignment& result, double PickOutcome::*residual) {
-  double sum = 0;
-  int count = 0;
+  double sum = 0, sum_of_weights = 0;
   for (const PickOutcome& outcome : result.picks) {
     if (!outcome.used) continue;
-    sum += std::pow(outcome.*residual, 2);
-    ++count;
+    sum += std::pow(outcome.pick.weight * outcome.*residual, 2);
+    sum_of_weights += std::pow(outcome.pick.weight, 2);
   }
-  return count > 0 ? std::sqrt(sum / count) : 0;
+  return sum_of_weights > 0 ? std::sqrt(sum / sum_of_weights) : 0;
 }
 
 void SetResiduals(const AlignmentInput& input, const Similarity& scan_from_sparse,
@@ -292,14 +288,14 @@ void FitAllPicks(const AlignmentInput& input, double sigma_px, const AlignmentOp
     if (round == 1) return;
     std::vector<double> residuals;
     for (const PickOutcome& outcome : result->picks) {
-      if (outcome.used) residuals.push_back(outcome.residual_px);
+      if (outcome.used) residuals.push_back(outcome.pick.weight * outcome.residual_px);
     }
     std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
     // Median of a Rayleigh distribution: 1.177 sigma; 4.5 sigma is exceeded by 1 click in 25 000.
     const double limit =
         std::max(options.picks.min_bad_pick_px, 4.5 / 1.177 * residuals[residuals.size() / 2]);
     for (PickOutcome& outcome : result->picks) {
-      if (!outcome.used || !(outcome.residual_px > limit)) continue;
+      if (!outcome.used || !(outcome.pick.weight * outcome.residual_px > limit)) continue;
       outcome.used = false;
       result->warnings.push_back("The pick on " + LineOf(outcome.pick) + " (" +
                                  outcome.pick.image_name + ") was left out: it is " +
@@ -345,10 +341,15 @@ void AdjustPoses(const AlignmentInput& input, double pick_sigma_px,
   }
   SparseModel model = input.model;
   TransformModel(start, &model);
-  result->bundle =
-      AdjustToSurface({model, input.planes, surface, input.picks, used, pick_sigma_px,
-                       result->clicked_image, result->bend ? result->bend->bend : ScanBend()},
-                      options.bundle);
+  const PlaneBundleInput bundle_input{model,
+                                      input.planes,
+                                      surface,
+                                      input.picks,
+                                      used,
+                                      pick_sigma_px,
+                                      result->clicked_image,
+                                      result->bend ? result->bend->bend : ScanBend()};
+  result->bundle = AdjustToSurface(bundle_input, options.bundle);
   if (!result->bundle.usable) {
     result->bend.reset();
     result->warnings.push_back(result->bundle.reason + " One similarity for all photos is used.");
@@ -356,15 +357,26 @@ void AdjustPoses(const AlignmentInput& input, double pick_sigma_px,
   }
   result->adjusted = true;
   result->scan_from_sparse = result->bundle.adjusted_from_input * start;
+  result->photo_sigmas =
+      FindPhotoSigmas(FindPoseCovariances(bundle_input, result->bundle, options.bundle),
+                      result->bundle.model, result->surface_fit);
+  SetExpectedErrorAtCameras(result->photo_sigmas, &result->expected_error);
   const Eigen::Matrix2Xd errors = PickErrors(result->bundle.model, input.picks, Similarity());
   for (size_t i = 0; i < result->picks.size(); ++i) {
     result->picks[i].refined_residual_px = errors.col(static_cast<int>(i)).norm();
   }
   result->refined_pick_rms_px = PickRms(*result, &PickOutcome::refined_residual_px);
   if (result->bend) {
-    result->warnings.push_back("The scan is bent by " + Number(1000 * result->bend->bend_rms, 1) +
-                               " mm (rms over the sparse points): the photos were fitted to it as "
-                               "it is, so that their reprojection errors grow.");
+    std::string warning =
+        "The scan is bent by " + Number(1000 * result->bend->bend_rms, 1) +
+        " mm (rms over the sparse points): the photos were fitted to it as it is, so that their "
+        "reprojection errors grow.";
+    if (result->bend->bend_rms > kMaxLaserBend) {
+      warning +=
+          " That is more than a laser scanner does: the sparse model may be bent instead. Look at "
+          "the overlays (--overlays), and compare with --PlaneBA.bend 0.";
+    }
+    result->warnings.push_back(warning);
   }
   for (const uint32_t id : result->bundle.idle_images) {
     result->warnings.push_back(input.model.images.at(id).name +
@@ -373,108 +385,24 @@ void AdjustPoses(const AlignmentInput& input, double pick_sigma_px,
   }
 }
 
-ExpectedError ExpectedErrorOf(const AlignmentInput& input, double pick_sigma_px,
-                              const AlignmentOptions& options, const Alignment& result) {
+// Middle of the photos, and what the similarity leaves open there.
+void JudgeAccuracy(const AlignmentInput& input, double pick_sigma_px,
+                   const AlignmentOptions& options, Alignment* result) {
   const SimilarityFit by_picks =
-      result.refined ? SimilarityFit()
-                     : FitToPicks(input.model, input.picks, UsedPicks(result), pick_sigma_px,
-                                  result.scan_from_sparse, options.fit);
+      result->refined ? SimilarityFit()
+                      : FitToPicks(input.model, input.picks, UsedPicks(*result), pick_sigma_px,
+                                   result->scan_from_sparse, options.fit);
   std::vector<Eigen::Vector3d> centres;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const auto& [image_id, image] : input.model.images) {
-    centres.push_back(result.scan_from_sparse * image.cam_from_model.TargetOriginInSource());
+    centres.push_back(result->scan_from_sparse * image.cam_from_model.TargetOriginInSource());
+    middle += centres.back() / static_cast<double>(input.model.images.size());
   }
-  return PropagateError(result.refined ? result.surface_fit : by_picks, centres, input.scans);
-}
-
-// The refined pose is far more exact than the clicks: a used pick that is off shows there even
-// among six.
-void JudgePicksAgainstSurface(double rms_limit, Alignment* result) {
-  std::vector<double> residuals;
-  const PickOutcome* farthest = nullptr;
-  for (const PickOutcome& outcome : result->picks) {
-    if (!outcome.used) continue;
-    residuals.push_back(outcome.refined_residual_px);
-    if (farthest == nullptr || outcome.refined_residual_px > farthest->refined_residual_px) {
-      farthest = &outcome;
-    }
-  }
-  std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
-  const double median = residuals[residuals.size() / 2];
-  const std::string place = "where the sparse points lie on the scan's surface, ";
-  if (farthest->refined_residual_px > std::max(1.5 * rms_limit, 5 * median)) {
-    result->reasons.push_back(
-        "The pick on " + LineOf(farthest->pick) + " (" + farthest->pick.image_name +
-        ") is far off: " + place + "it misses by " + Number(farthest->refined_residual_px, 1) +
-        " pixels, half of the picks by less than " + Number(median, 1) + ". Correct or remove it.");
-  } else if (!(result->refined_pick_rms_px <= std::max(1.5 * rms_limit, 2 * result->pick_rms_px))) {
-    result->reasons.push_back("Picks and surface contradict each other: " + place +
-                              "the picks miss by " + Number(result->refined_pick_rms_px, 1) +
-                              " pixels (rms), the one on " + LineOf(farthest->pick) + " by " +
-                              Number(farthest->refined_residual_px, 1) + " pixels.");
-  }
-}
-
-void JudgePicks(const AlignmentInput& input, const AlignmentOptions& options, Alignment* result) {
-  const SparseImage* image = input.model.FindImage(result->clicked_image);
-  const double limit = options.trust.PickRmsLimit(input.model.cameras.at(image->camera_id));
-  const auto worst = std::max_element(
-      result->picks.begin(), result->picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
-        return (a.used ? a.residual_px : -1) < (b.used ? b.residual_px : -1);
-      });
-  if (!(result->pick_rms_px <= limit)) {
-    result->reasons.push_back("The picks miss by " + Number(result->pick_rms_px, 1) +
-                              " pixels (rms), more than the limit of " + Number(limit, 1) +
-                              "; the worst is on " + LineOf(worst->pick) + " with " +
-                              Number(worst->residual_px, 1) +
-                              " pixels. Pick again, or pick more points so that a bad one shows.");
-  }
-  if (!(result->position_sigma <= options.trust.max_position_sigma)) {
-    result->reasons.push_back(
-        "The picks leave the camera's position open by " + Number(result->position_sigma, 2) +
-        " m (one standard deviation). Spread them more over the photo and in depth.");
-  }
-  if (result->surface_fit.converged && result->reasons.empty()) {
-    JudgePicksAgainstSurface(limit, result);
-  }
-}
-
-void JudgeScale(const TrustOptions& trust, Alignment* result) {
-  const ScaleEstimate& scale = result->scale;
-  if (scale.num_features < trust.min_scale_features) {
-    result->reasons.push_back("The scale rests on " + std::to_string(scale.num_features) +
-                              " features of " + result->clicked_image + ", fewer than " +
-                              std::to_string(trust.min_scale_features) + ".");
-  }
-  if (!(scale.relative_mad <= trust.max_scale_mad)) {
-    result->reasons.push_back("The scale differs from feature to feature by " +
-                              Number(100 * scale.relative_mad, 0) + " % (limit " +
-                              Number(100 * trust.max_scale_mad, 0) + " %): the pose of " +
-                              result->clicked_image +
-                              " in the scan does not agree with its pose in the sparse model. "
-                              "Check that the picks name the right photo.");
-  }
-}
-
-void JudgePlacement(const TrustOptions& trust, Alignment* result) {
-  const Placement& placement = result->placement;
-  const int judged = placement.num_on_surface + placement.num_floating + placement.num_hidden;
-  if (judged < 20) {
-    result->reasons.push_back("Only " + std::to_string(judged) +
-                              " sparse points lie where the scanner saw something, too few to "
-                              "tell whether the alignment is right.");
-  } else if (!(placement.SurfaceShare() >= trust.min_surface_share)) {
-    result->reasons.push_back(
-        "Only " + Number(100 * placement.SurfaceShare(), 0) +
-        " % of the sparse points that the scanner could see lie within " +
-        Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
-        Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.");
-  }
-  if (!(placement.CameraShare() >= trust.min_camera_share)) {
-    result->reasons.push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +
-                              " of " + std::to_string(placement.num_cameras) +
-                              " photos would have been taken from behind the surface that the "
-                              "scanner saw.");
-  }
+  result->expected_error =
+      PropagateError(result->refined ? result->surface_fit : by_picks, centres, input.scans);
+  if (!result->refined) return;
+  result->open = FindOpenDirections(result->surface_fit, middle);
+  if (!result->open.None()) result->warnings.push_back(result->open.Sentence());
 }
 
 }  // namespace
@@ -497,7 +425,7 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
   const ScanPatches surface(input.scans, options.surface);
 
   progress->Stage("pose from picks");
-  for (const Pick& pick : input.picks) result.picks.push_back({pick});
+  for (const Pick& pick : input.picks) result.picks.push_back({pick, pick.weight > 0});
   std::vector<View> views = ReviewViews(input, options, &result.warnings);
   for (const View& view : views) ReportBadPicks(view, &result);
 
@@ -511,13 +439,17 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
       ScanFromSparse(view.cam_from_scan, view.image->cam_from_model, view.scale.scale);
   SetResiduals(input, result.scan_from_sparse, &PickOutcome::residual_px, &result);
   const double pick_sigma_px = std::max(0.5, pose.sigma_px);
-  if (input.picks.size() > view.picks.size()) {
+  const auto num_on = std::count_if(input.picks.begin(), input.picks.end(),
+                                    [](const Pick& pick) { return pick.weight > 0; });
+  if (num_on > static_cast<long>(view.picks.size())) {
     FitAllPicks(input, pick_sigma_px, options, &result);
   }
   result.scan_from_sparse_from_picks = result.scan_from_sparse;
   result.pick_rms_px = PickRms(result, &PickOutcome::residual_px);
   for (const PickOutcome& outcome : result.picks) {
-    result.pick_max_px = std::max(result.pick_max_px, outcome.residual_px);
+    if (outcome.pick.weight > 0) {
+      result.pick_max_px = std::max(result.pick_max_px, outcome.residual_px);
+    }
   }
 
   progress->Stage("surface refinement");
@@ -526,7 +458,7 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
   FitOnSurface(input, pick_sigma_px, points, surface, options, &result);
 
   progress->Stage("trust");
-  result.expected_error = ExpectedErrorOf(input, pick_sigma_px, options, result);
+  JudgeAccuracy(input, pick_sigma_px, options, &result);
   TrustOptions trust = options.trust;
   if (!result.refined) {
     // Clicks alone are rough, and say themselves how rough.
@@ -535,14 +467,14 @@ Alignment AlignToScan(const AlignmentInput& input, double sigma_px, const FreeSp
   }
   result.placement =
       CheckPlacement(input.model, points, result.scan_from_sparse, surface, free_space, trust);
-  JudgePicks(input, options, &result);
-  JudgeScale(options.trust, &result);
-  JudgePlacement(trust, &result);
+  JudgeAlignment(input, trust, &result);
   // After the checks: an adjustment brings points to the surface that do not belong there, too.
   if (result.refined && result.reasons.empty()) {
     progress->Stage("bundle adjustment");
     AdjustPoses(input, pick_sigma_px, points, surface, options, &result);
   }
+  JudgePicksLeftOut(options.trust.PickRmsLimit(input.model.cameras.at(view.image->camera_id)),
+                    &result);
   return result;
 }
 

@@ -2,15 +2,19 @@
 // From picks to one similarity for the whole sparse model (thesis 7.1), refined on the scan's
 // surface, and judged.
 
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "align/expected_error.h"
+#include "align/open_directions.h"
 #include "align/pick_review.h"
 #include "align/picks.h"
 #include "align/plane_bundle.h"
+#include "align/pose_covariance.h"
 #include "align/scale.h"
 #include "align/scan_bend.h"
 #include "align/scan_patches.h"
@@ -72,8 +76,11 @@ struct Alignment {
   PlaneBundle bundle;
   bool adjusted = false;
   std::optional<BendFit> bend;  // of a bent scan
-  // Of the similarity: by the surface where it was refined, else by the picks.
+  // Of the similarity: by the surface where it was refined, else by the picks. Of an adjusted model
+  // at_cameras and rotation are those of photo_sigmas.
   ExpectedError expected_error;
+  std::map<uint32_t, PhotoSigma> photo_sigmas;  // of an adjusted model
+  OpenDirections open;                          // what the surface leaves to the picks
   Placement placement;
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted, in sentences; empty = trusted.

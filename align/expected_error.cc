@@ -16,6 +16,36 @@ double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_sca
   return variance >= 0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity();
 }
 
+std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
+                                               const SparseModel& adjusted,
+                                               const SimilarityFit& fit) {
+  const double rotation = std::sqrt(fit.covariance.block<3, 3>(3, 3).trace());
+  std::map<uint32_t, PhotoSigma> sigmas;
+  for (const auto& [image_id, covariance] : covariances) {
+    const Eigen::Vector3d centre =
+        adjusted.images.at(image_id).cam_from_model.TargetOriginInSource();
+    sigmas[image_id] = {
+        std::max(std::sqrt(covariance.block<3, 3>(3, 3).trace()), PositionSigmaAt(fit, centre)),
+        std::max(std::sqrt(covariance.block<3, 3>(0, 0).trace()), rotation)};
+  }
+  return sigmas;
+}
+
+void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, ExpectedError* error) {
+  if (sigmas.empty()) return;
+  std::vector<double> positions, rotations;
+  for (const auto& [image_id, sigma] : sigmas) {
+    positions.push_back(sigma.position);
+    rotations.push_back(sigma.rotation);
+  }
+  const auto median = [](std::vector<double>* values) {
+    std::nth_element(values->begin(), values->begin() + values->size() / 2, values->end());
+    return (*values)[values->size() / 2];
+  };
+  error->at_cameras = median(&positions);
+  error->rotation = median(&rotations);
+}
+
 ExpectedError PropagateError(const SimilarityFit& fit,
                              const std::vector<Eigen::Vector3d>& camera_centres,
                              const std::vector<Scan>& scans) {

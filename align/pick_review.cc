@@ -60,6 +60,10 @@ PointPairs Selected(const PointPairs& pairs, const std::vector<int>& indices) {
     selected.x_in_img.col(i) = pairs.x_in_img.col(indices[i]);
     selected.x_in_scan.col(i) = pairs.x_in_scan.col(indices[i]);
   }
+  if (pairs.weight.size() > 0) {
+    selected.weight.resize(n);
+    for (int i = 0; i < n; ++i) selected.weight[i] = pairs.weight[indices[i]];
+  }
   return selected;
 }
 
@@ -129,7 +133,7 @@ std::vector<int> LeaveOutBadPicks(const CameraProjection& projection, const Poin
       review->leave_one_out_px[kept[k]] = trial.distance_px[k];
     }
     const int n = current.size();
-    if (review->exchanged || left_out >= pairs.size() / 7 || n < 7 || trial.best < 0) break;
+    if (review->exchanged || left_out >= pairs.size() / 6 || n < 6 || trial.best < 0) break;
     if (!(trial.distance_px[trial.best] > options.min_bad_pick_px)) break;
     if (ChanceOfGain(review->pose().sum_px2, trial.best_sum_px2, n) > options.max_chance) break;
     review->used[kept[trial.best]] = false;

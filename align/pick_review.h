@@ -59,8 +59,8 @@ struct PickReview {
   }
 };
 
-// pairs: at least 6 that have no layout problem. From 7 picks on one may be bad (from 14 on two,
-// and so on: one in seven) and is found by leaving out each in turn.
+// pairs: at least 6 that have no layout problem. One in six may be bad and is found by leaving out
+// each in turn.
 PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
                        const PickReviewOptions& options);
 

@@ -16,7 +16,9 @@ namespace roomtex {
 namespace {
 
 constexpr char kHeader[] = "image_name,x,y,scan_x,scan_y,scan_z";
-constexpr int kNumFields = 6;
+constexpr int kNumFields = 6;  // and a seventh, the weight, where the header has it
+constexpr char kWeight[] = "weight";
+constexpr double kMaxWeight = 1000;
 constexpr size_t kMaxLineLength = 64 * 1024;
 const char* const kFieldNames[kNumFields] = {"image_name", "x", "y", "scan_x", "scan_y", "scan_z"};
 
@@ -83,15 +85,18 @@ std::optional<double> ParseNumber(const std::string& text) {
   return value;
 }
 
-void CheckHeader(const std::string& path, long line_number, const std::string& line) {
-  const std::string expected = std::string("Expected the header line ") + kHeader;
+// Number of fields that the header announces.
+int ReadHeader(const std::string& path, long line_number, const std::string& line) {
+  const std::string expected = std::string("Expected the header line ") + kHeader +
+                               " (and, if wanted, a seventh field " + kWeight + ")";
   const auto fields = SplitCsv(line);
-  bool matches = fields && static_cast<int>(fields->size()) == kNumFields;
-  for (int i = 0; matches && i < kNumFields; ++i) {
-    matches = Lowercase((*fields)[i]) == kFieldNames[i];
+  const int num_fields = fields ? static_cast<int>(fields->size()) : 0;
+  bool matches = num_fields == kNumFields || num_fields == kNumFields + 1;
+  for (int i = 0; matches && i < num_fields; ++i) {
+    matches = Lowercase((*fields)[i]) == (i < kNumFields ? kFieldNames[i] : kWeight);
   }
-  if (matches) return;
-  const bool looks_like_pick = fields && fields->size() == kNumFields && ParseNumber((*fields)[1]);
+  if (matches) return num_fields;
+  const bool looks_like_pick = num_fields >= kNumFields && ParseNumber((*fields)[1]);
   throw InputError(path, LinePosition(line_number),
                    looks_like_pick
                        ? "the header is missing: the first line is a pick already"
@@ -99,16 +104,17 @@ void CheckHeader(const std::string& path, long line_number, const std::string& l
                    expected);
 }
 
-Pick ParsePick(const std::string& path, long line_number, const std::string& line) {
+Pick ParsePick(const std::string& path, long line_number, const std::string& line, int num_fields) {
   const auto fields = SplitCsv(line);
   if (!fields) {
     throw InputError(path, LinePosition(line_number), "a quoted name is not closed by a quote",
                      "A quote inside a quoted name is written twice");
   }
-  if (static_cast<int>(fields->size()) != kNumFields) {
+  if (static_cast<int>(fields->size()) != num_fields) {
     throw InputError(path, LinePosition(line_number),
                      "found " + std::to_string(fields->size()) + " fields, expected " +
-                         std::to_string(kNumFields) + " (" + kHeader + ")",
+                         std::to_string(num_fields) + " (" + kHeader +
+                         (num_fields > kNumFields ? std::string(",") + kWeight : "") + ")",
                      "Separate fields by commas, write decimals with a point, and put a name that "
                      "holds a comma in double quotes");
   }
@@ -116,18 +122,29 @@ Pick ParsePick(const std::string& path, long line_number, const std::string& lin
     throw InputError(path, LinePosition(line_number), "the image name is empty",
                      "Name the photo as in the sparse model");
   }
-  double values[kNumFields - 1];
-  for (int i = 1; i < kNumFields; ++i) {
+  double values[kNumFields] = {0, 0, 0, 0, 0, 1};
+  for (int i = 1; i < num_fields; ++i) {
     const auto value = ParseNumber((*fields)[i]);
     if (!value) {
       throw InputError(path, LinePosition(line_number),
-                       std::string(kFieldNames[i]) + " is " + Quoted((*fields)[i]) +
-                           ", which is not a finite number",
+                       std::string(i < kNumFields ? kFieldNames[i] : kWeight) + " is " +
+                           Quoted((*fields)[i]) + ", which is not a finite number",
                        "Correct the line or remove it");
     }
     values[i - 1] = *value;
   }
-  return {(*fields)[0], {values[0], values[1]}, {values[2], values[3], values[4]}, line_number};
+  if (!(values[5] >= 0 && values[5] <= kMaxWeight)) {
+    throw InputError(
+        path, LinePosition(line_number),
+        std::string(kWeight) + " is " + Quoted((*fields)[kNumFields]),
+        "A weight is 1 for an ordinary pick, more for a more exact one (up to 1000), 0 "
+        "for one that is switched off");
+  }
+  return {(*fields)[0],
+          {values[0], values[1]},
+          {values[2], values[3], values[4]},
+          line_number,
+          values[5]};
 }
 
 void RefuseDuplicates(const std::string& path, const std::vector<Pick>& picks) {
@@ -189,7 +206,7 @@ std::vector<Pick> ReadPicks(const std::string& path) {
   if (!stream) throw InputError(path, "", "cannot be opened", "Check that you may read it");
   std::vector<Pick> picks;
   std::string line;
-  bool has_header = false;
+  int num_fields = 0;  // 0 = the header is still to come
   for (long line_number = 1; std::getline(stream, line); ++line_number) {
     if (line_number == 1 && line.rfind("\xef\xbb\xbf", 0) == 0) line.erase(0, 3);
     if (line.size() > kMaxLineLength || line.find('\0') != std::string::npos) {
@@ -198,15 +215,14 @@ std::vector<Pick> ReadPicks(const std::string& path) {
     }
     line = Trimmed(line);
     if (line.empty() || line[0] == '#') continue;
-    if (!has_header) {
-      CheckHeader(path, line_number, line);
-      has_header = true;
+    if (num_fields == 0) {
+      num_fields = ReadHeader(path, line_number, line);
       continue;
     }
-    picks.push_back(ParsePick(path, line_number, line));
+    picks.push_back(ParsePick(path, line_number, line, num_fields));
   }
   if (stream.bad()) throw InputError(path, "", "could not be read to its end", "Check the disk");
-  if (!has_header) {
+  if (num_fields == 0) {
     throw InputError(path, "", "holds no picks",
                      std::string("Expected the header line ") + kHeader);
   }
@@ -217,7 +233,9 @@ std::vector<Pick> ReadPicks(const std::string& path) {
 void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
   OutputFile file(path);
   std::ostream& out = file.stream();
-  out << kHeader << '\n' << std::setprecision(17);
+  const bool weighted =
+      std::any_of(picks.begin(), picks.end(), [](const Pick& pick) { return pick.weight != 1; });
+  out << kHeader << (weighted ? std::string(",") + kWeight : "") << '\n' << std::setprecision(17);
   for (const Pick& pick : picks) {
     std::string name = pick.image_name;
     if (name.find_first_of(",\"#") != std::string::npos || name != Trimmed(name)) {
@@ -227,7 +245,9 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
       name = "\"" + name + "\"";
     }
     out << name << ',' << pick.x_in_img.x() << ',' << pick.x_in_img.y() << ',' << pick.x_in_scan.x()
-        << ',' << pick.x_in_scan.y() << ',' << pick.x_in_scan.z() << '\n';
+        << ',' << pick.x_in_scan.y() << ',' << pick.x_in_scan.z();
+    if (weighted) out << ',' << pick.weight;
+    out << '\n';
   }
   file.Commit();
 }
@@ -253,7 +273,7 @@ void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& pi
       throw InputError(path, LinePosition(pick.line), where.str(),
                        "Give x and y in pixels of the photo as taken");
     }
-    ++count[pick.image_name];
+    count[pick.image_name] += pick.weight > 0;
   }
   int most = 0;
   for (const auto& [name, number] : count) most = std::max(most, number);

@@ -1,8 +1,9 @@
 #pragma once
 // The picks file: points that a user saw both in a photo and in the scan.
 //
-// CSV with the header image_name,x,y,scan_x,scan_y,scan_z; `#` starts a comment line; a name with a
-// comma stands in double quotes. x, y in `img` of the photo as taken, scan_* in `scan` (metres).
+// CSV with the header image_name,x,y,scan_x,scan_y,scan_z and, if wanted, a seventh column weight;
+// `#` starts a comment line; a name with a comma stands in double quotes. x, y in `img` of the
+// photo as taken, scan_* in `scan` (metres).
 
 #include <string>
 #include <vector>
@@ -18,13 +19,16 @@ struct Pick {
   Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
   Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
   long line = 0;  // in the picks file; 0 = not from a file
+  // How many times less its click noise is than that of a pick with weight 1; 0 = switched off: it
+  // is reported, but nothing rests on it.
+  double weight = 1;
 };
 
 // The fewest picks in one photo that fix its pose (thesis 7.1.1).
 inline constexpr int kMinPicksPerPhoto = 6;
 
-// Throws InputError with the line: no header, wrong number of fields, not a finite number, the same
-// pixel or the same scan point picked twice in one photo.
+// Throws InputError with the line: no header, wrong number of fields, not a finite number, a
+// negative weight, the same pixel or the same scan point picked twice in one photo.
 std::vector<Pick> ReadPicks(const std::string& path);
 // Written aside and renamed; reading it back gives the same numbers to the last bit.
 void WritePicks(const std::string& path, const std::vector<Pick>& picks);

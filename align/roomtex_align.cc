@@ -38,11 +38,13 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's sparse model: a folder, .bin or .txt.");
   command->AddInputPaths("scan_path", &a->scan_paths,
                          "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
-  command->AddInputPath(
-      "picks_path", &a->picks_path,
-      "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z; at least six in one "
-      "photo; pixels of the photo as taken, metres in the scan frame.",
-      Command::Kind::kOptional);
+  command->AddInputPath("picks_path", &a->picks_path,
+                        "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
+                        "weight: 1 = ordinary, "
+                        "more = more exact, 0 = off); at least six in one photo; pixels of the "
+                        "photo as taken, metres "
+                        "in the scan frame.",
+                        Command::Kind::kOptional);
   command->AddOutputPath(
       "output_path", &a->output_path,
       "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
@@ -154,6 +156,7 @@ Json PicksToJson(const Alignment& alignment) {
     one["refined_residual_px"] = NumberOrNull(outcome.refined_residual_px);
     one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
     one["used"] = outcome.used;
+    one["weight"] = outcome.pick.weight;
     per_pick.push_back(one);
   }
   json["count"] = alignment.picks.size();
@@ -175,6 +178,38 @@ Json ExpectedErrorToJson(const ExpectedError& error) {
   json["far_corner"] = {error.far_corner.x(), error.far_corner.y(), error.far_corner.z()};
   json["rotation_deg"] = NumberOrNull(DegFromRad(error.rotation));
   json["scale"] = NumberOrNull(error.scale);
+  return json;
+}
+
+// One standard deviation of each photo of an adjusted model; null for one that took no part.
+Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
+  Json json = Json::array();
+  for (const auto& [image_id, image] : aligned.images) {
+    const auto at = alignment.photo_sigmas.find(image_id);
+    const bool known = at != alignment.photo_sigmas.end();
+    Json one;
+    one["name"] = image.name;
+    one["position_sigma_mm"] = known ? NumberOrNull(1000 * at->second.position) : Json(nullptr);
+    one["rotation_sigma_deg"] =
+        known ? NumberOrNull(DegFromRad(at->second.rotation)) : Json(nullptr);
+    json.push_back(one);
+  }
+  return json;
+}
+
+Json OpenDirectionsToJson(const OpenDirections& open) {
+  const auto to_json = [](const std::vector<Eigen::Vector3d>& directions) {
+    Json json = Json::array();
+    for (const Eigen::Vector3d& d : directions) json.push_back({d.x(), d.y(), d.z()});
+    return json;
+  };
+  Json json;
+  json["degenerate"] = !open.None();
+  json["num_facings"] = open.num_facings;
+  json["open_translations"] = to_json(open.slides);
+  json["open_rotations"] = to_json(open.turns);
+  json["open_scale"] = open.scale;
+  json["position_sigma_mm"] = NumberOrNull(1000 * open.slide_sigma);
   return json;
 }
 
@@ -216,6 +251,7 @@ void FillReport(const Alignment& alignment, double reprojection_rms_before,
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
   r["placement"] = PlacementToJson(alignment.placement);
   r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
+  r["surface_geometry"] = alignment.refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
   r["agreement"] = nullptr;
 }
 
@@ -311,6 +347,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, before.rms_px, after.rms_px, &context.report);
+  context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   WriteSparseModel(model, a.output_path);

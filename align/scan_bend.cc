@@ -273,9 +273,10 @@ class BendSolver {
         if (valid) jacobian.col(k) = (*more - *less) / (2 * kStep);
       }
       if (!valid) continue;
-      const double deviations = error->norm() / pick_sigma_px_;
+      const double sigma_px = pick_sigma_px_ / picks_[i].weight;
+      const double deviations = error->norm() / sigma_px;
       const double weight =
-          (deviations > kHuber ? kHuber / deviations : 1.0) / (pick_sigma_px_ * pick_sigma_px_);
+          (deviations > kHuber ? kHuber / deviations : 1.0) / (sigma_px * sigma_px);
       *normal += weight * jacobian.transpose() * jacobian;
       *gradient += weight * jacobian.transpose() * *error;
     }

@@ -8,6 +8,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "align/surface_cells.h"
+
 namespace roomtex {
 namespace {
 
@@ -23,6 +25,9 @@ constexpr double kGateShrink = 0.8;
 // Metres; what remains of every distance beyond the known noise (waviness of patches, slight
 // bends).
 constexpr double kSurfaceNoise = 0.001;
+// Cells of the surface with fewer points say nothing about the accuracy of the fit.
+constexpr int kMinPointsOfCell = 5;
+constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
 
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -61,6 +66,7 @@ class PickTerms {
     if (!x) return Eigen::Vector2d::Constant(kInfinity);
     return *x - term.pick->x_in_img;
   }
+  double Weight(int i) const { return terms_[i].pick->weight; }
 
   // By central differences: six to a hundred picks, so exactness of the step is all that matters.
   Eigen::Matrix<double, 2, 7> Jacobian(int i, const Similarity& s,
@@ -106,9 +112,10 @@ void AddPicks(const PickTerms& terms, const std::vector<bool>& used, double sigm
     const Eigen::Vector2d error = terms.Error(i, s);
     const Eigen::Matrix<double, 2, 7> jacobian = terms.Jacobian(i, s, pivot);
     if (!error.allFinite() || !jacobian.allFinite()) continue;
-    const double deviations = error.norm() / sigma_px;
+    const double own_sigma_px = sigma_px / terms.Weight(i);
+    const double deviations = error.norm() / own_sigma_px;
     const double weight = deviations > kHuber ? kHuber / deviations : 1.0;
-    normal->Add<2>(jacobian, error, weight / (sigma_px * sigma_px));
+    normal->Add<2>(jacobian, error, weight / (own_sigma_px * own_sigma_px));
   }
 }
 
@@ -175,10 +182,74 @@ std::vector<Match> FindMatches(const std::vector<SurfacePoint>& points, const Sc
   return matches;
 }
 
+void AddDistance(const Match& match, const Eigen::Vector3d& x_in_scan,
+                 const Eigen::Vector3d& surface_normal, const Eigen::Vector3d& pivot, double weight,
+                 Normal* normal) {
+  const Eigen::Vector3d arm = x_in_scan - pivot;
+  Eigen::Matrix<double, 1, 7> jacobian;
+  jacobian << surface_normal.transpose(), arm.cross(surface_normal).transpose(),
+      surface_normal.dot(arm);
+  normal->Add<1>(jacobian, Eigen::Matrix<double, 1, 1>(match.distance), weight);
+}
+
 // Tukey's biweight: what lies beyond the gate does not pull.
 double TukeyWeight(double distance, double gate) {
   const double u = distance / gate;
   return u * u < 1 ? (1 - u * u) * (1 - u * u) : 0;
+}
+
+// How far the surface is off as a whole within a cell, metres^2: the spread of the cells' median
+// distances beyond what their points' own noise explains. Bends of model and scan show there.
+double CommonVariance(const std::vector<Match>& matches, const SurfaceCells& cells) {
+  std::map<int, std::vector<double>> distances, variances;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const int cell = cells.Cell(i);
+    if (cells.NumPoints(cell) < kMinPointsOfCell) continue;
+    distances[cell].push_back(matches[i].distance);
+    variances[cell].push_back(std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2));
+  }
+  std::vector<double> excess;
+  for (auto& [cell, values] : distances) {
+    const auto n = static_cast<double>(values.size());
+    // The variance of a median is pi / 2 times that of a mean.
+    excess.push_back(std::pow(Median(values), 2) - M_PI / 2 * Median(variances[cell]) / n);
+  }
+  // Median of the square of a normal variable: 0.4549 variances.
+  return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / 0.4549);
+}
+
+// Fills what the fit knows about its own accuracy, at its solution.
+void JudgeAccuracy(const std::vector<Match>& matches, const std::vector<SurfacePoint>& points,
+                   const ScanPatches& surface, const PickTerms& terms,
+                   const std::vector<bool>& used, double sigma_px, const Similarity& start,
+                   SimilarityFit* fit) {
+  std::vector<Eigen::Vector3d> places, normals;
+  for (const Match& match : matches) {
+    places.push_back(surface.patches()[match.patch].point);
+    normals.push_back(surface.patches()[match.patch].normal);
+  }
+  const SurfaceCells cells(places, normals);
+  const double common = CommonVariance(matches, cells);
+  Normal normal;
+  int num_counted = 0;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const int count = cells.NumPoints(cells.Cell(i));
+    // A few points, where patches may straddle an edge, fix nothing on their own.
+    const double share = cells.NumPointsAlike(i) / static_cast<double>(matches.size());
+    if (count < kMinPointsOfCell || share < kMinFacingShare) continue;
+    ++num_counted;
+    const double own = std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2);
+    const Eigen::Vector3d n = cells.SharedNormal(i);
+    AddDistance(matches[i], fit->scan_from_sparse * points[matches[i].point].x_in_sparse, n,
+                fit->pivot, 1 / (own + count * common), &normal);
+    fit->facing += n * n.transpose();
+  }
+  fit->facing /= std::max(1, num_counted);
+  fit->surface_information = normal.matrix;
+  AddPicks(terms, used, sigma_px, fit->scan_from_sparse, fit->pivot, &normal);
+  AddScalePrior(fit->scan_from_sparse, start, &normal);
+  Vector7d step;
+  if (!SolveStep(normal, &step, &fit->covariance)) fit->covariance.setConstant(kInfinity);
 }
 
 }  // namespace
@@ -296,16 +367,10 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
     const double inflation = std::max(1.0, 1.4826 * Median(deviations));
     Normal normal;
     for (const Match& match : matches) {
-      const ScanPatch& patch = surface.patches()[match.patch];
-      const Eigen::Vector3d q = s * points[match.point].x_in_sparse;
-      const Eigen::Vector3d arm = q - fit.pivot;
-      Eigen::Matrix<double, 1, 7> jacobian;
-      jacobian << patch.normal.transpose(), arm.cross(patch.normal).transpose(),
-          patch.normal.dot(arm);
       const double own_gate = std::min(options.max_gate, std::max(gate, 3 * match.sigma));
       const double sigma = match.sigma * inflation;
-      normal.Add<1>(jacobian, Eigen::Matrix<double, 1, 1>(match.distance),
-                    TukeyWeight(match.distance, own_gate) / (sigma * sigma));
+      AddDistance(match, s * points[match.point].x_in_sparse, surface.patches()[match.patch].normal,
+                  fit.pivot, TukeyWeight(match.distance, own_gate) / (sigma * sigma), &normal);
     }
     AddPicks(terms, used, sigma_px, s, fit.pivot, &normal);
     AddScalePrior(s, start, &normal);
@@ -319,15 +384,16 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
     fit.converged = IsTiny(step) && gate <= last_gate;
     gate = std::max(kGateShrink * gate, std::min(gate, last_gate));
   }
+  matches = FindMatches(points, surface, fit.scan_from_sparse, gate, options.max_gate);
   double sum_before = 0, sum_after = 0;
-  for (const Match& match :
-       FindMatches(points, surface, fit.scan_from_sparse, gate, options.max_gate)) {
+  for (const Match& match : matches) {
     const ScanPatch& patch = surface.patches()[match.patch];
     const Eigen::Vector3d before = start * points[match.point].x_in_sparse - patch.point;
     sum_before += std::pow(patch.normal.dot(before), 2);
     sum_after += match.distance * match.distance;
     ++fit.num_points;
   }
+  JudgeAccuracy(matches, points, surface, terms, used, sigma_px, start, &fit);
   fit.converged = fit.num_points > 0;
   fit.rms_before = fit.num_points > 0 ? std::sqrt(sum_before / fit.num_points) : 0;
   fit.rms_after = fit.num_points > 0 ? std::sqrt(sum_after / fit.num_points) : 0;

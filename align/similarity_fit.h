@@ -52,7 +52,14 @@ struct SimilarityFit {
       0;  // RMS distance from the surface of the points that are on it at the end ...
   double rms_after = 0;  // ... under the start and under the result, metres
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
-  Matrix7d covariance = Matrix7d::Zero();  // of (dt, w, ds); infinite without a solution
+  // Of (dt, w, ds); infinite without a solution. What stays unknown of a surface, and how the model
+  // bends against it, is taken to be the same for all points of half a metre of it.
+  Matrix7d covariance = Matrix7d::Zero();
+  // Inverse of the covariance that the surface alone would give: without picks, without a solution
+  // zero.
+  Matrix7d surface_information = Matrix7d::Zero();
+  // Mean of n n^T over the points on the surface: which ways it faces.
+  Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();
 };
 
 // Residuals of the picks under a similarity, pixels; columns as `picks`. Infinite behind the

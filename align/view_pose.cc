@@ -165,13 +165,14 @@ struct ReprojectionCost {
     T params[kMaxCameraParams], x, y;
     for (size_t i = 0; i < camera->params.size(); ++i) params[i] = T(camera->params[i]);
     camera_formulas::Project(camera->model, params, T(p[0] / p[2]), T(p[1] / p[2]), &x, &y);
-    residual[0] = x - T(x_in_img.x());
-    residual[1] = y - T(x_in_img.y());
+    residual[0] = weight * (x - T(x_in_img.x()));
+    residual[1] = weight * (y - T(x_in_img.y()));
     return true;
   }
   const Camera* camera;
   Eigen::Vector2d x_in_img;
   Eigen::Vector3d rotated_point;
+  double weight;
 };
 
 class PoseProblem {
@@ -183,7 +184,7 @@ class PoseProblem {
       problem_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6>(
               new ReprojectionCost{&projection.camera(), pairs.x_in_img.col(i),
-                                   start.rotation * pairs.x_in_scan.col(i)}),
+                                   start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
           nullptr, parameters_);
     }
   }
@@ -266,9 +267,10 @@ std::optional<ViewPose> Refine(const CameraProjection& projection, const PointPa
   ViewPose result;
   result.cam_from_scan = problem.Pose();
   result.residual_px = PickResiduals(projection, pairs, result.cam_from_scan);
-  result.sum_px2 = result.residual_px.squaredNorm();
+  result.sum_px2 = pairs.SumOfSquares(result.residual_px);
   if (!std::isfinite(result.sum_px2)) return std::nullopt;
-  result.rms_px = std::sqrt(result.sum_px2 / pairs.size());
+  const double sum_of_weights = pairs.SumOfSquares(Eigen::VectorXd::Ones(pairs.size()));
+  result.rms_px = std::sqrt(result.sum_px2 / sum_of_weights);
   result.sigma_px = std::sqrt(result.sum_px2 / std::max(1, 2 * pairs.size() - 6));
   return result;
 }
@@ -279,7 +281,15 @@ PointPairs PointPairs::Without(int index) const {
   PointPairs rest{Eigen::Matrix2Xd(2, size() - 1), Eigen::Matrix3Xd(3, size() - 1)};
   rest.x_in_img << x_in_img.leftCols(index), x_in_img.rightCols(size() - 1 - index);
   rest.x_in_scan << x_in_scan.leftCols(index), x_in_scan.rightCols(size() - 1 - index);
+  if (weight.size() == 0) return rest;
+  rest.weight.resize(size() - 1);
+  rest.weight << weight.head(index), weight.tail(size() - 1 - index);
   return rest;
+}
+
+double PointPairs::SumOfSquares(const Eigen::VectorXd& residual_px) const {
+  return weight.size() == 0 ? residual_px.squaredNorm()
+                            : residual_px.cwiseProduct(weight).squaredNorm();
 }
 
 PointPairs PointPairs::Mirrored() const {

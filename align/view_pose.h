@@ -18,7 +18,11 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 struct PointPairs {
   Eigen::Matrix2Xd x_in_img;   // pixels, distorted, as taken
   Eigen::Matrix3Xd x_in_scan;  // metres
+  // How many times less its click noise is than that of a pick with weight 1; empty = all 1.
+  Eigen::VectorXd weight = Eigen::VectorXd();
 
+  double WeightOf(int index) const { return weight.size() > 0 ? weight[index] : 1; }
+  double SumOfSquares(const Eigen::VectorXd& residual_px) const;  // each times its weight
   int size() const { return static_cast<int>(x_in_img.cols()); }
   PointPairs Without(int index) const;
   // As if the scan had been read with the other azimuth sense: x -> -x.
@@ -35,9 +39,10 @@ inline constexpr double kCoplanarShare = 0.01;
 struct ViewPose {
   Rigid cam_from_scan;
   Eigen::VectorXd residual_px;  // distance between click and projection, one per pick
-  double sum_px2 = 0;           // sum of their squares
-  double rms_px = 0;            // root of their mean square
-  // Standard deviation of a click per coordinate, from the residuals: sqrt(sum_px2 / (2 n - 6)).
+  double sum_px2 = 0;           // weighted sum of their squares
+  double rms_px = 0;            // root of their weighted mean square
+  // Standard deviation of a click with weight 1 per coordinate, from the residuals:
+  // sqrt(sum_px2 / (2 n - 6)).
   double sigma_px = 0;
   // Covariance of (w, dt) with x_in_cam = exp(w) R x_in_scan + t + dt: inverse normal matrix of the
   // last step times sigma_px^2. rad^2, rad m, m^2. Infinite where the picks do not determine the

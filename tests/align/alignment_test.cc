@@ -116,13 +116,57 @@ TEST(Alignment, LeavesOutOneBadPickAndNamesItsLine) {
   EXPECT_LT(alignment.pick_rms_px, 4);
 }
 
-TEST(Alignment, DoesNotTrustSixPicksWithOneFarOff) {
+// Five picks are fewer than are asked for, so the answer is not trusted; but it is there, and
+// right.
+TEST(Alignment, OfSixPicksOneFarOffIsNamedAndTheOthersGiveTheAnswer) {
+  int num_named = 0;
   for (int bad = 0; bad < 6; ++bad) {
     SimulatedCase one = MakeCase(0, 6);
     const Eigen::Vector2d middle(968, 644);
-    one.picks[bad].x_in_img += 50 * (middle - one.picks[bad].x_in_img).normalized();
-    EXPECT_NE(Reasons(AlignCase(one)), "") << bad;
+    one.picks[bad].x_in_img += 60 * (middle - one.picks[bad].x_in_img).normalized();
+    const Alignment alignment = AlignCase(one);
+    EXPECT_NE(Reasons(alignment), "") << bad;
+    if (alignment.picks[bad].used) continue;
+    ++num_named;
+    EXPECT_THAT(Reasons(alignment), HasSubstr("line " + std::to_string(bad + 2))) << bad;
+    EXPECT_TRUE(alignment.adjusted) << bad;
+    EXPECT_LT(WorstPoseErrors(*one.room, alignment.bundle.model, Similarity()).position, 0.003)
+        << bad;
   }
+  EXPECT_GE(num_named, 5);
+}
+
+TEST(Alignment, APickThatIsSwitchedOffChangesNothing) {
+  const SimulatedCase& one = MakeCase(0, 6);
+  SimulatedCase more = one;
+  Pick wrong = one.picks[2];
+  wrong.x_in_img = Eigen::Vector2d(968, 644);
+  wrong.x_in_scan += Eigen::Vector3d(3, 3, 3);
+  wrong.weight = 0;
+  more.picks.insert(more.picks.begin() + 1, wrong);
+  const Alignment expected = AlignCase(one), found = AlignCase(more);
+  EXPECT_THAT(found.reasons, IsEmpty()) << Reasons(found);
+  EXPECT_FALSE(found.picks[1].used);
+  EXPECT_GT(found.picks[1].residual_px, 100);
+  EXPECT_EQ(found.pick_max_px, expected.pick_max_px);
+  EXPECT_THAT(found.scan_from_sparse.Matrix(),
+              IsNearMatrix(expected.scan_from_sparse.Matrix(), 1e-9));
+}
+
+// A bad pick of low weight is not worth a word; the answer is nearer to the truth for it.
+TEST(Alignment, AWeakPickHasLittleSay) {
+  AlignmentOptions options;
+  options.plane_constrained = false;
+  options.picks.min_bad_pick_px = 1000;  // nothing is left out
+  options.trust.max_pick_rms_px = 1000;
+  SimulatedCase one = MakeCase(1, 8);
+  one.picks[3].x_in_img += Eigen::Vector2d(15, 10);
+  const double bad =
+      WorstPoseErrors(*one.room, one.model, AlignCase(one, options).scan_from_sparse).position;
+  one.picks[3].weight = 0.05;
+  const double good =
+      WorstPoseErrors(*one.room, one.model, AlignCase(one, options).scan_from_sparse).position;
+  EXPECT_LT(good, 0.7 * bad);
 }
 
 TEST(Alignment, RefusesExchangedPicksWithTheirLines) {

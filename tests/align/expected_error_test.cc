@@ -53,6 +53,27 @@ TEST(ExpectedError, IsLargestAtTheCornerFarFromThePivot) {
   EXPECT_NEAR(error.scale, 1e-3, 1e-12);
 }
 
+// What the model itself says of a photo counts where it is more than the similarity leaves open.
+TEST(ExpectedError, OfAPhotoIsTheLargerOfItsOwnAndOfTheSimilarity) {
+  const SimilarityFit fit = FitWithCovariance();
+  SparseModel model;
+  PoseCovariances covariances;
+  for (uint32_t id = 1; id <= 3; ++id) {
+    model.images[id].cam_from_model.translation = {1.0 * id, 2, 3};
+    covariances[id] = (id == 2 ? 1e-2 : 1e-12) * Eigen::Matrix<double, 6, 6>::Identity();
+  }
+  const auto sigmas = FindPhotoSigmas(covariances, model, fit);
+  ASSERT_EQ(sigmas.size(), 3u);
+  EXPECT_NEAR(sigmas.at(1).position, PositionSigmaAt(fit, {-1, -2, -3}), 1e-12);
+  EXPECT_NEAR(sigmas.at(2).position, std::sqrt(3e-2), 1e-12);
+  EXPECT_NEAR(sigmas.at(2).rotation, std::sqrt(3e-2), 1e-12);
+  ExpectedError error;
+  SetExpectedErrorAtCameras(sigmas, &error);
+  EXPECT_EQ(error.at_cameras, sigmas.at(3).position);
+  SetExpectedErrorAtCameras({}, &error);
+  EXPECT_EQ(error.at_cameras, sigmas.at(3).position);
+}
+
 TEST(ExpectedError, IsInfiniteWhereTheFitLeavesSomethingOpen) {
   SimilarityFit fit = FitWithCovariance();
   fit.covariance(0, 0) = std::numeric_limits<double>::infinity();

@@ -64,13 +64,59 @@ TEST(PickReview, NamesTwoBadPicksAmongFourteen) {
   EXPECT_EQ(NumUsed(review), 12);
 }
 
-TEST(PickReview, LeavesNoneOutOfSixButShowsTheResidual) {
-  PickMaker maker(6);
-  PointPairs pairs = maker.WithNoise(maker.General(6), 1.0);
-  pairs.x_in_img.col(1) += Eigen::Vector2d(120, 90);
-  const PickReview review = ReviewPicks(maker.projection, pairs, {});
-  EXPECT_EQ(NumUsed(review), 6);
-  EXPECT_GT(review.RmsPx(), 10);
+TEST(PickReview, NamesTheOneBadPickAmongSix) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    PickMaker maker(seed);
+    PointPairs pairs = maker.WithNoise(maker.General(6), 1.0);
+    const int bad = static_cast<int>(seed % 6);
+    pairs.x_in_img.col(bad) += Eigen::Vector2d(120, 90);
+    const PickReview review = ReviewPicks(maker.projection, pairs, {});
+    EXPECT_FALSE(review.used[bad]) << seed;
+    EXPECT_EQ(NumUsed(review), 5) << seed;
+    EXPECT_LT(review.pose().rms_px, 4) << seed;
+  }
+}
+
+TEST(PickReview, KeepsSixOrdinaryPicks) {
+  int left_out = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    PickMaker maker(seed);
+    left_out +=
+        6 - NumUsed(ReviewPicks(maker.projection, maker.WithNoise(maker.General(6), 1.5), {}));
+  }
+  EXPECT_LE(left_out, 4);  // one in a hundred, by max_chance
+}
+
+// A weight of 2 is half the click noise: as good as four clicks on the same point.
+TEST(PickReview, AWeightOfTwoCountsLikeFourPicks) {
+  PickMaker maker(5);
+  PointPairs pairs = maker.WithNoise(maker.General(8), 1.5);
+  pairs.weight = Eigen::VectorXd::Ones(8);
+  pairs.weight[2] = 2;
+  PointPairs repeated{Eigen::Matrix2Xd(2, 11), Eigen::Matrix3Xd(3, 11)};
+  for (int i = 0; i < 11; ++i) {
+    repeated.x_in_img.col(i) = pairs.x_in_img.col(i < 8 ? i : 2);
+    repeated.x_in_scan.col(i) = pairs.x_in_scan.col(i < 8 ? i : 2);
+  }
+  const ViewPose weighted = SolveViewPoses(maker.projection, pairs).at(0);
+  const ViewPose expected = SolveViewPoses(maker.projection, repeated).at(0);
+  EXPECT_THAT(weighted.cam_from_scan, IsNearRigid(expected.cam_from_scan, 1e-8, 1e-8));
+  EXPECT_NEAR(weighted.sum_px2, expected.sum_px2, 1e-6);
+  EXPECT_NEAR(weighted.rms_px, expected.rms_px, 1e-6);
+}
+
+TEST(PickReview, AHeavyPickPullsThePoseAndALightOneDoesNot) {
+  PickMaker maker(8);
+  PointPairs pairs = maker.WithNoise(maker.General(8), 1.0);
+  pairs.x_in_img.col(4) += Eigen::Vector2d(12, -9);
+  const auto residual = [&](double weight) {
+    pairs.weight = Eigen::VectorXd::Ones(8);
+    pairs.weight[4] = weight;
+    return SolveViewPoses(maker.projection, pairs).at(0).residual_px[4];
+  };
+  EXPECT_GT(residual(0.01), residual(1));
+  EXPECT_GT(residual(1), residual(20));
+  EXPECT_LT(residual(100), 0.01);
 }
 
 TEST(PickReview, NamesExchangedPicks) {

@@ -56,6 +56,35 @@ TEST(Picks, ReadsQuotedNamesWithCommasAndQuotes) {
   EXPECT_EQ(picks[0].image_name, "hall, \"north\".jpg");
 }
 
+TEST(Picks, ReadsAndWritesWeights) {
+  const TempFolder folder;
+  WriteBytes(folder / "a.csv",
+             "image_name,x,y,scan_x,scan_y,scan_z,Weight\na.jpg,1,2,3,4,5,0.25\n"
+             "a.jpg,2,2,3,4,6,0\n");
+  const std::vector<Pick> picks = ReadPicks(folder / "a.csv");
+  ASSERT_EQ(picks.size(), 2u);
+  EXPECT_EQ(picks[0].weight, 0.25);
+  EXPECT_EQ(picks[1].weight, 0);
+  WritePicks(folder / "b.csv", picks);
+  EXPECT_EQ(ReadPicks(folder / "b.csv")[0].weight, 0.25);
+}
+
+TEST(Picks, RefusesWeightsThatAreNone) {
+  const std::string header = "image_name,x,y,scan_x,scan_y,scan_z,weight\n";
+  EXPECT_INPUT_ERROR(ReadText(header + "a.jpg,1,2,3,4,5,-1\n"), "line 2: weight is \"-1\"");
+  EXPECT_INPUT_ERROR(ReadText(header + "a.jpg,1,2,3,4,5,nan\n"), "weight is \"nan\"");
+  EXPECT_INPUT_ERROR(ReadText(header + "a.jpg,1,2,3,4,5\n"), "found 6 fields, expected 7");
+  EXPECT_INPUT_ERROR(ReadText(std::string(kHeader) + "a.jpg,1,2,3,4,5,1\n"),
+                     "found 7 fields, expected 6");
+}
+
+TEST(Picks, ThoseSwitchedOffDoNotCount) {
+  std::vector<Pick> picks = PicksOf("a.jpg", 6);
+  picks[4].weight = 0;
+  EXPECT_INPUT_ERROR(CheckPicksAgainstModel("picks.csv", picks, ModelWith({"a.jpg"})),
+                     "at most 5 in one photo");
+}
+
 TEST(Picks, ReadsBackWhatItWroteToTheLastBit) {
   const TempFolder folder;
   const std::vector<Pick> picks = {{"a, b#\".jpg", {0.1, 1.0 / 3}, {1e-17, -2.0 / 7, 1e9}, 0},

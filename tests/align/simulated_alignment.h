@@ -27,23 +27,32 @@ inline std::vector<Pick> PicksOfPhoto(const SimulatedRoom& room, int photo, int 
   return picks;
 }
 
-// Room `seed` with `num_picks` picks in the best photo: click noise 1.5 pixels, range noise 2 mm,
-// keypoint noise 0.7 pixels.
-inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
-  static std::map<std::pair<int, int>, SimulatedCase> cases;
-  SimulatedCase& one = cases[{seed, num_picks}];
-  if (one.room != nullptr) return one;
+inline SimulatedRoomOptions CaseOptions(int seed) {
   SimulatedRoomOptions options;
   options.random_seed = seed;
   options.num_photos = 16;
   options.scan_columns = 800;
   options.scan_rows = 400;
+  return options;
+}
+
+// `num_picks` picks in the best photo: click noise 1.5 pixels, keypoint noise 0.7 pixels.
+inline SimulatedCase MakeCase(const SimulatedRoomOptions& options, int num_picks) {
+  SimulatedCase one;
   one.room = std::make_shared<SimulatedRoom>(options);
   one.model = one.room->MakeSparseModel(2000, 0.7);
   one.scans = {one.room->MakeScan(0)};
   one.scans[0].path = "room.rtpi";
   one.scans[0].is_rtpi = true;
   one.picks = PicksOfPhoto(*one.room, one.room->BestPhotoForPicks(), num_picks);
+  return one;
+}
+
+// Room `seed`, range noise 2 mm.
+inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
+  static std::map<std::pair<int, int>, SimulatedCase> cases;
+  SimulatedCase& one = cases[{seed, num_picks}];
+  if (one.room == nullptr) one = MakeCase(CaseOptions(seed), num_picks);
   return one;
 }
 
