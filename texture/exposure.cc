@@ -287,7 +287,12 @@ ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
   if (options.mode == "none" || exposures.empty()) return solution;
   const ExposureTies ties = TieExposures(exposures, overlaps, options, &solution);
   const std::vector<double> log_gains = SolveBrightness(ties.prior, overlaps);
-  if (!solution.exif_ignored) FindContradictions(ties.prior, log_gains, &solution);
+  if (options.mode == "exif") {
+    const ExposurePrior doubted = PriorFromExif(exposures, true);
+    FindContradictions(doubted, SolveBrightness(doubted, overlaps), &solution);
+  } else if (!solution.exif_ignored) {
+    FindContradictions(ties.prior, log_gains, &solution);
+  }
   std::array<std::vector<double>, 3> channels = {log_gains, log_gains, log_gains};
   if (options.white_balance && options.mode == "match") {
     for (int k = 0; k < 3; ++k) {

@@ -192,6 +192,14 @@ TEST(Exposure, ModeExifMatchesPhotosWithoutExif) {
   EXPECT_LT(capture.LargestError(solution), 0.02);
 }
 
+TEST(Exposure, ModeExifObeysWrongExifButNamesIt) {
+  Capture capture(kExposures, 6000, 0.02, Chain);
+  capture.exif[2].exposure_time = 0.5 / 60;  // is 2 / 60
+  const ExposureSolution solution = capture.Solve("exif");
+  EXPECT_NEAR(solution.gains[2][1] / solution.gains[1][1], 2, 1e-3);
+  EXPECT_EQ(solution.contradicted, std::vector<int>{2});
+}
+
 TEST(Exposure, ModeNoneLeavesPhotosAlone) {
   Capture capture(kExposures, 3000, 0.02, Chain);
   for (const Eigen::Vector3f& gain : capture.Solve("none").gains) {
