@@ -1,11 +1,14 @@
 // A simulated room through cameras with faults: exposures against the truth, and colours nearly as
 // good as without the faults.
 
+#include "capture/camera_faults.h"
+
 #include <cmath>
 #include <map>
 #include <memory>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "capture/capture_writer.h"
 #include "capture/simulated_room.h"
@@ -191,6 +194,41 @@ TEST_F(CameraFaults, ResponseIsEstimatedAndUndone) {
   EXPECT_LT(without.psnr_db, plain - 3);
   EXPECT_GT(with.psnr_db, plain - 0.8);
   EXPECT_LT(with.gain_rms_ev, 0.02);
+}
+
+// A still scene, photo 0 of the room, taken with shorter and longer times by the film camera.
+void ShootBracket(const std::string& photo_path, const std::string& folder) {
+  const cv::Mat scene = ReadPhoto(photo_path);
+  const ResponseTable film("film");
+  for (int ev = -3; ev <= 3; ++ev) {
+    cv::Mat photo = scene.clone();
+    for (int i = 0; i < static_cast<int>(photo.total()); ++i) {
+      auto& bgr = photo.at<cv::Vec3b>(i);
+      for (int k = 0; k < 3; ++k) {
+        const float light = LinearFromSrgbByte()[bgr[k]] * static_cast<float>(std::exp2(ev));
+        bgr[k] = cv::saturate_cast<uchar>(film.Grey(light));
+      }
+    }
+    const std::string path = folder + "/bracket_" + std::to_string(ev + 3) + ".jpg";
+    cv::imwrite(path, photo, {cv::IMWRITE_JPEG_QUALITY, 95});
+    ExposureData exif;
+    exif.exposure_time = std::exp2(ev) / 30;
+    WriteExposureData(path, exif);
+  }
+}
+
+TEST_F(CameraFaults, ResponseFromABracketIsUndone) {
+  SimulatedRoomOptions room = Room();
+  const double plain = Colorize(room, {}).psnr_db;
+  const TempFolder bracket;
+  ShootBracket(Photos(SimulatedRoom(room)) / "photos/photo_000.jpg", bracket.path());
+  room.response = "film";
+  ExposureOptions options;
+  options.bracket_path = bracket.path();
+  const Outcome with = Colorize(room, options);
+  EXPECT_EQ(with.result.exposure.response, "bracket");
+  EXPECT_GT(with.psnr_db, plain - 0.6);
+  EXPECT_LT(with.gain_rms_ev, 0.01);
 }
 
 TEST_F(CameraFaults, ResponseFromAFileIsUndone) {
