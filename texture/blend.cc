@@ -173,8 +173,10 @@ SampleViews UnpackViews(const Observation* observations, int count,
 }  // namespace
 
 BlendedSample BlendSample(const Observation* observations, int count,
-                          const std::vector<Eigen::Vector3f>& gains, double outlier) {
+                          const std::vector<Eigen::Vector3f>& gains, double outlier,
+                          float* shares) {
   BlendedSample result;
+  if (shares != nullptr) std::fill(shares, shares + std::max(count, 0), 0.0f);
   if (count <= 0) return result;
   // What is in doubt comes last and counts only where there is nothing else.
   if (observations[0].in_doubt == 0) {
@@ -204,6 +206,7 @@ BlendedSample BlendSample(const Observation* observations, int count,
     result.blend += views.weights[i] * views.colors[i];
   }
   result.blend /= sum;
+  for (int i = 0; shares != nullptr && i < views.count; ++i) shares[i] = views.weights[i] / sum;
   return result;
 }
 

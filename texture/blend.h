@@ -72,8 +72,10 @@ struct BlendedSample {
       false;  // the dominant photo does not contradict the blend: it may give detail
 };
 // gains: linear, one 3-vector (r, g, b) per photo. A sample whose observations are all in doubt has
-// a colour only if two of them agree.
+// a colour only if two of them agree. shares (if given): room for `count` numbers, what each
+// observation has of the blend; they sum to 1, or are all 0 without a colour.
 BlendedSample BlendSample(const Observation* observations, int count,
-                          const std::vector<Eigen::Vector3f>& gains, double outlier);
+                          const std::vector<Eigen::Vector3f>& gains, double outlier,
+                          float* shares = nullptr);
 
 }  // namespace roomtex

@@ -5,6 +5,7 @@
 
 #include "core/photo.h"
 #include "texture/cpu_stages.h"
+#include "texture/debug_images.h"
 #include "texture/photo_pass.h"
 #include "texture/texture_grid.h"
 #include "texture/texture_scale.h"
@@ -152,7 +153,9 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   ObservationStore store(NumSlots(input), options.blend.max_views);
   result.samples_seen =
       ObservePhotos(input, photos, options.occlusion, options.blend, num_threads, progress, &store);
-  if (options.texture_scale == 1 && !has_atlas) input.occluders.clear();
+  if (options.texture_scale == 1 && !has_atlas && options.debug_path.empty()) {
+    input.occluders.clear();
+  }
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
@@ -169,6 +172,12 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     result.scans.push_back(std::move(colored));
   }
   CountVertices(scans, &result);
+  if (!options.debug_path.empty()) {
+    WriteDebugImages(options.debug_path,
+                     {scans, photos, input, grids, store, result.exposure.gains, options.occlusion,
+                      options.blend},
+                     num_threads, progress);
+  }
 
   result.pixels_per_sample = MedianPixelsPerSample(input, store, photos);
   result.texture_scale = options.texture_scale > 0

@@ -34,7 +34,8 @@ struct ColorizeOptions {
   // Working memory for texture images finer than the samples, megabytes (1e6 bytes); the finished
   // image adds 7 bytes a texel. Less = more passes over the photos.
   double texture_memory_mb = 2000;
-  AtlasOptions atlas;  // of meshes without a grid
+  AtlasOptions atlas;      // of meshes without a grid
+  std::string debug_path;  // folder for debug_images.h; "" = none
 
   std::vector<std::string> Problems() const;
 };

@@ -92,6 +92,12 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
   command->AddBool("output_obj", &o->output_obj,
                    "Also write model.obj, model.mtl and their texture images model_0.png ... into "
                    "the output folder; the up axis stays the scan's.");
+  command->AddOutputPath(
+      "debug_path", &o->colorize.debug_path,
+      "Folder for pictures of what was seen and decided: per photo depth map, depth boundaries, "
+      "how it sees the scan and what it gives; per scan the photo that dominates, number of "
+      "photos, disagreement. Its README.txt is the legend.",
+      Command::Kind::kOptional);
   command->AddChoice(
       "Texture.image_format", &o->image_format, {"png", "jpeg"},
       "Texture images of model.glb and model.obj. png keeps every texel and draws no "

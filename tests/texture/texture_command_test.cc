@@ -1,6 +1,7 @@
 // roomtex-texture as a user calls it, on a simulated capture with true poses.
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -430,6 +431,52 @@ TEST_F(TextureCommand, DoesNotWriteOverTheScanItReads) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("written over"), std::string::npos) << result.err;
   EXPECT_EQ(ReadBytes(Path("own/model.rtpi")), ReadBytes(Capture() + "/scan.rtpi"));
+}
+
+TEST_F(TextureCommand, DebugPicturesAddUpToTheResult) {
+  const CommandResult result =
+      Texture("plain_blend", "--Blend.detail 0 --Texture.unseen black --debug_path '" +
+                                 Path("what was seen") + "'");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string folder = Path("what was seen/");
+  const std::string legend = ReadBytes(folder + "README.txt");
+  const auto& linear = LinearFromSrgbByte();
+  cv::Mat3f sum(190, 500, cv::Vec3f(0, 0, 0));
+  for (int photo = 0; photo < 12; ++photo) {
+    char stem[64];
+    std::snprintf(stem, sizeof stem, "%03d_photo_%03d", photo, photo);
+    EXPECT_NE(legend.find(stem), std::string::npos);
+    const cv::Mat depth = cv::imread(folder + stem + "_depth_mm.png", cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(depth.type(), CV_16U);
+    double farthest;
+    cv::minMaxLoc(depth, nullptr, &farthest);
+    EXPECT_TRUE(farthest > 1500 && farthest < 7000) << farthest;  // the room is 5 by 4 metres
+    EXPECT_EQ(cv::imread(folder + stem + "_boundary.jpg").size(), depth.size());
+    EXPECT_EQ(cv::imread(folder + stem + "_depth.jpg").size(), depth.size());
+    const cv::Mat3b part = cv::imread(folder + stem + "_contribution.png");
+    const cv::Mat3b sight = cv::imread(folder + stem + "_sight.png");
+    ASSERT_EQ(part.size(), sum.size());
+    ASSERT_EQ(sight.size(), sum.size());
+    for (int i = 0; i < 500 * 190; ++i) {
+      const cv::Vec3b c = part(i / 500, i % 500), seen = sight(i / 500, i % 500);
+      for (int k = 0; k < 3; ++k) sum(i / 500, i % 500)[k] += linear[c[k]];
+      // What is hidden, turned away or outside the photo gives nothing.
+      if (seen[0] == seen[1] && seen[1] == seen[2]) {
+        ASSERT_EQ(c, cv::Vec3b(0, 0, 0));
+      }
+    }
+  }
+  const cv::Mat3b blend = cv::imread(Path("plain_blend/texture.png"));
+  double error = 0;
+  for (int i = 0; i < 500 * 190; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      error += std::abs(sum(i / 500, i % 500)[k] - linear[blend(i / 500, i % 500)[k]]);
+    }
+  }
+  EXPECT_LT(error / (3 * 500 * 190), 0.003);  // twelve times half a grey level
+  for (const char* name : {"significance.png", "num_photos.png", "disagreement.png"}) {
+    EXPECT_EQ(cv::imread(folder + name).size(), sum.size()) << name;
+  }
 }
 
 // A patterned and a plain photo of each pose: colour comes from the plain ones only.
