@@ -7,6 +7,7 @@
 #include "texture/cpu_stages.h"
 #include "texture/debug_images.h"
 #include "texture/photo_pass.h"
+#include "texture/single_holes.h"
 #include "texture/texture_grid.h"
 #include "texture/texture_scale.h"
 #include "texture/unify_exposure.h"
@@ -112,8 +113,8 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
 
 // Texture images finer than the samples, from the exposures found on the samples.
 void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
-                      const std::vector<ScanSurface>& surfaces, const ColorizeOptions& options,
-                      int num_threads, PhotoPassInput* input, Progress* progress,
+                      const ColorizeOptions& options, int num_threads,
+                      std::vector<ScanSurface>* surfaces, PhotoPassInput* input, Progress* progress,
                       ColorizeResult* result) {
   const TexelPassOptions texels{options.occlusion, options.blend, options.detail,
                                 1e6 * options.texture_memory_mb};
@@ -127,7 +128,9 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
       FinishPage(source, &atlas.pages.back(), &atlas.num_texels, &atlas.num_seen);
     }
     if (!scans[s].organised || result->texture_scale == 1) continue;
-    const ScanTexels source(scans[s], surfaces[s], result->scans[s].samples, result->texture_scale);
+    ScanSurface& surface = (*surfaces)[s];
+    FillHoles(scans[s], FindSingleHoles(scans[s], surface.links), &surface);
+    const ScanTexels source(scans[s], surface, result->scans[s].samples, result->texture_scale);
     result->scans[s].texture = ColorizeTexels(source, photos, result->exposure.gains, texels,
                                               num_threads, input, progress);
   }
@@ -168,6 +171,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
                                     options.detail, num_threads)
                           .Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
     colored.triangles = std::move(surfaces[s].triangles);
+    AppendTrianglesOverHoles(scans[s], FindSingleHoles(scans[s], surfaces[s].links),
+                             &colored.triangles);
     colored.atlas = std::move(atlases[s]);
     result.scans.push_back(std::move(colored));
   }
@@ -188,7 +193,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     store = ObservationStore(0, 1);
     input.samples = {};
     progress->Stage("texture");
-    ColorizeTextures(scans, photos, surfaces, options, num_threads, &input, progress, &result);
+    ColorizeTextures(scans, photos, options, num_threads, &surfaces, &input, progress, &result);
   }
   return result;
 }

@@ -78,9 +78,10 @@ TexelBlock ScanTexels::Rows(int first, int end) const {
     for (int c = 0; c < num_columns(); ++c, ++texel) {
       const Place x = PlaceOf(c);
       const int index = scan_.Index(x.nearest, y.nearest);
-      if (scan_.IsMissing(index)) continue;
+      if (!surface_.points[index].allFinite()) continue;
       SetTexel(texel, x, y, &block);
-      block.unseen[texel] = colors_.rgb[index];
+      // Where a missing sample was given a place, its neighbour's colour.
+      block.unseen[texel] = colors_.rgb[scan_.IsMissing(index) ? index - scan_.num_columns : index];
       // Runs do not close full turns (grid_runs.h).
       const uint8_t links = surface_.links.bits[index];
       const bool right = (c + 1) % scale_ != 0 || (links & GridLinks::kRight) != 0;

@@ -150,9 +150,11 @@ cv::Mat PartImage(const Scan& scan, const ColoredScan& colored, const TexturedPa
     if (grid_row < 0 || grid_row >= grid.num_rows) continue;
     for (int column = 0; column < image.cols; ++column) {
       const int grid_column = (part.first_column + column + grid.num_columns) % grid.num_columns;
-      if (scan.IsMissing(scan.Index(grid_column / scale, grid_row / scale))) continue;
-      const auto& [r, g, b] =
-          grid.rgb[static_cast<size_t>(grid_row) * grid.num_columns + grid_column];
+      const size_t texel = static_cast<size_t>(grid_row) * grid.num_columns + grid_column;
+      const auto& [r, g, b] = grid.rgb[texel];
+      // A single missing sample may have got texels of its own.
+      const bool missing = scan.IsMissing(scan.Index(grid_column / scale, grid_row / scale));
+      if (missing && (scale == 1 || grid.rgb[texel] == Rgb{0, 0, 0})) continue;
       image(row, column) = {b, g, r};
       known(row, column) = 1;
     }

@@ -7,6 +7,7 @@
 #include "tests/support/temp_folder.h"
 #include "tests/texture/two_walls.h"
 #include "texture/colorize.h"
+#include "texture/single_holes.h"
 #include "texture/texture_grid.h"
 #include "texture/texture_scale.h"
 
@@ -128,6 +129,47 @@ TEST_F(TexelPass, ShowsWhatLiesBetweenTheSamples) {
       EXPECT_GT(psnr, 38);
     }
   }
+}
+
+TEST_F(TexelPass, SingleMissingSamplesAreNoPinholes) {
+  Shoot();
+  Scan scan = scene_.MakeScan(60, 60, kHalfAngle);
+  const Scan whole = scan;
+  const std::vector<int> lost = {scan.Index(30, 30), scan.Index(20, 40)};
+  const std::vector<int> gap = {scan.Index(40, 20), scan.Index(41, 20)};
+  for (const int i : lost) scan.points[i] = Scan::MissingPoint();
+  for (const int i : gap) scan.points[i] = Scan::MissingPoint();
+  scan.points[scan.Index(0, 30)] = Scan::MissingPoint();  // at the border
+  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  EXPECT_EQ(FindSingleHoles(scan, surface.links), lost);
+  const ColorizeResult result = Run(scan, 4);
+  // As much surface as without the holes, all of it turned to the scanner.
+  const auto area = [](const Scan& of, const std::vector<Triangle>& triangles) {
+    double sum = 0;
+    for (const auto& [a, b, c] : triangles) {
+      const Eigen::Vector3d normal =
+          (of.points[b] - of.points[a]).cross(of.points[c] - of.points[a]);
+      EXPECT_GT(normal.dot(of.Station() - of.points[a]), 0);
+      sum += 0.5 * normal.norm();
+    }
+    return sum;
+  };
+  const double cell = area(whole, surface.triangles) / (59 * 59);
+  EXPECT_GT(area(scan, result.scans[0].triangles), area(scan, surface.triangles) + 3 * cell * 0.9);
+  const ColorGrid& texture = result.scans[0].texture;
+  for (const int i : lost) {
+    const int column = i % 60, row = i / 60;
+    for (int y = 4 * row; y < 4 * row + 4; ++y) {
+      for (int x = 4 * column; x < 4 * column + 4; ++x) {
+        const Eigen::Vector3f truth = scene_.color(TruePlace(scene_, scan, 4, x, y));
+        const Rgb& rgb = texture.rgb[y * 240 + x];
+        const auto& linear = LinearFromSrgbByte();
+        EXPECT_GT(texture.views[y * 240 + x], 0);
+        EXPECT_NEAR(linear[rgb[0]] / linear[rgb[1]], truth[0] / truth[1], 0.12);
+      }
+    }
+  }
+  EXPECT_EQ(texture.rgb[(4 * 20 + 1) * 240 + 4 * 40 + 1], (Rgb{0, 0, 0}));
 }
 
 TEST_F(TexelPass, SamplesDoNotDependOnTheScale) {
