@@ -222,6 +222,30 @@ TEST(Alignment, NeverTrustsTheScanOfAnotherRoom) {
   }
 }
 
+// The same walls, windows and doors, and clicks on nothing else: only what stands and hangs in the
+// room tells that the scan is of another one.
+TEST(Alignment, NeverTrustsTheScanOfARoomOfTheSameShape) {
+  int num_tried = 0;
+  for (const int seed : {0, 3, 8}) {
+    SimulatedCase one = MakeCase(seed);
+    one.scans = MakeCase(seed + 1).scans;
+    const ScanPatches surface(one.scans, ScanPatchOptions());
+    one.picks.clear();
+    for (const Pick& pick : PicksOfPhoto(*one.room, one.room->BestPhotoForPicks(), 60)) {
+      const auto nearest = surface.FindNearest(pick.x_in_scan, 0.2);
+      if (!nearest || std::abs(nearest->distance) > 0.02 || one.picks.size() == 8) continue;
+      one.picks.push_back(pick);
+    }
+    if (one.picks.size() < 6) continue;
+    try {
+      EXPECT_NE(Reasons(AlignCase(one)), "") << seed;
+      ++num_tried;
+    } catch (const InputError&) {
+    }
+  }
+  EXPECT_GE(num_tried, 1);
+}
+
 TEST(Alignment, RefusesPicksInMillimetres) {
   SimulatedCase one = MakeCase();
   for (Pick& pick : one.picks) pick.x_in_scan *= 1000;
