@@ -93,6 +93,14 @@ void JudgePlacement(const TrustOptions& trust, Alignment* result) {
         " % of the sparse points that the scanner could see lie within " +
         Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
         Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.");
+  } else if (!(placement.ChangedShare() <= trust.max_changed_share)) {
+    const double percent = 100.0 / judged;
+    result->reasons.push_back(
+        Number(percent * placement.num_floating, 0) +
+        " % of the sparse points float in space that the scanner saw to be empty, and " +
+        Number(percent * placement.num_hidden, 0) + " % lie behind its surface (at most " +
+        Number(100 * trust.max_changed_share, 0) +
+        " % of each): the scan is of another room, or much was moved between scan and photos.");
   }
   if (!(placement.CameraShare() >= trust.min_camera_share)) {
     result->reasons.push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +

@@ -105,6 +105,11 @@ void AddOptions(Arguments* a, Command* command) {
       "Share of the sparse points visible to the scanner that must be on the surface; "
       "larger = stricter.");
   command->AddDouble(
+      "Trust.max_changed_share", &o.trust.max_changed_share,
+      "Share of the sparse points that may float in space the scanner saw to be empty while as "
+      "many "
+      "lie behind its surface: another room, or things moved; larger = more tolerant.");
+  command->AddDouble(
       "Trust.min_camera_share", &o.trust.min_camera_share,
       "Share of the photos that must not lie behind the surface; larger = stricter.");
   command->AddDouble(
@@ -220,6 +225,7 @@ Json PlacementToJson(const Placement& placement) {
   json["num_floating"] = placement.num_floating;
   json["num_hidden"] = placement.num_hidden;
   json["surface_share"] = placement.SurfaceShare();
+  json["changed_share"] = placement.ChangedShare();
   json["camera_share"] = placement.CameraShare();
   return json;
 }

@@ -21,6 +21,8 @@ std::vector<std::string> TrustOptions::Problems() const {
   require(surface_tolerance > 0, "--Trust.surface_tolerance must be positive");
   require(min_surface_share >= 0 && min_surface_share <= 1,
           "--Trust.min_surface_share must lie between 0 and 1");
+  require(max_changed_share >= 0 && max_changed_share <= 1,
+          "--Trust.max_changed_share must lie between 0 and 1");
   require(min_camera_share >= 0 && min_camera_share <= 1,
           "--Trust.min_camera_share must lie between 0 and 1");
   require(max_position_sigma > 0, "--Trust.max_position_sigma must be positive");
@@ -34,6 +36,11 @@ double Placement::SurfaceShare() const {
 
 double Placement::CameraShare() const {
   return num_cameras > 0 ? static_cast<double>(num_cameras_free) / num_cameras : 0;
+}
+
+double Placement::ChangedShare() const {
+  const int known = num_on_surface + num_floating + num_hidden;
+  return known > 0 ? static_cast<double>(std::min(num_floating, num_hidden)) / known : 0;
 }
 
 Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoint>& points,

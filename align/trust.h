@@ -26,6 +26,10 @@ struct TrustOptions {
   // Of the sparse points that the scanner could see, the share that must be on the surface, not
   // floating in what the scanner saw to be empty. Larger = stricter.
   double min_surface_share = 0.6;
+  // Things that people move leave points floating where they are now, and points behind where they
+  // were; the scan of another room does so everywhere. The smaller of the two shares (of the points
+  // near what the scanner saw) must not be larger than this. Larger = more tolerant.
+  double max_changed_share = 0.08;
   // Share of the photos that must not have been taken from inside a wall or outside the scan.
   double min_camera_share = 0.5;
   // Metres; a pose of the picks less certain than this (one standard deviation) fixes nothing.
@@ -49,6 +53,8 @@ struct Placement {
   // num_on_surface / (num_on_surface + num_floating); 0 without any.
   double SurfaceShare() const;
   double CameraShare() const;
+  // min(num_floating, num_hidden) / (num_on_surface + num_floating + num_hidden); 0 without any.
+  double ChangedShare() const;
 };
 
 Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoint>& points,

@@ -87,7 +87,9 @@ SimulatedCase WithMirroredScan(int seed) {
 }
 
 SimulatedCase FarOff(SimulatedCase one) {
-  one.picks[2].x_in_img += Eigen::Vector2d(60, -40);
+  const Camera& camera = one.room->camera();
+  const Eigen::Vector2d middle(0.5 * camera.width, 0.5 * camera.height);
+  one.picks[2].x_in_img += 70 * (middle - one.picks[2].x_in_img).normalized();
   return one;
 }
 SimulatedCase WithOnePickFarOff(int seed) { return FarOff(RoomWithPicks(seed, 6)); }
