@@ -172,20 +172,25 @@ void RunAll(int num_rooms) {
   std::printf(
       "Photos off, over all alignments that were found: median photo of the median and of the "
       "worst room, worst photo of all rooms.\n\n"
-      "| %d rooms | trusted | exit 4, model written | refused | wrong and trusted | mm by one "
+      "| case, %d rooms each | trusted | exit 4, model written | refused | wrong and trusted | mm "
+      "by one "
       "similarity | mm | degrees | "
       "error / expected error: 10 %%, 50 %%, 90 %% |\n|---|---|---|---|---|---|---|---|---|\n",
       num_rooms);
   for (const Row& row : kRows) {
     Counts counts;
     for (int seed = 0; seed < num_rooms; ++seed) Add(row.make(seed), row.is_right, &counts);
-    std::printf("| %s | %d | %d | %d | %d | %.2f | %.2f, %.2f, %.2f | %.4f | %.2f, %.2f, %.2f |\n",
-                row.name, counts.trusted, counts.untrusted, counts.refused,
-                counts.wrong_and_trusted, Quantile(counts.similarity_mm, 0.5),
-                Quantile(counts.median_mm, 0.5), Quantile(counts.median_mm, 1),
-                Quantile(counts.worst_mm, 1), Quantile(counts.median_deg, 0.5),
-                Quantile(counts.expected_ratio, 0.1), Quantile(counts.expected_ratio, 0.5),
-                Quantile(counts.expected_ratio, 0.9));
+    std::printf("| %s | %d | %d | %d | %d |", row.name, counts.trusted, counts.untrusted,
+                counts.refused, counts.wrong_and_trusted);
+    if (counts.median_mm.empty()) {
+      std::printf(" - | - | - | - |\n");
+      continue;
+    }
+    std::printf(" %.2f | %.2f, %.2f, %.2f | %.4f | %.2f, %.2f, %.2f |\n",
+                Quantile(counts.similarity_mm, 0.5), Quantile(counts.median_mm, 0.5),
+                Quantile(counts.median_mm, 1), Quantile(counts.worst_mm, 1),
+                Quantile(counts.median_deg, 0.5), Quantile(counts.expected_ratio, 0.1),
+                Quantile(counts.expected_ratio, 0.5), Quantile(counts.expected_ratio, 0.9));
     std::fflush(stdout);
   }
 }
