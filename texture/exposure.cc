@@ -1,6 +1,7 @@
 #include "texture/exposure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -320,39 +321,56 @@ float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector
   return std::clamp(1 / std::max(*high, 1e-6f), 0.5f, 1.0f);
 }
 
+namespace {
+
+using Bytes = std::array<int, 3>;  // sRGB
+
+Bytes ToBytes(const Eigen::Vector3f& light) {
+  return {SrgbByteFromLinear(light[0]), SrgbByteFromLinear(light[1]), SrgbByteFromLinear(light[2])};
+}
+
+double Difference(const Bytes& a, const Bytes& b) {
+  return (std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2])) / 3.0;
+}
+
+}  // namespace
+
 Disagreement MeasureDisagreement(const ObservationStore& store,
                                  const std::vector<Eigen::Vector3f>& gains) {
   const CpuTimer timer(CpuStage::kExposure, CpuTimer::Scope::kProcess);
   Disagreement result;
-  const auto byte_difference = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-    int sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      sum += std::abs(int{SrgbByteFromLinear(a[k])} - int{SrgbByteFromLinear(b[k])});
-    }
-    return sum / 3.0;
+  const auto bytes_after = [&gains](const Observation& observation) {
+    return ToBytes(UnpackColor(observation.color).cwiseProduct(gains[observation.photo]));
   };
   const size_t stride = SampleStride(store, gains.size());
   // A sample far away in the order, for the difference at random; golden-section steps visit all
   // parts.
   const auto far_step = static_cast<size_t>(0.381966 * static_cast<double>(store.num_samples()));
   size_t num_random = 0;
+  std::vector<Bytes> before, after;
   for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
     const Observation* o = store.Begin(sample);
+    const int count = store.Count(sample);
+    if (count < 2) continue;
+    before.clear();
+    after.clear();
+    for (int i = 0; i < count; ++i) {
+      before.push_back(ToBytes(UnpackColor(o[i].color)));
+      after.push_back(bytes_after(o[i]));
+    }
     const size_t other = (sample + far_step) % store.num_samples();
-    for (int i = 0; i < store.Count(sample); ++i) {
-      const Eigen::Vector3f a = UnpackColor(o[i].color);
-      const Eigen::Vector3f& gain_a = gains[o[i].photo];
-      for (int j = i + 1; j < store.Count(sample); ++j) {
-        const Eigen::Vector3f b = UnpackColor(o[j].color);
-        result.before += byte_difference(a, b);
-        result.after += byte_difference(a.cwiseProduct(gain_a), b.cwiseProduct(gains[o[j].photo]));
-        ++result.num_pairs;
-        if (store.Count(other) == 0) continue;
-        const Observation& random = store.Begin(other)[0];
-        result.at_random += byte_difference(
-            a.cwiseProduct(gain_a), UnpackColor(random.color).cwiseProduct(gains[random.photo]));
-        ++num_random;
+    const bool has_other = store.Count(other) > 0;
+    const Bytes random = has_other ? bytes_after(store.Begin(other)[0]) : Bytes{};
+    for (int i = 0; i < count; ++i) {
+      const int num_pairs = count - 1 - i;
+      for (int j = i + 1; j < count; ++j) {
+        result.before += Difference(before[i], before[j]);
+        result.after += Difference(after[i], after[j]);
       }
+      result.num_pairs += num_pairs;
+      if (!has_other) continue;
+      result.at_random += num_pairs * Difference(after[i], random);
+      num_random += num_pairs;
     }
   }
   if (result.num_pairs > 0) {

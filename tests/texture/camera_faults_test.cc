@@ -42,7 +42,7 @@ class CameraFaults : public testing::Test {
 
   // photos: numbers of those that are used; empty = all.
   static Outcome Colorize(const SimulatedRoomOptions& room_options, const ExposureOptions& exposure,
-                          const std::vector<int>& photos = {}) {
+                          const std::vector<int>& photos = {}, int texture_scale = 1) {
     const SimulatedRoom room(room_options);
     Progress quiet(true);
     const TempFolder& folder = Photos(room);
@@ -59,6 +59,7 @@ class CameraFaults : public testing::Test {
     }
     ColorizeOptions options;
     options.exposure = exposure;
+    options.texture_scale = texture_scale;
     Outcome outcome;
     outcome.result = ColorizeScans({room.MakeScan()}, views, options, 2, &quiet);
     outcome.gain_rms_ev = GainError(room, numbers, outcome.result.exposure.gains);
@@ -194,6 +195,31 @@ TEST_F(CameraFaults, ResponseIsEstimatedAndUndone) {
   EXPECT_LT(without.psnr_db, plain - 3);
   EXPECT_GT(with.psnr_db, plain - 0.8);
   EXPECT_LT(with.gain_rms_ev, 0.02);
+}
+
+// Mean of the seen cells' sRGB bytes, red to blue.
+Eigen::Vector3d MeanColor(const ColorGrid& grid) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (size_t i = 0; i < grid.rgb.size(); ++i) {
+    if (grid.views[i] == 0) continue;
+    for (int k = 0; k < 3; ++k) sum[k] += grid.rgb[i][k];
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST_F(CameraFaults, AreUndoneInFinerTexturesToo) {
+  SimulatedRoomOptions room = Room();
+  room.response = "film";
+  ExposureOptions options;
+  options.response = "estimate";
+  options.vignetting = true;
+  const Outcome outcome = Colorize(room, options, {}, 2);
+  const ColoredScan& colored = outcome.result.scans[0];
+  EXPECT_EQ(colored.texture.num_columns, 2 * colored.samples.num_columns);
+  const Eigen::Vector3d difference = MeanColor(colored.texture) - MeanColor(colored.samples);
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1.5) << difference.transpose();
 }
 
 // A still scene, photo 0 of the room, taken with shorter and longer times by the film camera.
