@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <limits>
 
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -228,17 +229,39 @@ const std::array<float, 256>& LinearFromSrgbByte() {
   return table;
 }
 
+namespace {
+
+// Byte i starts where the value i - 0.5 lies. A table over the square root, where bytes are about
+// evenly spaced, says where to start looking: exact, and without a search.
+struct SrgbBytes {
+  static constexpr int kCells = 1024;
+  std::array<float, 257> lower_bounds{};
+  std::array<uint8_t, kCells + 1> first_of_cell{};
+
+  SrgbBytes() {
+    for (int i = 1; i < 256; ++i) {
+      lower_bounds[i] = static_cast<float>(LinearFromSrgb((i - 0.5) / 255));
+    }
+    lower_bounds[256] = std::numeric_limits<float>::infinity();
+    int byte = 0;
+    for (int cell = 0; cell <= kCells; ++cell) {
+      // A little lower than the cell: roots are rounded.
+      const double root = std::max(0.0, cell - 0.01) / kCells;
+      while (byte < 255 && lower_bounds[byte + 1] <= root * root) ++byte;
+      first_of_cell[cell] = static_cast<uint8_t>(byte);
+    }
+  }
+};
+
+}  // namespace
+
 uint8_t SrgbByteFromLinear(float linear) {
-  // Byte i starts where the value i - 0.5 lies: a search in 256 bounds is exact and cheap.
-  static const std::array<float, 256> lower_bounds = [] {
-    std::array<float, 256> bounds{};
-    bounds[0] = 0;
-    for (int i = 1; i < 256; ++i) bounds[i] = static_cast<float>(LinearFromSrgb((i - 0.5) / 255));
-    return bounds;
-  }();
+  static const SrgbBytes bytes;
   if (!(linear > 0)) return 0;
-  return static_cast<uint8_t>(std::upper_bound(lower_bounds.begin(), lower_bounds.end(), linear) -
-                              lower_bounds.begin() - 1);
+  if (linear >= 1) return 255;
+  int byte = bytes.first_of_cell[static_cast<int>(std::sqrt(linear) * SrgbBytes::kCells)];
+  while (linear >= bytes.lower_bounds[byte + 1]) ++byte;
+  return static_cast<uint8_t>(byte);
 }
 
 }  // namespace roomtex

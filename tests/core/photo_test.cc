@@ -296,5 +296,14 @@ TEST(Srgb, ClampsWhatIsOutside) {
   EXPECT_EQ(SrgbByteFromLinear(std::numeric_limits<float>::infinity()), 255);
 }
 
+TEST(Srgb, BytesAreTheNearestForEveryLight) {
+  for (int i = 0; i <= 2000000; ++i) {
+    const float linear = static_cast<float>(i) / 1900000.0f;
+    const double nearest = 255 * SrgbFromLinear(std::min(1.0f, linear));
+    ASSERT_LE(std::abs(SrgbByteFromLinear(linear) - nearest), 0.5 + 1e-3) << linear;
+  }
+  EXPECT_EQ(SrgbByteFromLinear(1e-30f), 0);
+}
+
 }  // namespace
 }  // namespace roomtex
