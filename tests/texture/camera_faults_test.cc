@@ -70,7 +70,8 @@ class CameraFaults : public testing::Test {
   // The photos of a room; their pixels are rendered once per camera.
   static const TempFolder& Photos(const SimulatedRoom& room) {
     const SimulatedRoomOptions& o = room.options();
-    const std::string key = o.response + std::to_string(o.vignetting + 10 * o.white_balance_ev);
+    const std::string key = o.response + std::to_string(o.vignetting + 10 * o.white_balance_ev) +
+                            std::to_string(o.field_of_view_deg);
     std::unique_ptr<TempFolder>& folder = captures_[key];
     if (!folder) {
       folder = std::make_unique<TempFolder>();
@@ -142,6 +143,16 @@ TEST_F(CameraFaults, OnePhotoAloneKeepsItsExposure) {
   const Outcome outcome = Colorize(Room(), {}, {4});
   EXPECT_GT(outcome.result.exposure.gains[0][1], 0.4f);
   EXPECT_LE(outcome.result.exposure.gains[0][1], 1.0f);
+}
+
+TEST_F(CameraFaults, PhotosThatOverlapNothingKeepTheirExif) {
+  SimulatedRoomOptions room = Room();
+  room.field_of_view_deg = 22;  // telephoto pictures of different walls
+  const Outcome outcome = Colorize(room, {}, {0, 3, 6, 9});
+  const ExposureSolution& exposure = outcome.result.exposure;
+  EXPECT_EQ(exposure.by_exif.size(), 3u);
+  EXPECT_TRUE(exposure.unconnected.empty());
+  EXPECT_LT(outcome.gain_rms_ev, 1e-3);
 }
 
 TEST_F(CameraFaults, WhiteBalanceThatVariesIsEvenedOut) {
