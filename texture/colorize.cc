@@ -118,12 +118,15 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
                       ColorizeResult* result) {
   const TexelPassOptions texels{options.occlusion, options.blend, options.detail,
                                 1e6 * options.texture_memory_mb};
+  // A mesh has no spacing of samples that says how fine a depth map must be.
+  TexelPassOptions on_mesh = texels;
+  on_mesh.occlusion.depth_map_size = std::max(texels.occlusion.depth_map_size, 2048);
   for (size_t s = 0; s < scans.size(); ++s) {
     MeshAtlas& atlas = result->scans[s].atlas;
     for (int page = 0; page < atlas.num_pages; ++page) {
       const AtlasTexels source(scans[s].points, result->scans[s].triangles, atlas,
                                result->scans[s].samples.rgb, page);
-      atlas.pages.push_back(ColorizeTexels(source, photos, result->exposure.gains, texels,
+      atlas.pages.push_back(ColorizeTexels(source, photos, result->exposure.gains, on_mesh,
                                            num_threads, input, progress));
       FinishPage(source, &atlas.pages.back(), &atlas.num_texels, &atlas.num_seen);
     }

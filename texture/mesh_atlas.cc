@@ -16,6 +16,7 @@ namespace {
 
 // Texels around a chart, and the grid that charts begin on: no mixing in the first three mipmaps.
 constexpr int kGutter = 8;
+constexpr double kMostGutters = 3;  // texels with gutters, of those allowed without
 constexpr double kWorthTexels = 8;  // from vertex to vertex, in mode "auto"
 
 int RoundUp(double length) {
@@ -253,6 +254,7 @@ MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
   const int room = options.max_page_size - 3 * kGutter;
   ChartOptions chart_options;
   chart_options.max_extent = room * texel / std::sqrt(2.0);  // a chart may lie askew in its box
+  chart_options.smooth_below = kWorthTexels * texel;
   std::vector<FlatChart> flat;
   MeshCharts charts = MakeFlatCharts(points, triangles, chart_options, texel, &flat);
   std::vector<std::array<int, 2>> sizes;
@@ -267,6 +269,7 @@ MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
     total += static_cast<double>(sizes.back()[0]) * sizes.back()[1];
     widest = std::max({widest, sizes.back()[0], sizes.back()[1]});
   }
+  if (total > kMostGutters * max_texels) return atlas;
   atlas.page_size = ChoosePageSize(total, widest, options.max_page_size);
   const Packing packing = PackRectangles(sizes, atlas.page_size);
   atlas.texel_size = texel;

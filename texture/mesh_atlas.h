@@ -62,7 +62,8 @@ SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
 // What a pixel of the nearest photo that looks at a probe covers there, metres: median. 0 = none.
 double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>& photos);
 
-// Charts laid out on pages, at most max_texels in all; empty if the options or the mesh want none.
+// Charts laid out on pages, at most max_texels in all (three times that with the gutters around
+// them); empty if the options or the mesh want none, or if it falls into too many charts.
 // A triangle that would not fit on a page gets larger texels than the others.
 MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
                       const std::vector<Triangle>& triangles, double pixel_on_surface,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include <Eigen/Geometry>
 
@@ -44,6 +45,27 @@ std::vector<std::array<int, 3>> FindNeighbours(const std::vector<Triangle>& tria
   return neighbours;
 }
 
+// Replaces the normals of small triangles by the mean over their surroundings.
+void SmoothNormals(const std::vector<std::array<int, 3>>& neighbours,
+                   const std::vector<double>& areas, double smooth_below,
+                   std::vector<Eigen::Vector3d>* normals) {
+  constexpr int kRings = 12;
+  const double small = 0.5 * smooth_below * smooth_below;  // half a square
+  if (!(small > 0)) return;
+  std::vector<Eigen::Vector3d> next = *normals;
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (size_t t = 0; t < areas.size(); ++t) {
+      if (!(areas[t] > 0) || areas[t] >= small) continue;
+      Eigen::Vector3d sum = (*normals)[t];
+      for (const int other : neighbours[t]) {
+        if (other >= 0 && areas[other] < small) sum += (*normals)[other];
+      }
+      if (sum.norm() > 1e-6) next[t] = sum.normalized();
+    }
+    normals->swap(next);
+  }
+}
+
 }  // namespace
 
 MeshCharts GrowCharts(const std::vector<Eigen::Vector3d>& points,
@@ -66,6 +88,7 @@ MeshCharts GrowCharts(const std::vector<Eigen::Vector3d>& points,
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return areas[a] > areas[b]; });
   const std::vector<std::array<int, 3>> neighbours = FindNeighbours(triangles);
+  SmoothNormals(neighbours, areas, options.smooth_below, &normals);
 
   MeshCharts charts;
   charts.chart_of.assign(count, -1);

@@ -411,6 +411,13 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
       ColorizeScans(scans, list.photos, colorize, context.options.num_threads, &context.progress);
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
+  for (size_t i = 0; i < scans.size(); ++i) {
+    if (scans[i].organised || colorize.atlas.mode != "1" || !result.scans[i].atlas.empty())
+      continue;
+    context.Warn(scans[i].path +
+                 " got no atlas: no photo looks at it, or it falls into too many small charts. "
+                 "Decimate or smooth the mesh.");
+  }
   if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
     result.exposure.tones[0]->response.Write(options.output_path + "/response.txt");
   }

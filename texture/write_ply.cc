@@ -1,6 +1,8 @@
 #include "texture/write_ply.h"
 
 #include <cstring>
+#include <sstream>
+#include <utility>
 
 #include "core/output_file.h"
 
@@ -43,6 +45,18 @@ bool NeedsDouble(const std::vector<Scan>& scans) {
   return false;
 }
 
+// What the importers' reader wants to know of a mesh (importers/ply.h).
+std::string CommentsOf(const std::vector<Scan>& scans) {
+  if (scans.empty()) return "";
+  std::ostringstream comments;
+  comments.precision(17);
+  for (const auto& [name, v] :
+       {std::pair{"up", scans[0].up}, std::pair{"station", scans[0].Station()}}) {
+    comments << "comment roomtex " << name << ' ' << v[0] << ' ' << v[1] << ' ' << v[2] << '\n';
+  }
+  return comments.str();
+}
+
 }  // namespace
 
 void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
@@ -57,8 +71,8 @@ void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredSc
   OutputFile file(path);
   file.stream() << "ply\nformat binary_little_endian 1.0\ncomment roomtex-texture: scan frame, "
                    "metres; views = photos that see the vertex\n"
-                << "element vertex " << num_vertices << "\nproperty " << type << " x\nproperty "
-                << type << " y\nproperty " << type << " z\nproperty uchar red\n"
+                << CommentsOf(scans) << "element vertex " << num_vertices << "\nproperty " << type
+                << " x\nproperty " << type << " y\nproperty " << type << " z\nproperty uchar red\n"
                 << "property uchar green\nproperty uchar blue\nproperty uchar views\n"
                 << "element face " << num_faces
                 << "\nproperty list uchar int vertex_indices\nend_header\n";

@@ -91,6 +91,45 @@ TEST(GrowCharts, KeepsToTheLargestExtent) {
   }
 }
 
+// A wall of 50 x 50 quads of 4 mm with the noise of a scanner: its triangles point anywhere.
+Scan NoisyWall() {
+  Scan wall = MeshOf({}, {});
+  unsigned state = 3;
+  for (int i = 0; i < 51 * 51; ++i) {
+    state = state * 1664525u + 1013904223u;
+    const double noise = 0.006 * (static_cast<double>(state >> 8) / (1 << 24) - 0.5);
+    wall.points.emplace_back(0.004 * (i % 51), 0.004 * (i / 51), noise);
+  }
+  for (int row = 0; row < 50; ++row) {
+    for (int column = 0; column < 50; ++column) {
+      const int a = row * 51 + column, b = a + 1, c = a + 51, d = a + 52;
+      wall.triangles.push_back({a, b, c});
+      wall.triangles.push_back({b, d, c});
+    }
+  }
+  return wall;
+}
+
+TEST(GrowCharts, NoiseDoesNotTearAWallApart) {
+  const Scan wall = NoisyWall();
+  EXPECT_GT(GrowCharts(wall.points, wall.triangles, {}).normals.size(), 100u);
+  ChartOptions options;
+  options.smooth_below = 0.016;
+  EXPECT_LE(GrowCharts(wall.points, wall.triangles, options).normals.size(), 3u);
+  // Large triangles are left as they are.
+  const Scan box = Box();
+  EXPECT_EQ(GrowCharts(box.points, box.triangles, options).normals.size(), 6u);
+}
+
+TEST(LayOutAtlas, GivesUpWhereGuttersWouldFillThePages) {
+  const Scan box = Box();
+  AtlasOptions options;
+  options.mode = "1";
+  options.texel_size = 0.1;  // 2200 texels, six charts with 8 texels around
+  EXPECT_TRUE(LayOutAtlas(box.points, box.triangles, 0, 2200, options).empty());
+  EXPECT_FALSE(LayOutAtlas(box.points, box.triangles, 0, 22000, options).empty());
+}
+
 TEST(GrowCharts, SurvivesAnyTriangles) {
   Scan mesh = Box();
   mesh.points.emplace_back(1, 1, 1);

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "importers/obj.h"
+#include "importers/ply.h"
 #include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/two_walls.h"
@@ -81,6 +82,17 @@ TEST(WriteColoredPly, ConcatenatesScansInGridOrder) {
             std::string::npos);
   const size_t header = bytes.find("end_header\n") + 11;
   EXPECT_EQ(bytes.size(), header + ply.points.size() * 16 + 2 * colored.triangles.size() * 13);
+}
+
+TEST(WriteColoredPly, KeepsTheUpAxisForTheReader) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  scan.up = Eigen::Vector3d(0, 0.6, 0.8);
+  scan.scan_from_station.translation = Eigen::Vector3d(0.1, 0.2, 0.3);
+  WriteColoredPly({scan}, {ColorByCell(scan)}, folder / "m.ply");
+  const Scan again = ReadPly(folder / "m.ply", {});
+  EXPECT_LT((again.up - scan.up).norm(), 1e-12);
+  EXPECT_LT((again.Station() - scan.Station()).norm(), 1e-12);
 }
 
 TEST(WriteColoredPly, KeepsMillimetresOfGeoreferencedScans) {
