@@ -70,10 +70,12 @@ else
   textured=$out/textured
   mkdir -p "$out"
   "$bin/roomtex-texture" --input_path "$model" --image_path "$images" --scan_path "$scan" \
-    --output_path "$textured" --Texture.scale 1 "${color_options[@]}" >/dev/null
+    --output_path "$textured" "${color_options[@]}" >/dev/null
 fi
 [ -n "$model" ] || { echo "render: give --model, the aligned COLMAP model" >&2; exit 2; }
 beside=()
 [ -n "$images" ] && beside=(--image_path "$images")
-exec "$bin/roomtex-render" --ply_path "$textured/model.ply" --input_path "$model" "${beside[@]}" \
+mesh=(--ply_path "$textured/model.ply")
+[ -e "$textured/model.glb" ] && mesh=(--glb_path "$textured/model.glb")
+exec "$bin/roomtex-render" "${mesh[@]}" --input_path "$model" "${beside[@]}" \
   --folder_path "$out" "${render_options[@]}"

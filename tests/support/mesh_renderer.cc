@@ -14,6 +14,19 @@
 namespace roomtex {
 namespace {
 
+// Linear between the four texels around.
+cv::Vec3f TexelAt(const cv::Mat& texture, const Eigen::Vector2d& uv) {
+  const double x = std::clamp(uv.x() * texture.cols - 0.5, 0.0, texture.cols - 1.0);
+  const double y = std::clamp(uv.y() * texture.rows - 0.5, 0.0, texture.rows - 1.0);
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const int right = std::min(column + 1, texture.cols - 1),
+            below = std::min(row + 1, texture.rows - 1);
+  const auto s = static_cast<float>(x - column), t = static_cast<float>(y - row);
+  const auto texel = [&](int r, int c) { return cv::Vec3f(texture.at<cv::Vec3b>(r, c)); };
+  return (1 - t) * ((1 - s) * texel(row, column) + s * texel(row, right)) +
+         t * ((1 - s) * texel(below, column) + s * texel(below, right));
+}
+
 cv::Vec3f ColorAt(const ColoredMesh& mesh, const RayHit& hit) {
   const Triangle& t = mesh.triangles[hit.triangle];
   const Eigen::Vector3d &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
@@ -24,6 +37,13 @@ cv::Vec3f ColorAt(const ColoredMesh& mesh, const RayHit& hit) {
     share[0] = normal.dot((c - b).cross(hit.point - b)) / area;
     share[1] = normal.dot((a - c).cross(hit.point - c)) / area;
     share[2] = 1 - share[0] - share[1];
+  }
+  const int texture =
+      mesh.texture_of_triangle.empty() ? -1 : mesh.texture_of_triangle[hit.triangle];
+  if (texture >= 0) {
+    Eigen::Vector2d uv = Eigen::Vector2d::Zero();
+    for (int i = 0; i < 3; ++i) uv += share[i] * mesh.uv[t[i]].cast<double>();
+    return TexelAt(mesh.textures[texture], uv);
   }
   cv::Vec3f bgr;
   for (int k = 0; k < 3; ++k) {
@@ -85,10 +105,17 @@ ColoredMesh CutBeyond(const ColoredMesh& mesh, const Eigen::Vector3d& axis, doub
   ColoredMesh cut;
   cut.points = mesh.points;
   cut.colors = mesh.colors;
-  for (const Triangle& t : mesh.triangles) {
+  cut.uv = mesh.uv;
+  cut.textures = mesh.textures;
+  for (size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
     const bool beyond = std::any_of(
         t.begin(), t.end(), [&](int corner) { return axis.dot(mesh.points[corner]) > limit; });
-    if (!beyond) cut.triangles.push_back(t);
+    if (beyond) continue;
+    cut.triangles.push_back(t);
+    if (!mesh.texture_of_triangle.empty()) {
+      cut.texture_of_triangle.push_back(mesh.texture_of_triangle[i]);
+    }
   }
   return cut;
 }

@@ -20,10 +20,18 @@ struct ColoredMesh {
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix<uint8_t, 3, 1>> colors;  // red, green, blue
   std::vector<Triangle> triangles;
+  // With texture images (8-bit BGR): a position per vertex, (0, 0) is the upper-left corner of the
+  // image, and the image per triangle, -1 = colours of the corners. Empty without.
+  std::vector<Eigen::Vector2f> uv;
+  std::vector<int> texture_of_triangle;
+  std::vector<cv::Mat> textures;
 };
 
 // A binary PLY as roomtex-texture writes it: vertices with colours, faces last. Throws InputError.
 ColoredMesh ReadColoredMesh(const std::string& path);
+
+// A model.glb of roomtex-texture. Throws InputError.
+ColoredMesh ReadTexturedMesh(const std::string& path);
 
 // Axis-aligned box that holds all but the outermost hundredth of the vertices on each side: what is
 // seen through a window does not count.

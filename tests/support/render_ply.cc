@@ -2,7 +2,7 @@
 //   one picture: from the pose of a photo of a COLMAP model, the photo beside it
 //   --folder_path: a set of them from photos' poses, from new viewpoints in the room and from
 //   outside, and a contact sheet of all
-// Triangles carry the colours of their corners.
+// A PLY's triangles carry the colours of their corners, a GLB's its texture images.
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ namespace roomtex {
 namespace {
 
 struct RenderOptions {
-  std::string ply_path, input_path, image_path, output_path, folder_path, image_name;
+  std::string ply_path, glb_path, input_path, image_path, output_path, folder_path, image_name;
   double turn_deg = 0, back = 0, up = 0;
   int width = 0;
   int num_photos = 4, num_ring = 4;
@@ -259,6 +259,9 @@ void RenderSet(const RenderOptions& options, const SparseModel& model, const Col
 }
 
 void RenderModel(const RenderOptions& options, const Command::Context& context) {
+  if (options.ply_path.empty() == options.glb_path.empty()) {
+    throw UsageError("give --ply_path or --glb_path");
+  }
   if (options.output_path.empty() == options.folder_path.empty()) {
     throw UsageError("give --output_path for one picture or --folder_path for a set of them");
   }
@@ -270,7 +273,8 @@ void RenderModel(const RenderOptions& options, const Command::Context& context) 
   if (model.images.empty()) {
     throw InputError(options.input_path, "", "holds no registered photo", "Give an aligned model");
   }
-  const ColoredMesh mesh = ReadColoredMesh(options.ply_path);
+  const ColoredMesh mesh = options.glb_path.empty() ? ReadColoredMesh(options.ply_path)
+                                                    : ReadTexturedMesh(options.glb_path);
   if (options.folder_path.empty()) {
     RenderOne(options, model, mesh, context);
   } else {
@@ -287,7 +291,10 @@ int main(int argc, char** argv) {
   Command command("roomtex-render", "Renders a coloured model.ply, to look at results.",
                   "roomtex-render --ply_path textured/model.ply --input_path aligned --image_path "
                   "images --folder_path pictures");
-  command.AddInputPath("ply_path", &o.ply_path, "coloured mesh");
+  command.AddInputPath("ply_path", &o.ply_path, "model.ply: the colours of the vertices",
+                       Command::Kind::kOptional);
+  command.AddInputPath("glb_path", &o.glb_path, "model.glb instead: with its texture images",
+                       Command::Kind::kOptional);
   command.AddInputPath("input_path", &o.input_path, "COLMAP model in the scan frame");
   command.AddOutputPath("folder_path", &o.folder_path,
                         "folder for a set of pictures and contact_sheet.png",
