@@ -199,7 +199,7 @@ LinearRgb RoomScene::Color(const SceneHit& hit, const Eigen::Vector3d& side_x,
   const Eigen::Vector2f& longer = x.squaredNorm() > y.squaredNorm() ? x : y;
   const float length = longer.norm();
   const float area = std::abs(x.x() * y.y() - x.y() * y.x());
-  const float width = std::max(length > 0 ? area / length : 0.0f, kTextureBandLimit);
+  const float width = std::max(length > 0 ? area / length : 0.0f, finest_detail_);
   const int taps = std::clamp(static_cast<int>(std::ceil(length / width - 0.25f)), 1, 6);
   const float footprint = std::max(width, length / static_cast<float>(taps));
   LinearRgb albedo = LinearRgb::Zero();

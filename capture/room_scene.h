@@ -2,6 +2,7 @@
 // The surfaces of the simulated room, their colour under its light and what a ray meets.
 // Frame: `room` (simulated_room.h).
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -87,6 +88,11 @@ class RoomScene {
                   double top_radius, double height, int sides, bool with_caps);
   void AddLight(const AreaLight& light) { lights_.push_back(light); }
 
+  // Colours are averaged over at least this width (metres), the photos' and the true ones alike.
+  void SetFinestDetail(double width) {
+    finest_detail_ = std::max(kTextureBandLimit, static_cast<float>(width));
+  }
+
   // Builds the ray caster and, if `shading`, the light on every patch. Call once, after the last
   // Add.
   void Finish(bool shading, int num_threads);
@@ -110,6 +116,7 @@ class RoomScene {
   struct Light;
   LinearRgb Illumination(const SceneHit& hit) const;
 
+  float finest_detail_ = kTextureBandLimit;
   std::vector<Surface> surfaces_;
   std::vector<Patch> patches_;
   std::vector<AreaLight> lights_;

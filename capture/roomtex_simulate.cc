@@ -19,6 +19,8 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddBool("furnished", &options->furnished, "table, shelf, sofa, pictures and so on");
   command->AddBool("bare_walls", &options->bare_walls,
                    "plain walls, floor and ceiling: nothing for features to hold on to");
+  command->AddDouble("finest_detail", &options->finest_detail,
+                     "metres: no surface has finer detail; larger = smoother pictures and prints");
   command->AddBool("shading", &options->shading,
                    "light from a lamp and the window instead of even light");
   command->AddInt("num_photos", &options->num_photos, "number of photos");

@@ -34,6 +34,7 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   require(within(width, 4.6, 20), "room_width must be 4.6 to 20 m: the furniture has to fit in");
   require(within(depth, 3.8, 20), "room_depth must be 3.8 to 20 m: the furniture has to fit in");
   require(within(height, 2.5, 6), "room_height must be 2.5 to 6 m");
+  require(within(finest_detail, 0, 0.1), "finest_detail must be 0 to 0.1 m");
   require(num_photos >= 1 && num_photos <= 1000, "num_photos must be 1 to 1000");
   require(photo_width >= 64 && photo_width <= 20000, "photo_width must be 64 to 20000 pixels");
   require(photo_height >= 64 && photo_height <= 20000, "photo_height must be 64 to 20000 pixels");
@@ -66,6 +67,7 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
 struct SimulatedRoom::Impl {
   explicit Impl(const SimulatedRoomOptions& given)
       : options(given), camera(MakeRoomCamera(given)), projection(camera) {
+    scene.SetFinestDetail(options.finest_detail);
     FurnishRoom(options, &scene);
     scene.Finish(options.shading, options.num_threads);
     cam_from_room = PlaceCameras(options, scene);

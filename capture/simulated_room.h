@@ -25,7 +25,8 @@ struct SimulatedRoomOptions {
   double width = 5.0, depth = 4.0, height = 2.7;  // metres
   bool furnished = true;                          // table, shelf, chairs, pictures ...
   bool bare_walls = false;  // plain walls, floor and ceiling: nothing for features to hold on to
-  bool shading = false;     // Lambertian shading under ceiling lamps instead of plain albedo
+  double finest_detail = 0.0015;  // metres: no surface has finer detail
+  bool shading = false;           // Lambertian shading under ceiling lamps instead of plain albedo
   // Photos.
   int num_photos = 30;
   int photo_width = 1936, photo_height = 1288;  // pixels

@@ -114,7 +114,7 @@ PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
 
 namespace {
 
-constexpr float kFits = 0.1f;   // agreement: at three times the distance `outlier`
+constexpr float kFits = 0.5f;   // agreement
 constexpr int kMostViews = 64;  // BlendOptions::Problems
 
 // The observations of one sample, brought to one exposure.
@@ -125,8 +125,8 @@ struct SampleViews {
   std::array<float, kMostViews> reliability;       // 1, less towards clipped colours
   std::array<float, kMostViews> weights;
 
-  // 1 for equal colours, 1/2 at the distance `outlier`. A clipped channel agrees with everything
-  // lighter.
+  // 1 for equal colours, 1/2 at the distance `outlier`, flat where noise and resolution differ and
+  // steep beyond. A clipped channel agrees with everything lighter.
   float Agreement(int i, int j, float outlier) const {
     const Eigen::Array3f step = (roots[j] - roots[i]).array();
     float square = 0;
@@ -134,7 +134,8 @@ struct SampleViews {
       if ((clipped[i][k] != 0 && step[k] > 0) || (clipped[j][k] != 0 && step[k] < 0)) continue;
       square += step[k] * step[k];
     }
-    return 1 / (1 + square / (outlier * outlier));
+    const float ratio = square / (outlier * outlier);
+    return 1 / (1 + ratio * ratio);
   }
 
   // The observation that most weight agrees with; of equals the heavier one.

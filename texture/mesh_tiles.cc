@@ -187,6 +187,50 @@ std::vector<Triangle> FindFringes(const Scan& scan, const ScanSurface& surface,
   return fringes;
 }
 
+// Where the neighbours of a sample are missing there is no quad: what ends there may reach one
+// spacing on, at the sample's range.
+void AddFringesAtHoles(const Scan& scan, const ScanSurface& surface,
+                       std::vector<Eigen::Vector3d>* points, std::vector<Triangle>* fringes) {
+  const auto measured = [&scan](int column, int row) {
+    return column >= 0 && row >= 0 && column < scan.num_columns && row < scan.num_rows &&
+           !scan.IsMissing(scan.Index(column, row));
+  };
+  for (int row = 0; row < scan.num_rows; ++row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      if (!measured(column, row)) continue;
+      const Eigen::Vector3d& point = surface.points[scan.Index(column, row)];
+      const Eigen::Vector3d ray = point - scan.Station();
+      // The step from the neighbour to this sample, as it would be at the same range.
+      const auto step = [&](int from_column, int from_row) -> Eigen::Vector3d {
+        const Eigen::Vector3d from =
+            surface.points[scan.Index(from_column, from_row)] - scan.Station();
+        return ray - from * (ray.norm() / from.norm());
+      };
+      constexpr int kAround[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+      for (const auto& [dc, dr] : kAround) {
+        const int c = column + dc, r = row + dr;
+        if (c < 0 || r < 0 || c >= scan.num_columns || r >= scan.num_rows || measured(c, r) ||
+            !measured(column - dc, row - dr)) {
+          continue;
+        }
+        const int side = measured(column + dr, row + dc) ? 1 : -1;
+        if (!measured(column + side * dr, row + side * dc)) continue;
+        const Eigen::Vector3d on = step(column - dc, row - dr);
+        // As wide on either side: at a corner it reaches both ways.
+        const Eigen::Vector3d beside = step(column + side * dr, row + side * dc);
+        const int first = static_cast<int>(points->size());
+        for (const Eigen::Vector3d& corner :
+             {Eigen::Vector3d(point - beside), Eigen::Vector3d(point + beside),
+              Eigen::Vector3d(point + beside + on), Eigen::Vector3d(point - beside + on)}) {
+          points->push_back(corner);
+        }
+        fringes->push_back({first, first + 1, first + 2});
+        fringes->push_back({first, first + 2, first + 3});
+      }
+    }
+  }
+}
+
 // Samples that the scanner missed here and there must not be peepholes: gaps of up to kWidestGap
 // samples along a row or a column between samples at about the same range are filled for the
 // occluders only. Gives the triangles that touch a filled cell; `points` gets the filled places.
@@ -253,7 +297,8 @@ OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface) {
   if (!scan.organised) return tiles;
   tiles.shadows = TileTriangles(scan, true, surface.points, FindShadows(scan, surface));
   std::vector<Eigen::Vector3d> corners;
-  const std::vector<Triangle> fringes = FindFringes(scan, surface, &corners);
+  std::vector<Triangle> fringes = FindFringes(scan, surface, &corners);
+  AddFringesAtHoles(scan, surface, &corners, &fringes);
   tiles.fringes = TileTriangles(scan, false, corners, fringes);
   std::vector<Eigen::Vector3d> points = surface.points;
   const std::vector<Triangle> fillings = FillGaps(scan, &points);

@@ -161,7 +161,7 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
                      "Share of the sample spacing over which photo pixels are averaged. Larger = "
                      "smoother; 0 = the colour at the sample.");
   command->AddBool("Blend.detail", &o->blend.detail,
-                   "Put back the detail that blending loses, from the dominant photo.");
+                   "Put back the detail that blending loses, from the dominant photo (thesis).");
   command->AddDouble("Blend.detail_sigma", &o->detail.sigma,
                      "What counts as detail: Gaussian sigma in samples. Larger = coarser.");
   command->AddInt("Blend.detail_border", &o->detail.border,

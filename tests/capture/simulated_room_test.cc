@@ -365,5 +365,43 @@ TEST(SimulatedSparseModel, EveryPhotoSeesManyPointsAndOverlapsSeveralOthers) {
   }
 }
 
+TEST(SimulatedRoom, HasNoFinerDetailThanAskedFor) {
+  SimulatedRoomOptions options = SmallRoom();
+  // Mean step of the colour from sample to sample.
+  const auto roughness = [](const SimulatedRoom& room) {
+    const std::vector<Eigen::Vector3f> colors = room.TrueColors();
+    double sum = 0;
+    for (size_t i = 1; i < colors.size(); ++i) sum += (colors[i] - colors[i - 1]).norm();
+    return sum / static_cast<double>(colors.size());
+  };
+  const double fine = roughness(SimulatedRoom(options));
+  options.finest_detail = 0.05;
+  EXPECT_LT(roughness(SimulatedRoom(options)), 0.9 * fine);
+}
+
+TEST(SimulatedRoom, SightingsProjectTheSamplesThatNothingHides) {
+  const SimulatedRoom room(SmallRoom());
+  const Scan scan = room.MakeScan();
+  const TrueSamples samples = room.MakeTrueSamples();
+  const CameraProjection camera(room.camera());
+  const Rigid scan_from_room = room.ScanFromRoom();
+  int num_seen = 0;
+  const std::vector<Eigen::Vector2f> sightings = room.TrueSightings(samples, 1);
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    ASSERT_EQ(samples.points[i].x() == samples.points[i].x(), !scan.IsMissing(static_cast<int>(i)));
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    // Without noise: on the ray, within five standard deviations.
+    const Eigen::Vector3d point = scan_from_room * samples.points[i];
+    ASSERT_LT((point - scan.points[i]).norm(), 6 * room.options().range_noise);
+    ASSERT_LT(point.normalized().cross(scan.points[i].normalized()).norm(), 1e-6);
+    if (!(sightings[i].x() == sightings[i].x())) continue;
+    ++num_seen;
+    const auto position = camera.ImgFromCam(room.CamFromScan(1) * point);
+    ASSERT_TRUE(position.has_value());
+    ASSERT_LT((sightings[i].cast<double>() - *position).norm(), 1e-2);
+  }
+  EXPECT_GT(num_seen, 0.05 * static_cast<double>(scan.points.size()));
+}
+
 }  // namespace
 }  // namespace roomtex

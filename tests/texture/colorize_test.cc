@@ -37,10 +37,19 @@ class Colorize : public ::testing::Test {
     double mean = 0, largest = 0;
     int count = 0, red_on_wall = 0, red_on_seen_wall = 0;
   };
-  // Some photo really sees the point.
+  // Some photo really sees the point, and the surface around it for a pixel each way: what it mixes
+  // with the board's colour shows neither.
   bool IsSeen(const Eigen::Vector3d& point) const {
     return std::any_of(photos_.begin(), photos_.end(), [&](const PhotoView& photo) {
-      return (scene_.Hit(photo.Centre(), point - photo.Centre()) - point).norm() < 1e-6;
+      const Eigen::Vector3d ray = point - photo.Centre();
+      const double pixel = ray.norm() / photo.camera.MeanFocalLength();
+      for (const auto& [x, y] : {std::pair<int, int>(0, 0), {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}) {
+        const Eigen::Vector3d beside = point + pixel * Eigen::Vector3d(x, y, 0);
+        if ((scene_.Hit(photo.Centre(), beside - photo.Centre()) - beside).norm() > 1e-6) {
+          return false;
+        }
+      }
+      return true;
     });
   }
   Error Measure(const Scan& scan, const ColorGrid& grid) const {

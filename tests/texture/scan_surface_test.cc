@@ -57,6 +57,43 @@ TEST(ScanSurface, CanKeepTheMeasuredPoints) {
   for (size_t i = 0; i < scan.points.size(); ++i) ASSERT_EQ(surface.points[i], scan.points[i]);
 }
 
+TEST(ScanSurface, KeepsACornerSharpInSpiteOfNoise) {
+  // Two walls that meet in a vertical edge, seen from inside.
+  Scan scan;
+  scan.num_columns = scan.num_rows = 160;
+  const auto truth = [](const Eigen::Vector3d& d) -> Eigen::Vector3d {
+    const double left = 3 / (-d.z() - d.x()), right = 3 / (-d.z() + d.x());
+    return d * std::min(left > 0 ? left : 1e9, right > 0 ? right : 1e9);
+  };
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(0, 0.002);
+  std::vector<Eigen::Vector3d> exact;
+  for (int r = 0; r < 160; ++r) {
+    for (int c = 0; c < 160; ++c) {
+      const double azimuth = 0.003 * (c - 80), elevation = 0.003 * (80 - r);
+      const Eigen::Vector3d d(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+                              -std::cos(azimuth) * std::cos(elevation));
+      exact.push_back(truth(d));
+      scan.points.push_back(exact.back() + noise(random) * d);
+      scan.intensity.push_back(1);
+    }
+  }
+  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  double all = 0, at_corner = 0;
+  int num_at_corner = 0;
+  for (int r = 0; r < 160; ++r) {
+    for (int c = 0; c < 160; ++c) {
+      const double error = (surface.points[scan.Index(c, r)] - exact[scan.Index(c, r)]).norm();
+      all += error * error / (160 * 160);
+      if (std::abs(c - 80) > 4) continue;
+      at_corner += error * error;
+      ++num_at_corner;
+    }
+  }
+  EXPECT_LT(std::sqrt(all), 0.0006);
+  EXPECT_LT(std::sqrt(at_corner / num_at_corner), 0.0012);
+}
+
 TEST(GridLinks, EndAtDepthEdges) {
   const TwoWalls scene;
   const Scan scan = scene.MakeScan(100, 100);
@@ -97,6 +134,39 @@ TEST(OccluderTiles, HoldEveryTriangleAndASampleTileEverySampleOnce) {
     for (int i : tile.index) ++count[i];
   }
   for (int c : count) ASSERT_EQ(c, 1);
+}
+
+TEST(OccluderTiles, FringesReachOneSpacingBeyondTheLastSample) {
+  const TwoWalls scene;
+  Scan scan = scene.MakeScan(130, 130);
+  const auto reach = [&scan]() {  // of the fringes at the board's range
+    const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+    double x = 0, y = 0;
+    for (const MeshTile& tile : MakeOccluderTiles(scan, surface).fringes) {
+      for (int i = 0; i < tile.points.size(); ++i) {
+        const Eigen::Vector3d p =
+            tile.points.origin +
+            Eigen::Vector3d(tile.points.x[i], tile.points.y[i], tile.points.z[i]);
+        EXPECT_GT(p.z(), -2.5);
+        x = std::max(x, p.x());
+        y = std::max(y, p.y());
+      }
+    }
+    return Eigen::Vector2d(x, y);
+  };
+  double last = 0;
+  for (const Eigen::Vector3d& p : scan.points) {
+    if (p.z() > -3) last = std::max(last, p.x());
+  }
+  const double spacing = 2 * 1.0 / 129;
+  EXPECT_GT(reach().x(), scene.board_half - 0.1 * spacing);
+  EXPECT_NEAR(reach().x(), last + spacing, 0.3 * spacing);
+  EXPECT_GT(reach().y(), scene.board_half - 0.1 * spacing);
+  // The same when nothing was measured behind.
+  for (Eigen::Vector3d& p : scan.points) {
+    if (p.z() < -3) p = Scan::MissingPoint();
+  }
+  EXPECT_NEAR(reach().x(), last + spacing, 0.3 * spacing);
 }
 
 }  // namespace
