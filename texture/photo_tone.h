@@ -45,11 +45,12 @@ class ResponseCurve {
 // exp(a1 r^2 + a2 r^4 + a3 r^6), r = 1 at half the photo's diagonal from the principal point.
 struct Vignetting {
   Eigen::Vector3d a = Eigen::Vector3d::Zero();
-  double largest_radius2 = 1;  // it stays as it is beyond
+  double largest_radius2 = 1;  // it goes on straight (in r^2) beyond
 
   double LogFactor(double radius2) const {
     const double r2 = radius2 < largest_radius2 ? radius2 : largest_radius2;
-    return r2 * (a[0] + r2 * (a[1] + r2 * a[2]));
+    const double slope = a[0] + r2 * (2 * a[1] + r2 * 3 * a[2]);
+    return r2 * (a[0] + r2 * (a[1] + r2 * a[2])) + (slope > 0 ? slope * (radius2 - r2) : 0);
   }
   bool is_none() const { return a.isZero(); }
 };

@@ -175,7 +175,7 @@ void AddLensTerms(const Unknowns& unknowns, int lens, double radius2, Row* row) 
   }
 }
 
-// Radius^2 up to which there are views: 98 % of them lie within.
+// Radius^2 up to which there are views: all but half a percent of them lie within.
 double LargestRadius2(const ExposureSamples& samples, const std::vector<int>& lens, int number) {
   std::vector<float> radii;
   for (const ExposureView& view : samples.views) {
@@ -183,7 +183,7 @@ double LargestRadius2(const ExposureSamples& samples, const std::vector<int>& le
   }
   constexpr size_t kFewest = 2000;
   if (radii.size() < kFewest) return 0;
-  const auto high = radii.begin() + static_cast<long>(radii.size() * 98 / 100);
+  const auto high = radii.begin() + static_cast<long>(radii.size() * 199 / 200);
   std::nth_element(radii.begin(), high, radii.end());
   return std::min(*high, 1.0f);
 }

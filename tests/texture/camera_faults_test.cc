@@ -192,6 +192,7 @@ TEST_F(CameraFaults, VignettingIsUndone) {
   ASSERT_TRUE(with.result.exposure.tones[0]);
   EXPECT_NEAR(std::exp(-with.result.exposure.tones[0]->vignetting.LogFactor(0.8)),
               1 - 0.5 * (0.6 * 0.8 + 0.4 * 0.64), 0.02);
+  EXPECT_NEAR(std::exp(-with.result.exposure.tones[0]->vignetting.LogFactor(1)), 0.5, 0.04);
 }
 
 TEST_F(CameraFaults, ResponseIsEstimatedAndUndone) {
