@@ -46,6 +46,8 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddChoice("wrong_exif", &options->wrong_exif, {"none", "one", "all"},
                      "one: the middle photo notes a quarter of its exposure time; all: every photo "
                      "notes the same");
+  command->AddDouble("strangers", &options->strangers,
+                     "share of the photos in which somebody stands who is not in the scan");
   command->AddInt("num_stations", &options->num_stations, "number of scans");
   command->AddInt("scan_columns", &options->scan_columns, "samples over the full turn");
   command->AddInt("scan_rows", &options->scan_rows, "samples from -60 to +75 degrees of elevation");

@@ -14,6 +14,7 @@
 #include "capture/room_scene.h"
 #include "capture/simulated_observations.h"
 #include "capture/simulated_scan.h"
+#include "capture/stranger.h"
 #include "core/error.h"
 #include "core/parallel.h"
 
@@ -52,6 +53,7 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   require(wrong_exif == "none" || wrong_exif == "one" || wrong_exif == "all",
           "wrong_exif must be none, one or all");
   require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
+  require(within(strangers, 0, 1), "strangers must be 0 to 1 (a share of the photos)");
   require(num_stations >= 1 && num_stations <= 8, "num_stations must be 1 to 8");
   require(scan_columns >= 16 && scan_columns <= 20000, "scan_columns must be 16 to 20000");
   require(scan_rows >= 16 && scan_rows <= 20000, "scan_rows must be 16 to 20000");
@@ -143,8 +145,18 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   settings.white_balance = WhiteBalance(photo);
   settings.noise = impl_->options.photo_noise;
   settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
-  return impl_->Renderer().Render(impl_->cam_from_room.at(photo), settings,
-                                  impl_->options.num_threads);
+  cv::Mat image = impl_->Renderer().Render(impl_->cam_from_room.at(photo), settings,
+                                           impl_->options.num_threads);
+  if (HasStranger(photo)) {
+    DrawStranger(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 521, photo), &image);
+  }
+  return image;
+}
+
+// Spread evenly over the photos.
+bool SimulatedRoom::HasStranger(int photo) const {
+  const double share = impl_->options.strangers;
+  return std::floor((photo + 1) * share) > std::floor(photo * share);
 }
 
 Scan SimulatedRoom::MakeScan(int station) const {

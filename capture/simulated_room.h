@@ -43,6 +43,7 @@ struct SimulatedRoomOptions {
   // "one": the middle photo's EXIF notes a quarter of the time; "all": every photo's notes the same
   // time.
   std::string wrong_exif = "none";
+  double strangers = 0;  // share of the photos in which somebody stands who is not in the scan
   // Scans.
   int num_stations = 1;
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
@@ -91,6 +92,7 @@ class SimulatedRoom {
   Eigen::Vector3f WhiteBalance(int photo) const;  // factors on red, green, blue
   // 8-bit BGR, sRGB-encoded, with distortion, exposure, blur and noise.
   cv::Mat RenderPhoto(int photo) const;
+  bool HasStranger(int photo) const;
 
   // station >= 0. The scan in the frame of station 0 (scan_from_station says where station k
   // stood). Intensity is an infrared reflectance, not the photos' brightness; integers 0..4095.

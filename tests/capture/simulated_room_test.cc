@@ -403,5 +403,25 @@ TEST(SimulatedRoom, SightingsProjectTheSamplesThatNothingHides) {
   EXPECT_GT(num_seen, 0.05 * static_cast<double>(scan.points.size()));
 }
 
+TEST(SimulatedRoom, StrangersStandInTheGivenShareOfThePhotos) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 4;
+  const SimulatedRoom empty(options);
+  options.strangers = 0.5;
+  const SimulatedRoom visited(options);
+  int num_strangers = 0;
+  for (int photo = 0; photo < 4; ++photo) {
+    cv::Mat difference;
+    cv::absdiff(empty.RenderPhoto(photo), visited.RenderPhoto(photo), difference);
+    const double changed =
+        cv::countNonZero(difference.reshape(1) > 8) / static_cast<double>(3 * difference.total());
+    num_strangers += visited.HasStranger(photo);
+    EXPECT_EQ(changed > 0, visited.HasStranger(photo));
+    EXPECT_LT(changed, 0.25);
+    EXPECT_GE(changed, visited.HasStranger(photo) ? 0.03 : 0.0);
+  }
+  EXPECT_EQ(num_strangers, 2);
+}
+
 }  // namespace
 }  // namespace roomtex
