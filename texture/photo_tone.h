@@ -2,6 +2,7 @@
 // How the bytes of a photo become linear light: response curve and vignetting. A photo without a
 // tone is sRGB, without vignetting.
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -45,12 +46,14 @@ class ResponseCurve {
 // exp(a1 r^2 + a2 r^4 + a3 r^6), r = 1 at half the photo's diagonal from the principal point.
 struct Vignetting {
   Eigen::Vector3d a = Eigen::Vector3d::Zero();
-  double largest_radius2 = 1;  // it goes on straight (in r^2) beyond
+  // It goes on straight (in r^2) beyond, to twice what it is there at most.
+  double largest_radius2 = 1;
 
   double LogFactor(double radius2) const {
     const double r2 = radius2 < largest_radius2 ? radius2 : largest_radius2;
     const double slope = a[0] + r2 * (2 * a[1] + r2 * 3 * a[2]);
-    return r2 * (a[0] + r2 * (a[1] + r2 * a[2])) + (slope > 0 ? slope * (radius2 - r2) : 0);
+    const double value = r2 * (a[0] + r2 * (a[1] + r2 * a[2]));
+    return value + std::clamp(slope * (radius2 - r2), 0.0, std::max(value, 0.0));
   }
   bool is_none() const { return a.isZero(); }
 };
