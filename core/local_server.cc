@@ -1,0 +1,512 @@
+#include "core/local_server.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include <httplib.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <pwd.h>
+#include <sys/eventfd.h>
+#include <sys/random.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/local_server_address.h"
+#include "core/local_server_connection.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kMaxConnections = 128;  // open at a time
+constexpr int kMaxRequests = 1000;    // of one connection
+constexpr int kMaxJsonDepth = 64;     // deeper nesting would use up the stack
+constexpr size_t kBlockBytes = size_t{1} << 16;
+
+std::string MakeToken() {
+  std::array<unsigned char, 20> bytes;
+  size_t size = 0;
+  while (size < bytes.size()) {
+    const ssize_t got = getrandom(bytes.data() + size, bytes.size() - size, 0);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) throw std::runtime_error("the operating system gives no random numbers");
+    size += static_cast<size_t>(got);
+  }
+  std::string token;
+  for (const unsigned char byte : bytes) {
+    token += "0123456789abcdef"[byte >> 4];
+    token += "0123456789abcdef"[byte & 15];
+  }
+  return token;
+}
+
+// The time does not tell how much is right.
+bool EqualSecrets(const std::string& a, const std::string& b) {
+  if (a.size() != b.size()) return false;
+  unsigned difference = 0;
+  for (size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
+  return difference == 0;
+}
+
+// The descriptor that a signal makes readable; -1 = none.
+std::atomic<int> signalled_fd{-1};
+
+extern "C" void StopOnSignal(int) {
+  const int saved = errno;
+  const uint64_t one = 1;
+  const int fd = signalled_fd;
+  if (fd >= 0 && write(fd, &one, sizeof one) < 0) errno = saved;  // full means stopping already
+  errno = saved;
+}
+
+}  // namespace
+
+struct LocalServer::Impl : httplib::Server {
+  // Fills in the answer to a request that may ask.
+  using Route = std::function<void(const httplib::Request&, httplib::Response&)>;
+  using Method = std::string;
+
+  explicit Impl(const LocalServerOptions& server_options);
+  ~Impl() override;
+
+  void AddRoute(const Method& method, const std::string& path, Route route);
+  void AddBodyRoute(const Method& method, const std::string& path,
+                    std::function<Json(const Json&)> handler);
+  void Bind();
+  void AllowHosts();
+  void CatchSignals();
+  void Accept();
+  void Serve(int socket);
+  void Respond(const httplib::Request& request, httplib::Response& response);
+  // Why the request may not be answered, or "".
+  std::string Objection(const httplib::Request& request) const;
+  bool IsAllowedHost(const std::string& host) const;
+  void RequestStop();
+  void Join();
+
+  const LocalServerOptions options;
+  const std::string token = MakeToken();
+  int listen_fd = -1, stop_fd = -1, port = 0;
+  LocalAddress address;
+  std::vector<std::string> hosts;                         // "name:port", lower case
+  std::map<std::string, std::map<Method, Route>> routes;  // by path
+  std::unique_ptr<httplib::ThreadPool> pool;
+  std::thread acceptor;
+  std::atomic<int> num_connections{0};
+  bool catches_signals = false;
+  struct sigaction old_interrupt {
+  }, old_terminate{};
+};
+
+namespace {
+
+void SetJson(httplib::Response& response, int status, const std::string& text) {
+  response.status = status;
+  response.set_content(text, "application/json");
+}
+
+void SetError(httplib::Response& response, int status, const std::string& sentence) {
+  SetJson(response, status, ErrorText(sentence));
+}
+
+void SetContent(const httplib::Request& request, const LocalServer::Content& content,
+                httplib::Response& response) {
+  const std::string etag = "\"" + content.etag + "\"";
+  response.headers.erase("Cache-Control");
+  response.set_header("Cache-Control", content.immutable      ? "private, max-age=86400, immutable"
+                                       : content.etag.empty() ? "no-store"
+                                                              : "private, no-cache");
+  if (!content.etag.empty()) {
+    response.set_header("ETag", etag);
+    if (request.get_header_value("If-None-Match").find(etag) != std::string::npos) {
+      response.status = 304;
+      return;
+    }
+  }
+  response.status = 200;
+  if (!content.bytes || content.bytes->empty()) {
+    response.set_content("", content.type);
+    return;
+  }
+  // Not copied: a GLB has hundreds of megabytes.
+  response.set_content_provider(
+      content.bytes->size(), content.type,
+      [bytes = content.bytes](size_t offset, size_t length, httplib::DataSink& sink) {
+        return sink.write(bytes->data() + offset, std::min(length, kBlockBytes));
+      });
+}
+
+// Calls a handler; whatever it throws becomes an answer.
+void Guarded(httplib::Response& response, const std::function<void()>& handler) {
+  try {
+    handler();
+  } catch (const InputError& error) {
+    SetError(response, 422, error.what());
+  } catch (const UsageError& error) {
+    SetError(response, 422, error.what());
+  } catch (const std::bad_alloc&) {
+    SetError(response, 500, "out of memory");
+  } catch (const std::exception& error) {
+    SetError(response, 500, std::string("internal error: ") + error.what());
+  } catch (...) {
+    SetError(response, 500, "internal error of an unknown kind");
+  }
+}
+
+LocalServer::Query QueryOf(const httplib::Request& request) {
+  LocalServer::Query query;
+  for (const auto& [name, value] : request.params) query.emplace(name, value);
+  return query;
+}
+
+// None if the text is no JSON or nested too deeply.
+std::optional<Json> ParseBody(const std::string& text) {
+  if (text.empty()) return Json::object();
+  bool too_deep = false;
+  const auto look = [&](int depth, Json::parse_event_t, Json&) {
+    if (depth > kMaxJsonDepth) too_deep = true;
+    return !too_deep;  // what is too deep is dropped
+  };
+  Json json = Json::parse(text, look, false);
+  if (too_deep || json.is_discarded()) return std::nullopt;
+  return json;
+}
+
+std::string Dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+LocalServer::Impl::Impl(const LocalServerOptions& server_options) : options(server_options) {
+  ThrowIfProblems(options.Problems());
+  stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (stop_fd < 0) throw std::runtime_error(std::string("eventfd: ") + std::strerror(errno));
+  set_default_headers(SafetyHeaders());
+  set_keep_alive_max_count(kMaxRequests);
+  set_keep_alive_timeout(static_cast<time_t>(std::max(1.0, options.idle_seconds)));
+  // Everything is answered here; httplib's own routing is never reached.
+  set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
+    Respond(request, response);
+    return HandlerResponse::Handled;
+  });
+}
+
+LocalServer::Impl::~Impl() {
+  RequestStop();
+  Join();
+  close(stop_fd);
+}
+
+void LocalServer::Impl::AddRoute(const Method& method, const std::string& path, Route route) {
+  if (path.empty() || path[0] != '/') throw std::logic_error("a path begins with /: " + path);
+  if (acceptor.joinable()) throw std::logic_error("the server runs already: " + path);
+  if (!routes[path].emplace(method, std::move(route)).second) {
+    throw std::logic_error("the path is added twice: " + method + " " + path);
+  }
+}
+
+void LocalServer::Impl::AddBodyRoute(const Method& method, const std::string& path,
+                                     std::function<Json(const Json&)> handler) {
+  AddRoute(method, path, [handler](const httplib::Request& request, httplib::Response& response) {
+    const bool is_json =
+        LowerCase(request.get_header_value("Content-Type")).rfind("application/json", 0) == 0;
+    if (!is_json && !request.body.empty()) {
+      return SetError(response, 415, "The request must be application/json.");
+    }
+    const std::optional<Json> body = ParseBody(request.body);
+    if (!body) return SetError(response, 400, "The request is not JSON that can be read.");
+    SetJson(response, 200, Dump(handler(*body)));
+  });
+}
+
+void LocalServer::Impl::Bind() {
+  address = ResolveHost(options.host).value();
+  address.set_port(options.port);
+  listen_fd = ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  // SO_REUSEPORT, httplib's default, would let two servers share a port.
+  const int yes = 1;
+  setsockopt(listen_fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (listen_fd < 0 || bind(listen_fd, address.get(), address.size) != 0 ||
+      ::listen(listen_fd, 64) != 0) {
+    const int error = errno;
+    if (listen_fd >= 0) close(std::exchange(listen_fd, -1));
+    const std::string port_text = "--port " + std::to_string(options.port) + ": ";
+    if (error == EADDRINUSE) {
+      throw UsageError(port_text + "the port is taken on " + options.host +
+                       ", perhaps by another roomtex; give another one, or 0 for any free one");
+    }
+    if (error == EACCES) {
+      throw UsageError(port_text + "this user may not use the port; give one above 1023, or 0");
+    }
+    throw UsageError("--host " + options.host + ", " + port_text + std::strerror(error));
+  }
+  LocalAddress bound;
+  bound.size = sizeof bound.storage;
+  getsockname(listen_fd, bound.get(), &bound.size);
+  port = bound.port();
+  svr_sock_ = listen_fd;  // httplib looks here whether it is to go on sending
+}
+
+void LocalServer::Impl::AllowHosts() {
+  std::vector<std::string> names = options.allowed_hosts;
+  names.insert(names.end(), {"127.0.0.1", "localhost", "[::1]", address.Text()});
+  if (LowerCase(options.host).find_first_not_of("0123456789abcdef:.") != std::string::npos) {
+    names.push_back(options.host);
+  }
+  if (!address.IsLoopback()) names.push_back(HostName());
+  const std::string suffix = ":" + std::to_string(port);
+  for (const std::string& name : names) {
+    const bool has_port =
+        name.find(':', name.rfind(']') == std::string::npos ? 0 : name.rfind(']')) !=
+        std::string::npos;
+    hosts.push_back(LowerCase(has_port ? name : name + suffix));
+    if (!has_port && port == 80) hosts.push_back(LowerCase(name));  // browsers leave out 80
+  }
+}
+
+bool LocalServer::Impl::IsAllowedHost(const std::string& host) const {
+  if (std::find(hosts.begin(), hosts.end(), LowerCase(host)) != hosts.end()) return true;
+  // Rebinding needs a name: where others may come in, every address of ours is good.
+  const size_t colon = host.rfind(':');
+  return !address.IsLoopback() && colon != std::string::npos &&
+         host.substr(colon + 1) == std::to_string(port) && IsAddressLiteral(host.substr(0, colon));
+}
+
+void LocalServer::Impl::CatchSignals() {
+  signalled_fd = stop_fd;
+  struct sigaction action {};
+  action.sa_handler = StopOnSignal;
+  action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);  // the second one kills
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, &old_interrupt);
+  sigaction(SIGTERM, &action, &old_terminate);
+  // What the shell had ignored, e.g. for a job in the background, stays ignored.
+  if (old_interrupt.sa_handler == SIG_IGN) sigaction(SIGINT, &old_interrupt, nullptr);
+  if (old_terminate.sa_handler == SIG_IGN) sigaction(SIGTERM, &old_terminate, nullptr);
+  catches_signals = true;
+}
+
+void LocalServer::Impl::RequestStop() {
+  const uint64_t one = 1;
+  // Never read, so that it wakes everyone; a full counter is a stop as well.
+  if (::write(stop_fd, &one, sizeof one) < 0) return;
+}
+
+void LocalServer::Impl::Accept() {
+  while (true) {
+    pollfd fds[2] = {{listen_fd, POLLIN, 0}, {stop_fd, POLLIN, 0}};
+    if (poll(fds, 2, -1) < 0 && errno != EINTR) break;
+    if (fds[1].revents != 0) break;
+    if (fds[0].revents == 0) continue;
+    const int socket = accept4(listen_fd, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (socket < 0) {
+      // Out of descriptors: the connection stays in line, some of ours will end.
+      if (errno != EINTR && errno != EAGAIN) IsReadable(stop_fd, 50);
+      continue;
+    }
+    const int yes = 1;
+    setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    if (num_connections >= kMaxConnections) {
+      close(socket);
+      continue;
+    }
+    ++num_connections;
+    pool->enqueue([this, socket] {
+      Serve(socket);
+      --num_connections;
+    });
+  }
+  close(std::exchange(listen_fd, -1));
+}
+
+void LocalServer::Impl::Serve(int socket) {
+  LocalConnection connection(socket, stop_fd, options);
+  try {
+    for (int count = 1; count <= kMaxRequests; ++count) {
+      std::optional<std::string> body = connection.NextRequest();
+      if (!body) return;
+      // Nobody waits for a thread while this one waits for a browser's next wish.
+      const bool is_last =
+          count == kMaxRequests || IsReadable(stop_fd) || num_connections > options.num_threads;
+      bool wants_close = false;
+      const bool ok = process_request(connection, is_last, wants_close,
+                                      [&](httplib::Request& r) { r.body = std::move(*body); });
+      if (!ok || wants_close || is_last) return;
+    }
+  } catch (const std::exception&) {
+    // Out of memory while reading or answering: this connection ends, the server does not.
+  }
+}
+
+std::string LocalServer::Impl::Objection(const httplib::Request& request) const {
+  const std::string host = request.get_header_value("Host");
+  if (!IsAllowedHost(host)) {
+    return "This server is not reached under the name \"" + host + "\"; use " + hosts.back() + ".";
+  }
+  const bool changes = request.method != "GET" && request.method != "HEAD";
+  if (request.has_header("Origin")) {
+    if (LowerCase(request.get_header_value("Origin")) != "http://" + LowerCase(host)) {
+      return "Pages of other sites may not use this server.";
+    }
+  } else if (changes) {
+    return "A request that changes something must say which page it comes from (Origin).";
+  }
+  const std::string given = request.path.substr(0, token.size() + 1);
+  const bool ends = request.path.size() == given.size() || request.path[given.size()] == '/';
+  if (!EqualSecrets(given, "/" + token) || !ends) {
+    return "The address lacks the token; open the address that the command has printed.";
+  }
+  return "";
+}
+
+void LocalServer::Impl::Respond(const httplib::Request& request, httplib::Response& response) {
+  const std::string objection = Objection(request);
+  if (!objection.empty()) return SetError(response, 403, objection);
+  const std::string path = request.path.substr(token.size() + 1);
+  if (path.empty()) {  // the page's relative URLs need the slash
+    response.set_header("Location", "/" + token + "/");
+    return SetError(response, 308, "The address ends with a slash.");
+  }
+  const auto found = routes.find(path);
+  if (found == routes.end()) return SetError(response, 404, "There is nothing at this address.");
+  const auto route = found->second.find(request.method == "HEAD" ? "GET" : request.method);
+  if (route == found->second.end()) {
+    std::string methods;
+    for (const auto& [method, ignored] : found->second) {
+      methods += (methods.empty() ? "" : ", ") + method;
+    }
+    response.set_header("Allow", methods);
+    return SetError(response, 405, "This address does not take " + request.method + ".");
+  }
+  Guarded(response, [&] { route->second(request, response); });
+}
+
+void LocalServer::Impl::Join() {
+  if (acceptor.joinable()) acceptor.join();
+  if (pool) pool->shutdown();
+  pool.reset();
+  if (std::exchange(catches_signals, false)) {
+    sigaction(SIGINT, &old_interrupt, nullptr);
+    sigaction(SIGTERM, &old_terminate, nullptr);
+    signalled_fd = -1;
+  }
+}
+
+LocalServer::LocalServer(const LocalServerOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
+LocalServer::~LocalServer() = default;
+
+void LocalServer::AddAsset(const std::string& path, const std::string& type, std::string bytes) {
+  impl_->AddRoute("GET", path,
+                  [type, text = std::make_shared<const std::string>(std::move(bytes))](
+                      const httplib::Request&, httplib::Response& response) {
+                    response.status = 200;
+                    response.set_content(*text, type);
+                  });
+}
+
+void LocalServer::AddJson(const std::string& path, std::function<Json(const Query&)> handler) {
+  impl_->AddRoute("GET", path,
+                  [handler](const httplib::Request& request, httplib::Response& response) {
+                    SetJson(response, 200, Dump(handler(QueryOf(request))));
+                  });
+}
+
+void LocalServer::AddContent(const std::string& path,
+                             std::function<std::optional<Content>(const Query&)> handler) {
+  impl_->AddRoute("GET", path,
+                  [handler](const httplib::Request& request, httplib::Response& response) {
+                    const std::optional<Content> content = handler(QueryOf(request));
+                    if (content) return SetContent(request, *content, response);
+                    SetError(response, 404, "There is nothing at this address.");
+                  });
+}
+
+void LocalServer::AddPost(const std::string& path, std::function<Json(const Json&)> handler) {
+  impl_->AddBodyRoute("POST", path, std::move(handler));
+}
+void LocalServer::AddPut(const std::string& path, std::function<Json(const Json&)> handler) {
+  impl_->AddBodyRoute("PUT", path, std::move(handler));
+}
+void LocalServer::AddDelete(const std::string& path, std::function<Json(const Json&)> handler) {
+  impl_->AddBodyRoute("DELETE", path, std::move(handler));
+}
+
+void LocalServer::Start(bool stop_on_signals) {
+  if (impl_->port != 0) throw std::logic_error("the server was started already");
+  impl_->Bind();
+  impl_->AllowHosts();
+  if (stop_on_signals) impl_->CatchSignals();
+  impl_->pool = std::make_unique<httplib::ThreadPool>(impl_->options.num_threads);
+  impl_->acceptor = std::thread([this] { impl_->Accept(); });
+}
+
+void LocalServer::Wait() {
+  while (!IsReadable(impl_->stop_fd, 1000000)) {
+  }
+  impl_->Join();
+}
+
+void LocalServer::RequestStop() { impl_->RequestStop(); }
+bool LocalServer::stopping() const { return IsReadable(impl_->stop_fd); }
+int LocalServer::port() const { return impl_->port; }
+
+std::string LocalServer::Url() const {
+  const std::string host = impl_->address.IsAny() ? HostName() : impl_->address.Text();
+  return "http://" + host + ":" + std::to_string(impl_->port) + "/" + impl_->token + "/";
+}
+
+std::string LocalServer::SshLine() const {
+  const passwd* user = getpwuid(geteuid());
+  const std::string host = impl_->address.IsAny() ? "127.0.0.1" : impl_->address.Text();
+  const std::string number = std::to_string(impl_->port);
+  return "ssh -L " + number + ":" + host + ":" + number + " " +
+         (user != nullptr ? std::string(user->pw_name) + "@" : "") + HostName();
+}
+
+std::vector<std::string> LocalServerOptions::Problems() const {
+  std::vector<std::string> problems;
+  const std::optional<LocalAddress> address = ResolveHost(host);
+  if (!address) {
+    problems.push_back("--host is \"" + host + "\", which is no address of this machine; give " +
+                       LocalServerOptions().host);
+  } else if (!address->IsLoopback() && !allow_remote) {
+    problems.push_back("--host " + host +
+                       " lets other computers in; say --allow_remote 1 if that is meant, or keep " +
+                       LocalServerOptions().host + " and use ssh -L");
+  }
+  const auto require = [&](bool holds, const char* text) {
+    if (!holds) problems.push_back(text);
+  };
+  require(port >= 0 && port <= 65535, "--port must be between 0 (any free one) and 65535");
+  require(max_body_bytes > 0, "max_body_bytes must be positive");
+  require(max_header_bytes > 0, "max_header_bytes must be positive");
+  require(num_threads > 0, "num_threads must be positive");
+  require(request_seconds > 0 && idle_seconds > 0 && stall_seconds > 0,
+          "request_seconds, idle_seconds and stall_seconds must be positive");
+  return problems;
+}
+
+void AddLocalServerOptions(LocalServerOptions* options, Command* command) {
+  command->AddString("host", &options->host,
+                     "Address to serve on; one that other computers reach needs --allow_remote 1.");
+  command->AddInt("port", &options->port, "Port to serve on; 0 = any free one.");
+  command->AddBool("allow_remote", &options->allow_remote,
+                   "Let other computers in that know the address with its token. Nothing is "
+                   "encrypted: prefer ssh -L.");
+  command->AddBool("open", &options->open, "Open the page in the browser.");
+}
+
+}  // namespace roomtex
