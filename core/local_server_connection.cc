@@ -19,8 +19,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxFields = 100;         // header lines of a request
 constexpr double kFarewellSeconds = 2;  // for the last bytes when stopping or refusing
 constexpr size_t kBlockBytes = size_t{1} << 16;
-const std::array<const char*, 7> kUsedFields = {
-    "host", "origin", "content-type", "if-none-match", "connection", "accept-encoding", "accept"};
+const std::array<const char*, 6> kUsedFields = {"host",          "origin",     "content-type",
+                                                "if-none-match", "connection", "accept-encoding"};
 // Scripts, styles and pictures only from us; blob: is how three.js hands textures on.
 const char kContentPolicy[] =
     "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' blob:; "

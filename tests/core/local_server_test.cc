@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <csignal>
 #include <mutex>
+#include <random>
 #include <thread>
 
 #include <arpa/inet.h>
@@ -381,6 +382,47 @@ TEST_F(ServedPage, TheBodyOfARefusedRequestIsNeverTakenForARequest) {
                  "\r\nConnection: close\r\n\r\n" + inner);
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(answer, Not(HasSubstr("HTTP/1.1 200")));
+}
+
+TEST_F(ServedPage, TextIsCompressedForThoseWhoTakeIt) {
+  const std::string get = "GET " + base_ + "/sum?a=1&b=2 HTTP/1.1\r\n" + HostLine();
+  const std::string close = "Connection: close\r\n\r\n";
+  EXPECT_THAT(SendRaw(port_, get + "Accept-Encoding: br, gzip\r\n" + close),
+              HasSubstr("Content-Encoding: gzip"));
+  EXPECT_THAT(SendRaw(port_, get + "Accept-Encoding: br\r\n" + close), HasSubstr("{\"sum\":3}"));
+}
+
+TEST_F(ServedPage, NoBytesBringTheServerDown) {
+  const std::string whole = "POST " + base_ + "/echo?a=%41&b HTTP/1.1\r\n" + HostLine() +
+                            "Origin: " + origin_ +
+                            "\r\nContent-Type: application/json\r\nContent-Length: 9\r\n"
+                            "Accept-Encoding: gzip\r\nIf-None-Match: \"x\"\r\n\r\n{\"a\":[1]}";
+  EXPECT_THAT(SendRaw(port_, whole), StartsWith("HTTP/1.1 200"));
+  std::mt19937 random(1);
+  for (int i = 0; i < 600; ++i) {
+    std::string bytes = whole;
+    const int num_changes = 1 + static_cast<int>(random() % 4);
+    for (int k = 0; k < num_changes && !bytes.empty(); ++k) {
+      const size_t at = random() % bytes.size();
+      switch (random() % 4) {
+        case 0:
+          bytes[at] = static_cast<char>(random());
+          break;
+        case 1:
+          bytes.erase(at, 1 + random() % 20);
+          break;
+        case 2:
+          bytes.insert(at, bytes.substr(random() % bytes.size(), random() % 40));
+          break;
+        default:
+          bytes.resize(at);
+          break;
+      }
+    }
+    const std::string answer = SendRaw(port_, bytes);
+    EXPECT_THAT(answer, testing::AnyOf("", StartsWith("HTTP/1.1 ")));
+  }
+  EXPECT_EQ(GetStatus(base_ + "/"), 200);
 }
 
 TEST_F(ServedPage, OneConnectionTakesSeveralRequests) {
