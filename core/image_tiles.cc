@@ -35,6 +35,7 @@ int64_t BytesOf(const cv::Mat& image) {
 }  // namespace
 
 struct ImageTiles::Picture {
+  std::string id;
   int64_t generation = 0;
   TilePyramid pyramid;
   Format format = Format::kJpeg;
@@ -93,6 +94,7 @@ void ImageTiles::Add(const std::string& id, int width, int height, Format format
   while (LevelSize(std::max(width, height), picture->pyramid.num_levels - 1) > options_.tile_size) {
     ++picture->pyramid.num_levels;
   }
+  picture->id = id;
   picture->format = format;
   picture->loader = std::move(loader);
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -163,7 +165,7 @@ cv::Mat ImageTiles::Decode(const Picture& picture) {
     const auto size = [](int width, int height) {
       return std::to_string(width) + " x " + std::to_string(height);
     };
-    throw InputError("picture", "",
+    throw InputError(picture.id, "",
                      "has " + size(image.cols, image.rows) + " pixels, expected " +
                          size(pyramid.width, pyramid.height),
                      "Use the photos that COLMAP was given");

@@ -63,8 +63,10 @@ class LocalServer {
   ~LocalServer();  // stops and waits
 
   // What is reachable, to be said before Start(). Paths begin with "/" and are without the token:
-  // "/" is the page, "/pick.js" an asset of it, "/tile" a handler. An asset may be large; it is
-  // kept.
+  // "/" is the page, "/pick.js" an asset of it, "/tile" a handler. Assets are scripts, styles and
+  // the like, sent compressed; large bytes are AddContent's, which does not copy them. A page says
+  // its URLs relative and names an icon (data:,), because /favicon.ico lacks the token; it changes
+  // things by fetch() with Content-Type application/json.
   //
   // Handlers run in parallel on several threads, the same one as well: guard what they share. An
   // InputError or UsageError becomes 422 with {"error": sentence}, any other exception 500; the

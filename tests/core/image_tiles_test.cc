@@ -230,7 +230,7 @@ TEST(ImageTiles, FailuresOfTheLoaderAreThrownAndTriedAgain) {
     EXPECT_INPUT_ERROR(tiles.Tile("p", 0, 0, 0), "does not exist");
   }
   cv::imwrite(path, cv::Mat(60, 81, CV_8UC3, cv::Scalar(1, 2, 3)));
-  EXPECT_INPUT_ERROR(tiles.Tile("p", 0, 0, 0), "has 81 x 60 pixels, expected 80 x 60");
+  EXPECT_INPUT_ERROR(tiles.Tile("p", 0, 0, 0), "p: has 81 x 60 pixels, expected 80 x 60");
   cv::imwrite(path, cv::Mat(60, 80, CV_8UC3, cv::Scalar(1, 2, 3)));
   EXPECT_NE(tiles.Tile("p", 0, 0, 0), nullptr);
 }
