@@ -56,8 +56,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "CSV patterned_image,plain_image: colour comes from the plain twin of every "
       "registered patterned photo.",
       Command::Kind::kOptional);
-  command->AddInputPath("scan_poses", &o->scan_poses, "File with a pose for each of several scans.",
-                        Command::Kind::kOptional);
+  command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   AddScanReaderOptions(&o->scan_reader, command);
 }
 
