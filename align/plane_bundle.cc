@@ -72,6 +72,24 @@ double ImageNoise(const SparseModel& model) {
   return std::max(0.1, Median(std::move(errors)) / 1.1774 / std::sqrt(free_share));
 }
 
+double ImageCost(const SparseModel& model, double sigma_px) {
+  constexpr double kHuber = 2.5;
+  std::map<uint32_t, CameraProjection> projections;
+  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  double cost = 0;
+  for (const auto& [id, point] : model.points) {
+    for (const TrackElement& element : point.track) {
+      const SparseImage& image = model.images.at(element.image_id);
+      const auto x =
+          projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
+      if (!x) continue;
+      const double r = (*x - image.points2d[element.point2d_index]).norm() / sigma_px;
+      cost += r < kHuber ? r * r : kHuber * (2 * r - kHuber);
+    }
+  }
+  return cost;
+}
+
 // How far a round moved the cameras.
 bool IsSettled(const SparseModel& before, const SparseModel& after) {
   for (const auto& [id, image] : after.images) {
@@ -338,6 +356,7 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
   if (result.reason.empty()) {
     MoveIdle(input, &result);
     result.plane_rms_before = SurfaceRms(input.model, result.constraints);
+    result.image_cost = ImageCost(result.model, result.sigma_px);
     result.model = BendModel(result.model, input.bend);
     result.plane_rms_after = SurfaceRms(result.model, result.constraints);
     result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;
