@@ -75,8 +75,8 @@ struct PlaneBundle {
   // RMS over all observations, pixels.
   double reprojection_rms_before = 0, reprojection_rms_after = 0;
   double sigma_px = 0;  // image noise per coordinate, from the input's residuals
-  // Sum over all observations of Huber's cost of the reprojection error in units of sigma_px, of the
-  // adjusted model before it is put onto a bent scan: twice the negative log likelihood.
+  // Sum over all observations of Huber's cost of the reprojection error in units of sigma_px, of
+  // the adjusted model before it is put onto a bent scan: twice the negative log likelihood.
   double image_cost = 0;
   int num_rounds = 0;
 };
