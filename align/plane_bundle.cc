@@ -48,22 +48,29 @@ std::string Number(double value, int digits) {
   return text;
 }
 
-// Standard deviation of a keypoint's coordinate, from the middle of the residuals (outliers do not
-// count), with what points and poses have taken up of them.
-double ImageNoise(const SparseModel& model) {
+// Of every observation, pixels.
+std::vector<double> ReprojectionDistances(const SparseModel& model) {
   std::map<uint32_t, CameraProjection> projections;
   for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
-  std::vector<double> errors;
-  size_t num_points = 0;
+  std::vector<double> distances;
   for (const auto& [id, point] : model.points) {
-    num_points += point.track.size() >= 2;
     for (const TrackElement& element : point.track) {
       const SparseImage& image = model.images.at(element.image_id);
       const auto x =
           projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
-      if (x) errors.push_back((*x - image.points2d[element.point2d_index]).norm());
+      if (x) distances.push_back((*x - image.points2d[element.point2d_index]).norm());
     }
   }
+  return distances;
+}
+
+// Standard deviation of a keypoint's coordinate, from the middle of the residuals (outliers do not
+// count), with what points and poses have taken up of them.
+double ImageNoise(const SparseModel& model) {
+  std::vector<double> errors = ReprojectionDistances(model);
+  const auto num_points =
+      std::count_if(model.points.begin(), model.points.end(),
+                    [](const auto& point) { return point.second.track.size() >= 2; });
   const double num_equations = 2.0 * static_cast<double>(errors.size());
   const double num_unknowns =
       3.0 * static_cast<double>(num_points) + 6.0 * static_cast<double>(model.images.size());
@@ -74,18 +81,10 @@ double ImageNoise(const SparseModel& model) {
 
 double ImageCost(const SparseModel& model, double sigma_px) {
   constexpr double kHuber = 2.5;
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
   double cost = 0;
-  for (const auto& [id, point] : model.points) {
-    for (const TrackElement& element : point.track) {
-      const SparseImage& image = model.images.at(element.image_id);
-      const auto x =
-          projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
-      if (!x) continue;
-      const double r = (*x - image.points2d[element.point2d_index]).norm() / sigma_px;
-      cost += r < kHuber ? r * r : kHuber * (2 * r - kHuber);
-    }
+  for (const double distance : ReprojectionDistances(model)) {
+    const double r = distance / sigma_px;
+    cost += r < kHuber ? r * r : kHuber * (2 * r - kHuber);
   }
   return cost;
 }
