@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/file_reader.h"
+#include "importers/mesh_scan.h"
 #include "importers/pcd.h"
 #include "importers/ply_header.h"
 
@@ -196,7 +197,7 @@ class PlyParser {
       }
     }
     source_->EndFile();
-    RemoveMissing();
+    FinishMesh(file_.path(), options_.max_range, &scan_);
     return std::move(scan_);
   }
 
@@ -347,29 +348,6 @@ class PlyParser {
   }
 
   // Points that are not finite or too far are missing, and so are the triangles at them.
-  void RemoveMissing() {
-    scan_.organised = false;
-    scan_.path = file_.path();
-    scan_.num_columns = static_cast<int>(scan_.points.size());
-    scan_.num_rows = 1;
-    for (size_t i = 0; i < scan_.points.size(); ++i) {
-      const double range = (scan_.points[i] - scan_.Station()).norm();
-      if (std::isfinite(range) && (options_.max_range <= 0 || range <= options_.max_range))
-        continue;
-      scan_.points[i] = Scan::MissingPoint();
-      scan_.intensity[i] = 0;
-    }
-    const auto is_open = [this](const Triangle& t) {
-      return std::any_of(t.begin(), t.end(), [this](int i) { return scan_.IsMissing(i); });
-    };
-    scan_.triangles.erase(std::remove_if(scan_.triangles.begin(), scan_.triangles.end(), is_open),
-                          scan_.triangles.end());
-    if (scan_.triangles.empty()) {
-      throw InputError(file_.path(), "", "holds no triangle with three measured corners",
-                       options_.max_range > 0 ? "Give a larger --max_range" : "Give another file");
-    }
-  }
-
   const FileReader& file_;
   const PlyHeader& header_;
   PlyOptions options_;
