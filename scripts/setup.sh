@@ -8,8 +8,14 @@ packages=(
   libeigen3-dev libceres-dev libopencv-dev libpcl-dev libembree-dev libgeographiclib-dev
   libexiv2-dev libsqlite3-dev libsqlitecpp-dev libtinygltf-dev libcli11-dev nlohmann-json3-dev
   libcpp-httplib-dev
+  libmeshoptimizer-dev
   libboost-dev libgtest-dev libgmock-dev libbenchmark-dev
+  chromium
 )
+# The page of roomtex-view is built with npm, the browser tests run with Node: any that is there already
+# will do.
+command -v node >/dev/null || packages+=(nodejs)
+command -v npm >/dev/null || packages+=(npm)
 
 missing=()
 for package in "${packages[@]}"; do

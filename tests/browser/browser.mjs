@@ -1,0 +1,100 @@
+// What every test of a page needs: a command that serves it, a browser that opens it, and folders.
+
+import { spawn } from 'node:child_process';
+import { mkdtempSync, mkdirSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+
+function fromEnvironment(name) {
+  const value = process.env[name];
+  if (!value) throw new Error(`${name} is not set: run these tests by ctest`);
+  return value;
+}
+
+const bin = fromEnvironment('ROOMTEX_BIN');
+const require = createRequire(
+    path.join(fromEnvironment('ROOMTEX_BROWSER_PACKAGES'), 'package.json'));
+const { chromium } = require('playwright-core');
+
+export function makeFolder() {
+  const folder = mkdtempSync(path.join(tmpdir(), 'roomtex-browser-'));
+  return {
+    path: (...parts) => path.join(folder, ...parts),
+    remove: () => rmSync(folder, { recursive: true, force: true }),
+  };
+}
+
+// Runs a command to its end: {code, stdout, stderr}.
+export function run(command, args) {
+  return new Promise((resolve, reject) => {
+    const child = spawn(path.join(bin, command), args);
+    const result = { code: null, stdout: '', stderr: '' };
+    child.stdout.on('data', (data) => { result.stdout += data; });
+    child.stderr.on('data', (data) => { result.stderr += data; });
+    child.on('error', reject);
+    child.on('close', (code) => resolve({ ...result, code }));
+  });
+}
+
+// Starts a command that serves a page and waits until it has printed its URL on stdout.
+export function serve(command, args) {
+  return new Promise((resolve, reject) => {
+    const child = spawn(path.join(bin, command), args);
+    const server = {
+      stdout: '',
+      stderr: '',
+      url: null,
+      // Ends it as Ctrl-C does; gives the exit code.
+      stop: () => {
+        child.kill('SIGINT');
+        return closed;
+      },
+    };
+    const closed = new Promise((done) => child.on('close', done));
+    child.stderr.on('data', (data) => { server.stderr += data; });
+    child.stdout.on('data', (data) => {
+      server.stdout += data;
+      const found = server.stdout.match(/http:\/\/\S+\n/);
+      if (found && !server.url) {
+        server.url = found[0].trim();
+        resolve(server);
+      }
+    });
+    child.on('error', reject);
+    closed.then((code) => reject(new Error(
+        `${command} ended with ${code} before it served: ${server.stderr}`)));
+  });
+}
+
+// A page that remembers what went wrong in it: errors() must be empty at the end of a test.
+export async function openPage(browser, url, { width = 1600, height = 1000 } = {}) {
+  const page = await browser.newPage({ viewport: { width, height } });
+  const errors = [];
+  page.on('pageerror', (error) => errors.push(String(error)));
+  page.on('console', (message) => {
+    if (message.type() === 'error') errors.push(message.text());
+  });
+  page.on('requestfailed', (request) => errors.push(`${request.url()} failed`));
+  page.on('request', (request) => {
+    const to = new URL(request.url());
+    if (to.protocol === 'http:' && to.host !== new URL(url).host) errors.push(`asked ${to.host}`);
+  });
+  if (url !== 'about:blank') await page.goto(url);
+  return { page, errors: () => errors };
+}
+
+export function launchBrowser() {
+  // --no-sandbox: containers run as root. SwiftShader: WebGL without a GPU.
+  return chromium.launch({
+    executablePath: fromEnvironment('ROOMTEX_CHROMIUM'),
+    args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
+           '--enable-unsafe-swiftshader'],
+  });
+}
+
+export async function screenshot(page, name) {
+  const folder = fromEnvironment('ROOMTEX_SCREENSHOTS');
+  mkdirSync(folder, { recursive: true });
+  await page.screenshot({ path: path.join(folder, `${name}.png`) });
+}
