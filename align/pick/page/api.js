@@ -1,0 +1,61 @@
+// The server's answers. URLs are relative: the token is the first part of this page's path.
+
+// `kind`: "refused" (the server says no, `message` is its sentence), "gone" (it does not answer) or
+// "restarted" (something answers, but no longer at this address: a new server has a new token).
+export class ServerError extends Error {
+  constructor(kind, message, status = 0) {
+    super(message);
+    this.kind = kind;
+    this.status = status;
+  }
+}
+
+async function ask(path, init = {}) {
+  let response;
+  try {
+    response = await fetch(path, init);
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+    throw new ServerError('gone', 'the server does not answer');
+  }
+  let answer = null;
+  try {
+    answer = await response.json();
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+  }
+  if (response.ok && answer !== null) return answer;
+  if (answer && answer.error && response.status < 500) {
+    throw new ServerError('refused', answer.error, response.status);
+  }
+  if (response.status === 403 || response.status === 404) {
+    throw new ServerError('restarted', 'the server was started anew and has a new address');
+  }
+  throw new ServerError('gone', (answer && answer.error) || `the server says ${response.status}`);
+}
+
+function send(method, path, body) {
+  return ask(path, {
+    method,
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify(body),
+  });
+}
+
+export const api = {
+  state: () => ask('state'),
+  scanPoint: (scan, x, y) => ask(`scan_point?scan=${scan}&x=${x}&y=${y}`),
+  putPicks: (revision, picks) => send('PUT', 'picks', { revision, picks }),
+  edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, { signal }),
+  startAlign: () => send('POST', 'align', {}),
+  endAlign: () => send('DELETE', 'align', {}),
+  align: () => ask('align'),
+
+  photoTile: (photo) => (level, x, y) => `tile?photo=${photo}&level=${level}&x=${x}&y=${y}`,
+  scanTile: (scan, picture) => (level, x, y) =>
+      `tile?scan=${scan}&picture=${picture}&level=${level}&x=${x}&y=${y}`,
+  backTile: (photo, scan, revision) => (level, x, y) =>
+      `tile?back=${photo}&scan=${scan}&revision=${revision}&level=${level}&x=${x}&y=${y}`,
+  thumbnail: (photo) => `thumbnail?photo=${photo}`,
+  overlay: (name) => `overlay?name=${encodeURIComponent(name)}`,
+};

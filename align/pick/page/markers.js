@@ -1,0 +1,236 @@
+// Drawings over the pictures: picks, predictions, residuals, edges. All in CSS pixels of a pane
+// (see view.js). Everything has a dark rim, because photos are light and dark; what a pick is shows
+// in its shape and its text as well as in its colour.
+
+import { kMarkerReach } from './pane.js';
+
+const kRadius = 9;
+export const kColors = {
+  used: '#7ee787',
+  waiting: '#ffffff',
+  half: '#ffd24a',
+  off: '#b8b8b8',
+  bad: '#ff8f80',
+  worst: '#ffb057',
+  ghost: '#8fd3ff',
+  vector: '#ff7ad9',
+};
+const kRim = 'rgba(0, 0, 0, 0.8)';
+const kFont = '600 12px system-ui, "DejaVu Sans", sans-serif';
+
+// Draws what `path` traces, light on a dark rim.
+function twice(context, color, width, path) {
+  for (const [style, extra] of [[kRim, 2.5], [color, 0]]) {
+    context.strokeStyle = style;
+    context.lineWidth = width + extra;
+    context.beginPath();
+    path();
+    context.stroke();
+  }
+}
+
+function label(context, text, x, y, color, strong) {
+  context.font = kFont;
+  const width = context.measureText(text).width + 8;
+  context.fillStyle = strong ? color : 'rgba(20, 20, 20, 0.85)';
+  context.beginPath();
+  context.roundRect(x, y - 16, width, 17, 3);
+  context.fill();
+  context.fillStyle = strong ? '#141414' : color;
+  context.fillText(text, x + 4, y - 3.5);
+}
+
+// pick: {id, number, place: [x, y] img, status, worst, selected, dim}.
+export function drawMarker(context, view, pick) {
+  const [x, y] = view.toScreen(pick.place);
+  const reach = 40;
+  if (x < -reach || y < -reach || x > view.width + reach || y > view.height + reach) return;
+  const color = kColors[pick.status === 'used' && pick.worst ? 'worst' : pick.status] ?? '#ffffff';
+  context.globalAlpha = pick.dim ? 0.55 : 1;
+  context.setLineDash(pick.status === 'off' ? [3, 3] : []);
+  const r = pick.dim ? 6 : kRadius;
+  const width = pick.selected ? 2.4 : 1.5;
+  twice(context, color, width, () => {
+    if (pick.status === 'half') {
+      context.rect(x - r, y - r, 2 * r, 2 * r);
+    } else if (pick.status === 'bad') {
+      for (const [dx, dy] of [[0, -r - 2], [r + 2, 0], [0, r + 2], [-r - 2, 0]]) {
+        context.lineTo(x + dx, y + dy);
+      }
+      context.closePath();
+    } else {
+      context.arc(x, y, r, 0, 2 * Math.PI);
+    }
+    // Four ticks that point at the place and leave it free.
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + dx * (r - 5), y + dy * (r - 5));
+      context.lineTo(x + dx * (r + 5), y + dy * (r + 5));
+    }
+  });
+  context.setLineDash([]);
+  if (pick.selected) twice(context, '#ffffff', 1, () => context.arc(x, y, r + 8, 0, 2 * Math.PI));
+  const signs = { bad: ' ✕', off: ' off', half: ' ?' };
+  const text = pick.number + (pick.status === 'used' && pick.worst ? ' ▲' : signs[pick.status] ?? '');
+  label(context, text, x + r + 4, y - r + 2, color, pick.selected);
+  context.globalAlpha = 1;
+}
+
+// Where the solution expects the other half of a pick.
+export function drawGhost(context, view, place, number) {
+  const [x, y] = view.toScreen(place);
+  if (!view.shows(place, 0)) {
+    drawAway(context, view, [x, y], `${number}: G goes there`);
+    return;
+  }
+  context.setLineDash([4, 3]);
+  twice(context, kColors.ghost, 1.6, () => {
+    context.arc(x, y, kRadius + 3, 0, 2 * Math.PI);
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + dx * 4, y + dy * 4);
+      context.lineTo(x + dx * (kRadius + 3), y + dy * (kRadius + 3));
+    }
+  });
+  context.setLineDash([]);
+  label(context, `${number} predicted · Enter`, x + kRadius + 8, y - kRadius + 2, kColors.ghost, false);
+}
+
+// An arrow at the pane's border towards something that lies outside.
+function drawAway(context, view, [x, y], text) {
+  const middle = [view.width / 2, view.height / 2];
+  const dx = x - middle[0], dy = y - middle[1];
+  const scale = Math.min((middle[0] - 18) / Math.abs(dx || 1e-9), (middle[1] - 18) / Math.abs(dy || 1e-9));
+  const tip = [middle[0] + dx * scale, middle[1] + dy * scale];
+  const angle = Math.atan2(dy, dx);
+  context.save();
+  context.translate(...tip);
+  context.rotate(angle);
+  twice(context, kColors.ghost, 2, () => {
+    context.moveTo(-8, -7);
+    context.lineTo(4, 0);
+    context.lineTo(-8, 7);
+  });
+  context.restore();
+  context.font = kFont;
+  const width = context.measureText(text).width + 8;
+  label(context, text, Math.min(Math.max(tip[0] - width / 2, 6), view.width - width - 6),
+        Math.min(Math.max(tip[1] + (dy > 0 ? -16 : 32), 22), view.height - 8), kColors.ghost, false);
+}
+
+// A place that was clicked and cannot be picked.
+export function drawRefused(context, view, place, snap) {
+  const [x, y] = view.toScreen(place);
+  twice(context, kColors.bad, 2, () => {
+    context.moveTo(x - 7, y - 7);
+    context.lineTo(x + 7, y + 7);
+    context.moveTo(x + 7, y - 7);
+    context.lineTo(x - 7, y + 7);
+  });
+  if (!snap) return;
+  const [sx, sy] = view.toScreen(snap);
+  context.setLineDash([3, 3]);
+  twice(context, kColors.ghost, 1.4, () => {
+    context.moveTo(x, y);
+    context.lineTo(sx, sy);
+  });
+  context.setLineDash([]);
+  twice(context, kColors.ghost, 2, () => context.arc(sx, sy, 5, 0, 2 * Math.PI));
+}
+
+// The crosshair that the arrow keys move where no point is selected.
+export function drawCrosshairCursor(context, view, place) {
+  const [x, y] = view.toScreen(place);
+  twice(context, '#ffffff', 1.2, () => {
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + dx * 5, y + dy * 5);
+      context.lineTo(x + dx * 22, y + dy * 22);
+    }
+  });
+}
+
+// From clicks to projections, longer than they are by a factor that is returned (and shown): the
+// largest round one with which no used vector is longer than a twentieth of the photo.
+// picks: [{place, residual: [dx, dy] pixels, status}].
+export function drawResiduals(context, view, picks) {
+  const longest = Math.max(0, ...picks.filter((pick) => pick.status === 'used')
+                                      .map((pick) => Math.hypot(...pick.residual)));
+  const limit = Math.hypot(view.picture_width, view.picture_height) / 20;
+  const factor = [200, 100, 50, 20, 10, 5, 2].find((one) => one * longest <= limit) ?? 1;
+  for (const { place, residual } of picks) {
+    const length = Math.hypot(...residual) * factor;
+    const shown = Math.min(1, 3 * limit / Math.max(length, 1e-9));  // a pick far off: cut short
+    const from = view.toScreen(place);
+    const to = view.toScreen([place[0] + residual[0] * factor * shown,
+                              place[1] + residual[1] * factor * shown]);
+    const angle = Math.atan2(to[1] - from[1], to[0] - from[0]);
+    if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 1) continue;
+    twice(context, kColors.vector, 1.8, () => {
+      context.moveTo(...from);
+      context.lineTo(...to);
+      for (const turn of shown < 1 ? [] : [2.6, -2.6]) {
+        context.moveTo(...to);
+        context.lineTo(to[0] + 7 * Math.cos(angle + turn), to[1] + 7 * Math.sin(angle + turn));
+      }
+    });
+  }
+  return factor;
+}
+
+const kEdgeStyles = {
+  depth: { color: '#ffe066', width: 1.6, dash: [] },
+  crease: { color: '#7fe7ff', width: 1.6, dash: [7, 4] },
+  intensity: { color: '#ffb3f0', width: 1.6, dash: [1.5, 4] },
+};
+
+// edges: [{kind, points: [[x, y]...] img}]. A path per kind: thousands of lines are drawn at once.
+export function drawEdges(context, view, edges) {
+  for (const [kind, style] of Object.entries(kEdgeStyles)) {
+    const path = new Path2D();
+    for (const edge of edges) {
+      if (edge.kind !== kind) continue;
+      edge.points.forEach((point, index) => {
+        const [x, y] = view.toScreen(point);
+        if (index === 0) path.moveTo(x, y);
+        else path.lineTo(x, y);
+      });
+    }
+    context.lineCap = style.dash.length > 0 && style.dash[0] < 2 ? 'round' : 'butt';
+    context.setLineDash(style.dash);
+    for (const [color, extra] of [['rgba(0, 0, 0, 0.55)', 1.6], [style.color, 0]]) {
+      context.strokeStyle = color;
+      context.lineWidth = style.width + extra;
+      context.stroke(path);
+    }
+  }
+  context.setLineDash([]);
+  context.lineCap = 'butt';
+}
+
+// The marker of a list that a press at `screen` takes: its id, or null.
+export function markerAt(view, markers, screen) {
+  let best = null;
+  let best_distance = kMarkerReach;
+  for (const marker of markers) {
+    if (marker.dim) continue;
+    const [x, y] = view.toScreen(marker.place);
+    const distance = Math.hypot(screen[0] - x, screen[1] - y) - (marker.selected ? 0.5 : 0);
+    if (distance < best_distance) [best, best_distance] = [marker.id, distance];
+  }
+  return best;
+}
+
+// What the line styles of drawEdges() mean, as elements.
+export function edgeLegend() {
+  const names = { depth: 'depth jump', crease: 'crease', intensity: 'intensity' };
+  return Object.entries(kEdgeStyles).map(([kind, { color, width, dash }]) => {
+    const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+    svg.setAttribute('viewBox', '0 0 30 8');
+    const line = document.createElementNS('http://www.w3.org/2000/svg', 'line');
+    const attributes = { x1: 1, y1: 4, x2: 29, y2: 4, stroke: color, 'stroke-width': width + 0.6,
+                         'stroke-dasharray': dash.join(' ') };
+    for (const [name, value] of Object.entries(attributes)) line.setAttribute(name, value);
+    svg.append(line);
+    const row = document.createElement('div');
+    row.append(svg, names[kind]);
+    return row;
+  });
+}

@@ -1,0 +1,286 @@
+// The picks of this page, their history, and their way to the server.
+//
+// The list here is what the user sees and changes at once; the server's answer (SESSION of
+// align/pick/README.md) follows and brings all the numbers. One request is under way at a time and
+// carries the whole list, so an answer never mixes with a later change. Entries of the list are never
+// changed, only replaced: the history then costs nothing.
+
+import { api, ServerError } from './api.js';
+
+const kMinInterval = 80;    // milliseconds between two requests while something is dragged
+const kRetryAfter = 1500;   // milliseconds
+const kHistory = 500;       // changes that can be undone
+
+const sent_fields = ({ image_name, img, scan, point, weight }) =>
+    ({ image_name, img, scan, point, weight });
+
+function samePicks(a, b) {
+  const text = (picks) => JSON.stringify(picks.map(({ image_name, img, scan, weight }) =>
+      [image_name, img, scan && [scan.id, scan.x, scan.y], weight]));
+  return text(a) === text(b);
+}
+
+// Events: "change" (list or numbers), "sync" (state), "refused" (detail: the server's sentence).
+export class Picks extends EventTarget {
+  list = [];      // {uid, image_name, img, scan, point, weight}
+  rows = new Map();  // uid -> the server's pick with its numbers
+  session = null;
+  // "saved", "saving", "unsaved" (the file could not be written), "gone" (no answer), "restarted",
+  // "stale" (another tab was faster)
+  state = 'saved';
+  why = '';
+  #next_uid = 1;
+  #undo = [];
+  #redo = [];
+  #draft = null;      // {label, uid, before}: a drag under way
+  #version = 0;       // of the list
+  #accepted = 0;      // version that the server has
+  #accepted_list = [];
+  #busy = false;
+  #last_sent = 0;
+  #timer = 0;
+  #other = null;      // session of the faster tab
+
+  // Takes the server's picks as they are; nothing to undo from here.
+  adopt(session) {
+    this.list = session.picks.map((pick) => ({ uid: this.#next_uid++, ...sent_fields(pick) }));
+    this.#undo = [];
+    this.#redo = [];
+    this.#draft = null;
+    this.#accepted = ++this.#version;
+    this.#take(session, this.list);
+  }
+
+  // The same picks with more numbers.
+  refresh(session) {
+    if (session.revision === this.session.revision && !this.pending) this.#take(session, this.list);
+  }
+
+  find(uid) { return this.list.find((pick) => pick.uid === uid) ?? null; }
+  numberOf(uid) { return this.list.findIndex((pick) => pick.uid === uid) + 1; }
+  statusOf(pick) {
+    if (!pick.img || !pick.scan) return 'half';
+    if (pick.weight === 0) return 'off';
+    const status = this.rows.get(pick.uid)?.status;
+    return status && status !== 'half' && status !== 'off' ? status : 'waiting';
+  }
+  get pending() { return this.#version !== this.#accepted; }
+
+  // Changes the list by fn(list) -> list. Changes with the same `merge` within a second are one step
+  // of the history (a key held down).
+  change(label, uid, fn, merge = '') {
+    this.#drop();
+    const before = this.list;
+    this.list = fn(before);
+    const last = this.#undo.at(-1);
+    if (merge && last && last.merge === merge && Date.now() - last.time < 1000) {
+      last.after = this.list;
+      last.time = Date.now();
+    } else {
+      this.#push({ label, uid, before, after: this.list, merge, time: Date.now() });
+    }
+    this.#changed();
+  }
+
+  add(label, fields) {
+    const uid = this.#next_uid++;
+    const pick = { uid, image_name: '', img: null, scan: null, point: null, weight: 1, ...fields };
+    this.change(label, uid, (list) => [...list, pick]);
+    return uid;
+  }
+
+  set(label, uid, fields, merge = '') {
+    this.change(label, uid, (list) => list.map(
+        (pick) => pick.uid === uid ? { ...pick, ...fields } : pick), merge);
+  }
+
+  remove(label, uid) { this.change(label, uid, (list) => list.filter((pick) => pick.uid !== uid)); }
+
+  // A drag: begin, any number of live(), then keep() or drop().
+  begin(label, uid) { this.#draft = { label, uid, before: this.list }; }
+  live(uid, fields) {
+    this.list = this.list.map((pick) => pick.uid === uid ? { ...pick, ...fields } : pick);
+    this.#changed();
+  }
+  keep() {
+    const draft = this.#draft;
+    this.#draft = null;
+    if (draft && draft.before !== this.list) {
+      this.#push({ ...draft, after: this.list, merge: '', time: Date.now() });
+    }
+  }
+  drop() { if (this.#drop()) this.#changed(); }
+  #drop() {
+    const draft = this.#draft;
+    this.#draft = null;
+    if (!draft || draft.before === this.list) return false;
+    this.list = draft.before;
+    return true;
+  }
+
+  get can_undo() { return this.#undo.length > 0; }
+  get can_redo() { return this.#redo.length > 0; }
+  get undo_label() { return this.#undo.at(-1)?.label ?? ''; }
+  get redo_label() { return this.#redo.at(-1)?.label ?? ''; }
+
+  // The step that was undone ({label, uid}), or null.
+  undo() { return this.#step(this.#undo, this.#redo, 'before'); }
+  redo() { return this.#step(this.#redo, this.#undo, 'after'); }
+  #step(from, to, side) {
+    this.#drop();
+    const step = from.pop();
+    if (!step) return null;
+    to.push(step);
+    this.list = step[side];
+    this.#changed();
+    return step;
+  }
+  #push(step) {
+    this.#undo.push(step);
+    if (this.#undo.length > kHistory) this.#undo.shift();
+    this.#redo = [];
+  }
+
+  #changed() {
+    ++this.#version;
+    if (this.state === 'saved' || this.state === 'unsaved') this.#setState('saving');
+    this.dispatchEvent(new Event('change'));
+    this.#schedule();
+  }
+
+  #setState(state, why = '') {
+    this.state = state;
+    this.why = why;
+    this.dispatchEvent(new Event('sync'));
+  }
+
+  #schedule() {
+    if (this.#busy || this.#timer || this.state === 'stale' || !this.pending) return;
+    const wait = this.#draft ? Math.max(0, this.#last_sent + kMinInterval - Date.now()) : 0;
+    if (wait === 0) {
+      this.#send();
+      return;
+    }
+    this.#timer = setTimeout(() => {
+      this.#timer = 0;
+      this.#schedule();
+    }, wait);
+  }
+
+  async #send() {
+    this.#busy = true;
+    this.#last_sent = Date.now();
+    const version = this.#version;
+    const list = this.list;
+    try {
+      const session = await api.putPicks(this.session.revision, list.map(sent_fields));
+      this.#accepted = version;
+      this.#busy = false;
+      this.#take(session, list);
+      this.#schedule();
+    } catch (error) {
+      this.#busy = false;
+      if (!(error instanceof ServerError)) throw error;
+      if (error.kind === 'refused') await this.#refused(error, list);
+      else this.#gone(error);
+    }
+  }
+
+  // The numbers for `list`, which may be older than the one that is shown.
+  #take(session, list) {
+    this.session = session;
+    this.#accepted_list = list;
+    this.rows = new Map(list.map((pick, index) => [pick.uid, session.picks[index]]));
+    // The point of a place comes from the server.
+    this.list = this.list.map((pick) => {
+      const sent = list.find((one) => one.uid === pick.uid);
+      const row = this.rows.get(pick.uid);
+      if (!row || !sent || sent.scan !== pick.scan || pick.point || !row.point) return pick;
+      return { ...pick, point: row.point };
+    });
+    if (this.pending) this.#setState('saving');
+    else if (session.saved) this.#setState('saved');
+    else this.#setState('unsaved', session.save_error);
+    this.dispatchEvent(new Event('change'));
+  }
+
+  // The server said no: either another tab changed the picks since, or there is something wrong
+  // with what was sent; then the last list that it took is back.
+  async #refused(error, list) {
+    let now;
+    try {
+      now = (await api.state()).session;
+    } catch (failure) {
+      this.#gone(failure);
+      return;
+    }
+    if (now.revision !== this.session.revision) {
+      this.#differs(now, list);
+      return;
+    }
+    while (this.#undo.length > 0 && this.#undo.at(-1).after === this.list) {
+      if (this.#undo.pop().before === this.#accepted_list) break;
+    }
+    this.list = this.#accepted_list;
+    this.#draft = null;
+    this.#accepted = this.#version;
+    this.#setState(this.session.saved ? 'saved' : 'unsaved', this.session.save_error);
+    this.dispatchEvent(new Event('change'));
+    this.dispatchEvent(new CustomEvent('refused', { detail: error.message }));
+  }
+
+  // The server has another revision than this page. If it is what was sent, only the answer was
+  // lost.
+  #differs(now, list) {
+    if (list && samePicks(now.picks, list)) {
+      this.#accepted = list === this.list ? this.#version : this.#accepted;
+      this.#take(now, list);
+      this.#schedule();
+      return;
+    }
+    this.#other = now;
+    this.#setState('stale', 'the picks were changed in another tab');
+  }
+
+  #gone(error) {
+    this.#setState(error.kind === 'restarted' ? 'restarted' : 'gone', error.message);
+    setTimeout(() => this.check(), kRetryAfter);
+  }
+
+  // Asks how the picks stand at the server: after it was gone, and when this page comes back to the
+  // front.
+  async check() {
+    if (this.#busy || this.state === 'stale') return;
+    this.#busy = true;
+    let now;
+    try {
+      now = (await api.state()).session;
+    } catch (error) {
+      this.#busy = false;
+      this.#gone(error instanceof ServerError ? error : new ServerError('gone', String(error)));
+      return;
+    }
+    this.#busy = false;
+    if (now.revision !== this.session.revision) {
+      this.#differs(now, this.list);
+    } else if (this.state === 'gone' || this.state === 'restarted') {
+      this.#setState(this.pending ? 'saving' : this.session.saved ? 'saved' : 'unsaved',
+                     this.session.save_error);
+      this.#schedule();
+    }
+  }
+
+  // A stale page: takes the picks of the other tab, or puts its own over them.
+  takeOther() {
+    this.state = 'saved';
+    this.adopt(this.#other);
+    this.#other = null;
+  }
+  keepOwn() {
+    this.session = { ...this.session, revision: this.#other.revision };
+    this.#other = null;
+    ++this.#version;
+    this.#setState('saving');
+    this.#schedule();
+  }
+}

@@ -1,0 +1,95 @@
+// What part of a picture a pane shows.
+//
+// Frames: `img` - pixels of the picture (level 0 of its tiles), the upper-left pixel covers 0..1 and
+// is centred at 0.5, 0.5: the coordinates of the picks, without any shift. `screen` - CSS pixels
+// from the pane's upper-left corner. `scale` is CSS pixels per pixel along x; along y it is
+// scale * aspect, because the samples of a scan need not be as high as they are wide.
+
+import { clamp } from './dom.js';
+
+const kMaxScale = 64;
+
+export class View {
+  constructor() {
+    this.picture_width = this.picture_height = 1;
+    this.aspect = 1;
+    this.width = this.height = 1;  // of the pane, CSS pixels
+    this.scale = 1;
+    this.centre = [0.5, 0.5];  // img, shown in the middle of the pane
+    this.fitted = true;        // follows the pane's size until the user zooms or pans
+  }
+
+  setPicture(width, height, aspect) {
+    this.picture_width = width;
+    this.picture_height = height;
+    this.aspect = aspect;
+    this.fit();
+  }
+
+  // The middle stays in the middle and the scale as it is; a fitted view stays fitted.
+  resize(width, height) {
+    this.width = Math.max(1, width);
+    this.height = Math.max(1, height);
+    if (this.fitted) this.fit();
+  }
+
+  get fit_scale() {
+    const margin = 8;
+    return Math.max(1e-4, Math.min(
+        (this.width - margin) / this.picture_width,
+        (this.height - margin) / (this.picture_height * this.aspect)));
+  }
+
+  fit() {
+    this.scale = this.fit_scale;
+    this.centre = [this.picture_width / 2, this.picture_height / 2];
+    this.fitted = true;
+  }
+
+  toScreen([x, y]) {
+    return [(x - this.centre[0]) * this.scale + this.width / 2,
+            (y - this.centre[1]) * this.scale * this.aspect + this.height / 2];
+  }
+
+  toImg([x, y]) {
+    return [(x - this.width / 2) / this.scale + this.centre[0],
+            (y - this.height / 2) / (this.scale * this.aspect) + this.centre[1]];
+  }
+
+  contains([x, y]) {
+    return x >= 0 && y >= 0 && x <= this.picture_width && y <= this.picture_height;
+  }
+
+  // Whether a place is seen, at least `margin` CSS pixels inside the pane.
+  shows(img, margin = 0) {
+    const [x, y] = this.toScreen(img);
+    return x >= margin && y >= margin && x <= this.width - margin && y <= this.height - margin;
+  }
+
+  panBy(dx, dy) {
+    this.centre = [this.centre[0] - dx / this.scale, this.centre[1] - dy / (this.scale * this.aspect)];
+    this.#moved();
+  }
+
+  // What is at `screen` stays there.
+  zoomAt(screen, factor) {
+    const fixed = this.toImg(screen);
+    this.scale = clamp(this.scale * factor, Math.min(this.fit_scale, 1) / 2, kMaxScale);
+    const now = this.toImg(screen);
+    this.centre = [this.centre[0] + fixed[0] - now[0], this.centre[1] + fixed[1] - now[1]];
+    this.#moved();
+  }
+
+  // at_least: CSS pixels per pixel; a finer scale is kept.
+  centreOn(img, at_least = 0) {
+    this.centre = [...img];
+    this.scale = clamp(Math.max(this.scale, at_least), 1e-4, kMaxScale);
+    this.#moved();
+  }
+
+  #moved() {
+    this.fitted = false;
+    this.centre = [clamp(this.centre[0], 0, this.picture_width),
+                   clamp(this.centre[1], 0, this.picture_height)];
+  }
+}
