@@ -13,9 +13,8 @@
 namespace roomtex {
 namespace {
 
-// Points of the model carry errors of their own: projected across a baseline like their own, they
-// are off by more than a keypoint.
-constexpr double kPointErrorFactor = 1.5;
+// The poses that saw the common points carry errors of their own, beside those of the keypoints.
+constexpr double kPoseErrorFactor = 1.5;
 // Of the common points that must fit; the rest may be mismatches.
 constexpr double kMinShareOfPoints = 0.5;
 // Common points within a smaller part of the photo's diagonal agree with any scale and any pose.
@@ -34,7 +33,50 @@ struct CommonPoint {
   Ray ray;  // in the left-out view
   Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
   const SparsePoint* point = nullptr;
+  std::vector<std::pair<Rigid, Ray>> sights;  // cam_from_model and ray of the views that know it
 };
+
+// Squared errors of a point in pixels, and the normal equations that lead to where they are least.
+struct PointFit {
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  double sum2 = 0;  // infinite when x lies behind a view
+
+  void Add(const Rigid& cam_from_model, const Ray& ray, const Eigen::Vector3d& x_in_model) {
+    const Eigen::Vector3d x = cam_from_model * x_in_model;
+    if (!(x.z() > 1e-9)) {
+      sum2 = std::numeric_limits<double>::infinity();
+      return;
+    }
+    const Eigen::Vector2d error = ray.PixelError(x.hnormalized());
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << 1 / x.z(), 0, -x.x() / (x.z() * x.z()), 0, 1 / x.z(), -x.y() / (x.z() * x.z());
+    const Eigen::Matrix<double, 2, 3> jacobian =
+        ray.img_from_ray * projection * cam_from_model.rotation.toRotationMatrix();
+    hessian += jacobian.transpose() * jacobian;
+    gradient += jacobian.transpose() * error;
+    sum2 += error.squaredNorm();
+  }
+};
+
+// How much the least sum of squared errors of a point, px^2, grows when the view sees it as well:
+// by chi-square of two, times the keypoint noise, if the pose is right. A point of a short baseline
+// may lie far off in depth, so its place in the model says little about where another view sees it.
+double GrowthByView(const CommonPoint& common, const Rigid& view_from_model) {
+  Eigen::Vector3d x = common.point->x_in_model;
+  double without = 0, best = std::numeric_limits<double>::infinity();
+  for (int step = 0; step < 6; ++step) {
+    PointFit fit;
+    for (const auto& [cam_from_model, ray] : common.sights) fit.Add(cam_from_model, ray, x);
+    if (step == 0) without = fit.sum2;  // the model's points are adjusted
+    fit.Add(view_from_model, common.ray, x);
+    best = std::min(best, fit.sum2);
+    if (!std::isfinite(fit.sum2)) break;
+    x -= fit.hessian.ldlt().solve(fit.gradient);
+    if (!x.allFinite()) break;
+  }
+  return std::max(0.0, best - without);
+}
 
 // One pose that a left-out view may have.
 struct Candidate {
@@ -218,9 +260,15 @@ std::map<int, CommonPoint> ViewChainer::Impl::CommonPoints(uint32_t image_id,
   std::map<int, CommonPoint> common;
   for (const auto& [row, point_id] : point_of_row) {
     if (point_id == kInvalidPoint3dId) continue;
-    CommonPoint point{RayOf(image_id, row), images->Keypoints(image_id)[row],
-                      &model.points.at(point_id)};
-    if (point.ray.valid) common.emplace(row, point);
+    CommonPoint point{
+        RayOf(image_id, row), images->Keypoints(image_id)[row], &model.points.at(point_id), {}};
+    if (!point.ray.valid) continue;
+    for (const TrackElement& element : point.point->track) {
+      const Ray ray = RayOf(element.image_id, static_cast<int>(element.point2d_index));
+      if (!ray.valid) continue;
+      point.sights.emplace_back(model.images.at(element.image_id).cam_from_model, ray);
+    }
+    common.emplace(row, std::move(point));
   }
   return common;
 }
@@ -305,16 +353,12 @@ Rigid ViewChainer::Impl::Refine(const Rigid& view_from_left, uint32_t left_id,
 // extent: of the fitting points in the photo, share of its diagonal.
 void ViewChainer::Impl::Score(const std::map<int, CommonPoint>& common, Candidate* candidate,
                               int* num_fitting, double* extent) const {
-  const double limit2 = std::pow(kPointErrorFactor * pair_options.MaxErrorPx(), 2);
+  const double limit2 = std::pow(kPoseErrorFactor * pair_options.MaxErrorPx(), 2);
   Eigen::AlignedBox2d box;
   *num_fitting = 0;
   candidate->cost = 0;
   for (const auto& [row, point] : common) {
-    const Eigen::Vector3d x = candidate->view.cam_from_model * point.point->x_in_model;
-    double error2 = limit2;
-    if (x.z() > 1e-9) {
-      error2 = std::min(limit2, point.ray.PixelError(x.hnormalized()).squaredNorm());
-    }
+    const double error2 = std::min(limit2, GrowthByView(point, candidate->view.cam_from_model));
     candidate->cost += error2;
     if (!(error2 < limit2)) continue;
     ++*num_fitting;

@@ -129,8 +129,9 @@ inline int WritePlanarSubset(const std::string& database_path, const SparseModel
 }
 
 // Only neighbours in the order of names, the first `count` photos; a keypoint that the pair before
-// matched is used again num_triples times a pair at most. The number of images.
-inline int WriteChainSubset(const std::string& database_path, int count, int num_triples,
+// matched is used again num_triples times a pair at most; seed: which of them. The number of
+// images.
+inline int WriteChainSubset(const std::string& database_path, int count, int num_triples, int seed,
                             const std::string& subset_path) {
   const Database database(database_path);
   std::vector<std::pair<std::string, uint32_t>> order;
@@ -141,7 +142,7 @@ inline int WriteChainSubset(const std::string& database_path, int count, int num
   for (const DatabasePair& pair : database.ReadPairs(1)) {
     pairs[{pair.image_id1, pair.image_id2}] = pair;
   }
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(seed);
   SubsetWriter subset(database_path, subset_path);
   std::set<int> rows_before;  // of the left photo, matched with its own left neighbour
   for (int k = 0; k + 1 < count; ++k) {
