@@ -7,7 +7,9 @@
 #include <optional>
 #include <sstream>
 
+#include "align/joint_picks.h"
 #include "align/judgement.h"
+#include "align/pose_choice.h"
 #include "core/error.h"
 #include "core/parallel.h"
 
@@ -192,28 +194,6 @@ std::vector<View> ReviewViews(const AlignmentInput& input, const AlignmentOption
   return views;
 }
 
-// Coplanar picks can have two poses that fit about equally well: the one that also makes sense of
-// the sparse points (one scale for all of them) is right.
-void ChoosePose(const AlignmentInput& input, const std::vector<std::vector<Triangle>>& meshes,
-                const AlignmentOptions& options, View* view) {
-  double best_mad = std::numeric_limits<double>::infinity();
-  const double rms_limit = std::max(1.5 * view->review.pose().rms_px, 1.0);
-  for (size_t i = 0; i < view->review.poses.size(); ++i) {
-    const ViewPose& pose = view->review.poses[i];
-    if (pose.rms_px > rms_limit) break;
-    ScaleOptions scale_options = options.scale;
-    scale_options.edge_px = std::max(scale_options.edge_px, 2 * pose.rms_px);
-    const ScaleEstimate scale = EstimateScale(input.model, *view->image, pose.cam_from_scan,
-                                              input.scans, meshes, scale_options);
-    const double mad =
-        scale.num_features >= options.trust.min_scale_features ? scale.relative_mad : 1e6 + i;
-    if (i > 0 && !(mad < 0.7 * best_mad)) continue;
-    best_mad = mad;
-    view->scale = scale;
-    view->cam_from_scan = pose.cam_from_scan;
-  }
-}
-
 View ChooseView(const AlignmentInput& input, std::vector<View> views,
                 const AlignmentOptions& options) {
   const auto best = std::min_element(views.begin(), views.end(), [](const View& a, const View& b) {
@@ -222,7 +202,14 @@ View ChooseView(const AlignmentInput& input, std::vector<View> views,
   View view = std::move(*best);
   std::vector<std::vector<Triangle>> meshes;
   for (const Scan& scan : input.scans) meshes.push_back(BuildScanMesh(scan, options.mesh));
-  ChoosePose(input, meshes, options, &view);
+  const PoseChoice choice =
+      ChoosePose(view.review.poses, options.scale, options.trust.min_scale_features,
+                 [&](const Rigid& cam_from_scan, const ScaleOptions& scale_options) {
+                   return EstimateScale(input.model, *view.image, cam_from_scan, input.scans,
+                                        meshes, scale_options);
+                 });
+  view.scale = choice.scale;
+  view.cam_from_scan = view.review.poses[choice.index].cam_from_scan;
   if (view.scale.num_features == 0) {
     throw Contradiction(
         input.picks_path, "",
@@ -280,33 +267,23 @@ void SetResiduals(const AlignmentInput& input, const Similarity& scan_from_spars
 // Picks of several photos as one answer; the ones that then stand far off are left out and named.
 void FitAllPicks(const AlignmentInput& input, double sigma_px, const AlignmentOptions& options,
                  Alignment* result) {
-  for (int round = 0; round < 2; ++round) {
-    const SimilarityFit fit = FitToPicks(input.model, input.picks, UsedPicks(*result), sigma_px,
-                                         result->scan_from_sparse, options.fit);
-    if (!fit.converged) {
-      result->warnings.push_back("The picks of all photos together gave no solution; those of " +
-                                 result->clicked_image + " alone are used.");
-      return;
-    }
-    result->scan_from_sparse = fit.scan_from_sparse;
-    SetResiduals(input, fit.scan_from_sparse, &PickOutcome::residual_px, result);
-    if (round == 1) return;
-    std::vector<double> residuals;
-    for (const PickOutcome& outcome : result->picks) {
-      if (outcome.used) residuals.push_back(outcome.pick.weight * outcome.residual_px);
-    }
-    std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
-    // Median of a Rayleigh distribution: 1.177 sigma; 4.5 sigma is exceeded by 1 click in 25 000.
-    const double limit =
-        std::max(options.picks.min_bad_pick_px, 4.5 / 1.177 * residuals[residuals.size() / 2]);
-    for (PickOutcome& outcome : result->picks) {
-      if (!outcome.used || !(outcome.pick.weight * outcome.residual_px > limit)) continue;
-      outcome.used = false;
-      result->warnings.push_back("The pick on " + LineOf(outcome.pick) + " (" +
-                                 outcome.pick.image_name + ") was left out: it is " +
-                                 Number(outcome.residual_px, 1) +
-                                 " pixels away from where the other picks put it.");
-    }
+  const JointPickFit joint =
+      FitPicksJointly(input.model, input.picks, UsedPicks(*result), sigma_px,
+                      result->scan_from_sparse, options.fit, options.picks.min_bad_pick_px);
+  if (!joint.converged) {
+    result->warnings.push_back("The picks of all photos together gave no solution; those of " +
+                               result->clicked_image + " alone are used.");
+  }
+  result->scan_from_sparse = joint.scan_from_sparse;
+  SetResiduals(input, joint.scan_from_sparse, &PickOutcome::residual_px, result);
+  for (size_t i = 0; i < result->picks.size(); ++i) {
+    PickOutcome& outcome = result->picks[i];
+    if (joint.used[i] == outcome.used) continue;
+    outcome.used = false;
+    result->warnings.push_back("The pick on " + LineOf(outcome.pick) + " (" +
+                               outcome.pick.image_name + ") was left out: it is " +
+                               Number(joint.left_out_px[i], 1) +
+                               " pixels away from where the other picks put it.");
   }
 }
 

@@ -252,9 +252,8 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
   file.Commit();
 }
 
-void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
-                            const SparseModel& model) {
-  std::map<std::string, int> count;
+void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
+                    const SparseModel& model) {
   for (const Pick& pick : picks) {
     const SparseImage* image = model.FindImage(pick.image_name);
     if (image == nullptr) {
@@ -273,8 +272,14 @@ void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& pi
       throw InputError(path, LinePosition(pick.line), where.str(),
                        "Give x and y in pixels of the photo as taken");
     }
-    count[pick.image_name] += pick.weight > 0;
   }
+}
+
+void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
+                            const SparseModel& model) {
+  CheckPickNames(path, picks, model);
+  std::map<std::string, int> count;
+  for (const Pick& pick : picks) count[pick.image_name] += pick.weight > 0;
   int most = 0;
   for (const auto& [name, number] : count) most = std::max(most, number);
   if (most >= kMinPicksPerPhoto) return;

@@ -34,7 +34,10 @@ std::vector<Pick> ReadPicks(const std::string& path);
 void WritePicks(const std::string& path, const std::vector<Pick>& picks);
 
 // Throws InputError: a name that is not in the model (with the nearest one that is), a pixel
-// outside its photo, fewer than kMinPicksPerPhoto picks in every photo.
+// outside its photo.
+void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
+                    const SparseModel& model);
+// The same, and for fewer than kMinPicksPerPhoto picks in every photo.
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model);
 

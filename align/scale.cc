@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/ray_caster.h"
+#include "core/parallel.h"
 
 namespace roomtex {
 namespace {
@@ -80,10 +80,8 @@ double Median(std::vector<double> values) {
 class DepthFinder {
  public:
   DepthFinder(const CameraProjection& projection, const Rigid& cam_from_scan,
-              const VisiblePart& part)
-      : projection_(projection),
-        cam_from_scan_(cam_from_scan),
-        caster_(part.points, part.triangles) {}
+              const RayCaster& surface)
+      : projection_(projection), cam_from_scan_(cam_from_scan), surface_(surface) {}
 
   // Depth (z in `cam`) of the nearest scan surface behind a pixel.
   std::optional<double> At(const Eigen::Vector2d& x_in_img) const {
@@ -91,7 +89,7 @@ class DepthFinder {
     if (!x_in_cam) return std::nullopt;
     const Eigen::Vector3d direction =
         (cam_from_scan_.rotation.conjugate() * x_in_cam->homogeneous()).normalized();
-    const auto hit = caster_.Cast(cam_from_scan_.TargetOriginInSource(), direction);
+    const auto hit = surface_.Cast(cam_from_scan_.TargetOriginInSource(), direction);
     if (!hit) return std::nullopt;
     return (cam_from_scan_ * hit->point).z();
   }
@@ -114,8 +112,18 @@ class DepthFinder {
  private:
   const CameraProjection& projection_;
   Rigid cam_from_scan_;
-  RayCaster caster_;
+  const RayCaster& surface_;
 };
+
+// A feature with a sparse point: what its depth in the scan says.
+struct Feature {
+  Eigen::Vector2d x_in_img;
+  double sparse_depth = 0;
+  bool has_surface = false;
+  double ratio = 0;  // 0: no smooth surface
+};
+
+constexpr int kFeaturesPerChunk = 64;
 
 }  // namespace
 
@@ -133,20 +141,38 @@ ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
                             const ScaleOptions& options) {
   const CameraProjection projection(model.cameras.at(image.camera_id));
   const VisiblePart part = FindVisiblePart(projection, cam_from_scan, scans, meshes);
-  const DepthFinder depths(projection, cam_from_scan, part);
-  ScaleEstimate estimate;
-  std::vector<double> ratios;
+  const RayCaster surface(part.points, part.triangles);
+  return EstimateScale(model, image, cam_from_scan, surface, options, 1);
+}
+
+ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
+                            const Rigid& cam_from_scan, const RayCaster& surface,
+                            const ScaleOptions& options, int num_threads) {
+  const CameraProjection projection(model.cameras.at(image.camera_id));
+  const DepthFinder depths(projection, cam_from_scan, surface);
+  std::vector<Feature> features;
   for (size_t i = 0; i < image.points2d.size(); ++i) {
     if (image.point3d_ids[i] == kInvalidPoint3dId) continue;
     const auto point = model.points.find(image.point3d_ids[i]);
     if (point == model.points.end()) continue;
     const double alpha = (image.cam_from_model * point->second.x_in_model).z();
-    if (!(alpha > 0)) continue;
-    const auto beta = depths.At(image.points2d[i]);
-    if (!beta) continue;
-    ++estimate.num_candidates;
-    if (!depths.IsSmooth(image.points2d[i], *beta, options)) continue;
-    ratios.push_back(*beta / alpha);  // Thesis (7.3), inverted
+    if (alpha > 0) features.push_back({image.points2d[i], alpha});
+  }
+  const int count = static_cast<int>(features.size());
+  ParallelFor(num_threads, 0, (count + kFeaturesPerChunk - 1) / kFeaturesPerChunk, [&](int chunk) {
+    const int end = std::min(count, (chunk + 1) * kFeaturesPerChunk);
+    for (int i = chunk * kFeaturesPerChunk; i < end; ++i) {
+      const auto beta = depths.At(features[i].x_in_img);
+      features[i].has_surface = beta.has_value();
+      if (!beta || !depths.IsSmooth(features[i].x_in_img, *beta, options)) continue;
+      features[i].ratio = *beta / features[i].sparse_depth;  // Thesis (7.3), inverted
+    }
+  });
+  ScaleEstimate estimate;
+  std::vector<double> ratios;
+  for (const Feature& feature : features) {
+    estimate.num_candidates += feature.has_surface;
+    if (feature.ratio > 0) ratios.push_back(feature.ratio);
   }
   if (ratios.empty()) return estimate;
   const double median = Median(ratios);

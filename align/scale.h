@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/ray_caster.h"
 #include "core/scan.h"
 
 namespace roomtex {
@@ -40,5 +41,10 @@ ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
                             const Rigid& cam_from_scan, const std::vector<Scan>& scans,
                             const std::vector<std::vector<Triangle>>& meshes,
                             const ScaleOptions& options);
+// The same for who asks again and again: `surface` holds the meshes of all scans. The number of
+// threads changes nothing.
+ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
+                            const Rigid& cam_from_scan, const RayCaster& surface,
+                            const ScaleOptions& options, int num_threads);
 
 }  // namespace roomtex

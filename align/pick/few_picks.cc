@@ -1,0 +1,111 @@
+#include "align/pick/few_picks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <opencv2/calib3d.hpp>
+
+namespace roomtex {
+namespace {
+
+// Two poses are the same one: radians, metres.
+constexpr double kSameRotation = 1e-4, kSamePosition = 1e-4;
+// Starts that leave the other picks farther off than this share of the photo's diagonal lead
+// nowhere.
+constexpr double kMaxStartShare = 0.3;
+constexpr size_t kMaxStarts = 6;
+
+PointPairs Chosen(const PointPairs& pairs, const std::vector<int>& indices) {
+  const int n = static_cast<int>(indices.size());
+  PointPairs chosen{Eigen::Matrix2Xd(2, n), Eigen::Matrix3Xd(3, n)};
+  for (int i = 0; i < n; ++i) {
+    chosen.x_in_img.col(i) = pairs.x_in_img.col(indices[i]);
+    chosen.x_in_scan.col(i) = pairs.x_in_scan.col(indices[i]);
+  }
+  return chosen;
+}
+
+bool IsSame(const Rigid& a, const Rigid& b) {
+  return RotationAngle(a.rotation, b.rotation) < kSameRotation &&
+         (a.TargetOriginInSource() - b.TargetOriginInSource()).norm() < kSamePosition;
+}
+
+void AddIfNew(const ViewPose& pose, std::vector<ViewPose>* poses) {
+  const bool known = std::any_of(poses->begin(), poses->end(), [&](const ViewPose& other) {
+    return IsSame(pose.cam_from_scan, other.cam_from_scan);
+  });
+  if (!known) poses->push_back(pose);
+}
+
+}  // namespace
+
+std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs) {
+  const Eigen::Vector3d centre = pairs.x_in_scan.rowwise().mean();
+  std::vector<cv::Point3d> points;
+  std::vector<cv::Point2d> rays;
+  for (int i = 0; i < 3; ++i) {
+    const auto x = projection.CamFromImg(pairs.x_in_img.col(i));
+    if (!x) return {};
+    const Eigen::Vector3d p = pairs.x_in_scan.col(i) - centre;
+    points.emplace_back(p.x(), p.y(), p.z());
+    rays.emplace_back(x->x(), x->y());
+  }
+  std::vector<cv::Mat> rotations, translations;
+  cv::solveP3P(points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations,
+               cv::SOLVEPNP_AP3P);
+  std::vector<ViewPose> poses;
+  for (size_t i = 0; i < rotations.size(); ++i) {
+    Eigen::Vector3d axis, translation;
+    for (int k = 0; k < 3; ++k) {
+      axis[k] = rotations[i].at<double>(k);
+      translation[k] = translations[i].at<double>(k);
+    }
+    if (!axis.allFinite() || !translation.allFinite()) continue;
+    ViewPose pose;
+    const double angle = axis.norm();
+    if (angle > 0) pose.cam_from_scan.rotation = Eigen::AngleAxisd(angle, axis / angle);
+    pose.cam_from_scan.translation = translation - pose.cam_from_scan.rotation * centre;
+    pose.residual_px = PickResiduals(projection, pairs, pose.cam_from_scan);
+    if (!pose.residual_px.allFinite()) continue;  // a point behind the camera
+    pose.sum_px2 = pose.residual_px.squaredNorm();
+    pose.rms_px = std::sqrt(pose.sum_px2 / 3);
+    pose.covariance.setConstant(std::numeric_limits<double>::infinity());
+    if (pose.rms_px < 1) AddIfNew(pose, &poses);
+  }
+  return poses;
+}
+
+std::vector<ViewPose> SolveFewPicks(const CameraProjection& projection, const PointPairs& pairs) {
+  std::vector<ViewPose> poses = SolveViewPoses(projection, pairs);
+  struct Start {
+    double worst_px;
+    Rigid cam_from_scan;
+  };
+  std::vector<Start> starts;
+  const Camera& camera = projection.camera();
+  const double max_px = kMaxStartShare * std::hypot(camera.width, camera.height);
+  for (int i = 0; i < pairs.size(); ++i) {
+    for (int j = i + 1; j < pairs.size(); ++j) {
+      for (int k = j + 1; k < pairs.size(); ++k) {
+        for (const ViewPose& pose : SolveThreePicks(projection, Chosen(pairs, {i, j, k}))) {
+          const double worst_px = PickResiduals(projection, pairs, pose.cam_from_scan).maxCoeff();
+          if (worst_px < max_px) starts.push_back({worst_px, pose.cam_from_scan});
+        }
+      }
+    }
+  }
+  std::sort(starts.begin(), starts.end(),
+            [](const Start& a, const Start& b) { return a.worst_px < b.worst_px; });
+  if (starts.size() > kMaxStarts) starts.resize(kMaxStarts);
+  for (const Start& start : starts) {
+    for (const ViewPose& pose : SolveViewPoses(projection, pairs, start.cam_from_scan)) {
+      AddIfNew(pose, &poses);
+    }
+  }
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const ViewPose& a, const ViewPose& b) { return a.sum_px2 < b.sum_px2; });
+  return poses;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,20 @@
+#pragma once
+// Poses from fewer picks than the thesis asks for (7.1.1): three to five leave several that fit,
+// and the sparse model has to say which it is (pose_choice.h).
+
+#include <vector>
+
+#include "align/view_pose.h"
+
+namespace roomtex {
+
+// Every pose that sees three picks exactly where they were clicked, with the points in front of the
+// camera (P3P; Ke and Roumeliotis 2017, OpenCV's SOLVEPNP_AP3P); up to four, in no order of merit.
+// pairs: 3, not collinear. Residuals are rounding, covariances infinite.
+std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs);
+
+// SolveViewPoses() for 4 or 5 picks, started from every pose of every three of them as well: the
+// linear start needs six. Best first.
+std::vector<ViewPose> SolveFewPicks(const CameraProjection& projection, const PointPairs& pairs);
+
+}  // namespace roomtex

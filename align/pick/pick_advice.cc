@@ -1,0 +1,152 @@
+#include "align/pick/pick_advice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "align/judgement.h"
+
+namespace roomtex {
+namespace {
+
+// Second extent of the scan points over the first, and spread over the photo's diagonal, below
+// which picks are worth a warning. (FindLayoutProblem refuses 0.02 and 0.015.)
+constexpr double kThinShare = 0.12, kCrowdedShare = 0.1;
+// Photo and sparse model disagree: joint residuals over those of the photo alone, and pixels.
+constexpr double kModelFactor = 3, kModelPx = 4;
+
+std::string Count(int number, const std::string& noun) {
+  return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::string AsSentence(std::string text) {
+  if (text.empty()) return text;
+  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  if (text.back() != '.') text += '.';
+  return text;
+}
+
+std::string LayoutProblemOfThree(const PointPairs& pairs) {
+  const Eigen::Vector3d extents = PrincipalExtents(pairs.x_in_scan);
+  if (extents[1] > PickReviewOptions().min_line_share * extents[0]) return "";
+  return "the three picks lie on one straight line, around which the camera could turn freely; "
+         "pick a point beside it";
+}
+
+std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPairs& pairs,
+                                        const ScanReaderOptions& reader) {
+  std::vector<std::string> warnings;
+  if (pairs.size() < kMinPicksPerPhoto) return warnings;
+  if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
+    const std::string other = reader.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+    warnings.push_back("The scan looks like a mirror image of the room: the picks miss by " +
+                       Number(review.RmsPx(), 1) + " pixels (rms), but by " +
+                       Number(review.mirrored_rms_px, 1) +
+                       " when the scan is reflected. End this session and read an RTPI scan with "
+                       "--azimuth " +
+                       other + ".");
+  } else if (review.exchanged) {
+    warnings.push_back("Picks " + std::to_string(review.exchanged->first + 1) + " and " +
+                       std::to_string(review.exchanged->second + 1) +
+                       " of this photo look exchanged: with their places in the photo swapped all "
+                       "picks fit to " +
+                       Number(review.exchanged_rms_px, 1) + " pixels.");
+  }
+  for (int i = 0; i < pairs.size(); ++i) {
+    if (review.used[i]) continue;
+    warnings.push_back("Pick " + std::to_string(i + 1) + " of this photo is left out: it is " +
+                       Number(review.leave_one_out_px[i], 1) +
+                       " pixels away from where the others put it.");
+  }
+  return warnings;
+}
+
+std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera) {
+  std::vector<std::string> warnings;
+  const Eigen::Vector3d extents = PrincipalExtents(pairs.x_in_scan);
+  if (extents[1] < kThinShare * extents[0]) {
+    warnings.push_back(
+        "The picks lie nearly on one line, which fixes the turn about it badly. Pick a point far "
+        "beside it.");
+  } else if (pairs.size() >= 4 && extents[2] < kCoplanarShare * extents[0]) {
+    warnings.push_back(
+        "All picks lie on one plane. Two poses may fit them; a pick in front of the plane or "
+        "behind it decides.");
+  }
+  const Eigen::Vector2d centre = pairs.x_in_img.rowwise().mean();
+  const double spread = std::sqrt((pairs.x_in_img.colwise() - centre).squaredNorm() / pairs.size());
+  if (spread < kCrowdedShare * std::hypot(camera.width, camera.height)) {
+    warnings.push_back(
+        "The picks crowd in one part of the photo. Spread over all of it they fix the pose much "
+        "better.");
+  }
+  return warnings;
+}
+
+std::string ModelWarning(const PickReview& review, const PhotoState& photo) {
+  if (static_cast<int>(review.used.size()) < kMinPicksPerPhoto) return "";
+  const double own_px = review.RmsPx();
+  if (!(photo.rms_px > kModelPx && photo.rms_px > kModelFactor * own_px)) return "";
+  return "The picks of this photo agree with each other (" + Number(own_px, 1) +
+         " pixels), but not with where the sparse model and the other picks have the photo (" +
+         Number(photo.rms_px, 1) + " pixels): its pose in the model may be wrong.";
+}
+
+std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
+                     const PickScene& scene) {
+  std::map<std::string, int> on;
+  int num_half = 0;
+  for (const SessionPick& pick : picks) {
+    if (!pick.complete()) ++num_half;
+    if (pick.complete() && pick.weight > 0) ++on[pick.image_name];
+  }
+  std::string name;
+  int most = 0;
+  for (const auto& [image_name, count] : on) {
+    if (count <= most) continue;
+    most = count;
+    name = image_name;
+  }
+  if (num_half > 0 && most < kMinPicksPerPhoto) {
+    return "Click the same point on the other side.";
+  }
+  if (most == 0) {
+    return "Click a point that you recognise on both sides, such as a corner of a picture or of "
+           "furniture: once in the photo, once in the scan.";
+  }
+  const PhotoState& photo = solution.photos.at(name);
+  const auto bad =
+      std::find_if(solution.picks.begin(), solution.picks.end(),
+                   [](const PickState& state) { return state.status == PickState::Status::kBad; });
+  if (most < kMinPicksPerPhoto) {
+    const std::string more = Count(kMinPicksPerPhoto - most, "more pair");
+    if (most < 3) return more + " to go in this photo; spread them over the photo and in depth.";
+    if (!photo.solved() && !solution.with_rays) return more + " to go; the scan is being prepared.";
+    if (!photo.solved())
+      return more + " to go. These alone fix no pose: " +
+             (photo.warnings.empty() ? "pick another point." : photo.warnings[0]);
+    return more + " to go in this photo. Click one side: the other shows where to look.";
+  }
+  if (!photo.solved()) {
+    return photo.warnings.empty() ? "These picks fix no pose: check them." : photo.warnings[0];
+  }
+  if (bad != solution.picks.end()) {
+    return "A pick is left out as wrong (pick " + std::to_string(bad - solution.picks.begin() + 1) +
+           "): drag it to its place, or pick another point, so that six remain.";
+  }
+  const TrustOptions trust;
+  const Camera& camera = scene.FindPhoto(name)->projection->camera();
+  if (photo.rms_px > trust.PickRmsLimit(camera)) {
+    return "The picks miss by " + Number(photo.rms_px, 1) +
+           " pixels: look at the worst one, or switch picks off one by one.";
+  }
+  if (!solution.with_rays) return "Enough picks; the scan is being prepared.";
+  if (!solution.scan_from_sparse) {
+    return "The pose of the photo is known, but no sparse point of it lies on the scan: pick in a "
+           "photo with more sparse points.";
+  }
+  return "Enough picks: compare photo and scan by the back-projection, then align.";
+}
+
+}  // namespace roomtex

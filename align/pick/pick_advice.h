@@ -1,0 +1,27 @@
+#pragma once
+// What the page says about the picks, in sentences.
+
+#include <string>
+#include <vector>
+
+#include "align/pick/pick_solution.h"
+
+namespace roomtex {
+
+// With a capital letter and a full stop.
+std::string AsSentence(std::string text);
+
+// "" or why three picks fix nothing.
+std::string LayoutProblemOfThree(const PointPairs& pairs);
+// Exchanged, mirrored, bad. Picks are counted from 1 in their photo.
+std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPairs& pairs,
+                                        const ScanReaderOptions& reader);
+// Nearly on one line, on one plane, crowded in a part of the photo.
+std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera);
+// The picks of the photo agree with each other, but not with where the other photos have it.
+std::string ModelWarning(const PickReview& review, const PhotoState& photo);
+// What to do now.
+std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
+                     const PickScene& scene);
+
+}  // namespace roomtex

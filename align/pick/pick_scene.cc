@@ -1,0 +1,173 @@
+#include "align/pick/pick_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "align/pick/mesh_panorama.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kPanoramaColumns = 4096;
+constexpr int kCoarseSamples = 300000;  // of the mesh that decides which edges a photo sees
+constexpr int kRankCells = 8;           // a photo has this many cells across and down
+
+// A name of the model must not lead out of the folder of the photos.
+bool StaysInside(const std::string& name) {
+  const std::filesystem::path path(name);
+  if (path.is_absolute()) return false;
+  return std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
+}
+
+std::string ProblemOf(const PickPhoto& photo, const Camera& camera) {
+  if (!StaysInside(photo.name())) return "The name of this photo leads out of --image_path.";
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(photo.path, ignored)) {
+    return "There is no photo " + photo.path + ".";
+  }
+  const auto [width, height] = ReadPhotoSize(photo.path);
+  if (width == 0) return photo.path + " is no photo that can be read.";
+  if (width == camera.width && height == camera.height) return "";
+  return photo.name() + " has " + std::to_string(width) + " x " + std::to_string(height) +
+         " pixels, its camera in the model " + std::to_string(camera.width) + " x " +
+         std::to_string(camera.height) + ".";
+}
+
+// Share of the cells of a photo in which it has sparse points.
+double Coverage(const SparseImage& image, const Camera& camera) {
+  std::set<int> cells;
+  for (size_t i = 0; i < image.points2d.size(); ++i) {
+    if (image.point3d_ids[i] == kInvalidPoint3dId) continue;
+    const Eigen::Vector2d& x = image.points2d[i];
+    const auto cell = [](double at, int size) {
+      return std::clamp(static_cast<int>(kRankCells * at / size), 0, kRankCells - 1);
+    };
+    cells.insert(kRankCells * cell(x.y(), camera.height) + cell(x.x(), camera.width));
+  }
+  return cells.size() / static_cast<double>(kRankCells * kRankCells);
+}
+
+}  // namespace
+
+PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
+  RequireFolder(input.image_path, "Check --image_path");
+  progress->Stage("read model");
+  model_ = ReadSparseModel(input.input_path);
+  if (model_.images.empty()) {
+    throw InputError(input.input_path, "", "the sparse model has no photos",
+                     "Reconstruct the photos first (roomtex-mapper)");
+  }
+  for (const auto& [id, camera] : model_.cameras) projections_.emplace(id, camera);
+  AddPhotos();
+  progress->Stage("read scan");
+  scans_ = ReadScans(input.scan_paths, input.scan_poses, input.scan_reader);
+  for (const Scan& scan : scans_) {
+    if (!scan.organised) {
+      panoramas_.push_back(PanoramaOfMesh(scan, kPanoramaColumns, input.num_threads));
+    }
+    places_.push_back(std::make_unique<ScanPlaces>(scan.organised ? scan : panoramas_.back()));
+  }
+  progress->Finish();
+}
+
+PickScene::~PickScene() {
+  stopping_ = true;
+  if (worker_.joinable()) worker_.join();
+}
+
+void PickScene::AddPhotos() {
+  for (const auto& [id, image] : model_.images) {
+    PickPhoto photo;
+    photo.image = &image;
+    photo.projection = &projections_.at(image.camera_id);
+    photo.path = input_.image_path + "/" + image.name;
+    photo.problem = ProblemOf(photo, photo.projection->camera());
+    photo.missing = !photo.problem.empty();
+    photo.num_points = static_cast<int>(
+        std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
+                      [](uint64_t point_id) { return point_id != kInvalidPoint3dId; }));
+    photos_.push_back(photo);
+  }
+  std::sort(photos_.begin(), photos_.end(),
+            [](const PickPhoto& a, const PickPhoto& b) { return a.name() < b.name(); });
+  for (size_t i = 0; i < photos_.size(); ++i) photos_[i].id = static_cast<int>(i);
+  RankPhotos();
+}
+
+void PickScene::RankPhotos() {
+  std::vector<std::pair<double, int>> order;
+  for (const PickPhoto& photo : photos_) {
+    // Points that many photos see connect this one to them.
+    double connections = 0;
+    for (const uint64_t point_id : photo.image->point3d_ids) {
+      const auto point = model_.points.find(point_id);
+      if (point != model_.points.end()) {
+        connections +=
+            std::log2(static_cast<double>(std::max<size_t>(point->second.track.size(), 1)));
+      }
+    }
+    const double score =
+        Coverage(*photo.image, photo.projection->camera()) * std::sqrt(connections);
+    order.emplace_back(photo.missing ? 1.0 : -score, photo.id);
+  }
+  std::sort(order.begin(), order.end());
+  for (size_t i = 0; i < order.size(); ++i) photos_[order[i].second].rank = static_cast<int>(i + 1);
+}
+
+const PickPhoto* PickScene::FindPhoto(const std::string& name) const {
+  const auto at = std::lower_bound(
+      photos_.begin(), photos_.end(), name,
+      [](const PickPhoto& photo, const std::string& n) { return photo.name() < n; });
+  return at == photos_.end() || at->name() != name ? nullptr : &*at;
+}
+
+void PickScene::Prepare() {
+  worker_ = std::thread([this] { Work(); });
+}
+
+void PickScene::Work() {
+  const auto publish = [this](const auto& store) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      store();
+    }
+    changed_.notify_all();
+  };
+  rays_ = std::make_unique<ScanRays>(scans_);
+  publish([&] { rays_ready_ = rays_.get(); });
+  if (stopping_) return;
+  auto edges = std::make_unique<Edges>();
+  edges->free_space = std::make_unique<FreeSpace>(scans_, kCoarseSamples);
+  for (const auto& places : places_) {
+    if (stopping_) return;
+    for (ScanEdge& edge : FindScanEdges(places->scan(), ScanEdgeOptions())) {
+      edges->edges.push_back(std::move(edge));
+    }
+  }
+  edges_ = std::move(edges);
+  publish([&] { edges_ready_ = edges_.get(); });
+}
+
+const ScanRays* PickScene::WaitForRays(const std::function<bool()>& give_up) const {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (rays_ready_ == nullptr && !give_up()) {
+    changed_.wait_for(lock, std::chrono::milliseconds(50));
+  }
+  return rays_ready_;
+}
+
+const PickScene::Edges* PickScene::WaitForEdges(const std::function<bool()>& give_up) const {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (edges_ready_ == nullptr && !give_up()) {
+    changed_.wait_for(lock, std::chrono::milliseconds(50));
+  }
+  return edges_ready_;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,98 @@
+#pragma once
+// What roomtex-pick works on and what does not change while it runs: sparse model, photos, scans.
+// What takes seconds is made in the background.
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "align/free_space.h"
+#include "align/overlay.h"
+#include "align/pick/scan_places.h"
+#include "align/pick/scan_rays.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/camera_model.h"
+#include "core/progress.h"
+#include "core/scan.h"
+#include "importers/scan_reader.h"
+
+namespace roomtex {
+
+struct PickSceneInput {
+  std::string input_path, image_path, scan_poses;
+  std::vector<std::string> scan_paths;
+  ScanReaderOptions scan_reader;
+  int num_threads = -1;
+};
+
+struct PickPhoto {
+  int id = 0;  // position in PickScene::photos(), which are in the order of their names
+  const SparseImage* image = nullptr;
+  const CameraProjection* projection = nullptr;
+  std::string path;
+  // The file that can be shown: there, inside the folder of the photos, of its camera's size;
+  // otherwise why it is not, in a sentence.
+  bool missing = false;
+  std::string problem;
+  int num_points = 0;  // sparse points it sees
+  int rank = 0;        // 1 = pick here first: many sparse points, all over the photo
+
+  const std::string& name() const { return image->name; }
+};
+
+class PickScene {
+ public:
+  // Throws InputError.
+  PickScene(const PickSceneInput& input, Progress* progress);
+  ~PickScene();  // ends what runs in the background
+
+  const PickSceneInput& input() const { return input_; }
+  const SparseModel& model() const { return model_; }
+  const std::vector<Scan>& scans() const { return scans_; }
+  int num_scans() const { return static_cast<int>(scans_.size()); }
+  // The grid that is picked on: the scan's own, or of a mesh what PanoramaOfMesh() makes of it.
+  const ScanPlaces& places(int scan) const { return *places_[scan]; }
+  const std::vector<PickPhoto>& photos() const { return photos_; }
+  const PickPhoto* FindPhoto(const std::string& name) const;
+
+  // Begins to make what takes seconds.
+  void Prepare();
+  // Null until it stands.
+  const ScanRays* rays() const { return rays_ready_.load(); }
+  struct Edges {
+    std::unique_ptr<FreeSpace> free_space;
+    std::vector<ScanEdge> edges;
+  };
+  // Null until they stand, or when give_up() became true while waiting for them.
+  const ScanRays* WaitForRays(const std::function<bool()>& give_up) const;
+  const Edges* WaitForEdges(const std::function<bool()>& give_up) const;
+
+ private:
+  void AddPhotos();
+  void RankPhotos();
+  void Work();
+
+  const PickSceneInput input_;
+  SparseModel model_;
+  std::vector<Scan> scans_;
+  std::deque<Scan> panoramas_;  // of meshes
+  std::vector<std::unique_ptr<ScanPlaces>> places_;
+  std::map<uint32_t, CameraProjection> projections_;
+  std::vector<PickPhoto> photos_;
+
+  std::thread worker_;
+  std::atomic<bool> stopping_{false};
+  std::unique_ptr<ScanRays> rays_;
+  std::unique_ptr<Edges> edges_;
+  std::atomic<const ScanRays*> rays_ready_{nullptr};
+  std::atomic<const Edges*> edges_ready_{nullptr};
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,53 @@
+#pragma once
+// Serves the page of roomtex-pick: the paths of align/pick/README.md.
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "align/pick/pick_scene.h"
+#include "align/pick/pick_session.h"
+#include "core/image_tiles.h"
+#include "core/local_server.h"
+#include "core/page.h"
+
+namespace roomtex {
+
+class PickServer {
+ public:
+  struct Setup {
+    LocalServerOptions server;
+    std::string image_name;    // the photo to begin with; "" = choose
+    std::string aligned_path;  // where roomtex-align writes
+  };
+
+  // scene and session must outlive it.
+  PickServer(const PickScene& scene, PickSession* session, const Page& page, const Setup& setup);
+  ~PickServer();
+
+  // As LocalServer.
+  void Start(bool stop_on_signals) { server_.Start(stop_on_signals); }
+  void Wait() { server_.Wait(); }
+  const LocalServer& server() const { return server_; }
+
+ private:
+  using Query = LocalServer::Query;
+  using Content = LocalServer::Content;
+  void AddPictures();
+  Json State();
+  std::optional<Content> Tile(const Query& query);
+  std::optional<Content> Thumbnail(const Query& query);
+  Json ScanPoint(const Query& query) const;
+  int SelectedPhoto() const;
+
+  const PickScene& scene_;
+  PickSession* const session_;
+  const Setup setup_;
+  ImageTiles tiles_;
+  std::mutex thumbnails_mutex_;  // one is made at a time: tiles are more urgent
+  std::map<int, std::shared_ptr<const std::string>> thumbnails_;
+  LocalServer server_;  // last: its threads use the rest
+};
+
+}  // namespace roomtex

@@ -1,0 +1,90 @@
+#pragma once
+// What the picks say, for the page: poses, residuals, doubts. By the functions that roomtex-align
+// runs, so that both say the same of the same picks.
+
+#include <limits>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "align/pick/pick_scene.h"
+#include "align/pick/session_pick.h"
+
+namespace roomtex {
+
+inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+// NaN where there is no number.
+struct PickState {
+  enum class Status { kUsed, kOff, kBad, kHalf, kWaiting };
+  Status status = Status::kHalf;
+  Eigen::Vector2d error_px = Eigen::Vector2d::Constant(kNoNumber);  // projection - click
+  double residual_px = kNoNumber;
+  // Metres between the picked point and the click's ray where that is as deep as the point.
+  double residual = kNoNumber;
+  double leave_one_out_px = kNoNumber;
+  bool worst = false;  // of the used picks of its photo
+  // Where the missing partner of a half pick should be.
+  std::optional<Eigen::Vector2d> predicted_img;
+  std::optional<ScanSpot> predicted_spot;
+  Eigen::Vector3d predicted_point = Eigen::Vector3d::Zero();
+};
+
+struct PhotoState {
+  enum class By { kNothing, kPicks, kSparseModel };
+  int num_complete = 0, num_used = 0;
+  By by = By::kNothing;
+  Rigid cam_from_scan;        // only if solved()
+  double rms_px = kNoNumber;  // weighted, of the used picks
+  double rms = kNoNumber;     // metres, the same
+  double position_sigma = kNoNumber;
+  bool ambiguous = false;
+  std::vector<std::string> warnings;
+
+  bool solved() const { return by != By::kNothing; }
+};
+
+struct PickSolution {
+  std::vector<PickState> picks;              // one per pick
+  std::map<std::string, PhotoState> photos;  // all of the model
+  std::optional<Similarity> scan_from_sparse;
+  ScaleEstimate scale;
+  double rms_px = kNoNumber;  // of all used picks, as roomtex-align's picks.rms_px
+  int num_clicked_photos = 0;
+  bool with_rays = false;  // the ray caster stood
+  std::string next;        // what to do now
+};
+
+class PickSolver {
+ public:
+  explicit PickSolver(const PickScene& scene) : scene_(scene) {}
+
+  // One call at a time.
+  PickSolution Solve(const std::vector<SessionPick>& picks);
+
+ private:
+  struct View;
+  struct Joint;
+  PickReview Review(const std::string& name, const CameraProjection& projection,
+                    const PointPairs& pairs);
+  void SolveView(const ScanRays* rays, View* view, PhotoState* photo);
+  void FitModel(const std::vector<SessionPick>& picks, const std::vector<View>& views,
+                PickSolution* solution) const;
+  void Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const;
+  void Predict(const std::vector<SessionPick>& picks, const ScanRays* rays,
+               PickSolution* solution) const;
+
+  const PickScene& scene_;
+  const AlignmentOptions options_;
+  // The review of a photo whose picks have not changed is not made again.
+  struct Reviewed {
+    PointPairs pairs;
+    PickReview review;
+  };
+  std::map<std::string, Reviewed> reviewed_;
+};
+
+}  // namespace roomtex
