@@ -1,18 +1,18 @@
 // Runs roomtex-align on the saved picks and shows what it says, also when it says no.
 
-import { api, ServerError } from './api.js';
-import { byId, el } from './dom.js';
+import {api, ServerError} from './api.js';
+import {byId, el} from './dom.js';
 
 const kPoll = 400;  // milliseconds
 const kVerdicts = {
-  trusted: { sign: '✓', text: 'Trusted' },
-  untrusted: { sign: '▲', text: 'Not trusted' },
-  failed: { sign: '✕', text: 'Refused' },
+  trusted: {sign: '✓', text: 'Trusted'},
+  untrusted: {sign: '▲', text: 'Not trusted'},
+  failed: {sign: '✕', text: 'Refused'},
 };
 
 export class AlignDialog {
-  #status = null;    // the server's last answer
-  #revision = -1;    // of the picks that it rests on
+  #status = null;  // the server's last answer
+  #revision = -1;  // of the picks that it rests on
   #parts = {};
   #timer = 0;
 
@@ -24,13 +24,16 @@ export class AlignDialog {
     this.button = byId('align-open');
     this.button.addEventListener('click', () => this.open());
     const parts = this.#parts;
-    parts.close = el('button', { type: 'button', onclick: () => this.dialog.close() }, 'Close');
-    parts.again = el('button', { type: 'button', class: 'main', onclick: () => this.#start() }, 'Run again');
-    parts.end = el('button', { type: 'button', onclick: () => this.#end() }, 'Cancel');
-    parts.body = el('div', { class: 'body', tabindex: '0', role: 'region', 'aria-label': 'What roomtex-align says' });
-    parts.live = el('p', { role: 'status', class: 'hidden' });
+    parts.close = el('button', {type: 'button', onclick: () => this.dialog.close()}, 'Close');
+    parts.again =
+        el('button', {type: 'button', class: 'main', onclick: () => this.#start()}, 'Run again');
+    parts.end = el('button', {type: 'button', onclick: () => this.#end()}, 'Cancel');
+    parts.body =
+        el('div',
+           {class: 'body', tabindex: '0', role: 'region', 'aria-label': 'What roomtex-align says'});
+    parts.live = el('p', {role: 'status', class: 'hidden'});
     this.dialog.append(
-        el('header', {}, el('h2', { id: 'align-title' }, 'Align')), parts.live, parts.body,
+        el('header', {}, el('h2', {id: 'align-title'}, 'Align')), parts.live, parts.body,
         el('footer', {}, parts.end, parts.again, parts.close));
     this.#poll();  // a run may be under way from before this page was opened
   }
@@ -40,18 +43,24 @@ export class AlignDialog {
     if (!this.dialog.open) this.dialog.showModal();
     const known = this.#status && this.#status.state !== 'idle' &&
         (this.#status.state === 'running' || this.#revision === this.picks.session.revision);
-    if (known) this.#show();
-    else this.#start();
+    if (known)
+      this.#show();
+    else
+      this.#start();
   }
 
   async #start() {
-    const { body } = this.#parts;
-    const most = Math.max(0, ...Object.values(this.picks.session.photos).map((one) => one.num_complete));
+    const {body} = this.#parts;
+    const most =
+        Math.max(0, ...Object.values(this.picks.session.photos).map((one) => one.num_complete));
     if (most < this.facts.min_picks) {
       this.#status = null;
       this.#buttons(false);
-      body.replaceChildren(el('p', {}, `roomtex-align needs ${this.facts.min_picks} picks in one photo; ` +
-          `there are ${most} so far.`), el('p', {}, this.picks.session.next));
+      body.replaceChildren(
+          el('p', {},
+             `roomtex-align needs ${this.facts.min_picks} picks in one photo; ` +
+                 `there are ${most} so far.`),
+          el('p', {}, this.picks.session.next));
       return;
     }
     this.#message('Saving the picks…');
@@ -59,7 +68,8 @@ export class AlignDialog {
       await new Promise((done) => setTimeout(done, 50));
     }
     if (this.picks.state !== 'saved') {
-      this.#message(`The picks are not saved: ${this.picks.why}. roomtex-align reads the saved ones.`);
+      this.#message(
+          `The picks are not saved: ${this.picks.why}. roomtex-align reads the saved ones.`);
       return;
     }
     this.#revision = this.picks.session.revision;
@@ -107,32 +117,38 @@ export class AlignDialog {
       this.#timer = setTimeout(() => this.#poll(), 4 * kPoll);
       return;
     }
-    const { state, share } = this.#status;
+    const {state, share} = this.#status;
     const running = state === 'running';
     this.button.textContent = !running ? 'Align…' :
-        typeof share === 'number' ? `Aligning, ${Math.round(100 * share)} %` : 'Aligning…';
+        typeof share === 'number'      ? `Aligning, ${Math.round(100 * share)} %` :
+                                         'Aligning…';
     if (running) this.#timer = setTimeout(() => this.#poll(), kPoll);
     if (this.dialog.open && state !== 'idle') this.#show();
   }
 
   #show() {
-    if (this.#status.state === 'running') this.#showRunning();
-    else this.#showDone();
+    if (this.#status.state === 'running')
+      this.#showRunning();
+    else
+      this.#showDone();
   }
 
   #showRunning() {
-    const { body, live } = this.#parts;
-    const { stage, share, log } = this.#status;
+    const {body, live} = this.#parts;
+    const {stage, share, log} = this.#status;
     this.#buttons(true);
     let progress = body.querySelector('progress');
     if (!progress) {
-      progress = el('progress', { max: '1', 'aria-label': 'Progress of roomtex-align' });
-      body.replaceChildren(el('p', { class: 'stage' }), progress, el('pre', { class: 'log', tabindex: '0' }));
+      progress = el('progress', {max: '1', 'aria-label': 'Progress of roomtex-align'});
+      body.replaceChildren(
+          el('p', {class: 'stage'}), progress, el('pre', {class: 'log', tabindex: '0'}));
     }
     body.querySelector('.stage').textContent = stage || 'Starting…';
     if (live.textContent !== stage) live.textContent = stage;
-    if (typeof share === 'number') progress.value = share;
-    else progress.removeAttribute('value');
+    if (typeof share === 'number')
+      progress.value = share;
+    else
+      progress.removeAttribute('value');
     const box = body.querySelector('.log');
     const at_end = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
     box.textContent = log.join('\n');
@@ -145,55 +161,79 @@ export class AlignDialog {
     this.#buttons(false, true);
     this.#parts.live.textContent = `${verdict.text}. ${status.headline}`;
     const parts = [
-      el('div', { class: 'verdict', 'data-verdict': status.verdict },
-         el('span', { class: 'sign', 'aria-hidden': 'true' }, verdict.sign),
-         el('div', {}, el('strong', {}, verdict.text), el('p', { class: 'headline' }, status.headline))),
+      el('div', {class: 'verdict', 'data-verdict': status.verdict},
+         el('span', {class: 'sign', 'aria-hidden': 'true'}, verdict.sign),
+         el('div', {}, el('strong', {}, verdict.text),
+            el('p', {class: 'headline'}, status.headline))),
     ];
     if (status.sentences.length > 0) {
-      parts.push(el('ul', { class: 'sentences' }, ...status.sentences.map((one) => el('li', {}, one))));
+      parts.push(
+          el('ul', {class: 'sentences'}, ...status.sentences.map((one) => el('li', {}, one))));
     }
     if (status.facts.length > 0) {
-      parts.push(el('dl', { class: 'facts' }, ...status.facts.flatMap(
-          ({ name, value }) => [el('dt', {}, name), el('dd', {}, String(value))])));
+      parts.push(
+          el('dl', {class: 'facts'},
+             ...status.facts.flatMap(
+                 ({name, value}) => [el('dt', {}, name), el('dd', {}, String(value))])));
     }
     if (status.overlays.length > 0) {
-      parts.push(el('div', { class: 'overlays' }, ...status.overlays.map((name) => this.#overlay(name))));
+      parts.push(
+          el('div', {class: 'overlays'}, ...status.overlays.map((name) => this.#overlay(name))));
     }
     parts.push(this.#command(status.command));
     if (status.log.length > 0) {
-      parts.push(el('details', {}, el('summary', {}, `What it said while it ran (exit code ${status.exit_code})`),
-                    el('pre', { class: 'log', tabindex: '0' }, status.log.join('\n'))));
+      parts.push(
+          el('details', {},
+             el('summary', {}, `What it said while it ran (exit code ${status.exit_code})`),
+             el('pre', {class: 'log', tabindex: '0'}, status.log.join('\n'))));
     }
     this.#parts.body.replaceChildren(...parts);
     this.#parts.body.scrollTop = 0;
   }
 
   #command(line) {
-    const code = el('code', { tabindex: '0' }, line);
-    const copy = el('button', { type: 'button', onclick: async () => {
-      getSelection().selectAllChildren(code);
-      try {
-        await navigator.clipboard.writeText(line);
-        copy.textContent = 'Copied';
-      } catch (error) {
-        copy.textContent = 'Marked: press Ctrl+C';
-      }
-    } }, 'Copy');
-    return el('div', {}, el('p', { class: 'quiet' }, 'The same in a shell:'),
-              el('div', { class: 'command' }, code, copy));
+    const code = el('code', {tabindex: '0'}, line);
+    const copy =
+        el('button', {
+          type: 'button',
+          onclick: async () => {
+            getSelection().selectAllChildren(code);
+            try {
+              await navigator.clipboard.writeText(line);
+              copy.textContent = 'Copied';
+            } catch (error) {
+              copy.textContent = 'Marked: press Ctrl+C';
+            }
+          }
+        },
+           'Copy');
+    return el(
+        'div', {}, el('p', {class: 'quiet'}, 'The same in a shell:'),
+        el('div', {class: 'command'}, code, copy));
   }
 
   #overlay(name) {
-    return el('button', { type: 'button', 'aria-label': `Enlarge ${name}`, onclick: () => this.#enlarge(name) },
-              el('img', { src: api.overlay(name), alt: `${name}: photo, scan from its pose, edges`, loading: 'lazy' }),
-              el('span', {}, name));
+    return el(
+        'button',
+        {type: 'button', 'aria-label': `Enlarge ${name}`, onclick: () => this.#enlarge(name)},
+        el('img', {
+          src: api.overlay(name),
+          alt: `${name}: photo, scan from its pose, edges`,
+          loading: 'lazy'
+        }),
+        el('span', {}, name));
   }
 
   #enlarge(name) {
     const large = byId('large');
     large.replaceChildren(
-        el('header', {}, el('h2', {}, name), el('button', { type: 'button', onclick: () => large.close() }, 'Close')),
-        el('img', { src: api.overlay(name), alt: `${name}: photo, scan from its pose, edges`, onclick: () => large.close() }));
+        el('header', {}, el('h2', {}, name),
+           el('button', {type: 'button', onclick: () => large.close()}, 'Close')),
+        el('img', {
+          src: api.overlay(name),
+          alt: `${name}: photo, scan from its pose, edges`,
+          onclick: () => large.close()
+        }));
     large.showModal();
   }
 }

@@ -37,7 +37,7 @@ async function ask(path, init = {}) {
 function send(method, path, body) {
   return ask(path, {
     method,
-    headers: { 'Content-Type': 'application/json' },
+    headers: {'Content-Type': 'application/json'},
     body: JSON.stringify(body),
   });
 }
@@ -45,8 +45,8 @@ function send(method, path, body) {
 export const api = {
   state: () => ask('state'),
   scanPoint: (scan, x, y) => ask(`scan_point?scan=${scan}&x=${x}&y=${y}`),
-  putPicks: (revision, picks) => send('PUT', 'picks', { revision, picks }),
-  edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, { signal }),
+  putPicks: (revision, picks) => send('PUT', 'picks', {revision, picks}),
+  edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, {signal}),
   startAlign: () => send('POST', 'align', {}),
   endAlign: () => send('DELETE', 'align', {}),
   align: () => ask('align'),

@@ -2,21 +2,21 @@
 // scan's edges over the photo. Both belong to a revision of the picks; they follow once the picks
 // rest for a moment, and until the new one has come the old one stays.
 
-import { api, ServerError } from './api.js';
-import { byId, clamp, setText } from './dom.js';
-import { drawEdges } from './markers.js';
-import { drawTiles } from './tiles.js';
+import {api, ServerError} from './api.js';
+import {byId, clamp, setText} from './dom.js';
+import {drawEdges} from './markers.js';
+import {drawTiles} from './tiles.js';
 
 const kSettle = 250;  // milliseconds without a change
 const kBlink = 500;   // milliseconds on, and off
 
 export class BackProjection {
-  mode = 'off';  // "over", "swipe", "blink"
+  mode = 'off';   // "over", "swipe", "blink"
   #shown = null;  // picture, see tiles.js
   #next = null;   // the picture of a newer revision, while its tiles come
   #canvas = new OffscreenCanvas(1, 1);
   #opacity = 0.6;
-  #line = 0.5;    // of the swipe, share of the pane's width
+  #line = 0.5;  // of the swipe, share of the pane's width
   #lit = true;
   #before = 'off';  // mode before blinking
   #timer = 0;
@@ -29,14 +29,16 @@ export class BackProjection {
     pane.drawings.push((context, view) => this.#drawLine(context, view));
     this.select.addEventListener('change', () => this.setMode(this.select.value));
     this.range.addEventListener('input', () => {
-      if (this.mode === 'swipe') this.#line = this.range.value / 100;
-      else this.#opacity = this.range.value / 100;
+      if (this.mode === 'swipe')
+        this.#line = this.range.value / 100;
+      else
+        this.#opacity = this.range.value / 100;
       pane.redraw();
     });
     // The line can be taken with the mouse.
     this.grip = {
-      hit: ([x]) => this.mode === 'swipe' && this.available &&
-          Math.abs(x - this.#line * pane.view.width) < 6,
+      hit: ([x]) =>
+          this.mode === 'swipe' && this.available && Math.abs(x - this.#line * pane.view.width) < 6,
       drag: ([x]) => {
         this.#line = clamp(x / pane.view.width, 0.02, 0.98);
         this.#showRange();
@@ -45,18 +47,29 @@ export class BackProjection {
     };
   }
 
-  get available() { return this.#shown !== null || this.#next !== null; }
+  get available() {
+    return this.#shown !== null || this.#next !== null;
+  }
 
   // picture: of the scan; null: no solution for this photo.
   show(photo, scan, revision) {
     if (!scan || revision === null) {
       this.#shown = this.#next = null;
     } else {
-      const { width, height, tile_size, num_levels } = scan;
-      const next = { width, height, tile_size, num_levels, photo: photo.id, scan: scan.id,
-                     revision, url: api.backTile(photo.id, scan.id, revision) };
+      const {width, height, tile_size, num_levels} = scan;
+      const next = {
+        width,
+        height,
+        tile_size,
+        num_levels,
+        photo: photo.id,
+        scan: scan.id,
+        revision,
+        url: api.backTile(photo.id, scan.id, revision)
+      };
       const now = this.#next ?? this.#shown;
-      if (now && now.photo === next.photo && now.scan === next.scan && now.revision === revision) return;
+      if (now && now.photo === next.photo && now.scan === next.scan && now.revision === revision)
+        return;
       if (this.#shown && (this.#shown.photo !== next.photo || this.#shown.scan !== next.scan)) {
         this.#shown = null;
       }
@@ -106,7 +119,7 @@ export class BackProjection {
 
   #draw(context, view, ratio, pane) {
     if (this.mode === 'off' || !this.available) return [];
-    const { width, height } = context.canvas;
+    const {width, height} = context.canvas;
     if (this.#canvas.width !== width || this.#canvas.height !== height) {
       [this.#canvas.width, this.#canvas.height] = [width, height];
     }
@@ -114,7 +127,7 @@ export class BackProjection {
     layer.clearRect(0, 0, width, height);
     const urls = [];
     if (this.#next) {
-      const coming = drawTiles(layer, this.#next, view, pane.store, { ratio });
+      const coming = drawTiles(layer, this.#next, view, pane.store, {ratio});
       urls.push(...coming);
       if (coming.every((url) => pane.store.get(url))) {
         this.#shown = this.#next;
@@ -123,7 +136,7 @@ export class BackProjection {
     }
     if (this.#shown && this.#next) layer.clearRect(0, 0, width, height);
     if (this.#shown) {
-      const old = drawTiles(layer, this.#shown, view, pane.store, { ratio });
+      const old = drawTiles(layer, this.#shown, view, pane.store, {ratio});
       if (!this.#next) urls.push(...old);
     }
     if (!this.#lit) return urls;
@@ -155,10 +168,11 @@ export class EdgeLayer {
   #key = '';
   #asking = null;
 
-  constructor(pane, legend) {
+  constructor(pane) {
     this.pane = pane;
-    this.legend = legend;
-    pane.drawings.unshift((context, view) => { if (this.on) drawEdges(context, view, this.edges); });
+    pane.drawings.unshift((context, view) => {
+      if (this.on) drawEdges(context, view, this.edges);
+    });
   }
 
   // revision null: no solution.

@@ -1,7 +1,7 @@
 // The bars between photo and scan, and between pictures and lists: dragged, or moved by arrow keys.
 // Shares of the window are kept, so both sides grow with it; they are remembered for the next time.
 
-import { byId, clamp } from './dom.js';
+import {byId, clamp} from './dom.js';
 
 function listenTo(id, variable, shareAt, keys) {
   const divider = byId(id);
@@ -43,7 +43,8 @@ export function listenToDividers() {
   listenTo('divider', '--photo-share', (event) => {
     const box = byId('work').getBoundingClientRect();
     return 100 * (event.clientX - box.left) / box.width;
-  }, { ArrowLeft: -2, ArrowRight: 2 });
-  listenTo('dock-divider', '--dock-share', (event) => 100 * (innerHeight - event.clientY) / innerHeight,
-           { ArrowUp: 2, ArrowDown: -2 });
+  }, {ArrowLeft: -2, ArrowRight: 2});
+  listenTo(
+      'dock-divider', '--dock-share', (event) => 100 * (innerHeight - event.clientY) / innerHeight,
+      {ArrowUp: 2, ArrowDown: -2});
 }

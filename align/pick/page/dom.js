@@ -6,9 +6,12 @@ export function el(name, attributes = {}, ...children) {
   const element = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
-    if (key.startsWith('on')) element.addEventListener(key.slice(2), value);
-    else if (key === 'class') element.className = value;
-    else element.setAttribute(key, value === true ? '' : value);
+    if (key.startsWith('on'))
+      element.addEventListener(key.slice(2), value);
+    else if (key === 'class')
+      element.className = value;
+    else
+      element.setAttribute(key, value === true ? '' : value);
   }
   element.append(...children.filter((child) => child !== null && child !== undefined));
   return element;
@@ -43,11 +46,14 @@ export function typing(target) {
 
 // At most one sentence at a time, read out by screen readers.
 let toast_timer = 0;
-export function say(text, { seconds = 5, urgent = false } = {}) {
+export function say(text, {seconds = 5, urgent = false} = {}) {
   const toast = byId('toast');
   toast.setAttribute('role', urgent ? 'alert' : 'status');
   toast.textContent = text;
   toast.hidden = text === '';
   clearTimeout(toast_timer);
-  if (text && seconds) toast_timer = setTimeout(() => { toast.hidden = true; }, seconds * 1000);
+  if (text && seconds)
+    toast_timer = setTimeout(() => {
+      toast.hidden = true;
+    }, seconds * 1000);
 }

@@ -1,24 +1,24 @@
 // What clicks, drags and keys do to the picks. Sides are "photo" and "scan".
 //
-// Where a click of the scan lands is for the server to judge (missing samples, depth edges), so a place
-// in the scan is first only tried: until the answer has come, and after a refusal, it is `tried` and
-// not part of the picks.
+// Where a click of the scan lands is for the server to judge (missing samples, depth edges), so a
+// place in the scan is first only tried: until the answer has come, and after a refusal, it is
+// `tried` and not part of the picks.
 
-import { api, ServerError } from './api.js';
-import { clamp, say } from './dom.js';
+import {api, ServerError} from './api.js';
+import {clamp, say} from './dom.js';
 
 const kLiveInterval = 80;  // milliseconds between two places tried while a marker is dragged
 
 export class Editor {
-  photo = null;     // of the server's state
+  photo = null;  // of the server's state
   scan = null;
   selected = null;  // uid
   side = 'photo';   // the pane that keys mean
   // {uid (null: a new pick), place: [x, y], scan: id, message, snap: [x, y] | null}
   tried = null;
-  cross = { photo: null, scan: null };  // img of the crosshair that keys move, once they did
+  cross = {photo: null, scan: null};  // img of the crosshair that keys move, once they did
   #try_count = 0;
-  #drag = null;     // {side, uid, last, busy, next}
+  #drag = null;  // {side, uid, last, busy, next}
 
   // on: {changed(), choosePhoto(name), chooseScan(id), centre(side, img)}
   constructor(picks, on) {
@@ -26,17 +26,35 @@ export class Editor {
     this.on = on;
   }
 
+  showPhoto(photo) {
+    this.photo = photo;
+    this.cross.photo = null;
+    // A scan point without a partner goes along to the new photo.
+    const loose = this.picks.list.find((pick) => !pick.img);
+    if (!loose || loose.image_name === photo.name) return;
+    const label = `pick ${this.picks.numberOf(loose.uid)} to ${photo.name}`;
+    this.picks.set(label, loose.uid, {image_name: photo.name}, `photo of ${loose.uid}`);
+  }
+
+  showScan(scan) {
+    this.scan = scan;
+    this.cross.scan = null;
+  }
+
   // The unfinished pick that a click completes or moves: of this photo, or of none yet.
   get half() {
-    return this.picks.list.find((pick) => (!pick.img || !pick.scan) &&
-        (pick.image_name === this.photo?.name || !pick.img)) ?? null;
+    return this.picks.list.find(
+               (pick) => (!pick.img || !pick.scan) &&
+                   (pick.image_name === this.photo?.name || !pick.img)) ??
+        null;
   }
 
   // Where a pick lies on a side, or null; only what is on the picture that is shown.
   placeOf(pick, side) {
     if (!pick) return null;
     if (side === 'photo') return pick.image_name === this.photo?.name ? pick.img : null;
-    if (this.tried && this.tried.uid === pick.uid && this.tried.scan === this.scan?.id) return this.tried.place;
+    if (this.tried && this.tried.uid === pick.uid && this.tried.scan === this.scan?.id)
+      return this.tried.place;
     return pick.scan && pick.scan.id === this.scan?.id ? [pick.scan.x, pick.scan.y] : null;
   }
 
@@ -45,10 +63,12 @@ export class Editor {
     const row = pick && this.picks.rows.get(pick.uid);
     if (!row) return null;
     if (side === 'photo') {
-      return !pick.img && pick.scan && pick.image_name === this.photo?.name ? row.predicted_img : null;
+      return !pick.img && pick.scan && pick.image_name === this.photo?.name ? row.predicted_img :
+                                                                              null;
     }
     const place = row.predicted_scan;
-    return !pick.scan && pick.img && place && place.id === this.scan?.id ? [place.x, place.y] : null;
+    return !pick.scan && pick.img && place && place.id === this.scan?.id ? [place.x, place.y] :
+                                                                           null;
   }
 
   // For drawing and for the mouse.
@@ -60,8 +80,12 @@ export class Editor {
       if (!place) return;
       const row = this.picks.rows.get(pick.uid);
       markers.push({
-        id: pick.uid, number: index + 1, place, status: this.picks.statusOf(pick),
-        worst: row?.worst === true, selected: pick.uid === this.selected,
+        id: pick.uid,
+        number: index + 1,
+        place,
+        status: this.picks.statusOf(pick),
+        worst: row?.worst === true,
+        selected: pick.uid === this.selected,
         dim: side === 'scan' && pick.image_name !== this.photo?.name && pick.img !== null,
         residual: row?.residual ?? null,
       });
@@ -69,7 +93,7 @@ export class Editor {
     return markers;
   }
 
-  select(uid, { centre = false } = {}) {
+  select(uid, {centre = false} = {}) {
     const pick = this.picks.find(uid);
     this.forgetTried();
     this.selected = pick ? uid : null;
@@ -85,12 +109,12 @@ export class Editor {
   }
 
   step(step) {
-    const { list } = this.picks;
+    const {list} = this.picks;
     if (list.length === 0) return;
     const at = list.findIndex((pick) => pick.uid === this.selected);
     const to = at < 0 ? (step > 0 ? 0 : list.length - 1) : (at + step + list.length) % list.length;
-    this.select(list[to].uid, { centre: true });
-    say(`Pick ${to + 1} of ${list.length}`, { seconds: 1.5 });
+    this.select(list[to].uid, {centre: true});
+    say(`Pick ${to + 1} of ${list.length}`, {seconds: 1.5});
   }
 
   // A point is set: the click of a mouse, or of the crosshair.
@@ -104,10 +128,12 @@ export class Editor {
     const name = this.photo.name;
     if (half) {
       const label = half.img ? 'moved' : 'completed';
-      this.picks.set(`pick ${this.picks.numberOf(half.uid)} ${label}`, half.uid, { img, image_name: name });
+      this.picks.set(
+          `pick ${this.picks.numberOf(half.uid)} ${label}`, half.uid, {img, image_name: name});
       this.selected = half.uid;
     } else {
-      this.selected = this.picks.add(`pick ${this.picks.list.length + 1} begun`, { image_name: name, img });
+      this.selected =
+          this.picks.add(`pick ${this.picks.list.length + 1} begun`, {image_name: name, img});
     }
     this.on.changed();
   }
@@ -118,7 +144,7 @@ export class Editor {
     } catch (error) {
       if (!(error instanceof ServerError)) throw error;
       if (error.kind !== 'refused') this.picks.check();
-      return { ok: false, message: `Not set: ${error.message}.`, snap: null };
+      return {ok: false, message: `Not set: ${error.message}.`, snap: null};
     }
   }
 
@@ -126,30 +152,31 @@ export class Editor {
   async #tryPlace(uid, place, merge = '') {
     const count = ++this.#try_count;
     const scan = this.scan.id;
-    this.tried = { uid, place, scan, message: '', snap: null };
+    this.tried = {uid, place, scan, message: '', snap: null};
     this.on.changed();
     const answer = await this.#ask(scan, place);
     if (count !== this.#try_count) return;  // another place has been tried since
     if (!answer.ok) {
       const snap = answer.snap ? [answer.snap.x, answer.snap.y] : null;
-      this.tried = { uid, place, scan, message: answer.message, snap };
+      this.tried = {uid, place, scan, message: answer.message, snap};
       this.on.changed();
       return;
     }
     this.tried = null;
-    this.#setScan(uid, { id: scan, x: place[0], y: place[1] }, answer.point, merge);
+    this.#setScan(uid, {id: scan, x: place[0], y: place[1]}, answer.point, merge);
   }
 
   #setScan(uid, scan, point, merge) {
     const pick = uid === null ? null : this.picks.find(uid);
     if (pick) {
       const label = pick.scan ? 'moved in the scan' : 'completed';
-      // A scan point that was clicked first belongs to the photo that is shown when it is completed.
-      this.picks.set(`pick ${this.picks.numberOf(uid)} ${label}`, uid, { scan, point: null }, merge);
+      // A scan point that was clicked first belongs to the photo that is shown when it is
+      // completed.
+      this.picks.set(`pick ${this.picks.numberOf(uid)} ${label}`, uid, {scan, point: null}, merge);
       this.selected = uid;
     } else {
-      this.selected = this.picks.add(`pick ${this.picks.list.length + 1} begun`,
-                                     { image_name: this.photo.name, scan });
+      this.selected = this.picks.add(
+          `pick ${this.picks.list.length + 1} begun`, {image_name: this.photo.name, scan});
     }
     this.on.changed();
   }
@@ -177,7 +204,7 @@ export class Editor {
       return true;
     }
     if (!half.scan && row.predicted_scan) {
-      const { id, x, y } = row.predicted_scan;
+      const {id, x, y} = row.predicted_scan;
       if (id !== this.scan?.id) this.on.chooseScan(id);
       this.#tryPlace(half.uid, [x, y]);
       return true;
@@ -188,7 +215,8 @@ export class Editor {
   showGhost() {
     const half = this.half;
     const row = half && this.picks.rows.get(half.uid);
-    if (row?.predicted_scan && row.predicted_scan.id !== this.scan?.id) this.on.chooseScan(row.predicted_scan.id);
+    if (row?.predicted_scan && row.predicted_scan.id !== this.scan?.id)
+      this.on.chooseScan(row.predicted_scan.id);
     for (const side of ['photo', 'scan']) {
       const ghost = this.ghostOf(half, side);
       if (ghost) this.on.centre(side, ghost);
@@ -210,7 +238,9 @@ export class Editor {
     const pick = this.picks.find(uid);
     if (!pick || !pick.img || !pick.scan || (pick.weight !== 0) === on) return;
     const number = this.picks.numberOf(uid);
-    this.picks.set(`pick ${number} ${on ? 'on' : 'off'}`, uid, { weight: on ? pick.on_weight ?? 1 : 0, on_weight: pick.weight });
+    this.picks.set(
+        `pick ${number} ${on ? 'on' : 'off'}`, uid,
+        {weight: on ? pick.on_weight ?? 1 : 0, on_weight: pick.weight});
     this.on.changed();
   }
 
@@ -228,7 +258,7 @@ export class Editor {
       this.remove(this.selected);
     } else {
       this.selected = null;
-      this.cross = { photo: null, scan: null };
+      this.cross = {photo: null, scan: null};
     }
     this.on.changed();
   }
@@ -237,15 +267,15 @@ export class Editor {
     this.forgetTried();
     const step = redo ? this.picks.redo() : this.picks.undo();
     if (!step) return;
-    say(`${redo ? 'Again' : 'Undone'}: ${step.label}`, { seconds: 2.5 });
+    say(`${redo ? 'Again' : 'Undone'}: ${step.label}`, {seconds: 2.5});
     const pick = this.picks.find(step.uid);
     if (pick?.img && pick.image_name !== this.photo?.name) this.on.choosePhoto(pick.image_name);
     this.selected = pick ? step.uid : null;
     this.on.changed();
   }
 
-  // Arrow keys: the selected point of the side, else the crosshair. dx, dy: in pixels for the point;
-  // for the crosshair `screen_step` more, so that it is quick where the picture is small.
+  // Arrow keys: the selected point of the side, else the crosshair. dx, dy: in pixels for the
+  // point; for the crosshair `screen_step` more, so that it is quick where the picture is small.
   move(side, dx, dy, view) {
     const pick = this.picks.find(this.selected);
     const place = this.placeOf(pick, side);
@@ -253,13 +283,18 @@ export class Editor {
     if (!place) {
       const from = this.crossOf(side, view);
       const step = Math.max(1, 10 / view.scale);
-      this.cross[side] = [clamp(from[0] + dx * step, 0, width), clamp(from[1] + dy * step, 0, height)];
+      this.cross[side] =
+          [clamp(from[0] + dx * step, 0, width), clamp(from[1] + dy * step, 0, height)];
       this.on.changed();
       return;
     }
     const to = [clamp(place[0] + dx, 0, width), clamp(place[1] + dy, 0, height)];
-    if (side === 'scan') this.#tryPlace(pick.uid, to, `nudge scan ${pick.uid}`);
-    else this.picks.set(`pick ${this.picks.numberOf(pick.uid)} moved`, pick.uid, { img: to }, `nudge photo ${pick.uid}`);
+    if (side === 'scan')
+      this.#tryPlace(pick.uid, to, `nudge scan ${pick.uid}`);
+    else
+      this.picks.set(
+          `pick ${this.picks.numberOf(pick.uid)} moved`, pick.uid, {img: to},
+          `nudge photo ${pick.uid}`);
     this.on.changed();
   }
 
@@ -271,7 +306,7 @@ export class Editor {
   dragStart(side, uid) {
     this.forgetTried();
     this.selected = uid;
-    this.#drag = { side, uid, last: 0, busy: false, next: null };
+    this.#drag = {side, uid, last: 0, busy: false, next: null};
     this.picks.begin(`pick ${this.picks.numberOf(uid)} moved`, uid);
   }
 
@@ -280,9 +315,9 @@ export class Editor {
     if (!drag) return;
     const to = [clamp(img[0], 0, view.picture_width), clamp(img[1], 0, view.picture_height)];
     if (side === 'photo') {
-      this.picks.live(uid, { img: to });
+      this.picks.live(uid, {img: to});
     } else {
-      this.tried = { uid, place: to, scan: this.scan.id, message: '', snap: null };
+      this.tried = {uid, place: to, scan: this.scan.id, message: '', snap: null};
       drag.next = to;
       this.#dragScan(drag);
     }
@@ -302,14 +337,19 @@ export class Editor {
     const answer = this.#drag === drag ? await this.#ask(scan, place) : null;
     drag.busy = false;
     if (this.#drag !== drag) return;
-    if (answer.ok) this.picks.live(drag.uid, { scan: { id: scan, x: place[0], y: place[1] }, point: null });
+    if (answer.ok)
+      this.picks.live(drag.uid, {scan: {id: scan, x: place[0], y: place[1]}, point: null});
     drag.message = answer.ok ? '' : answer.message;
     this.on.changed();
     this.#dragScan(drag);
   }
 
-  get drag_message() { return this.#drag?.message ?? ''; }
-  get dragging() { return this.#drag !== null; }
+  get drag_message() {
+    return this.#drag?.message ?? '';
+  }
+  get dragging() {
+    return this.#drag !== null;
+  }
 
   async drop(side, uid, img, view) {
     const drag = this.#drag;
@@ -317,7 +357,7 @@ export class Editor {
     const to = [clamp(img[0], 0, view.picture_width), clamp(img[1], 0, view.picture_height)];
     this.#drag = null;
     if (side === 'photo') {
-      this.picks.live(uid, { img: to });
+      this.picks.live(uid, {img: to});
       this.picks.keep();
       this.on.changed();
       return;

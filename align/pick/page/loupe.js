@@ -2,8 +2,8 @@
 // crosshair, and the coordinates. It sits in a corner of the pane and goes to another one when the
 // cursor comes.
 
-import { drawTiles } from './tiles.js';
-import { View } from './view.js';
+import {drawTiles} from './tiles.js';
+import {View} from './view.js';
 
 const kMagnification = 8;  // device-independent pixels per pixel of the picture
 
@@ -27,7 +27,7 @@ export class Loupe {
   }
 
   draw() {
-    const { pane, view, canvas, place } = this;
+    const {pane, view, canvas, place} = this;
     const picture = pane.picture;
     this.element.hidden = !this.shown || !place || !picture;
     if (this.element.hidden) {
@@ -45,12 +45,12 @@ export class Loupe {
     view.width = view.height = size;
     view.scale = kMagnification;
     view.centre = [...place];
-    const context = canvas.getContext('2d', { alpha: false });
+    const context = canvas.getContext('2d', {alpha: false});
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = getComputedStyle(pane.element).backgroundColor;
     context.fillRect(0, 0, canvas.width, canvas.height);
-    pane.store.want(this, drawTiles(context, picture, view, pane.store,
-                                    { ratio, tone: pane.tone, level: 0 }));
+    pane.store.want(
+        this, drawTiles(context, picture, view, pane.store, {ratio, tone: pane.tone, level: 0}));
     context.scale(ratio, ratio);
     drawCrosshair(context, size);
     this.text.textContent = `${place[0].toFixed(1)}, ${place[1].toFixed(1)} ${this.unit}`;
@@ -64,8 +64,10 @@ export class Loupe {
     const box = this.element;
     const near = cursor && cursor[1] > this.pane.view.height - box.offsetHeight - 40;
     if (!near) return;
-    if (cursor[0] < box.offsetWidth + 40) box.classList.add('right');
-    else if (cursor[0] > this.pane.view.width - box.offsetWidth - 40) box.classList.remove('right');
+    if (cursor[0] < box.offsetWidth + 40)
+      box.classList.add('right');
+    else if (cursor[0] > this.pane.view.width - box.offsetWidth - 40)
+      box.classList.remove('right');
   }
 }
 
@@ -73,8 +75,10 @@ export class Loupe {
 function drawCrosshair(context, size) {
   const middle = size / 2;
   const gap = 7;
-  const lines = [[0, middle, middle - gap, middle], [middle + gap, middle, size, middle],
-                 [middle, 0, middle, middle - gap], [middle, middle + gap, middle, size]];
+  const lines = [
+    [0, middle, middle - gap, middle], [middle + gap, middle, size, middle],
+    [middle, 0, middle, middle - gap], [middle, middle + gap, middle, size]
+  ];
   for (const [style, width] of [['rgba(0, 0, 0, 0.75)', 3], ['#ffffff', 1]]) {
     context.strokeStyle = style;
     context.lineWidth = width;

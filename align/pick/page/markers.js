@@ -2,7 +2,7 @@
 // (see view.js). Everything has a dark rim, because photos are light and dark; what a pick is shows
 // in its shape and its text as well as in its colour.
 
-import { kMarkerReach } from './pane.js';
+import {kMarkerReach} from './pane.js';
 
 const kRadius = 9;
 export const kColors = {
@@ -27,6 +27,14 @@ function twice(context, color, width, path) {
     path();
     context.stroke();
   }
+}
+
+// Right of and above a marker at x, y that reaches `reach` to the sides; left of it at the border.
+function labelBeside(context, view, text, [x, y], reach, color, strong) {
+  context.font = kFont;
+  const width = context.measureText(text).width + 8;
+  const left = x + reach + width > view.width ? x - reach - width : x + reach;
+  label(context, text, left, Math.max(18, y), color, strong);
 }
 
 function label(context, text, x, y, color, strong) {
@@ -69,9 +77,10 @@ export function drawMarker(context, view, pick) {
   });
   context.setLineDash([]);
   if (pick.selected) twice(context, '#ffffff', 1, () => context.arc(x, y, r + 8, 0, 2 * Math.PI));
-  const signs = { bad: ' ✕', off: ' off', half: ' ?' };
-  const text = pick.number + (pick.status === 'used' && pick.worst ? ' ▲' : signs[pick.status] ?? '');
-  label(context, text, x + r + 4, y - r + 2, color, pick.selected);
+  const signs = {bad: ' ✕', off: ' off', half: ' ?'};
+  const text =
+      pick.number + (pick.status === 'used' && pick.worst ? ' ▲' : signs[pick.status] ?? '');
+  labelBeside(context, view, text, [x, y - r + 2], r + 4, color, pick.selected);
   context.globalAlpha = 1;
 }
 
@@ -91,14 +100,17 @@ export function drawGhost(context, view, place, number) {
     }
   });
   context.setLineDash([]);
-  label(context, `${number} predicted · Enter`, x + kRadius + 8, y - kRadius + 2, kColors.ghost, false);
+  labelBeside(
+      context, view, `${number} predicted · Enter`, [x, y - kRadius + 2], kRadius + 8,
+      kColors.ghost, false);
 }
 
 // An arrow at the pane's border towards something that lies outside.
 function drawAway(context, view, [x, y], text) {
   const middle = [view.width / 2, view.height / 2];
   const dx = x - middle[0], dy = y - middle[1];
-  const scale = Math.min((middle[0] - 18) / Math.abs(dx || 1e-9), (middle[1] - 18) / Math.abs(dy || 1e-9));
+  const scale =
+      Math.min((middle[0] - 18) / Math.abs(dx || 1e-9), (middle[1] - 18) / Math.abs(dy || 1e-9));
   const tip = [middle[0] + dx * scale, middle[1] + dy * scale];
   const angle = Math.atan2(dy, dx);
   context.save();
@@ -112,8 +124,9 @@ function drawAway(context, view, [x, y], text) {
   context.restore();
   context.font = kFont;
   const width = context.measureText(text).width + 8;
-  label(context, text, Math.min(Math.max(tip[0] - width / 2, 6), view.width - width - 6),
-        Math.min(Math.max(tip[1] + (dy > 0 ? -16 : 32), 22), view.height - 8), kColors.ghost, false);
+  label(
+      context, text, Math.min(Math.max(tip[0] - width / 2, 6), view.width - width - 6),
+      Math.min(Math.max(tip[1] + (dy > 0 ? -16 : 32), 22), view.height - 8), kColors.ghost, false);
 }
 
 // A place that was clicked and cannot be picked.
@@ -151,16 +164,18 @@ export function drawCrosshairCursor(context, view, place) {
 // largest round one with which no used vector is longer than a twentieth of the photo.
 // picks: [{place, residual: [dx, dy] pixels, status}].
 export function drawResiduals(context, view, picks) {
-  const longest = Math.max(0, ...picks.filter((pick) => pick.status === 'used')
-                                      .map((pick) => Math.hypot(...pick.residual)));
+  const longest = Math.max(
+      0,
+      ...picks.filter((pick) => pick.status === 'used')
+          .map((pick) => Math.hypot(...pick.residual)));
   const limit = Math.hypot(view.picture_width, view.picture_height) / 20;
   const factor = [200, 100, 50, 20, 10, 5, 2].find((one) => one * longest <= limit) ?? 1;
-  for (const { place, residual } of picks) {
+  for (const {place, residual} of picks) {
     const length = Math.hypot(...residual) * factor;
     const shown = Math.min(1, 3 * limit / Math.max(length, 1e-9));  // a pick far off: cut short
     const from = view.toScreen(place);
-    const to = view.toScreen([place[0] + residual[0] * factor * shown,
-                              place[1] + residual[1] * factor * shown]);
+    const to = view.toScreen(
+        [place[0] + residual[0] * factor * shown, place[1] + residual[1] * factor * shown]);
     const angle = Math.atan2(to[1] - from[1], to[0] - from[0]);
     if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 1) continue;
     twice(context, kColors.vector, 1.8, () => {
@@ -176,9 +191,9 @@ export function drawResiduals(context, view, picks) {
 }
 
 const kEdgeStyles = {
-  depth: { color: '#ffe066', width: 1.6, dash: [] },
-  crease: { color: '#7fe7ff', width: 1.6, dash: [7, 4] },
-  intensity: { color: '#ffb3f0', width: 1.6, dash: [1.5, 4] },
+  depth: {color: '#ffe066', width: 1.6, dash: []},
+  crease: {color: '#7fe7ff', width: 1.6, dash: [7, 4]},
+  intensity: {color: '#ffb3f0', width: 1.6, dash: [1.5, 4]},
 };
 
 // edges: [{kind, points: [[x, y]...] img}]. A path per kind: thousands of lines are drawn at once.
@@ -189,8 +204,10 @@ export function drawEdges(context, view, edges) {
       if (edge.kind !== kind) continue;
       edge.points.forEach((point, index) => {
         const [x, y] = view.toScreen(point);
-        if (index === 0) path.moveTo(x, y);
-        else path.lineTo(x, y);
+        if (index === 0)
+          path.moveTo(x, y);
+        else
+          path.lineTo(x, y);
       });
     }
     context.lineCap = style.dash.length > 0 && style.dash[0] < 2 ? 'round' : 'butt';
@@ -220,13 +237,20 @@ export function markerAt(view, markers, screen) {
 
 // What the line styles of drawEdges() mean, as elements.
 export function edgeLegend() {
-  const names = { depth: 'depth jump', crease: 'crease', intensity: 'intensity' };
-  return Object.entries(kEdgeStyles).map(([kind, { color, width, dash }]) => {
+  const names = {depth: 'depth jump', crease: 'crease', intensity: 'intensity'};
+  return Object.entries(kEdgeStyles).map(([kind, {color, width, dash}]) => {
     const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
     svg.setAttribute('viewBox', '0 0 30 8');
     const line = document.createElementNS('http://www.w3.org/2000/svg', 'line');
-    const attributes = { x1: 1, y1: 4, x2: 29, y2: 4, stroke: color, 'stroke-width': width + 0.6,
-                         'stroke-dasharray': dash.join(' ') };
+    const attributes = {
+      x1: 1,
+      y1: 4,
+      x2: 29,
+      y2: 4,
+      stroke: color,
+      'stroke-width': width + 0.6,
+      'stroke-dasharray': dash.join(' ')
+    };
     for (const [name, value] of Object.entries(attributes)) line.setAttribute(name, value);
     svg.append(line);
     const row = document.createElement('div');

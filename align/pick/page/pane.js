@@ -3,11 +3,11 @@
 // There are no tools to switch between. The wheel zooms at the cursor; a press that moves by more
 // than kClickSlack pans, or moves the marker it began on; a press that does not move is a click.
 
-import { drawTiles } from './tiles.js';
-import { View } from './view.js';
+import {drawTiles} from './tiles.js';
+import {View} from './view.js';
 
-const kClickSlack = 4;     // CSS pixels
-const kWheelZoom = 0.002;  // per CSS pixel of wheel
+const kClickSlack = 4;           // CSS pixels
+const kWheelZoom = 0.002;        // per CSS pixel of wheel
 export const kMarkerReach = 11;  // CSS pixels; a press this near to a marker takes it
 
 export class Pane {
@@ -20,9 +20,9 @@ export class Pane {
     this.view = new View();
     this.picture = null;
     this.tone = null;
-    this.layers = [];        // of pictures: (context, view, ratio, this) => urls
-    this.drawings = [];      // (context, view) in CSS pixels
-    this.cursor = null;      // screen place of the mouse, null when it is elsewhere
+    this.layers = [];    // of pictures: (context, view, ratio, this) => urls
+    this.drawings = [];  // (context, view) in CSS pixels
+    this.cursor = null;  // screen place of the mouse, null when it is elsewhere
     this.press = null;
     [this.tiles, this.overlay] = element.querySelectorAll('canvas');
     new ResizeObserver(() => this.#resize()).observe(element);
@@ -33,7 +33,9 @@ export class Pane {
     this.#resize();
   }
 
-  get ratio() { return window.devicePixelRatio || 1; }
+  get ratio() {
+    return window.devicePixelRatio || 1;
+  }
 
   // picture: see tiles.js, with `key` and `aspect`. The view stays when only what is shown of the
   // same place changes (same key).
@@ -79,7 +81,7 @@ export class Pane {
   }
 
   #resize() {
-    const { clientWidth: width, clientHeight: height } = this.element;
+    const {clientWidth: width, clientHeight: height} = this.element;
     if (width === 0 || height === 0) return;
     for (const canvas of [this.tiles, this.overlay]) {
       canvas.width = Math.round(width * this.ratio);
@@ -90,7 +92,7 @@ export class Pane {
   }
 
   #draw() {
-    const context = this.tiles.getContext('2d', { alpha: false });
+    const context = this.tiles.getContext('2d', {alpha: false});
     context.fillStyle = getComputedStyle(this.element).backgroundColor;
     context.fillRect(0, 0, this.tiles.width, this.tiles.height);
     const drawing = this.overlay.getContext('2d');
@@ -100,8 +102,8 @@ export class Pane {
       this.store.want(this, []);
       return;
     }
-    const urls = drawTiles(context, this.picture, this.view, this.store,
-                           { ratio: this.ratio, tone: this.tone });
+    const urls = drawTiles(
+        context, this.picture, this.view, this.store, {ratio: this.ratio, tone: this.tone});
     for (const layer of this.layers) urls.push(...layer(context, this.view, this.ratio, this));
     this.store.want(this, urls);
     drawing.scale(this.ratio, this.ratio);
@@ -138,13 +140,12 @@ export class Pane {
       const delta = event.deltaY * lines * (event.ctrlKey ? 4 : 1);
       this.zoom(Math.exp(-kWheelZoom * Math.max(-400, Math.min(400, delta))), this.#place(event));
       this.on.hover(this.cursor);
-    }, { passive: false });
+    }, {passive: false});
   }
 
   #down(event) {
     if (this.press || !this.picture || event.button > 1) return;
     if (event.button === 1) event.preventDefault();
-    this.element.focus({ preventScroll: true });
     const at = this.#place(event);
     const grip = event.button === 0 ? this.on.grips?.find((one) => one.hit(at)) : null;
     // Alt: a new point right on top of a marker.
@@ -155,7 +156,7 @@ export class Pane {
       const grabbed = this.view.toImg(at);
       offset = [place[0] - grabbed[0], place[1] - grabbed[1]];
     }
-    this.press = { at, last: at, marker, grip, offset, button: event.button, moved: false };
+    this.press = {at, last: at, marker, grip, offset, button: event.button, moved: false};
     try {
       this.element.setPointerCapture(event.pointerId);
     } catch (error) {
@@ -173,9 +174,12 @@ export class Pane {
         if (press.marker !== null) this.on.dragStart(press.marker);
       }
       if (press.moved || press.grip) {
-        if (press.grip) press.grip.drag(at);
-        else if (press.marker !== null) this.on.drag(press.marker, this.#target(press, at));
-        else this.pan(at[0] - press.last[0], at[1] - press.last[1]);
+        if (press.grip)
+          press.grip.drag(at);
+        else if (press.marker !== null)
+          this.on.drag(press.marker, this.#target(press, at));
+        else
+          this.pan(at[0] - press.last[0], at[1] - press.last[1]);
       }
       press.last = at;
     }
@@ -190,8 +194,10 @@ export class Pane {
     const at = this.#place(event);
     if (press.grip) return;
     if (press.marker !== null) {
-      if (press.moved) this.on.drop(press.marker, this.#target(press, at));
-      else this.on.select(press.marker);
+      if (press.moved)
+        this.on.drop(press.marker, this.#target(press, at));
+      else
+        this.on.select(press.marker);
     } else if (!press.moved && press.button === 0) {
       const img = this.view.toImg(at);
       if (this.view.contains(img)) this.on.click(img);
@@ -215,10 +221,14 @@ export class Pane {
   #setCursor(at) {
     const press = this.press;
     let cursor = 'crosshair';
-    if (press?.moved && press.marker === null && !press.grip) cursor = 'grabbing';
-    else if (press?.marker !== null && press?.moved) cursor = 'none';
-    else if (this.on.grips?.some((grip) => grip.hit(at))) cursor = 'ew-resize';
-    else if (this.on.markerAt(at) !== null) cursor = 'move';
+    if (press?.moved && press.marker === null && !press.grip)
+      cursor = 'grabbing';
+    else if (press?.marker !== null && press?.moved)
+      cursor = 'none';
+    else if (this.on.grips?.some((grip) => grip.hit(at)))
+      cursor = 'ew-resize';
+    else if (this.on.markerAt(at) !== null)
+      cursor = 'move';
     this.element.style.cursor = cursor;
   }
 }

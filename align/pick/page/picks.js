@@ -2,27 +2,30 @@
 //
 // The list here is what the user sees and changes at once; the server's answer (SESSION of
 // align/pick/README.md) follows and brings all the numbers. One request is under way at a time and
-// carries the whole list, so an answer never mixes with a later change. Entries of the list are never
-// changed, only replaced: the history then costs nothing.
+// carries the whole list, so an answer never mixes with a later change. Entries of the list are
+// never changed, only replaced: the history then costs nothing.
 
-import { api, ServerError } from './api.js';
+import {api, ServerError} from './api.js';
 
-const kMinInterval = 80;    // milliseconds between two requests while something is dragged
-const kRetryAfter = 1500;   // milliseconds
-const kHistory = 500;       // changes that can be undone
+const kMinInterval = 80;   // milliseconds between two requests while something is dragged
+const kRetryAfter = 1500;  // milliseconds
+const kHistory = 500;      // changes that can be undone
 
-const sent_fields = ({ image_name, img, scan, point, weight }) =>
-    ({ image_name, img, scan, point, weight });
+const sent_fields = ({image_name, img, scan, point, weight}) =>
+    ({image_name, img, scan, point, weight});
 
 function samePicks(a, b) {
-  const text = (picks) => JSON.stringify(picks.map(({ image_name, img, scan, weight }) =>
-      [image_name, img, scan && [scan.id, scan.x, scan.y], weight]));
+  const text = (picks) => JSON.stringify(
+      picks.map(({image_name,
+                  img,
+                  scan,
+                  weight}) => [image_name, img, scan && [scan.id, scan.x, scan.y], weight]));
   return text(a) === text(b);
 }
 
 // Events: "change" (list or numbers), "sync" (state), "refused" (detail: the server's sentence).
 export class Picks extends EventTarget {
-  list = [];      // {uid, image_name, img, scan, point, weight}
+  list = [];         // {uid, image_name, img, scan, point, weight}
   rows = new Map();  // uid -> the server's pick with its numbers
   session = null;
   // "saved", "saving", "unsaved" (the file could not be written), "gone" (no answer), "restarted",
@@ -32,18 +35,18 @@ export class Picks extends EventTarget {
   #next_uid = 1;
   #undo = [];
   #redo = [];
-  #draft = null;      // {label, uid, before}: a drag under way
-  #version = 0;       // of the list
-  #accepted = 0;      // version that the server has
+  #draft = null;  // {label, uid, before}: a drag under way
+  #version = 0;   // of the list
+  #accepted = 0;  // version that the server has
   #accepted_list = [];
   #busy = false;
   #last_sent = 0;
   #timer = 0;
-  #other = null;      // session of the faster tab
+  #other = null;  // session of the faster tab
 
   // Takes the server's picks as they are; nothing to undo from here.
   adopt(session) {
-    this.list = session.picks.map((pick) => ({ uid: this.#next_uid++, ...sent_fields(pick) }));
+    this.list = session.picks.map((pick) => ({uid: this.#next_uid++, ...sent_fields(pick)}));
     this.#undo = [];
     this.#redo = [];
     this.#draft = null;
@@ -56,18 +59,24 @@ export class Picks extends EventTarget {
     if (session.revision === this.session.revision && !this.pending) this.#take(session, this.list);
   }
 
-  find(uid) { return this.list.find((pick) => pick.uid === uid) ?? null; }
-  numberOf(uid) { return this.list.findIndex((pick) => pick.uid === uid) + 1; }
+  find(uid) {
+    return this.list.find((pick) => pick.uid === uid) ?? null;
+  }
+  numberOf(uid) {
+    return this.list.findIndex((pick) => pick.uid === uid) + 1;
+  }
   statusOf(pick) {
     if (!pick.img || !pick.scan) return 'half';
     if (pick.weight === 0) return 'off';
     const status = this.rows.get(pick.uid)?.status;
     return status && status !== 'half' && status !== 'off' ? status : 'waiting';
   }
-  get pending() { return this.#version !== this.#accepted; }
+  get pending() {
+    return this.#version !== this.#accepted;
+  }
 
-  // Changes the list by fn(list) -> list. Changes with the same `merge` within a second are one step
-  // of the history (a key held down).
+  // Changes the list by fn(list) -> list. Changes with the same `merge` within a second are one
+  // step of the history (a key held down).
   change(label, uid, fn, merge = '') {
     this.#drop();
     const before = this.list;
@@ -77,39 +86,46 @@ export class Picks extends EventTarget {
       last.after = this.list;
       last.time = Date.now();
     } else {
-      this.#push({ label, uid, before, after: this.list, merge, time: Date.now() });
+      this.#push({label, uid, before, after: this.list, merge, time: Date.now()});
     }
     this.#changed();
   }
 
   add(label, fields) {
     const uid = this.#next_uid++;
-    const pick = { uid, image_name: '', img: null, scan: null, point: null, weight: 1, ...fields };
+    const pick = {uid, image_name: '', img: null, scan: null, point: null, weight: 1, ...fields};
     this.change(label, uid, (list) => [...list, pick]);
     return uid;
   }
 
   set(label, uid, fields, merge = '') {
-    this.change(label, uid, (list) => list.map(
-        (pick) => pick.uid === uid ? { ...pick, ...fields } : pick), merge);
+    this.change(
+        label, uid, (list) => list.map((pick) => pick.uid === uid ? {...pick, ...fields} : pick),
+        merge);
   }
 
-  remove(label, uid) { this.change(label, uid, (list) => list.filter((pick) => pick.uid !== uid)); }
+  remove(label, uid) {
+    this.change(label, uid, (list) => list.filter((pick) => pick.uid !== uid));
+  }
 
   // A drag: begin, any number of live(), then keep() or drop().
-  begin(label, uid) { this.#draft = { label, uid, before: this.list }; }
+  begin(label, uid) {
+    this.#draft = {label, uid, before: this.list};
+  }
   live(uid, fields) {
-    this.list = this.list.map((pick) => pick.uid === uid ? { ...pick, ...fields } : pick);
+    this.list = this.list.map((pick) => pick.uid === uid ? {...pick, ...fields} : pick);
     this.#changed();
   }
   keep() {
     const draft = this.#draft;
     this.#draft = null;
     if (draft && draft.before !== this.list) {
-      this.#push({ ...draft, after: this.list, merge: '', time: Date.now() });
+      this.#push({...draft, after: this.list, merge: '', time: Date.now()});
     }
   }
-  drop() { if (this.#drop()) this.#changed(); }
+  drop() {
+    if (this.#drop()) this.#changed();
+  }
   #drop() {
     const draft = this.#draft;
     this.#draft = null;
@@ -118,14 +134,26 @@ export class Picks extends EventTarget {
     return true;
   }
 
-  get can_undo() { return this.#undo.length > 0; }
-  get can_redo() { return this.#redo.length > 0; }
-  get undo_label() { return this.#undo.at(-1)?.label ?? ''; }
-  get redo_label() { return this.#redo.at(-1)?.label ?? ''; }
+  get can_undo() {
+    return this.#undo.length > 0;
+  }
+  get can_redo() {
+    return this.#redo.length > 0;
+  }
+  get undo_label() {
+    return this.#undo.at(-1)?.label ?? '';
+  }
+  get redo_label() {
+    return this.#redo.at(-1)?.label ?? '';
+  }
 
   // The step that was undone ({label, uid}), or null.
-  undo() { return this.#step(this.#undo, this.#redo, 'before'); }
-  redo() { return this.#step(this.#redo, this.#undo, 'after'); }
+  undo() {
+    return this.#step(this.#undo, this.#redo, 'before');
+  }
+  redo() {
+    return this.#step(this.#redo, this.#undo, 'after');
+  }
   #step(from, to, side) {
     this.#drop();
     const step = from.pop();
@@ -181,8 +209,10 @@ export class Picks extends EventTarget {
     } catch (error) {
       this.#busy = false;
       if (!(error instanceof ServerError)) throw error;
-      if (error.kind === 'refused') await this.#refused(error, list);
-      else this.#gone(error);
+      if (error.kind === 'refused')
+        await this.#refused(error, list);
+      else
+        this.#gone(error);
     }
   }
 
@@ -196,11 +226,14 @@ export class Picks extends EventTarget {
       const sent = list.find((one) => one.uid === pick.uid);
       const row = this.rows.get(pick.uid);
       if (!row || !sent || sent.scan !== pick.scan || pick.point || !row.point) return pick;
-      return { ...pick, point: row.point };
+      return {...pick, point: row.point};
     });
-    if (this.pending) this.#setState('saving');
-    else if (session.saved) this.#setState('saved');
-    else this.#setState('unsaved', session.save_error);
+    if (this.pending)
+      this.#setState('saving');
+    else if (session.saved)
+      this.#setState('saved');
+    else
+      this.#setState('unsaved', session.save_error);
     this.dispatchEvent(new Event('change'));
   }
 
@@ -226,7 +259,7 @@ export class Picks extends EventTarget {
     this.#accepted = this.#version;
     this.#setState(this.session.saved ? 'saved' : 'unsaved', this.session.save_error);
     this.dispatchEvent(new Event('change'));
-    this.dispatchEvent(new CustomEvent('refused', { detail: error.message }));
+    this.dispatchEvent(new CustomEvent('refused', {detail: error.message}));
   }
 
   // The server has another revision than this page. If it is what was sent, only the answer was
@@ -264,8 +297,11 @@ export class Picks extends EventTarget {
     if (now.revision !== this.session.revision) {
       this.#differs(now, this.list);
     } else if (this.state === 'gone' || this.state === 'restarted') {
-      this.#setState(this.pending ? 'saving' : this.session.saved ? 'saved' : 'unsaved',
-                     this.session.save_error);
+      this.#setState(
+          this.pending           ? 'saving' :
+              this.session.saved ? 'saved' :
+                                   'unsaved',
+          this.session.save_error);
       this.#schedule();
     }
   }
@@ -277,7 +313,7 @@ export class Picks extends EventTarget {
     this.#other = null;
   }
   keepOwn() {
-    this.session = { ...this.session, revision: this.#other.revision };
+    this.session = {...this.session, revision: this.#other.revision};
     this.#other = null;
     ++this.#version;
     this.#setState('saving');

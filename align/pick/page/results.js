@@ -1,6 +1,6 @@
 // The numbers of the server: the table of picks, and what they say about the photo.
 
-import { byId, el, number, setText } from './dom.js';
+import {byId, el, number, setText} from './dom.js';
 
 const kStates = {
   used: 'used',
@@ -25,7 +25,9 @@ export class Results {
       if (uids.has(uid)) continue;
       // The focus goes on to the neighbour, not to the top of the page.
       if (row.line.contains(document.activeElement)) {
-        (row.line.nextElementSibling ?? row.line.previousElementSibling)?.querySelector('button')?.focus();
+        (row.line.nextElementSibling ?? row.line.previousElementSibling)
+            ?.querySelector('button')
+            ?.focus();
       }
       row.line.remove();
       this.#rows.delete(uid);
@@ -44,28 +46,38 @@ export class Results {
     setText(byId('pick-count'), picks.list.length > 0 ? String(picks.list.length) : '');
   }
 
-  show(uid) { this.#rows.get(uid)?.line.scrollIntoView({ block: 'nearest' }); }
+  show(uid) {
+    this.#rows.get(uid)?.line.scrollIntoView({block: 'nearest'});
+  }
 
   #add(uid) {
     const cells = {
-      number: el('button', { type: 'button', class: 'number', onfocus: () => this.on.choose(uid) }),
-      photo: el('td', { class: 'photo' }),
+      number: el('button', {type: 'button', class: 'number', onfocus: () => this.on.choose(uid)}),
+      photo: el('td', {class: 'photo'}),
       px: el('span'),
-      bar: el('span', { class: 'bar' }),
-      mm: el('td', { class: 'right' }),
-      left_out: el('td', { class: 'right' }),
-      state: el('td', { class: 'state' }),
-      on: el('input', { type: 'checkbox', onchange: (event) => this.on.enable(uid, event.target.checked) }),
-      remove: el('button', { type: 'button', title: 'Remove (Delete)', onclick: () => this.on.remove(uid) }, 'Remove'),
+      bar: el('span', {class: 'bar'}),
+      mm: el('td', {class: 'right'}),
+      left_out: el('td', {class: 'right'}),
+      state: el('td', {class: 'state'}),
+      on:
+          el('input',
+             {type: 'checkbox', onchange: (event) => this.on.enable(uid, event.target.checked)}),
+      remove: el(
+          'button', {type: 'button', title: 'Remove (Delete)', onclick: () => this.on.remove(uid)},
+          'Remove'),
     };
-    cells.line = el('tr', {
-      'data-uid': uid,
-      onclick: (event) => {
-        if (!event.target.closest('.actions')) this.on.choose(uid);
-      },
-    }, el('td', {}, cells.number), cells.photo,
-       el('td', { class: 'right value' }, cells.bar, cells.px), cells.mm, cells.left_out, cells.state,
-       el('td', { class: 'actions' }, el('label', { title: 'Count this pick (X)' }, cells.on, ' on'), cells.remove));
+    cells.line =
+        el('tr', {
+          'data-uid': uid,
+          onclick: (event) => {
+            if (!event.target.closest('.actions')) this.on.choose(uid);
+          },
+        },
+           el('td', {}, cells.number), cells.photo,
+           el('td', {class: 'right value'}, cells.bar, cells.px), cells.mm, cells.left_out,
+           cells.state,
+           el('td', {class: 'actions'},
+              el('label', {title: 'Count this pick (X)'}, cells.on, ' on'), cells.remove));
     this.#rows.set(uid, cells);
     return cells;
   }
@@ -103,9 +115,12 @@ export function showSummary(photo, session, min_picks) {
   const counted = solution ? `${solution.num_used} used of ${solution.num_complete}` : 'none yet';
   add('Picks', counted);
   if (solution?.solved) {
-    add('Solved by', solution.by === 'sparse_model' ? 'the picks with the sparse model\u2019s help' : 'its own picks');
-    add('Residual', `${number(solution.rms_px, 2)} px rms` +
-        (typeof solution.rms_mm === 'number' ? `, ${number(solution.rms_mm, 1)} mm` : ''));
+    add('Solved by',
+        solution.by === 'sparse_model' ? 'the picks with the sparse model\u2019s help' :
+                                         'its own picks');
+    add('Residual',
+        `${number(solution.rms_px, 2)} px rms` +
+            (typeof solution.rms_mm === 'number' ? `, ${number(solution.rms_mm, 1)} mm` : ''));
     if (typeof solution.position_sigma_mm === 'number') {
       add('Camera', `± ${number(solution.position_sigma_mm, 1)} mm in position`);
     }
@@ -114,19 +129,25 @@ export function showSummary(photo, session, min_picks) {
   }
   const similarity = session.similarity;
   if (similarity) {
-    add('Scale', `${Number(similarity.scale.toPrecision(6))}, spread ${number(100 * similarity.relative_mad, 2)} % over ` +
-        `${similarity.num_features} features`);
-    add('All picks', `${number(similarity.rms_px, 2)} px rms in ${similarity.num_photos} ` +
-        (similarity.num_photos === 1 ? 'photo' : 'photos'));
+    add('Scale',
+        `${Number(similarity.scale.toPrecision(6))}, spread ${
+            number(100 * similarity.relative_mad, 2)} % over ` +
+            `${similarity.num_features} features`);
+    add('All picks',
+        `${number(similarity.rms_px, 2)} px rms in ${similarity.num_photos} ` +
+            (similarity.num_photos === 1 ? 'photo' : 'photos'));
   }
   const warnings = [...(solution?.warnings ?? [])];
   if (solution?.ambiguous) {
-    warnings.unshift('Two camera positions fit these picks about equally well: add a pick at another depth.');
+    warnings.unshift(
+        'Two camera positions fit these picks about equally well: add a pick at another depth.');
   }
   const text = JSON.stringify([facts.map((one) => one.textContent), warnings]);
   if (body.dataset.text === text) return;
   body.dataset.text = text;
   body.replaceChildren(
       el('dl', {}, ...facts),
-      ...(warnings.length > 0 ? [el('ul', { 'aria-label': 'Warnings' }, ...warnings.map((one) => el('li', {}, one)))] : []));
+      ...(warnings.length > 0 ?
+              [el('ul', {'aria-label': 'Warnings'}, ...warnings.map((one) => el('li', {}, one)))] :
+              []));
 }

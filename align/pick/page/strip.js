@@ -1,31 +1,39 @@
 // The photos as thumbnails, those to pick in first in front; picks and residual of each on it.
 
-import { api } from './api.js';
-import { byId, el, number, setText } from './dom.js';
+import {api} from './api.js';
+import {byId, el, number, setText} from './dom.js';
 
 export class Strip {
   #photos = [];
   #thumbs = new Map();  // id -> {photo, element, picks, rms, image}
   #queue = [];          // ids of thumbnails in view that are not loaded
   #loading = false;
-  #shown = [];          // ids in order, under the filter
+  #shown = [];  // ids in order, under the filter
   #current = null;
 
   constructor(photos, choose) {
     this.box = byId('thumbs');
     this.choose = choose;
     this.#photos = photos;
-    const seen = new IntersectionObserver((entries) => this.#seen(entries), { root: this.box });
+    const seen = new IntersectionObserver((entries) => this.#seen(entries), {root: this.box});
     for (const photo of photos) {
-      const image = el('img', { alt: '', draggable: 'false' });
-      const picks = el('span', { class: 'badge', hidden: true });
-      const rms = el('span', { class: 'badge rms', hidden: true });
-      const element = el('div', {
-        class: 'thumb', role: 'option', id: `thumb-${photo.id}`, 'aria-selected': 'false',
-        'aria-disabled': photo.missing ? 'true' : undefined, 'data-id': photo.id,
-        onclick: () => { if (!photo.missing) this.choose(photo.id); },
-      }, image, picks, rms, el('span', { class: 'name' }, `\u200e${photo.name}`));
-      this.#thumbs.set(photo.id, { photo, element, picks, rms, image });
+      const image = el('img', {alt: '', draggable: 'false'});
+      const picks = el('span', {class: 'badge', hidden: true});
+      const rms = el('span', {class: 'badge rms', hidden: true});
+      const element =
+          el('div', {
+            class: 'thumb',
+            role: 'option',
+            id: `thumb-${photo.id}`,
+            'aria-selected': 'false',
+            'aria-disabled': photo.missing ? 'true' : undefined,
+            'data-id': photo.id,
+            onclick: () => {
+              if (!photo.missing) this.choose(photo.id);
+            },
+          },
+             image, picks, rms, el('span', {class: 'name'}, `\u200e${photo.name}`));
+      this.#thumbs.set(photo.id, {photo, element, picks, rms, image});
       this.box.append(element);
       seen.observe(element);
     }
@@ -54,21 +62,26 @@ export class Strip {
   update(current, solutions, counts) {
     if (current !== this.#current) {
       this.#current = current;
-      this.#thumbs.get(current)?.element.scrollIntoView({ block: 'nearest' });
+      this.#thumbs.get(current)?.element.scrollIntoView({block: 'nearest'});
     }
     this.box.setAttribute('aria-activedescendant', `thumb-${current}`);
-    for (const { photo, element, picks, rms } of this.#thumbs.values()) {
+    for (const {photo, element, picks, rms} of this.#thumbs.values()) {
       const solution = solutions[photo.name];
       const count = counts.get(photo.name) ?? 0;
       element.setAttribute('aria-selected', String(photo.id === current));
       picks.hidden = count === 0 && photo.rank !== 1 && !photo.missing;
-      setText(picks, photo.missing ? 'no file' : count > 0 ? `${count} pick${count > 1 ? 's' : ''}` :
-          'suggested');
+      setText(
+          picks,
+          photo.missing ? 'no file' :
+              count > 0 ? `${count} pick${count > 1 ? 's' : ''}` :
+                          'suggested');
       rms.hidden = !solution || typeof solution.rms_px !== 'number';
       if (!rms.hidden) setText(rms, `${number(solution.rms_px)} px`);
       const sees = typeof photo.scan_share === 'number' ?
-          `, sees ${Math.round(100 * photo.scan_share)} % of the scan` : '';
-      element.title = photo.missing ? `${photo.name}: there is no such file in the photo folder` :
+          `, sees ${Math.round(100 * photo.scan_share)} % of the scan` :
+          '';
+      element.title = photo.missing ?
+          `${photo.name}: there is no such file in the photo folder` :
           `${photo.name}: ${photo.num_points} points of the sparse model${sees}`;
     }
   }
@@ -76,17 +89,20 @@ export class Strip {
   #filter() {
     const text = byId('filter').value.trim().toLowerCase();
     this.#shown = [];
-    for (const { photo, element } of this.#thumbs.values()) {
+    for (const {photo, element} of this.#thumbs.values()) {
       element.hidden = !photo.name.toLowerCase().includes(text);
       if (!element.hidden) this.#shown.push(photo.id);
     }
-    setText(byId('strip-count'), this.#shown.length === this.#photos.length ?
-        String(this.#photos.length) : `${this.#shown.length} of ${this.#photos.length}`);
+    setText(
+        byId('strip-count'),
+        this.#shown.length === this.#photos.length ?
+            String(this.#photos.length) :
+            `${this.#shown.length} of ${this.#photos.length}`);
   }
 
   #key(event) {
     const columns = getComputedStyle(this.box).gridTemplateColumns.split(' ').length;
-    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -columns, ArrowDown: columns }[event.key];
+    const step = {ArrowLeft: -1, ArrowRight: 1, ArrowUp: -columns, ArrowDown: columns}[event.key];
     if (!step) return;
     event.preventDefault();
     const id = this.next(step);

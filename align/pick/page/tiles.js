@@ -9,21 +9,25 @@ export function gammaTable(gamma) {
   if (gamma === 1) return null;
   const bytes = new Uint8ClampedArray(256);
   for (let i = 0; i < 256; ++i) bytes[i] = Math.round(255 * (i / 255) ** (1 / gamma));
-  return { key: gamma.toFixed(2), bytes };
+  return {key: gamma.toFixed(2), bytes};
 }
 
 export class TileStore {
-  #tiles = new Map();     // url -> {bitmap, toned, tone, bytes}, least recently used first
+  #tiles = new Map();  // url -> {bitmap, toned, tone, bytes}, least recently used first
   #bytes = 0;
-  #wanted = new Map();    // owner -> urls, most urgent first
-  #running = new Map();   // url -> AbortController
-  #failed = new Map();    // url -> when to ask again, milliseconds; Infinity = never
+  #wanted = new Map();   // owner -> urls, most urgent first
+  #running = new Map();  // url -> AbortController
+  #failed = new Map();   // url -> when to ask again, milliseconds; Infinity = never
   #listeners = new Set();
 
   // Called when a tile has come.
-  onTile(listener) { this.#listeners.add(listener); }
+  onTile(listener) {
+    this.#listeners.add(listener);
+  }
 
-  get bytes() { return this.#bytes; }
+  get bytes() {
+    return this.#bytes;
+  }
 
   // Says all that `owner` needs now; what nobody needs any longer is given up.
   want(owner, urls) {
@@ -53,13 +57,13 @@ export class TileStore {
   }
 
   #tone(tile, tone) {
-    const { width, height } = tile.bitmap;
+    const {width, height} = tile.bitmap;
     if (!tile.toned) {
       tile.toned = new OffscreenCanvas(width, height);
       tile.bytes += width * height * 4;
       this.#bytes += width * height * 4;
     }
-    const context = tile.toned.getContext('2d', { willReadFrequently: true });
+    const context = tile.toned.getContext('2d', {willReadFrequently: true});
     context.drawImage(tile.bitmap, 0, 0);
     const pixels = context.getImageData(0, 0, width, height);
     const data = pixels.data;
@@ -93,11 +97,11 @@ export class TileStore {
     const controller = new AbortController();
     this.#running.set(url, controller);
     try {
-      const response = await fetch(url, { signal: controller.signal });
+      const response = await fetch(url, {signal: controller.signal});
       if (!response.ok) throw new Error(String(response.status));
-      const bitmap = await createImageBitmap(await response.blob(), { colorSpaceConversion: 'none' });
+      const bitmap = await createImageBitmap(await response.blob(), {colorSpaceConversion: 'none'});
       const bytes = bitmap.width * bitmap.height * 4;
-      this.#tiles.set(url, { bitmap, toned: null, tone: '', bytes });
+      this.#tiles.set(url, {bitmap, toned: null, tone: '', bytes});
       this.#bytes += bytes;
       this.#failed.delete(url);
       this.#evict(this.#tiles.get(url));
@@ -140,10 +144,13 @@ export function visibleTiles(picture, view, level) {
   const last_x = Math.ceil(picture.width / size) - 1;
   const last_y = Math.ceil(picture.height / size) - 1;
   const tiles = [];
-  for (let y = Math.max(0, Math.floor(top / size)); y <= Math.min(last_y, Math.floor(bottom / size)); ++y) {
-    for (let x = Math.max(0, Math.floor(left / size)); x <= Math.min(last_x, Math.floor(right / size)); ++x) {
-      const distance = Math.hypot((x + 0.5) * size - view.centre[0], (y + 0.5) * size - view.centre[1]);
-      tiles.push({ level, x, y, distance });
+  for (let y = Math.max(0, Math.floor(top / size));
+       y <= Math.min(last_y, Math.floor(bottom / size)); ++y) {
+    for (let x = Math.max(0, Math.floor(left / size));
+         x <= Math.min(last_x, Math.floor(right / size)); ++x) {
+      const distance =
+          Math.hypot((x + 0.5) * size - view.centre[0], (y + 0.5) * size - view.centre[1]);
+      tiles.push({level, x, y, distance});
     }
   }
   return tiles.sort((a, b) => a.distance - b.distance);
@@ -151,7 +158,7 @@ export function visibleTiles(picture, view, level) {
 
 // Draws what is there, coarser where the finer has not come, onto a canvas whose pixels are
 // 1 / ratio CSS pixels. Returns the URLs that are needed, most urgent first.
-export function drawTiles(context, picture, view, store, { ratio, tone = null, level = null }) {
+export function drawTiles(context, picture, view, store, {ratio, tone = null, level = null}) {
   const wanted_level = level ?? levelFor(picture, view, ratio);
   const coarsest = picture.num_levels - 1;
   const tiles = visibleTiles(picture, view, wanted_level);
@@ -197,6 +204,7 @@ function drawPart(context, picture, bitmap, tile, coarser, device) {
   const y = tile.y * size * step;
   const [left, top] = device(x, y);
   const [right, bottom] = device(x + source_width * share * step, y + source_height * share * step);
-  context.drawImage(bitmap, source_x, source_y, source_width, source_height,
-                    left, top, right - left, bottom - top);
+  context.drawImage(
+      bitmap, source_x, source_y, source_width, source_height, left, top, right - left,
+      bottom - top);
 }

@@ -1,11 +1,11 @@
 // What part of a picture a pane shows.
 //
-// Frames: `img` - pixels of the picture (level 0 of its tiles), the upper-left pixel covers 0..1 and
-// is centred at 0.5, 0.5: the coordinates of the picks, without any shift. `screen` - CSS pixels
-// from the pane's upper-left corner. `scale` is CSS pixels per pixel along x; along y it is
+// Frames: `img` - pixels of the picture (level 0 of its tiles), the upper-left pixel covers 0..1
+// and is centred at 0.5, 0.5: the coordinates of the picks, without any shift. `screen` - CSS
+// pixels from the pane's upper-left corner. `scale` is CSS pixels per pixel along x; along y it is
 // scale * aspect, because the samples of a scan need not be as high as they are wide.
 
-import { clamp } from './dom.js';
+import {clamp} from './dom.js';
 
 const kMaxScale = 64;
 
@@ -35,9 +35,11 @@ export class View {
 
   get fit_scale() {
     const margin = 8;
-    return Math.max(1e-4, Math.min(
-        (this.width - margin) / this.picture_width,
-        (this.height - margin) / (this.picture_height * this.aspect)));
+    return Math.max(
+        1e-4,
+        Math.min(
+            (this.width - margin) / this.picture_width,
+            (this.height - margin) / (this.picture_height * this.aspect)));
   }
 
   fit() {
@@ -47,13 +49,17 @@ export class View {
   }
 
   toScreen([x, y]) {
-    return [(x - this.centre[0]) * this.scale + this.width / 2,
-            (y - this.centre[1]) * this.scale * this.aspect + this.height / 2];
+    return [
+      (x - this.centre[0]) * this.scale + this.width / 2,
+      (y - this.centre[1]) * this.scale * this.aspect + this.height / 2
+    ];
   }
 
   toImg([x, y]) {
-    return [(x - this.width / 2) / this.scale + this.centre[0],
-            (y - this.height / 2) / (this.scale * this.aspect) + this.centre[1]];
+    return [
+      (x - this.width / 2) / this.scale + this.centre[0],
+      (y - this.height / 2) / (this.scale * this.aspect) + this.centre[1]
+    ];
   }
 
   contains([x, y]) {
@@ -67,7 +73,8 @@ export class View {
   }
 
   panBy(dx, dy) {
-    this.centre = [this.centre[0] - dx / this.scale, this.centre[1] - dy / (this.scale * this.aspect)];
+    this.centre =
+        [this.centre[0] - dx / this.scale, this.centre[1] - dy / (this.scale * this.aspect)];
     this.#moved();
   }
 
@@ -89,7 +96,8 @@ export class View {
 
   #moved() {
     this.fitted = false;
-    this.centre = [clamp(this.centre[0], 0, this.picture_width),
-                   clamp(this.centre[1], 0, this.picture_height)];
+    this.centre = [
+      clamp(this.centre[0], 0, this.picture_width), clamp(this.centre[1], 0, this.picture_height)
+    ];
   }
 }

@@ -1,0 +1,108 @@
+// What the page says about itself: whether the picks are saved, whether the server is there, and
+// why a place cannot be picked.
+
+import {app} from './app.js';
+import {byId, el, setText} from './dom.js';
+
+const kSaveTexts = {
+  saved: () => 'saved',
+  saving: () => 'saving…',
+  unsaved: (why) => `not saved: ${why}`,
+  gone: (why) => `not saved: ${why}; trying again`,
+  restarted: (why) => `not saved: ${why}`,
+  stale: (why) => `not saved: ${why}`,
+};
+
+export function showSync() {
+  const {picks, server} = app;
+  const box = byId('save');
+  box.dataset.state = picks.state;
+  box.title = server ? server.picks_path : '';
+  // Nothing is unsaved when the server is gone and nothing was changed since.
+  const gone = picks.state === 'gone' && !picks.pending;
+  setText(
+      byId('save-text'),
+      gone ? 'the server does not answer; trying again' : kSaveTexts[picks.state](picks.why));
+  const banner = byId('banner');
+  if (banner.dataset.state === picks.state) return;
+  banner.dataset.state = picks.state;
+  const content = bannerOf(picks.state);
+  banner.replaceChildren(...content);
+  banner.hidden = content.length === 0;
+}
+
+function bannerOf(state) {
+  const {picks, editor} = app;
+  if (state === 'stale') {
+    const reload = () => {
+      picks.takeOther();
+      editor.select(null);
+    };
+    return [
+      el('p', {},
+         'The picks were changed in another tab or window. What you change here is not saved ' +
+             'until you choose.'),
+      el('button', {type: 'button', onclick: () => picks.keepOwn()}, 'Keep mine'),
+      el('button', {type: 'button', class: 'main', onclick: reload}, 'Reload the picks'),
+    ];
+  }
+  if (state === 'gone') {
+    return [el(
+        'p', {},
+        'roomtex-pick does not answer. Go on: changes of the photo side and removals are ' +
+            'kept here and saved as soon as it is back. Do not close this page.')];
+  }
+  if (state === 'restarted') {
+    return [el(
+        'p', {},
+        'roomtex-pick was started anew and has a new address, which it printed. What the ' +
+            'last one had not saved is only on this page.')];
+  }
+  return [];
+}
+
+// The server's sentence where the click was, with the nearest place that can be picked.
+export function showHint() {
+  const {editor, panes} = app;
+  const hint = byId('hint');
+  const {tried} = editor;
+  const message = tried?.message || (tried ? editor.drag_message : '');
+  if (!message || tried.scan !== editor.scan.id) {
+    hint.hidden = true;
+    return;
+  }
+  const key = `${message} ${tried.snap !== null} ${tried.message !== ''}`;
+  if (hint.dataset.key !== key) {
+    hint.dataset.key = key;
+    hint.replaceChildren(el('p', {}, message), hintActions(tried));
+  }
+  hint.hidden = false;
+  const box = panes.scan.element.getBoundingClientRect();
+  const [x, y] = panes.scan.view.toScreen(tried.place);
+  // Beside the place, never over it.
+  const left = box.left + x + 20;
+  const top = box.top + y + 20;
+  const fits_right = left + hint.offsetWidth < innerWidth - 8;
+  const fits_below = top + hint.offsetHeight < innerHeight - 8;
+  hint.style.left = `${Math.max(8, fits_right ? left : left - hint.offsetWidth - 40)}px`;
+  hint.style.top = `${Math.max(50, fits_below ? top : top - hint.offsetHeight - 40)}px`;
+}
+
+function hintActions(tried) {
+  const {editor, panes} = app;
+  const then = (action) => () => {
+    action();
+    panes.scan.element.focus();
+  };
+  const actions = el('div', {class: 'actions'});
+  if (tried.snap) {
+    actions.append(
+        el('button', {type: 'button', class: 'main', onclick: then(() => editor.takeSnap())},
+           'Nearest place (Enter)'));
+  }
+  if (tried.message) {
+    actions.append(
+        el('button', {type: 'button', onclick: then(() => editor.back())}, 'Leave it (Esc)'));
+  }
+  return actions;
+}
