@@ -90,7 +90,8 @@ void ServePicking(Arguments a, bool port_given, const Command::Context& context)
   PickSession session(scene, a.output_path);
   scene.Prepare();
   const auto server =
-      StartServer(scene, &session, {a.server, a.image_name, a.aligned_path}, port_given, context);
+      StartServer(scene, &session, {a.server, a.image_name, a.aligned_path, FindAlignProgram()},
+                  port_given, context);
   std::cout << server->server().Url() << "\n" << server->server().SshLine() << std::endl;
   if (a.server.open) {
     const std::string problem = OpenPage(server->server().Url());

@@ -128,7 +128,13 @@ const PickPhoto* PickScene::FindPhoto(const std::string& name) const {
 }
 
 void PickScene::Prepare() {
-  worker_ = std::thread([this] { Work(); });
+  worker_ = std::thread([this] {
+    try {
+      Work();
+    } catch (const std::exception&) {
+      // Out of memory: the page works on, without what needs the rays.
+    }
+  });
 }
 
 void PickScene::Work() {

@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iterator>
+#include <sstream>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -19,6 +24,34 @@ namespace {
 
 constexpr int kThumbnailWidth = 240;  // pixels
 constexpr int kThumbnailQuality = 82;
+constexpr int kNumOverlays = 4;
+
+// What roomtex-align is given: what this command was given.
+std::vector<std::string> AlignArguments(const PickScene& scene, const PickSession& session,
+                                        const PickServer::Setup& setup) {
+  const PickSceneInput& input = scene.input();
+  std::vector<std::string> arguments = {"--input_path", input.input_path};
+  const auto add = [&](const std::string& name, const std::string& value) {
+    arguments.push_back(name);
+    arguments.push_back(value);
+  };
+  for (const std::string& path : input.scan_paths) add("--scan_path", path);
+  add("--picks_path", session.picks_path());
+  add("--output_path", setup.aligned_path);
+  add("--image_path", input.image_path);
+  if (!input.scan_poses.empty()) add("--scan_poses", input.scan_poses);
+  const ScanReaderOptions &reader = input.scan_reader, defaults;
+  if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
+  if (reader.units != defaults.units) add("--units", reader.units);
+  if (reader.max_range != defaults.max_range) {
+    std::ostringstream text;
+    text << std::setprecision(17) << reader.max_range;
+    add("--max_range", text.str());
+  }
+  if (input.num_threads > 0) add("--num_threads", std::to_string(input.num_threads));
+  add("--overlays", std::to_string(kNumOverlays));
+  return arguments;
+}
 
 std::string PhotoPicture(int id) { return "photo/" + std::to_string(id); }
 std::string ScanPicture(int id, const std::string& name) {
@@ -57,6 +90,9 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
       session_(session),
       setup_(setup),
       tiles_(ImageTilesOptions()),
+      back_projections_(ImageTilesOptions().tile_size),
+      sights_(scene),
+      align_(setup.align_program, AlignArguments(scene, *session, setup), setup.aligned_path),
       server_(setup.server) {
   AddPictures();
   AddPage(page, &server_);
@@ -68,6 +104,27 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
     PutPicks put = ParsePutPicks(json, scene_);
     return SessionToJson(*session_->Put(put.revision, std::move(put.picks)), scene_);
   });
+  server_.AddJson("/edges", [this](const Query& query) { return Edges(query); });
+  AddAlign();
+}
+
+void PickServer::AddAlign() {
+  server_.AddPost("/align", [this](const Json&) {
+    if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
+    align_.Start();
+    return align_.State();
+  });
+  server_.AddJson("/align", [this](const Query&) { return align_.State(); });
+  server_.AddDelete("/align", [this](const Json&) {
+    align_.Cancel();
+    return align_.State();
+  });
+  server_.AddContent("/overlay", [this](const Query& query) { return Overlay(query); });
+}
+
+void PickServer::Wait() {
+  server_.Wait();
+  align_.Cancel();
 }
 
 PickServer::~PickServer() = default;
@@ -104,6 +161,34 @@ int PickServer::SelectedPhoto() const {
   return selected;
 }
 
+// In the order of the strip: the best to pick in first.
+Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
+  const std::vector<double> shares = sights_.ScanShares(snapshot.solution, snapshot.revision);
+  std::vector<const PickPhoto*> order;
+  for (const PickPhoto& photo : scene_.photos()) order.push_back(&photo);
+  std::sort(order.begin(), order.end(),
+            [](const PickPhoto* a, const PickPhoto* b) { return a->rank < b->rank; });
+  Json json = Json::array();
+  for (const PickPhoto* photo : order) {
+    const TilePyramid pyramid = tiles_.Pyramid(PhotoPicture(photo->id));
+    const Camera& camera = photo->projection->camera();
+    Json one;
+    one["id"] = photo->id;
+    one["name"] = photo->name();
+    one["width"] = camera.width;
+    one["height"] = camera.height;
+    one["tile_size"] = pyramid.tile_size;
+    one["num_levels"] = pyramid.num_levels;
+    one["missing"] = photo->missing;
+    one["problem"] = photo->problem;
+    one["num_points"] = photo->num_points;
+    one["scan_share"] = shares.empty() ? Json() : Json(shares[photo->id]);
+    one["rank"] = photo->rank;
+    json.push_back(one);
+  }
+  return json;
+}
+
 Json PickServer::State() {
   const auto snapshot = session_->Refresh();
   Json json;
@@ -128,34 +213,69 @@ Json PickServer::State() {
     one["pictures"] = ScanPictureNames();
     json["scans"].push_back(one);
   }
-  std::vector<const PickPhoto*> order;
-  for (const PickPhoto& photo : scene_.photos()) order.push_back(&photo);
-  std::sort(order.begin(), order.end(),
-            [](const PickPhoto* a, const PickPhoto* b) { return a->rank < b->rank; });
-  json["photos"] = Json::array();
-  for (const PickPhoto* photo : order) {
-    const TilePyramid pyramid = tiles_.Pyramid(PhotoPicture(photo->id));
-    const Camera& camera = photo->projection->camera();
-    Json one;
-    one["id"] = photo->id;
-    one["name"] = photo->name();
-    one["width"] = camera.width;
-    one["height"] = camera.height;
-    one["tile_size"] = pyramid.tile_size;
-    one["num_levels"] = pyramid.num_levels;
-    one["missing"] = photo->missing;
-    one["problem"] = photo->problem;
-    one["num_points"] = photo->num_points;
-    one["scan_share"] = nullptr;
-    one["rank"] = photo->rank;
-    json["photos"].push_back(one);
-  }
+  json["photos"] = Photos(*snapshot);
   json["selected_photo"] = SelectedPhoto();
   json["session"] = SessionToJson(*snapshot, scene_);
   return json;
 }
 
+std::shared_ptr<const PickSession::Snapshot> PickServer::SolvedRevision(const PickPhoto& photo,
+                                                                        int revision) {
+  auto snapshot = session_->Refresh();
+  if (snapshot->revision != revision) return nullptr;
+  return snapshot->solution.photos.at(photo.name()).solved() ? snapshot : nullptr;
+}
+
+std::optional<LocalServer::Content> PickServer::BackTile(const Query& query, int photo_id) {
+  const auto scan = WholeOf(query, "scan"), revision = WholeOf(query, "revision");
+  const auto level = WholeOf(query, "level"), x = WholeOf(query, "x"), y = WholeOf(query, "y");
+  const bool exists = photo_id >= 0 && photo_id < static_cast<int>(scene_.photos().size()) &&
+                      scan && *scan >= 0 && *scan < scene_.num_scans();
+  if (!exists || !revision || !level || !x || !y) return std::nullopt;
+  const PickPhoto& photo = scene_.photos()[photo_id];
+  const auto give_up = [this, revision] {
+    return server_.stopping() || session_->Now()->revision != *revision;
+  };
+  const ScanRays* rays = scene_.WaitForRays(give_up);
+  const auto snapshot = SolvedRevision(photo, *revision);
+  if (photo.missing || rays == nullptr || !snapshot) return std::nullopt;
+  auto bytes =
+      back_projections_.Tile({photo_id, *scan, *revision}, *level, *x, *y, [&]() -> cv::Mat {
+        const Rigid& cam_from_scan = snapshot->solution.photos.at(photo.name()).cam_from_scan;
+        return DrawBackProjection(scene_, *rays, photo, cam_from_scan, *scan, give_up);
+      });
+  if (!bytes) return std::nullopt;
+  return Content{std::move(bytes), "image/png", "", true};
+}
+
+Json PickServer::Edges(const Query& query) {
+  const auto id = WholeOf(query, "photo"), revision = WholeOf(query, "revision");
+  if (!id || *id < 0 || *id >= static_cast<int>(scene_.photos().size()) || !revision) {
+    throw UsageError("There is no such photo.");
+  }
+  const PickPhoto& photo = scene_.photos()[*id];
+  const auto snapshot = SolvedRevision(photo, *revision);
+  if (!snapshot) throw UsageError("The picks have changed, or do not place this photo.");
+  const auto edges =
+      sights_.Edges(photo, snapshot->solution.photos.at(photo.name()), *revision,
+                    [&] { return server_.stopping() || session_->Now()->revision != *revision; });
+  if (!edges) throw UsageError("The picks have changed.");
+  return *edges;
+}
+
+std::optional<LocalServer::Content> PickServer::Overlay(const Query& query) {
+  const auto name = query.find("name");
+  if (name == query.end()) return std::nullopt;
+  const std::string path = align_.OverlayPath(name->second);
+  std::ifstream stream(path, std::ios::binary);
+  if (path.empty() || !stream) return std::nullopt;
+  auto bytes = std::make_shared<const std::string>(std::istreambuf_iterator<char>(stream),
+                                                   std::istreambuf_iterator<char>());
+  return Content{std::move(bytes), "image/jpeg", "", false};
+}
+
 std::optional<LocalServer::Content> PickServer::Tile(const Query& query) {
+  if (const auto back = WholeOf(query, "back")) return BackTile(query, *back);
   std::string id;
   if (const auto photo = WholeOf(query, "photo")) {
     id = PhotoPicture(*photo);

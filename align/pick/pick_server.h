@@ -6,6 +6,9 @@
 #include <mutex>
 #include <string>
 
+#include "align/pick/align_job.h"
+#include "align/pick/back_projection.h"
+#include "align/pick/photo_sights.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_session.h"
 #include "core/image_tiles.h"
@@ -20,6 +23,7 @@ class PickServer {
     LocalServerOptions server;
     std::string image_name;    // the photo to begin with; "" = choose
     std::string aligned_path;  // where roomtex-align writes
+    std::string align_program = FindAlignProgram();
   };
 
   // scene and session must outlive it.
@@ -28,15 +32,23 @@ class PickServer {
 
   // As LocalServer.
   void Start(bool stop_on_signals) { server_.Start(stop_on_signals); }
-  void Wait() { server_.Wait(); }
+  void Wait();
   const LocalServer& server() const { return server_; }
 
  private:
   using Query = LocalServer::Query;
   using Content = LocalServer::Content;
   void AddPictures();
+  void AddAlign();
   Json State();
+  Json Photos(const PickSession::Snapshot& snapshot);
   std::optional<Content> Tile(const Query& query);
+  std::optional<Content> BackTile(const Query& query, int photo_id);
+  Json Edges(const Query& query);
+  std::optional<Content> Overlay(const Query& query);
+  // The solution of a revision; null if that is no longer the session's, or does not place the
+  // photo.
+  std::shared_ptr<const PickSession::Snapshot> SolvedRevision(const PickPhoto& photo, int revision);
   std::optional<Content> Thumbnail(const Query& query);
   Json ScanPoint(const Query& query) const;
   int SelectedPhoto() const;
@@ -47,6 +59,9 @@ class PickServer {
   ImageTiles tiles_;
   std::mutex thumbnails_mutex_;  // one is made at a time: tiles are more urgent
   std::map<int, std::shared_ptr<const std::string>> thumbnails_;
+  BackProjections back_projections_;
+  PhotoSights sights_;
+  AlignJob align_;
   LocalServer server_;  // last: its threads use the rest
 };
 

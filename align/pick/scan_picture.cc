@@ -16,8 +16,8 @@ constexpr double kContrast = 52;
 constexpr double kNoiseShare = 0.15;
 // "shaded": samples on either side that a normal rests on, and the light beside the viewer.
 constexpr int kNormalReach = 2;
-constexpr float kLightRight = 0.45f, kLightUp = 0.6f;
-constexpr float kDarkest = 30, kBrightest = 245;
+constexpr float kLightRight = 0.4f, kLightUp = 0.3f;
+constexpr float kDarkest = 45, kBrightest = 245;
 
 cv::Mat1b MeasuredMask(const ScanPlaces& places) {
   cv::Mat1b mask(places.height(), places.width());
@@ -102,6 +102,17 @@ Eigen::Vector3f NormalAt(const ScanPlaces& places, int column, int row) {
   return (normal / length).cast<float>();
 }
 
+// Beside a single sample that is missing a surface goes on: only where there is no such gap is a
+// sample that is not smooth the rim of something.
+bool IsBesideGap(const ScanPlaces& places, int column, int row) {
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, places.height() - 1); ++r) {
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, places.width() - 1); ++c) {
+      if (places.scan().IsMissing(places.SampleAt(c, r))) return true;
+    }
+  }
+  return false;
+}
+
 cv::Mat DrawShaded(const ScanPlaces& places) {
   const Scan& scan = places.scan();
   cv::Mat3f normals(places.height(), places.width());
@@ -119,7 +130,8 @@ cv::Mat DrawShaded(const ScanPlaces& places) {
   for (int row = 0; row < grey.rows; ++row) {
     for (int column = 0; column < grey.cols; ++column) {
       const int sample = places.SampleAt(column, row);
-      if (!places.IsSmooth(sample)) continue;  // depth edges stay black
+      if (scan.IsMissing(sample)) continue;
+      if (!places.IsSmooth(sample) && !IsBesideGap(places, column, row)) continue;  // black
       const cv::Vec3f v = normals(row, column);
       const Eigen::Vector3f n(v[0], v[1], v[2]);
       const float length = n.norm();

@@ -5,6 +5,7 @@
 // row) of the picture is centred at (column + 0.5, row + 0.5). Where the columns of the file run
 // against the viewer's right, the picture is the grid turned the other way round.
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -29,6 +30,8 @@ class ScanPlaces {
   bool closed() const { return closed_; }
   // Angle between two rows over the angle between two columns where those are farthest apart.
   double aspect() const { return aspect_; }
+  // Radians between neighbouring samples, the larger of the two ways.
+  double step() const { return std::max(column_step_, row_step_); }
   // Index of the sample at (column, row) of the picture.
   int SampleAt(int column, int row) const {
     return scan_.Index(flipped_ ? scan_.num_columns - 1 - column : column, row);

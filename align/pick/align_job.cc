@@ -1,0 +1,271 @@
+#include "align/pick/align_job.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/error.h"
+
+extern char** environ;
+
+namespace roomtex {
+namespace {
+
+constexpr size_t kMaxLog = 300;    // lines
+constexpr size_t kMaxLine = 4000;  // characters
+constexpr int kPatienceMs = 2000;  // between SIGTERM and SIGKILL
+
+// The stages that roomtex-align prints, in their order, with their seconds on a scan of 2 M samples
+// and 30 photos: what a share of the whole is measured by. A stage prints when it is done.
+struct Stage {
+  const char* name;
+  double seconds;
+};
+constexpr Stage kStages[] = {
+    {"read model", 0.1},
+    {"read scan", 0.3},
+    {"planes", 0.9},
+    {"scan surface", 0.1},
+    {"pose from picks", 0.05},
+    {"scale", 0.4},
+    {"surface refinement", 0.1},
+    {"trust", 0.05},
+    {"bundle adjustment", 6},
+    {"write", 0.1},
+    {"agreement", 0.9},
+    {"overlays", 0.9},
+};
+constexpr int kNumStages = sizeof kStages / sizeof kStages[0];
+
+// Index of the stage whose line this is; -1 if it is none.
+int StageOf(const std::string& line) {
+  for (int i = 0; i < kNumStages; ++i) {
+    const std::string name = kStages[i].name;
+    const bool is_stage = line.size() > name.size() + 2 &&
+                          line.compare(0, name.size(), name) == 0 && line[name.size()] == ' ' &&
+                          line.compare(line.size() - 2, 2, " s") == 0;
+    if (is_stage) return i;
+  }
+  return -1;
+}
+
+double ShareDone(int stages_done) {
+  double done = 0, all = 0;
+  for (int i = 0; i < kNumStages; ++i) {
+    all += kStages[i].seconds;
+    if (i < stages_done) done += kStages[i].seconds;
+  }
+  return done / all;
+}
+
+Json ReadReport(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  Json json = Json::parse(stream, nullptr, false);
+  return json.is_discarded() ? Json() : json;
+}
+
+}  // namespace
+
+AlignJob::AlignJob(std::string program, std::vector<std::string> arguments,
+                   std::string aligned_path)
+    : program_(std::move(program)),
+      arguments_(std::move(arguments)),
+      aligned_path_(std::move(aligned_path)) {}
+
+AlignJob::~AlignJob() { Cancel(); }
+
+void AlignJob::Start() {
+  const std::lock_guard<std::mutex> starting(starting_);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (state_ == "running") throw UsageError("An alignment is running already.");
+  }
+  if (follower_.joinable()) follower_.join();
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  // A group of its own: Ctrl-C at the terminal ends us, and we end it.
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  std::vector<char*> argv = {const_cast<char*>(program_.c_str())};
+  for (const std::string& argument : arguments_) {
+    argv.push_back(const_cast<char*>(argument.c_str()));
+  }
+  argv.push_back(nullptr);
+  pid_t child = 0;
+  const int failed =
+      posix_spawnp(&child, program_.c_str(), &actions, &attributes, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  close(ends[1]);
+  if (failed != 0) {
+    close(ends[0]);
+    throw UsageError(program_ + " cannot be started: " + std::strerror(failed) + ".");
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state_ = "running";
+    child_ = child;
+    cancelled_ = false;
+    stages_done_ = 0;
+    log_.clear();
+    errors_.clear();
+    overlays_.clear();
+    verdict_ = {};
+  }
+  follower_ = std::thread([this, child, fd = ends[0]] { Follow(child, fd); });
+}
+
+void AlignJob::Follow(pid_t child, int errors_fd) {
+  std::string rest;
+  char block[4096];
+  while (true) {
+    const ssize_t count = read(errors_fd, block, sizeof block);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    rest.append(block, static_cast<size_t>(count));
+    for (size_t end; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1)) {
+      TakeLine(rest.substr(0, end));
+    }
+    if (rest.size() > kMaxLine) rest.resize(kMaxLine);  // the rest of a line that never ends
+  }
+  if (!rest.empty()) TakeLine(rest);
+  close(errors_fd);
+  // Not reaped yet: until the lock below is held, Cancel() still hits this process and no other.
+  siginfo_t info{};
+  while (waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+  }
+  int status = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    child_ = 0;
+    waitpid(child, &status, 0);
+  }
+  Finish(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
+}
+
+void AlignJob::TakeLine(const std::string& line) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  log_.push_back(line.substr(0, kMaxLine));
+  if (log_.size() > kMaxLog) log_.pop_front();
+  const int stage = StageOf(line);
+  if (stage >= 0) stages_done_ = std::max(stages_done_, stage + 1);
+  const std::string from = "roomtex-align: ";
+  if (line.rfind(from, 0) == 0) {
+    errors_.push_back(line.substr(from.size()));
+  } else if (!errors_.empty() && stage < 0) {
+    errors_.push_back(line);  // a message of several lines
+  }
+}
+
+void AlignJob::Finish(int exit_code) {
+  // Only these two write a report: another one is of an earlier run.
+  const bool has_report = exit_code == kExitDone || exit_code == kExitUntrusted;
+  const Json report = has_report ? ReadReport(aligned_path_ + "/alignment.json") : Json();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (cancelled_) {
+    verdict_ = {"failed", "Ended before it was done.", {}, {}};
+  } else {
+    try {
+      verdict_ = JudgeRun(exit_code, report, errors_);
+    } catch (const Json::exception&) {
+      verdict_ = JudgeRun(exit_code, Json(), errors_);
+    }
+    if (report.is_object() && report.contains("overlays") && report["overlays"].is_array()) {
+      for (const Json& path : report["overlays"]) {
+        if (!path.is_string()) continue;
+        overlays_.push_back(std::filesystem::path(path.get<std::string>()).filename().string());
+      }
+    }
+  }
+  exit_code_ = exit_code;
+  state_ = "done";
+}
+
+void AlignJob::Cancel() {
+  const std::lock_guard<std::mutex> starting(starting_);
+  const auto kill_with = [this](int signal) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (child_ == 0) return false;
+    cancelled_ = true;
+    kill(-child_, signal);
+    return true;
+  };
+  bool alive = kill_with(SIGTERM);
+  for (int waited = 0; alive && waited < kPatienceMs; waited += 20) {
+    usleep(20000);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    alive = child_ != 0;
+  }
+  if (alive) kill_with(SIGKILL);
+  if (follower_.joinable()) follower_.join();
+}
+
+Json AlignJob::State() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool running = state_ == "running", done = state_ == "done";
+  Json json;
+  json["state"] = state_;
+  json["stage"] = running && stages_done_ < kNumStages ? kStages[stages_done_].name : "";
+  json["share"] = running ? Json(ShareDone(stages_done_)) : done ? Json(1.0) : Json();
+  json["log"] = log_;
+  json["exit_code"] = done ? Json(exit_code_) : Json();
+  json["verdict"] = verdict_.verdict;
+  json["headline"] = verdict_.headline;
+  json["sentences"] = verdict_.sentences;
+  json["facts"] = Json::array();
+  for (const auto& [name, value] : verdict_.facts) {
+    json["facts"].push_back({{"name", name}, {"value", value}});
+  }
+  json["command"] = ShellLine("roomtex-align", arguments_);
+  json["overlays"] = overlays_;
+  return json;
+}
+
+std::string AlignJob::OverlayPath(const std::string& name) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool known = std::find(overlays_.begin(), overlays_.end(), name) != overlays_.end();
+  return known ? aligned_path_ + "/overlays/" + name : "";
+}
+
+std::string FindAlignProgram() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::string beside = (self.parent_path() / "roomtex-align").string();
+  return !error && access(beside.c_str(), X_OK) == 0 ? beside : "roomtex-align";
+}
+
+std::string ShellLine(const std::string& program, const std::vector<std::string>& arguments) {
+  std::string line = program;
+  for (const std::string& argument : arguments) {
+    const bool plain =
+        !argument.empty() && std::all_of(argument.begin(), argument.end(), [](unsigned char c) {
+          return std::isalnum(c) || std::strchr("-_./=+,:@%", c) != nullptr;
+        });
+    line += ' ';
+    if (plain) {
+      line += argument;
+      continue;
+    }
+    line += '\'';
+    for (const char c : argument) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    line += '\'';
+  }
+  return line;
+}
+
+}  // namespace roomtex

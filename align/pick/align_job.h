@@ -1,0 +1,73 @@
+#pragma once
+// roomtex-align as the page runs it: a process of its own on the saved picks, followed by what it
+// prints, its report put into plain words.
+
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sys/types.h>
+
+#include "core/report.h"
+
+namespace roomtex {
+
+struct AlignVerdict {
+  std::string verdict;   // "trusted", "untrusted" or "failed"
+  std::string headline;  // one short sentence
+  std::vector<std::string> sentences;
+  std::vector<std::pair<std::string, std::string>> facts;  // name, value with its unit
+};
+// report: alignment.json, null if the exit code says that there is none; errors: what was printed
+// beside the progress. exit_code as docs/commands.md, 128 + signal for a killed process.
+AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::string>& errors);
+
+// One run at a time. Safe from several threads.
+class AlignJob {
+ public:
+  // program: the executable. arguments: all of its options. aligned_path: where it writes.
+  AlignJob(std::string program, std::vector<std::string> arguments, std::string aligned_path);
+  ~AlignJob();  // ends a running one
+
+  // Throws UsageError if it runs already or cannot be started.
+  void Start();
+  // Ends a running one (SIGTERM, after two seconds SIGKILL) and waits for it.
+  void Cancel();
+  // As GET align of align/pick/README.md.
+  Json State();
+  // Path of an overlay of the last run; "" for any other name.
+  std::string OverlayPath(const std::string& name);
+
+ private:
+  void Follow(pid_t child, int errors_fd);
+  void TakeLine(const std::string& line);
+  void Finish(int exit_code);
+
+  const std::string program_;
+  const std::vector<std::string> arguments_;
+  const std::string aligned_path_;
+  std::mutex starting_;  // Start, Cancel: one at a time
+  std::thread follower_;
+
+  std::mutex mutex_;  // of all that follows
+  std::string state_ = "idle";
+  pid_t child_ = 0;  // 0 = none
+  bool cancelled_ = false;
+  int stages_done_ = 0;
+  std::deque<std::string> log_;
+  std::vector<std::string> errors_;
+  int exit_code_ = 0;
+  AlignVerdict verdict_;
+  std::vector<std::string> overlays_;
+};
+
+// roomtex-align of the folder that this program lies in; its bare name (found by PATH) if there is
+// none.
+std::string FindAlignProgram();
+
+// A line for a shell.
+std::string ShellLine(const std::string& program, const std::vector<std::string>& arguments);
+
+}  // namespace roomtex
