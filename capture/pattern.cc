@@ -12,7 +12,7 @@
 namespace roomtex {
 namespace {
 
-constexpr double kFinest = 7;  // pixels: the smallest shapes
+constexpr double kFinest = 5.5;  // pixels: the smallest shapes
 
 uint64_t SeedOf(const PatternOptions& options) {
   return MixBits(static_cast<uint64_t>(options.random_seed), 0x9a77e2);
@@ -26,16 +26,24 @@ cv::Size BlockedSize(const PatternOptions& options) {
   return {up(options.width), up(options.height)};
 }
 
-cv::Mat1b FromDetail(const cv::Mat1f& detail, const PatternOptions& options) {
+// detail: 0 = black, 65535 = white.
+cv::Mat1b FromDetail(const cv::Mat1w& detail, const PatternOptions& options) {
   // Thesis 5.1.2: the intensity is inverted, the blocks are re-arranged.
-  const cv::Mat1b spread = SpreadGrey(-detail, options.brightness);
+  const cv::Mat1w inverted = 65535 - detail;
+  const cv::Mat1b spread = SpreadGrey(inverted, options.brightness);
   const BlockShuffle shuffle = ShuffleBlocks(spread, options.blocks, SeedOf(options));
   return ApplyShuffle(spread, options.blocks, shuffle)({0, 0, options.width, options.height})
       .clone();
 }
 
+cv::Mat1w Wide(const cv::Mat1b& grey) {
+  cv::Mat1w wide;
+  grey.convertTo(wide, CV_16U, 257);
+  return wide;
+}
+
 // Grey, scaled so that it covers `size`, the overhang cut off.
-cv::Mat1f Cover(const cv::Mat& photo, cv::Size size) {
+cv::Mat1b Cover(const cv::Mat& photo, cv::Size size) {
   cv::Mat grey;
   if (photo.channels() == 3) {
     cv::cvtColor(photo, grey, cv::COLOR_BGR2GRAY);
@@ -75,15 +83,15 @@ cv::Mat1b MakePattern(const PatternOptions& options) {
   ThrowIfProblems(options.Problems());
   const cv::Size size = BlockedSize(options);
   const cv::Mat1b detail = DrawDetail(size.width, size.height, kFinest, SeedOf(options));
-  return FromDetail(cv::Mat1f(detail), options);
+  return FromDetail(Wide(detail), options);
 }
 
 cv::Mat1b MakePattern(const cv::Mat& photo, const PatternOptions& options) {
   ThrowIfProblems(options.Problems());
   const cv::Size size = BlockedSize(options);
-  const cv::Mat1f covering = Cover(photo, size);
+  const cv::Mat1b covering = Cover(photo, size);
   const cv::Mat1b detail = DrawDetail(size.width, size.height, kFinest, SeedOf(options));
-  return FromDetail(covering + cv::Mat1f(detail), options);
+  return FromDetail(0.5 * Wide(covering) + 0.5 * Wide(detail), options);
 }
 
 }  // namespace roomtex

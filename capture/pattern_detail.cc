@@ -12,9 +12,10 @@
 namespace roomtex {
 namespace {
 
-constexpr double kOctave = 1.5;    // from one size of shapes to the next
-constexpr double kCovered = 0.15;  // share of the picture that the shapes of one size cover
-constexpr int kShift = 4;          // corners are drawn to a sixteenth of a pixel
+constexpr double kOctave = 1.5;     // from one size of shapes to the next
+constexpr double kCovered = 0.25;   // share of the picture that the shapes of one size cover
+constexpr double kSoftening = 0.8;  // pixels, Gaussian sigma
+constexpr int kShift = 4;           // corners are drawn to a sixteenth of a pixel
 
 // A convex polygon or an ellipse, of this mean diameter, at any place.
 void DrawShape(double diameter, RandomStream* random, cv::Mat1b* image) {
@@ -54,16 +55,18 @@ cv::Mat1b DrawDetail(int width, int height, double finest, uint64_t seed) {
       DrawShape(low * std::pow(kOctave, random.Uniform()), &random, &image);
     }
   }
+  // Without the steps of single pixels along edges, which give features that all look alike.
+  cv::GaussianBlur(image, image, {}, kSoftening);
   return image;
 }
 
-cv::Mat1b SpreadGrey(const cv::Mat1f& image, double brightness) {
-  cv::Mat1f smooth;
+cv::Mat1b SpreadGrey(const cv::Mat1w& image, double brightness) {
+  cv::Mat1w smooth;
   cv::GaussianBlur(image, smooth, {}, 2);
   std::vector<int> order(image.total());
   std::iota(order.begin(), order.end(), 0);
-  const float* value = image.ptr<float>();
-  const float* tie = smooth.ptr<float>();
+  const uint16_t* value = image.ptr<uint16_t>();
+  const uint16_t* tie = smooth.ptr<uint16_t>();
   std::sort(order.begin(), order.end(), [&](int a, int b) {
     if (value[a] != value[b]) return value[a] < value[b];
     if (tie[a] != tie[b]) return tie[a] < tie[b];

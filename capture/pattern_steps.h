@@ -15,7 +15,7 @@ cv::Mat1b DrawDetail(int width, int height, double finest, uint64_t seed);
 // Grey values by rank: the darkest pixel becomes 0, the brightest 255, and between them each grey
 // value is as frequent as it takes for the mean `brightness` (0..1). Pixels of equal value are
 // ordered by a smoothed copy of the image.
-cv::Mat1b SpreadGrey(const cv::Mat1f& image, double brightness);
+cv::Mat1b SpreadGrey(const cv::Mat1w& image, double brightness);
 
 // A shuffle of blocks x blocks tiles: the block at place i (row by row) of the result is block
 // order[i] of the image.
