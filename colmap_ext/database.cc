@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <sqlite3.h>
 #include <unistd.h>
@@ -118,6 +119,8 @@ InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& err
     case SQLITE_PERM:
     case SQLITE_IOERR:
       return InputError(path, "", "cannot be read" + said, "Check the rights of file and folder");
+    case SQLITE_FULL:
+      return InputError(path, "", "cannot be copied: the disk is full", "Make space");
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     default:
@@ -511,6 +514,40 @@ void Database::CopyForMapper(const std::string& path, Schema schema) const {
                                 "LIKE 'sqlite_%' AND name NOT IN ('descriptors', 'matches')");
     while (statement.executeStep()) tables.push_back(statement.getColumn(0).getString());
     for (const std::string& table : tables) CopyRows(from, copy, table);
+    transaction.commit();
+  });
+}
+
+size_t Database::CountPairs() const {
+  size_t count = 0;
+  impl_->ForEachRow(
+      "two_view_geometries", "SELECT COUNT(*) FROM two_view_geometries WHERE rows > 0",
+      [&](const Row& row) { count = static_cast<size_t>(row.Integer(0, 0, INT64_MAX)); });
+  return count;
+}
+
+void Database::CopyWithCameras(const std::string& path,
+                               const std::map<uint32_t, Camera>& cameras) const {
+  impl_->Guarded([&] {
+    SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    SQLite::Backup(copy, *impl_->sqlite).executeStep(-1);
+    copy.exec("PRAGMA journal_mode = DELETE");  // out of WAL, which the copy took over
+    copy.exec("PRAGMA journal_mode = MEMORY");  // no file beside it
+    SQLite::Transaction transaction(copy);
+    SQLite::Statement update(copy,
+                             "UPDATE cameras SET model = ?, width = ?, height = ?, params = ?, "
+                             "prior_focal_length = ? WHERE camera_id = ?");
+    for (const auto& [camera_id, camera] : cameras) {
+      update.bind(1, static_cast<int>(camera.model));
+      update.bind(2, camera.width);
+      update.bind(3, camera.height);
+      update.bindNoCopy(4, camera.params.data(),
+                        static_cast<int>(camera.params.size() * sizeof(double)));
+      update.bind(5, camera.has_prior_focal_length ? 1 : 0);
+      update.bind(6, static_cast<int64_t>(camera_id));
+      update.exec();
+      update.reset();
+    }
     transaction.commit();
   });
 }

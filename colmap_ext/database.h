@@ -54,6 +54,8 @@ class Database {
   // the keypoints of their images, or this is an InputError. Pairs of images that the database no
   // longer holds are left out, as COLMAP does.
   std::vector<DatabasePair> ReadPairs(int min_matches) const;
+  // Number of pairs with a verified match, without reading them.
+  size_t CountPairs() const;
 
   // Writes at `path` (which must not exist) a database with everything that COLMAP's mapper reads,
   // i.e. without the rows of descriptors and raw matches, most of the bytes. COLMAP opens databases
@@ -61,6 +63,10 @@ class Database {
   // 3.9 reads, whatever the version of this database.
   enum class Schema { kAsIs, kColmap39 };
   void CopyForMapper(const std::string& path, Schema schema) const;
+
+  // Writes at `path` (missing or empty) the whole database, with these rows of the table cameras
+  // (which it must have) replaced. Needs no WAL file beside it.
+  void CopyWithCameras(const std::string& path, const std::map<uint32_t, Camera>& cameras) const;
 
   const std::string& path() const;
 
