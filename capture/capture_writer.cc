@@ -9,6 +9,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "capture/simulated_projector.h"
 #include "capture/true_colors.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/error.h"
@@ -55,6 +56,17 @@ void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_fo
   }
 }
 
+// A place every 20 seconds; with projectors every minute, its plain photo 7 seconds later.
+std::string DateTime(const SimulatedRoom& room, int photo) {
+  const bool paired = !room.Projectors().empty();
+  const int place = room.PlaceOf(photo);
+  const int seconds = paired ? 60 * place + (room.IsPatterned(photo) ? 0 : 7) : 20 * place;
+  char date_time[40];
+  std::snprintf(date_time, sizeof(date_time), "2008:05:01 %02d:%02d:%02d", 12 + seconds / 3600,
+                seconds / 60 % 60, seconds % 60);
+  return date_time;
+}
+
 void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
   const cv::Mat image = room.RenderPhoto(photo);
   std::vector<uchar> bytes;
@@ -69,10 +81,7 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
     exposure.f_number = kAperture;
     exposure.iso = kIso;
     exposure.camera = "roomtex simulated camera";
-    char date_time[32];
-    std::snprintf(date_time, sizeof(date_time), "2008:05:01 %02d:%02d:%02d", 12 + photo / 180,
-                  photo / 3 % 60, photo % 3 * 20);
-    exposure.date_time = date_time;
+    exposure.date_time = DateTime(room, photo);
     WriteExposureData(file.partial_path(), exposure);
   }
   file.Commit();
@@ -151,6 +160,30 @@ void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
                 CameraModelName(camera.model) + " --ImageReader.camera_params " + params + "\n");
 }
 
+// What roomtex-associate has to find, and what the projectors throw from where.
+void WriteProjectors(const SimulatedRoom& room, const std::string& folder) {
+  if (room.Projectors().empty()) return;
+  std::string pairs = "patterned_image,plain_image\n";
+  for (int photo = 0; photo < room.NumPhotos(); photo += 2) {
+    pairs += room.PhotoName(photo) + "," + room.PhotoName(photo + 1) + "\n";
+  }
+  WriteText(folder + "/associations.csv", pairs);
+  const Rigid room_from_scan = room.ScanFromRoom().Inverse();
+  std::ostringstream text = ExactStream();
+  text << "# proj_from_scan: PATTERN WIDTH HEIGHT fx fy cx cy qw qx qy qz tx ty tz\n";
+  for (const Projector& projector : room.Projectors()) {
+    const Camera& camera = projector.camera();
+    const std::string name = "pattern_" + std::to_string(camera.camera_id) + ".png";
+    text << name << " " << camera.width << " " << camera.height;
+    for (const double param : camera.params) text << " " << param;
+    text << " " << PoseLine(projector.proj_from_room() * room_from_scan) << "\n";
+    std::vector<uchar> bytes;
+    cv::imencode(".png", projector.pattern(), bytes);
+    WriteText(folder + "/" + name, std::string(bytes.begin(), bytes.end()));
+  }
+  WriteText(folder + "/projectors.txt", text.str());
+}
+
 void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   SparseModel model;
   model.cameras[1] = room.camera();
@@ -167,6 +200,7 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   }
   WriteSparseModelText(model, folder);
   WriteText(folder + "/exposures.csv", exposures.str());
+  WriteProjectors(room, folder);
   const Rigid scan_from_room = room.ScanFromRoom();
   WriteSimilarity(folder + "/scan_from_room.txt",
                   {1, scan_from_room.rotation, scan_from_room.translation});

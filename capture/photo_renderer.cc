@@ -9,6 +9,7 @@
 
 #include "capture/camera_faults.h"
 #include "capture/random_stream.h"
+#include "capture/simulated_projector.h"
 #include "core/parallel.h"
 #include "core/photo.h"
 
@@ -52,7 +53,8 @@ Eigen::Vector2d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
 }
 
 PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_img,
-                                         double y_in_img, double pixel_size) const {
+                                         double y_in_img, double pixel_size,
+                                         const ProjectedLight* projected) const {
   const auto direction_at = [&](double x, double y) -> Eigen::Vector3d {
     return room_from_cam.leftCols<3>() * RayAt(x, y).homogeneous().normalized();
   };
@@ -83,9 +85,16 @@ PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_
   }
   shot.place += hit->patch;
   const Eigen::Vector3d normal = scene_.patches()[hit->patch].Normal();
-  shot.color =
-      tint.cwiseProduct(scene_.Color(*hit, OffsetOnPlane(origin, next_x, hit->point, normal),
-                                     OffsetOnPlane(origin, next_y, hit->point, normal)));
+  const Eigen::Vector3d side_x = OffsetOnPlane(origin, next_x, hit->point, normal);
+  const Eigen::Vector3d side_y = OffsetOnPlane(origin, next_y, hit->point, normal);
+  LinearRgb added = LinearRgb::Zero();
+  if (projected != nullptr) {
+    const ProjectedLight::Arrival arrival = projected->At(*hit, side_x, side_y);
+    added.setConstant(arrival.light);
+    // A border of a shadow is a border like that of a surface.
+    shot.place = static_cast<int>(MixBits(shot.place, arrival.lit_by));
+  }
+  shot.color = tint.cwiseProduct(scene_.Color(*hit, side_x, side_y, added));
   return shot;
 }
 
@@ -96,7 +105,7 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
   cv::Mat place(height_, width_, CV_32S);
   ParallelFor(num_threads, 0, height_, [&](int y) {
     for (int x = 0; x < width_; ++x) {
-      const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1);
+      const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings.projected);
       linear.at<cv::Vec3f>(y, x) = {shot.color.z(), shot.color.y(), shot.color.x()};
       place.at<int>(y, x) = shot.place;
     }
@@ -116,7 +125,7 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
       LinearRgb sum = LinearRgb::Zero();
       for (int k = 0; k < kSide * kSide; ++k) {
         sum += Shoot(room_from_cam, x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide,
-                     1.0 / kSide)
+                     1.0 / kSide, settings.projected)
                    .color;
       }
       sum /= kSide * kSide;

@@ -12,6 +12,8 @@
 
 namespace roomtex {
 
+class ProjectedLight;
+
 struct PhotoSettings {
   double exposure_ev = 0;
   double blur_px = 0;       // Gaussian sigma
@@ -21,6 +23,7 @@ struct PhotoSettings {
   std::string response = "srgb";
   double vignetting = 0;
   Eigen::Vector3f white_balance = Eigen::Vector3f::Ones();  // factors on red, green, blue
+  const ProjectedLight* projected = nullptr;                // falls on top of the room's light
 };
 
 class PhotoRenderer {
@@ -38,7 +41,8 @@ class PhotoRenderer {
   };
   Eigen::Vector2d RayAt(double x_in_img, double y_in_img) const;
   using Pose = Eigen::Matrix<double, 3, 4>;
-  Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size) const;
+  Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size,
+             const ProjectedLight* projected) const;
   void Develop(const cv::Mat& linear, const PhotoSettings& settings, int num_threads,
                cv::Mat* photo) const;
 

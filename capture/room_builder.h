@@ -27,6 +27,7 @@ class RoomBuilder {
   void AddLights();
   void AddPictures();
   void AddFurniture();
+  void AddFewFurniture();  // of a bare room
   void AddDoor();
 
  private:
@@ -41,7 +42,8 @@ class RoomBuilder {
   }
   int Add(const TexturePtr& texture, const Infrared& infrared,
           Surface::Kind kind = Surface::Kind::kOpaque, bool shines = false) {
-    return scene_.AddSurface({texture, infrared, kind, shines});
+    return scene_.AddSurface(
+        {options_.bare ? MakePlain(MeanAlbedo(*texture)) : texture, infrared, kind, shines});
   }
   // A picture of this size in metres, one pixel per millimetre of its longer side.
   int AddPictureSurface(const cv::Mat& picture, double width, double height, float grain = 0.03f,

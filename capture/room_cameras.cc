@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "capture/random_stream.h"
+#include "capture/simulated_projector.h"
 #include "core/camera_formulas.h"
 #include "core/frames.h"
 
@@ -76,6 +77,37 @@ double TripodClearance(const RoomScene& scene, double x, double y, double height
   }
   return nearest;
 }
+
+// A light meter of 40 x 27 places; the window may burn out. The brightest channel of each, EV 0.
+std::vector<float> MeterPlaces(const RoomScene& scene, const ProjectedLight* projected,
+                               const CameraProjection& projection, const Rigid& cam_from_room) {
+  std::vector<float> brightest;
+  const Camera& camera = projection.camera();
+  const Rigid room_from_cam = cam_from_room.Inverse();
+  const Eigen::Vector3d point_like = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 40 * 27; ++k) {
+    const Eigen::Vector2d at((k % 40 + 0.5) / 40 * camera.width,
+                             (k / 40 + 0.5) / 27 * camera.height);
+    const auto ray = projection.CamFromImg(at);
+    if (!ray) continue;
+    const Eigen::Vector3d direction = room_from_cam.rotation * ray->homogeneous().normalized();
+    const auto hit = scene.Cast(room_from_cam.translation, direction);
+    if (!hit || scene.patches()[hit->patch].shines) continue;
+    LinearRgb added = LinearRgb::Zero();
+    if (projected != nullptr) added.setConstant(projected->At(*hit, point_like, point_like).light);
+    brightest.push_back(scene.Color(*hit, point_like, point_like, added).maxCoeff());
+  }
+  return brightest;
+}
+
+// The value that only 1 % of the places exceed.
+float Brightest(std::vector<float> brightest) {
+  const size_t rank = brightest.size() * 99 / 100;
+  std::nth_element(brightest.begin(), brightest.begin() + rank, brightest.end());
+  return brightest[rank];
+}
+
+constexpr double kBurnsOut = 0.95;
 
 }  // namespace
 
@@ -181,29 +213,26 @@ std::vector<double> ChooseExposures(const SimulatedRoomOptions& options, const R
   std::vector<double> exposures;
   for (size_t i = 0; i < cam_from_room.size(); ++i) {
     RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 203, i));
-    // A light meter of 40 x 27 places; the window may burn out.
-    std::vector<float> brightest;
-    const Rigid room_from_cam = cam_from_room[i].Inverse();
-    for (int k = 0; k < 40 * 27; ++k) {
-      const Eigen::Vector2d at((k % 40 + 0.5) / 40 * camera.width,
-                               (k / 40 + 0.5) / 27 * camera.height);
-      const auto ray = projection.CamFromImg(at);
-      if (!ray) continue;
-      const Eigen::Vector3d direction = room_from_cam.rotation * ray->homogeneous().normalized();
-      const auto hit = scene.Cast(room_from_cam.translation, direction);
-      if (hit && !scene.patches()[hit->patch].shines) {
-        brightest.push_back(scene.Color(*hit).maxCoeff());
-      }
-    }
+    const std::vector<float> places = MeterPlaces(scene, nullptr, projection, cam_from_room[i]);
     int thirds = random.Index(2 * most + 1) - most;
-    if (!brightest.empty()) {
-      const size_t rank = brightest.size() * 99 / 100;
-      std::nth_element(brightest.begin(), brightest.begin() + rank, brightest.end());
-      while (thirds > -most && brightest[rank] * std::exp2(thirds / 3.0) > 0.95) --thirds;
+    if (!places.empty()) {
+      const float brightest = Brightest(places);
+      while (thirds > -most && brightest * std::exp2(thirds / 3.0) > kBurnsOut) --thirds;
     }
     exposures.push_back(thirds / 3.0);
   }
   return exposures;
+}
+
+double MeterExposure(const RoomScene& scene, const ProjectedLight* projected, const Camera& camera,
+                     const Rigid& cam_from_room) {
+  const std::vector<float> places =
+      MeterPlaces(scene, projected, CameraProjection(camera), cam_from_room);
+  int thirds = 6;
+  if (places.empty()) return 0;
+  const float brightest = Brightest(places);
+  while (thirds > -18 && brightest * std::exp2(thirds / 3.0) > kBurnsOut) --thirds;
+  return thirds / 3.0;
 }
 
 }  // namespace roomtex

@@ -11,6 +11,8 @@
 
 namespace roomtex {
 
+class ProjectedLight;
+
 // camera_id 1. options.camera_model must be one of COLMAP's.
 Camera MakeRoomCamera(const SimulatedRoomOptions& options);
 
@@ -25,5 +27,10 @@ std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const Room
 // burns out.
 std::vector<double> ChooseExposures(const SimulatedRoomOptions& options, const RoomScene& scene,
                                     const Camera& camera, const std::vector<Rigid>& cam_from_room);
+
+// The longest exposure (EV, thirds, -6 to 2) at which next to nothing burns out, room light and
+// projected light together. projected may be null.
+double MeterExposure(const RoomScene& scene, const ProjectedLight* projected, const Camera& camera,
+                     const Rigid& cam_from_room);
 
 }  // namespace roomtex

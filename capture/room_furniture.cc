@@ -18,6 +18,7 @@ void RoomBuilder::AddTable(const Rigid& at) {
   }
   Part(at, oak_, -kLong / 2 + 0.11, -kWide / 2 + 0.06, kHigh - 0.12, kLong - 0.22, 0.025, 0.088);
   Part(at, oak_, -kLong / 2 + 0.11, kWide / 2 - 0.085, kHigh - 0.12, kLong - 0.22, 0.025, 0.088);
+  if (options_.bare) return;
   // A laptop, newspapers, a pile of books, a cup and a bowl.
   const Rigid laptop = at * Placed(-0.3, 0.0, kHigh, 14);
   Part(laptop, metal_, -0.17, -0.12, 0, 0.34, 0.24, 0.018);
@@ -173,6 +174,7 @@ void RoomBuilder::AddSideboard(const Rigid& at) {
     scene_.AddBox(metal_, at * Placed(x + (i == 2 ? 0.03 : wide - 0.05), kDeep + 0.016, 0.5),
                   {0.02, 0.025, 0.09});
   }
+  if (options_.bare) return;
   const double top = kHigh + 0.025;
   const Rigid clock = at * Placed(0.42, 0.2, top, -10);
   Part(clock, walnut_, -0.13, -0.04, 0, 0.26, 0.08, 0.28);
@@ -348,6 +350,17 @@ void RoomBuilder::AddFurniture() {
       0.02);
 }
 
+void RoomBuilder::AddFewFurniture() {
+  const double table_x = width_ - 1.75, table_y = 1.55;
+  AddTable(Placed(table_x, table_y, 0, 7));
+  AddChair(Placed(table_x - 0.3, table_y - 0.62, 0, 10), walnut_);
+  AddChair(Placed(table_x + 0.35, table_y + 0.66, 0, 174), walnut_);
+  AddSofa(Placed(0.02, 0.47 * depth_, 0, -90));
+  AddSideboard(Placed(width_ - 3.3 > 1.2 ? 1.55 : 1.1, 0.016, 0));
+  const int carton = Add(MakePlain(RgbFromSrgb(176, 138, 92)), {0.3f, 0.6f, {0.6f, 0.3f, 0}});
+  Part(Placed(1.0, depth_ - 0.62, 0, 5), carton, 0, 0, 0, 0.55, 0.42, 0.38);
+}
+
 void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
   RoomBuilder builder(options, scene);
   builder.AddShell();
@@ -357,7 +370,12 @@ void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
     builder.AddDoor();
   }
   if (options.furnished && !options.bare_walls) builder.AddPictures();
-  if (options.furnished) builder.AddFurniture();
+  if (!options.furnished) return;
+  if (options.bare) {
+    builder.AddFewFurniture();
+  } else {
+    builder.AddFurniture();
+  }
 }
 
 }  // namespace roomtex

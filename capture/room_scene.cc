@@ -185,7 +185,7 @@ bool RoomScene::IsOccluded(const Eigen::Vector3d& from, const Eigen::Vector3d& t
 }
 
 LinearRgb RoomScene::Color(const SceneHit& hit, const Eigen::Vector3d& side_x,
-                           const Eigen::Vector3d& side_y) const {
+                           const Eigen::Vector3d& side_y, const LinearRgb& added) const {
   const Patch& patch = patches_[hit.patch];
   const RoomTexture& texture = *surfaces_[patch.surface].texture;
   Eigen::Matrix2f uv_from_st;
@@ -207,7 +207,7 @@ LinearRgb RoomScene::Color(const SceneHit& hit, const Eigen::Vector3d& side_x,
     const float along = (static_cast<float>(i) + 0.5f) / static_cast<float>(taps) - 0.5f;
     albedo += texture.Albedo(uv + along * longer, footprint);
   }
-  return albedo.cwiseProduct(Illumination(hit)) / static_cast<float>(taps);
+  return albedo.cwiseProduct(Illumination(hit) + added) / static_cast<float>(taps);
 }
 
 LinearRgb RoomScene::Color(const SceneHit& hit) const {

@@ -104,8 +104,9 @@ class RoomScene {
 
   // Linear light, EV 0, averaged over the parallelogram that side_x and side_y span around the hit
   // (tangential; zero = the finest detail there is).
-  LinearRgb Color(const SceneHit& hit, const Eigen::Vector3d& side_x,
-                  const Eigen::Vector3d& side_y) const;
+  // added: light on top of the room's, on the scale of its light.
+  LinearRgb Color(const SceneHit& hit, const Eigen::Vector3d& side_x, const Eigen::Vector3d& side_y,
+                  const LinearRgb& added = LinearRgb::Zero()) const;
   LinearRgb Color(const SceneHit& hit) const;
   float InfraredReflectance(const SceneHit& hit) const;  // 0..1
 

@@ -432,6 +432,18 @@ LinearRgb RgbFromSrgb(int red, int green, int blue) {
   return {table[red], table[green], table[blue]};
 }
 
+LinearRgb MeanAlbedo(const RoomTexture& texture) {
+  constexpr int kSide = 16;
+  constexpr float kStep = 0.7f / kSide;
+  LinearRgb sum = LinearRgb::Zero();
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Eigen::Vector2f at(static_cast<float>(i % kSide) + 0.5f,
+                             static_cast<float>(i / kSide) + 0.5f);
+    sum += texture.Albedo(kStep * at, kStep);
+  }
+  return sum / (kSide * kSide);
+}
+
 TexturePtr MakePlain(const LinearRgb& color) { return std::make_shared<Plain>(color); }
 TexturePtr MakePlaster(const LinearRgb& color, float contrast, uint32_t seed) {
   return std::make_shared<Plaster>(color, contrast, seed);

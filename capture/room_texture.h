@@ -27,6 +27,8 @@ class RoomTexture {
   virtual LinearRgb Albedo(const Eigen::Vector2f& uv, float footprint) const = 0;
 };
 using TexturePtr = std::shared_ptr<const RoomTexture>;
+// Over the first half square metre.
+LinearRgb MeanAlbedo(const RoomTexture& texture);
 
 // One colour all over.
 TexturePtr MakePlain(const LinearRgb& color);

@@ -19,11 +19,23 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
   command->AddBool("furnished", &options->furnished, "table, shelf, sofa, pictures and so on");
   command->AddBool("bare_walls", &options->bare_walls,
                    "plain walls, floor and ceiling: nothing for features to hold on to");
+  command->AddInt("projectors", &options->projectors,
+                  "projectors that throw patterns; every place is then photographed twice, "
+                  "patterned and plain, and the room is bare unless --bare says otherwise");
+  command->AddInt("projector_width", &options->projector_width, "pixels");
+  command->AddInt("projector_height", &options->projector_height, "pixels");
+  command->AddDouble("projector_field_of_view_deg", &options->projector_field_of_view_deg,
+                     "horizontal, degrees; smaller = finer pattern on less of the walls");
+  command->AddDouble("projector_light", &options->projector_light,
+                     "light of a white pattern at 1 m, room light = 1");
+  command->AddDouble("projector_focus", &options->projector_focus,
+                     "metres from the projector to where its pattern is sharp");
   command->AddDouble("finest_detail", &options->finest_detail,
                      "metres: no surface has finer detail; larger = smoother pictures and prints");
   command->AddBool("shading", &options->shading,
                    "light from a lamp and the window instead of even light");
-  command->AddInt("num_photos", &options->num_photos, "number of photos");
+  command->AddInt("num_photos", &options->num_photos,
+                  "number of photos; with projectors: of places");
   command->AddInt("photo_width", &options->photo_width, "pixels");
   command->AddInt("photo_height", &options->photo_height, "pixels");
   command->AddDouble("field_of_view_deg", &options->field_of_view_deg, "horizontal, degrees");
@@ -93,6 +105,7 @@ int main(int argc, char** argv) {
   std::string output_path;
   int seed = -1;
   bool reachable = false;
+  std::string bare = "auto";
   Command command(
       "roomtex-simulate",
       "Makes a capture of a simulated room: photos, a range scan, picks, and the truth.",
@@ -102,11 +115,15 @@ int main(int argc, char** argv) {
                         "folder for the capture; its README.txt says what is what");
   command.AddInt("seed", &seed, "the same as --random_seed; -1 = take that one");
   AddOptions(&options, &command);
+  command.AddChoice("bare", &bare, {"auto", "1", "0"},
+                    "bare walls, and little furniture in one colour a piece; auto = with "
+                    "projectors");
   command.AddBool("reachable", &reachable,
                   "write truth/reachable.ply too: the mean of the photos with true places, "
                   "visibility and exposure");
   return command.Run(argc, argv, [&](const Command::Context& context) {
     options.random_seed = seed >= 0 ? seed : context.options.random_seed;
+    options.bare = bare == "1" || (bare == "auto" && options.projectors > 0);
     options.num_threads = context.options.num_threads;
     ThrowIfProblems(options.Problems());
     context.progress.Stage("room");

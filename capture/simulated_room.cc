@@ -13,6 +13,7 @@
 #include "capture/room_furniture.h"
 #include "capture/room_scene.h"
 #include "capture/simulated_observations.h"
+#include "capture/simulated_projector.h"
 #include "capture/simulated_scan.h"
 #include "capture/stranger.h"
 #include "core/error.h"
@@ -21,8 +22,11 @@
 namespace roomtex {
 
 namespace {
-constexpr double kNominalExposureTime = 1.0 / 30;  // seconds at EV 0
+// Seconds at EV 0. The room is dimmed for projectors.
+double NominalExposureTime(const SimulatedRoomOptions& options) {
+  return options.projectors > 0 ? 1.0 / 4 : 1.0 / 30;
 }
+}  // namespace
 
 std::vector<std::string> SimulatedRoomOptions::Problems() const {
   std::vector<std::string> problems;
@@ -36,6 +40,16 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   require(within(depth, 3.8, 20), "room_depth must be 3.8 to 20 m: the furniture has to fit in");
   require(within(height, 2.5, 6), "room_height must be 2.5 to 6 m");
   require(within(finest_detail, 0, 0.1), "finest_detail must be 0 to 0.1 m");
+  require(projectors >= 0 && projectors <= kMaxProjectors,
+          "projectors must be 0 to " + std::to_string(kMaxProjectors));
+  require(projector_width >= 320 && projector_width <= 16384,
+          "projector_width must be 320 to 16384 pixels");
+  require(projector_height >= 240 && projector_height <= 16384,
+          "projector_height must be 240 to 16384 pixels");
+  require(within(projector_field_of_view_deg, 10, 120),
+          "projector_field_of_view_deg must be 10 to 120");
+  require(within(projector_light, 0, 1000), "projector_light must be 0 to 1000");
+  require(within(projector_focus, 0.3, 100), "projector_focus must be 0.3 to 100 m");
   require(num_photos >= 1 && num_photos <= 1000, "num_photos must be 1 to 1000");
   require(photo_width >= 64 && photo_width <= 20000, "photo_width must be 64 to 20000 pixels");
   require(photo_height >= 64 && photo_height <= 20000, "photo_height must be 64 to 20000 pixels");
@@ -66,15 +80,32 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   return problems;
 }
 
+namespace {
+SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
+  options.bare_walls = options.bare_walls || options.bare;
+  return options;
+}
+}  // namespace
+
 struct SimulatedRoom::Impl {
   explicit Impl(const SimulatedRoomOptions& given)
-      : options(given), camera(MakeRoomCamera(given)), projection(camera) {
+      : options(Completed(given)), camera(MakeRoomCamera(given)), projection(camera) {
     scene.SetFinestDetail(options.finest_detail);
     FurnishRoom(options, &scene);
+    const std::vector<Rigid> room_from_projector = PlaceProjectors(options);
+    for (const Rigid& place : room_from_projector) AddProjectorBody(place, &scene);
     scene.Finish(options.shading, options.num_threads);
     cam_from_room = PlaceCameras(options, scene);
     room_from_station = PlaceStations(options, scene);
     exposures = ChooseExposures(options, scene, camera, cam_from_room);
+    for (size_t k = 0; k < room_from_projector.size(); ++k) {
+      projectors.push_back(MakeProjector(options, static_cast<int>(k), room_from_projector[k]));
+    }
+    if (projectors.empty()) return;
+    projected = std::make_unique<ProjectedLight>(projectors, scene, RoomArea(options));
+    for (const Rigid& pose : cam_from_room) {
+      patterned_exposures.push_back(MeterExposure(scene, projected.get(), camera, pose));
+    }
   }
 
   RoomScanner Scanner(int station) const {
@@ -96,7 +127,10 @@ struct SimulatedRoom::Impl {
   const CameraProjection projection;
   RoomScene scene;
   std::vector<Rigid> cam_from_room, room_from_station;
-  std::vector<double> exposures;
+  std::vector<double> exposures;  // per place; of the plain photos
+  std::vector<Projector> projectors;
+  std::unique_ptr<ProjectedLight> projected;  // if there are projectors
+  std::vector<double> patterned_exposures;    // per place
   mutable std::once_flag renderer_made;
   mutable std::unique_ptr<PhotoRenderer> renderer;
 };
@@ -109,27 +143,41 @@ SimulatedRoom::~SimulatedRoom() = default;
 
 const SimulatedRoomOptions& SimulatedRoom::options() const { return impl_->options; }
 const Camera& SimulatedRoom::camera() const { return impl_->camera; }
-int SimulatedRoom::NumPhotos() const { return impl_->options.num_photos; }
+int SimulatedRoom::NumPhotos() const {
+  return impl_->options.num_photos * (impl_->projected ? 2 : 1);
+}
+bool SimulatedRoom::IsPatterned(int photo) const { return impl_->projected && photo % 2 == 0; }
+int SimulatedRoom::PlaceOf(int photo) const { return impl_->projected ? photo / 2 : photo; }
+const std::vector<Projector>& SimulatedRoom::Projectors() const { return impl_->projectors; }
 
 std::string SimulatedRoom::PhotoName(int photo) const {
   char name[32];
-  std::snprintf(name, sizeof(name), "photo_%03d.jpg", photo);
+  if (impl_->projected) {
+    std::snprintf(name, sizeof(name), "IMG_%04d.jpg", photo + 1);
+  } else {
+    std::snprintf(name, sizeof(name), "photo_%03d.jpg", photo);
+  }
   return name;
 }
 
-Rigid SimulatedRoom::CamFromRoom(int photo) const { return impl_->cam_from_room.at(photo); }
+Rigid SimulatedRoom::CamFromRoom(int photo) const {
+  return impl_->cam_from_room.at(PlaceOf(photo));
+}
 Rigid SimulatedRoom::CamFromScan(int photo) const {
-  return impl_->cam_from_room.at(photo) * impl_->room_from_station[0];
+  return CamFromRoom(photo) * impl_->room_from_station[0];
 }
 Rigid SimulatedRoom::ScanFromRoom() const { return impl_->room_from_station[0].Inverse(); }
-double SimulatedRoom::ExposureEv(int photo) const { return impl_->exposures.at(photo); }
+double SimulatedRoom::ExposureEv(int photo) const {
+  const auto& exposures = IsPatterned(photo) ? impl_->patterned_exposures : impl_->exposures;
+  return exposures.at(PlaceOf(photo));
+}
 double SimulatedRoom::ExposureTime(int photo) const {
-  return kNominalExposureTime * std::exp2(ExposureEv(photo));
+  return NominalExposureTime(impl_->options) * std::exp2(ExposureEv(photo));
 }
 
 double SimulatedRoom::NotedTime(int photo) const {
   const std::string& wrong = impl_->options.wrong_exif;
-  if (wrong == "all") return kNominalExposureTime;
+  if (wrong == "all") return NominalExposureTime(impl_->options);
   return ExposureTime(photo) * (wrong == "one" && photo == NumPhotos() / 2 ? 0.25 : 1);
 }
 Eigen::Vector3f SimulatedRoom::WhiteBalance(int photo) const {
@@ -145,8 +193,9 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   settings.white_balance = WhiteBalance(photo);
   settings.noise = impl_->options.photo_noise;
   settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
-  cv::Mat image = impl_->Renderer().Render(impl_->cam_from_room.at(photo), settings,
-                                           impl_->options.num_threads);
+  if (IsPatterned(photo)) settings.projected = impl_->projected.get();
+  cv::Mat image =
+      impl_->Renderer().Render(CamFromRoom(photo), settings, impl_->options.num_threads);
   if (HasStranger(photo)) {
     DrawStranger(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 521, photo), &image);
   }
@@ -236,7 +285,7 @@ std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& sam
                                                           int photo) const {
   constexpr double kFlattest = 0.05;
   constexpr int kAtOnce = 4096;
-  const Rigid& cam_from_room = impl_->cam_from_room.at(photo);
+  const Rigid cam_from_room = CamFromRoom(photo);
   const Eigen::Vector3d centre = cam_from_room.TargetOriginInSource();
   const int count = static_cast<int>(samples.points.size());
   std::vector<Eigen::Vector2f> sightings(
@@ -272,7 +321,10 @@ SparseModel SimulatedRoom::MakeSparseModel(int num_points, double noise_px) cons
       ScanFromSparse().Inverse() *
       Similarity{1, scan_from_room.rotation, scan_from_room.translation};
   SparseModel model = MakeRoomSparseModel(impl_->Photos(), sparse_from_room, num_points, noise_px);
-  for (auto& [id, image] : model.images) image.name = PhotoName(static_cast<int>(id) - 1);
+  const int photos_per_place = impl_->projected ? 2 : 1;
+  for (auto& [id, image] : model.images) {
+    image.name = PhotoName(photos_per_place * (static_cast<int>(id) - 1));
+  }
   return model;
 }
 
@@ -280,7 +332,7 @@ std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const 
   RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 701, photo));
   std::vector<SimulatedPick> picks;
   for (const PickCandidate& candidate :
-       SpreadPicks(impl_->Candidates(photo), count, impl_->PhotoDiagonal())) {
+       SpreadPicks(impl_->Candidates(PlaceOf(photo)), count, impl_->PhotoDiagonal())) {
     const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
     picks.push_back({PhotoName(photo), candidate.x_in_img + impl_->options.click_noise_px * noise,
                      candidate.x_in_scan});
@@ -292,8 +344,9 @@ int SimulatedRoom::BestPhotoForPicks() const {
   int best_photo = 0;
   double best = -1;
   for (int photo = 0; photo < NumPhotos(); ++photo) {
+    if (impl_->projected && !IsPatterned(photo)) continue;
     // How far apart the picks would lie: the smallest spread of the points in space.
-    const auto picks = SpreadPicks(impl_->Candidates(photo), 8, impl_->PhotoDiagonal());
+    const auto picks = SpreadPicks(impl_->Candidates(PlaceOf(photo)), 8, impl_->PhotoDiagonal());
     if (picks.size() < 6) continue;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const auto& pick : picks) mean += pick.x_in_scan / static_cast<double>(picks.size());

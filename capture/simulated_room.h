@@ -19,16 +19,28 @@
 
 namespace roomtex {
 
+class Projector;
+
 struct SimulatedRoomOptions {
   int random_seed = 0;
   // Room and what stands in it.
   double width = 5.0, depth = 4.0, height = 2.7;  // metres
   bool furnished = true;                          // table, shelf, chairs, pictures ...
   bool bare_walls = false;  // plain walls, floor and ceiling: nothing for features to hold on to
+  // The same, and the furniture is little and in one colour a piece: what projectors are made for.
+  bool bare = false;
   double finest_detail = 0.0015;  // metres: no surface has finer detail
   bool shading = false;           // Lambertian shading under ceiling lamps instead of plain albedo
+  // Projectors that throw patterns (thesis 5.1.2); 0 = none. With them every place is photographed
+  // twice without moving the camera: patterned, then plain.
+  int projectors = 0;
+  int projector_width = 1920, projector_height = 1080;  // pixels
+  double projector_field_of_view_deg = 85;              // horizontal; short throw
+  // White light at 1 m on the axis, room light = 1: 3500 lumens in a room of 150 lux.
+  double projector_light = 15;
+  double projector_focus = 3.2;  // metres from the lens to where the pattern is sharp
   // Photos.
-  int num_photos = 30;
+  int num_photos = 30;                          // places, if there are projectors
   int photo_width = 1936, photo_height = 1288;  // pixels
   double field_of_view_deg = 65;                // horizontal
   std::string camera_model = "OPENCV";          // any COLMAP model; distortion of an ordinary lens
@@ -82,17 +94,21 @@ class SimulatedRoom {
   const SimulatedRoomOptions& options() const;
   const Camera& camera() const;  // one for all photos, camera_id 1
 
-  int NumPhotos() const;
-  std::string PhotoName(int photo) const;         // "photo_000.jpg"
-  Rigid CamFromRoom(int photo) const;             // truth
-  Rigid CamFromScan(int photo) const;             // truth, frame of station 0 = THE scan frame
-  double ExposureEv(int photo) const;             // truth, 0 = nominal
-  double ExposureTime(int photo) const;           // seconds, truth
-  double NotedTime(int photo) const;              // seconds, as in EXIF
+  int NumPhotos() const;  // twice the places if there are projectors
+  // "photo_000.jpg"; with projectors IMG_0001.jpg (patterned), IMG_0002.jpg (plain), IMG_0003.jpg
+  std::string PhotoName(int photo) const;
+  bool IsPatterned(int photo) const;     // taken in the projectors' light
+  int PlaceOf(int photo) const;          // the camera has not moved between photos of one place
+  Rigid CamFromRoom(int photo) const;    // truth
+  Rigid CamFromScan(int photo) const;    // truth, frame of station 0 = THE scan frame
+  double ExposureEv(int photo) const;    // truth, 0 = nominal
+  double ExposureTime(int photo) const;  // seconds, truth
+  double NotedTime(int photo) const;     // seconds, as in EXIF
   Eigen::Vector3f WhiteBalance(int photo) const;  // factors on red, green, blue
   // 8-bit BGR, sRGB-encoded, with distortion, exposure, blur and noise.
   cv::Mat RenderPhoto(int photo) const;
   bool HasStranger(int photo) const;
+  const std::vector<Projector>& Projectors() const;
 
   // station >= 0. The scan in the frame of station 0 (scan_from_station says where station k
   // stood). Intensity is an infrared reflectance, not the photos' brightness; integers 0..4095.
@@ -110,14 +126,15 @@ class SimulatedRoom {
 
   // True sparse model in the frame scan * S^-1 for a made-up similarity S = ScanFromSparse():
   // points on surfaces with tracks over the photos that really see them, keypoint noise of
-  // noise_px. For tests that do not want to run COLMAP.
+  // noise_px. For tests that do not want to run COLMAP. With projectors: of the patterned photos.
   SparseModel MakeSparseModel(int num_points, double noise_px) const;
   Similarity ScanFromSparse() const;
 
   // Picks of one photo (scan samples that the photo sees, well spread, at corners of things), with
   // the click noise of the options.
   std::vector<SimulatedPick> MakePicks(int photo, int count) const;
-  // The photo that sees the most of the scan, spread in depth: where a user would click.
+  // The photo that sees the most of the scan, spread in depth: where a user would click. Never a
+  // plain one, if there are projectors: COLMAP gets the patterned ones.
   int BestPhotoForPicks() const;
 
  private:

@@ -57,6 +57,8 @@ Sightings CollectSightings(const SimulatedRoom& room, const TrueSamples& samples
   result.views.assign(count, 0);
   std::vector<Eigen::Vector4f> sums(reachable ? count : 0, Eigen::Vector4f::Zero());
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    // The colours are the plain photos' business.
+    if (room.IsPatterned(photo)) continue;
     const std::vector<Eigen::Vector2f> positions = room.TrueSightings(samples, photo);
     cv::Mat image;
     if (reachable) image = ReadPhoto(photo_folder + "/" + room.PhotoName(photo));
