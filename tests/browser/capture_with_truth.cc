@@ -1,0 +1,86 @@
+// browser_capture FOLDER: a small simulated capture for the tests of the pages, with what a user
+// would not have: COLMAP's model of it without running COLMAP, and places.json, the places that
+// one sees both in a photo and in the scan. No click noise: the test clicks where it wants.
+
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <limits>
+
+#include <nlohmann/json.hpp>
+
+#include "capture/capture_writer.h"
+#include "capture/simulated_room.h"
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+namespace {
+
+// The column and row of the sample that lies nearest to a point of the scan.
+Eigen::Vector2i FindSample(const Scan& scan, const Eigen::Vector3d& x_in_scan) {
+  Eigen::Vector2i best(0, 0);
+  double best_distance = std::numeric_limits<double>::infinity();
+  for (int row = 0; row < scan.num_rows; ++row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      const Eigen::Vector3d sample = scan.points[scan.Index(column, row)];
+      const double distance = (sample - x_in_scan).norm();
+      if (distance < best_distance) {
+        best_distance = distance;
+        best = {column, row};
+      }
+    }
+  }
+  return best;
+}
+
+nlohmann::json Places(const SimulatedRoom& room, const Scan& scan, int photo, int count) {
+  nlohmann::json places = nlohmann::json::array();
+  for (const SimulatedPick& pick : room.MakePicks(photo, count)) {
+    const Eigen::Vector2i sample = FindSample(scan, pick.x_in_scan);
+    places.push_back({{"image_name", pick.image_name},
+                      {"img", {pick.x_in_img.x(), pick.x_in_img.y()}},
+                      {"scan", {sample.x() + 0.5, sample.y() + 0.5}},
+                      {"point", {pick.x_in_scan.x(), pick.x_in_scan.y(), pick.x_in_scan.z()}}});
+  }
+  return places;
+}
+
+void WriteAll(const std::string& folder) {
+  SimulatedRoomOptions options;
+  options.shading = true;
+  options.num_photos = 12;
+  options.photo_width = 960;
+  options.photo_height = 640;
+  options.scan_columns = 800;
+  options.scan_rows = 400;
+  options.click_noise_px = 0;
+  const SimulatedRoom room(options);
+  Progress progress(/*quiet=*/true);
+  WriteCapture(room, folder + "/capture", &progress);
+  WriteSparseModel(room.MakeSparseModel(2500, 0.5), folder + "/sparse");
+  const Scan scan = room.MakeScan(0);
+  const int best = room.BestPhotoForPicks();
+  nlohmann::json places;
+  places["photo"] = room.PhotoName(best);
+  places["places"] = Places(room, scan, best, 16);
+  places["other_photo"] = room.PhotoName((best + 1) % room.NumPhotos());
+  places["other_places"] = Places(room, scan, (best + 1) % room.NumPhotos(), 16);
+  std::ofstream(folder + "/places.json") << places.dump(1) << "\n";
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "Say: browser_capture FOLDER\n");
+    return 2;
+  }
+  try {
+    roomtex::WriteAll(argv[1]);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,436 @@
+// roomtex-pick in a browser, on a simulated room: by mouse and by keys, as its user works.
+
+import assert from 'node:assert/strict';
+import {readFileSync, writeFileSync} from 'node:fs';
+import {after, before, test} from 'node:test';
+
+import {launchBrowser, makeFolder, run, screenshot} from './browser.mjs';
+import {capture, distance, lowestContrast, PickPage, servePicks, until} from './pick_page.mjs';
+
+const kSampleSpacing = 0.04;  // metres; what a scan of 800 columns has at 5 m
+
+let browser;
+let places;  // of the photo that suits best, those that can be picked
+let other_places;
+
+// Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile.
+async function onPage(body, {picks_file = '', allowed = [], more = [], size = {}} = {}) {
+  const folder = makeFolder();
+  const picks_path = folder.path('picks.csv');
+  if (picks_file) writeFileSync(picks_path, picks_file);
+  const server = await servePicks(picks_path, ['--image_name', places[0].image_name, ...more]);
+  const page = await PickPage.open(browser, server, picks_path, size);
+  try {
+    await body(page, {folder, server, picks_path});
+    const unexpected = page.errors().filter((one) => !allowed.some((known) => known.test(one)));
+    assert.deepEqual(unexpected, []);
+  } catch (error) {
+    await screenshot(page.page, 'pick-failed');
+    throw error;
+  } finally {
+    await page.close();
+    assert.equal(await server.stop(), 0);
+    folder.remove();
+  }
+}
+
+// A picks file of the first `count` places.
+function fileOf(list) {
+  return [
+    'image_name,x,y,scan_x,scan_y,scan_z',
+    ...list.map(({image_name, img, point}) => [image_name, ...img, ...point].join())
+  ].join('\n') +
+      '\n';
+}
+
+// Those of places.json that the server takes: corners of things are often depth edges.
+async function usable(server, list) {
+  const result = [];
+  for (const place of list) {
+    const [x, y] = place.scan;
+    const answer = await (await fetch(`${server.url}scan_point?scan=0&x=${x}&y=${y}`)).json();
+    if (!answer.ok) continue;
+    // The picture of the scan lies as the test thinks.
+    assert.ok(
+        distance(answer.point, place.point) < kSampleSpacing,
+        `${x}, ${y}: ${answer.point} instead of ${place.point}`);
+    result.push(place);
+  }
+  assert.ok(result.length >= 8, `only ${result.length} places can be picked`);
+  return result;
+}
+
+before(async () => {
+  browser = await launchBrowser();
+  const all = JSON.parse(readFileSync(capture('places.json'), 'utf8'));
+  const server = await servePicks(capture('none.csv'));
+  places = await usable(server, all.places);
+  other_places = await usable(server, all.other_places);
+  assert.equal(await server.stop(), 0);
+});
+
+after(async () => {
+  await browser.close();
+});
+
+test('six pairs by mouse: numbers come, the file follows every step', async () => {
+  await onPage(async (page) => {
+    assert.equal(page.file().length, 0);
+    for (const [index, place] of places.slice(0, 6).entries()) {
+      // Either side first.
+      const sides = index % 2 === 0 ? ['photo', 'scan'] : ['scan', 'photo'];
+      await page.click(sides[0], place[sides[0] === 'photo' ? 'img' : 'scan']);
+      await page.rowIs(index, (row) => row.status === 'half', 'half finished');
+      await page.saved();
+      assert.equal(page.file().length, index, 'half a pick is not written');
+      if (index === 5) await watchForResiduals(page.page);
+      await page.click(sides[1], place[sides[1] === 'photo' ? 'img' : 'scan']);
+      await page.rowIs(index, (row) => row.status !== 'half', 'completed');
+      await page.saved();
+      const picks = page.file();
+      assert.equal(picks.length, index + 1);
+      assert.equal(picks[index].image_name, place.image_name);
+      assert.ok(distance(picks[index].img, place.img) < 0.5, `${picks[index].img}`);
+      assert.ok(distance(picks[index].point, place.point) < kSampleSpacing);
+    }
+    const milliseconds =
+        await until(() => page.page.evaluate(() => window.residuals_after), 'the sixth residual');
+    console.log(
+        `from the sixth click to its residual on the screen: ${milliseconds.toFixed(0)} ms`);
+    await until(async () => (await page.rows()).every((row) => row.status === 'used'), 'all used');
+    for (const row of await page.rows()) {
+      assert.ok(row.px !== null && row.px < 2.5, `pick ${row.number}: ${row.px} px`);
+      assert.ok(row.mm !== null && row.mm < 30, `pick ${row.number}: ${row.mm} mm`);
+      assert.ok(row.left_out !== null && row.left_out >= row.px);
+    }
+    assert.match(await page.text('#summary-body'), /6 used of 6/);
+    assert.match(await page.text('#photo-fit'), /px rms/);
+    await page.page.click('#photo-whole');
+    await page.page.click('#scan-whole');
+    await screenshot(page.page, 'pick-six');
+  });
+});
+
+// Notes the time from the next mouse button that is let go until pick 6 has a residual.
+function watchForResiduals(page) {
+  return page.evaluate(() => {
+    let released = 0;
+    addEventListener('pointerup', () => {
+      released = performance.now();
+    }, true);
+    new MutationObserver(() => {
+      const cell = document.querySelector('#rows tr:nth-child(6) .value');
+      if (released === 0 || window.residuals_after || !/\d/.test(cell?.textContent)) return;
+      requestAnimationFrame(() => {
+        window.residuals_after = performance.now() - released;
+      });
+    })
+        .observe(
+            document.querySelector('#rows'), {subtree: true, childList: true, characterData: true});
+  });
+}
+
+test('a pick dragged far off is marked, dragged back it is good again; undo and redo', async () => {
+  const first = places.slice(0, 8);
+  await onPage(async (page) => {
+    await page.rowsAre(8);
+    const from = first[2].img;
+    const to = [from[0] < 480 ? from[0] + 60 : from[0] - 60, from[1]];
+    let on_the_way = null;
+    await page.page.click('#photo-whole');
+    await page.drag('photo', from, to, async () => {
+      // The numbers follow before the button is let go.
+      on_the_way = await page.rowIs(2, (row) => row.px > 10, 'its residual grows');
+    });
+    assert.ok(on_the_way);
+    const bad =
+        await page.rowIs(2, (row) => row.status === 'bad' || /worst/.test(row.state), 'marked');
+    assert.match(bad.state, /✕|▲/, 'not by colour alone');
+    assert.ok(bad.left_out > 30, `${bad.left_out}`);
+    await page.saved();
+    assert.ok(distance(page.file()[2].img, to) < 2.5, `${page.file()[2].img}`);
+    const far = page.file()[2].img;
+    await screenshot(page.page, 'pick-far');
+
+    await page.drag('photo', far, from);
+    await page.rowIs(2, (row) => row.status === 'used' && row.px < 5, 'good again');
+    await page.saved();
+    assert.ok(distance(page.file()[2].img, from) < 2.5);
+
+    await page.page.keyboard.press('Control+z');
+    await page.rowIs(2, (row) => row.left_out > 30, 'far again');
+    await page.saved();
+    assert.deepEqual(page.file()[2].img, far);
+    await page.page.keyboard.press('Control+z');
+    await page.rowIs(2, (row) => row.status === 'used', 'as in the file');
+    await page.saved();
+    assert.ok(distance(page.file()[2].img, from) < 1e-6);
+    assert.ok(await page.page.isDisabled('#undo'));
+    await page.page.keyboard.press('Control+Shift+Z');
+    await page.rowIs(2, (row) => row.left_out > 30, 'far once more');
+    await page.page.keyboard.press('Control+y');
+    await page.rowIs(2, (row) => row.status === 'used', 'back once more');
+    assert.ok(await page.page.isDisabled('#redo'));
+    await page.saved();
+  }, {picks_file: fileOf(first)});
+});
+
+test('a point in the scan is dragged, a place without an echo is refused', async () => {
+  await onPage(async (page) => {
+    await page.rowsAre(7);
+    await page.zoomTo('scan', places[1].scan);
+    const [x, y] = places[1].scan;
+    await page.drag('scan', [x, y], [x + 6, y]);
+    await page.saved();
+    await until(
+        () => distance(page.file()[1].point, places[1].point) > 0.01 ||
+            page.page.locator('#hint').isVisible(),
+        'it has moved, or the place is refused');
+    await page.page.keyboard.press('Escape');
+    await page.page.keyboard.press('Control+z');
+    await page.saved();
+    await until(
+        () => distance(page.file()[1].point, places[1].point) < 1e-6,
+        'back to the point of the file');
+  }, {picks_file: fileOf(places.slice(0, 7))});
+});
+
+test('off and on, remove and bring back, next and previous', async () => {
+  await onPage(async (page) => {
+    await page.rowsAre(7);
+    await page.page.focus('#photo-pane');
+    for (let step = 0; step < 3; ++step) await page.page.keyboard.press('n');
+    await page.rowIs(2, (row) => row.selected, 'selected by the third N');
+    const view = await page.view('photo');
+    assert.ok(distance(view.centre, places[2].img) < 0.01, 'in the middle of the photo');
+    assert.ok(distance((await page.view('scan')).centre, places[2].scan) < 2, 'and of the scan');
+    await page.page.keyboard.press('p');
+    await page.rowIs(1, (row) => row.selected, 'selected by P');
+
+    await page.page.keyboard.press('x');
+    await page.rowIs(1, (row) => row.status === 'off' && !row.on, 'off');
+    await page.saved();
+    assert.deepEqual(page.file().map((pick) => pick.weight), [1, 0, 1, 1, 1, 1, 1]);
+    await page.page.keyboard.press('x');
+    await page.rowIs(1, (row) => row.status === 'used' && row.on, 'on');
+    await page.saved();
+    assert.ok(page.file().every((pick) => pick.weight === 1));
+    // The same by mouse.
+    await page.page.locator('#rows tr').nth(3).locator('input').click();
+    await page.rowIs(3, (row) => row.status === 'off', 'off by its box');
+    await page.saved();
+    assert.equal(page.file()[3].weight, 0);
+    await page.page.locator('#rows tr').nth(3).locator('input').click();
+    await page.rowIs(3, (row) => row.status === 'used', 'on by its box');
+
+    const before = page.file();
+    await page.page.focus('#photo-pane');
+    await page.page.keyboard.press('Delete');
+    await page.rowsAre(6);
+    await page.saved();
+    assert.deepEqual(page.file(), before.filter((pick, index) => index !== 1));
+    await page.page.keyboard.press('Control+z');
+    await page.rowsAre(7);
+    await page.saved();
+    assert.deepEqual(page.file(), before);
+  }, {picks_file: fileOf(places.slice(0, 7))});
+});
+
+test('the missing half is predicted near the truth, and taken by Enter', async () => {
+  await onPage(async (page) => {
+    await page.rowsAre(6);
+    const place = places[6];
+    await page.click('photo', place.img);
+    await page.rowIs(6, (row) => row.status === 'half', 'half finished');
+    await page.saved();
+    const ghost =
+        await until(async () => (await page.session()).picks[6].predicted_scan, 'a prediction');
+    assert.ok(
+        distance([ghost.x, ghost.y], place.scan) < 4, `${ghost.x}, ${ghost.y}: ${place.scan}`);
+    await page.page.click('#scan-whole');
+    await page.redrawn();
+    await screenshot(page.page, 'pick-half');
+    await page.page.focus('#photo-pane');
+    await page.page.keyboard.press('Enter');
+    // A prediction on a depth edge is refused, and the nearest place offered.
+    await until(
+        async () => (await page.rows())[6].status !== 'half' ||
+            await page.page.locator('#hint').isVisible(),
+        'taken or refused');
+    if ((await page.rows())[6].status === 'half') await page.page.keyboard.press('Enter');
+    await page.rowIs(6, (row) => row.status === 'used', 'completed by the prediction');
+    await page.saved();
+    assert.ok(distance(page.file()[6].point, place.point) < 3 * kSampleSpacing);
+
+    // The other way round: from the scan into the photo.
+    await page.click('scan', places[7].scan);
+    await page.rowIs(7, (row) => row.status === 'half', 'half finished');
+    await page.saved();
+    const in_photo =
+        await until(async () => (await page.session()).picks[7].predicted_img, 'a prediction');
+    assert.ok(distance(in_photo, places[7].img) < 5, `${in_photo}: ${places[7].img}`);
+    await page.page.keyboard.press('Enter');
+    await page.rowIs(7, (row) => row.status === 'used', 'completed by the prediction');
+    await page.saved();
+    assert.ok(distance(page.file()[7].img, places[7].img) < 5);
+  }, {picks_file: fileOf(places.slice(0, 6))});
+});
+
+test('reloading the page goes on with the picks, and so does a new server', async () => {
+  await onPage(async (page, {server, picks_path}) => {
+    await page.rowsAre(6);
+    await page.pick(places[6]);
+    const before = (await page.rows()).map(({photo, px, status}) => [photo, px, status]);
+    const file = page.file();
+    await page.page.reload();
+    await page.page.waitForSelector('body[data-ready]');
+    await page.rowsAre(7);
+    assert.deepEqual((await page.rows()).map(({photo, px, status}) => [photo, px, status]), before);
+    assert.deepEqual(page.file(), file);
+    const second = await servePicks(picks_path);
+    const again = await PickPage.open(browser, second, picks_path);
+    await again.rowsAre(7);
+    await until(async () => (await again.rows())[6].px !== null, 'numbers');
+    const [row] = (await again.rows()).slice(6);
+    assert.ok(Math.abs(row.px - before[6][1]) < 0.02, `${row.px} after ${before[6][1]}`);
+    assert.deepEqual(again.errors(), []);
+    await again.close();
+    assert.equal(await second.stop(), 0);
+  }, {picks_file: fileOf(places.slice(0, 6))});
+});
+
+test('picks in a second photo', async () => {
+  await onPage(async (page) => {
+    await page.rowsAre(6);
+    const name = other_places[0].image_name;
+    await page.page.fill('#filter', name);
+    await until(
+        async () => await page.page.locator('.thumb:visible').count() === 1, 'one thumbnail');
+    await page.page.locator('.thumb:visible').click();
+    await until(async () => (await page.text('#photo-name')) === name, 'the photo is chosen');
+    await page.page.fill('#filter', '');
+    await page.pick(other_places[0]);
+    await page.pick(other_places[1]);
+    const row = await page.rowIs(7, (one) => one.status === 'used', 'used');
+    assert.equal(row.photo, name);
+    assert.ok(row.px < 8, `${row.px}`);
+    assert.equal(page.file().filter((pick) => pick.image_name === name).length, 2);
+  }, {picks_file: fileOf(places.slice(0, 6))});
+});
+
+test('one pick by the keyboard alone', async () => {
+  await onPage(async (page) => {
+    const {page: window} = page;
+    const place = places[0];
+    // The photo has the focus from the start; Tab and W lead to the other pane.
+    assert.equal(await window.evaluate(() => document.activeElement.id), 'photo-pane');
+    for (const [side, target] of [['photo', place.img], ['scan', place.scan]]) {
+      if (side === 'scan') await window.keyboard.press('w');
+      assert.equal(await window.evaluate(() => document.activeElement.id), `${side}-pane`);
+      await steerCrosshair(page, side, target);
+      await window.keyboard.press(side === 'photo' ? 'Space' : 'Enter');
+    }
+    await page.rowIs(0, (row) => row.status !== 'half', 'completed');
+    await page.saved();
+    const [pick] = page.file();
+    assert.ok(distance(pick.img, place.img) < 1, `${pick.img}: ${place.img}`);
+    assert.ok(distance(pick.point, place.point) < 2 * kSampleSpacing);
+    // Then the arrows move the selected point: by one pixel, with Shift by a tenth.
+    await window.keyboard.press('w');
+    await window.keyboard.press('ArrowRight');
+    await window.keyboard.press('Shift+ArrowDown');
+    await page.saved();
+    await until(
+        () => distance(page.file()[0].img, [pick.img[0] + 1, pick.img[1] + 0.1]) < 1e-9,
+        'moved by 1 and 0.1');
+  });
+});
+
+// By arrow keys, first coarsely, then with Shift; the loupe says where the crosshair is.
+async function steerCrosshair(page, side, target) {
+  const {page: window} = page;
+  const loupe = window.locator(`#${side}-loupe`);
+  const press = async (key, times) => {
+    for (let i = 0; i < times; ++i) await window.keyboard.press(key);
+    await page.redrawn();
+    return [Number(await loupe.getAttribute('data-x')), Number(await loupe.getAttribute('data-y'))];
+  };
+  for (const shift of ['', 'Shift+', 'Shift+']) {
+    for (const [axis, minus, plus] of [
+             [0, 'ArrowLeft', 'ArrowRight'], [1, 'ArrowUp', 'ArrowDown']]) {
+      const one = await press(shift + plus, 1);
+      const two = await press(shift + minus, 1);
+      const step = one[axis] - two[axis];
+      const count = Math.round((target[axis] - two[axis]) / step);
+      await press(shift + (count > 0 ? plus : minus), Math.abs(count));
+    }
+    await press('+', 4);
+  }
+}
+
+test('Align says trusted, and the model lies where it should', async () => {
+  await onPage(async (page, {folder}) => {
+    await page.rowsAre(8);
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.match(await page.text('#align .verdict'), /✓\s*Trusted/);
+    assert.ok((await page.text('#align .headline')).length > 10);
+    assert.match(await page.text('#align code'), /roomtex-align .*--picks_path/);
+    assert.ok(await page.page.locator('#align .facts dt').count() > 0);
+    const overlays = page.page.locator('#align .overlays button');
+    assert.ok(await overlays.count() > 0);
+    await overlays.first().click();
+    await page.page.waitForSelector('#large[open] img');
+    await until(
+        () => page.page.evaluate(() => document.querySelector('#large img').naturalWidth > 300),
+        'the overlay');
+    await page.page.keyboard.press('Escape');
+    await until(async () => !await page.page.isVisible('#large'), 'Escape closes it');
+    await screenshot(page.page, 'pick-align');
+    assert.ok((await lowestContrast(page.page, '#align')).ratio >= 4.5);
+    const aligned = folder.path('aligned');
+    const result = await run(
+        'roomtex-evaluate', ['--truth_path', capture('capture', 'truth'), '--input_path', aligned]);
+    assert.equal(result.code, 0, result.stderr);
+    const {poses} = JSON.parse(result.stdout);
+    assert.equal(poses.num_registered, 12);
+    assert.ok(poses.position_median_mm < 10, `${poses.position_median_mm} mm`);
+    assert.ok(poses.rotation_median_deg < 0.15, `${poses.rotation_median_deg} degrees`);
+    // The focus stays in the dialog and comes back afterwards.
+    for (let press = 0; press < 12; ++press) {
+      await page.page.keyboard.press('Tab');
+      assert.ok(
+          await page.page.evaluate(
+              () => document.activeElement === document.body ||
+                  document.activeElement.closest('#align') !== null),
+          'the focus is trapped');
+    }
+    await page.page.keyboard.press('Escape');
+    await until(async () => !await page.page.isVisible('#align'), 'Escape closes the dialog');
+    assert.equal(await page.page.evaluate(() => document.activeElement.id), 'align-open');
+  }, {picks_file: fileOf(places.slice(0, 8))});
+});
+
+test('picks that are wrong are refused in words', async () => {
+  const wrong = places.slice(0, 6).map((place) => ({...place}));
+  [wrong[0].img, wrong[3].img] = [wrong[3].img, wrong[0].img];
+  [wrong[1].img, wrong[4].img] = [wrong[4].img, wrong[1].img];
+  await onPage(async (page) => {
+    await page.rowsAre(6);
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    const text = await page.text('#align .verdict');
+    assert.match(text, /Not trusted|Refused/);
+    assert.match(text, /▲|✕/);
+    assert.match(await page.text('#align .headline'), /\w+ \w+ \w+/);
+    await screenshot(page.page, 'pick-refused');
+  }, {picks_file: fileOf(wrong)});
+});
+
+test('too few picks: Align says so without running', async () => {
+  await onPage(async (page) => {
+    await page.rowsAre(3);
+    await page.page.click('#align-open');
+    assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);
+  }, {picks_file: fileOf(places.slice(0, 3))});
+});

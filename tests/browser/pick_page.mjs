@@ -1,0 +1,238 @@
+// roomtex-pick's page as its user has it: mouse, keys, what can be read. Nothing reaches into the
+// page's scripts; where a pixel is on the screen the pane says itself (data-view).
+
+import assert from 'node:assert/strict';
+import {existsSync, readFileSync} from 'node:fs';
+import path from 'node:path';
+
+import {openPage, serve} from './browser.mjs';
+
+// Waits until `probe` gives something true and returns it; no fixed times anywhere.
+export async function until(probe, what, seconds = 30) {
+  const end = Date.now() + 1000 * seconds;
+  for (;;) {
+    const result = await probe();
+    if (result) return result;
+    if (Date.now() > end) throw new Error(`waited ${seconds} s for: ${what}`);
+    await new Promise((done) => setTimeout(done, 20));
+  }
+}
+
+// Picks of a file: [{image_name, img, point, weight}].
+export function readPicks(path) {
+  if (!existsSync(path)) return [];
+  const lines = readFileSync(path, 'utf8').split('\n').filter((line) => line && line[0] !== '#');
+  assert.match(lines[0], /^image_name,x,y,scan_x,scan_y,scan_z(,weight)?$/);
+  return lines.slice(1).map((line) => {
+    const fields = line.split(',');
+    const [x, y, px, py, pz, weight = 1] = fields.slice(1).map(Number);
+    return {image_name: fields[0], img: [x, y], point: [px, py, pz], weight};
+  });
+}
+
+export function distance(a, b) {
+  return Math.hypot(...a.map((value, i) => value - b[i]));
+}
+
+// Of the capture that browser_capture has made.
+export function capture(...parts) {
+  const folder = process.env.ROOMTEX_CAPTURE;
+  if (!folder) throw new Error('ROOMTEX_CAPTURE is not set: run these tests by ctest');
+  return path.join(folder, ...parts);
+}
+
+// Starts roomtex-pick on it.
+export function servePicks(picks_path, more = []) {
+  return serve('roomtex-pick', [
+    '--input_path',
+    capture('sparse'),
+    '--image_path',
+    capture('capture', 'photos'),
+    '--scan_path',
+    capture('capture', 'scan.rtpi'),
+    '--output_path',
+    picks_path,
+    '--port',
+    '0',
+    ...more,
+  ]);
+}
+
+export class PickPage {
+  static async open(browser, server, picks_path, size = {}) {
+    const {page, errors} = await openPage(browser, server.url, size);
+    await page.waitForSelector('body[data-ready]');
+    const result = new PickPage();
+    Object.assign(result, {page, errors, picks_path, url: server.url});
+    await result.view('photo');
+    await result.view('scan');
+    return result;
+  }
+
+  // CSS pixels of the window per pixel and where things are: {scale, aspect, centre, box}.
+  async view(side) {
+    const pane = this.page.locator(`#${side}-pane`);
+    const text = await until(() => pane.getAttribute('data-view'), `${side} is drawn`);
+    const [scale, aspect, x, y] = text.split(' ').map(Number);
+    return {scale, aspect, centre: [x, y], box: await pane.boundingBox(), text};
+  }
+
+  async toScreen(side, img) {
+    const {scale, aspect, centre, box} = await this.view(side);
+    return [
+      box.x + box.width / 2 + (img[0] - centre[0]) * scale,
+      box.y + box.height / 2 + (img[1] - centre[1]) * scale * aspect,
+    ];
+  }
+
+  // By the wheel, from the whole picture; so far that a CSS pixel is less than a quarter of a
+  // pixel.
+  async zoomTo(side, img, scale = 5) {
+    const button = side === 'photo' ? '#photo-whole' : '#scan-whole';
+    await this.page.click(button);
+    await this.redrawn();
+    for (let step = 0; step < 40; ++step) {
+      const view = await this.view(side);
+      if (view.scale >= scale) return;
+      await this.page.mouse.move(...await this.toScreen(side, img));
+      await this.page.mouse.wheel(0, -400);
+      await until(async () => (await this.view(side)).text !== view.text, 'the wheel zooms');
+    }
+    assert.fail('the wheel does not zoom');
+  }
+
+  // Two frames: what was changed is drawn.
+  redrawn() {
+    return this.page.evaluate(
+        () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  }
+
+  async click(side, img) {
+    await this.zoomTo(side, img);
+    await this.page.mouse.click(...await this.toScreen(side, img));
+  }
+
+  // Presses on one place of a side and lets go on another; both must be in view.
+  async drag(side, from, to, on_the_way = async () => {}) {
+    await this.page.mouse.move(...await this.toScreen(side, from));
+    await this.page.mouse.down();
+    const [x, y] = await this.toScreen(side, to);
+    await this.page.mouse.move(x, y, {steps: 12});
+    await on_the_way();
+    await this.page.mouse.up();
+  }
+
+  // Both halves of a place of places.json; waits until it is in the table and in the file.
+  async pick(place) {
+    const before = (await this.rows()).length;
+    await this.click('photo', place.img);
+    await this.rowsAre(before + 1);
+    await this.click('scan', place.scan);
+    await this.rowIs(before, (row) => row.status !== 'half', 'completed');
+    await this.saved();
+  }
+
+  // The table as it is read.
+  rows() {
+    return this.page.locator('#rows tr').evaluateAll((lines) => lines.map((line) => {
+      const cells = [...line.children].map((cell) => cell.textContent.trim());
+      const value = (text) => text === '–' ? null : Number(text);
+      return {
+        number: Number(cells[0]),
+        photo: cells[1],
+        px: value(cells[2]),
+        mm: value(cells[3]),
+        left_out: value(cells[4]),
+        state: cells[5],
+        status: line.dataset.status,
+        selected: line.getAttribute('aria-selected') === 'true',
+        on: line.querySelector('input').checked,
+      };
+    }));
+  }
+
+  rowsAre(count) {
+    return until(async () => (await this.rows()).length === count, `${count} rows`);
+  }
+
+  rowIs(index, test, what) {
+    return until(async () => {
+      const row = (await this.rows())[index];
+      return row && test(row) ? row : null;
+    }, `pick ${index + 1}: ${what}`);
+  }
+
+  async saved() {
+    await until(
+        async () => await this.page.getAttribute('#save', 'data-state') === 'saved',
+        'the picks are saved');
+  }
+
+  file() {
+    return readPicks(this.picks_path);
+  }
+
+  text(selector) {
+    return this.page.locator(selector).innerText();
+  }
+
+  // The server's own words: what the page draws but does not write.
+  async session() {
+    return (await (await fetch(`${this.url}state`)).json()).session;
+  }
+
+  async close() {
+    await this.page.close();
+  }
+}
+
+// The lowest contrast of the text that is seen below `selector` (WCAG 2): {ratio, text, color,
+// ground}. Grounds that shine through are put over what lies behind.
+export function lowestContrast(page, selector = 'body') {
+  return page.evaluate((root) => {
+    const parse = (color) => {
+      const [r, g, b, a = 1] = color.match(/[\d.]+/g).map(Number);
+      return [r, g, b, a];
+    };
+    const over =
+        ([r, g, b, a],
+         below) => [r, g, b].map((value, i) => a * value + (1 - a) * below[i]).concat(1);
+    const ground = (element) => {
+      const layers = [];
+      for (let one = element; one; one = one.parentElement) {
+        const color = parse(getComputedStyle(one).backgroundColor);
+        layers.unshift(color);
+        if (color[3] === 1) break;
+      }
+      return layers.reduce((below, layer) => over(layer, below), [0, 0, 0, 1]);
+    };
+    const luminance = (color) => {
+      const [r, g, b] = color.slice(0, 3).map((byte) => {
+        const value = byte / 255;
+        return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
+      });
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    let worst = {ratio: Infinity};
+    let count = 0;
+    for (const element of document.querySelector(root).querySelectorAll('*')) {
+      const own = [...element.childNodes]
+                      .filter((node) => node.nodeType === Node.TEXT_NODE)
+                      .map((node) => node.textContent.trim())
+                      .join(' ')
+                      .trim();
+      const text = own || element.getAttribute('placeholder');
+      if (!text || !element.checkVisibility({visibilityProperty: true, opacityProperty: true})) {
+        continue;
+      }
+      // WCAG leaves out what cannot be used at the moment; ours is readable all the same.
+      const below = ground(element);
+      const color = over(parse(getComputedStyle(element).color), below);
+      const [low, high] = [luminance(color), luminance(below)].sort((a, b) => a - b);
+      const ratio = (high + 0.05) / (low + 0.05);
+      ++count;
+      if (ratio < worst.ratio) worst = {ratio, text, color: color.join(), ground: below.join()};
+    }
+    return {...worst, count};
+  }, selector);
+}
