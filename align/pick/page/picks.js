@@ -296,14 +296,16 @@ export class Picks extends EventTarget {
     this.#busy = false;
     if (now.revision !== this.session.revision) {
       this.#differs(now, this.list);
-    } else if (this.state === 'gone' || this.state === 'restarted') {
+      return;
+    }
+    if (this.state === 'gone' || this.state === 'restarted') {
       this.#setState(
           this.pending           ? 'saving' :
               this.session.saved ? 'saved' :
                                    'unsaved',
           this.session.save_error);
-      this.#schedule();
     }
+    this.#schedule();  // what was changed while this was asked
   }
 
   // A stale page: takes the picks of the other tab, or puts its own over them.
