@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "align/judgement.h"
 
@@ -13,6 +14,28 @@ namespace {
 constexpr double kThinShare = 0.12, kCrowdedShare = 0.1;
 // Photo and sparse model disagree: joint residuals over those of the photo alone, and pixels.
 constexpr double kModelFactor = 3, kModelPx = 4;
+
+// Metres from the surface to which a pick counts as on it; as roomtex-align has it.
+constexpr double kPickReach = 0.06;
+
+std::string OtherAzimuth(const ScanReaderOptions& reader) {
+  return reader.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+}
+
+// Metres along the ray of the nearest scan; 0 where nothing can be said, infinite where no scanner
+// looked.
+double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_scan) {
+  double distance = std::numeric_limits<double>::infinity();
+  for (int scan = 0; scan < scene.num_scans(); ++scan) {
+    const auto place = scene.places(scan).PlaceOf(x_in_scan);
+    if (!place) continue;
+    const ScanPlaces::Found found = scene.places(scan).PointAt(*place);
+    // At an edge the surface may be that of the one side or of the other.
+    if (found.reason != ScanPlaces::Reason::kNone) return 0;
+    distance = std::min(distance, (found.x_in_scan - x_in_scan).norm());
+  }
+  return distance;
+}
 
 std::string Count(int number, const std::string& noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
@@ -39,13 +62,12 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPai
   std::vector<std::string> warnings;
   if (pairs.size() < kMinPicksPerPhoto) return warnings;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
-    const std::string other = reader.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
     warnings.push_back("The scan looks like a mirror image of the room: the picks miss by " +
                        Number(review.RmsPx(), 1) + " pixels (rms), but by " +
                        Number(review.mirrored_rms_px, 1) +
                        " when the scan is reflected. End this session and read an RTPI scan with "
                        "--azimuth " +
-                       other + ".");
+                       OtherAzimuth(reader) + ".");
   } else if (review.exchanged) {
     warnings.push_back("Picks " + std::to_string(review.exchanged->first + 1) + " and " +
                        std::to_string(review.exchanged->second + 1) +
@@ -91,6 +113,33 @@ std::string ModelWarning(const PickReview& review, const PhotoState& photo) {
   return "The picks of this photo agree with each other (" + Number(own_px, 1) +
          " pixels), but not with where the sparse model and the other picks have the photo (" +
          Number(photo.rms_px, 1) + " pixels): its pose in the model may be wrong.";
+}
+
+std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
+                                         const std::vector<int>& on, const PickScene& scene) {
+  std::vector<std::string> warnings;
+  int num_off = 0, num_mirrored_off = 0;
+  for (size_t k = 0; k < on.size(); ++k) {
+    const SessionPick& pick = picks[on[k]];
+    const double off = DistanceFromSurface(scene, *pick.x_in_scan);
+    if (!(off > kPickReach)) continue;
+    ++num_off;
+    const Rigid& scan_from_station = scene.scans()[0].scan_from_station;
+    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * *pick.x_in_scan;
+    x_in_station.x() *= -1;
+    num_mirrored_off +=
+        !(DistanceFromSurface(scene, scan_from_station * x_in_station) <= kPickReach);
+    warnings.push_back("The scan point of pick " + std::to_string(k + 1) + " of this photo lies " +
+                       (std::isfinite(off) ? Number(off, 2) + " m" : std::string("far")) +
+                       " off the scan's surface. Drag it to its place in the scan.");
+  }
+  if (num_off >= 2 && 3 * num_mirrored_off <= num_off) {
+    warnings = {
+        "These picks were made on a mirror image of this scan. End this session and read an "
+        "RTPI scan with --azimuth " +
+        OtherAzimuth(scene.input().scan_reader) + "."};
+  }
+  return warnings;
 }
 
 std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,

@@ -20,6 +20,10 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPai
 std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera);
 // The picks of the photo agree with each other, but not with where the other photos have it.
 std::string ModelWarning(const PickReview& review, const PhotoState& photo);
+// Picks whose points do not lie on the scan that was read, perhaps because it is a mirror image of
+// the one they were made on. picks: all; `on`: indices of those of one photo.
+std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
+                                         const std::vector<int>& on, const PickScene& scene);
 // What to do now.
 std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
                      const PickScene& scene);

@@ -53,6 +53,16 @@ double Coverage(const SparseImage& image, const Camera& camera) {
   return cells.size() / static_cast<double>(kRankCells * kRankCells);
 }
 
+double ScoreOf(const SparseImage& image, const Camera& camera, const SparseModel& model) {
+  double connections = 0;  // points that many photos see connect this one to them
+  for (const uint64_t point_id : image.point3d_ids) {
+    const auto point = model.points.find(point_id);
+    if (point == model.points.end()) continue;
+    connections += std::log2(static_cast<double>(std::max<size_t>(point->second.track.size(), 1)));
+  }
+  return Coverage(image, camera) * std::sqrt(connections);
+}
+
 }  // namespace
 
 PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
@@ -92,32 +102,25 @@ void PickScene::AddPhotos() {
     photo.num_points = static_cast<int>(
         std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
                       [](uint64_t point_id) { return point_id != kInvalidPoint3dId; }));
+    photo.score = ScoreOf(image, photo.projection->camera(), model_);
     photos_.push_back(photo);
   }
   std::sort(photos_.begin(), photos_.end(),
             [](const PickPhoto& a, const PickPhoto& b) { return a.name() < b.name(); });
   for (size_t i = 0; i < photos_.size(); ++i) photos_[i].id = static_cast<int>(i);
-  RankPhotos();
 }
 
-void PickScene::RankPhotos() {
-  std::vector<std::pair<double, int>> order;
+std::vector<const PickPhoto*> PickScene::Ranked(const std::vector<double>& scan_shares) const {
+  std::vector<std::pair<double, const PickPhoto*>> scored;
   for (const PickPhoto& photo : photos_) {
-    // Points that many photos see connect this one to them.
-    double connections = 0;
-    for (const uint64_t point_id : photo.image->point3d_ids) {
-      const auto point = model_.points.find(point_id);
-      if (point != model_.points.end()) {
-        connections +=
-            std::log2(static_cast<double>(std::max<size_t>(point->second.track.size(), 1)));
-      }
-    }
-    const double score =
-        Coverage(*photo.image, photo.projection->camera()) * std::sqrt(connections);
-    order.emplace_back(photo.missing ? 1.0 : -score, photo.id);
+    const double share = scan_shares.empty() ? 1 : scan_shares[photo.id];
+    scored.emplace_back(photo.missing ? 1.0 : -photo.score * std::sqrt(share), &photo);
   }
-  std::sort(order.begin(), order.end());
-  for (size_t i = 0; i < order.size(); ++i) photos_[order[i].second].rank = static_cast<int>(i + 1);
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<const PickPhoto*> ranked;
+  for (const auto& [score, photo] : scored) ranked.push_back(photo);
+  return ranked;
 }
 
 const PickPhoto* PickScene::FindPhoto(const std::string& name) const {

@@ -40,7 +40,8 @@ struct PickPhoto {
   bool missing = false;
   std::string problem;
   int num_points = 0;  // sparse points it sees
-  int rank = 0;        // 1 = pick here first: many sparse points, all over the photo
+  double score = 0;    // how good it is to pick in: many sparse points, all over the photo, that
+                       // other photos see as well
 
   const std::string& name() const { return image->name; }
 };
@@ -59,6 +60,9 @@ class PickScene {
   const ScanPlaces& places(int scan) const { return *places_[scan]; }
   const std::vector<PickPhoto>& photos() const { return photos_; }
   const PickPhoto* FindPhoto(const std::string& name) const;
+  // The best to pick in first, those without a file last. scan_shares: by id, what share of the
+  // scan each sees; empty = not known.
+  std::vector<const PickPhoto*> Ranked(const std::vector<double>& scan_shares) const;
 
   // Begins to make what takes seconds.
   void Prepare();
@@ -74,7 +78,6 @@ class PickScene {
 
  private:
   void AddPhotos();
-  void RankPhotos();
   void Work();
 
   const PickSceneInput input_;

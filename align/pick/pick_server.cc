@@ -150,13 +150,14 @@ void PickServer::AddPictures() {
 int PickServer::SelectedPhoto() const {
   if (const PickPhoto* photo = scene_.FindPhoto(setup_.image_name)) return photo->id;
   const auto now = session_->Now();
-  int selected = 0, most = 0;
+  int selected = scene_.Ranked({})[0]->id, most = 0;
   for (const PickPhoto& photo : scene_.photos()) {
     const int count = static_cast<int>(
         std::count_if(now->picks.begin(), now->picks.end(),
                       [&](const SessionPick& pick) { return pick.image_name == photo.name(); }));
-    if (count > most || (most == 0 && photo.rank == 1)) selected = photo.id;
-    most = std::max(most, count);
+    if (count <= most) continue;
+    selected = photo.id;
+    most = count;
   }
   return selected;
 }
@@ -164,12 +165,8 @@ int PickServer::SelectedPhoto() const {
 // In the order of the strip: the best to pick in first.
 Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
   const std::vector<double> shares = sights_.ScanShares(snapshot.solution, snapshot.revision);
-  std::vector<const PickPhoto*> order;
-  for (const PickPhoto& photo : scene_.photos()) order.push_back(&photo);
-  std::sort(order.begin(), order.end(),
-            [](const PickPhoto* a, const PickPhoto* b) { return a->rank < b->rank; });
   Json json = Json::array();
-  for (const PickPhoto* photo : order) {
+  for (const PickPhoto* photo : scene_.Ranked(shares)) {
     const TilePyramid pyramid = tiles_.Pyramid(PhotoPicture(photo->id));
     const Camera& camera = photo->projection->camera();
     Json one;
@@ -183,7 +180,7 @@ Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
     one["problem"] = photo->problem;
     one["num_points"] = photo->num_points;
     one["scan_share"] = shares.empty() ? Json() : Json(shares[photo->id]);
-    one["rank"] = photo->rank;
+    one["rank"] = json.size() + 1;
     json.push_back(one);
   }
   return json;

@@ -109,8 +109,15 @@ void PickSolver::SolveView(const ScanRays* rays, View* view, PhotoState* photo) 
   } else {
     photo->ambiguous = n < kMinPicksPerPhoto && review.poses.size() > 1;
   }
-  // Three picks alone say nothing.
-  if (n == 3 && view->scale.num_features < options_.trust.min_scale_features) return;
+  if (n == 3 && view->scale.num_features < options_.trust.min_scale_features) {
+    if (rays != nullptr) {
+      photo->warnings.push_back(
+          "Three picks fit several poses, and too few sparse points of this photo lie on the scan "
+          "to "
+          "tell which.");
+    }
+    return;
+  }
   view->has_pose = true;
   view->cam_from_scan = review.poses[chosen].cam_from_scan;
   photo->cam_from_scan = view->cam_from_scan;
@@ -266,6 +273,7 @@ PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
       view.pairs.x_in_scan.col(k) = *pick.x_in_scan;
       view.pairs.weight[k] = pick.weight;
     }
+    solution.photos[name].warnings = SurfaceWarnings(picks, view.picks, scene_);
     SolveView(rays, &view, &solution.photos[name]);
     for (int k = 0; k < n && view.has_pose; ++k) {
       PickState& state = solution.picks[view.picks[k]];
