@@ -11,19 +11,18 @@ namespace {
 
 constexpr double kSpacing = 0.05;  // metres between the nodes of a grid
 constexpr int kLightSide = 4;      // shadow rays per light: its square
-constexpr int kSkyRings = 4, kSkySectors = 8;
 constexpr double kLift =
     0.01;  // metres above a surface: what hangs flat on a wall throws no shadow
 constexpr double kAmbientReach = 1.0;  // metres: what is farther away takes no ambient light
 
 // Directions over the half-sphere around `normal`, equally weighted under the cosine law.
-std::vector<Eigen::Vector3d> SkyDirections(const Eigen::Vector3d& normal) {
+std::vector<Eigen::Vector3d> SkyDirections(const Eigen::Vector3d& normal, int rings, int sectors) {
   const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
   std::vector<Eigen::Vector3d> directions;
-  for (int ring = 0; ring < kSkyRings; ++ring) {
-    const double sin2 = (ring + 0.5) / kSkyRings;
-    for (int sector = 0; sector < kSkySectors; ++sector) {
-      const double angle = 2 * kPi * (sector + 0.5 * (ring & 1)) / kSkySectors;
+  for (int ring = 0; ring < rings; ++ring) {
+    const double sin2 = (ring + 0.5) / rings;
+    for (int sector = 0; sector < sectors; ++sector) {
+      const double angle = 2 * kPi * (sector + 0.5 * (ring & 1)) / sectors;
       directions.push_back(std::sqrt(sin2) * (std::cos(angle) * x + std::sin(angle) * y) +
                            std::sqrt(1 - sin2) * normal);
     }
@@ -53,22 +52,31 @@ LinearRgb LightFrom(const AreaLight& light, const Eigen::Vector3d& point,
 }
 
 LinearRgb LightAt(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
-                  const std::vector<AreaLight>& lights, const LightMap::IsFree& is_free) {
+                  const std::vector<AreaLight>& lights, const LightMap::IsFree& is_free,
+                  const LightMap::Sight& sight) {
   LinearRgb light = LinearRgb::Zero();
   for (const AreaLight& area : lights) light += LightFrom(area, point, normal, is_free);
+  const LinearRgb ambient(0.50f, 0.48f, 0.45f);
+  if (sight) {
+    double open = 0;
+    const auto directions = SkyDirections(normal, 8, 16);
+    for (const Eigen::Vector3d& direction : directions) {
+      open += std::min(sight(point, direction) / kAmbientReach, 1.0);
+    }
+    return light + ambient * static_cast<float>(0.25 + 0.75 * open / directions.size());
+  }
   int free = 0, count = 0;
-  for (const Eigen::Vector3d& direction : SkyDirections(normal)) {
+  for (const Eigen::Vector3d& direction : SkyDirections(normal, 4, 8)) {
     free += is_free(point, point + kAmbientReach * direction) ? 1 : 0;
     ++count;
   }
-  const LinearRgb ambient(0.50f, 0.48f, 0.45f);
   return light + ambient * (0.25f + 0.75f * static_cast<float>(free) / static_cast<float>(count));
 }
 
 }  // namespace
 
 LightMap::LightMap(const std::vector<Patch>& patches, const std::vector<AreaLight>& lights,
-                   const IsFree& is_free, int num_threads)
+                   const IsFree& is_free, const Sight& sight, int num_threads)
     : grids_(patches.size()) {
   ParallelFor(num_threads, 0, static_cast<int>(patches.size()), [&](int index) {
     const Patch& patch = patches[index];
@@ -91,9 +99,9 @@ LightMap::LightMap(const std::vector<Patch>& patches, const std::vector<AreaLigh
         const double t =
             std::clamp(static_cast<double>(row) / (grid.rows - 1), inset_t, 1 - inset_t);
         const Eigen::Vector3d point = patch.At(s, t);
-        LinearRgb light = LightAt(point + kLift * normal, normal, lights, is_free);
+        LinearRgb light = LightAt(point + kLift * normal, normal, lights, is_free, sight);
         if (patch.two_sided) {
-          light = 0.5f * (light + LightAt(point - kLift * normal, -normal, lights, is_free));
+          light = 0.5f * (light + LightAt(point - kLift * normal, -normal, lights, is_free, sight));
         }
         grid.nodes.push_back(light);
       }

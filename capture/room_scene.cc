@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "capture/random_stream.h"
 #include "capture/room_light.h"
@@ -121,7 +122,7 @@ void RoomScene::AddFrustum(int surface, const Eigen::Vector3d& bottom_centre, do
   }
 }
 
-void RoomScene::Finish(bool shading, int num_threads) {
+void RoomScene::Finish(bool shading, bool smooth_light, int num_threads) {
   std::vector<Eigen::Vector3d> corners;
   std::vector<Triangle> triangles;
   for (size_t i = 0; i < patches_.size(); ++i) {
@@ -144,7 +145,14 @@ void RoomScene::Finish(bool shading, int num_threads) {
   const auto is_free = [this](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     return !caster_->IsOccluded(from, to, 0.0005);
   };
-  light_.reset(new Light{LightMap(patches_, lights_, is_free, num_threads)});
+  LightMap::Sight sight;
+  if (smooth_light) {
+    sight = [this](const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
+      const auto hit = caster_->Cast(from, direction, 0.0005);
+      return hit ? hit->distance : std::numeric_limits<double>::infinity();
+    };
+  }
+  light_.reset(new Light{LightMap(patches_, lights_, is_free, sight, num_threads)});
 }
 
 Eigen::Vector3d OffsetOnPlane(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,

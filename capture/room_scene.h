@@ -93,9 +93,9 @@ class RoomScene {
     finest_detail_ = std::max(kTextureBandLimit, static_cast<float>(width));
   }
 
-  // Builds the ray caster and, if `shading`, the light on every patch. Call once, after the last
-  // Add.
-  void Finish(bool shading, int num_threads);
+  // Builds the ray caster and, if `shading`, the light on every patch (smooth_light: see LightMap).
+  // Call once, after the last Add.
+  void Finish(bool shading, bool smooth_light, int num_threads);
 
   std::optional<SceneHit> Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                double min_distance = 0) const;

@@ -94,7 +94,7 @@ struct SimulatedRoom::Impl {
     FurnishRoom(options, &scene);
     const std::vector<Rigid> room_from_projector = PlaceProjectors(options);
     for (const Rigid& place : room_from_projector) AddProjectorBody(place, &scene);
-    scene.Finish(options.shading, options.num_threads);
+    scene.Finish(options.shading, options.bare, options.num_threads);
     cam_from_room = PlaceCameras(options, scene);
     room_from_station = PlaceStations(options, scene);
     exposures = ChooseExposures(options, scene, camera, cam_from_room);
