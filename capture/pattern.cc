@@ -31,7 +31,8 @@ cv::Mat1b FromDetail(const cv::Mat1w& detail, const PatternOptions& options) {
   // Thesis 5.1.2: the intensity is inverted, the blocks are re-arranged.
   const cv::Mat1w inverted = 65535 - detail;
   const cv::Mat1b spread = SpreadGrey(inverted, options.brightness);
-  const BlockShuffle shuffle = ShuffleBlocks(spread, options.blocks, SeedOf(options));
+  const BlockShuffle shuffle =
+      ShuffleBlocks(spread, options.blocks, {options.width, options.height}, SeedOf(options));
   return ApplyShuffle(spread, options.blocks, shuffle)({0, 0, options.width, options.height})
       .clone();
 }

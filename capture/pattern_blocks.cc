@@ -40,8 +40,7 @@ Block Describe(const cv::Mat1b& block) {
   return result;
 }
 
-// margin: share by which they must differ more than kLeastStep and kMostCorrelation ask.
-bool AreAlike(const std::vector<float>& a, const std::vector<float>& b, double margin) {
+bool AreAlike(const std::vector<float>& a, const std::vector<float>& b) {
   // A block that is cut off meets its neighbour along its own length.
   const size_t count = std::min(a.size(), b.size());
   if (count == 0) return false;
@@ -55,32 +54,55 @@ bool AreAlike(const std::vector<float>& a, const std::vector<float>& b, double m
     bb += b[i] * b[i];
     ab += a[i] * b[i];
   }
-  if (step / n < kLeastStep * (1 + margin)) return true;
+  if (step / n < kLeastStep) return true;
   const double var_a = aa - sum_a * sum_a / n, var_b = bb - sum_b * sum_b / n;
   const double cov = ab - sum_a * sum_b / n;
-  return cov > kMostCorrelation * (1 - margin) * std::sqrt(std::max(var_a * var_b, 0.0)) && cov > 0;
+  return cov > 0 && cov > kMostCorrelation * std::sqrt(std::max(var_a * var_b, 0.0));
 }
 
 // a is left of b, or above it.
-bool AreAlike(const Block& a, const Block& b, bool beside, double margin) {
-  return AreAlike(a.sides[beside ? kRight : kBottom], b.sides[beside ? kLeft : kTop], margin) ||
-         AreAlike(a.thumb, b.thumb, margin);
+bool AreAlike(const Block& a, const Block& b, bool beside) {
+  return AreAlike(a.sides[beside ? kRight : kBottom], b.sides[beside ? kLeft : kTop]) ||
+         AreAlike(a.thumb, b.thumb);
 }
 
+// The block at a place of an image of this size; those of the last column and row may be cut off.
+cv::Rect BlockAt(cv::Size size, int blocks, int place) {
+  const int width = (size.width + blocks - 1) / blocks;
+  const int height = (size.height + blocks - 1) / blocks;
+  return cv::Rect(place % blocks * width, place / blocks * height, width, height) &
+         cv::Rect({0, 0}, size);
+}
+
+// Blocks of an image on the places of a board, of which only `visible` is seen.
 class Board {
  public:
-  Board(std::vector<Block> blocks, int size, std::vector<int> order, double margin)
-      : blocks_(std::move(blocks)), size_(size), order_(std::move(order)), margin_(margin) {}
+  Board(const cv::Mat1b& image, int blocks, cv::Size visible, std::vector<int> order)
+      : size_(blocks), order_(std::move(order)) {
+    const int places = blocks * blocks;
+    // What is left of a block in the last column and row.
+    const cv::Size whole = BlockAt(image.size(), blocks, 0).size();
+    const cv::Size last = BlockAt(visible, blocks, places - 1).size();
+    for (int i = 0; i < places; ++i) {
+      const cv::Rect block = BlockAt(image.size(), blocks, i);
+      for (int cut = 0; cut < 4; ++cut) {
+        const cv::Size left(cut & 1 ? last.width : whole.width,
+                            cut & 2 ? last.height : whole.height);
+        const cv::Rect seen = block & cv::Rect(block.tl(), left);
+        described_[cut].push_back(seen.empty() ? Block() : Describe(image(seen)));
+      }
+    }
+  }
 
   // Alike neighbours of one place.
   int CountAt(int place) const {
     const int x = place % size_, y = place / size_;
     const Block& here = At(place);
     int count = 0;
-    if (x > 0) count += AreAlike(At(place - 1), here, true, margin_);
-    if (x + 1 < size_) count += AreAlike(here, At(place + 1), true, margin_);
-    if (y > 0) count += AreAlike(At(place - size_), here, false, margin_);
-    if (y + 1 < size_) count += AreAlike(here, At(place + size_), false, margin_);
+    if (x > 0) count += AreAlike(At(place - 1), here, true);
+    if (x + 1 < size_) count += AreAlike(here, At(place + 1), true);
+    if (y > 0) count += AreAlike(At(place - size_), here, false);
+    if (y + 1 < size_) count += AreAlike(here, At(place + size_), false);
     return count;
   }
   int Count() const {
@@ -105,46 +127,36 @@ class Board {
   const std::vector<int>& order() const { return order_; }
 
  private:
-  const Block& At(int place) const { return blocks_[order_[place]]; }
+  const Block& At(int place) const {
+    const int cut = (place % size_ == size_ - 1 ? 1 : 0) + (place / size_ == size_ - 1 ? 2 : 0);
+    return described_[cut][order_[place]];
+  }
   void TryExchange(int a, int b) {
     const int before = CountAt(a) + CountAt(b);
     std::swap(order_[a], order_[b]);
     if (CountAt(a) + CountAt(b) > before) std::swap(order_[a], order_[b]);
   }
 
-  std::vector<Block> blocks_;
+  std::array<std::vector<Block>, 4> described_;  // whole, cut at the right, at the bottom, both
   int size_;
   std::vector<int> order_;
-  double margin_;
 };
 
-// The block of a place; those of the last column and row may be cut off.
-cv::Rect BlockAt(const cv::Mat1b& image, int blocks, int place) {
-  const int width = (image.cols + blocks - 1) / blocks, height = (image.rows + blocks - 1) / blocks;
-  return cv::Rect(place % blocks * width, place / blocks * height, width, height) &
-         cv::Rect(0, 0, image.cols, image.rows);
-}
-
-std::vector<Block> DescribeBlocks(const cv::Mat1b& image, int blocks) {
-  std::vector<Block> all;
-  for (int i = 0; i < blocks * blocks; ++i) {
-    const cv::Rect rect = BlockAt(image, blocks, i);
-    all.push_back(rect.empty() ? Block() : Describe(image(rect)));
-  }
-  return all;
+std::vector<int> InOrder(int blocks) {
+  std::vector<int> order(static_cast<size_t>(blocks) * blocks);
+  std::iota(order.begin(), order.end(), 0);
+  return order;
 }
 
 }  // namespace
 
-BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, uint64_t seed) {
-  std::vector<int> order(static_cast<size_t>(blocks) * blocks);
-  std::iota(order.begin(), order.end(), 0);
+BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible, uint64_t seed) {
+  std::vector<int> order = InOrder(blocks);
   RandomStream random(MixBits(seed, 0xb10c5));
   for (int i = static_cast<int>(order.size()) - 1; i > 0; --i) {
     std::swap(order[i], order[random.Index(i + 1)]);
   }
-  // The last column and row will be cut off, which changes what their blocks are like a little.
-  Board board(DescribeBlocks(image, blocks), blocks, std::move(order), 0.2);
+  Board board(image, blocks, visible, std::move(order));
   board.Improve(&random);
   return {board.order(), board.Count()};
 }
@@ -152,16 +164,14 @@ BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, uint64_t seed) {
 cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const BlockShuffle& shuffle) {
   cv::Mat1b result(image.rows, image.cols);
   for (int place = 0; place < blocks * blocks; ++place) {
-    image(BlockAt(image, blocks, shuffle.order[place]))
-        .copyTo(result(BlockAt(image, blocks, place)));
+    image(BlockAt(image.size(), blocks, shuffle.order[place]))
+        .copyTo(result(BlockAt(image.size(), blocks, place)));
   }
   return result;
 }
 
 int CountSimilarNeighbours(const cv::Mat1b& pattern, int blocks) {
-  std::vector<int> order(static_cast<size_t>(blocks) * blocks);
-  std::iota(order.begin(), order.end(), 0);
-  return Board(DescribeBlocks(pattern, blocks), blocks, std::move(order), 0).Count();
+  return Board(pattern, blocks, pattern.size(), InOrder(blocks)).Count();
 }
 
 }  // namespace roomtex

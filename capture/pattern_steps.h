@@ -29,8 +29,9 @@ struct BlockShuffle {
 // correlation above kMostCorrelation. Blocks are exchanged until no neighbours are alike.
 inline constexpr double kLeastStep = 16;
 inline constexpr double kMostCorrelation = 0.6;
-// width and height of the image are multiples of `blocks`.
-BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, uint64_t seed);
+// width and height of the image are multiples of `blocks`; visible: what will be seen of it, from
+// the upper left corner.
+BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible, uint64_t seed);
 cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const BlockShuffle& shuffle);
 // Neighbours in a pattern that are alike. Its blocks have width / blocks pixels, rounded up, and so
 // on; the last column and row may be cut off.
