@@ -174,8 +174,10 @@ class BinarySource : public ValueSource {
 
 class PlyParser {
  public:
-  PlyParser(const FileReader& file, const PlyHeader& header, const PlyOptions& options)
-      : file_(file), header_(header), options_(options) {
+  // wanted: may be null.
+  PlyParser(const FileReader& file, const PlyHeader& header, const PlyOptions& options,
+            PlyVertexValues* wanted)
+      : file_(file), header_(header), options_(options), wanted_(wanted) {
     if (header.format == "ascii") {
       source_ = std::make_unique<AsciiSource>(file, header);
     } else {
@@ -279,11 +281,26 @@ class PlyParser {
     source_->EndEntry();
   }
 
+  // Where the values of each vertex property go; null = nowhere.
+  std::vector<std::vector<float>*> WantedByProperty() {
+    std::vector<std::vector<float>*> targets(vertex_->properties.size(), nullptr);
+    if (wanted_ == nullptr) return targets;
+    wanted_->values.assign(wanted_->names.size(), {});
+    for (size_t i = 0; i < wanted_->names.size(); ++i) {
+      const int property = vertex_->Find({wanted_->names[i]});
+      if (property < 0 || vertex_->properties[property].is_list) continue;
+      targets[property] = &wanted_->values[i];
+      wanted_->values[i].reserve(static_cast<size_t>(vertex_->count));
+    }
+    return targets;
+  }
+
   void ReadVertices() {
     const int intensity = vertex_->Find({"intensity", "scalar_intensity", "scalar_Intensity"});
     const auto count = static_cast<size_t>(vertex_->count);
     scan_.points.reserve(count);
     scan_.intensity.reserve(count);
+    const std::vector<std::vector<float>*> wanted = WantedByProperty();
     for (size_t i = 0; i < count; ++i) {
       Eigen::Vector3d point = Eigen::Vector3d::Zero();
       double value_of_intensity = 0;
@@ -299,6 +316,7 @@ class PlyParser {
           if (p == coordinate_[k]) point[k] = value;
         }
         if (p == intensity) value_of_intensity = value;
+        if (wanted[p] != nullptr) wanted[p]->push_back(static_cast<float>(value));
       }
       source_->EndEntry();
       scan_.points.push_back(options_.meters_per_unit * point);
@@ -351,6 +369,7 @@ class PlyParser {
   const FileReader& file_;
   const PlyHeader& header_;
   PlyOptions options_;
+  PlyVertexValues* wanted_;
   std::unique_ptr<ValueSource> source_;
   const PlyElement* vertex_ = nullptr;
   const PlyElement* face_ = nullptr;
@@ -391,11 +410,12 @@ int AppendFaces(const PlyPart& part, int first_vertex, std::ostream& stream) {
 
 }  // namespace
 
-Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format) {
+Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format,
+             PlyVertexValues* values) {
   const FileReader file(path);
   const PlyHeader header = ReadPlyHeader(file);
   if (format != nullptr) *format = header.format;
-  return PlyParser(file, header, options).Parse();
+  return PlyParser(file, header, options, values).Parse();
 }
 
 void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {

@@ -14,12 +14,21 @@ struct PlyOptions {
       0;  // metres from the origin (or the station that our own files name); 0 = no limit
 };
 
+// Values of vertex properties that ReadPly itself has no use for, e.g. colours.
+struct PlyVertexValues {
+  std::vector<std::string> names;
+  // Per name one value per vertex, as in the file; empty if the file has no such property.
+  std::vector<std::vector<float>> values;
+};
+
 // Reads ascii and binary files of both byte orders: vertices x, y, z and, if there, intensity
 // (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles. Other
 // elements and properties are skipped. The scan is not organised; `up` and station come from our
 // own files' comments, otherwise z and the origin. Throws InputError with line or byte; a cloud
-// without faces is refused. format: "ascii", "little" or "big" endian; may be null.
-Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr);
+// without faces is refused. format: "ascii", "little" or "big" endian; may be null. values: what
+// else is wanted of the vertices; may be null.
+Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr,
+             PlyVertexValues* values = nullptr);
 
 // Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate, pcd.h), intensity
 // float; faces. triangles index scan.points; missing samples are left out. Several scans become one

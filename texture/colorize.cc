@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "core/parallel.h"
 #include "core/photo.h"
 #include "texture/cpu_stages.h"
 #include "texture/debug_images.h"
@@ -78,6 +80,22 @@ void CountVertices(const std::vector<Scan>& scans, ColorizeResult* result) {
     }
   }
   if (result->num_colored > 0) result->views_mean /= static_cast<double>(result->num_colored);
+}
+
+std::vector<float> Disagreements(const GridOfSamples& grid, const PhotoPassInput& input,
+                                 const ObservationStore& store,
+                                 const std::vector<Eigen::Vector3f>& gains, int num_threads) {
+  std::vector<float> result(static_cast<size_t>(grid.num_columns) * grid.num_rows,
+                            std::numeric_limits<float>::quiet_NaN());
+  ParallelFor(
+      num_threads, static_cast<int>(grid.first_tile), static_cast<int>(grid.end_tile), [&](int t) {
+        const SampleTile& tile = input.samples[t];
+        for (int i = 0; i < tile.points.size(); ++i) {
+          const size_t slot = static_cast<size_t>(tile.first_slot) + i;
+          result[tile.index[i]] = SampleDisagreement(store.Begin(slot), store.Count(slot), gains);
+        }
+      });
+  return result;
 }
 
 std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) {
@@ -173,6 +191,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     colored.samples = GridColorizer(input, store, result.exposure.gains, options.blend,
                                     options.detail, num_threads)
                           .Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
+    colored.disagreement =
+        Disagreements(grids[s], input, store, result.exposure.gains, num_threads);
     colored.triangles = std::move(surfaces[s].triangles);
     AppendTrianglesOverHoles(scans[s], FindSingleHoles(scans[s], surfaces[s].links),
                              &colored.triangles);

@@ -47,6 +47,9 @@ struct ColoredScan {
   // Texel (c, r) lies at the sample coordinates ((c + 0.5) / scale - 0.5, (r + 0.5) / scale - 0.5).
   ColorGrid texture;
   MeshAtlas atlas;  // of a mesh without a grid, where it is worth one
+  // One per sample: how far the photos that see it differ after the exposures were unified
+  // (SampleDisagreement); NaN where fewer than two do.
+  std::vector<float> disagreement;
 };
 
 struct ColorizeResult {

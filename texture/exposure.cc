@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -379,6 +380,22 @@ Disagreement MeasureDisagreement(const ObservationStore& store,
   }
   if (num_random > 0) result.at_random /= static_cast<double>(num_random);
   return result;
+}
+
+float SampleDisagreement(const Observation* observations, int count,
+                         const std::vector<Eigen::Vector3f>& gains) {
+  if (count < 2) return std::numeric_limits<float>::quiet_NaN();
+  std::vector<Bytes> after;
+  after.reserve(static_cast<size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const Observation& o = observations[i];
+    after.push_back(ToBytes(UnpackColor(o.color).cwiseProduct(gains[o.photo])));
+  }
+  double sum = 0;
+  for (int i = 0; i < count; ++i) {
+    for (int j = i + 1; j < count; ++j) sum += Difference(after[i], after[j]);
+  }
+  return static_cast<float>(sum / (0.5 * count * (count - 1)));
 }
 
 }  // namespace roomtex

@@ -87,5 +87,9 @@ struct Disagreement {
 };
 Disagreement MeasureDisagreement(const ObservationStore& store,
                                  const std::vector<Eigen::Vector3f>& gains);
+// The same of one sample, with the given gains: mean over all pairs of its observations and over
+// the channels. NaN with fewer than two.
+float SampleDisagreement(const Observation* observations, int count,
+                         const std::vector<Eigen::Vector3f>& gains);
 
 }  // namespace roomtex

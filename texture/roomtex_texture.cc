@@ -12,6 +12,7 @@
 #include "importers/scan_reader.h"
 #include "texture/colorize.h"
 #include "texture/cpu_stages.h"
+#include "texture/evidence.h"
 #include "texture/output_set.h"
 #include "texture/photo_list.h"
 #include "texture/texture_scale.h"
@@ -33,6 +34,7 @@ struct TextureOptions {
   GlbOptions glb;
   std::string image_format = "png";
   bool output_obj = false;
+  bool output_evidence = true;
   double texel_mm = 0;
 };
 
@@ -91,6 +93,10 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
   command->AddBool("output_obj", &o->output_obj,
                    "Also write model.obj, model.mtl and their texture images model_0.png ... into "
                    "the output folder; the up axis stays the scan's.");
+  command->AddBool("output_evidence", &o->output_evidence,
+                   "Also write evidence.ply: a point per vertex of model.ply, in its order, with "
+                   "scan intensity, number of photos and their disagreement, for roomtex-view and "
+                   "CloudCompare; 21 bytes a vertex.");
   command->AddOutputPath(
       "debug_path", &o->colorize.debug_path,
       "Folder for pictures of what was seen and decided: per photo depth map, depth boundaries, "
@@ -335,8 +341,9 @@ void ProtectInputs(const TextureOptions& options) {
 void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& folder,
                       const Command::Context& context) {
   std::string older;
-  for (const char* name : {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi",
-                           "model.obj", "model.mtl", "model_0.png", "model_0.jpg"}) {
+  for (const char* name :
+       {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model.obj", "model.mtl",
+        "model_0.png", "model_0.jpg", "evidence.ply"}) {
     const bool written = std::find(names.begin(), names.end(), name) != names.end();
     if (written || !std::filesystem::exists(folder + "/" + name)) continue;
     older += (older.empty() ? "" : ", ") + std::string(name);
@@ -355,6 +362,7 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   OutputSet set(options.output_path);
   WriteColoredPly(scans, colored, set.Path("model.ply"));
   WriteColoredGlb(scans, colored, set.Path("model.glb"), glb);
+  if (options.output_evidence) WriteEvidence(scans, colored, set.Path("evidence.ply"));
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     if (scans[s].organised) {

@@ -36,15 +36,6 @@ class ByteSink {
   std::vector<char> bytes_;
 };
 
-bool NeedsDouble(const std::vector<Scan>& scans) {
-  for (const Scan& scan : scans) {
-    const Bounds bounds = FindBounds(scan);
-    if (!(bounds.min.x() <= bounds.max.x())) continue;
-    if (bounds.min.cwiseAbs().cwiseMax(bounds.max.cwiseAbs()).maxCoeff() > kFloatLimit) return true;
-  }
-  return false;
-}
-
 // What the importers' reader wants to know of a mesh (importers/ply.h).
 std::string CommentsOf(const std::vector<Scan>& scans) {
   if (scans.empty()) return "";
@@ -59,6 +50,15 @@ std::string CommentsOf(const std::vector<Scan>& scans) {
 
 }  // namespace
 
+bool NeedsDoubleCoordinates(const std::vector<Scan>& scans) {
+  for (const Scan& scan : scans) {
+    const Bounds bounds = FindBounds(scan);
+    if (!(bounds.min.x() <= bounds.max.x())) continue;
+    if (bounds.min.cwiseAbs().cwiseMax(bounds.max.cwiseAbs()).maxCoeff() > kFloatLimit) return true;
+  }
+  return false;
+}
+
 void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
                      const std::string& path) {
   size_t num_vertices = 0, num_faces = 0;
@@ -66,7 +66,7 @@ void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredSc
     num_vertices += scans[s].points.size() - scans[s].NumMissing();
     num_faces += colored[s].triangles.size();
   }
-  const bool as_double = NeedsDouble(scans);
+  const bool as_double = NeedsDoubleCoordinates(scans);
   const std::string type = as_double ? "double" : "float";
   OutputFile file(path);
   file.stream() << "ply\nformat binary_little_endian 1.0\ncomment roomtex-texture: scan frame, "

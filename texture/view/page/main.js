@@ -1,0 +1,438 @@
+// The viewer: puts the parts together and draws when something has changed, never else.
+
+import * as THREE from 'three';
+
+import { getJson } from './api.js';
+import { Cameras } from './cameras.js';
+import { length } from './format.js';
+import { readFragment, writeFragment } from './fragment.js';
+import { Frames } from './frames.js';
+import { drawLegend } from './legend.js';
+import { Measures } from './measure.js';
+import { Navigation } from './navigation.js';
+import { Panel, showFailure } from './panel.js';
+import { Room } from './room.js';
+
+const kSlowFrame = 60;       // milliseconds of the graphics card: coarse while moving
+const kLongestFrame = 500;   // milliseconds: coarser at rest, too
+const kFragmentPause = 300;  // milliseconds between two changes of the address
+const kBackgrounds = { dark: 0x1b1e24, light: 0xf2f3f5 };
+
+THREE.ColorManagement.enabled = false;
+
+class Viewer {
+  constructor(scene, renderer) {
+    this.renderer = renderer;
+    this.canvas = renderer.domElement;
+    this.frames = new Frames(scene);
+    this.data = scene;
+    this.world = new THREE.Scene();
+    this.background = 'dark';
+    this.mode = 'colour';
+    this.evidence = null;
+    this.measuring = false;
+    this.scheduled = false;
+    this.numPictures = 0;
+    this.slow = false;
+    this.cost = 0;  // milliseconds that the graphics card took for the last picture
+    this.fence = null;
+    this.labels = document.getElementById('labels');
+    this.labelPool = [];
+    const invalidate = () => this.invalidate();
+    this.panel = new Panel(this);
+    const fail = (sentence) => this.panel.fail(sentence);
+    this.room = new Room(scene, renderer, { invalidate, refine: () => this.refine(), fail });
+    this.world.add(this.room.group);
+    this.navigation = new Navigation(this.canvas, {
+      cast: (ray) => this.room.cast(ray),
+      floor: () => this.floorHeight(),
+      invalidate,
+    });
+    const box = new THREE.Box3();
+    for (const chunk of this.room.chunks) {
+      box.union(chunk.box.clone().applyMatrix4(this.room.group.matrixWorld));
+    }
+    this.navigation.setBounds(box);
+    this.measures = new Measures(
+        { frames: this.frames, up: new THREE.Vector3(...scene.up).normalize(), invalidate });
+    this.world.add(this.measures.group);
+    this.cameras = new Cameras([], { frames: this.frames, invalidate, fail, maxTexture: 4096 });
+    this.#listen();
+  }
+
+  async start() {
+    new ResizeObserver(() => this.resize()).observe(this.canvas.parentElement);
+    this.resize();
+    this.setBackground('dark');
+    const fromAddress = readFragment(location.hash, this.frames);
+    if (fromAddress.look) this.navigation.setView(fromAddress.look);
+    else this.#firstView();
+    this.panel.describe();
+    const invalidate = () => this.invalidate(), fail = (sentence) => this.panel.fail(sentence);
+    const room = this.room.load();
+    if (this.data.num_cameras > 0) {
+      const gl = this.renderer.getContext();
+      this.cameras = new Cameras(await getJson('cameras'), {
+        frames: this.frames, invalidate, fail, maxTexture: gl.getParameter(gl.MAX_TEXTURE_SIZE),
+      });
+      this.world.add(this.cameras.group, this.cameras.overlay);
+      this.cameras.setSize(THREE.MathUtils.clamp(0.03 * this.navigation.size, 0.02, 1));
+      this.resize();
+    }
+    this.panel.showCameras();
+    await room;
+    this.firstPicture = performance.now();
+    await this.applyExtra(fromAddress.extra);
+    try {
+      this.evidence = await getJson('evidence');
+    } catch (error) {
+      this.evidence = { available: false, reason: error.message };
+    }
+    this.panel.showEvidence();
+    if (fromAddress.extra.surface) this.setMode(fromAddress.extra.surface);
+    this.remember();
+  }
+
+  // Where the whole room is seen from the side that the scanner stood on.
+  #firstView() {
+    this.navigation.mode = 'orbit';
+    const flyTo = this.navigation.flyTo;
+    this.navigation.flyTo = (position, quaternion) => {
+      this.navigation.camera.position.copy(position);
+      this.navigation.camera.quaternion.copy(quaternion);
+      this.navigation.moved();
+    };
+    this.navigation.home();
+    this.navigation.flyTo = flyTo;
+  }
+
+  floorHeight() {
+    if (this.knownFloor === undefined || !this.room.loaded) this.knownFloor = this.room.floorHeight();
+    return this.knownFloor;
+  }
+
+  // --- pictures -------------------------------------------------------------------------------
+
+  invalidate() {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame((now) => this.#frame(now));
+  }
+
+  // A finer picture of the same: on slow graphics cards not for every piece that comes.
+  refine() {
+    if (this.refineTimer || this.scheduled) return;
+    this.refineTimer = setTimeout(() => {
+      this.refineTimer = null;
+      this.invalidate();
+    }, Math.min(3 * this.cost, 2000));
+  }
+
+  #frame(now) {
+    this.scheduled = false;
+    if (this.#isDrawing()) return this.invalidate();  // the last picture is not finished
+    const pause = now - (this.lastFrame ?? now);
+    this.lastFrame = now;
+    const goesOn = this.navigation.step(this.drewLast ? Math.min(pause, 200) / 1000 : 0.016);
+    this.room.coarseOnly = this.slow && this.navigation.moving;
+    const more = this.draw();
+    this.drewLast = goesOn;
+    if (goesOn) this.invalidate();
+    else if (more) this.refine();
+    this.panel.showProgress();
+  }
+
+  // Whether the graphics card still works on the last picture; learns how long it takes.
+  #isDrawing() {
+    if (!this.fence) return false;
+    const gl = this.renderer.getContext();
+    if (gl.getSyncParameter(this.fence.sync, gl.SYNC_STATUS) !== gl.SIGNALED &&
+        performance.now() - this.fence.started < 10000) return true;
+    gl.deleteSync(this.fence.sync);
+    this.cost = performance.now() - this.fence.started;
+    this.fence = null;
+    // Handing over takes its time once.
+    if (!this.room.loaded || this.room.coarseOnly || this.room.handedOver) return false;
+    if (this.cost > kSlowFrame) this.slow = true;
+    if (this.cost > kLongestFrame && this.room.tolerance < 8) this.room.tolerance *= 1.4;
+    return false;
+  }
+
+  // Gives whether there is more to hand over to the graphics card.
+  draw() {
+    const { camera } = this.navigation;
+    const started = performance.now();
+    camera.updateMatrixWorld();
+    const more = this.room.update(camera, this.heightPx);
+    this.cameras.update(camera.position);
+    this.measures.update(camera);
+    this.renderer.render(this.world, camera);
+    this.#placeLabels();
+    const gl = this.renderer.getContext();
+    if (this.fence) gl.deleteSync(this.fence.sync);
+    this.fence = { sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), started };
+    gl.flush();
+    if (!this.scheduled) this.#watch();
+    ++this.numPictures;
+    return more;
+  }
+  // Looks for the end of the picture although no other one is wanted, to learn its cost.
+  #watch() {
+    clearTimeout(this.watchTimer);
+    this.watchTimer = setTimeout(() => {
+      if (this.#isDrawing()) this.#watch();
+    }, Math.max(20, Math.min(this.cost / 4, 200)));
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.heightPx = this.renderer.domElement.height;
+    this.navigation.resize(width, height);
+    this.cameras.resize(width, height);
+    this.measures.resize(width, height);
+    // At once: a canvas of a new size is empty.
+    this.draw();
+  }
+
+  // Labels of distances and of the camera under the pointer: [{at (page), text, className}].
+  labelList() {
+    const list = this.measures.labels().map(({ at, metres }) =>
+      ({ at, text: length(metres), className: 'distance' }));
+    if (this.cameras.hovered && this.cameras.visible) {
+      const { position, name } = this.cameras.hovered;
+      list.push({ at: position, text: name, className: 'camera', below: true });
+    }
+    const { camera, width, height } = this.navigation;
+    return list.map((label) => {
+      const place = label.at.clone().project(camera);
+      return { ...label, x: (place.x + 1) * width / 2, y: (1 - place.y) * height / 2,
+               inFront: place.z < 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2 };
+    }).filter((label) => label.inFront);
+  }
+  #placeLabels() {
+    const list = this.labelList();
+    while (this.labelPool.length < list.length) {
+      this.labelPool.push(this.labels.appendChild(document.createElement('div')));
+    }
+    this.labelPool.forEach((element, i) => {
+      const label = list[i];
+      element.hidden = !label;
+      if (!label) return;
+      element.textContent = label.text;
+      element.className = label.className;
+      const shift = label.below ? '14px' : '-50%';
+      element.style.transform = `translate(${label.x}px, ${label.y}px) translate(-50%, ${shift})`;
+    });
+  }
+
+  // What is seen as a PNG of `scale` pixels per CSS pixel, with labels and legend.
+  async picture(scale) {
+    const { width, height } = this.navigation;
+    const canvas = document.createElement('canvas');
+    canvas.width = Math.round(width * scale);
+    canvas.height = Math.round(height * scale);
+    const context = canvas.getContext('2d');
+    const ratio = this.renderer.getPixelRatio();
+    const hover = this.measures.hover;
+    this.measures.setHover(null);
+    this.room.coarseOnly = false;
+    this.renderer.setPixelRatio(scale);
+    this.renderer.setSize(width, height, false);
+    this.draw();
+    context.drawImage(this.renderer.domElement, 0, 0, canvas.width, canvas.height);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    context.font = `600 ${13 * scale}px system-ui, sans-serif`;
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    for (const { x, y, text } of this.labelList()) {
+      const half = context.measureText(text).width / 2 + 8 * scale;
+      context.fillStyle = 'rgba(16, 18, 23, 0.9)';
+      context.beginPath();
+      context.roundRect(x * scale - half, (y - 12) * scale, 2 * half, 24 * scale, 4 * scale);
+      context.fill();
+      context.fillStyle = '#fff';
+      context.fillText(text, x * scale, y * scale);
+    }
+    context.textAlign = 'left';
+    context.textBaseline = 'alphabetic';
+    if (this.mode !== 'colour') drawLegend(context, this.mode, this.evidence, scale);
+    this.measures.setHover(hover);
+    this.draw();
+    return new Promise((done) => canvas.toBlob(done, 'image/png'));
+  }
+
+  // --- what the panel sets --------------------------------------------------------------------
+
+  async setMode(mode) {
+    if (mode !== 'colour' && !this.evidence?.available) return;
+    this.mode = mode;
+    this.panel.showMode();
+    try {
+      await this.room.setMode(mode, this.evidence);
+    } catch (error) {
+      this.panel.fail(error.message);
+    }
+    this.remember();
+  }
+  setBackground(name) {
+    this.background = name;
+    this.renderer.setClearColor(kBackgrounds[name]);
+    this.invalidate();
+  }
+  setMeasuring(on) {
+    this.measuring = on;
+    if (!on) {
+      this.measures.cancel();
+      this.measures.setHover(null);
+    }
+    this.panel.showMeasuring();
+  }
+
+  async standIn(camera) {
+    if (!camera) return;
+    this.target = camera;
+    this.cameras.leave();
+    this.cameras.setChosen(camera);
+    this.panel.showStanding(camera);
+    this.navigation.standIn(camera.position, camera.quaternion, this.cameras.lens(camera), () => {
+      if (this.target === camera) this.cameras.stand(camera);
+    });
+    this.remember();
+  }
+  stepCamera(step) {
+    const { list } = this.cameras;
+    if (list.length === 0) return;
+    const now = list.indexOf(this.target ?? this.cameras.chosen);
+    this.standIn(list[(now < 0 ? (step > 0 ? 0 : list.length - 1) : now + step + list.length) % list.length]);
+  }
+  leaveCamera() { this.navigation.leaveCamera(); }
+
+  // --- pointer --------------------------------------------------------------------------------
+
+  #listen() {
+    const { navigation, canvas } = this;
+    navigation.addEventListener('move', () => {
+      this.remember();
+      clearTimeout(this.restTimer);
+      this.restTimer = setTimeout(() => this.invalidate(), 230);
+    });
+    navigation.addEventListener('mode', () => this.panel.showMovement());
+    navigation.addEventListener('eye', () => this.panel.showEye());
+    navigation.addEventListener('leave', () => {
+      this.target = null;
+      this.cameras.leave();
+      this.panel.showStanding(null);
+      this.remember();
+    });
+    navigation.addEventListener('pick', ({ detail }) => this.#pick(detail.x, detail.y));
+    this.measures.addEventListener('change', () => this.panel.showMeasures());
+    canvas.addEventListener('pointermove', (event) => this.#hover(event.offsetX, event.offsetY));
+    canvas.addEventListener('pointerleave', () => {
+      this.cameras.setHovered(null);
+      this.measures.setHover(null);
+    });
+    canvas.addEventListener('webglcontextlost', (event) => {
+      event.preventDefault();
+      showFailure('The graphics card has given up on this page. Reload it.');
+    });
+    addEventListener('hashchange', () => {
+      const { look, extra } = readFragment(location.hash, this.frames);
+      if (location.hash === this.written) return;
+      if (look) navigation.setView(look);
+      this.applyExtra(extra);
+      if (extra.surface !== this.mode) this.setMode(extra.surface ?? 'colour');
+    });
+  }
+  #hover(x, y) {
+    if (this.navigation.drag && this.navigation.pointers.size > 0) return;
+    const ray = this.navigation.rayAt(x, y);
+    const hit = this.room.cast(ray);
+    if (this.measuring) {
+      this.cameras.setHovered(null);
+      this.measures.setHover(hit?.point ?? null);
+    } else {
+      this.cameras.setHovered(this.#cameraAt(ray, hit));
+    }
+    this.canvas.parentElement.classList.toggle('on-camera', this.cameras.hovered !== null);
+  }
+  #cameraAt(ray, hit) {
+    const { camera, height } = this.navigation;
+    const pixelAngle = camera.isPerspectiveCamera ? camera.fov * Math.PI / 180 / height : 1e-4;
+    return this.cameras.find(ray, hit?.distance ?? Infinity, pixelAngle);
+  }
+  async #pick(x, y) {
+    const ray = this.navigation.rayAt(x, y);
+    if (this.measuring) return this.measureAt(x, y);
+    const camera = this.#cameraAt(ray, this.room.cast(ray));
+    if (camera) this.standIn(camera);
+  }
+  async measureAt(x, y) {
+    try {
+      const point = await this.measures.pick(this.navigation.rayAt(x, y), this.room);
+      if (!this.measuring) return;
+      if (point) this.measures.add(point);
+      this.panel.hint(point
+        ? this.measures.first ? 'Now the second point.' : 'Click the first point of the next distance; Esc ends.'
+        : 'There is no surface. Click another place.');
+    } catch (error) {
+      this.panel.fail(error.message);
+    }
+  }
+
+  // --- the address ----------------------------------------------------------------------------
+
+  remember() {
+    if (this.fragmentTimer) return;
+    this.fragmentTimer = setTimeout(() => {
+      this.fragmentTimer = null;
+      this.written = writeFragment(this.navigation.view, this.frames, {
+        camera: this.target?.name,
+        surface: this.mode === 'colour' ? '' : this.mode,
+      });
+      history.replaceState(null, '', this.written);
+    }, kFragmentPause);
+  }
+  applyExtra(extra) {
+    if (!extra.camera) return;
+    const camera = this.cameras.list.find(({ name }) => name === extra.camera);
+    if (camera) this.standIn(camera);
+  }
+}
+
+// Whether WebGL is computed by the processor, as on servers: no time for smooth edges then.
+function isSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (!gl) return false;
+  const name = gl.getParameter(gl.RENDERER) + (gl.getExtension('WEBGL_debug_renderer_info')
+      ? gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info').UNMASKED_RENDERER_WEBGL) : '');
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+async function main() {
+  let renderer;
+  try {
+    renderer = new THREE.WebGLRenderer({
+      canvas: document.getElementById('canvas'), antialias: !isSoftware(),
+      powerPreference: 'high-performance',
+    });
+  } catch {
+    return showFailure('This browser shows no three-dimensional graphics (WebGL 2 is missing or ' +
+                       'switched off). Use a recent Firefox, Chrome, Edge or Safari.');
+  }
+  renderer.outputColorSpace = THREE.LinearSRGBColorSpace;  // bytes as they are
+  try {
+    const viewer = new Viewer(await getJson('scene'), renderer);
+    globalThis.roomtexView = viewer;  // for the browser's console, and for tests
+    await viewer.start();
+  } catch (error) {
+    console.warn(error);
+    showFailure(error.message);
+  }
+}
+
+main();

@@ -1,0 +1,318 @@
+// Everything on the page that is not the picture: buttons, lists, keys, sentences.
+
+import { coordinates, count, length } from './format.js';
+import { showLegend } from './legend.js';
+import { kModes } from './surface.js';
+
+const $ = (id) => document.getElementById(id);
+const radios = (name) => [...document.querySelectorAll(`input[name="${name}"]`)];
+const check = (name, value) => {
+  for (const radio of radios(name)) radio.checked = radio.value === value;
+};
+
+function make(tag, { text, className, ...properties } = {}, ...children) {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (className) element.className = className;
+  Object.assign(element, properties);
+  element.append(...children);
+  return element;
+}
+
+// Instead of the picture.
+export function showFailure(sentence) {
+  $('loading').hidden = true;
+  const box = make('div', { className: 'failed', text: sentence });
+  box.setAttribute('role', 'alert');
+  $('stage').append(box);
+}
+
+export class Panel {
+  constructor(viewer) {
+    this.viewer = viewer;
+    this.options = [];
+    this.#bind();
+    this.#bindKeys();
+  }
+
+  fail(sentence) {
+    if ([...$('errors').children].some((box) => box.dataset.sentence === sentence)) return;
+    const close = make('button', { text: '×', type: 'button', title: 'Close' });
+    close.setAttribute('aria-label', 'Close');
+    const box = make('div', {}, make('span', { text: sentence }), close);
+    box.dataset.sentence = sentence;
+    close.addEventListener('click', () => box.remove());
+    $('errors').append(box);
+  }
+  hint(sentence) {
+    $('hint').textContent = sentence;
+    clearTimeout(this.hintTimer);
+    if (!this.viewer.measuring) this.hintTimer = setTimeout(() => { $('hint').textContent = ''; }, 4000);
+  }
+
+  // --- controls -------------------------------------------------------------------------------
+
+  #bind() {
+    const { viewer } = this;
+    const onRadio = (name, set) => {
+      for (const radio of radios(name)) radio.addEventListener('change', () => set(radio.value));
+    };
+    onRadio('mode', (mode) => viewer.navigation.setMode(mode));
+    onRadio('surface', (mode) => viewer.setMode(mode));
+    onRadio('background', (name) => viewer.setBackground(name));
+    const onClick = (id, act) => $(id).addEventListener('click', act);
+    onClick('home', () => viewer.navigation.home());
+    onClick('measure', () => viewer.setMeasuring(!viewer.measuring));
+    onClick('keys', () => $('help').showModal());
+    onClick('previous', () => viewer.stepCamera(-1));
+    onClick('next', () => viewer.stepCamera(1));
+    onClick('leave', () => viewer.leaveCamera());
+    onClick('clear-measures', () => viewer.measures.clear());
+    onClick('copy-measures', () => this.#copy(viewer.measures.csv(), 'The distances are in the clipboard.'));
+    onClick('save-picture', () => this.savePicture());
+    onClick('copy-link', () => this.#copy(location.href, 'The address of this view is in the clipboard.'));
+    const onInput = (id, set) => $(id).addEventListener('input', (event) => set(event.target));
+    onInput('both-sides', ({ checked }) => viewer.room.setBothSides(checked));
+    onInput('opacity', ({ value }) => viewer.cameras.setOpacity(Number(value)));
+    onInput('top', () => this.#setTop());
+    onInput('eye', ({ value }) => {
+      viewer.navigation.setEyeHeight(Number(value));
+      this.showEye();
+    });
+    onInput('speed', ({ value }) => {
+      viewer.navigation.speed = Number(value);
+      $('speed-value').textContent = `${Number(value).toFixed(1)} m/s`;
+    });
+    onInput('show-cameras', ({ checked }) => viewer.cameras.setVisible(checked));
+    onInput('show-pictures', ({ checked }) => viewer.cameras.setPictures(checked));
+    onInput('show-points', ({ checked }) => this.#showPoints(checked));
+    onInput('camera-size', ({ value }) => this.#setCameraSize(Number(value)));
+    $('help').addEventListener('click', (event) => {
+      if (event.target === $('help')) $('help').close();
+    });
+  }
+  async #copy(text, sentence) {
+    try {
+      await navigator.clipboard.writeText(text);
+      this.hint(sentence);
+    } catch {
+      this.fail('The browser does not let this page use the clipboard.');
+    }
+  }
+  async #showPoints(on) {
+    try {
+      await this.viewer.cameras.setPointsVisible(on);
+    } catch (error) {
+      this.fail(error.message);
+    }
+  }
+  #setCameraSize(size) {
+    this.viewer.cameras.setSize(size);
+    $('camera-size-value').textContent = length(size).replace('.0 mm', ' mm');
+  }
+  // The slider runs from floor to ceiling.
+  #setTop() {
+    const { viewer } = this, share = Number($('top').value);
+    const { min, max } = viewer.navigation.bounds;
+    const floor = viewer.floorHeight();
+    const height = share >= 1 ? 1e9 : min.y + share * (max.y - min.y);
+    $('top-value').textContent = share >= 1 ? 'off' : `${(height - floor).toFixed(2)} m`;
+    viewer.room.setTop(height);
+  }
+  async savePicture() {
+    const { viewer } = this;
+    const scale = Number(radios('scale').find((radio) => radio.checked).value);
+    const blob = await viewer.picture(scale);
+    if (!blob) return this.fail('The picture is too large for this browser.');
+    const link = make('a', { href: URL.createObjectURL(blob),
+                             download: `${viewer.data.name.replace(/\.[^.]*$/, '')}-view.png` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    this.hint('The picture is saved.');
+  }
+
+  // --- what is shown --------------------------------------------------------------------------
+
+  describe() {
+    const { data } = this.viewer;
+    document.title = `${data.name} – roomtex-view`;
+    $('name').textContent = data.name;
+    $('facts').textContent = `${count(data.num_vertices)} points, ${count(data.num_triangles)} triangles` +
+        (data.num_cameras ? `, ${data.num_cameras} cameras` : '');
+    for (const warning of data.warnings) $('warnings').append(make('p', { text: warning }));
+  }
+  showProgress() {
+    const { room } = this.viewer;
+    const first = room.loaded && room.pages.every((page) => page.texture || page.complete);
+    $('loading').classList.toggle('quiet', first);
+    $('loading').hidden = first && room.settled;
+    if (!first) {
+      $('loading-bar').value = room.progress;
+      $('loading-text').textContent = 'Loading the room …';
+    } else if (!room.settled) {
+      $('loading-text').textContent = 'Details';
+      $('loading-bar').removeAttribute('value');
+    }
+  }
+  showMode() {
+    const { mode, evidence } = this.viewer;
+    check('surface', mode);
+    showLegend($('legend'), mode, evidence);
+  }
+  showEvidence() {
+    const { evidence } = this.viewer;
+    for (const radio of radios('surface')) {
+      radio.disabled = radio.value !== 'colour' && !evidence.available;
+    }
+    $('no-evidence').hidden = evidence.available;
+    $('no-evidence').textContent = evidence.reason;
+  }
+  showMovement() {
+    const { mode } = this.viewer.navigation;
+    check('mode', mode);
+    $('walk-section').hidden = mode !== 'walk';
+  }
+  showEye() {
+    const { eyeHeight } = this.viewer.navigation;
+    $('eye').value = eyeHeight;
+    $('eye-value').textContent = `${eyeHeight.toFixed(2)} m`;
+  }
+  showMeasuring() {
+    const { measuring } = this.viewer;
+    $('measure').setAttribute('aria-pressed', measuring);
+    $('stage').classList.toggle('measuring', measuring);
+    $('crosshair').hidden = !measuring || !this.byKeys;
+    this.hint(measuring ? 'Click the first point (or Enter for the one at the cross).' : '');
+  }
+  showStanding(camera) {
+    $('standing').hidden = !camera;
+    if (camera) $('standing-name').textContent = camera.name;
+    for (const option of this.options) {
+      option.setAttribute('aria-selected', option.camera === camera);
+      if (option.camera !== camera) continue;
+      this.#activate(option);
+    }
+    const without = camera !== null && !camera.photo;
+    $('opacity').disabled = without;
+    if (without) this.hint('The file of this photo is not there.');
+  }
+
+  showCameras() {
+    const { list, size } = this.viewer.cameras;
+    $('no-cameras').hidden = list.length > 0;
+    $('camera-controls').hidden = list.length === 0;
+    if (list.length === 0) return;
+    $('camera-size').value = size;
+    $('camera-size').max = Math.max(1, 2 * size);
+    this.#setCameraSize(size);
+    this.options = list.map((camera) => {
+      const image = make('img', { alt: '', loading: 'lazy', width: 54, height: 36 });
+      if (camera.photo) image.src = `photo?id=${camera.id}&max=128`;
+      const option = make('li', { id: `camera-${camera.id}`, camera }, image,
+                          make('span', { text: camera.name, title: camera.name }));
+      option.setAttribute('role', 'option');
+      option.setAttribute('aria-selected', 'false');
+      option.addEventListener('click', () => this.viewer.standIn(camera));
+      option.addEventListener('pointerenter', () => this.viewer.cameras.setHovered(camera));
+      option.addEventListener('pointerleave', () => this.viewer.cameras.setHovered(null));
+      return option;
+    });
+    $('camera-list').replaceChildren(...this.options);
+    $('camera-list').addEventListener('keydown', (event) => this.#listKey(event));
+  }
+  #activate(option) {
+    for (const other of this.options) other.classList.toggle('active', other === option);
+    $('camera-list').setAttribute('aria-activedescendant', option.id);
+    option.scrollIntoView({ block: 'nearest' });
+  }
+  #listKey(event) {
+    const now = this.options.findIndex((option) => option.classList.contains('active'));
+    const last = this.options.length - 1;
+    const to = { ArrowDown: Math.min(now + 1, last), ArrowUp: Math.max(now - 1, 0), Home: 0,
+                 End: last }[event.key];
+    if (to !== undefined) this.#activate(this.options[to]);
+    else if ((event.key === 'Enter' || event.key === ' ') && now >= 0) {
+      this.viewer.standIn(this.options[now].camera);
+    } else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  showMeasures() {
+    const { list } = this.viewer.measures;
+    $('no-measures').hidden = list.length > 0;
+    $('copy-measures').disabled = $('clear-measures').disabled = list.length === 0;
+    $('measures').replaceChildren(...list.map((m, i) => {
+      const remove = make('button', { text: 'Delete', type: 'button' });
+      remove.setAttribute('aria-label', `Delete distance ${i + 1}, ${length(m.distance)}`);
+      remove.addEventListener('click', () => this.viewer.measures.remove(i));
+      const rows = [['height', length(m.height)], ['level', length(m.horizontal)],
+                    ['dx dy dz', [m.difference.x, m.difference.y, m.difference.z].map(length).join(', ')],
+                    ['from', coordinates(m.from)], ['to', coordinates(m.to)]];
+      const details = make('dl');
+      for (const [term, text] of rows) details.append(make('dt', { text: term }), make('dd', { text }));
+      return make('li', {}, make('div', { className: 'head' },
+          make('strong', { text: length(m.distance) }), remove), details);
+    }));
+  }
+
+  // --- keys -----------------------------------------------------------------------------------
+
+  #bindKeys() {
+    addEventListener('keydown', (event) => this.#key(event));
+    addEventListener('pointerdown', () => {
+      this.byKeys = false;
+      $('crosshair').hidden = true;
+    });
+  }
+  #key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || $('help').open) return;
+    const { viewer } = this, on = event.target;
+    const inSlider = on.matches?.('input[type="range"], input[type="radio"]');
+    const onButton = on.matches?.('button, input, a, summary, [role="listbox"]');
+    const toggle = (id) => $(id).click();
+    const acts = {
+      o: () => viewer.navigation.setMode('orbit'), g: () => viewer.navigation.setMode('walk'),
+      t: () => viewer.navigation.setMode('top'), h: () => viewer.navigation.home(),
+      m: () => { this.byKeys = true; viewer.setMeasuring(!viewer.measuring); },
+      f: () => toggle('show-cameras'), p: () => toggle('show-points'),
+      ',': () => viewer.stepCamera(-1), '.': () => viewer.stepCamera(1),
+      l: () => radios('background').find((radio) => !radio.checked).click(),
+      x: () => this.savePicture(), '?': () => $('help').showModal(),
+      '[': () => this.#fade(-0.1), ']': () => this.#fade(0.1),
+      Escape: () => this.#escape(),
+    };
+    if (!onButton) {
+      acts[' '] = () => this.#fade(viewer.cameras.opacity > 0 ? -1 : 1);
+      acts.Enter = () => {
+        if (!viewer.measuring) return;
+        this.byKeys = true;
+        $('crosshair').hidden = false;
+        viewer.measureAt(viewer.navigation.width / 2, viewer.navigation.height / 2);
+      };
+    }
+    kModes.forEach((mode, i) => { acts[i + 1] = () => viewer.setMode(mode); });
+    const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (act && !(event.repeat && !'[],.'.includes(event.key))) {
+      act();
+      event.preventDefault();
+    } else if (!(inSlider && event.key.startsWith('Arrow')) && viewer.navigation.key(event)) {
+      event.preventDefault();
+    }
+  }
+  #fade(step) {
+    if (!this.viewer.target) return;
+    const opacity = Math.min(Math.max(this.viewer.cameras.opacity + step, 0), 1);
+    $('opacity').value = opacity;
+    this.viewer.cameras.setOpacity(opacity);
+  }
+  #escape() {
+    const { viewer } = this;
+    if (viewer.measuring) {
+      if (!viewer.measures.cancel()) viewer.setMeasuring(false);
+      else this.hint('Click the first point; Esc ends.');
+    } else if (viewer.target) {
+      viewer.leaveCamera();
+    }
+  }
+}

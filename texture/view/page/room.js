@@ -1,0 +1,407 @@
+// The surface of the room in chunks: a coarse level of everything first, whole chunks where they
+// are looked at, a bounded share of both per picture.
+
+import * as THREE from 'three';
+
+import { getBitmap, getBytes, Queue } from './api.js';
+import { kModes, SurfaceLook } from './surface.js';
+
+const kMagic = 0x31435452;
+const kUploadBytes = 3 << 20;       // handed to the graphics card per picture
+const kMaxTriangles = 12e6;         // of the finer levels kept; 20 bytes each
+const kPreviewTexture = 1024;       // texels of the first, quick texture
+const kStripRows = 256;             // of a texture handed over per picture
+const kWantedEdgePx = 2;            // an edge longer than this on the screen asks for a finer level
+const kEdges = [4, 2, 1];           // edge of each level, in those of the whole mesh
+const kFull = 2;
+
+// Bytes of ViewChunks::Encode as a geometry whose arrays are views of them.
+function parseChunk(bytes, chunk) {
+  const [magic, numPoints, numCorners, flags] = new Uint32Array(bytes, 0, 4);
+  if (magic !== kMagic) throw new Error('A part of the room came damaged. Reload the page.');
+  const geometry = new THREE.BufferGeometry();
+  let at = 16;
+  const positions = new Float32Array(bytes, at, 3 * numPoints);
+  at += positions.byteLength;
+  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+  if (flags & 1) {
+    geometry.setAttribute('uv',
+        new THREE.BufferAttribute(new Uint16Array(bytes, at, 2 * numPoints), 2, true));
+  } else {
+    geometry.setAttribute('tint',
+        new THREE.BufferAttribute(new Uint8Array(bytes, at, 4 * numPoints), 4, true));
+  }
+  at += 4 * numPoints;
+  geometry.setIndex(new THREE.BufferAttribute(new Uint16Array(bytes, at, numCorners), 1));
+  geometry.boundingBox = new THREE.Box3(new THREE.Vector3(...chunk.min),
+                                        new THREE.Vector3(...chunk.max));
+  geometry.boundingSphere = geometry.boundingBox.getBoundingSphere(new THREE.Sphere());
+  return geometry;
+}
+
+// Where a ray meets a triangle; the distance, or Infinity. Both sides or the front only.
+function meet(origin, direction, positions, a, b, c, frontOnly) {
+  const ax = positions[3 * a], ay = positions[3 * a + 1], az = positions[3 * a + 2];
+  const ux = positions[3 * b] - ax, uy = positions[3 * b + 1] - ay, uz = positions[3 * b + 2] - az;
+  const vx = positions[3 * c] - ax, vy = positions[3 * c + 1] - ay, vz = positions[3 * c + 2] - az;
+  const px = direction.y * vz - direction.z * vy;
+  const py = direction.z * vx - direction.x * vz;
+  const pz = direction.x * vy - direction.y * vx;
+  const determinant = ux * px + uy * py + uz * pz;
+  if (frontOnly ? determinant < 1e-14 : Math.abs(determinant) < 1e-14) return Infinity;
+  const tx = origin.x - ax, ty = origin.y - ay, tz = origin.z - az;
+  const u = (tx * px + ty * py + tz * pz) / determinant;
+  if (u < 0 || u > 1) return Infinity;
+  const qx = ty * uz - tz * uy, qy = tz * ux - tx * uz, qz = tx * uy - ty * ux;
+  const v = (direction.x * qx + direction.y * qy + direction.z * qz) / determinant;
+  if (v < 0 || u + v > 1) return Infinity;
+  const distance = (vx * qx + vy * qy + vz * qz) / determinant;
+  return distance > 1e-4 ? distance : Infinity;
+}
+
+// A page of texture: small at once, then whole, strip by strip.
+class PageTexture {
+  constructor(renderer, page) {
+    this.page = page;
+    this.renderer = renderer;
+    this.texture = null;
+    this.pending = null;  // {bitmap, texture, row}
+  }
+  async loadPreview() {
+    const bitmap = await getBitmap(`texture?page=${this.page.id}&max=${kPreviewTexture}`);
+    this.#begin(bitmap);
+    while (!this.step());
+    this.complete = Math.max(this.page.width, this.page.height) <= kPreviewTexture;
+  }
+  async loadWhole(max) {
+    if (this.complete) return;
+    this.#begin(await getBitmap(`texture?page=${this.page.id}&max=${max}`));
+  }
+  #begin(bitmap) {
+    const gl = this.renderer.getContext();
+    const levels = 1 + Math.floor(Math.log2(Math.max(bitmap.width, bitmap.height)));
+    const texture = gl.createTexture();
+    this.renderer.state.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, levels, gl.RGBA8, bitmap.width, bitmap.height);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    const anisotropy = gl.getExtension('EXT_texture_filter_anisotropic');
+    if (anisotropy) {
+      const most = gl.getParameter(anisotropy.MAX_TEXTURE_MAX_ANISOTROPY_EXT);
+      gl.texParameterf(gl.TEXTURE_2D, anisotropy.TEXTURE_MAX_ANISOTROPY_EXT, Math.min(8, most));
+    }
+    this.renderer.state.unbindTexture();
+    this.pending = { bitmap, texture, row: 0 };
+  }
+  // Hands over the next strip; true when the whole texture is there.
+  step() {
+    if (!this.pending) return true;
+    const gl = this.renderer.getContext();
+    const { bitmap, texture } = this.pending;
+    const rows = Math.min(kStripRows, bitmap.height - this.pending.row);
+    this.renderer.state.bindTexture(gl.TEXTURE_2D, texture);
+    gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+    gl.pixelStorei(gl.UNPACK_SKIP_ROWS, this.pending.row);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, this.pending.row, bitmap.width, rows, gl.RGBA,
+                     gl.UNSIGNED_BYTE, bitmap);
+    gl.pixelStorei(gl.UNPACK_SKIP_ROWS, 0);
+    this.pending.row += rows;
+    const done = this.pending.row >= bitmap.height;
+    if (done) {
+      gl.generateMipmap(gl.TEXTURE_2D);
+      if (this.texture) gl.deleteTexture(this.texture.sourceTexture);
+      this.texture = new THREE.ExternalTexture(texture);
+      bitmap.close();
+      this.pending = null;
+    }
+    this.renderer.state.unbindTexture();
+    return done;
+  }
+}
+
+export class Room {
+  // scene: of the server. invalidate: asks for a new picture. fail: takes a sentence.
+  // refine: the same, when the graphics card has time.
+  constructor(scene, renderer, { invalidate, refine, fail }) {
+    this.scene = scene;
+    this.refine = refine;
+    this.renderer = renderer;
+    this.invalidate = invalidate;
+    this.fail = fail;
+    this.group = new THREE.Group();  // `scan` relative to its origin, turned so that up is +Y
+    this.group.quaternion.setFromUnitVectors(new THREE.Vector3(...scene.up).normalize(),
+                                             new THREE.Vector3(0, 1, 0));
+    this.group.updateMatrixWorld();
+    this.look = new SurfaceLook();
+    this.materials = new Map();
+    this.mode = 'colour';
+    this.frontOnly = true;
+    this.top = 1e9;
+    this.coarseOnly = false;
+    this.queue = new Queue(4);
+    this.arrived = [];  // meshes to be handed over
+    this.pages = scene.pages.map((page) => new PageTexture(renderer, page));
+    this.chunks = scene.chunks.map((chunk) => ({
+      ...chunk, levels: [null, null, null], asked: [true, false, false], wanted: 0, lastWanted: 0,
+      box: new THREE.Box3(new THREE.Vector3(...chunk.min), new THREE.Vector3(...chunk.max)),
+    }));
+    this.numCoarse = 0;
+    this.numTriangles = 0;
+    this.tolerance = 1;  // times kWantedEdgePx: larger on slow graphics cards
+    this.longestUpload = 0;
+  }
+
+  get loaded() { return this.numCoarse === this.chunks.length; }
+  // Nothing more is on its way for this point of view.
+  get settled() {
+    return this.loaded && this.queue.idle && this.arrived.length === 0 && !this.dirty &&
+        this.pages.every((page) => page.complete);
+  }
+  get progress() {
+    const all = this.chunks.length + this.pages.length;
+    return (this.numCoarse + this.pages.filter((page) => page.texture).length) / Math.max(all, 1);
+  }
+
+  #material(page) {
+    if (!this.materials.has(page)) this.materials.set(page, this.look.makeMaterial(page >= 0));
+    return this.materials.get(page);
+  }
+
+  async load() {
+    for (const page of this.pages) this.#loadPage(page);
+    await Promise.all(this.chunks.map((chunk) => new Promise((done) => {
+      this.queue.add(chunk.id, () => this.#load(chunk, 0).finally(done));
+    })));
+  }
+
+  async #loadPage(page) {
+    try {
+      await page.loadPreview();
+      this.#showPage(page);
+      const gl = this.renderer.getContext();
+      // After the room as a whole: the first picture does not wait for it.
+      while (!this.loaded) await new Promise((later) => setTimeout(later, 50));
+      await page.loadWhole(gl.getParameter(gl.MAX_TEXTURE_SIZE));
+      this.refine();
+    } catch (error) {
+      page.complete = true;
+      this.fail(error.message);
+    }
+  }
+  #showPage(page) {
+    this.#material(page.page.id).uniforms.page.value = page.texture;
+    this.refine();
+  }
+
+  async #load(chunk, level) {
+    try {
+      const geometry = parseChunk(await getBytes(`chunk?id=${chunk.id}&level=${level}`), chunk);
+      if (this.mode !== 'colour') await this.#loadEvidence(chunk, level, geometry);
+      const mesh = new THREE.Mesh(geometry, this.#material(chunk.page));
+      mesh.matrixAutoUpdate = false;
+      this.arrived.push({ chunk, level, mesh });
+      this.dirty = true;
+      this.refine();
+    } catch (error) {
+      if (level > 0) chunk.asked[level] = false;
+      this.fail(error.message);
+    }
+  }
+
+  async #loadEvidence(chunk, level, geometry) {
+    if (geometry.attributes.evidence) return;
+    const bytes = await getBytes(`evidence_chunk?id=${chunk.id}&level=${level}`);
+    geometry.setAttribute('evidence', new THREE.BufferAttribute(new Uint8Array(bytes), 4, true));
+  }
+
+  // mode: one of kModes; evidence: the server's description.
+  async setMode(mode, evidence) {
+    if (!kModes.includes(mode)) return;
+    this.mode = mode;
+    if (mode !== 'colour') {
+      const tasks = [];
+      for (const chunk of this.chunks) {
+        for (const [level, mesh] of chunk.levels.entries()) {
+          if (mesh && !mesh.geometry.attributes.evidence) {
+            tasks.push(new Promise((done, failed) => this.queue.add(level, () =>
+              this.#loadEvidence(chunk, level, mesh.geometry).then(done, failed))));
+          }
+        }
+      }
+      await Promise.all(tasks);
+      if (this.mode !== mode) return;  // another one was chosen meanwhile
+    }
+    this.look.setMode(mode, evidence);
+    this.invalidate();
+  }
+  setTop(height) {
+    this.top = height;
+    this.look.setTop(height);
+    this.invalidate();
+  }
+  setBothSides(both) {
+    this.frontOnly = !both;
+    this.look.setBothSides(both);
+    this.invalidate();
+  }
+
+  // To be called before every picture: hands over what has arrived, as much as one picture may, and
+  // asks for what the camera wants. heightPx: of the picture. Gives whether there is more to hand
+  // over.
+  update(camera, heightPx) {
+    const started = performance.now();
+    let bytes = 0;
+    while (this.arrived.length > 0 && bytes < kUploadBytes) {
+      const { chunk, level, mesh } = this.arrived.shift();
+      this.#accept(chunk, level, mesh);
+      bytes += 16 * mesh.geometry.attributes.position.count + 2 * mesh.geometry.index.count;
+    }
+    if (bytes < kUploadBytes) {
+      const page = this.pages.find((candidate) => candidate.pending);
+      if (page?.step()) {
+        page.complete = true;
+        this.#showPage(page);
+      }
+    }
+    this.#choose(camera, heightPx);
+    this.dirty = false;
+    this.handedOver = bytes > 0 || this.pages.some((page) => page.pending);
+    this.longestUpload = Math.max(this.longestUpload, performance.now() - started);
+    return this.arrived.length > 0 || this.pages.some((page) => page.pending);
+  }
+
+  #accept(chunk, level, mesh) {
+    chunk.levels[level] = mesh;
+    if (level === 0) {
+      ++this.numCoarse;
+    } else {
+      this.numTriangles += mesh.geometry.index.count / 3;
+      // The graphics card has them then; rays are cast at the coarse level and by the server.
+      for (const attribute of [...Object.values(mesh.geometry.attributes), mesh.geometry.index]) {
+        attribute.onUpload(() => { attribute.array = null; });
+      }
+    }
+    this.group.add(mesh);
+    if (this.mode !== 'colour' && !mesh.geometry.attributes.evidence) {  // chosen meanwhile
+      this.queue.add(level, () => this.#loadEvidence(chunk, level, mesh.geometry)
+          .then(this.invalidate, (error) => this.fail(error.message)));
+    }
+  }
+
+  // The level whose edges are short enough on the screen, and the nearest to it that is there.
+  #choose(camera, heightPx) {
+    const frustum = new THREE.Frustum().setFromProjectionMatrix(
+        new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
+            .multiply(this.group.matrixWorld));
+    const eye = this.group.worldToLocal(camera.position.clone());
+    const now = performance.now();
+    this.shownTriangles = 0;
+    for (const chunk of this.chunks) {
+      let pxPerMetre;
+      if (camera.isOrthographicCamera) {
+        pxPerMetre = heightPx * camera.zoom / (camera.top - camera.bottom);
+      } else {
+        const distance = Math.max(chunk.box.distanceToPoint(eye), camera.near);
+        pxPerMetre = heightPx / (2 * distance * Math.tan(camera.fov * Math.PI / 360));
+      }
+      const edgePx = chunk.spacing * pxPerMetre;
+      const inView = frustum.intersectsBox(chunk.box);
+      let level = 0;
+      while (level < kFull && kEdges[level] * edgePx > kWantedEdgePx * this.tolerance) ++level;
+      if (this.coarseOnly) level = 0;
+      if (inView && level > 0) {
+        chunk.lastWanted = now;
+        if (this.loaded && !chunk.asked[level]) {
+          chunk.asked[level] = true;
+          this.queue.add(1000 - Math.min(edgePx, 1000), () => this.#load(chunk, level));
+        }
+      }
+      let shown = level;
+      while (shown > 0 && !chunk.levels[shown]) --shown;
+      chunk.levels.forEach((mesh, i) => { if (mesh) mesh.visible = i === shown; });
+      if (inView && chunk.levels[shown]) {
+        this.shownTriangles += chunk.levels[shown].geometry.index.count / 3;
+      }
+    }
+    this.#forget();
+  }
+
+  // The finer levels that were not looked at for the longest time, beyond what may be kept.
+  #forget() {
+    if (this.numTriangles <= kMaxTriangles) return;
+    const byAge = [...this.chunks].sort((a, b) => a.lastWanted - b.lastWanted);
+    for (const chunk of byAge) {
+      for (const level of [1, 2]) {
+        const mesh = chunk.levels[level];
+        if (!mesh || mesh.visible) continue;
+        if (this.numTriangles <= kMaxTriangles) return;
+        this.numTriangles -= mesh.geometry.index.count / 3;
+        this.group.remove(mesh);
+        mesh.geometry.dispose();
+        chunk.levels[level] = null;
+        chunk.asked[level] = false;
+      }
+    }
+  }
+
+  // Where a ray meets the coarse level, for moving about; {distance, point} or null. Measuring asks
+  // the server.
+  cast(ray) {
+    const local = ray.clone().applyMatrix4(this.group.matrixWorld.clone().invert());
+    let best = Infinity;
+    const at = new THREE.Vector3();
+    for (const chunk of this.chunks) {
+      const coarse = chunk.levels[0];
+      if (!coarse) continue;
+      if (!chunk.box.containsPoint(local.origin)) {
+        if (!local.intersectBox(chunk.box, at) || at.distanceTo(local.origin) > best) continue;
+      }
+      const positions = coarse.geometry.attributes.position.array;
+      const corners = coarse.geometry.index.array;
+      for (let i = 0; i < corners.length; i += 3) {
+        const distance = meet(local.origin, local.direction, positions, corners[i], corners[i + 1],
+                              corners[i + 2], this.frontOnly);
+        if (distance >= best) continue;
+        if (ray.origin.y + distance * ray.direction.y > this.top) continue;
+        best = distance;
+      }
+    }
+    return best < Infinity ? { distance: best, point: ray.at(best, new THREE.Vector3()) } : null;
+  }
+
+  // Height of the floor: where most of what lies level in the lower half of the room lies.
+  floorHeight() {
+    const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3();
+    const box = new THREE.Box3();
+    for (const chunk of this.chunks) box.union(chunk.box.clone().applyMatrix4(this.group.matrixWorld));
+    if (box.isEmpty()) return 0;
+    const middle = (box.min.y + box.max.y) / 2;
+    const step = 0.02, areas = new Map();
+    for (const { levels: [coarse] } of this.chunks) {
+      if (!coarse) continue;
+      const { position } = coarse.geometry.attributes;
+      const corners = coarse.geometry.index.array;
+      for (let i = 0; i < corners.length; i += 3) {
+        for (const [vector, k] of [[a, 0], [b, 1], [c, 2]]) {
+          vector.fromBufferAttribute(position, corners[i + k]).applyQuaternion(this.group.quaternion);
+        }
+        const height = (a.y + b.y + c.y) / 3;
+        const normal = b.sub(a).cross(c.sub(a));
+        if (height > middle || normal.y < 0.9 * normal.length()) continue;
+        const bin = Math.floor(height / step);
+        areas.set(bin, (areas.get(bin) ?? 0) + normal.y);
+      }
+    }
+    let best = Math.floor(box.min.y / step), most = 0;
+    for (const [bin, area] of areas) {
+      const sum = area + (areas.get(bin + 1) ?? 0);
+      if (sum > most) [best, most] = [bin, sum];
+    }
+    return (best + 1) * step;
+  }
+}

@@ -1,0 +1,64 @@
+#pragma once
+// The aligned model and the photos, as the viewer shows them.
+
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/sparse_model.h"
+#include "core/report.h"
+
+namespace roomtex {
+
+// Where the positions of a photo lie in the room: a lattice over the photo. Between its nodes
+// straight lines are good to a tenth of a pixel, whatever the distortion.
+struct PhotoLattice {
+  int columns = 0, rows = 0;  // nodes
+  // Row by row from the upper left corner of the photo: unit vectors in `cam`; zero where no ray of
+  // the camera's valid field goes.
+  std::vector<Eigen::Vector3f> directions;
+};
+PhotoLattice MakePhotoLattice(const Camera& camera);
+
+class ViewCameras {
+ public:
+  // No cameras.
+  ViewCameras() = default;
+  // image_path: folder of the photos; "" = none. A photo that is not there is no error: the camera
+  // lacks its picture.
+  ViewCameras(SparseModel model_in_scan, const std::string& image_path);
+
+  size_t size() const { return images_.size(); }
+  size_t num_photos() const;  // whose file is there
+  const SparseModel& model() const { return model_; }
+
+  // [{id, name, width, height, focal, center [3] (`scan`), rotation_wxyz (cam_from_scan), corners
+  // [4][3] (unit, `cam`: upper left, upper right, lower right, lower left), photo (bool)}]; by
+  // name.
+  Json ToJson() const;
+  // {columns, rows, directions [3 * columns * rows]}. Throws UsageError for a camera that is not
+  // there.
+  Json Lattice(int id) const;
+  // JPEG with at most max_size pixels along its longer side, in the shape of the lattice; null if
+  // there is no file. Throws InputError if it cannot be read.
+  std::shared_ptr<const std::string> Photo(int id, int max_size) const;
+  // Points of the sparse model: float x y z (relative to `origin`), bytes r g b 255; without far
+  // strays: see the .cc file.
+  std::string EncodePoints(const Eigen::Vector3d& origin) const;
+
+ private:
+  const SparseImage& Image(int id) const;
+
+  SparseModel model_;
+  std::vector<const SparseImage*> images_;  // by name
+  std::vector<std::string> paths_;          // "" = no such file
+  // The pictures asked for last; behind a pointer, so that this can be moved.
+  struct Cache;
+  std::shared_ptr<Cache> cache_;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,77 @@
+#pragma once
+// A large mesh in pieces that a browser takes one by one: near pieces whole, far ones coarse.
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "texture/view/view_model.h"
+
+namespace roomtex {
+
+struct ViewChunkOptions {
+  int max_triangles = 1 << 16;  // of a chunk
+  int max_vertices = 65535;     // so that indices fit into 16 bits
+  // Triangles that are simplified together. Their border is kept, so that neighbours of any level
+  // fit; and the coarse triangles stay so small that the texture does not swim on them.
+  int patch_triangles = 2048;
+  // The levels below the whole: share of the triangles that each aims at, and metres that it may be
+  // off.
+  double coarse_share = 1.0 / 16, coarse_error = 0.02;
+  double middle_share = 1.0 / 4, middle_error = 0.005;
+};
+
+// Triangles of one image that lie close together.
+struct ViewChunk {
+  int page = -1;  // index into ViewModel::images; -1 = colours of the points
+  size_t first = 0, end = 0;
+  int num_vertices = 0;
+  Eigen::Vector3f low = Eigen::Vector3f::Zero(),
+                  high = Eigen::Vector3f::Zero();  // box, relative to ViewModel::origin
+  float spacing = 0;                               // metres, a typical edge of its triangles
+
+  size_t num_triangles() const { return end - first; }
+};
+
+class ViewChunks {
+ public:
+  enum Level { kCoarse = 0, kMiddle = 1, kFull = 2 };
+
+  // The model must outlive this. Cuts the mesh; coarser levels are made when asked for.
+  explicit ViewChunks(const ViewModel& model, const ViewChunkOptions& options = {});
+
+  const std::vector<ViewChunk>& chunks() const { return chunks_; }
+  // Order in which the chunks hold the triangles of the model; every one once.
+  const std::vector<uint32_t>& order() const { return order_; }
+
+  // One level of a chunk. May be called from several threads.
+  struct Geometry {
+    std::vector<uint32_t> points;   // indices into ViewModel::points
+    std::vector<uint16_t> corners;  // three per triangle, into points
+    double error = 0;               // metres that it is off, at most
+  };
+  std::shared_ptr<const Geometry> Make(int chunk, Level level) const;
+
+  // What the page loads, little-endian: uint32 "RTC1", number of points, number of corners, 1 =
+  // with texture coordinates, 2 = with colours; per point x y z (float, metres relative to the
+  // origin); per point u v (uint16, 65535 = 1) or r g b 255 (bytes); corners (uint16).
+  std::string Encode(int chunk, Level level) const;
+
+ private:
+  Geometry Simplify(const ViewChunk& chunk, double share, double tolerance) const;
+  Geometry MakeFull(const ViewChunk& chunk) const;
+
+  const ViewModel& model_;
+  const ViewChunkOptions options_;
+  std::vector<uint32_t> order_;
+  std::vector<ViewChunk> chunks_;
+  mutable std::mutex mutex_;
+  // Made before; [level][chunk].
+  mutable std::vector<std::shared_ptr<const Geometry>> made_[kFull];
+};
+
+}  // namespace roomtex

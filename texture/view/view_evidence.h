@@ -1,0 +1,38 @@
+#pragma once
+// Scan intensity, number of photos and their disagreement at the points of the model.
+
+#include <string>
+#include <vector>
+
+#include "core/report.h"
+#include "texture/evidence.h"
+#include "texture/view/view_model.h"
+
+namespace roomtex {
+
+class ViewEvidence {
+ public:
+  // Not there; `reason` is a sentence for the user.
+  explicit ViewEvidence(const std::string& reason) : reason_(reason) {}
+  // Finds for every point of the model the nearest point of the evidence, at most
+  // kMaxDistance away.
+  ViewEvidence(const ViewModel& model, const Evidence& evidence);
+
+  static constexpr double kMaxDistance = 1e-3;       // metres; the two files round differently
+  static constexpr double kDisagreementStep = 0.25;  // of a code of one byte; 255 = fewer than two
+
+  // {available, reason, intensity [low, high] (1st and 99th percentile: black and white),
+  // max_views, disagreement_high (98th percentile), disagreement_step}.
+  Json ToJson() const;
+  // Four bytes per point: intensity as grey, photos, disagreement (code), 0 = known, 255 = nothing
+  // is known of the point.
+  std::string Encode(const std::vector<uint32_t>& points) const;
+
+ private:
+  std::string reason_;
+  std::vector<std::array<uint8_t, 4>> codes_;
+  double intensity_low_ = 0, intensity_high_ = 1, disagreement_high_ = 1;
+  int max_views_ = 0;
+};
+
+}  // namespace roomtex

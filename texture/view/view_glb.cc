@@ -1,0 +1,379 @@
+// An own reader, because the viewer opens files of any origin: everything that the JSON part says
+// is compared with the bytes of the binary part, and images stay encoded for the browser.
+
+#include <cstring>
+#include <limits>
+#include <optional>
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/photo.h"
+#include "importers/file_reader.h"
+#include "texture/view/view_model.h"
+
+namespace roomtex {
+namespace {
+
+using nlohmann::json;
+
+const char kDamaged[] = "The file is damaged: write it again";
+const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this";
+constexpr int kMaxDepth = 32;           // of nodes
+constexpr size_t kMaxJson = 256 << 20;  // bytes; ours have some thousand
+
+// The numbers of one accessor as floats or indices.
+struct Elements {
+  const char* begin = nullptr;
+  size_t count = 0, stride = 0;
+  int type = 0, components = 0;
+  bool normalized = false;
+
+  template <typename T>
+  T As(size_t i, int k) const {
+    T value;
+    std::memcpy(&value, begin + i * stride + static_cast<size_t>(k) * sizeof(T), sizeof(T));
+    return value;
+  }
+  float Float(size_t i, int k) const {
+    switch (type) {
+      case 5121:
+        return static_cast<float>(As<uint8_t>(i, k)) / (normalized ? 255.0f : 1.0f);
+      case 5123:
+        return static_cast<float>(As<uint16_t>(i, k)) / (normalized ? 65535.0f : 1.0f);
+      default:
+        return As<float>(i, k);
+    }
+  }
+  uint32_t Index(size_t i) const {
+    return type == 5121   ? As<uint8_t>(i, 0)
+           : type == 5123 ? As<uint16_t>(i, 0)
+                          : As<uint32_t>(i, 0);
+  }
+};
+
+class GlbReader {
+ public:
+  explicit GlbReader(const std::string& path) : path_(path) { ReadChunks(path); }
+
+  ViewModel Read() {
+    model_.path = path_;
+    CheckExtensions();
+    ReadImages();
+    const json scene = Object("scenes", Number(root_, "scene", 0));
+    const json& roots = List(scene, "nodes");
+    const bool ours = Text(Member(root_, "asset"), "generator") == "roomtex-texture";
+    // Ours: what the root node turns is the scan frame.
+    Eigen::Affine3d scan_from_gltf = Eigen::Affine3d::Identity();
+    if (ours && roots.size() == 1) {
+      scan_from_gltf = Transform(Object("nodes", Index(roots[0]))).inverse();
+    }
+    for (const json& node : roots) AddNode(Index(node), scan_from_gltf, 0);
+    if (model_.triangles.empty()) Fail("has no triangles", "Give what roomtex-texture wrote");
+    model_.up = (scan_from_gltf.linear() * Eigen::Vector3d::UnitY()).normalized();
+    Recentre();
+    return std::move(model_);
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& finding, const std::string& remedy = kDamaged) const {
+    throw InputError(path_, "", finding, remedy);
+  }
+
+  void ReadChunks(const std::string& path) {
+    const FileReader file(path);
+    const auto word = [&file](int64_t at) {
+      uint32_t value;
+      file.Read(at, &value, 4);
+      return value;
+    };
+    if (file.size() < 20 || word(0) != 0x46546c67) {
+      Fail("is no binary glTF (GLB)", "Give the model.glb that roomtex-texture wrote");
+    }
+    if (word(4) != 2)
+      Fail("is glTF of version " + std::to_string(word(4)) + ", expected 2", kNotOurs);
+    const uint32_t json_size = word(12);
+    if (word(16) != 0x4e4f534a || json_size > file.size() - 20 || json_size > kMaxJson) {
+      throw InputError(path, BytePosition(12), "the JSON part does not fit into the file",
+                       kDamaged);
+    }
+    root_ = json::parse(file.ReadSome(20, json_size), nullptr, false);
+    if (!root_.is_object()) {
+      throw InputError(path, BytePosition(20), "the JSON part cannot be read", kDamaged);
+    }
+    const int64_t at = 20 + static_cast<int64_t>(json_size);
+    if (at + 8 > file.size()) return;  // without a binary part
+    const uint32_t size = word(at);
+    if (word(at + 4) != 0x004e4942 || size > file.size() - at - 8) {
+      throw InputError(
+          path, BytePosition(at),
+          "the binary part of " + std::to_string(size) + " bytes does not fit into the file",
+          "The file is cut off: copy it again");
+    }
+    binary_.resize(size);
+    file.Read(at + 8, binary_.data(), size);
+  }
+
+  // Members of the JSON; a damaged one is an InputError.
+  static const json& Member(const json& object, const char* name) {
+    static const json kNone;
+    const auto found = object.is_object() ? object.find(name) : object.end();
+    return object.is_object() && found != object.end() ? *found : kNone;
+  }
+  const json& List(const json& object, const char* name) const {
+    static const json kEmpty = json::array();
+    const json& list = Member(object, name);
+    if (list.is_null()) return kEmpty;
+    if (!list.is_array()) Fail(std::string("\"") + name + "\" is no list");
+    return list;
+  }
+  int64_t Index(const json& value) const {
+    if (!value.is_number_unsigned() || value.get<uint64_t>() > (uint64_t{1} << 40)) {
+      Fail("has " + value.dump().substr(0, 40) + " where a number from 0 on belongs");
+    }
+    return value.get<int64_t>();
+  }
+  int64_t Number(const json& object, const char* name, std::optional<int64_t> otherwise) const {
+    const json& value = Member(object, name);
+    if (value.is_null() && otherwise) return *otherwise;
+    if (value.is_null()) Fail(std::string("lacks \"") + name + "\"");
+    return Index(value);
+  }
+  static std::string Text(const json& object, const char* name) {
+    const json& value = Member(object, name);
+    return value.is_string() ? value.get<std::string>() : "";
+  }
+  const json& Object(const char* list, int64_t index) const {
+    const json& objects = List(root_, list);
+    if (index >= static_cast<int64_t>(objects.size()) || !objects[index].is_object()) {
+      Fail(std::string("names number ") + std::to_string(index) + " of \"" + list +
+           "\", there are " + std::to_string(objects.size()));
+    }
+    return objects[index];
+  }
+
+  void CheckExtensions() const {
+    for (const json& name : List(root_, "extensionsRequired")) {
+      const std::string text = name.is_string() ? name.get<std::string>() : "?";
+      if (text == "KHR_materials_unlit") continue;
+      Fail("needs the glTF extension " + text + ", which is not read", kNotOurs);
+    }
+  }
+
+  // Offset and size in the binary part.
+  std::pair<size_t, size_t> View(int64_t number) const {
+    const json& view = Object("bufferViews", number);
+    const auto offset = static_cast<size_t>(Number(view, "byteOffset", 0));
+    const auto size = static_cast<size_t>(Number(view, "byteLength", std::nullopt));
+    if (Number(view, "buffer", std::nullopt) != 0 ||
+        !Member(Object("buffers", 0), "uri").is_null()) {
+      Fail("keeps data in another file", kNotOurs);
+    }
+    if (offset > binary_.size() || size > binary_.size() - offset) {
+      Fail("says it holds " + std::to_string(offset + size) + " bytes of data, but has " +
+           std::to_string(binary_.size()));
+    }
+    return {offset, size};
+  }
+
+  Elements ElementsOf(int64_t number) const {
+    const json& accessor = Object("accessors", number);
+    if (!Member(accessor, "sparse").is_null()) Fail("has sparse accessors", kNotOurs);
+    const auto [view_offset, view_size] = View(Number(accessor, "bufferView", std::nullopt));
+    Elements elements;
+    elements.count = static_cast<size_t>(Number(accessor, "count", std::nullopt));
+    elements.type = static_cast<int>(Number(accessor, "componentType", std::nullopt));
+    elements.normalized = Member(accessor, "normalized") == true;
+    const std::string type = Text(accessor, "type");
+    elements.components = type == "SCALAR" ? 1 : type == "VEC2" ? 2 : type == "VEC3" ? 3 : 4;
+    const size_t size = elements.type == 5121                            ? 1
+                        : elements.type == 5123                          ? 2
+                        : elements.type == 5125 || elements.type == 5126 ? 4
+                                                                         : 0;
+    if (size == 0) Fail("has numbers of a type that is not read", kNotOurs);
+    const size_t element = size * static_cast<size_t>(elements.components);
+    const json& view = Object("bufferViews", Number(accessor, "bufferView", std::nullopt));
+    elements.stride = static_cast<size_t>(Number(view, "byteStride", 0));
+    if (elements.stride == 0) elements.stride = element;
+    const auto offset = static_cast<size_t>(Number(accessor, "byteOffset", 0));
+    const bool fits = elements.stride >= element && elements.stride < (1u << 20) &&
+                      offset <= view_size &&
+                      (elements.count == 0 ||
+                       (element <= view_size - offset &&
+                        elements.count - 1 <= (view_size - offset - element) / elements.stride));
+    if (!fits) {
+      Fail("says that a list has " + std::to_string(elements.count) +
+           " items, more than its bytes can hold");
+    }
+    elements.begin = binary_.data() + view_offset + offset;
+    return elements;
+  }
+
+  void ReadImages() {
+    for (const json& image : List(root_, "images")) {
+      if (!Member(image, "uri").is_null()) Fail("keeps its images in other files", kNotOurs);
+      const auto [offset, size] = View(Number(image, "bufferView", std::nullopt));
+      ViewImage result;
+      result.bytes = std::make_shared<const std::string>(binary_.data() + offset, size);
+      const auto [width, height] = EncodedImageSize(*result.bytes);
+      if (width <= 0 || height <= 0) Fail("has an image that is neither PNG nor JPEG", kNotOurs);
+      result.width = width;
+      result.height = height;
+      result.type = (*result.bytes)[0] == '\xff' ? "image/jpeg" : "image/png";
+      model_.images.push_back(std::move(result));
+    }
+  }
+
+  Eigen::Affine3d Transform(const json& node) const {
+    const auto numbers = [&](const char* name, std::vector<double> values) {
+      const json& list = List(node, name);
+      if (!list.empty() && list.size() != values.size()) Fail("has a node of a wrong transform");
+      for (size_t i = 0; i < list.size(); ++i) {
+        if (!list[i].is_number()) Fail("has a node of a wrong transform");
+        values[i] = list[i].get<double>();
+      }
+      return values;
+    };
+    Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+    if (!List(node, "matrix").empty()) {
+      const std::vector<double> m = numbers("matrix", std::vector<double>(16));
+      transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(m.data());
+      transform.makeAffine();
+    } else {
+      const auto t = numbers("translation", {0, 0, 0}), s = numbers("scale", {1, 1, 1});
+      const auto q = numbers("rotation", {0, 0, 0, 1});  // x y z w
+      transform.translate(Eigen::Vector3d(t[0], t[1], t[2]));
+      transform.rotate(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized());
+      transform.scale(Eigen::Vector3d(s[0], s[1], s[2]));
+    }
+    const double determinant = transform.linear().determinant();
+    if (!transform.matrix().allFinite() || !(std::abs(determinant) > 1e-12)) {
+      Fail("has a node whose transform cannot be inverted");
+    }
+    return transform;
+  }
+
+  void AddNode(int64_t number, const Eigen::Affine3d& scan_from_parent, int depth) {
+    if (depth > kMaxDepth) Fail("has nodes that contain themselves or lie too deep");
+    if (++num_nodes_ > 100000) Fail("has too many nodes", kNotOurs);
+    const json& node = Object("nodes", number);
+    const Eigen::Affine3d scan_from_node = scan_from_parent * Transform(node);
+    if (!Member(node, "mesh").is_null()) {
+      const json& mesh = Object("meshes", Number(node, "mesh", std::nullopt));
+      for (const json& primitive : List(mesh, "primitives"))
+        AddPrimitive(primitive, scan_from_node);
+    }
+    for (const json& child : List(node, "children"))
+      AddNode(Index(child), scan_from_node, depth + 1);
+  }
+
+  // Index into images, -1 for a material without.
+  int PageOf(const json& primitive) const {
+    if (Member(primitive, "material").is_null()) return -1;
+    const json& material = Object("materials", Number(primitive, "material", std::nullopt));
+    const json& reference = Member(Member(material, "pbrMetallicRoughness"), "baseColorTexture");
+    if (reference.is_null()) return -1;
+    const json& texture = Object("textures", Number(reference, "index", std::nullopt));
+    const int64_t page = Number(texture, "source", std::nullopt);
+    if (page >= static_cast<int64_t>(model_.images.size()))
+      Fail("names an image that is not there");
+    return static_cast<int>(page);
+  }
+
+  void AddPrimitive(const json& primitive, const Eigen::Affine3d& scan_from_node) {
+    if (Number(primitive, "mode", 4) != 4) return;  // points and lines
+    const json& attributes = Member(primitive, "attributes");
+    const Elements positions = ElementsOf(Number(attributes, "POSITION", std::nullopt));
+    if (positions.components != 3 || positions.type != 5126)
+      Fail("has positions that are no floats");
+    const size_t first = points_.size();
+    if (positions.count > static_cast<size_t>(std::numeric_limits<int>::max()) - first) {
+      Fail("has more than 2^31 vertices", "Divide the mesh");
+    }
+    for (size_t i = 0; i < positions.count; ++i) {
+      const Eigen::Vector3d p(positions.As<float>(i, 0), positions.As<float>(i, 1),
+                              positions.As<float>(i, 2));
+      points_.push_back(scan_from_node * p);
+    }
+    const int page = PageOf(primitive);
+    AddColors(attributes, page, positions.count);
+    AddTriangles(primitive, first, page, scan_from_node.linear().determinant() < 0);
+  }
+
+  void AddColors(const json& attributes, int page, size_t count) {
+    model_.uv.resize(points_.size(), Eigen::Vector2f::Zero());
+    model_.colors.resize(points_.size(), {200, 200, 200});
+    const size_t first = points_.size() - count;
+    const char* name = page >= 0 ? "TEXCOORD_0" : "COLOR_0";
+    if (Member(attributes, name).is_null()) {
+      if (page >= 0) Fail("has a texture without texture coordinates");
+      return;
+    }
+    const Elements values = ElementsOf(Number(attributes, name, std::nullopt));
+    if (values.count != count || values.components < (page >= 0 ? 2 : 3)) {
+      Fail(std::string("has another number of ") + name + " than of positions");
+    }
+    for (size_t i = 0; i < count; ++i) {
+      if (page >= 0) {
+        model_.uv[first + i] = {values.Float(i, 0), values.Float(i, 1)};
+        continue;
+      }
+      for (int k = 0; k < 3; ++k) {
+        model_.colors[first + i][k] = SrgbByteFromLinear(values.Float(i, k));
+      }
+    }
+  }
+
+  void AddTriangles(const json& primitive, size_t first, int page, bool mirrored) {
+    const size_t num_points = points_.size() - first;
+    Elements indices;
+    const bool indexed = !Member(primitive, "indices").is_null();
+    if (indexed) {
+      indices = ElementsOf(Number(primitive, "indices", std::nullopt));
+      if (indices.type == 5126) Fail("has indices that are no whole numbers");
+    }
+    const size_t num_corners = indexed ? indices.count : num_points;
+    for (size_t i = 0; i + 2 < num_corners; i += 3) {
+      Triangle triangle;
+      for (int k = 0; k < 3; ++k) {
+        const size_t corner = indexed ? indices.Index(i + k) : i + k;
+        if (corner >= num_points) {
+          Fail("has a face that names vertex " + std::to_string(corner) + " of " +
+               std::to_string(num_points));
+        }
+        triangle[k] = static_cast<int>(first + corner);
+      }
+      if (mirrored) std::swap(triangle[1], triangle[2]);
+      const bool finite = points_[triangle[0]].allFinite() && points_[triangle[1]].allFinite() &&
+                          points_[triangle[2]].allFinite();
+      if (!finite) continue;
+      model_.triangles.push_back(triangle);
+      model_.page_of_triangle.push_back(page);
+    }
+  }
+
+  void Recentre() {
+    Eigen::AlignedBox3d box;
+    for (const Triangle& triangle : model_.triangles) {
+      for (const int corner : triangle) box.extend(points_[corner]);
+    }
+    model_.origin = box.center();
+    model_.points.reserve(points_.size());
+    for (const Eigen::Vector3d& p : points_) {
+      model_.points.push_back((p - model_.origin).cast<float>());
+    }
+  }
+
+  std::string path_, binary_;
+  json root_;
+  ViewModel model_;
+  std::vector<Eigen::Vector3d> points_;  // `scan`
+  int num_nodes_ = 0;
+};
+
+}  // namespace
+
+ViewModel ReadViewGlb(const std::string& path) { return GlbReader(path).Read(); }
+
+}  // namespace roomtex

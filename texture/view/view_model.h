@@ -1,0 +1,56 @@
+#pragma once
+// What the viewer shows: a coloured mesh in the scan frame, read from what roomtex-texture wrote.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/scan.h"
+
+namespace roomtex {
+
+// A texture image as it stands in the file.
+struct ViewImage {
+  std::shared_ptr<const std::string> bytes;  // PNG or JPEG
+  std::string type;                          // "image/png" or "image/jpeg"
+  int width = 0, height = 0;                 // texels, by the image's header
+};
+
+struct ViewModel {
+  std::string path;
+  // `scan` frame. Points are floats relative to the origin, so that georeferenced scans keep their
+  // millimetres.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d up = Eigen::Vector3d::UnitY();  // unit
+  std::vector<Eigen::Vector3f> points;
+  // One per point: a place in the image (glTF: 0, 0 = upper-left corner), and the colour where
+  // there is no image, sRGB. Either may be empty.
+  std::vector<Eigen::Vector2f> uv;
+  std::vector<std::array<uint8_t, 3>> colors;
+  std::vector<Triangle> triangles;
+  std::vector<int> page_of_triangle;  // index into images; -1 = colours of the points
+  std::vector<ViewImage> images;
+
+  Eigen::Vector3d InScan(size_t point) const { return origin + points[point].cast<double>(); }
+};
+
+// A folder that roomtex-texture wrote (model.glb, or model.ply if there is no GLB), a .glb or a
+// .ply. Throws InputError: nothing there, damaged, no triangles, things of glTF that we do not
+// read.
+ViewModel ReadViewModel(const std::string& path);
+
+// Binary glTF 2.0: triangles with one texture image or vertex colours each; nodes with their
+// transforms. The scan frame is that below the root node of roomtex-texture's files, and glTF's own
+// for any other file. Numbers are checked against the bytes that are there.
+ViewModel ReadViewGlb(const std::string& path);
+// A triangle mesh; colours by red, green, blue if it has them, otherwise light grey.
+ViewModel ReadViewPly(const std::string& path);
+
+// Width and height of a PNG or JPEG by its header; {0, 0} for anything else.
+std::array<int, 2> EncodedImageSize(const std::string& bytes);
+
+}  // namespace roomtex
