@@ -4,10 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 
 namespace roomtex {
 namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // Two poses are the same one: radians, metres.
 constexpr double kSameRotation = 1e-4, kSamePosition = 1e-4;
@@ -38,6 +41,47 @@ void AddIfNew(const ViewPose& pose, std::vector<ViewPose>* poses) {
   if (!known) poses->push_back(pose);
 }
 
+// Projections minus clicks of three picks; NaN where a point is not in the photo's field.
+Vector6d Errors(const CameraProjection& projection, const PointPairs& pairs, const Rigid& pose) {
+  Vector6d errors = Vector6d::Constant(std::numeric_limits<double>::quiet_NaN());
+  for (int i = 0; i < 3; ++i) {
+    const auto x = projection.ImgFromCam(pose * pairs.x_in_scan.col(i));
+    if (x) errors.segment<2>(2 * i) = *x - pairs.x_in_img.col(i);
+  }
+  return errors;
+}
+
+Rigid Moved(const Rigid& pose, const Vector6d& step) {
+  const Eigen::Vector3d w = step.head<3>();
+  Rigid moved = pose;
+  if (w.norm() > 0) {
+    moved.rotation = (Eigen::AngleAxisd(w.norm(), w.normalized()) * pose.rotation).normalized();
+  }
+  moved.translation += step.tail<3>();
+  return moved;
+}
+
+// Six equations, six unknowns: Newton's steps take away what the closed form leaves by rounding.
+void Polish(const CameraProjection& projection, const PointPairs& pairs, Rigid* pose) {
+  constexpr double kStep = 1e-6;
+  Vector6d errors = Errors(projection, pairs, *pose);
+  for (int i = 0; i < 10 && errors.norm() > 1e-9; ++i) {
+    Matrix6d jacobian;
+    for (int k = 0; k < 6; ++k) {
+      const Vector6d step = kStep * Vector6d::Unit(k);
+      jacobian.col(k) = (Errors(projection, pairs, Moved(*pose, step)) -
+                         Errors(projection, pairs, Moved(*pose, -step))) /
+                        (2 * kStep);
+    }
+    if (!jacobian.allFinite()) return;
+    const Rigid next = Moved(*pose, -jacobian.fullPivLu().solve(errors));
+    const Vector6d next_errors = Errors(projection, pairs, next);
+    if (!(next_errors.norm() < errors.norm())) return;
+    *pose = next;
+    errors = next_errors;
+  }
+}
+
 }  // namespace
 
 std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs) {
@@ -66,6 +110,7 @@ std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const 
     const double angle = axis.norm();
     if (angle > 0) pose.cam_from_scan.rotation = Eigen::AngleAxisd(angle, axis / angle);
     pose.cam_from_scan.translation = translation - pose.cam_from_scan.rotation * centre;
+    Polish(projection, pairs, &pose.cam_from_scan);
     pose.residual_px = PickResiduals(projection, pairs, pose.cam_from_scan);
     if (!pose.residual_px.allFinite()) continue;  // a point behind the camera
     pose.sum_px2 = pose.residual_px.squaredNorm();

@@ -48,13 +48,18 @@ cv::Mat DrawIntensity(const ScanPlaces& places) {
   return AsPicture(grey, MeasuredMask(places));
 }
 
-// Mean over the measured samples of a window.
-cv::Mat1f LocalMean(const cv::Mat1f& values, const cv::Mat1f& weights, int reach) {
-  const cv::Size window(2 * reach + 1, 2 * reach + 1);
-  cv::Mat1f sum, count, mean;
-  cv::boxFilter(values.mul(weights), sum, CV_32F, window, {-1, -1}, true, cv::BORDER_REFLECT);
-  cv::boxFilter(weights, count, CV_32F, window, {-1, -1}, true, cv::BORDER_REFLECT);
-  cv::divide(sum, cv::max(count, 1e-6), mean);
+// Mean over the measured samples of a window; around a closed picture.
+cv::Mat1f LocalMean(const cv::Mat1f& values, const cv::Mat1f& weights, int reach, bool closed) {
+  const auto sum_of = [&](const cv::Mat1f& addends) {
+    cv::Mat1f padded, sum;
+    cv::copyMakeBorder(addends, padded, 0, 0, reach, reach,
+                       closed ? cv::BORDER_WRAP : cv::BORDER_REFLECT);
+    cv::boxFilter(padded, sum, CV_32F, cv::Size(2 * reach + 1, 2 * reach + 1), {-1, -1}, true,
+                  cv::BORDER_REFLECT);
+    return cv::Mat1f(sum.colRange(reach, reach + addends.cols));
+  };
+  cv::Mat1f mean;
+  cv::divide(sum_of(values.mul(weights)), cv::max(sum_of(weights), 1e-6), mean);
   return mean;
 }
 
@@ -70,11 +75,12 @@ cv::Mat DrawLocal(const ScanPlaces& places) {
   const cv::Mat1b mask = MeasuredMask(places);
   cv::Mat1f weights;
   mask.convertTo(weights, CV_32F, 1 / 255.0);
-  const int reach = std::max(4, static_cast<int>(kWindowShare * places.height()));
-  const cv::Mat1f mean = LocalMean(values, weights, reach);
+  const int reach = std::min(std::max(4, static_cast<int>(kWindowShare * places.height())),
+                             std::max(places.width() - 1, 0));
+  const cv::Mat1f mean = LocalMean(values, weights, reach, places.closed());
   const cv::Mat1f difference = values - mean;
   cv::Mat1f deviation;
-  cv::sqrt(LocalMean(difference.mul(difference), weights, reach), deviation);
+  cv::sqrt(LocalMean(difference.mul(difference), weights, reach, places.closed()), deviation);
   const double overall = cv::mean(deviation, mask)[0];
   const cv::Mat grey = 128 + kContrast * difference / (deviation + kNoiseShare * overall + 1e-9);
   return AsPicture(grey, mask);
