@@ -206,6 +206,32 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
                   {1, scan_from_room.rotation, scan_from_room.translation});
 }
 
+std::string CommandsToType(bool paired, const std::string& scans) {
+  // The photos for COLMAP and those for the colours.
+  const std::string mapped = paired ? "linked/patterned" : "photos";
+  const std::string plain = paired ? "linked/plain" : "photos";
+  const auto extract = [](const std::string& database, const std::string& images) {
+    return "colmap feature_extractor --database_path " + database + " --image_path " + images +
+           " --SiftExtraction.use_gpu 0 $(cat camera_options.txt)\n";
+  };
+  std::string lines = "export QT_QPA_PLATFORM=offscreen\n";
+  if (paired) {
+    lines += extract("all.db", "photos") +
+             "roomtex-associate --database_path all.db --image_path photos --output_path "
+             "associations.csv --links_path linked\n";
+  }
+  return lines + extract("database.db", mapped) +
+         "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"
+         "roomtex-mapper --database_path database.db --image_path " +
+         mapped +
+         " --output_path sparse\n"
+         "roomtex-align --input_path sparse/0" +
+         scans +
+         " --picks_path picks.csv --output_path aligned\n"
+         "roomtex-texture --input_path aligned --image_path " +
+         plain + scans + " --database_path database.db --output_path textured\n";
+}
+
 void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   const SimulatedRoomOptions& options = room.options();
   std::string scans;
@@ -214,11 +240,17 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   }
   if (options.num_stations > 1) scans += " --scan_poses scan_poses.txt";
   std::ostringstream text;
-  text << "A simulated room: " << options.num_photos << " photos and " << options.num_stations
+  const bool paired = options.projectors > 0;
+  text << "A simulated room: " << room.NumPhotos() << " photos and " << options.num_stations
        << (options.num_stations == 1 ? " range scan" : " range scans")
        << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
        << "photos/             the photos"
        << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
+       << (paired
+               ? "                    every place twice, the camera unmoved: in the light of the "
+                 "projectors,\n"
+                 "                    then without it\n"
+               : "")
        << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
        << (options.num_stations > 1
                ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
@@ -234,18 +266,13 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
           "corner\n"
        << "                    of the floor) and true_colors.ply (scan points in grid order, "
           "missing\n"
-       << "                    ones left out, with their true colour)\n\n"
-       << "Type, in this folder:\n\n"
-       << "export QT_QPA_PLATFORM=offscreen\n"
-       << "colmap feature_extractor --database_path database.db --image_path photos "
-          "--SiftExtraction.use_gpu 0 "
-          "$(cat camera_options.txt)\n"
-       << "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"
-       << "roomtex-mapper --database_path database.db --image_path photos --output_path sparse\n"
-       << "roomtex-align --input_path sparse/0" << scans
-       << " --picks_path picks.csv --output_path aligned\n"
-       << "roomtex-texture --input_path aligned --image_path photos" << scans
-       << " --database_path database.db --output_path textured\n";
+       << "                    ones left out, with their true colour)\n"
+       << (paired ? "                    associations.csv (which photos belong together), "
+                    "pattern_N.png and\n"
+                    "                    projectors.txt (what the projectors throw, from where)\n"
+                  : "")
+       << "\nType, in this folder:\n\n"
+       << CommandsToType(paired, scans);
   WriteText(folder + "/README.txt", text.str());
 }
 

@@ -80,6 +80,7 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
 
 void Describe(const SimulatedRoom& room, const CaptureSummary& summary, Report* report) {
   (*report)["num_photos"] = room.NumPhotos();
+  (*report)["num_projectors"] = room.options().projectors;
   (*report)["camera_model"] = CameraModelName(room.camera().model);
   (*report)["camera_params"] = room.camera().params;
   const Rigid scan_from_room = room.ScanFromRoom();

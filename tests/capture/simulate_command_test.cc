@@ -185,6 +185,52 @@ TEST(SimulateCommand, MeanOfPhotosWithTrueVisibilityIsNearTheTruth) {
   EXPECT_GT(cells["psnr_db"].get<double>(), 26);
 }
 
+TEST(SimulateCommand, WritesPatternedAndPlainPhotosAsAPhotographerTakesThem) {
+  const TempFolder folder;
+  const std::string capture = folder / "capture";
+  const CommandResult result = RunCommandLine(
+      "roomtex-simulate --projectors 2 --projector_width 640 --projector_height 360" +
+      (kSmall + ("--output_path " + capture)) + " --report_path " + (folder / "report.json"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const SparseModel truth = ReadSparseModel(capture + "/truth");
+  ASSERT_EQ(truth.images.size(), 6u);
+  std::string pairs = "patterned_image,plain_image\n", last_time;
+  for (int photo = 0; photo < 6; photo += 2) {
+    const std::string names[2] = {"IMG_000" + std::to_string(photo + 1) + ".jpg",
+                                  "IMG_000" + std::to_string(photo + 2) + ".jpg"};
+    pairs += names[0] + "," + names[1] + "\n";
+    double times[2];
+    for (int k = 0; k < 2; ++k) {
+      const ExposureData exposure = ReadExposureData(capture + "/photos/" + names[k]);
+      EXPECT_LT(last_time, exposure.date_time);
+      last_time = exposure.date_time;
+      times[k] = exposure.exposure_time.value();
+    }
+    EXPECT_LT(times[0], times[1]);
+    EXPECT_THAT(truth.FindImage(names[0])->cam_from_model,
+                IsNearRigid(truth.FindImage(names[1])->cam_from_model, 0, 0));
+    // More contrast in the light of the projectors.
+    const auto contrast = [&](const std::string& name) {
+      cv::Scalar mean, deviation;
+      cv::meanStdDev(ReadPhoto(capture + "/photos/" + name), mean, deviation);
+      return deviation[1] / mean[1];
+    };
+    EXPECT_GT(contrast(names[0]), 0.12);
+  }
+  EXPECT_EQ(ReadBytes(capture + "/truth/associations.csv"), pairs);
+  for (const int projector : {1, 2}) {
+    const cv::Mat pattern =
+        ReadPhoto(capture + "/truth/pattern_" + std::to_string(projector) + ".png");
+    EXPECT_EQ(pattern.size(), cv::Size(640, 360));
+  }
+  EXPECT_NE(ReadBytes(capture + "/truth/projectors.txt").find("pattern_2.png 640 360 "),
+            std::string::npos);
+  EXPECT_NE(ReadBytes(capture + "/README.txt").find("roomtex-associate"), std::string::npos);
+  const Json report = Json::parse(ReadBytes(folder / "report.json"));
+  EXPECT_EQ(report["num_photos"], 6);
+  EXPECT_EQ(report["num_projectors"], 2);
+}
+
 TEST(SimulateCommand, SaysWhatIsWrong) {
   const TempFolder folder;
   const auto expect = [&](const std::string& arguments, int exit_code, const std::string& text) {
@@ -198,6 +244,9 @@ TEST(SimulateCommand, SaysWhatIsWrong) {
   expect(out + "--num_photos 0 --camera_model OPENVC", 2, "num_photos");
   expect(out + "--num_photos 0 --camera_model OPENVC", 2, "OPENVC");
   expect(out + "--num_photos three", 2, "three");
+  expect(out + "--projectors 9", 2, "projectors must be 0 to 8");
+  expect(out + "--projectors 1 --projector_focus 0", 2, "projector_focus");
+  expect(out + "--bare perhaps", 2, "bare");
   expect(out + "--photo_size 12", 2, "photo_size");
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
   WriteBytes(folder / "file", "not a folder");
