@@ -75,7 +75,11 @@ export async function openPage(browser, url, { width = 1600, height = 1000 } = {
   page.on('console', (message) => {
     if (message.type() === 'error') errors.push(message.text());
   });
-  page.on('requestfailed', (request) => errors.push(`${request.url()} failed`));
+  page.on('requestfailed', (request) => {
+    // A page may give up what it no longer needs (tiles out of view).
+    if (request.failure()?.errorText === 'net::ERR_ABORTED') return;
+    errors.push(`${request.url()} failed`);
+  });
   page.on('request', (request) => {
     const to = new URL(request.url());
     if (to.protocol === 'http:' && to.host !== new URL(url).host) errors.push(`asked ${to.host}`);

@@ -1,76 +1,32 @@
 // roomtex-pick in a browser, on a simulated room: by mouse and by keys, as its user works.
 
 import assert from 'node:assert/strict';
-import {readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
-import {launchBrowser, makeFolder, run, screenshot} from './browser.mjs';
-import {capture, distance, lowestContrast, PickPage, servePicks, until} from './pick_page.mjs';
-
-const kSampleSpacing = 0.04;  // metres; what a scan of 800 columns has at 5 m
+import {launchBrowser, run, screenshot} from './browser.mjs';
+import {
+  capture,
+  distance,
+  fileOf,
+  kSampleSpacing,
+  lowestContrast,
+  onPage,
+  PickPage,
+  servePicks,
+  until,
+  usablePlaces
+} from './pick_page.mjs';
 
 let browser;
 let places;  // of the photo that suits best, those that can be picked
 let other_places;
 
-// Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile.
-async function onPage(body, {picks_file = '', allowed = [], more = [], size = {}} = {}) {
-  const folder = makeFolder();
-  const picks_path = folder.path('picks.csv');
-  if (picks_file) writeFileSync(picks_path, picks_file);
-  const server = await servePicks(picks_path, ['--image_name', places[0].image_name, ...more]);
-  const page = await PickPage.open(browser, server, picks_path, size);
-  try {
-    await body(page, {folder, server, picks_path});
-    const unexpected = page.errors().filter((one) => !allowed.some((known) => known.test(one)));
-    assert.deepEqual(unexpected, []);
-  } catch (error) {
-    await screenshot(page.page, 'pick-failed');
-    throw error;
-  } finally {
-    await page.close();
-    assert.equal(await server.stop(), 0);
-    folder.remove();
-  }
-}
-
-// A picks file of the first `count` places.
-function fileOf(list) {
-  return [
-    'image_name,x,y,scan_x,scan_y,scan_z',
-    ...list.map(({image_name, img, point}) => [image_name, ...img, ...point].join())
-  ].join('\n') +
-      '\n';
-}
-
-// Those of places.json that the server takes, also a little beside them: corners of things are
-// often depth edges.
-async function usable(server, list) {
-  const ask = async (x, y) => (await fetch(`${server.url}scan_point?scan=0&x=${x}&y=${y}`)).json();
-  const result = [];
-  for (const place of list) {
-    const [x, y] = place.scan;
-    const answer = await ask(x, y);
-    const beside = await Promise.all(
-        [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(([dx, dy]) => ask(x + 0.45 * dx, y + 0.45 * dy)));
-    if (!answer.ok || !beside.every((one) => one.ok)) continue;
-    // The picture of the scan lies as the test thinks.
-    assert.ok(
-        distance(answer.point, place.point) < kSampleSpacing,
-        `${x}, ${y}: ${answer.point} instead of ${place.point}`);
-    result.push(place);
-  }
-  assert.ok(result.length >= 8, `only ${result.length} places can be picked`);
-  return result;
-}
+const pageOn = (body, options = {}) =>
+    onPage(browser, body, {image_name: places[0].image_name, ...options});
 
 before(async () => {
   browser = await launchBrowser();
-  const all = JSON.parse(readFileSync(capture('places.json'), 'utf8'));
-  const server = await servePicks(capture('none.csv'));
-  places = await usable(server, all.places);
-  other_places = await usable(server, all.other_places);
-  assert.equal(await server.stop(), 0);
+  ({places, other_places} = await usablePlaces());
 });
 
 after(async () => {
@@ -78,7 +34,7 @@ after(async () => {
 });
 
 test('six pairs by mouse: numbers come, the file follows every step', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     assert.equal(page.file().length, 0);
     for (const [index, place] of places.slice(0, 6).entries()) {
       // Either side first.
@@ -136,7 +92,7 @@ function watchForResiduals(page) {
 
 test('a pick dragged far off is marked, dragged back it is good again; undo and redo', async () => {
   const first = places.slice(0, 8);
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(8);
     const from = first[2].img;
     const to = [from[0] < 480 ? from[0] + 60 : from[0] - 60, from[1]];
@@ -180,7 +136,7 @@ test('a pick dragged far off is marked, dragged back it is good again; undo and 
 });
 
 test('a point in the scan is dragged, a place without an echo is refused', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(7);
     await page.zoomTo('scan', places[1].scan);
     const [x, y] = places[1].scan;
@@ -200,7 +156,7 @@ test('a point in the scan is dragged, a place without an echo is refused', async
 });
 
 test('off and on, remove and bring back, next and previous', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(7);
     await page.page.focus('#photo-pane');
     for (let step = 0; step < 3; ++step) await page.page.keyboard.press('n');
@@ -241,7 +197,7 @@ test('off and on, remove and bring back, next and previous', async () => {
 });
 
 test('the missing half is predicted near the truth, and taken by Enter', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(6);
     const place = places[6];
     await page.click('photo', place.img);
@@ -281,7 +237,7 @@ test('the missing half is predicted near the truth, and taken by Enter', async (
 });
 
 test('reloading the page goes on with the picks, and so does a new server', async () => {
-  await onPage(async (page, {server, picks_path}) => {
+  await pageOn(async (page, {server, picks_path}) => {
     await page.rowsAre(6);
     await page.pick(places[6]);
     await page.rowIs(6, (row) => row.px !== null, 'has its numbers');
@@ -306,7 +262,7 @@ test('reloading the page goes on with the picks, and so does a new server', asyn
 });
 
 test('picks in a second photo', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(6);
     const name = other_places[0].image_name;
     await page.page.fill('#filter', name);
@@ -325,7 +281,7 @@ test('picks in a second photo', async () => {
 });
 
 test('one pick by the keyboard alone', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     const {page: window} = page;
     const place = places[0];
     // The photo has the focus from the start; Tab and W lead to the other pane.
@@ -375,7 +331,7 @@ async function steerCrosshair(page, side, target) {
 }
 
 test('Align says trusted, and the model lies where it should', async () => {
-  await onPage(async (page, {folder}) => {
+  await pageOn(async (page, {folder}) => {
     await page.rowsAre(8);
     await page.page.click('#align-open');
     await page.page.waitForSelector('#align .verdict', {timeout: 240000});
@@ -421,7 +377,7 @@ test('picks that are wrong are refused in words', async () => {
   const wrong = places.slice(0, 6).map((place) => ({...place}));
   [wrong[0].img, wrong[3].img] = [wrong[3].img, wrong[0].img];
   [wrong[1].img, wrong[4].img] = [wrong[4].img, wrong[1].img];
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(6);
     await page.page.click('#align-open');
     await page.page.waitForSelector('#align .verdict', {timeout: 240000});
@@ -434,7 +390,7 @@ test('picks that are wrong are refused in words', async () => {
 });
 
 test('too few picks: Align says so without running', async () => {
-  await onPage(async (page) => {
+  await pageOn(async (page) => {
     await page.rowsAre(3);
     await page.page.click('#align-open');
     assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);

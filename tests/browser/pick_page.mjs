@@ -2,10 +2,10 @@
 // page's scripts; where a pixel is on the screen the pane says itself (data-view).
 
 import assert from 'node:assert/strict';
-import {existsSync, readFileSync} from 'node:fs';
+import {existsSync, readFileSync, writeFileSync} from 'node:fs';
 import path from 'node:path';
 
-import {openPage, serve} from './browser.mjs';
+import {makeFolder, openPage, screenshot, serve} from './browser.mjs';
 
 // Waits until `probe` gives something true and returns it; no fixed times anywhere.
 export async function until(probe, what, seconds = 30) {
@@ -184,6 +184,68 @@ export class PickPage {
   async close() {
     await this.page.close();
   }
+}
+
+// Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
+// what `allowed` names. picks_file: what the picks file holds before.
+export async function onPage(browser, body, {image_name, picks_file = '', allowed = []}) {
+  const folder = makeFolder();
+  const picks_path = folder.path('picks.csv');
+  if (picks_file) writeFileSync(picks_path, picks_file);
+  const server = await servePicks(picks_path, ['--image_name', image_name]);
+  const page = await PickPage.open(browser, server, picks_path);
+  try {
+    await body(page, {folder, server, picks_path});
+    const unexpected = page.errors().filter((one) => !allowed.some((known) => known.test(one)));
+    assert.deepEqual(unexpected, []);
+  } catch (error) {
+    await screenshot(page.page, 'pick-failed');
+    throw error;
+  } finally {
+    await page.close();
+    assert.equal(await server.stop(), 0);
+    folder.remove();
+  }
+}
+
+// A picks file of places.
+export function fileOf(places) {
+  const lines = places.map(({image_name, img, point}) => [image_name, ...img, ...point].join());
+  return ['image_name,x,y,scan_x,scan_y,scan_z', ...lines, ''].join('\n');
+}
+
+export const kSampleSpacing = 0.04;  // metres; what a scan of 800 columns has at 5 m
+
+// Those of places.json that the server takes, also a little beside them (corners of things are
+// often depth edges): {places, other_places}.
+export async function usablePlaces() {
+  const all = JSON.parse(readFileSync(capture('places.json'), 'utf8'));
+  const server = await servePicks(capture('none.csv'));
+  const result = {
+    places: await usable(server, all.places),
+    other_places: await usable(server, all.other_places),
+  };
+  assert.equal(await server.stop(), 0);
+  return result;
+}
+
+async function usable(server, list) {
+  const ask = async (x, y) => (await fetch(`${server.url}scan_point?scan=0&x=${x}&y=${y}`)).json();
+  const result = [];
+  for (const place of list) {
+    const [x, y] = place.scan;
+    const answer = await ask(x, y);
+    const beside = await Promise.all(
+        [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(([dx, dy]) => ask(x + 0.45 * dx, y + 0.45 * dy)));
+    if (!answer.ok || !beside.every((one) => one.ok)) continue;
+    // The picture of the scan lies as the test thinks.
+    assert.ok(
+        distance(answer.point, place.point) < kSampleSpacing,
+        `${x}, ${y}: ${answer.point} instead of ${place.point}`);
+    result.push(place);
+  }
+  assert.ok(result.length >= 8, `only ${result.length} places can be picked`);
+  return result;
 }
 
 // The lowest contrast of the text that is seen below `selector` (WCAG 2): {ratio, text, color,

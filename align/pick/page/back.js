@@ -155,10 +155,10 @@ export class BackProjection {
     context.fillStyle = '#ffffff';
     context.fillRect(x - 0.5, 0, 1, view.height);
     context.beginPath();
-    context.roundRect(x - 9, view.height / 2 - 14, 18, 28, 5);
+    context.roundRect(x - 9, view.height - 60, 18, 28, 5);
     context.fill();
     context.fillStyle = '#222222';
-    for (const dx of [-3, 1]) context.fillRect(x + dx, view.height / 2 - 6, 1.5, 12);
+    for (const dx of [-3, 1]) context.fillRect(x + dx, view.height - 52, 1.5, 12);
   }
 }
 
@@ -167,12 +167,30 @@ export class EdgeLayer {
   edges = [];
   #key = '';
   #asking = null;
+  // Thousands of lines are slow to stroke, above all without a graphics processor: they are
+  // stroked again only when the view has changed.
+  #canvas = new OffscreenCanvas(1, 1);
+  #drawn = '';
 
   constructor(pane) {
     this.pane = pane;
     pane.drawings.unshift((context, view) => {
-      if (this.on) drawEdges(context, view, this.edges);
+      if (this.on && this.edges.length > 0) this.#draw(context, view);
     });
+  }
+
+  #draw(context, view) {
+    const {ratio} = this.pane;
+    const {width, height} = context.canvas;
+    const key = [this.#key, view.scale, ...view.centre, width, height, this.edges.length].join();
+    if (this.#drawn !== key) {
+      this.#drawn = key;
+      [this.#canvas.width, this.#canvas.height] = [width, height];
+      const layer = this.#canvas.getContext('2d', {willReadFrequently: true});
+      layer.scale(ratio, ratio);
+      drawEdges(layer, view, this.edges);
+    }
+    context.drawImage(this.#canvas, 0, 0, width / ratio, height / ratio);
   }
 
   // revision null: no solution.
@@ -189,6 +207,7 @@ export class EdgeLayer {
       const edges = await api.edges(photo.id, revision, this.#asking.signal);
       if (this.#key !== key) return;
       this.edges = edges;
+      this.#drawn = '';
       this.pane.redraw();
     } catch (error) {
       if (error.name !== 'AbortError' && !(error instanceof ServerError)) throw error;

@@ -10,7 +10,7 @@ function listenTo(id, variable, shareAt, keys) {
   const set = (share) => {
     const value = clamp(share, low, high);
     document.documentElement.style.setProperty(variable, `${value}%`);
-    divider.setAttribute('aria-valuenow', String(Math.round(value)));
+    divider.setAttribute('aria-valuenow', value.toFixed(2));
     try {
       localStorage.setItem(`roomtex-pick ${variable}`, String(value));
     } catch (error) {
@@ -24,13 +24,15 @@ function listenTo(id, variable, shareAt, keys) {
   } catch (error) {
     // As above.
   }
+  let grabbed = 0;  // share between where the bar is and where it was taken
   divider.addEventListener('pointerdown', (event) => {
+    grabbed = now() - shareAt(event);
     divider.setPointerCapture(event.pointerId);
     event.preventDefault();
     divider.focus();
   });
   divider.addEventListener('pointermove', (event) => {
-    if (divider.hasPointerCapture(event.pointerId)) set(shareAt(event));
+    if (divider.hasPointerCapture(event.pointerId)) set(shareAt(event) + grabbed);
   });
   divider.addEventListener('keydown', (event) => {
     if (!(event.key in keys)) return;

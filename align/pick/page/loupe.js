@@ -1,6 +1,6 @@
 // The place under the cursor, or of the selected point, at eight times its size: true pixels, a
-// crosshair, and the coordinates. It sits in a corner of the pane and goes to another one when the
-// cursor comes.
+// crosshair, and the coordinates. It sits in a lower corner of the pane and goes up
+// when the cursor comes.
 
 import {drawTiles} from './tiles.js';
 import {View} from './view.js';
@@ -8,10 +8,9 @@ import {View} from './view.js';
 const kMagnification = 8;  // device-independent pixels per pixel of the picture
 
 export class Loupe {
-  constructor(pane, element, unit) {
+  constructor(pane, element) {
     this.pane = pane;
     this.element = element;
-    this.unit = unit;
     this.canvas = element.querySelector('canvas');
     this.text = element.querySelector('p');
     this.view = new View();
@@ -53,21 +52,21 @@ export class Loupe {
         this, drawTiles(context, picture, view, pane.store, {ratio, tone: pane.tone, level: 0}));
     context.scale(ratio, ratio);
     drawCrosshair(context, size);
-    this.text.textContent = `${place[0].toFixed(1)}, ${place[1].toFixed(1)} ${this.unit}`;
+    this.text.textContent = `${place[0].toFixed(1)}, ${place[1].toFixed(1)}`;
     this.element.dataset.x = place[0];
     this.element.dataset.y = place[1];
     this.#avoidCursor();
   }
 
+  // Down unless the cursor is near, then up.
   #avoidCursor() {
-    const cursor = this.pane.cursor;
-    const box = this.element;
-    const near = cursor && cursor[1] > this.pane.view.height - box.offsetHeight - 40;
-    if (!near) return;
-    if (cursor[0] < box.offsetWidth + 40)
-      box.classList.add('right');
-    else if (cursor[0] > this.pane.view.width - box.offsetWidth - 40)
-      box.classList.remove('right');
+    const {cursor, view} = this.pane;
+    if (!cursor) return;
+    const {offsetLeft: left, offsetWidth: width, offsetHeight: height, classList} = this.element;
+    const beside = cursor[0] > left - 40 && cursor[0] < left + width + 40;
+    const up = classList.contains('up');
+    if (beside && !up && cursor[1] > view.height - height - 50) classList.add('up');
+    if (up && (!beside || cursor[1] < height + 50)) classList.remove('up');
   }
 }
 

@@ -241,8 +241,8 @@ function build() {
     },
   });
   for (const side of kSides) app.panes[side] = makePane(side);
-  app.loupes.photo = new Loupe(app.panes.photo, byId('photo-loupe'), 'px');
-  app.loupes.scan = new Loupe(app.panes.scan, byId('scan-loupe'), 'samples');
+  app.loupes.photo = new Loupe(app.panes.photo, byId('photo-loupe'));
+  app.loupes.scan = new Loupe(app.panes.scan, byId('scan-loupe'));
   app.edges = new EdgeLayer(app.panes.photo);
   app.back = new BackProjection(app.panes.scan);
   app.panes.scan.on.grips.push(app.back.grip);

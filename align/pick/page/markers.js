@@ -193,33 +193,44 @@ export function drawResiduals(context, view, picks) {
 const kEdgeStyles = {
   depth: {color: '#ffe066', width: 1.6, dash: []},
   crease: {color: '#7fe7ff', width: 1.6, dash: [7, 4]},
-  intensity: {color: '#ffb3f0', width: 1.6, dash: [1.5, 4]},
+  intensity: {color: '#ffb3f0', width: 1.6, dash: [2, 3]},
 };
 
-// edges: [{kind, points: [[x, y]...] img}]. A path per kind: thousands of lines are drawn at once.
+// edges: [{kind, points: [[x, y]...] img}]. One path per kind, on a dark line without gaps.
 export function drawEdges(context, view, edges) {
   for (const [kind, style] of Object.entries(kEdgeStyles)) {
     const path = new Path2D();
     for (const edge of edges) {
-      if (edge.kind !== kind) continue;
-      edge.points.forEach((point, index) => {
-        const [x, y] = view.toScreen(point);
-        if (index === 0)
-          path.moveTo(x, y);
-        else
-          path.lineTo(x, y);
-      });
+      if (edge.kind === kind) addVisible(path, view, edge.points);
     }
-    context.lineCap = style.dash.length > 0 && style.dash[0] < 2 ? 'round' : 'butt';
+    context.setLineDash([]);
+    context.strokeStyle = 'rgba(0, 0, 0, 0.5)';
+    context.lineWidth = style.width + 1.4;
+    context.stroke(path);
     context.setLineDash(style.dash);
-    for (const [color, extra] of [['rgba(0, 0, 0, 0.55)', 1.6], [style.color, 0]]) {
-      context.strokeStyle = color;
-      context.lineWidth = style.width + extra;
-      context.stroke(path);
-    }
+    context.strokeStyle = style.color;
+    context.lineWidth = style.width;
+    context.stroke(path);
   }
   context.setLineDash([]);
-  context.lineCap = 'butt';
+}
+
+// The pieces of a line that may touch the pane.
+function addVisible(path, view, points) {
+  let before = null;
+  let begun = false;
+  for (const point of points) {
+    const here = view.toScreen(point);
+    const seen = before !== null && Math.max(before[0], here[0]) >= 0 &&
+        Math.max(before[1], here[1]) >= 0 && Math.min(before[0], here[0]) <= view.width &&
+        Math.min(before[1], here[1]) <= view.height;
+    if (seen) {
+      if (!begun) path.moveTo(...before);
+      path.lineTo(...here);
+    }
+    begun = seen;
+    before = here;
+  }
 }
 
 // The marker of a list that a press at `screen` takes: its id, or null.

@@ -6,7 +6,7 @@ const kStates = {
   used: 'used',
   off: 'off',
   bad: '✕ left out as wrong',
-  half: '? other side is missing',
+  half: '? one side missing',
   waiting: 'needs more picks',
 };
 
@@ -62,9 +62,14 @@ export class Results {
       on:
           el('input',
              {type: 'checkbox', onchange: (event) => this.on.enable(uid, event.target.checked)}),
-      remove: el(
-          'button', {type: 'button', title: 'Remove (Delete)', onclick: () => this.on.remove(uid)},
-          'Remove'),
+      remove:
+          el('button', {
+            type: 'button',
+            class: 'icon',
+            title: 'Remove (Delete)',
+            onclick: () => this.on.remove(uid)
+          },
+             '✕'),
     };
     cells.line =
         el('tr', {
@@ -112,7 +117,8 @@ export function showSummary(photo, session, min_picks) {
   const body = byId('summary-body');
   const facts = [];
   const add = (name, value) => facts.push(el('dt', {}, name), el('dd', {}, value));
-  const counted = solution ? `${solution.num_used} used of ${solution.num_complete}` : 'none yet';
+  const counted =
+      solution?.num_complete ? `${solution.num_used} used of ${solution.num_complete}` : 'none yet';
   add('Picks', counted);
   if (solution?.solved) {
     add('Solved by',

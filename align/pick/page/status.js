@@ -61,6 +61,33 @@ function bannerOf(state) {
   return [];
 }
 
+// The picks as lines of the picks file, for when nothing else takes them. Every scan place has been
+// seen by the server, so its point is known.
+function copyButton() {
+  const button =
+      el('button', {
+        type: 'button',
+        onclick: async () => {
+          const lines = app.picks.list.filter((pick) => pick.img && pick.point)
+                            .map(({image_name, img, point, weight}) => {
+                              const name = /[",]/.test(image_name) ?
+                                  `"${image_name.replaceAll('"', '""')}"` :
+                                  image_name;
+                              return [name, ...img, ...point, weight].join();
+                            });
+          const text = ['image_name,x,y,scan_x,scan_y,scan_z,weight', ...lines, ''].join('\n');
+          try {
+            await navigator.clipboard.writeText(text);
+            button.textContent = `Copied ${lines.length} picks`;
+          } catch (error) {
+            button.textContent = 'The browser does not allow it';
+          }
+        }
+      },
+         'Copy the picks as CSV');
+  return button;
+}
+
 // The server's sentence where the click was, with the nearest place that can be picked.
 export function showHint() {
   const {editor, panes} = app;

@@ -34,7 +34,7 @@ export class View {
   }
 
   get fit_scale() {
-    const margin = 8;
+    const margin = 24;
     return Math.max(
         1e-4,
         Math.min(
