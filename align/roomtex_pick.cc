@@ -93,11 +93,12 @@ void ServePicking(Arguments a, bool port_given, const Command::Context& context)
       StartServer(scene, &session, {a.server, a.image_name, a.aligned_path, FindAlignProgram()},
                   port_given, context);
   std::cout << server->server().Url() << "\n" << server->server().SshLine() << std::endl;
-  if (a.server.open) {
-    const std::string problem = OpenPage(server->server().Url());
-    if (!problem.empty()) context.Warn(problem);
-  }
+  OpenedPage opened;
+  if (a.server.open) opened = OpenPage(server->server().Url());
+  if (!opened.problem.empty()) context.Warn(opened.problem);
   server->Wait();
+  std::error_code ignored;
+  if (!opened.folder.empty()) std::filesystem::remove_all(opened.folder, ignored);
   if (!session.SaveAgain()) throw InputError(a.output_path, "", session.Now()->save_error, "");
   const auto now = session.Now();
   context.report["num_picks"] = now->picks.size();

@@ -15,7 +15,7 @@ extern char** environ;
 namespace roomtex {
 namespace {
 
-constexpr char kHint[] = "; open the address above by hand.";
+constexpr int kPatienceMs = 1000;
 
 std::string WriteRedirect(const std::string& path, const std::string& url) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -32,17 +32,8 @@ std::string WriteRedirect(const std::string& path, const std::string& url) {
   return written == static_cast<ssize_t>(page.size()) ? "" : "the disk is full";
 }
 
-}  // namespace
-
-std::string OpenPage(const std::string& url) {
-  std::error_code error;
-  std::string folder = (std::filesystem::temp_directory_path(error) / "roomtex-XXXXXX").string();
-  if (error || mkdtemp(folder.data()) == nullptr) {  // mode 0700
-    return "The browser was not opened: no temporary folder could be made" + std::string(kHint);
-  }
-  const std::string path = folder + "/open.html";
-  const std::string problem = WriteRedirect(path, url);
-  if (!problem.empty()) return "The browser was not opened: " + path + ": " + problem + kHint;
+// 0 or what posix_spawn says.
+int StartBrowser(const std::string& path, pid_t* child) {
   std::string program = "xdg-open", argument = path;
   char* arguments[] = {program.data(), argument.data(), nullptr};
   posix_spawn_file_actions_t actions;
@@ -55,23 +46,41 @@ std::string OpenPage(const std::string& url) {
   posix_spawnattr_init(&attributes);
   // Its own group: Ctrl-C ends this command, not the browser.
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-  pid_t child = 0;
   const int failed =
-      posix_spawnp(&child, program.c_str(), &actions, &attributes, arguments, environ);
+      posix_spawnp(child, program.c_str(), &actions, &attributes, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
-  if (failed != 0)
-    return "The browser was not opened: xdg-open: " + std::string(std::strerror(failed)) + kHint;
+  return failed;
+}
+
+}  // namespace
+
+OpenedPage OpenPage(const std::string& url) {
+  const auto refuse = [](const std::string& why, const std::string& folder) {
+    return OpenedPage{"The browser was not opened: " + why + "; open the address above by hand.",
+                      folder};
+  };
+  std::error_code error;
+  std::string folder = (std::filesystem::temp_directory_path(error) / "roomtex-XXXXXX").string();
+  if (error || mkdtemp(folder.data()) == nullptr) {  // mode 0700
+    return refuse("no temporary folder could be made", "");
+  }
+  const std::string path = folder + "/open.html";
+  const std::string problem = WriteRedirect(path, url);
+  if (!problem.empty()) return refuse(path + ": " + problem, folder);
+  pid_t child = 0;
+  const int failed = StartBrowser(path, &child);
+  if (failed != 0) return refuse(std::string("xdg-open: ") + std::strerror(failed), folder);
   // xdg-open ends at once where there is no browser, later or never where it becomes one.
-  for (int i = 0; i < 20; ++i) {
+  for (int waited = 0; waited < kPatienceMs; waited += 50) {
     int status = 0;
     if (waitpid(child, &status, WNOHANG) == child) {
-      if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
-      return "The browser was not opened: xdg-open found none" + std::string(kHint);
+      if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {"", folder};
+      return refuse("xdg-open found none", folder);
     }
     usleep(50000);
   }
-  return "";
+  return {"", folder};
 }
 
 }  // namespace roomtex

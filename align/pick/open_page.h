@@ -5,9 +5,12 @@
 
 namespace roomtex {
 
+struct OpenedPage {
+  std::string problem;  // a sentence that says why nothing was opened; "" = opened
+  std::string folder;   // to be removed at the end, "" = none: it holds the file below
+};
 // The URL holds a secret and must not stand in a list of processes: the browser is given a file
-// that leads there, in a folder of its own that only this user may read (and which stays: browsers
-// read it later). Gives "", or a sentence that says why nothing was opened.
-std::string OpenPage(const std::string& url);
+// that leads there, in a folder of its own that only this user may read.
+OpenedPage OpenPage(const std::string& url);
 
 }  // namespace roomtex
