@@ -89,6 +89,26 @@ Fit FitLayout(const Board& board, const CharucoLayout& layout,
   return fit;
 }
 
+// How many columns of squares the markers are arranged in; 0 if no number fits.
+int FindColumns(const Board& board, const std::vector<MarkerSighting>& markers) {
+  int largest = 0;
+  for (const MarkerSighting& marker : markers) largest = std::max(largest, marker.id);
+  double least = kMaxMiss;
+  int found = 0;
+  Board other = board;
+  for (int columns = 3; columns <= std::min(40, 2 * largest + 2); ++columns) {
+    other.columns = columns - 1;
+    other.rows = 2 * (largest + 1) / columns + 1;  // enough for all markers
+    for (const bool black : {true, false}) {
+      const double miss = FitLayout(other, {black, false}, markers).miss;
+      if (!(miss < least)) continue;
+      least = miss;
+      found = columns;
+    }
+  }
+  return found;
+}
+
 // The photo's position of an inner corner from the two markers beside it; none if one is missing.
 bool PlaceCorner(const Board& board, const Fit& fit, int column, int row, Eigen::Vector2d* x_in_img,
                  double* spacing_px) {
@@ -190,6 +210,10 @@ CharucoCorners LocateCharucoCorners(const Board& board,
     result.reason = std::to_string(markers.size()) + " markers with ids up to " +
                     std::to_string(largest) + " were found, but they are not arranged as on a " +
                     board.Name();
+    const int columns = FindColumns(board, markers);
+    if (columns > 0) {
+      result.reason += ", but as on one of " + std::to_string(columns) + " columns";
+    }
     return result;
   }
   int count = 0;

@@ -22,36 +22,39 @@ constexpr int kMaxParams = 12;
 constexpr int kMaxIterations = 100;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Projection of one corner and its derivatives: by the camera's parameters, and by a turn (about
-// the board's origin, in `cam`) and a shift of the board.
+// Projection of one corner and its derivatives: by the first kParams parameters of the camera, and
+// by a turn (about the board's origin, in `cam`) and a shift of the board.
+template <int kParams>
 struct Projected {
   Eigen::Vector2d x_in_img;
-  Eigen::Matrix<double, 2, kMaxParams> by_params;
+  Eigen::Matrix<double, 2, kParams> by_params;
   Eigen::Matrix<double, 2, 6> by_pose;
 };
 
-std::optional<Projected> ProjectCorner(const Camera& camera, const Rigid& cam_from_board,
-                                       const Eigen::Vector2d& x_on_board) {
-  using Jet = ceres::Jet<double, kMaxParams + 2>;
+// kParams: 0 or kMaxParams (parameters that the model lacks have zero derivatives).
+template <int kParams>
+std::optional<Projected<kParams>> ProjectCorner(const Camera& camera, const Rigid& cam_from_board,
+                                                const Eigen::Vector2d& x_on_board) {
+  using Jet = ceres::Jet<double, kParams + 2>;
   const Eigen::Vector3d turned =
       cam_from_board.rotation * Eigen::Vector3d(x_on_board.x(), x_on_board.y(), 0);
   const Eigen::Vector3d x = turned + cam_from_board.translation;
   if (!(x.z() > 1e-9)) return std::nullopt;
   std::array<Jet, kMaxParams> params;
   for (size_t i = 0; i < camera.params.size(); ++i) {
-    params[i] = Jet(camera.params[i], static_cast<int>(i));
+    params[i] = Jet(camera.params[i]);
+    if constexpr (kParams > 0) params[i].v[static_cast<int>(i)] = 1;
   }
-  const Jet u(x.x() / x.z(), kMaxParams), v(x.y() / x.z(), kMaxParams + 1);
+  const Jet u(x.x() / x.z(), kParams), v(x.y() / x.z(), kParams + 1);
   Jet img_x, img_y;
   camera_formulas::Project(camera.model, params.data(), u, v, &img_x, &img_y);
-  Projected result;
+  Projected<kParams> result;
   result.x_in_img = {img_x.a, img_y.a};
   if (!result.x_in_img.allFinite()) return std::nullopt;
-  result.by_params.row(0) = img_x.v.head<kMaxParams>();
-  result.by_params.row(1) = img_y.v.head<kMaxParams>();
+  result.by_params.row(0) = img_x.v.template head<kParams>();
+  result.by_params.row(1) = img_y.v.template head<kParams>();
   Eigen::Matrix2d by_uv;
-  by_uv << img_x.v[kMaxParams], img_x.v[kMaxParams + 1], img_y.v[kMaxParams],
-      img_y.v[kMaxParams + 1];
+  by_uv << img_x.v[kParams], img_x.v[kParams + 1], img_y.v[kParams], img_y.v[kParams + 1];
   Eigen::Matrix<double, 2, 3> uv_by_x;
   uv_by_x << 1 / x.z(), 0, -u.a / x.z(), 0, 1 / x.z(), -v.a / x.z();
   Eigen::Matrix3d cross;
@@ -62,24 +65,26 @@ std::optional<Projected> ProjectCorner(const Camera& camera, const Rigid& cam_fr
 }
 
 // The normal equations of one photo: camera (A), both (B), pose (C); right-hand sides a and b.
-struct Block {
-  Eigen::MatrixXd A, B;
-  Eigen::VectorXd a;
+template <int kParams>
+struct Equations {
+  Eigen::Matrix<double, kParams, kParams> A = Eigen::Matrix<double, kParams, kParams>::Zero();
+  Eigen::Matrix<double, kParams, 6> B = Eigen::Matrix<double, kParams, 6>::Zero();
+  Eigen::Matrix<double, kParams, 1> a = Eigen::Matrix<double, kParams, 1>::Zero();
   Matrix6 C = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
   double cost = 0;  // infinite when a corner has no projection
 };
+using Block = Equations<kMaxParams>;
+using PoseBlock = Equations<0>;
 
-Block MakeBlock(const BoardView& view, const Camera& camera, const Rigid& cam_from_board,
-                int num_free, double huber_px) {
-  Block block;
-  block.A = Eigen::MatrixXd::Zero(num_free, num_free);
-  block.B = Eigen::MatrixXd::Zero(num_free, 6);
-  block.a = Eigen::VectorXd::Zero(num_free);
+template <int kParams>
+Equations<kParams> MakeEquations(const BoardView& view, const Camera& camera,
+                                 const Rigid& cam_from_board, double huber_px) {
+  Equations<kParams> block;
   const double limit = huber_px > 0 ? huber_px / std::sqrt(view.weight) : kInfinity;
   for (int i = 0; i < view.x_on_board.cols(); ++i) {
     if (!view.used[i]) continue;
-    const auto projected = ProjectCorner(camera, cam_from_board, view.x_on_board.col(i));
+    const auto projected = ProjectCorner<kParams>(camera, cam_from_board, view.x_on_board.col(i));
     if (!projected) {
       block.cost = kInfinity;
       return block;
@@ -89,11 +94,12 @@ Block MakeBlock(const BoardView& view, const Camera& camera, const Rigid& cam_fr
     const bool far = length > limit;
     const double weight = view.weight * (far ? limit / length : 1);
     block.cost += view.weight * (far ? limit * (2 * length - limit) : length * length);
-    const auto by_params = projected->by_params.leftCols(num_free);
-    block.A.noalias() += weight * by_params.transpose() * by_params;
-    block.B.noalias() += weight * by_params.transpose() * projected->by_pose;
+    if constexpr (kParams > 0) {
+      block.A.noalias() += weight * projected->by_params.transpose() * projected->by_params;
+      block.B.noalias() += weight * projected->by_params.transpose() * projected->by_pose;
+      block.a.noalias() += weight * projected->by_params.transpose() * residual;
+    }
     block.C.noalias() += weight * projected->by_pose.transpose() * projected->by_pose;
-    block.a.noalias() += weight * by_params.transpose() * residual;
     block.b.noalias() += weight * projected->by_pose.transpose() * residual;
   }
   return block;
@@ -125,10 +131,12 @@ struct Reduced {
   Eigen::VectorXd g;
 };
 
-Reduced Reduce(const Block& block, double damping) {
+Reduced Reduce(const Block& block, int num_free, double damping) {
   const Eigen::LDLT<Matrix6> C(Damped(block.C, damping));
-  return {Damped(block.A, damping) - block.B * C.solve(block.B.transpose()),
-          block.a - block.B * C.solve(block.b)};
+  const Eigen::MatrixXd A = block.A.topLeftCorner(num_free, num_free);
+  const Eigen::MatrixXd B = block.B.topRows(num_free);
+  return {Damped(A, damping) - B * C.solve(B.transpose()),
+          block.a.head(num_free) - B * C.solve(block.b)};
 }
 
 // Inverse of a positive definite matrix whose rows differ by many orders of magnitude; none if it
@@ -163,7 +171,7 @@ std::vector<Block> MakeBlocks(const std::vector<BoardView>& views, const CameraF
   std::vector<Block> blocks;
   for (size_t i = 0; i < views.size(); ++i) {
     blocks.push_back(
-        MakeBlock(views[i], fit.camera, fit.cam_from_board[i], fit.lens.num_free, huber_px));
+        MakeEquations<kMaxParams>(views[i], fit.camera, fit.cam_from_board[i], huber_px));
   }
   return blocks;
 }
@@ -179,7 +187,7 @@ CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double
   const int n = fit.lens.num_free;
   Reduced sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   for (const Block& block : blocks) {
-    const Reduced reduced = Reduce(block, damping);
+    const Reduced reduced = Reduce(block, n, damping);
     sum.S += reduced.S;
     sum.g += reduced.g;
   }
@@ -191,8 +199,9 @@ CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double
   if (!step.allFinite()) return stepped;
   stepped.camera = WithStep(fit.camera, step);
   for (size_t i = 0; i < blocks.size(); ++i) {
-    const Vector6 pose_step =
-        Damped(blocks[i].C, damping).ldlt().solve(blocks[i].b - blocks[i].B.transpose() * step);
+    const Vector6 pose_step = Damped(blocks[i].C, damping)
+                                  .ldlt()
+                                  .solve(blocks[i].b - blocks[i].B.topRows(n).transpose() * step);
     if (pose_step.allFinite()) stepped.cam_from_board[i] = Moved(fit.cam_from_board[i], pose_step);
   }
   return stepped;
@@ -241,7 +250,7 @@ void HoldOut(const std::vector<BoardView>& views, const std::vector<Block>& bloc
   Reduced sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   std::vector<Reduced> parts;
   for (const Block& block : blocks) {
-    parts.push_back(Reduce(block, 0));
+    parts.push_back(Reduce(block, n, 0));
     sum.S += parts.back().S;
     sum.g += parts.back().g;
   }
@@ -301,7 +310,7 @@ Eigen::Matrix2Xd Residuals(const BoardView& view, const Camera& camera,
                            const Rigid& cam_from_board) {
   Eigen::Matrix2Xd residuals(2, view.x_on_board.cols());
   for (int i = 0; i < residuals.cols(); ++i) {
-    const auto projected = ProjectCorner(camera, cam_from_board, view.x_on_board.col(i));
+    const auto projected = ProjectCorner<0>(camera, cam_from_board, view.x_on_board.col(i));
     residuals.col(i) =
         projected ? Eigen::Vector2d(view.x_in_img.col(i) - projected->x_in_img)
                   : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()).eval();
@@ -322,13 +331,13 @@ double RmsLength(const BoardView& view, const Eigen::Matrix2Xd& residuals) {
 
 Rigid FitPose(const BoardView& view, const Camera& camera, const Rigid& start, double huber_px) {
   Rigid pose = start;
-  Block block = MakeBlock(view, camera, pose, 0, huber_px);
+  PoseBlock block = MakeEquations<0>(view, camera, pose, huber_px);
   double damping = 1e-4;
   for (int iteration = 0; iteration < 50 && std::isfinite(block.cost); ++iteration) {
     const Vector6 step = Damped(block.C, damping).ldlt().solve(block.b);
     if (!step.allFinite()) break;
     const Rigid moved = Moved(pose, step);
-    const Block next = MakeBlock(view, camera, moved, 0, huber_px);
+    const PoseBlock next = MakeEquations<0>(view, camera, moved, huber_px);
     if (next.cost < block.cost) {
       const bool done = block.cost - next.cost < 1e-10 * block.cost;
       pose = moved;
@@ -418,7 +427,7 @@ void Finish(const std::vector<BoardView>& views, CameraFit* fit) {
     num_coordinates +=
         2 * static_cast<int>(std::count(views[i].used.begin(), views[i].used.end(), true));
     sum += blocks[i].cost;
-    S += Reduce(blocks[i], 0).S;
+    S += Reduce(blocks[i], n, 0).S;
   }
   fit->redundancy = num_coordinates - n - 6 * static_cast<int>(views.size());
   fit->sigma_px = fit->redundancy > 0 ? std::sqrt(sum / fit->redundancy) : kInfinity;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -103,29 +104,30 @@ Eigen::Matrix2Xd MappingDifference(const Camera& camera, const Camera& other,
   const CameraProjection from(camera), to(other);
   const Eigen::Matrix2Xd grid = over.cols() > 0 ? over : PictureGrid(camera.width, camera.height);
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  const auto seen_by_other = [&](const Eigen::Vector2d& x) -> std::optional<Eigen::Vector2d> {
-    const auto ray = from.CamFromImg(x);
-    if (!ray) return std::nullopt;
-    return to.ImgFromCam(turn * ray->homogeneous());
-  };
+  const auto seen_by_other = [&](const Eigen::Vector3d& ray) { return to.ImgFromCam(turn * ray); };
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;  // where seen, and along which ray
+  for (int i = 0; i < grid.cols(); ++i) {
+    if (const auto ray = from.CamFromImg(grid.col(i)))
+      rays.emplace_back(grid.col(i), ray->homogeneous());
+  }
   for (int iteration = 0; iteration < 20; ++iteration) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (int i = 0; i < grid.cols(); ++i) {
-      const auto seen = seen_by_other(grid.col(i));
+    for (const auto& [x, ray] : rays) {
+      const auto seen = seen_by_other(ray);
       if (!seen) continue;
-      const Eigen::Vector3d ray = turn * from.CamFromImg(grid.col(i))->homogeneous();
-      const auto by_turn = DeriveAt(other, ray.hnormalized()).by_turn;
+      const auto by_turn = DeriveAt(other, (turn * ray).hnormalized()).by_turn;
       normal += by_turn.transpose() * by_turn;
-      right += by_turn.transpose() * (grid.col(i) - *seen);
+      right += by_turn.transpose() * (x - *seen);
     }
     const Eigen::Vector3d step = normal.ldlt().solve(right);
-    if (!step.allFinite() || !(step.norm() > 1e-12)) break;
+    if (!step.allFinite() || !(step.norm() > 1e-10)) break;
     turn = Eigen::AngleAxisd(step.norm(), step.normalized()).toRotationMatrix() * turn;
   }
   Eigen::Matrix2Xd difference(2, x_in_img.cols());
   for (int i = 0; i < x_in_img.cols(); ++i) {
-    const auto seen = seen_by_other(x_in_img.col(i));
+    const auto ray = from.CamFromImg(x_in_img.col(i));
+    const auto seen = ray ? seen_by_other(ray->homogeneous()) : std::nullopt;
     difference.col(i) = seen ? Eigen::Vector2d(*seen - x_in_img.col(i)) : NoPosition();
   }
   return difference;

@@ -128,8 +128,9 @@ void Apply(const Arguments& a, const Camera& camera, const Command::Context& con
                         " calibrated in " + a.database_output_path);
   if (applied.has_pairs) {
     context.Warn(
-        "the database's pairs were verified with the cameras as they were: with the copy, run "
-        "colmap's matcher on a database without matches if the old focal length was far off");
+        "pairs of photos in the database were verified with the cameras as they were; if their "
+        "focal "
+        "length was far off, extract and match anew with the printed options instead");
   }
   Json& json = context.report["applied"];
   json["output"] = a.database_output_path;

@@ -75,6 +75,23 @@ class Pattern {
   std::vector<int> marker_of_square_;
 };
 
+// Mean over a pixel by samples no two of which share a row or a column, shifted from pixel to
+// pixel: a square grid of samples would move edges that run along the pixels by up to half its
+// step, everywhere the same way.
+template <typename Light>
+double MeanOverPixel(const Light& light_at, int x, int y) {
+  constexpr int kSamples = 25;
+  const uint64_t bits = MixBits(static_cast<uint64_t>(x), static_cast<uint64_t>(y));
+  const double shift_x = static_cast<double>(bits & 0xffff) / 0x10000;
+  const double shift_y = static_cast<double>(bits >> 16 & 0xffff) / 0x10000;
+  double sum = 0;
+  for (int k = 0; k < kSamples; ++k) {
+    const double u = (k + shift_x) / kSamples, v = (k * 7 % kSamples + shift_y) / kSamples;
+    sum += light_at(x + u, y + v);
+  }
+  return sum / kSamples;
+}
+
 // All corners of the board with half a square around are in the picture.
 bool IsInside(const CameraProjection& projection, const Board& board, const Rigid& cam_from_board) {
   for (const double x : {-1.5, board.columns + 0.5}) {
@@ -114,7 +131,7 @@ Camera LensThatCallsFor(CameraModel model, int width, int height) {
       break;
     default:
       camera.model = CameraModel::kFullOpenCv;
-      camera.params = {f, 1.002 * f, cx, cy, -0.28, 0.2, 0.0008, -0.0006, -0.12, 0, 0, 0};
+      camera.params = {f, 1.002 * f, cx, cy, -0.25, 0.15, 0.0008, -0.0006, -0.05, 0, 0, 0};
   }
   return camera;
 }
@@ -209,16 +226,25 @@ cv::Mat BoardRenderer::Render(const Board& board, const Rigid& cam_from_board,
   ray_from_board << cam_from_board.rotation.toRotationMatrix().leftCols<2>() * board.square,
       cam_from_board.translation;
   const Eigen::Matrix3d board_from_ray = ray_from_board.inverse();
-  cv::Mat light(camera_.height, camera_.width, CV_32F);
-  for (int y = 0; y < light.rows; ++y) {
-    for (int x = 0; x < light.cols; ++x) {
-      double sum = 0;
-      for (int k = 0; k < 9; ++k) {
-        const Eigen::Vector2d ray = RayAt(x + (k % 3 + 0.5) / 3, y + (k / 3 + 0.5) / 3);
-        const Eigen::Vector3d at = board_from_ray * ray.homogeneous();
-        sum += pattern.Light(at.x() / at.z(), at.y() / at.z());
-      }
-      light.at<float>(y, x) = static_cast<float>(sum / 9);
+  const auto light_at = [&](double x, double y) {
+    const Eigen::Vector3d at = board_from_ray * RayAt(x, y).homogeneous();
+    return pattern.Light(at.x() / at.z(), at.y() / at.z());
+  };
+  const int width = camera_.width, height = camera_.height;
+  cv::Mat at_corners(height + 1, width + 1, CV_32F);  // of the pixels
+  for (int y = 0; y <= height; ++y) {
+    for (int x = 0; x <= width; ++x) {
+      at_corners.at<float>(y, x) = static_cast<float>(light_at(x, y));
+    }
+  }
+  cv::Mat light(height, width, CV_32F);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto [low, high] =
+          std::minmax({at_corners.at<float>(y, x), at_corners.at<float>(y, x + 1),
+                       at_corners.at<float>(y + 1, x), at_corners.at<float>(y + 1, x + 1)});
+      light.at<float>(y, x) =
+          high - low < 0.02f ? (low + high) / 2 : static_cast<float>(MeanOverPixel(light_at, x, y));
     }
   }
   if (options.blur_px > 0) cv::GaussianBlur(light, light, {}, options.blur_px);

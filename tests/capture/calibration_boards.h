@@ -42,7 +42,7 @@ struct BoardPhotoOptions {
   bool upper_left_is_black = true;
 };
 
-// Renders with 3x3 samples per pixel, in linear light.
+// Averages over pixels with an edge in them, in linear light.
 class BoardRenderer {
  public:
   explicit BoardRenderer(const Camera& camera);
