@@ -382,7 +382,7 @@ test('picks that are wrong are refused in words', async () => {
     await page.page.click('#align-open');
     await page.page.waitForSelector('#align .verdict', {timeout: 240000});
     const text = await page.text('#align .verdict');
-    assert.match(text, /Not trusted|Refused/);
+    assert.match(text, /Not trusted|Failed/);
     assert.match(text, /▲|✕/);
     assert.match(await page.text('#align .headline'), /\w+ \w+ \w+/);
     await screenshot(page.page, 'pick-refused');

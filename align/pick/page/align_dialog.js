@@ -7,8 +7,16 @@ const kPoll = 400;  // milliseconds
 const kVerdicts = {
   trusted: {sign: '✓', text: 'Trusted'},
   untrusted: {sign: '▲', text: 'Not trusted'},
-  failed: {sign: '✕', text: 'Refused'},
+  failed: {sign: '✕', text: 'Failed'},
 };
+
+// "Trusted: the photos ..." under the word Trusted is "The photos ...".
+function withoutVerdict(headline, word) {
+  if (headline === `${word}.`) return '';
+  if (!headline.startsWith(`${word}: `)) return headline;
+  const rest = headline.slice(word.length + 2);
+  return rest[0].toUpperCase() + rest.slice(1);
+}
 
 export class AlignDialog {
   #status = null;  // the server's last answer
@@ -158,13 +166,13 @@ export class AlignDialog {
   #showDone() {
     const status = this.#status;
     const verdict = kVerdicts[status.verdict] ?? kVerdicts.failed;
+    const headline = withoutVerdict(status.headline, verdict.text);
     this.#buttons(false, true);
-    this.#parts.live.textContent = `${verdict.text}. ${status.headline}`;
+    this.#parts.live.textContent = `${verdict.text}. ${headline}`;
     const parts = [
       el('div', {class: 'verdict', 'data-verdict': status.verdict},
          el('span', {class: 'sign', 'aria-hidden': 'true'}, verdict.sign),
-         el('div', {}, el('strong', {}, verdict.text),
-            el('p', {class: 'headline'}, status.headline))),
+         el('div', {}, el('strong', {}, verdict.text), el('p', {class: 'headline'}, headline))),
     ];
     if (status.sentences.length > 0) {
       parts.push(

@@ -274,8 +274,8 @@ export class Editor {
     this.on.changed();
   }
 
-  // Arrow keys: the selected point of the side, else the crosshair. dx, dy: in pixels for the
-  // point; for the crosshair `screen_step` more, so that it is quick where the picture is small.
+  // Arrow keys: the selected point of the side by dx, dy pixels, else the crosshair: by more where
+  // the picture is small, ten CSS pixels for each, so that it is quick.
   move(side, dx, dy, view) {
     const pick = this.picks.find(this.selected);
     const place = this.placeOf(pick, side);
