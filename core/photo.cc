@@ -100,15 +100,8 @@ std::optional<double> Angle(const Exiv2::ExifData& exif, const std::string& key,
   return is_negative ? -degrees : degrees;
 }
 
-}  // namespace
-
-std::optional<double> ExposureData::RelativeExposure() const {
-  if (!exposure_time) return std::nullopt;
-  const double n = f_number.value_or(1.0);
-  return *exposure_time * iso.value_or(1.0) / (n * n);
-}
-
-cv::Mat ReadPhoto(const std::string& path) {
+// flags: cv::IMREAD_*.
+cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
   const std::vector<unsigned char> bytes = ReadBytes(path);
   const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
@@ -118,9 +111,7 @@ cv::Mat ReadPhoto(const std::string& path) {
   }
   cv::Mat image;
   try {
-    if (!bytes.empty()) {
-      image = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    }
+    if (!bytes.empty()) image = cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {
     image.release();
   }
@@ -129,6 +120,29 @@ cv::Mat ReadPhoto(const std::string& path) {
                      "Expected a JPEG, PNG or TIFF file; re-export or remove it");
   }
   return image;
+}
+
+}  // namespace
+
+std::optional<double> ExposureData::RelativeExposure() const {
+  if (!exposure_time) return std::nullopt;
+  const double n = f_number.value_or(1.0);
+  return *exposure_time * iso.value_or(1.0) / (n * n);
+}
+
+cv::Mat ReadPhoto(const std::string& path) { return DecodePhoto(path, cv::IMREAD_COLOR); }
+
+cv::Mat1b ReadGreyPhoto(const std::string& path, int shrink) {
+  switch (shrink) {
+    case 8:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_GRAYSCALE_8);
+    case 4:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_GRAYSCALE_4);
+    case 2:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_GRAYSCALE_2);
+    default:
+      return DecodePhoto(path, cv::IMREAD_GRAYSCALE);
+  }
 }
 
 std::array<int, 2> ReadPhotoSize(const std::string& path) {

@@ -27,6 +27,10 @@ struct ExposureData {
 // turned either. Throws InputError if the file is missing, not an image or broken.
 cv::Mat ReadPhoto(const std::string& path);
 
+// The same in grey, made smaller while it is decoded: shrink is 1, 2, 4 or 8. For a JPEG this takes
+// a part of the time and memory.
+cv::Mat1b ReadGreyPhoto(const std::string& path, int shrink);
+
 // Width and height without decoding the pixels, from the file's header; {0, 0} if that cannot be
 // told.
 std::array<int, 2> ReadPhotoSize(const std::string& path);
