@@ -396,3 +396,21 @@ test('too few picks: Align says so without running', async () => {
     assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);
   }, {picks_file: fileOf(places.slice(0, 3))});
 });
+
+test('Align can be cancelled, and run again', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(8);
+    await page.page.click('#align-open');
+    const cancel = page.page.locator('#align footer button', {hasText: 'Cancel'});
+    await cancel.click();
+    await until(async () => /Cancelled/.test(await page.text('#align .body')), 'it says so');
+    await until(async () => {
+      const answer = await (await fetch(`${page.url}align`)).json();
+      return answer.state !== 'running';
+    }, 'it has ended');
+    await page.page.keyboard.press('Escape');
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+  }, {picks_file: fileOf(places.slice(0, 8))});
+});

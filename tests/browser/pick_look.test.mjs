@@ -368,3 +368,55 @@ test('every control has a name, and shows when it has the focus', async () => {
     }
   }, {picks_file: fileOf(places.slice(0, 6))});
 });
+
+test('tiles: few at a time, and those out of view are given up', async () => {
+  await pageOn(async (page) => {
+    // Held back here, so that they pile up as over a slow line.
+    let asked = 0, ended = 0, given_up = 0;
+    let holding = true;
+    const held = [];
+    const isTile = (request) => /tile\?/.test(request.url());
+    await page.page.route('**/tile?*', async (route) => {
+      ++asked;
+      if (holding) await new Promise((go) => held.push(go));
+      await route.continue().catch(() => {});  // it may have been given up meanwhile
+    });
+    page.page.on('requestfinished', (request) => {
+      ended += isTile(request);
+    });
+    page.page.on('requestfailed', (request) => {
+      given_up += isTile(request);
+    });
+    await page.page.selectOption('#scan-picture', 'local');
+    await until(() => asked === 3, 'tiles of the other picture are asked for');
+    for (let frame = 0; frame < 5; ++frame) await page.redrawn();
+    assert.equal(asked, 3, 'three at a time, the picks do not wait behind them');
+    await page.page.selectOption('#scan-picture', 'shaded');
+    await until(() => given_up >= 3, 'those of the first are given up');
+    holding = false;
+    for (const go of held) go();
+    await until(() => asked > 3 && ended + given_up === asked, 'all tiles have come');
+    await page.redrawn();
+    const [color] = await colorsAt(page, 'scan', [[400.5, 200.5]]);
+    assert.notDeepEqual(color, [56, 56, 56]);
+  });
+});
+
+test('with reduced motion B changes the picture once for each press', async () => {
+  await pageOn(async (page) => {
+    await page.page.emulateMedia({reducedMotion: 'reduce'});
+    await page.rowsAre(8);
+    const where = places.slice(0, 8).map((place) => place.scan);
+    const saturation = async () =>
+        Math.max(...(await colorsAt(page, 'scan', where))
+                     .map((color) => Math.max(...color) - Math.min(...color)));
+    await until(() => page.page.isEnabled('#back-mode'), 'there is a solution');
+    await page.page.focus('#scan-pane');
+    for (let press = 0; press < 2; ++press) {
+      await page.page.keyboard.press('b');
+      await until(async () => await saturation() > 30, 'the photo');
+      await page.page.keyboard.press('b');
+      await until(async () => await saturation() < 4, 'the scan');
+    }
+  }, {picks_file: fileOf(places.slice(0, 8))});
+});

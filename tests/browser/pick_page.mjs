@@ -145,7 +145,7 @@ export class PickPage {
         left_out: value(cells[4]),
         state: cells[5],
         status: line.dataset.status,
-        selected: line.getAttribute('aria-selected') === 'true',
+        selected: line.hasAttribute('data-selected'),
         on: line.querySelector('input').checked,
       };
     }));

@@ -68,7 +68,7 @@ function choosePhoto(id) {
   const {view} = panes.photo;
   if (editor.photo) views.set(editor.photo.id, [view.scale, view.centre, view.fitted]);
   editor.showPhoto(photo);
-  panes.photo.setPicture({
+  panes.photo.setPicture(photo.missing ? null : {
     key: `photo ${id}`,
     width: photo.width,
     height: photo.height,
@@ -79,6 +79,8 @@ function choosePhoto(id) {
   });
   if (views.has(id)) [view.scale, view.centre, view.fitted] = views.get(id);
   setText(byId('photo-name'), photo.name);
+  byId('photo-notice').hidden = !photo.missing;
+  setText(byId('photo-notice'), photo.problem || `There is no ${photo.name} in the photo folder.`);
   byId('photo-name').title = `${photo.name}, ${photo.width} x ${photo.height} pixels`;
   app.refresh();
   follow();
@@ -142,6 +144,7 @@ function showAll() {
   const solution = session.photos[editor.photo.name];
   setText(byId('photo-fit'), solution?.solved ? `${number(solution.rms_px, 2)} px rms` : '');
   setText(byId('next'), session.next);
+  byId('next').title = session.next;
   const steps = [['undo', 'Undo', picks.undo_label], ['redo', 'Redo', picks.redo_label]];
   for (const [id, name, label] of steps) {
     byId(id).disabled = !label;
@@ -184,12 +187,20 @@ function listen() {
   });
   picks.addEventListener('refused', (event) => say(event.detail, {seconds: 9, urgent: true}));
   addEventListener('focus', () => picks.check());
-  setInterval(() => {
-    if (!document.hidden) picks.check();
-  }, kHeartbeat);
+  setInterval(heartbeat, kHeartbeat);
   addEventListener('beforeunload', (event) => {
     if (picks.pending) event.preventDefault();
   });
+}
+
+// The shortest question there is; the answer does not matter.
+async function heartbeat() {
+  if (document.hidden || app.picks.state === 'gone' || app.picks.state === 'restarted') return;
+  try {
+    await api.align();
+  } catch (error) {
+    app.picks.check();
+  }
 }
 
 function listenToGamma() {

@@ -26,8 +26,7 @@ export class Pane {
     this.press = null;
     [this.tiles, this.overlay] = element.querySelectorAll('canvas');
     new ResizeObserver(() => this.#resize()).observe(element);
-    // The density of pixels changes when a window moves to another screen.
-    matchMedia('(resolution: 1dppx)').addEventListener('change', () => this.#resize());
+    this.#watchRatio();
     store.onTile(() => this.redraw());
     this.#listen();
     this.#resize();
@@ -78,6 +77,15 @@ export class Pane {
   centreOn(img, at_least = 0) {
     this.view.centreOn(img, at_least);
     this.redraw();
+  }
+
+  // The density of pixels changes when the window moves to another screen.
+  #watchRatio() {
+    const now = matchMedia(`(resolution: ${this.ratio}dppx)`);
+    now.addEventListener('change', () => {
+      this.#resize();
+      this.#watchRatio();
+    }, {once: true});
   }
 
   #resize() {

@@ -93,7 +93,8 @@ export class Results {
     const worst = status === 'used' && numbers.worst === true;
     cells.line.dataset.status = status;
     cells.line.toggleAttribute('data-worst', worst);
-    cells.line.setAttribute('aria-selected', String(pick.uid === selected));
+    cells.line.toggleAttribute('data-selected', pick.uid === selected);
+    cells.number.setAttribute('aria-current', String(pick.uid === selected));
     setText(cells.number, String(index));
     cells.number.setAttribute('aria-label', `Pick ${index}`);
     setText(cells.photo, pick.image_name);

@@ -65,25 +65,35 @@ export class Strip {
       this.#thumbs.get(current)?.element.scrollIntoView({block: 'nearest'});
     }
     this.box.setAttribute('aria-activedescendant', `thumb-${current}`);
-    for (const {photo, element, picks, rms} of this.#thumbs.values()) {
-      const solution = solutions[photo.name];
+    for (const thumb of this.#thumbs.values()) {
+      const {photo} = thumb;
       const count = counts.get(photo.name) ?? 0;
-      element.setAttribute('aria-selected', String(photo.id === current));
-      picks.hidden = count === 0 && photo.rank !== 1 && !photo.missing;
-      setText(
-          picks,
-          photo.missing ? 'no file' :
-              count > 0 ? `${count} pick${count > 1 ? 's' : ''}` :
-                          'suggested');
-      rms.hidden = !solution || typeof solution.rms_px !== 'number';
-      if (!rms.hidden) setText(rms, `${number(solution.rms_px)} px`);
-      const sees = typeof photo.scan_share === 'number' ?
-          `, sees ${Math.round(100 * photo.scan_share)} % of the scan` :
-          '';
-      element.title = photo.missing ?
-          `${photo.name}: there is no such file in the photo folder` :
-          `${photo.name}: ${photo.num_points} points of the sparse model${sees}`;
+      const rms = solutions[photo.name]?.rms_px ?? null;
+      const chosen = photo.id === current;
+      // Of hundreds of photos few change while a point is dragged.
+      const key = [chosen, count, rms, photo.scan_share].join();
+      if (thumb.key === key) continue;
+      thumb.key = key;
+      this.#fill(thumb, chosen, count, rms);
     }
+  }
+
+  #fill({photo, element, picks, rms}, chosen, count, rms_px) {
+    element.setAttribute('aria-selected', String(chosen));
+    picks.hidden = count === 0 && photo.rank !== 1 && !photo.missing;
+    setText(
+        picks,
+        photo.missing ? 'cannot be shown' :
+            count > 0 ? `${count} pick${count > 1 ? 's' : ''}` :
+                        'suggested');
+    rms.hidden = rms_px === null;
+    setText(rms, `${number(rms_px)} px`);
+    const sees = typeof photo.scan_share === 'number' ?
+        `, sees ${Math.round(100 * photo.scan_share)} % of the scan` :
+        '';
+    const points = `${photo.num_points} points of the sparse model`;
+    element.title =
+        `${photo.name}: ${photo.missing ? photo.problem || 'no such file' : points + sees}`;
   }
 
   #filter() {
