@@ -117,7 +117,7 @@ class DepthFinder {
 
 // A feature with a sparse point: what its depth in the scan says.
 struct Feature {
-  Eigen::Vector2d x_in_img;
+  Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
   double sparse_depth = 0;
   bool has_surface = false;
   double ratio = 0;  // 0: no smooth surface
@@ -131,6 +131,7 @@ std::vector<std::string> ScaleOptions::Problems() const {
   std::vector<std::string> problems;
   if (!(edge_px >= 0)) problems.push_back("--Scale.edge_px must not be negative");
   if (!(max_depth_step > 0)) problems.push_back("--Scale.max_depth_step must be positive");
+  if (max_features < 1) problems.push_back("max_features must be positive");
   if (!(max_deviations > 0)) problems.push_back("--Scale.max_deviations must be positive");
   return problems;
 }
@@ -156,7 +157,13 @@ ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
     const auto point = model.points.find(image.point3d_ids[i]);
     if (point == model.points.end()) continue;
     const double alpha = (image.cam_from_model * point->second.x_in_model).z();
-    if (alpha > 0) features.push_back({image.points2d[i], alpha});
+    if (alpha > 0) features.push_back({image.points2d[i], alpha, false, 0});
+  }
+  if (features.size() > static_cast<size_t>(options.max_features)) {
+    const size_t stride = (features.size() - 1) / options.max_features + 1;
+    size_t kept = 0;
+    for (size_t i = 0; i < features.size(); i += stride) features[kept++] = features[i];
+    features.resize(kept);
   }
   const int count = static_cast<int>(features.size());
   ParallelFor(num_threads, 0, (count + kFeaturesPerChunk - 1) / kFeaturesPerChunk, [&](int chunk) {

@@ -20,6 +20,9 @@ struct ScaleOptions {
   // Features whose ratio is farther from the median than this many robust standard deviations are
   // left out.
   double max_deviations = 3.0;
+  // Of more features with a sparse point every k-th is looked at: 2000 fix the scale to 2e-5 where
+  // they spread by 1e-3, far better than clicks fix the pose, and roomtex-pick asks at every click.
+  int max_features = 2000;
 
   std::vector<std::string> Problems() const;
 };
@@ -35,8 +38,9 @@ struct ScaleEstimate {
 // For each feature of `image` that has a sparse point: the scan point is where its viewing ray
 // meets the nearest scan triangle. num_features = 0 if no feature has one. Departures: the exact
 // intersection instead of the average of the triangle's corners (Appendix B's side test is what the
-// intersection does); the reciprocal of the thesis' s = beta / alpha (7.3), so that it is the scale
-// of scan_from_sparse; the "consistent average" is the mean of what lies near the median.
+// intersection does); at most max_features features; the reciprocal of the thesis' s = beta / alpha
+// (7.3), so that it is the scale of scan_from_sparse; the "consistent average" is the mean of what
+// lies near the median.
 ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
                             const Rigid& cam_from_scan, const std::vector<Scan>& scans,
                             const std::vector<std::vector<Triangle>>& meshes,
