@@ -91,6 +91,30 @@ TEST_F(PhotoListTest, LeavesPhotosWithoutATwinOutAndSaysSo) {
   EXPECT_NE(list.warnings[0].find("1 registered photos have no plain twin"), std::string::npos);
 }
 
+TEST_F(PhotoListTest, LeavesPhotosOutWhoseTwinIsNotInTheFolderAndNamesThem) {
+  Photo("plain_a.png", 60, 40);
+  Associate("patterned_image,plain_image\na.png,plain_a.png\nb.png,plain_b.png\nc.png,\n");
+  const PhotoList list = ListPhotos(model_, sources_);
+  ASSERT_EQ(list.photos.size(), 1u);  // never the patterned b.png or c.png
+  EXPECT_EQ(list.photos[0].name, "plain_a.png");
+  ASSERT_EQ(list.warnings.size(), 2u);
+  EXPECT_NE(list.warnings[0].find("give no colour: c.png"), std::string::npos);
+  EXPECT_NE(list.warnings[1].find("plain_b.png (twin of b.png)"), std::string::npos);
+  std::filesystem::remove(folder_ / "plain_a.png");
+  EXPECT_INPUT_ERROR(Names(), "holds none of the plain photos");
+}
+
+TEST_F(PhotoListTest, TakesAPlainPhotoOnceForTwoPatternedOnes) {
+  Photo("plain.png", 60, 40);
+  Associate("patterned_image,plain_image\na.png,plain.png\nb.png,plain.png\n");
+  EXPECT_EQ(Names(), (std::vector<std::string>{"plain.png"}));
+}
+
+TEST_F(PhotoListTest, RefusesAPhotoThatIsBothPatternedAndPlain) {
+  Associate("patterned_image,plain_image\na.png,b.png\nb.png,c.png\n");
+  EXPECT_INPUT_ERROR(Names(), "names b.png as a patterned photo and as a plain one");
+}
+
 TEST_F(PhotoListTest, RefusesBrokenTables) {
   Associate("");
   EXPECT_INPUT_ERROR(Names(), "is empty");

@@ -14,7 +14,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int kCellPx = 32;  // of the lattice, in a photo of 2000 pixels
+constexpr int kCellPx = 18;  // of the lattice, in a photo of 2000 pixels
 constexpr size_t kCacheBytes = 64 << 20;
 
 Eigen::Vector3f Direction(const CameraProjection& projection, const Eigen::Vector2d& x_in_img) {
@@ -133,7 +133,8 @@ Json ViewCameras::Lattice(int id) const {
   const PhotoLattice lattice = MakePhotoLattice(model_.cameras.at(Image(id).camera_id));
   Json directions = Json::array();
   for (const Eigen::Vector3f& direction : lattice.directions) {
-    for (int k = 0; k < 3; ++k) directions.push_back(direction[k]);
+    // Seven digits: a ten-thousandth of a pixel.
+    for (int k = 0; k < 3; ++k) directions.push_back(std::round(1e7 * direction[k]) / 1e7);
   }
   return {{"columns", lattice.columns}, {"rows", lattice.rows}, {"directions", directions}};
 }

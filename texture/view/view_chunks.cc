@@ -234,7 +234,7 @@ std::string ViewChunks::Encode(int chunk, Level level) const {
   const uint32_t header[4] = {0x31435452, static_cast<uint32_t>(geometry->points.size()),
                               static_cast<uint32_t>(geometry->corners.size()), textured ? 1u : 2u};
   std::string bytes;
-  bytes.reserve(sizeof header + 16 * geometry->points.size() + 2 * geometry->corners.size());
+  bytes.reserve(sizeof header + 20 * geometry->points.size() + 2 * geometry->corners.size());
   Append(header, 4, &bytes);
   for (const uint32_t point : geometry->points) Append(model_.points[point].data(), 3, &bytes);
   for (const uint32_t point : geometry->points) {
@@ -246,6 +246,13 @@ std::string ViewChunks::Encode(int chunk, Level level) const {
       const uint8_t rgba[4] = {r, g, b, 255};
       Append(rgba, 4, &bytes);
     }
+  }
+  for (const uint32_t point : geometry->points) {
+    const Eigen::Vector3f normal = 127 * model_.normals[point];
+    const int8_t xyz0[4] = {static_cast<int8_t>(std::lround(normal.x())),
+                            static_cast<int8_t>(std::lround(normal.y())),
+                            static_cast<int8_t>(std::lround(normal.z())), 0};
+    Append(xyz0, 4, &bytes);
   }
   Append(geometry->corners.data(), geometry->corners.size(), &bytes);
   return bytes;

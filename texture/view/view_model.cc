@@ -1,7 +1,11 @@
 #include "texture/view/view_model.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <filesystem>
+
+#include <Eigen/Geometry>
 
 #include "core/error.h"
 #include "core/output_file.h"
@@ -43,6 +47,40 @@ std::array<int, 2> EncodedImageSize(const std::string& bytes) {
   }
   if (bytes.size() > 4 && bytes.compare(0, 2, "\xff\xd8") == 0) return JpegSize(bytes);
   return {0, 0};
+}
+
+std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes) {
+  std::vector<Eigen::Vector3f> normals(model.points.size(), Eigen::Vector3f::Zero());
+  for (const Triangle& t : model.triangles) {
+    const Eigen::Vector3f& a = model.points[t[0]];
+    const Eigen::Vector3f twice_area = (model.points[t[1]] - a).cross(model.points[t[2]] - a);
+    for (const int corner : t) normals[corner] += twice_area;
+  }
+  const auto normalize = [](std::vector<Eigen::Vector3f>* vectors) {
+    for (Eigen::Vector3f& v : *vectors) {
+      const float length = v.norm();
+      v = length > 0 && std::isfinite(length) ? Eigen::Vector3f(v / length)
+                                              : Eigen::Vector3f::Zero();
+    }
+  };
+  std::vector<Eigen::Vector3f> sums;
+  for (int pass = 0; pass < passes; ++pass) {
+    normalize(&normals);
+    sums = normals;
+    for (const Triangle& t : model.triangles) {
+      const Eigen::Vector3f sum = normals[t[0]] + normals[t[1]] + normals[t[2]];
+      for (const int corner : t) sums[corner] += sum;
+    }
+    normals.swap(sums);
+  }
+  normalize(&normals);
+  return normals;
+}
+
+bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& direction) {
+  const Triangle& t = model.triangles[triangle];
+  const Eigen::Vector3f sum = model.normals[t[0]] + model.normals[t[1]] + model.normals[t[2]];
+  return sum.normalized().dot(direction.cast<float>()) < kFrontMargin;
 }
 
 ViewModel ReadViewPly(const std::string& path) {
@@ -92,8 +130,11 @@ ViewModel ReadViewModel(const std::string& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   RequireFile(file, "Give what roomtex-texture wrote");
-  if (extension == ".glb") return ReadViewGlb(file);
-  if (extension == ".ply") return ReadViewPly(file);
+  if (extension == ".glb" || extension == ".ply") {
+    ViewModel model = extension == ".glb" ? ReadViewGlb(file) : ReadViewPly(file);
+    model.normals = SmoothNormals(model);
+    return model;
+  }
   throw InputError(path, "", "is neither a folder nor a .glb or .ply file",
                    "Give the folder that roomtex-texture wrote");
 }

@@ -31,12 +31,23 @@ struct ViewModel {
   // there is no image, sRGB. Either may be empty.
   std::vector<Eigen::Vector2f> uv;
   std::vector<std::array<uint8_t, 3>> colors;
+  // One per point: unit, of the surface around it (SmoothNormals); zero where there is none.
+  std::vector<Eigen::Vector3f> normals;
   std::vector<Triangle> triangles;
   std::vector<int> page_of_triangle;  // index into images; -1 = colours of the points
   std::vector<ViewImage> images;
 
   Eigen::Vector3d InScan(size_t point) const { return origin + points[point].cast<double>(); }
 };
+
+// Front = the side that the scanner saw. A single triangle does not say it: where the scanner
+// looked along a wall, range noise turns triangles over. So these are normals weighted by area,
+// averaged over the neighbours `passes` times.
+std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes = 5);
+// Whether the triangle shows its front to who looks along `direction` (unit), or nearly so: at
+// edges the averaged normals lean over.
+bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& direction);
+inline constexpr float kFrontMargin = 0.05f;  // cosine
 
 // A folder that roomtex-texture wrote (model.glb, or model.ply if there is no GLB), a .glb or a
 // .ply. Throws InputError: nothing there, damaged, no triangles, things of glTF that we do not

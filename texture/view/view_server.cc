@@ -231,15 +231,12 @@ Json ViewServer::Impl::CastRay(const LocalServer::Query& query) {
     const auto hit = rays->Cast(from, direction, nearest);
     if (!hit) break;
     const Triangle& t = model.triangles[hit->triangle];
-    const Eigen::Vector3d a = model.InScan(t[0]);
-    const Eigen::Vector3d normal =
-        (model.InScan(t[1]) - a).cross(model.InScan(t[2]) - a).normalized();
-    const bool counts =
-        (!front_only || normal.dot(direction) < 0) && hit->point.dot(model.up) <= top;
+    const bool counts = (!front_only || ShowsFront(model, hit->triangle, direction)) &&
+                        hit->point.dot(model.up) <= top;
     if (counts) {
       return {{"hit", true},
               {"point", ToArray(hit->point)},
-              {"normal", ToArray(normal)},
+              {"normal", ToArray(Eigen::Vector3f(model.normals[t[0]]))},
               {"distance", hit->distance}};
     }
     nearest = hit->distance + 1e-5;

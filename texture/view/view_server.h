@@ -38,9 +38,9 @@ struct ViewContent {
 //   photo?id&max     JPEG; 404 without a file
 //   points           bytes of ViewCameras::EncodePoints
 //   cast?x&y&z&dx&dy&dz&front&top   nearest surface of the full mesh along a ray: {hit, point,
-//                    normal, distance}; front = 1: triangles seen from behind do not count; top:
-//                    nor what is farther up than that many metres (along `up`, from the scan's
-//                    origin)
+//                    normal, distance}; front = 1: what is seen from behind (ShowsFront) does not
+//                    count; top: nor what is farther up than that many metres (along `up`, from the
+//                    scan's origin)
 // The server must outlive this, and be stopped before this ends.
 class ViewServer {
  public:

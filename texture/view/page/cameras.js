@@ -49,6 +49,7 @@ export class Cameras {
     this.lines.frustumCulled = false;
     this.group.add(this.lines);
     this.thumbnails = new Map();  // id -> mesh
+    this.near = new Set();  // so near to the eye that they would only be in the way
     this.points = null;
   }
 
@@ -78,7 +79,7 @@ export class Cameras {
       colors.push(color.r, color.g, color.b, color.r, color.g, color.b);
     };
     for (const camera of this.list) {
-      if (camera === this.standing) continue;
+      if (camera === this.standing || this.near.has(camera)) continue;
       color.set(camera === this.hovered ? kColors.hovered
           : camera === this.chosen ? kColors.chosen
           : camera.photo ? kColors.plain : kColors.missing);
@@ -113,7 +114,7 @@ export class Cameras {
     let best = null, nearest = limit;
     const c = [0, 1, 2, 3].map(() => new THREE.Vector3()), at = new THREE.Vector3();
     for (const camera of this.list) {
-      if (camera === this.standing) continue;
+      if (camera === this.standing || this.near.has(camera)) continue;
       c.forEach((corner, k) => this.#corner(camera, k, corner));
       const faces = [[c[0], c[1], c[2]], [c[0], c[2], c[3]]];
       for (let k = 0; k < 4; ++k) faces.push([camera.position, c[k], c[(k + 1) % 4]]);
@@ -176,12 +177,18 @@ export class Cameras {
   // Before every picture: small photos in the cameras near the eye.
   update(eye) {
     if (!this.visible) return;
+    const inTheWay = this.list.filter(
+        (camera) => camera.position.distanceTo(eye) < 1.6 * this.size);
+    if (inTheWay.length !== this.near.size || inTheWay.some((camera) => !this.near.has(camera))) {
+      this.near = new Set(inTheWay);
+      this.#draw();
+    }
     const near = this.list.filter((camera) => camera.photo)
         .sort((a, b) => a.position.distanceToSquared(eye) - b.position.distanceToSquared(eye))
         .slice(0, kMaxNear);
     for (const [id, mesh] of this.thumbnails) {
       const camera = this.list[id];
-      mesh.visible = camera !== this.standing &&
+      mesh.visible = !this.standing && !this.near.has(camera) &&
           (camera === this.hovered || (this.pictures && near.includes(camera)));
     }
     if (!this.pictures) return;

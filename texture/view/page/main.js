@@ -14,7 +14,9 @@ import { Panel, showFailure } from './panel.js';
 import { Room } from './room.js';
 
 const kSlowFrame = 60;       // milliseconds of the graphics card: coarse while moving
-const kLongestFrame = 500;   // milliseconds: coarser at rest, too
+const kLongestFrame = 800;   // milliseconds: coarser at rest, too, up to kMaxTolerance
+const kShortFrame = 150;     // milliseconds: as fine as it should be again
+const kMaxTolerance = 4;
 const kFragmentPause = 300;  // milliseconds between two changes of the address
 const kBackgrounds = { dark: 0x1b1e24, light: 0xf2f3f5 };
 
@@ -33,7 +35,6 @@ class Viewer {
     this.measuring = false;
     this.scheduled = false;
     this.numPictures = 0;
-    this.slow = false;
     this.cost = 0;  // milliseconds that the graphics card took for the last picture
     this.fence = null;
     this.labels = document.getElementById('labels');
@@ -46,6 +47,8 @@ class Viewer {
     this.navigation = new Navigation(this.canvas, {
       cast: (ray) => this.room.cast(ray),
       floor: () => this.floorHeight(),
+      heading: () => this.wallHeading(),
+      sample: () => this.room.samplePoints(),
       invalidate,
     });
     const box = new THREE.Box3();
@@ -66,7 +69,7 @@ class Viewer {
     this.setBackground('dark');
     const fromAddress = readFragment(location.hash, this.frames);
     if (fromAddress.look) this.navigation.setView(fromAddress.look);
-    else this.#firstView();
+    else this.navigation.home(false);
     this.panel.describe();
     const invalidate = () => this.invalidate(), fail = (sentence) => this.panel.fail(sentence);
     const room = this.room.load();
@@ -82,6 +85,7 @@ class Viewer {
     this.panel.showCameras();
     await room;
     this.firstPicture = performance.now();
+    if (!fromAddress.look && !this.touched) this.navigation.home(false);
     await this.applyExtra(fromAddress.extra);
     try {
       this.evidence = await getJson('evidence');
@@ -93,22 +97,14 @@ class Viewer {
     this.remember();
   }
 
-  // Where the whole room is seen from the side that the scanner stood on.
-  #firstView() {
-    this.navigation.mode = 'orbit';
-    const flyTo = this.navigation.flyTo;
-    this.navigation.flyTo = (position, quaternion) => {
-      this.navigation.camera.position.copy(position);
-      this.navigation.camera.quaternion.copy(quaternion);
-      this.navigation.moved();
-    };
-    this.navigation.home();
-    this.navigation.flyTo = flyTo;
-  }
-
   floorHeight() {
     if (this.knownFloor === undefined || !this.room.loaded) this.knownFloor = this.room.floorHeight();
     return this.knownFloor;
+  }
+
+  wallHeading() {
+    if (this.knownHeading === undefined || !this.room.loaded) this.knownHeading = this.room.wallHeading();
+    return this.knownHeading;
   }
 
   // --- pictures -------------------------------------------------------------------------------
@@ -134,7 +130,7 @@ class Viewer {
     const pause = now - (this.lastFrame ?? now);
     this.lastFrame = now;
     const goesOn = this.navigation.step(this.drewLast ? Math.min(pause, 200) / 1000 : 0.016);
-    this.room.coarseOnly = this.slow && this.navigation.moving;
+    this.room.coarseOnly = this.room.slow && this.navigation.moving;
     const more = this.draw();
     this.drewLast = goesOn;
     if (goesOn) this.invalidate();
@@ -153,8 +149,10 @@ class Viewer {
     this.fence = null;
     // Handing over takes its time once.
     if (!this.room.loaded || this.room.coarseOnly || this.room.handedOver) return false;
-    if (this.cost > kSlowFrame) this.slow = true;
-    if (this.cost > kLongestFrame && this.room.tolerance < 8) this.room.tolerance *= 1.4;
+    if (this.cost > kSlowFrame) this.room.slow = true;
+    const { room } = this;
+    if (this.cost > kLongestFrame) room.tolerance = Math.min(room.tolerance * 1.4, kMaxTolerance);
+    else if (this.cost < kShortFrame) room.tolerance = Math.max(room.tolerance / 1.4, 1);
     return false;
   }
 
@@ -315,6 +313,9 @@ class Viewer {
 
   #listen() {
     const { navigation, canvas } = this;
+    for (const type of ['pointerdown', 'wheel', 'keydown']) {
+      addEventListener(type, () => { this.touched = true; }, { capture: true, passive: true });
+    }
     navigation.addEventListener('move', () => {
       this.remember();
       clearTimeout(this.restTimer);
@@ -416,10 +417,12 @@ function isSoftware() {
 async function main() {
   let renderer;
   try {
+    const software = isSoftware();
     renderer = new THREE.WebGLRenderer({
-      canvas: document.getElementById('canvas'), antialias: !isSoftware(),
+      canvas: document.getElementById('canvas'), antialias: !software,
       powerPreference: 'high-performance',
     });
+    renderer.isSoftware = software;
   } catch {
     return showFailure('This browser shows no three-dimensional graphics (WebGL 2 is missing or ' +
                        'switched off). Use a recent Firefox, Chrome, Edge or Safari.');

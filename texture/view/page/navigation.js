@@ -13,11 +13,14 @@ const reducedMotion = matchMedia('(prefers-reduced-motion: reduce)');
 
 export class Navigation extends EventTarget {
   // canvas takes pointer and keys; cast(ray) gives {distance, point} | null; floor() a height.
-  constructor(canvas, { cast, floor, invalidate }) {
+  // heading() that of the walls; sample() gives points of the room.
+  constructor(canvas, { cast, floor, heading, sample, invalidate }) {
     super();
     this.canvas = canvas;
     this.cast = cast;
     this.floor = floor;
+    this.heading = heading;
+    this.sample = sample;
     this.invalidate = invalidate;
     this.perspective = new THREE.PerspectiveCamera(kFov, 1, 0.02, 500);
     this.orthographic = new THREE.OrthographicCamera(-1, 1, 1, -1, -500, 500);
@@ -63,10 +66,14 @@ export class Navigation extends EventTarget {
       const tan = Math.max(tanY, tanX / aspect) * this.standing.zoom;
       this.perspective.fov = 2 * Math.atan(tan) * 180 / Math.PI;
     } else {
-      const tan = Math.tan(kFov * Math.PI / 360) * (aspect < 1 ? 1 / aspect : 1);
-      this.perspective.fov = Math.min(2 * Math.atan(tan) * 180 / Math.PI, 110);
+      this.perspective.fov = 2 * Math.atan(this.#freeLens().tan) * 180 / Math.PI;
     }
     this.perspective.updateProjectionMatrix();
+  }
+
+  #freeLens() {
+    const aspect = this.perspective.aspect || 1;
+    return { aspect, tan: Math.tan(kFov * Math.PI / 360) / Math.max(Math.min(aspect, 1), 0.4) };
   }
 
   // --- points of view -------------------------------------------------------------------------
@@ -92,17 +99,32 @@ export class Navigation extends EventTarget {
     this.moved();
   }
 
-  // The whole room, from above one side; or from within.
-  home() {
-    const centre = this.bounds.getCenter(new THREE.Vector3());
-    const size = this.bounds.getSize(new THREE.Vector3());
-    const direction = new THREE.Vector3(0.55, 0.75, 0.8).normalize();
-    const aspect = Math.min(this.width / this.height, 1.6);
-    const distance = 0.62 * size.length() / Math.tan(kFov * Math.PI / 360) / Math.max(aspect, 0.6) * 1.1;
-    const position = centre.clone().addScaledVector(direction, distance);
+  // The whole room from above one of its corners, as large as it fits.
+  home(fly = true) {
     this.leaveCamera();
-    if (this.mode !== 'orbit') this.setMode('orbit', false);
-    this.flyTo(position, lookRotation(centre.clone().sub(position)));
+    if (this.mode !== 'orbit') this.#switchMode('orbit');
+    const rotation = rotationOf(this.heading() + 0.62, -0.68);
+    const position = this.#framing(rotation);
+    if (fly) return this.flyTo(position, rotation);
+    this.perspective.position.copy(position);
+    this.perspective.quaternion.copy(rotation);
+    this.moved();
+  }
+  // From where a camera turned so sees all of the room, but for the few strays beyond it.
+  #framing(rotation) {
+    const { tan, aspect } = this.#freeLens();
+    const inverse = rotation.clone().invert();
+    const points = this.sample().map((p) => p.clone().applyQuaternion(inverse));
+    // Of the planes through the borders of the picture each has all points on one side: where they
+    // meet, the eye is. u = x or y, depth -z: u <= eye + t (eye_z - z), so eye_z >= ...
+    const bound = (values) => values.sort((a, b) => a - b)[Math.floor(0.999 * (values.length - 1))];
+    const side = (k, t) => {
+      const high = bound(points.map((p) => p.getComponent(k) + t * p.z));
+      const low = bound(points.map((p) => -p.getComponent(k) + t * p.z));
+      return { middle: (high - low) / 2, back: (high + low) / (2 * t) };
+    };
+    const x = side(0, 0.97 * tan * aspect), y = side(1, 0.94 * tan);
+    return new THREE.Vector3(x.middle, y.middle, Math.max(x.back, y.back)).applyQuaternion(rotation);
   }
 
   setMode(mode, fly = true) {
@@ -115,17 +137,19 @@ export class Navigation extends EventTarget {
       const size = this.bounds.getSize(new THREE.Vector3());
       const centre = this.bounds.getCenter(new THREE.Vector3());
       this.orthographic.position.copy(centre);
-      // What was at the right stays at the right, to the nearest quarter turn.
-      const yaw = yawPitch(before.quaternion)[0];
-      const quarter = Math.round(yaw / (Math.PI / 2)) * (Math.PI / 2);
-      this.orthographic.quaternion.copy(rotationOf(quarter, -Math.PI / 2));
-      const across = Math.abs(Math.sin(quarter)) > 0.5 ? [size.z, size.x] : [size.x, size.z];
+      // Along the walls; what was ahead stays ahead, to the nearest quarter turn.
+      const heading = this.heading(), quarter = Math.PI / 2;
+      const turns = Math.round((yawPitch(before.quaternion)[0] - heading) / quarter);
+      const yaw = heading + turns * quarter;
+      this.orthographic.quaternion.copy(rotationOf(yaw, -Math.PI / 2));
+      const c = Math.abs(Math.cos(yaw)), s = Math.abs(Math.sin(yaw));
+      const across = [c * size.x + s * size.z, s * size.x + c * size.z];
       this.#setOrthographicHeight(
-          1.1 * Math.max(across[1], across[0] * this.height / this.width));
+          1.04 * Math.max(across[1], across[0] * this.height / this.width));
     } else if (before === this.orthographic) {
       const yaw = yawPitch(before.quaternion)[0];
       if (mode === 'orbit') {
-        this.home();
+        this.home(fly);
       } else {
         this.perspective.position.copy(before.position);
         this.perspective.quaternion.copy(rotationOf(yaw, 0));

@@ -108,7 +108,7 @@ export class Panel {
   }
   #setCameraSize(size) {
     this.viewer.cameras.setSize(size);
-    $('camera-size-value').textContent = length(size).replace('.0 mm', ' mm');
+    $('camera-size-value').textContent = `${Math.round(100 * size)} cm`;
   }
   // The slider runs from floor to ceiling.
   #setTop() {
@@ -247,8 +247,8 @@ export class Panel {
       remove.setAttribute('aria-label', `Delete distance ${i + 1}, ${length(m.distance)}`);
       remove.addEventListener('click', () => this.viewer.measures.remove(i));
       const rows = [['height', length(m.height)], ['level', length(m.horizontal)],
-                    ['dx dy dz', [m.difference.x, m.difference.y, m.difference.z].map(length).join(', ')],
-                    ['from', coordinates(m.from)], ['to', coordinates(m.to)]];
+                    ['dx dy dz', `${coordinates(m.difference)} m`],
+                    ['from', `${coordinates(m.from)} m`], ['to', `${coordinates(m.to)} m`]];
       const details = make('dl');
       for (const [term, text] of rows) details.append(make('dt', { text: term }), make('dd', { text }));
       return make('li', {}, make('div', { className: 'head' },

@@ -4,11 +4,12 @@
 import * as THREE from 'three';
 
 import { getBitmap, getBytes, Queue } from './api.js';
-import { kModes, SurfaceLook } from './surface.js';
+import { kFrontMargin, kModes, SurfaceLook } from './surface.js';
 
 const kMagic = 0x31435452;
-const kUploadBytes = 3 << 20;       // handed to the graphics card per picture
-const kMaxTriangles = 12e6;         // of the finer levels kept; 20 bytes each
+const kUploadBytes = 3 << 20;       // handed to the graphics card per picture; where a picture takes
+const kSlowUploadBytes = 24 << 20;  // longer than that takes anyway, more
+const kMaxTriangles = 12e6;         // of the finer levels kept; 16 bytes each
 const kPreviewTexture = 1024;       // texels of the first, quick texture
 const kStripRows = 256;             // of a texture handed over per picture
 const kWantedEdgePx = 2;            // an edge longer than this on the screen asks for a finer level
@@ -32,6 +33,9 @@ function parseChunk(bytes, chunk) {
         new THREE.BufferAttribute(new Uint8Array(bytes, at, 4 * numPoints), 4, true));
   }
   at += 4 * numPoints;
+  geometry.setAttribute('normal',
+      new THREE.BufferAttribute(new Int8Array(bytes, at, 4 * numPoints), 4, true));
+  at += 4 * numPoints;
   geometry.setIndex(new THREE.BufferAttribute(new Uint16Array(bytes, at, numCorners), 1));
   geometry.boundingBox = new THREE.Box3(new THREE.Vector3(...chunk.min),
                                         new THREE.Vector3(...chunk.max));
@@ -39,8 +43,8 @@ function parseChunk(bytes, chunk) {
   return geometry;
 }
 
-// Where a ray meets a triangle; the distance, or Infinity. Both sides or the front only.
-function meet(origin, direction, positions, a, b, c, frontOnly) {
+// Where a ray meets a triangle; the distance, or Infinity. Both sides.
+function meet(origin, direction, positions, a, b, c) {
   const ax = positions[3 * a], ay = positions[3 * a + 1], az = positions[3 * a + 2];
   const ux = positions[3 * b] - ax, uy = positions[3 * b + 1] - ay, uz = positions[3 * b + 2] - az;
   const vx = positions[3 * c] - ax, vy = positions[3 * c + 1] - ay, vz = positions[3 * c + 2] - az;
@@ -48,7 +52,7 @@ function meet(origin, direction, positions, a, b, c, frontOnly) {
   const py = direction.z * vx - direction.x * vz;
   const pz = direction.x * vy - direction.y * vx;
   const determinant = ux * px + uy * py + uz * pz;
-  if (frontOnly ? determinant < 1e-14 : Math.abs(determinant) < 1e-14) return Infinity;
+  if (Math.abs(determinant) < 1e-14) return Infinity;
   const tx = origin.x - ax, ty = origin.y - ay, tz = origin.z - az;
   const u = (tx * px + ty * py + tz * pz) / determinant;
   if (u < 0 || u > 1) return Infinity;
@@ -57,6 +61,17 @@ function meet(origin, direction, positions, a, b, c, frontOnly) {
   if (v < 0 || u + v > 1) return Infinity;
   const distance = (vx * qx + vy * qy + vz * qz) / determinant;
   return distance > 1e-4 ? distance : Infinity;
+}
+
+// Whether who looks along `direction` sees the front, as the shader and the server decide it.
+function showsFront(normals, a, b, c, direction) {
+  let x = 0, y = 0, z = 0;
+  for (const i of [a, b, c]) {
+    x += normals[4 * i];
+    y += normals[4 * i + 1];
+    z += normals[4 * i + 2];
+  }
+  return x * direction.x + y * direction.y + z * direction.z < kFrontMargin * Math.hypot(x, y, z);
 }
 
 // A page of texture: small at once, then whole, strip by strip.
@@ -88,7 +103,7 @@ class PageTexture {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
     const anisotropy = gl.getExtension('EXT_texture_filter_anisotropic');
-    if (anisotropy) {
+    if (anisotropy && !this.renderer.isSoftware) {
       const most = gl.getParameter(anisotropy.MAX_TEXTURE_MAX_ANISOTROPY_EXT);
       gl.texParameterf(gl.TEXTURE_2D, anisotropy.TEXTURE_MAX_ANISOTROPY_EXT, Math.min(8, most));
     }
@@ -152,6 +167,7 @@ export class Room {
     }));
     this.numCoarse = 0;
     this.numTriangles = 0;
+    this.slow = false;  // the graphics card takes long
     this.tolerance = 1;  // times kWantedEdgePx: larger on slow graphics cards
     this.longestUpload = 0;
   }
@@ -256,12 +272,13 @@ export class Room {
   update(camera, heightPx) {
     const started = performance.now();
     let bytes = 0;
-    while (this.arrived.length > 0 && bytes < kUploadBytes) {
+    const mayTake = this.slow ? kSlowUploadBytes : kUploadBytes;
+    while (this.arrived.length > 0 && bytes < mayTake) {
       const { chunk, level, mesh } = this.arrived.shift();
       this.#accept(chunk, level, mesh);
-      bytes += 16 * mesh.geometry.attributes.position.count + 2 * mesh.geometry.index.count;
+      bytes += 20 * mesh.geometry.attributes.position.count + 2 * mesh.geometry.index.count;
     }
-    if (bytes < kUploadBytes) {
+    if (bytes < mayTake) {
       const page = this.pages.find((candidate) => candidate.pending);
       if (page?.step()) {
         page.complete = true;
@@ -363,15 +380,61 @@ export class Room {
       }
       const positions = coarse.geometry.attributes.position.array;
       const corners = coarse.geometry.index.array;
+      const normals = coarse.geometry.attributes.normal.array;
       for (let i = 0; i < corners.length; i += 3) {
-        const distance = meet(local.origin, local.direction, positions, corners[i], corners[i + 1],
-                              corners[i + 2], this.frontOnly);
+        const a = corners[i], b = corners[i + 1], c = corners[i + 2];
+        const distance = meet(local.origin, local.direction, positions, a, b, c);
         if (distance >= best) continue;
+        if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
         if (ray.origin.y + distance * ray.direction.y > this.top) continue;
         best = distance;
       }
     }
     return best < Infinity ? { distance: best, point: ray.at(best, new THREE.Vector3()) } : null;
+  }
+
+  // Some points of the room, page frame; before it is loaded the corners of its boxes.
+  samplePoints() {
+    const points = [];
+    for (const { levels: [coarse], box } of this.chunks) {
+      if (!coarse) {
+        for (let i = 0; i < 8; ++i) {
+          points.push(new THREE.Vector3(i & 1 ? box.min.x : box.max.x, i & 2 ? box.min.y : box.max.y,
+                                        i & 4 ? box.min.z : box.max.z));
+        }
+        continue;
+      }
+      const { position } = coarse.geometry.attributes;
+      for (let i = 0; i < position.count; i += 1 + (position.count >> 7)) {
+        points.push(new THREE.Vector3().fromBufferAttribute(position, i));
+      }
+    }
+    return points.map((point) => point.applyQuaternion(this.group.quaternion));
+  }
+
+  // Heading of the walls, radians in [0, pi/2): where most of what stands upright faces.
+  wallHeading() {
+    const bins = new Float64Array(90);
+    const vector = new THREE.Vector3();
+    for (const { levels: [coarse] } of this.chunks) {
+      if (!coarse) continue;
+      const { position, normal } = coarse.geometry.attributes;
+      const corners = coarse.geometry.index.array;
+      const area = new THREE.Triangle();
+      for (let i = 0; i < corners.length; i += 3) {
+        vector.fromBufferAttribute(normal, corners[i]).applyQuaternion(this.group.quaternion);
+        if (Math.abs(vector.y) > 0.2) continue;
+        area.setFromAttributeAndIndices(position, corners[i], corners[i + 1], corners[i + 2]);
+        const degrees = Math.round(Math.atan2(vector.x, vector.z) * 180 / Math.PI);
+        bins[((degrees % 90) + 90) % 90] += area.getArea();
+      }
+    }
+    let best = 0, most = -1;
+    for (let i = 0; i < 90; ++i) {
+      const sum = bins[(i + 89) % 90] + 2 * bins[i] + bins[(i + 1) % 90];
+      if (sum > most) [best, most] = [i, sum];
+    }
+    return best * Math.PI / 180;
   }
 
   // Height of the floor: where most of what lies level in the lower half of the room lies.

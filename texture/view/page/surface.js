@@ -60,9 +60,14 @@ function mapTexture(mode) {
   return texture;
 }
 
+// The front is what the scanner saw; the normals are smooth, so that at edges they lean (view_model.h).
+export const kFrontMargin = 0.05;
+
 const kVertex = `
 in vec4 tint;
 in vec4 evidence;
+uniform bool front_only;
+out float v_facing;
 out vec2 v_uv;
 out vec3 v_color;
 out vec2 v_place;
@@ -75,6 +80,11 @@ void main() {
   float compared = evidence.z < 0.9999 ? known : 0.0;
   v_evidence = vec4(evidence.x, evidence.y * 255.0, evidence.z * 255.0 * compared, compared);
   vec4 place = modelMatrix * vec4(position, 1.0);
+  // From the eye; in a picture without perspective along its axis.
+  vec3 along = isOrthographic ? -vec3(viewMatrix[0][2], viewMatrix[1][2], viewMatrix[2][2])
+                              : normalize(place.xyz - cameraPosition);
+  vec3 up = mat3(modelMatrix) * normal;
+  v_facing = front_only && dot(up, up) > 0.1 ? dot(up, along) : -1.0;
   v_place = vec2(place.y, known);
   gl_Position = projectionMatrix * viewMatrix * place;
 }`;
@@ -91,12 +101,13 @@ in vec2 v_uv;
 in vec3 v_color;
 in vec2 v_place;
 in vec4 v_evidence;
+in float v_facing;
 out vec4 pixel;
 vec3 mapped(float t) {
   return texture(ramp, vec2((clamp(t, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5)).rgb;
 }
 void main() {
-  if (v_place.x > top) discard;
+  if (v_place.x > top || v_facing > ${kFrontMargin}) discard;
   vec3 shown;
   if (mode == 0) {
     shown = textured ? texture(page, v_uv).rgb : v_color;
@@ -115,13 +126,13 @@ void main() {
 
 // The materials of all pages and what they have in common.
 export class SurfaceLook {
-  #materials = [];
   #ramps = { views: mapTexture('views'), disagreement: mapTexture('disagreement') };
   #blank = new THREE.DataTexture(new Uint8Array([120, 120, 120, 255]), 1, 1);
   #shared = {
     mode: { value: 0 },
     ramp: { value: this.#ramps.views },
     top: { value: 1e9 },
+    front_only: { value: true },
     high: { value: 1 },
     unknown: { value: new THREE.Vector3(...kUnknownColor).divideScalar(255) },
   };
@@ -130,15 +141,13 @@ export class SurfaceLook {
 
   // page: a texture or null = colours of the points.
   makeMaterial(textured) {
-    const material = new THREE.ShaderMaterial({
+    return new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
       vertexShader: kVertex,
       fragmentShader: kFragment,
-      side: THREE.FrontSide,
+      side: THREE.DoubleSide,
       uniforms: { ...this.#shared, textured: { value: textured }, page: { value: this.#blank } },
     });
-    this.#materials.push(material);
-    return material;
   }
 
   // evidence: the server's description, null in mode colour.
@@ -151,10 +160,5 @@ export class SurfaceLook {
     this.#shared.ramp.value = this.#ramps[mode] ?? this.#ramps.views;
   }
   setTop(height) { this.#shared.top.value = height; }
-  setBothSides(both) {
-    for (const material of this.#materials) {
-      material.side = both ? THREE.DoubleSide : THREE.FrontSide;
-      material.needsUpdate = true;
-    }
-  }
+  setBothSides(both) { this.#shared.front_only.value = !both; }
 }
