@@ -216,9 +216,9 @@ std::string CommandsToType(bool paired, const std::string& scans) {
   };
   std::string lines = "export QT_QPA_PLATFORM=offscreen\n";
   if (paired) {
-    lines += extract("all.db", "photos") +
-             "roomtex-associate --database_path all.db --image_path photos --output_path "
-             "associations.csv --links_path linked\n";
+    lines +=
+        "roomtex-associate --image_path photos --output_path associations.csv --links_path "
+        "linked\n";
   }
   return lines + extract("database.db", mapped) +
          "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"

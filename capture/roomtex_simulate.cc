@@ -30,6 +30,8 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
                      "light of a white pattern at 1 m, room light = 1");
   command->AddDouble("projector_focus", &options->projector_focus,
                      "metres from the projector to where its pattern is sharp");
+  command->AddBool("same_pattern", &options->same_pattern,
+                   "a mistake to study: all projectors throw the same pattern");
   command->AddDouble("finest_detail", &options->finest_detail,
                      "metres: no surface has finer detail; larger = smoother pictures and prints");
   command->AddBool("shading", &options->shading,

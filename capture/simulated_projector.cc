@@ -150,7 +150,7 @@ Projector MakeProjector(const SimulatedRoomOptions& options, int k, const Rigid&
   PatternOptions pattern;
   pattern.width = options.projector_width;
   pattern.height = options.projector_height;
-  pattern.random_seed = k + 1;
+  pattern.random_seed = options.same_pattern ? 1 : k + 1;
   Camera camera;
   camera.camera_id = static_cast<uint32_t>(k + 1);
   camera.model = CameraModel::kPinhole;

@@ -39,6 +39,7 @@ struct SimulatedRoomOptions {
   // White light at 1 m on the axis, room light = 1: 3500 lumens in a room of 150 lux.
   double projector_light = 15;
   double projector_focus = 3.2;  // metres from the lens to where the pattern is sharp
+  bool same_pattern = false;     // a mistake: all projectors throw the pattern of the first
   // Photos.
   int num_photos = 30;                          // places, if there are projectors
   int photo_width = 1936, photo_height = 1288;  // pixels
