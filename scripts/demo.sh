@@ -11,9 +11,14 @@ cmake --preset release >/dev/null
 cmake --build --preset release
 export PATH="$PWD/build/bin:$PATH" QT_QPA_PLATFORM=offscreen
 
+if [ -e "$out" ] && [ ! -e "$out/.roomtex-demo" ]; then
+  echo "demo: $out is there and was not made by this script; name another folder, or remove it." >&2
+  exit 3
+fi
 rm -rf "$out"
 mkdir -p "$out"
 cd "$out"
+touch .roomtex-demo
 
 # Prints a command, runs it; what COLMAP prints goes to colmap.log.
 say() { printf '\n$ %s\n' "$*"; }
@@ -46,5 +51,9 @@ Done. Look at
   $out/textured/texture.png  the colours in the scan's grid
   $out/aligned/              the sparse model in the scan: colmap gui --import_path $out/aligned \\
                              --database_path $out/database.db --image_path $out/capture/photos
+or walk through it, and see where the picks lie, in a browser:
+  build/bin/roomtex-view --input_path $out/textured --aligned $out/aligned --image_path $out/capture/photos
+  build/bin/roomtex-pick --input_path $out/sparse/0 --image_path $out/capture/photos \
+      --scan_path $out/capture/scan.rtpi --output_path $out/capture/picks.csv
 The numbers above compare poses and colours with the truth of the simulation.
 EOF
