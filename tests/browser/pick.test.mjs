@@ -280,6 +280,40 @@ test('picks in a second photo', async () => {
   }, {picks_file: fileOf(places.slice(0, 6))});
 });
 
+test('two scans: what is predicted in the other one is taken there', async () => {
+  const more = [
+    '--scan_path',
+    capture('capture', 'scan_1.rtpi'),
+    '--scan_poses',
+    capture('capture', 'scan_poses.txt'),
+  ];
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    const select = page.page.locator('#scan-select');
+    assert.deepEqual(await select.locator('option').allInnerTexts(), ['scan.rtpi', 'scan_1.rtpi']);
+    await page.click('photo', places[6].img);
+    const ghost =
+        await until(async () => (await page.session()).picks[6]?.predicted_scan, 'a prediction');
+    await page.saved();
+    await select.selectOption(String(1 - ghost.id));
+    await page.redrawn();
+    await page.page.setViewportSize({width: 1280, height: 720});
+    await screenshot(page.page, 'pick-two-scans');
+    await page.page.focus('#scan-pane');
+    await page.page.keyboard.press('Enter');
+    await until(async () => await select.inputValue() === String(ghost.id), 'the other scan');
+    await until(
+        async () => (await page.rows())[6].status !== 'half' ||
+            await page.page.locator('#hint').isVisible(),
+        'taken or refused');
+    if ((await page.rows())[6].status === 'half') await page.page.keyboard.press('Enter');
+    await page.rowIs(6, (row) => row.status === 'used', 'used');
+    await page.saved();
+    // The point is in the frame of the first scan, whichever scan it was picked in.
+    assert.ok(distance(page.file()[6].point, places[6].point) < 3 * kSampleSpacing);
+  }, {picks_file: fileOf(places.slice(0, 6)), more});
+});
+
 test('one pick by the keyboard alone', async () => {
   await pageOn(async (page) => {
     const {page: window} = page;

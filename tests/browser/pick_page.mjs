@@ -187,12 +187,13 @@ export class PickPage {
 }
 
 // Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
-// what `allowed` names. picks_file: what the picks file holds before.
-export async function onPage(browser, body, {image_name, picks_file = '', allowed = []}) {
+// what `allowed` names. picks_file: what the picks file holds before; more: options of the command.
+export async function onPage(
+    browser, body, {image_name, picks_file = '', allowed = [], more = []}) {
   const folder = makeFolder();
   const picks_path = folder.path('picks.csv');
   if (picks_file) writeFileSync(picks_path, picks_file);
-  const server = await servePicks(picks_path, ['--image_name', image_name]);
+  const server = await servePicks(picks_path, ['--image_name', image_name, ...more]);
   const page = await PickPage.open(browser, server, picks_path);
   try {
     await body(page, {folder, server, picks_path});

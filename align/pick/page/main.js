@@ -99,7 +99,8 @@ function chooseScan(id) {
     editor.showScan(scan);
   }
   byId('scan-select').value = String(id);
-  setText(byId('scan-name'), server.scans.length > 1 ? 'Scan' : scan.name);
+  byId('scan-name').hidden = server.scans.length > 1;
+  setText(byId('scan-name'), scan.name);
   byId('scan-name').title = `${scan.path}, ${scan.width} x ${scan.height} samples`;
   panes.scan.setPicture({
     key: `scan ${id}`,

@@ -13,7 +13,7 @@ export const kColors = {
   bad: '#ff8f80',
   worst: '#ffb057',
   ghost: '#8fd3ff',
-  vector: '#ff7ad9',
+  vector: '#ffffff',
 };
 const kRim = 'rgba(0, 0, 0, 0.8)';
 const kFont = '600 12px system-ui, "DejaVu Sans", sans-serif';
@@ -190,10 +190,11 @@ export function drawResiduals(context, view, picks) {
   return factor;
 }
 
+// Colours as in the overlays of roomtex-align.
 const kEdgeStyles = {
-  depth: {color: '#ffe066', width: 1.6, dash: []},
+  depth: {color: '#ff9cf0', width: 1.6, dash: []},
   crease: {color: '#7fe7ff', width: 1.6, dash: [7, 4]},
-  intensity: {color: '#ffb3f0', width: 1.6, dash: [2, 3]},
+  intensity: {color: '#ffe066', width: 1.6, dash: [2, 3]},
 };
 
 // edges: [{kind, points: [[x, y]...] img}]. One path per kind, on a dark line without gaps.
@@ -248,7 +249,7 @@ export function markerAt(view, markers, screen) {
 
 // What the line styles of drawEdges() mean, as elements.
 export function edgeLegend() {
-  const names = {depth: 'depth jump', crease: 'crease', intensity: 'intensity'};
+  const names = {depth: 'rim', crease: 'crease', intensity: 'intensity'};
   return Object.entries(kEdgeStyles).map(([kind, {color, width, dash}]) => {
     const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
     svg.setAttribute('viewBox', '0 0 30 8');
