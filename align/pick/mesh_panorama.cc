@@ -5,7 +5,6 @@
 
 #include "core/frames.h"
 #include "core/parallel.h"
-#include "core/ray_caster.h"
 
 namespace roomtex {
 namespace {
@@ -71,8 +70,13 @@ float IntensityAt(const Scan& mesh, const RayHit& hit) {
 
 }  // namespace
 
-Scan PanoramaOfMesh(const Scan& mesh, int num_columns, int num_threads) {
-  const RayCaster caster(mesh.points, mesh.triangles);
+int PanoramaColumns(const Scan& mesh) {
+  constexpr int kStep = 512;  // of the tiles
+  const double columns = 1.5 * std::sqrt(2.0 * static_cast<double>(mesh.points.size()));
+  return kStep * std::clamp(static_cast<int>(std::ceil(columns / kStep)), 4, 8);
+}
+
+Scan PanoramaOfMesh(const Scan& mesh, const RayCaster& caster, int num_columns, int num_threads) {
   Scan panorama;
   panorama.path = mesh.path;
   panorama.num_columns = num_columns;

@@ -14,7 +14,6 @@
 namespace roomtex {
 namespace {
 
-constexpr int kPanoramaColumns = 4096;
 constexpr int kCoarseSamples = 300000;  // of the mesh that decides which edges a photo sees
 constexpr int kRankCells = 8;           // a photo has this many cells across and down
 
@@ -78,12 +77,21 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
   progress->Stage("read scan");
   scans_ = ReadScans(input.scan_paths, input.scan_poses, input.scan_reader);
   for (const Scan& scan : scans_) {
-    if (!scan.organised) {
-      panoramas_.push_back(PanoramaOfMesh(scan, kPanoramaColumns, input.num_threads));
-    }
+    if (!scan.organised) AddPanorama(scan);
     places_.push_back(std::make_unique<ScanPlaces>(scan.organised ? scan : panoramas_.back()));
   }
   progress->Finish();
+}
+
+void PickScene::AddPanorama(const Scan& mesh) {
+  const int columns = PanoramaColumns(mesh);
+  if (scans_.size() == 1) {  // the rays of all scans are those of the mesh
+    rays_ = std::make_unique<ScanRays>(scans_);
+    panoramas_.push_back(PanoramaOfMesh(mesh, rays_->caster(), columns, input_.num_threads));
+    return;
+  }
+  const RayCaster caster(mesh.points, mesh.triangles);
+  panoramas_.push_back(PanoramaOfMesh(mesh, caster, columns, input_.num_threads));
 }
 
 PickScene::~PickScene() {
@@ -148,7 +156,7 @@ void PickScene::Work() {
     }
     changed_.notify_all();
   };
-  rays_ = std::make_unique<ScanRays>(scans_);
+  if (!rays_) rays_ = std::make_unique<ScanRays>(scans_);
   publish([&] { rays_ready_ = rays_.get(); });
   if (stopping_) return;
   auto edges = std::make_unique<Edges>();

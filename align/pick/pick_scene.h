@@ -78,6 +78,7 @@ class PickScene {
 
  private:
   void AddPhotos();
+  void AddPanorama(const Scan& mesh);
   void Work();
 
   const PickSceneInput input_;

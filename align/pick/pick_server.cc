@@ -138,7 +138,8 @@ void PickServer::AddPictures() {
   }
   for (int scan = 0; scan < scene_.num_scans(); ++scan) {
     const ScanPlaces& places = scene_.places(scan);
-    for (const std::string& name : ScanPictureNames()) {
+    pictures_.push_back(ScanPicturesOf(places.scan()));
+    for (const std::string& name : pictures_.back()) {
       tiles_.Add(ScanPicture(scan, name), places.width(), places.height(),
                  ImageTiles::Format::kJpeg,
                  [&places, name] { return DrawScanPicture(places, name); });
@@ -197,7 +198,7 @@ Json PickServer::State() {
   json["scans"] = Json::array();
   for (int scan = 0; scan < scene_.num_scans(); ++scan) {
     const ScanPlaces& places = scene_.places(scan);
-    const TilePyramid pyramid = tiles_.Pyramid(ScanPicture(scan, ScanPictureNames()[0]));
+    const TilePyramid pyramid = tiles_.Pyramid(ScanPicture(scan, "shaded"));
     Json one;
     one["id"] = scan;
     one["name"] = std::filesystem::path(places.scan().path).filename().string();
@@ -207,7 +208,7 @@ Json PickServer::State() {
     one["tile_size"] = pyramid.tile_size;
     one["num_levels"] = pyramid.num_levels;
     one["aspect"] = places.aspect();
-    one["pictures"] = ScanPictureNames();
+    one["pictures"] = pictures_[scan];
     json["scans"].push_back(one);
   }
   json["photos"] = Photos(*snapshot);

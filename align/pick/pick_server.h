@@ -56,6 +56,7 @@ class PickServer {
   const PickScene& scene_;
   PickSession* const session_;
   const Setup setup_;
+  std::vector<std::vector<std::string>> pictures_;  // of each scan
   ImageTiles tiles_;
   std::mutex thumbnails_mutex_;  // one is made at a time: tiles are more urgent
   std::map<int, std::shared_ptr<const std::string>> thumbnails_;

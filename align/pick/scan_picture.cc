@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <opencv2/imgproc.hpp>
 
@@ -63,13 +64,15 @@ cv::Mat1f LocalMean(const cv::Mat1f& values, const cv::Mat1f& weights, int reach
   return mean;
 }
 
+float Finite(float value) { return std::isfinite(value) ? value : 0; }
+
 cv::Mat DrawLocal(const ScanPlaces& places) {
   // The root of the intensity itself: grey levels of 8 bits have too few steps in the dark.
   cv::Mat1f values(places.height(), places.width());
   for (int row = 0; row < values.rows; ++row) {
     for (int column = 0; column < values.cols; ++column) {
       values(row, column) =
-          std::sqrt(std::max(0.0f, places.scan().intensity[places.SampleAt(column, row)]));
+          std::sqrt(std::max(0.0f, Finite(places.scan().intensity[places.SampleAt(column, row)])));
     }
   }
   const cv::Mat1b mask = MeasuredMask(places);
@@ -158,6 +161,17 @@ cv::Mat DrawShaded(const ScanPlaces& places) {
 const std::vector<std::string>& ScanPictureNames() {
   static const std::vector<std::string> names = {"intensity", "local", "shaded"};
   return names;
+}
+
+std::vector<std::string> ScanPicturesOf(const Scan& scan) {
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i)) || !std::isfinite(scan.intensity[i])) continue;
+    low = std::min(low, scan.intensity[i]);
+    high = std::max(high, scan.intensity[i]);
+  }
+  if (low == high) return {"shaded"};
+  return ScanPictureNames();
 }
 
 cv::Mat DrawScanPicture(const ScanPlaces& places, const std::string& name) {

@@ -13,6 +13,8 @@ namespace roomtex {
 // "intensity": 1st to 99th percentile grey. "local": every place against what surrounds it, so that
 // dark walls become readable. "shaded": the surface by its normals, depth edges dark.
 const std::vector<std::string>& ScanPictureNames();
+// Those that show something, the best first: without intensities only the shading.
+std::vector<std::string> ScanPicturesOf(const Scan& scan);
 
 // Missing samples are dark blue. An unknown name gives an empty picture.
 cv::Mat DrawScanPicture(const ScanPlaces& places, const std::string& name);

@@ -119,8 +119,8 @@ class FakeProgram : public PickPage {
 };
 
 TEST_F(FakeProgram, ARunningOneIsFollowedAndEnded) {
-  ServeWith("echo 'read model                   0.09 s' >&2\necho $$ > " + (folder_ / "pid") +
-            "\nsleep 100 & wait\n");
+  ServeWith("echo $$ > " + (folder_ / "pid") +
+            "\necho 'read model                   0.09 s' >&2\nsleep 100 & wait\n");
   ASSERT_EQ(Post("align").status, 200);
   Json state = WaitFor("stage", "read scan");
   EXPECT_EQ(state["state"], "running");

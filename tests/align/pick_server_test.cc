@@ -451,5 +451,56 @@ TEST_F(PickPage, EdgesOfTheScanLieOnThoseOfThePhoto) {
   }
 }
 
+// The same room as a mesh without a grid beside the scan: a page with two scans.
+TEST(PickScene, TakesAMeshAndSeveralScans) {
+  const TempFolder folder;
+  const Scan& scan = ThePickRoom().scene().scans()[0];
+  WriteScan(scan, BuildScanMesh(scan, ScanMeshOptions()), folder / "room.ply");
+  WriteBytes(folder / "poses.txt", "room.rtpi 1 0 0 0 0 0 0\nroom.ply 1 0 0 0 0 0 0\n");
+  PickSceneInput input = ThePickRoom().input();
+  input.scan_paths.push_back(folder / "room.ply");
+  input.scan_poses = folder / "poses.txt";
+  Progress progress(true);
+  PickScene scene(input, &progress);
+  ASSERT_EQ(scene.num_scans(), 2);
+  EXPECT_FALSE(scene.scans()[1].organised);
+  EXPECT_EQ(scene.places(1).width(), 2048);
+  scene.Prepare();
+  const auto never = [] { return false; };
+  const ScanRays* rays = scene.WaitForRays(never);
+  ASSERT_NE(scene.WaitForEdges(never), nullptr);
+  const int photo = ThePickRoom().clicked_photo();
+  const std::vector<SessionPick> truth = ThePickRoom().SmoothPicks(photo, 8);
+  std::vector<SessionPick> picks = truth;
+  int num_on_mesh = 0;
+  for (SessionPick& pick : picks) {  // every other one on the mesh's picture
+    const auto place = scene.places(1).PlaceOf(*pick.x_in_scan);
+    if (!place || num_on_mesh == 4) continue;
+    const ScanPlaces::Found found = scene.places(1).PointAt(*place);
+    if (found.reason != ScanPlaces::Reason::kNone) continue;
+    if (!((found.x_in_scan - *pick.x_in_scan).norm() < 0.003)) continue;  // hidden from there
+    pick.x_in_scan = found.x_in_scan;
+    pick.spot = ScanSpot{1, *place};
+    ++num_on_mesh;
+  }
+  ASSERT_GE(num_on_mesh, 2);
+  const PickSolution solution = PickSolver(scene).Solve(picks);
+  EXPECT_LT(solution.photos.at(picks[0].image_name).rms_px, 1.0);
+  EXPECT_THAT(solution.photos.at(picks[0].image_name).cam_from_scan,
+              IsNearRigid(ThePickRoom().room().CamFromScan(photo), 5e-3, 5e-3));
+  // The photo on the picture of the mesh.
+  const Rigid cam_from_scan = ThePickRoom().room().CamFromScan(photo);
+  const cv::Mat4b back = DrawBackProjection(scene, *rays, scene.photos()[photo], cam_from_scan, 1,
+                                            [] { return false; });
+  ASSERT_EQ(back.size(), cv::Size(2048, 1024));
+  int seen = 0;
+  for (const cv::Vec4b& color : back) seen += color[3] != 0;
+  EXPECT_GT(seen, 20000);
+  EXPECT_LT(seen, 1024 * 2048 / 3);
+  EXPECT_TRUE(DrawBackProjection(scene, *rays, scene.photos()[photo], cam_from_scan, 1, [] {
+                return true;
+              }).empty());
+}
+
 }  // namespace
 }  // namespace roomtex

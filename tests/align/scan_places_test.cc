@@ -230,6 +230,21 @@ TEST(ScanPicture, MissingSamplesAreBlueAndShadingTellsWallsApart) {
   EXPECT_LT(grey({0.5, 0.1, -1}), 20);  // the pillar's rim
 }
 
+TEST(ScanPicture, WithoutIntensitiesOnlyTheShadingShowsSomething) {
+  Scan scan = BoxScan(false);
+  EXPECT_EQ(ScanPicturesOf(scan), ScanPictureNames());
+  for (float& intensity : scan.intensity) intensity = 7;
+  EXPECT_EQ(ScanPicturesOf(scan), std::vector<std::string>{"shaded"});
+}
+
+TEST(MeshPanorama, HasAsManyColumnsAsTheMeshCanFill) {
+  Scan mesh;
+  for (const auto& [vertices, columns] : {std::pair{10, 2048}, {1900000, 3072}, {20000000, 4096}}) {
+    mesh.points.resize(vertices);
+    EXPECT_EQ(PanoramaColumns(mesh), columns);
+  }
+}
+
 TEST(MeshPanorama, ShowsTheMeshFromInsideInItsOwnFrame) {
   Scan scan = BoxScan(false);
   scan.up = Eigen::Vector3d::UnitY();
@@ -238,7 +253,8 @@ TEST(MeshPanorama, ShowsTheMeshFromInsideInItsOwnFrame) {
   mesh.num_columns = static_cast<int>(scan.points.size());
   mesh.num_rows = 1;
   mesh.triangles = BuildScanMesh(scan, ScanMeshOptions());
-  const Scan panorama = PanoramaOfMesh(mesh, 512, 2);
+  const RayCaster caster(mesh.points, mesh.triangles);
+  const Scan panorama = PanoramaOfMesh(mesh, caster, 512, 2);
   const ScanPlaces places(panorama);
   EXPECT_FALSE(places.flipped());
   EXPECT_TRUE(places.closed());
@@ -252,7 +268,7 @@ TEST(MeshPanorama, ShowsTheMeshFromInsideInItsOwnFrame) {
   ASSERT_TRUE(right);
   EXPECT_GT(right->x(), place->x());
   // One and two threads: the same.
-  const Scan again = PanoramaOfMesh(mesh, 512, 1);
+  const Scan again = PanoramaOfMesh(mesh, caster, 512, 1);
   for (size_t i = 0; i < panorama.points.size(); ++i) {
     if (panorama.IsMissing(static_cast<int>(i))) continue;
     ASSERT_EQ(panorama.points[i], again.points[i]);
