@@ -79,6 +79,8 @@ export class Cameras {
       colors.push(color.r, color.g, color.b, color.r, color.g, color.b);
     };
     for (const camera of this.list) {
+      // To who stands in a camera the others would only be in the way.
+      if (this.standing && camera !== this.hovered) continue;
       if (camera === this.standing || this.near.has(camera)) continue;
       color.set(camera === this.hovered ? kColors.hovered
           : camera === this.chosen ? kColors.chosen
@@ -110,7 +112,7 @@ export class Cameras {
 
   // The camera whose frustum the ray meets before `limit`, or whose centre is within a few pixels.
   find(ray, limit, pixelAngle) {
-    if (!this.visible) return null;
+    if (!this.visible || this.standing) return null;
     let best = null, nearest = limit;
     const c = [0, 1, 2, 3].map(() => new THREE.Vector3()), at = new THREE.Vector3();
     for (const camera of this.list) {
@@ -211,6 +213,7 @@ export class Cameras {
   async stand(camera) {
     this.leave();
     this.standing = camera;
+    this.setHovered(null);
     this.setChosen(camera);
     if (!camera.photo) return;
     try {

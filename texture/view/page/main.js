@@ -48,7 +48,7 @@ class Viewer {
       cast: (ray) => this.room.cast(ray),
       floor: () => this.floorHeight(),
       heading: () => this.wallHeading(),
-      sample: () => this.room.samplePoints(),
+      sample: () => ({ room: this.room.samplePoints(), cameras: this.#camerasAround() }),
       invalidate,
     });
     const box = new THREE.Box3();
@@ -102,6 +102,11 @@ class Viewer {
     return this.knownFloor;
   }
 
+  // Where the cameras stand, but for those that are far from everything.
+  #camerasAround() {
+    const around = this.navigation.bounds.clone().expandByScalar(0.5 * this.navigation.size);
+    return this.cameras.list.map(({ position }) => position).filter((p) => around.containsPoint(p));
+  }
   wallHeading() {
     if (this.knownHeading === undefined || !this.room.loaded) this.knownHeading = this.room.wallHeading();
     return this.knownHeading;

@@ -13,7 +13,7 @@ const reducedMotion = matchMedia('(prefers-reduced-motion: reduce)');
 
 export class Navigation extends EventTarget {
   // canvas takes pointer and keys; cast(ray) gives {distance, point} | null; floor() a height.
-  // heading() that of the walls; sample() gives points of the room.
+  // heading() that of the walls; sample() gives {room, cameras}, points.
   constructor(canvas, { cast, floor, heading, sample, invalidate }) {
     super();
     this.canvas = canvas;
@@ -114,23 +114,27 @@ export class Navigation extends EventTarget {
   #framing(rotation) {
     const { tan, aspect } = this.#freeLens();
     const inverse = rotation.clone().invert();
-    const points = this.sample().map((p) => p.clone().applyQuaternion(inverse));
+    const turned = (points) => points.map((p) => p.clone().applyQuaternion(inverse));
+    const { room, cameras } = this.sample();
+    const points = turned(room), all = turned(cameras);
     // Of the planes through the borders of the picture each has all points on one side: where they
     // meet, the eye is. u = x or y, depth -z: u <= eye + t (eye_z - z), so eye_z >= ...
     const bound = (values) => values.sort((a, b) => a - b)[Math.floor(0.999 * (values.length - 1))];
     const side = (k, t) => {
-      const high = bound(points.map((p) => p.getComponent(k) + t * p.z));
-      const low = bound(points.map((p) => -p.getComponent(k) + t * p.z));
+      const reach = (sign) => {
+        const of = (p) => sign * p.getComponent(k) + t * p.z;
+        return Math.max(bound(points.map(of)), ...all.map(of));
+      };
+      const high = reach(1), low = reach(-1);
       return { middle: (high - low) / 2, back: (high + low) / (2 * t) };
     };
-    const x = side(0, 0.97 * tan * aspect), y = side(1, 0.94 * tan);
+    const x = side(0, 0.93 * tan * aspect), y = side(1, 0.9 * tan);
     return new THREE.Vector3(x.middle, y.middle, Math.max(x.back, y.back)).applyQuaternion(rotation);
   }
 
   setMode(mode, fly = true) {
     if (mode === this.mode && !this.standing) return;
     const before = this.camera;
-    const target = this.#pivotInView();
     this.leaveCamera();
     this.#switchMode(mode);
     if (mode === 'top') {
@@ -156,10 +160,10 @@ export class Navigation extends EventTarget {
       }
     }
     if (mode === 'walk') {
-      const outside = !this.bounds.containsPoint(this.perspective.position);
-      const position = (outside ? (this.bounds.containsPoint(target)
-          ? target : this.bounds.getCenter(new THREE.Vector3()))
-          : this.perspective.position).clone();
+      // From where one is, unless that is far outside.
+      const near = this.bounds.clone().expandByScalar(2).containsPoint(this.perspective.position);
+      const position = near ? this.perspective.position.clone()
+          : this.bounds.getCenter(new THREE.Vector3());
       position.y = this.floor() + this.eyeHeight;
       const yaw = yawPitch(this.perspective.quaternion)[0];
       if (fly) this.flyTo(position, rotationOf(yaw, 0));

@@ -437,7 +437,7 @@ export class Room {
     return best * Math.PI / 180;
   }
 
-  // Height of the floor: where most of what lies level in the lower half of the room lies.
+  // Height of the floor: the lowest height at which much lies level; tables may have more of it.
   floorHeight() {
     const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3();
     const box = new THREE.Box3();
@@ -460,11 +460,12 @@ export class Room {
         areas.set(bin, (areas.get(bin) ?? 0) + normal.y);
       }
     }
-    let best = Math.floor(box.min.y / step), most = 0;
-    for (const [bin, area] of areas) {
-      const sum = area + (areas.get(bin + 1) ?? 0);
-      if (sum > most) [best, most] = [bin, sum];
-    }
-    return (best + 1) * step;
+    const sumAt = (bin) => areas.get(bin) + (areas.get(bin + 1) ?? 0);
+    const bins = [...areas.keys()].sort((a, b) => a - b);
+    const most = Math.max(0, ...bins.map(sumAt));
+    let bin = bins.find((candidate) => sumAt(candidate) >= 0.2 * most);
+    if (bin === undefined) return box.min.y;
+    if (areas.has(bin + 1) && sumAt(bin + 1) > sumAt(bin)) ++bin;
+    return (bin + 1) * step;
   }
 }
