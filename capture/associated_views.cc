@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "capture/associated_views_photo.h"
@@ -346,6 +347,7 @@ class Finder {
       result_.pairs.push_back(Describe(*c, best_of_plain.at(c->plain()) != c));
     }
     CollectMoved();
+    WarnOfBrightness();
     for (int i = 0; i < static_cast<int>(photos_.size()); ++i) {
       result_.num_photos += IsUsable(i);
       if (best_of_patterned.count(i) > 0 || best_of_plain.count(i) > 0) continue;
@@ -368,14 +370,7 @@ class Finder {
     pair.found_by = c.found_by;
     pair.by_keypoints = c.by_keypoints;
     pair.is_spare = is_spare;
-    if (pair.brightness_ratio < kEqualBrightness) {
-      const bool equal = pair.brightness_ratio > 1 / kEqualBrightness;
-      char ratio[32];
-      std::snprintf(ratio, sizeof ratio, "%.2f", pair.brightness_ratio);
-      result_.warnings.push_back(
-          pair.patterned_image + " is taken for patterned because it has more detail; it is " +
-          (equal ? "as bright as " : "darker than ") + pair.plain_image + " (ratio " + ratio + ")");
-    }
+    if (pair.brightness_ratio < kEqualBrightness) not_brighter_.push_back(pair);
     return pair;
   }
 
@@ -390,6 +385,21 @@ class Finder {
         result_.moved.begin(), result_.moved.end(), [](const MovedPair& a, const MovedPair& b) {
           return std::tie(a.first_image, a.second_image) < std::tie(b.first_image, b.second_image);
         });
+  }
+
+  void WarnOfBrightness() {
+    if (not_brighter_.empty()) return;
+    const AssociatedPair& first = not_brighter_[0];
+    char ratio[32];
+    std::snprintf(ratio, sizeof ratio, "%.2f", first.brightness_ratio);
+    result_.warnings.push_back(
+        std::to_string(not_brighter_.size()) +
+        " patterned photos are not brighter than their plain twins and were told by their "
+        "detail: " +
+        first.patterned_image + " is " + ratio + " times as bright as " + first.plain_image +
+        (first.exif_brightness ? " (exposures taken into account)"
+                               : " (no exposures in EXIF: automatic exposure hides the light)") +
+        (not_brighter_.size() > 1 ? ", and so on" : ""));
   }
 
   std::string WhySingle(int i) const {
@@ -442,6 +452,7 @@ class Finder {
   std::set<std::pair<int, int>> compared_, measured_;
   std::vector<Candidate> candidates_;
   std::map<int, int> other_size_;
+  std::vector<AssociatedPair> not_brighter_;
   Associations result_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
@@ -40,6 +41,32 @@ std::vector<std::string> SplitCsvLine(std::string line) {
   return fields;
 }
 
+// "a.jpg, b.jpg, c.jpg and 4 more".
+std::string Enumerate(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string text;
+  for (size_t i = 0; i < names.size() && i < kShown; ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+// Plain photo by patterned photo. A photo cannot be both: the pattern would be taken for colour.
+std::map<std::string, std::string> ReadPlainOf(const std::string& path) {
+  std::map<std::string, std::string> plain_of;
+  std::set<std::string> plain;
+  for (const AssociatedPhotos& pair : ReadAssociations(path)) {
+    plain_of[pair.patterned_image] = pair.plain_image;
+    if (!pair.plain_image.empty()) plain.insert(pair.plain_image);
+  }
+  for (const auto& [patterned, twin] : plain_of) {
+    if (plain.count(patterned) > 0) {
+      throw InputError(path, "", "names " + patterned + " as a patterned photo and as a plain one",
+                       "Correct the table: the pattern would be taken for colour");
+    }
+  }
+  return plain_of;
+}
+
 // Which file gives the colour for which registered photo: registered name -> file name.
 std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
                                                const PhotoSources& sources,
@@ -49,19 +76,17 @@ std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
     for (const auto& [id, image] : model.images) file_of[image.name] = image.name;
     return file_of;
   }
-  std::map<std::string, std::string> plain_of;
-  std::set<std::string> plain;
-  for (const AssociatedPhotos& pair : ReadAssociations(sources.associations_path)) {
-    plain_of[pair.patterned_image] = pair.plain_image;
-    if (!pair.plain_image.empty()) plain.insert(pair.plain_image);
-  }
-  std::set<std::string> used;
-  int without_twin = 0, unknown = 0;
+  const auto plain_of = ReadPlainOf(sources.associations_path);
+  std::set<std::string> plain, used;
+  for (const auto& [patterned, twin] : plain_of) plain.insert(twin);
+  std::vector<std::string> without_twin, missing;
   for (const auto& [id, image] : model.images) {
     const auto found = plain_of.find(image.name);
     if (found == plain_of.end()) continue;
     if (found->second.empty()) {
-      ++without_twin;
+      without_twin.push_back(image.name);
+    } else if (!std::filesystem::exists(sources.image_path + "/" + found->second)) {
+      missing.push_back(found->second + " (twin of " + image.name + ")");
     } else if (used.insert(found->second).second) {
       file_of[image.name] = found->second;
     }
@@ -69,15 +94,25 @@ std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
   for (const auto& [id, image] : model.images) {
     if (plain_of.count(image.name) > 0) continue;
     if (plain.count(image.name) == 0) {
-      ++unknown;
+      without_twin.push_back(image.name);
     } else if (used.insert(image.name).second) {
       file_of[image.name] = image.name;
     }
   }
-  if (without_twin + unknown > 0) {
-    warnings->push_back(std::to_string(without_twin + unknown) +
+  if (!without_twin.empty()) {
+    warnings->push_back(std::to_string(without_twin.size()) +
                         " registered photos have no plain twin in " + sources.associations_path +
-                        " and give no colour");
+                        " and give no colour: " + Enumerate(without_twin));
+  }
+  if (!missing.empty()) {
+    warnings->push_back(std::to_string(missing.size()) + " plain photos of " +
+                        sources.associations_path + " are not in " + sources.image_path +
+                        " and give no colour: " + Enumerate(missing));
+  }
+  if (file_of.empty() && !missing.empty()) {
+    throw InputError(sources.image_path, "",
+                     "holds none of the plain photos that " + sources.associations_path + " names",
+                     "Give the folder with the patterned and the plain photos");
   }
   if (file_of.empty()) {
     throw InputError(sources.associations_path, "",

@@ -22,9 +22,10 @@ struct PhotoList {
 
 // The registered photos of a model in the scan frame. With associations the plain twin of every
 // registered patterned photo takes its place; registered photos that the table knows only as plain
-// ones stay, those that it does not know are left out, because the pattern may be on them. Every
-// file is looked at: missing files, no image, another shape than the camera's make an InputError; a
-// photo of the same shape but another size gets a scaled camera.
+// ones stay, those that it does not know are left out, because the pattern may be on them, and so
+// are those whose plain twin is not in the folder. Every file is looked at: other missing files, no
+// image, another shape than the camera's make an InputError; a photo of the same shape but another
+// size gets a scaled camera.
 PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sources);
 
 // CSV with a header that names patterned_image and plain_image among its columns. Pairs in file
