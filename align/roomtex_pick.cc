@@ -4,13 +4,15 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <memory>
+#include <optional>
 
-#include "align/pick/open_page.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_server.h"
 #include "align/pick/pick_session.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/open_browser.h"
 #include "pick_page.h"
 
 namespace roomtex {
@@ -93,12 +95,10 @@ void ServePicking(Arguments a, bool port_given, const Command::Context& context)
       StartServer(scene, &session, {a.server, a.image_name, a.aligned_path, FindAlignProgram()},
                   port_given, context);
   std::cout << server->server().Url() << "\n" << server->server().SshLine() << std::endl;
-  OpenedPage opened;
-  if (a.server.open) opened = OpenPage(server->server().Url());
-  if (!opened.problem.empty()) context.Warn(opened.problem);
+  std::optional<OpenBrowser> browser;
+  if (a.server.open) browser.emplace(server->server().Url());
+  if (browser && !browser->problem().empty()) context.Warn(browser->problem());
   server->Wait();
-  std::error_code ignored;
-  if (!opened.folder.empty()) std::filesystem::remove_all(opened.folder, ignored);
   if (!session.SaveAgain()) throw InputError(a.output_path, "", session.Now()->save_error, "");
   const auto now = session.Now();
   context.report["num_picks"] = now->picks.size();
