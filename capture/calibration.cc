@@ -208,12 +208,13 @@ class PhotoSelection {
 std::string ReasonOf(const PhotoSelection::Dropped& dropped, double sigma, double edge_width,
                      double median_edge_width) {
   const auto num_bad = std::count(dropped.view.used.begin(), dropped.view.used.end(), false);
-  std::string reason = "its corners miss by " + Number(dropped.sigma) +
-                       " px, those of the median photo by " + Number(sigma) + " px";
-  if (num_bad > 0) {
-    reason = std::to_string(num_bad) + " of its " + std::to_string(dropped.view.used.size()) +
-             " corners contradict the other photos";
-  }
+  const auto num_corners = static_cast<long>(dropped.view.used.size());
+  const std::string reason = 4 * num_bad > num_corners
+                                 ? std::to_string(num_bad) + " of its " +
+                                       std::to_string(num_corners) +
+                                       " corners contradict the other photos"
+                                 : "its corners miss by " + Number(dropped.sigma) +
+                                       " px, those of the median photo by " + Number(sigma) + " px";
   if (edge_width > 1.5 * median_edge_width && median_edge_width > 0) {
     return reason + ": blurred (edges " + Number(edge_width, "%.1f") +
            " px wide, in the median photo " + Number(median_edge_width, "%.1f") + " px)";

@@ -98,9 +98,12 @@ class Drawing {
       if (photo.x_in_img.cols() == 0) continue;
       for (int i = 0; i < photo.x_in_img.cols(); ++i) {
         const bool good = photo.used && photo.corner_used[i];
-        cv::circle(picture_, Fixed(InPicture(photo.x_in_img.col(i))), (good ? 2 : 3) << kShift,
+        cv::circle(picture_, Fixed(InPicture(photo.x_in_img.col(i))), (good ? 3 : 5) << kShift,
                    good ? kDot : kRed, good ? cv::FILLED : 1, cv::LINE_AA, kShift);
       }
+      if (photo.used) continue;
+      const Eigen::Vector2d first = InPicture(photo.x_in_img.rowwise().minCoeff());
+      Write(photo.name, {static_cast<int>(first.x()), static_cast<int>(first.y()) - 10}, kRed);
     }
   }
 

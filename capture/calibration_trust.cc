@@ -16,7 +16,7 @@ namespace {
 constexpr int kCellsAlong = 12;       // cells of the coverage along the longer side
 constexpr double kNearCorner = 0.15;  // of the diagonal: so near a corner of the picture counts
 constexpr double kWantedShare = 0.6;  // of the cells; below it is a warning
-constexpr double kWantedRadius = 0.8;
+constexpr int kWantedCorners = 3;     // of the picture
 constexpr double kWantedCornerSigma = 0.5;  // pixels
 constexpr int kMaxPlaces = 150;             // where cameras are compared
 constexpr double kManyDropped = 1.0 / 3;
@@ -74,7 +74,7 @@ void WarnOfCoverage(const CalibrationOptions& options, Calibration* result) {
         Number(100 * coverage.radius, "%.0f") +
         " % of the way to its corners): what the lens does outside is not known; photograph the "
         "board near all borders and corners too");
-  } else if (coverage.radius < kWantedRadius || coverage.share < kWantedShare) {
+  } else if (reached < kWantedCorners || coverage.share < kWantedShare) {
     result->warnings.push_back("boards cover " + Number(100 * coverage.share, "%.0f") +
                                " % of the picture and reach " + std::to_string(reached) +
                                " of its corners: add photos with the board near the others");

@@ -152,7 +152,11 @@ void Run(Arguments* a, const Command::Context& context) {
   const Calibration calibration = Calibrate(photos, board, a->calibration, a->image_path);
   FillReport(calibration, board, &context.report);
   for (const std::string& warning : calibration.warnings) context.Warn(warning);
-  for (const std::string& reason : calibration.reasons) context.report.SetUntrusted(reason);
+  std::string reasons;
+  for (const std::string& reason : calibration.reasons) {
+    reasons += (reasons.empty() ? "" : "; ") + reason;
+  }
+  if (!reasons.empty()) context.report.SetUntrusted(reasons);
   context.progress.Note(calibration.why_model);
 
   context.progress.Stage("write");

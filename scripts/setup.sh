@@ -11,6 +11,7 @@ packages=(
   libmeshoptimizer-dev
   libboost-dev libgtest-dev libgmock-dev libbenchmark-dev
   chromium
+  opencv-doc  # its sample photos of a calibration board, for a test
 )
 # The page of roomtex-view is built with npm, the browser tests run with Node: any that is there already
 # will do.
