@@ -63,10 +63,17 @@ TEST_F(ViewChunksOfAWall, TheFullLevelIsTheMesh) {
     const auto full = chunks_->Make(static_cast<int>(c), ViewChunks::kFull);
     ASSERT_EQ(full->corners.size(), 3 * chunk.num_triangles());
     ASSERT_EQ(full->points.size(), static_cast<size_t>(chunk.num_vertices));
-    for (size_t i = 0; i < full->corners.size(); ++i) {
-      const Triangle& t = model_->triangles[chunks_->order()[chunk.first + i / 3]];
-      ASSERT_EQ(full->points[full->corners[i]], static_cast<uint32_t>(t[i % 3]));
+    std::multiset<std::array<uint32_t, 3>> sent, expected;
+    for (size_t i = 0; i < full->corners.size(); i += 3) {
+      sent.insert({full->points[full->corners[i]], full->points[full->corners[i + 1]],
+                   full->points[full->corners[i + 2]]});
     }
+    for (size_t i = chunk.first; i < chunk.end; ++i) {
+      const Triangle& t = model_->triangles[chunks_->order()[i]];
+      expected.insert(
+          {static_cast<uint32_t>(t[0]), static_cast<uint32_t>(t[1]), static_cast<uint32_t>(t[2])});
+    }
+    EXPECT_TRUE(sent == expected);
   }
 }
 

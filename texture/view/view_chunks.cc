@@ -98,6 +98,26 @@ void Measure(const ViewModel& model, const uint32_t* triangles, ViewChunk* chunk
   chunk->spacing = *middle;
 }
 
+// Triangles in an order in which a graphics card computes each point once or twice, points in the
+// order in which they are met.
+ViewChunks::Geometry Arrange(const std::vector<uint32_t>& points,
+                             const std::vector<unsigned int>& corners) {
+  ViewChunks::Geometry geometry;
+  std::vector<unsigned int> order(corners.size());
+  meshopt_optimizeVertexCache(order.data(), corners.data(), corners.size(), points.size());
+  std::vector<int> number(points.size(), -1);
+  geometry.points.reserve(points.size());
+  geometry.corners.reserve(order.size());
+  for (const unsigned int corner : order) {
+    if (number[corner] < 0) {
+      number[corner] = static_cast<int>(geometry.points.size());
+      geometry.points.push_back(points[corner]);
+    }
+    geometry.corners.push_back(static_cast<uint16_t>(number[corner]));
+  }
+  return geometry;
+}
+
 template <typename T>
 void Append(const T* values, size_t count, std::string* bytes) {
   bytes->append(reinterpret_cast<const char*>(values), count * sizeof(T));
@@ -158,21 +178,21 @@ ViewChunks::ViewChunks(const ViewModel& model, const ViewChunkOptions& options)
 }
 
 ViewChunks::Geometry ViewChunks::MakeFull(const ViewChunk& chunk) const {
-  Geometry geometry;
   PointNumbers numbers(static_cast<size_t>(chunk.num_vertices));
-  geometry.corners.reserve(3 * chunk.num_triangles());
+  std::vector<unsigned int> corners;
+  corners.reserve(3 * chunk.num_triangles());
   for (size_t i = chunk.first; i < chunk.end; ++i) {
     for (const int corner : model_.triangles[order_[i]]) {
-      geometry.corners.push_back(static_cast<uint16_t>(numbers(static_cast<uint32_t>(corner))));
+      corners.push_back(numbers(static_cast<uint32_t>(corner)));
     }
   }
-  geometry.points = std::move(numbers.points);
-  return geometry;
+  return Arrange(numbers.points, corners);
 }
 
 ViewChunks::Geometry ViewChunks::Simplify(const ViewChunk& chunk, double share,
                                           double tolerance) const {
-  Geometry geometry;
+  double largest_error = 0;
+  std::vector<unsigned int> all_corners;
   PointNumbers numbers(static_cast<size_t>(chunk.num_vertices) / 8);
   const auto simplify = [&](size_t first, size_t end) {
     PointNumbers local(end - first);
@@ -197,9 +217,9 @@ ViewChunks::Geometry ViewChunks::Simplify(const ViewChunk& chunk, double share,
                                    local.points.size(), kStride, 3 * std::max<size_t>(wanted, 1),
                                    allowed, meshopt_SimplifyLockBorder, &error));
     for (const unsigned int corner : result) {
-      geometry.corners.push_back(static_cast<uint16_t>(numbers(local.points[corner])));
+      all_corners.push_back(numbers(local.points[corner]));
     }
-    geometry.error = std::max(geometry.error, static_cast<double>(error * scale));
+    largest_error = std::max(largest_error, static_cast<double>(error * scale));
   };
   // The ranges that the constructor's split ended with.
   const std::function<void(size_t, size_t)> visit = [&](size_t first, size_t end) {
@@ -209,7 +229,8 @@ ViewChunks::Geometry ViewChunks::Simplify(const ViewChunk& chunk, double share,
     visit(middle, end);
   };
   visit(chunk.first, chunk.end);
-  geometry.points = std::move(numbers.points);
+  Geometry geometry = Arrange(numbers.points, all_corners);
+  geometry.error = largest_error;
   return geometry;
 }
 

@@ -51,7 +51,7 @@ class ViewChunks {
 
   // One level of a chunk. May be called from several threads.
   struct Geometry {
-    std::vector<uint32_t> points;   // indices into ViewModel::points
+    std::vector<uint32_t> points;   // indices into ViewModel::points, in the order of their use
     std::vector<uint16_t> corners;  // three per triangle, into points
     double error = 0;               // metres, as in the options
   };

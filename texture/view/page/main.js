@@ -134,7 +134,7 @@ class Viewer {
     if (this.#isDrawing()) return this.invalidate();  // the last picture is not finished
     const pause = now - (this.lastFrame ?? now);
     this.lastFrame = now;
-    const goesOn = this.navigation.step(this.drewLast ? Math.min(pause, 200) / 1000 : 0.016);
+    const goesOn = this.navigation.step(this.drewLast ? Math.min(pause, 300) / 1000 : 0.016);
     this.room.coarseOnly = this.room.slow && this.navigation.moving;
     const more = this.draw();
     this.drewLast = goesOn;

@@ -335,9 +335,9 @@ export class Navigation extends EventTarget {
     const turn = has('ArrowLeft') - has('ArrowRight');
     if (!forward && !right && !up && !turn) return false;
     this.#straighten();
-    if (turn) this.look(turn * 1.2 * Math.min(seconds, 0.1), 0);
+    if (turn) this.look(turn * 1.2 * seconds, 0);
     const run = has('ShiftLeft', 'ShiftRight') ? 3 : 1;
-    const step = Math.min(seconds, 0.1) * this.speed * run;
+    const step = seconds * this.speed * run;
     const [yaw] = yawPitch(this.perspective.quaternion);
     const level = new THREE.Vector3(right, 0, -forward).applyAxisAngle(kUp, yaw);
     if (level.lengthSq() > 0) this.perspective.position.addScaledVector(level.normalize(), step);
