@@ -297,7 +297,6 @@ test('two scans: what is predicted in the other one is taken there', async () =>
     await page.saved();
     await select.selectOption(String(1 - ghost.id));
     await page.redrawn();
-    await page.page.setViewportSize({width: 1280, height: 720});
     await screenshot(page.page, 'pick-two-scans');
     await page.page.focus('#scan-pane');
     await page.page.keyboard.press('Enter');

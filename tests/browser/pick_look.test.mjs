@@ -115,7 +115,7 @@ test('views stay when the window is resized and the divider dragged', async () =
     await page.zoomTo('photo', places[0].img, 3);
     await page.zoomTo('scan', places[0].scan, 3);
     const before = [await page.view('photo'), await page.view('scan')];
-    await page.page.setViewportSize({width: 1280, height: 720});
+    await page.page.setViewportSize({width: 1100, height: 640});
     await until(async () => (await page.view('photo')).box.width < before[0].box.width, 'smaller');
     await page.redrawn();
     assert.deepEqual(

@@ -194,7 +194,8 @@ export async function onPage(
   const picks_path = folder.path('picks.csv');
   if (picks_file) writeFileSync(picks_path, picks_file);
   const server = await servePicks(picks_path, ['--image_name', image_name, ...more]);
-  const page = await PickPage.open(browser, server, picks_path);
+  // Small: without a graphics processor the time goes into pixels.
+  const page = await PickPage.open(browser, server, picks_path, {width: 1280, height: 720});
   try {
     await body(page, {folder, server, picks_path});
     const unexpected = page.errors().filter((one) => !allowed.some((known) => known.test(one)));

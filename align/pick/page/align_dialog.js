@@ -11,11 +11,14 @@ const kVerdicts = {
 };
 
 // "Trusted: the photos ..." under the word Trusted is "The photos ...".
-function withoutVerdict(headline, word) {
-  if (headline === `${word}.`) return '';
-  if (!headline.startsWith(`${word}: `)) return headline;
-  const rest = headline.slice(word.length + 2);
-  return rest[0].toUpperCase() + rest.slice(1);
+function withoutVerdict(headline) {
+  const rest = headline.replace(/^(Trusted|Not to be trusted)[:.] ?/, '');
+  return rest === '' ? '' : rest[0].toUpperCase() + rest.slice(1);
+}
+
+// The reasons come as one paragraph; a line each is easier to work through.
+function lines(sentences) {
+  return sentences.flatMap((one) => one.split(/(?<=\S\S[.!]) (?=[A-Z])/));
 }
 
 export class AlignDialog {
@@ -166,7 +169,7 @@ export class AlignDialog {
   #showDone() {
     const status = this.#status;
     const verdict = kVerdicts[status.verdict] ?? kVerdicts.failed;
-    const headline = withoutVerdict(status.headline, verdict.text);
+    const headline = withoutVerdict(status.headline);
     this.#buttons(false, true);
     this.#parts.live.textContent = `${verdict.text}. ${headline}`;
     const parts = [
@@ -175,8 +178,8 @@ export class AlignDialog {
          el('div', {}, el('strong', {}, verdict.text), el('p', {class: 'headline'}, headline))),
     ];
     if (status.sentences.length > 0) {
-      parts.push(
-          el('ul', {class: 'sentences'}, ...status.sentences.map((one) => el('li', {}, one))));
+      parts.push(el(
+          'ul', {class: 'sentences'}, ...lines(status.sentences).map((one) => el('li', {}, one))));
     }
     if (status.facts.length > 0) {
       parts.push(

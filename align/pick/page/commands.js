@@ -37,9 +37,14 @@ function setPoint() {
   }
   const place = by_mouse ? view.toImg(cursor) : editor.crossOf(side, view);
   last_input[side] = 'keys';
-  editor.cross[side] = null;
   if (view.contains(place)) editor.set(side, place);
   return true;
+}
+
+// Whether keys have taken the crosshair somewhere: then Enter means that place.
+function crossMoved() {
+  const {side, cross} = app.editor;
+  return cross[side] !== null && crossShown(side);
 }
 
 function zoom(factor) {
@@ -97,7 +102,8 @@ export const kKeys = [
         keys: ['Enter'],
         shown: 'Enter',
         does: 'takes the predicted partner, or the nearest place that can be picked',
-        run: () => app.editor.takeSnap() || app.editor.acceptGhost() || setPoint(),
+        run: () =>
+            app.editor.takeSnap() || (!crossMoved() && app.editor.acceptGhost()) || setPoint(),
       },
       {
         keys: ['Space'],

@@ -119,6 +119,7 @@ export class Editor {
 
   // A point is set: the click of a mouse, or of the crosshair.
   set(side, img) {
+    this.cross = {photo: null, scan: null};
     const half = this.half;
     if (side === 'scan') {
       this.#tryPlace(half?.uid ?? null, img);
