@@ -71,7 +71,7 @@ std::unique_ptr<PickServer> StartServer(const PickScene& scene, PickSession* ses
     server->Start(true);
     return server;
   } catch (const UsageError&) {
-    if (port_given || setup.server.port == 0) throw;
+    if (port_given || setup.server.port != LocalServerOptions().port) throw;
   }
   PickServer::Setup other = setup;
   other.server.port = 0;

@@ -37,6 +37,9 @@ double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_s
   return distance;
 }
 
+// As the page numbers the picks.
+std::string NumberOf(int index) { return std::to_string(index + 1); }
+
 std::string Count(int number, const std::string& noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
 }
@@ -57,10 +60,10 @@ std::string LayoutProblemOfThree(const PointPairs& pairs) {
          "pick a point beside it";
 }
 
-std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPairs& pairs,
+std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
                                         const ScanReaderOptions& reader) {
   std::vector<std::string> warnings;
-  if (pairs.size() < kMinPicksPerPhoto) return warnings;
+  if (static_cast<int>(on.size()) < kMinPicksPerPhoto) return warnings;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
     warnings.push_back("The scan looks like a mirror image of the room: the picks miss by " +
                        Number(review.RmsPx(), 1) + " pixels (rms), but by " +
@@ -69,16 +72,16 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPai
                        "--azimuth " +
                        OtherAzimuth(reader) + ".");
   } else if (review.exchanged) {
-    warnings.push_back("Picks " + std::to_string(review.exchanged->first + 1) + " and " +
-                       std::to_string(review.exchanged->second + 1) +
-                       " of this photo look exchanged: with their places in the photo swapped all "
+    warnings.push_back("Picks " + NumberOf(on[review.exchanged->first]) + " and " +
+                       NumberOf(on[review.exchanged->second]) +
+                       " look exchanged: with their places in the photo swapped all "
                        "picks fit to " +
                        Number(review.exchanged_rms_px, 1) + " pixels.");
   }
-  for (int i = 0; i < pairs.size(); ++i) {
+  for (size_t i = 0; i < on.size(); ++i) {
     if (review.used[i]) continue;
-    warnings.push_back("Pick " + std::to_string(i + 1) + " of this photo is left out: it is " +
-                       Number(review.leave_one_out_px[i], 1) +
+    warnings.push_back("Pick " + NumberOf(on[i]) + " is left out: it is " +
+                       Number(review.leave_one_out_px[static_cast<int>(i)], 1) +
                        " pixels away from where the others put it.");
   }
   return warnings;
@@ -129,7 +132,7 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
     x_in_station.x() *= -1;
     num_mirrored_off +=
         !(DistanceFromSurface(scene, scan_from_station * x_in_station) <= kPickReach);
-    warnings.push_back("The scan point of pick " + std::to_string(k + 1) + " of this photo lies " +
+    warnings.push_back("The scan point of pick " + NumberOf(on[k]) + " lies " +
                        (std::isfinite(off) ? Number(off, 2) + " m" : std::string("far")) +
                        " off the scan's surface. Drag it to its place in the scan.");
   }

@@ -13,8 +13,9 @@ std::string AsSentence(std::string text);
 
 // "" or why three picks fix nothing.
 std::string LayoutProblemOfThree(const PointPairs& pairs);
-// Exchanged, mirrored, bad. Picks are counted from 1 in their photo.
-std::vector<std::string> ReviewWarnings(const PickReview& review, const PointPairs& pairs,
+// Exchanged, mirrored, bad. `on`: where the reviewed picks stand among all, which is their number
+// (from 1) in the sentences.
+std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
                                         const ScanReaderOptions& reader);
 // Nearly on one line, on one plane, crowded in a part of the photo.
 std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera);

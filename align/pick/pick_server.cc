@@ -111,6 +111,10 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
 void PickServer::AddAlign() {
   server_.AddPost("/align", [this](const Json&) {
     if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
+    const auto now = session_->Now();
+    const bool any = std::any_of(now->picks.begin(), now->picks.end(),
+                                 [](const SessionPick& pick) { return pick.complete(); });
+    if (!any) throw UsageError("There are no pairs yet: set six of them in one photo first.");
     align_.Start();
     return align_.State();
   });

@@ -86,7 +86,7 @@ void PickSolver::SolveView(const ScanRays* rays, View* view, PhotoState* photo) 
   }
   view->review = Review(view->photo->name(), projection, view->pairs);
   const PickReview& review = view->review;
-  for (std::string& warning : ReviewWarnings(review, view->pairs, scene_.input().scan_reader)) {
+  for (std::string& warning : ReviewWarnings(review, view->picks, scene_.input().scan_reader)) {
     photo->warnings.push_back(std::move(warning));
   }
   if (!review.HasPose()) {

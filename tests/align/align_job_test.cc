@@ -40,6 +40,7 @@ TEST_F(AlignButton, AlignsAndSaysHowGoodItIs) {
   const Json idle = Get("align").json();
   EXPECT_EQ(idle["state"], "idle");
   EXPECT_TRUE(idle["exit_code"].is_null());
+  EXPECT_EQ(Post("align").status, 422);  // there are no pairs yet
   EXPECT_THAT(idle["command"].get<std::string>(),
               HasSubstr("roomtex-align --input_path " + ThePickRoom().input().input_path));
   ASSERT_EQ(Put(1, ToJson(TruePicks(8))).status, 200);
@@ -107,6 +108,7 @@ class FakeProgram : public PickPage {
     WriteBytes(program, "#!/bin/sh\n" + script);
     std::filesystem::permissions(program, std::filesystem::perms::owner_all);
     Serve("", program);
+    Put(1, ToJson(TruePicks(1)));
   }
   Json WaitFor(const std::string& key, const Json& value) {
     for (int i = 0; i < 400; ++i) {
@@ -174,6 +176,7 @@ TEST_F(FakeProgram, ABrokenReportIsNoCrash) {
 
 TEST_F(FakeProgram, OneThatIsNotThereIsSaid) {
   Serve("", folder_ / "nothing");
+  Put(1, ToJson(TruePicks(1)));
   const Answer answer = Post("align");
   EXPECT_EQ(answer.status, 422);
   EXPECT_THAT(answer.body, HasSubstr("cannot be started"));

@@ -92,7 +92,8 @@ TEST(PickSolution, AWrongPickIsNamedAndLeftOut) {
   EXPECT_NEAR(solution.picks[3].error_px.x(), -40, 0.5);
   EXPECT_NEAR(solution.picks[3].leave_one_out_px, std::hypot(40, 25), 0.5);
   EXPECT_EQ(solution.photos.at(ClickedName()).num_used, 7);
-  EXPECT_THAT(solution.photos.at(ClickedName()).warnings, Contains(HasSubstr("Pick 4 of this")));
+  EXPECT_THAT(solution.photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("Pick 4 is left out")));
   EXPECT_THAT(solution.next, HasSubstr("pick 4"));
   ExpectTruePoses(solution, 0.01);
 }
@@ -122,7 +123,19 @@ TEST(PickSolution, ExchangedPicksAreNamed) {
   std::vector<SessionPick> picks = TruePicks(7);
   std::swap(picks[1].x_in_img, picks[4].x_in_img);
   EXPECT_THAT(Solve(picks).photos.at(ClickedName()).warnings,
-              Contains(HasSubstr("Picks 2 and 5 of this photo look exchanged")));
+              Contains(HasSubstr("Picks 2 and 5 look exchanged")));
+}
+
+TEST(PickSolution, PicksAreNumberedAsTheyStandInTheList) {
+  std::vector<SessionPick> picks = ThePickRoom().Picks(ThePickRoom().other_photo(), 1);
+  for (const SessionPick& pick : TruePicks(9)) picks.push_back(pick);
+  picks[2].weight = 0;
+  *picks[6].x_in_img += Eigen::Vector2d(30, -40);
+  const PickSolution solution = Solve(picks);
+  EXPECT_EQ(solution.picks[6].status, Status::kBad);
+  EXPECT_THAT(solution.photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("Pick 7 is left out")));
+  EXPECT_THAT(solution.next, HasSubstr("pick 7"));
 }
 
 TEST(PickSolution, AMirroredScanIsNamedWithTheOption) {
