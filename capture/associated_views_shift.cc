@@ -236,6 +236,7 @@ CameraShift FindCameraShift(const cv::Mat1b& plain, const cv::Mat1b& patterned,
   Motion motion = Motion::Zero();
   motion.head<2>() = start;
   std::vector<TileShift> tiles;
+  int least_steps = 3;  // the first two of them without roll and scale
   for (const int shrink : kShrink) {
     if (shrink > 1 && std::min(plain.cols, plain.rows) / shrink < 150) continue;
     cv::Mat1b a = plain, b = patterned;
@@ -252,12 +253,13 @@ CameraShift FindCameraShift(const cv::Mat1b& plain, const cv::Mat1b& patterned,
         break;
       }
       tiles = std::move(fitted);
-      const Motion next = Join(tiles, motion, step < 2).motion;
+      const Motion next = Join(tiles, motion, step + 1 < least_steps).motion;
       const double change = (next - motion).norm();
       motion = next;
-      if (change < 0.01 && step >= 2) break;
+      if (change < 0.01 && step + 1 >= least_steps) break;
     }
     motion *= shrink;
+    if (!tiles.empty()) least_steps = 1;
   }
   return Describe(tiles, motion);
 }

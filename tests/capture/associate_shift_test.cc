@@ -65,16 +65,25 @@ TEST(CameraShift, IsMeasuredInAnEmptyRoomWithItsError) {
 }
 
 TEST(CameraShift, SeesARollOfTheCamera) {
-  const AssociateScene scene(1);
-  Take take;
-  take.patterned = true;
-  take.roll_deg = 0.25;
-  take.ev = -0.7;
-  const CameraShift found =
-      FindCameraShift(Grey(scene.TakePhoto(0, Take())), Grey(scene.TakePhoto(0, take)), {0, 0});
-  // At the corners, half a diagonal of 433 pixels away.
-  EXPECT_NEAR(std::abs(found.roll_px), RadFromDeg(0.25) * 432.7, 0.15);
-  EXPECT_NEAR(found.offset_px, RadFromDeg(0.25) * 432.7 / std::sqrt(3), 0.1);
+  const AssociateScene scene(2);
+  // At the corners, half a diagonal of 432.7 pixels away.
+  const double roll_px = RadFromDeg(0.25) * 432.7, offset_px = roll_px / std::sqrt(3);
+  for (int place = 0; place < 2; ++place) {
+    const cv::Mat1b plain = Grey(scene.TakePhoto(place, Take()));
+    Take take;
+    take.roll_deg = 0.25;
+    take.ev = -0.7;
+    take.seed = 4;
+    const CameraShift same_light =
+        FindCameraShift(plain, Grey(scene.TakePhoto(place, take)), {0, 0});
+    EXPECT_NEAR(same_light.roll_px, roll_px, 0.05);
+    EXPECT_NEAR(same_light.offset_px, offset_px, 0.03);
+    take.patterned = true;
+    const CameraShift found = FindCameraShift(plain, Grey(scene.TakePhoto(place, take)), {0, 0});
+    EXPECT_NEAR(found.roll_px, roll_px, 0.25);
+    EXPECT_NEAR(found.offset_px, offset_px, 0.15);
+    EXPECT_NEAR(found.offset_px, offset_px, 3 * found.error_px);
+  }
 }
 
 TEST(CameraShift, IsNotFoundWithoutEdges) {
