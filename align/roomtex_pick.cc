@@ -82,6 +82,17 @@ std::unique_ptr<PickServer> StartServer(const PickScene& scene, PickSession* ses
   return server;
 }
 
+void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context) {
+  int num_missing = 0;
+  std::string problem;
+  for (const PickPhoto& photo : scene.photos()) {
+    if (photo.missing && num_missing++ == 0) problem = photo.problem;
+  }
+  if (num_missing == 0) return;
+  context.Warn(std::to_string(num_missing) + " of " + std::to_string(scene.photos().size()) +
+               " photos cannot be shown. The first: " + problem);
+}
+
 void ServePicking(Arguments a, bool port_given, const Command::Context& context) {
   CheckArguments(&a);
   a.scene.num_threads = context.options.num_threads;
@@ -89,6 +100,7 @@ void ServePicking(Arguments a, bool port_given, const Command::Context& context)
   if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
     throw UsageError("--image_name " + a.image_name + " is not in the sparse model");
   }
+  WarnOfMissingPhotos(scene, context);
   PickSession session(scene, a.output_path);
   scene.Prepare();
   const auto server =

@@ -116,6 +116,16 @@ void PickScene::AddPhotos() {
   std::sort(photos_.begin(), photos_.end(),
             [](const PickPhoto& a, const PickPhoto& b) { return a.name() < b.name(); });
   for (size_t i = 0; i < photos_.size(); ++i) photos_[i].id = static_cast<int>(i);
+  const bool none = std::all_of(photos_.begin(), photos_.end(),
+                                [](const PickPhoto& photo) { return photo.missing; });
+  if (none) {
+    std::string problem = photos_[0].problem;
+    problem.pop_back();  // the full stop
+    throw InputError(input_.image_path, "",
+                     "none of the model's " + std::to_string(photos_.size()) +
+                         " photos can be shown. " + problem,
+                     "Give the folder that COLMAP was given as --image_path");
+  }
 }
 
 std::vector<const PickPhoto*> PickScene::Ranked(const std::vector<double>& scan_shares) const {

@@ -92,6 +92,7 @@ TEST(PickCommand, PrintsWhereItServesSavesAndEndsOnCtrlC) {
       {"Origin", "http://127.0.0.1:" + std::to_string(command.port())}};
   EXPECT_EQ(client.Put(base + "picks", headers, put.dump(), "application/json")->status, 200);
   EXPECT_EQ(command.Interrupt(), 0) << command.err();
+  EXPECT_THAT(command.err(), HasSubstr("6 of 8 photos cannot be shown. The first: There is no"));
   const std::vector<Pick> picks = ReadPicks(folder / "picks.csv");
   ASSERT_EQ(picks.size(), 1u);
   EXPECT_EQ(picks[0].x_in_scan, *pick.x_in_scan);
@@ -147,6 +148,10 @@ TEST(PickCommand, RefusesWhatCannotBeServed) {
   expect(Options(folder / "broken.csv"), 3, "line 1");
   EXPECT_EQ(ReadBytes(folder / "broken.csv"), "image_name,x\n");
   expect("--output_path x.csv", 2, "--input_path");
+  std::string elsewhere = Options(folder / "picks.csv");
+  const std::string images = ThePickRoom().input().image_path;
+  elsewhere.replace(elsewhere.find(images), images.size(), folder.path());
+  expect(elsewhere, 3, "none of the model's 8 photos can be shown");
   const CommandResult help = RunCommandLine("roomtex-pick --help");
   EXPECT_EQ(help.exit_code, 0);
   for (const char* option : {"--image_name", "--aligned_path", "--scan_poses", "--azimuth",
