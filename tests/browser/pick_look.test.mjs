@@ -2,9 +2,10 @@
 // everything can be read and reached.
 
 import assert from 'node:assert/strict';
+import {writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
-import {launchBrowser, screenshot} from './browser.mjs';
+import {launchBrowser, makeFolder, screenshot} from './browser.mjs';
 import {
   distance,
   fileOf,
@@ -300,6 +301,33 @@ test('a server that does not answer loses nothing', async () => {
     assert.ok(!await page.page.isVisible('#banner'));
   }, {picks_file: fileOf(places.slice(0, 6)), allowed: [/ERR_CONNECTION_REFUSED/, /failed$/]});
 });
+
+test(
+    'a server that was started anew is told from one that is gone; picks can be copied',
+    async () => {
+      const folder = makeFolder();
+      const picks_path = folder.path('picks.csv');
+      writeFileSync(picks_path, fileOf(places.slice(0, 6)));
+      const server = await servePicks(picks_path);
+      const page = await PickPage.open(browser, server, picks_path);
+      await page.page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+      await page.rowsAre(6);
+      assert.equal(await server.stop(), 0);
+      await page.page.focus('#photo-pane');
+      await page.page.keyboard.press('n');
+      await page.page.keyboard.press('Delete');
+      await until(async () => /does not answer/.test(await page.text('#save')), 'gone');
+      const again = await servePicks(picks_path, [], new URL(server.url).port);
+      await until(async () => /started anew/.test(await page.text('#banner')), 'started anew');
+      assert.match(await page.text('#save'), /not saved/);
+      await page.page.click('#banner button');
+      await until(async () => /Copied 5/.test(await page.text('#banner')), 'copied');
+      writeFileSync(picks_path, await page.page.evaluate(() => navigator.clipboard.readText()));
+      assert.deepEqual(page.file().map(({img}) => img), places.slice(1, 6).map(({img}) => img));
+      await page.close();
+      assert.equal(await again.stop(), 0);
+      folder.remove();
+    });
 
 test('all text has a contrast of 4.5 or more, at every size', async () => {
   await pageOn(async (page) => {

@@ -42,7 +42,7 @@ export function capture(...parts) {
 }
 
 // Starts roomtex-pick on it.
-export function servePicks(picks_path, more = []) {
+export function servePicks(picks_path, more = [], port = 0) {
   return serve('roomtex-pick', [
     '--input_path',
     capture('sparse'),
@@ -53,7 +53,7 @@ export function servePicks(picks_path, more = []) {
     '--output_path',
     picks_path,
     '--port',
-    '0',
+    String(port),
     ...more,
   ]);
 }

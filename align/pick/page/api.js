@@ -25,11 +25,11 @@ async function ask(path, init = {}) {
     if (error.name === 'AbortError') throw error;
   }
   if (response.ok && answer !== null) return answer;
+  if (response.status === 403) {  // its token is another one
+    throw new ServerError('restarted', 'the server was started anew and has a new address');
+  }
   if (answer && answer.error && response.status < 500) {
     throw new ServerError('refused', answer.error, response.status);
-  }
-  if (response.status === 403 || response.status === 404) {
-    throw new ServerError('restarted', 'the server was started anew and has a new address');
   }
   throw new ServerError('gone', (answer && answer.error) || `the server says ${response.status}`);
 }

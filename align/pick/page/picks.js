@@ -42,6 +42,7 @@ export class Picks extends EventTarget {
   #busy = false;
   #last_sent = 0;
   #timer = 0;
+  #retry = 0;     // timer of the next question to a server that is gone
   #other = null;  // session of the faster tab
 
   // Takes the server's picks as they are; nothing to undo from here.
@@ -277,7 +278,8 @@ export class Picks extends EventTarget {
 
   #gone(error) {
     this.#setState(error.kind === 'restarted' ? 'restarted' : 'gone', error.message);
-    setTimeout(() => this.check(), kRetryAfter);
+    clearTimeout(this.#retry);
+    this.#retry = setTimeout(() => this.check(), kRetryAfter);
   }
 
   // Asks how the picks stand at the server: after it was gone, and when this page comes back to the

@@ -19,10 +19,8 @@ export function showSync() {
   box.dataset.state = picks.state;
   box.title = server ? server.picks_path : '';
   // Nothing is unsaved when the server is gone and nothing was changed since.
-  const gone = picks.state === 'gone' && !picks.pending;
-  setText(
-      byId('save-text'),
-      gone ? 'the server does not answer; trying again' : kSaveTexts[picks.state](picks.why));
+  const nothing_lost = !picks.pending && ['gone', 'restarted'].includes(picks.state);
+  setText(byId('save-text'), nothing_lost ? picks.why : kSaveTexts[picks.state](picks.why));
   const banner = byId('banner');
   if (banner.dataset.state === picks.state) return;
   banner.dataset.state = picks.state;
@@ -47,16 +45,20 @@ function bannerOf(state) {
     ];
   }
   if (state === 'gone') {
-    return [el(
-        'p', {},
-        'roomtex-pick does not answer. Go on: changes of the photo side and removals are ' +
-            'kept here and saved as soon as it is back. Do not close this page.')];
+    return [
+      el('p', {},
+         'roomtex-pick does not answer. What you change is kept here and saved as soon as it is ' +
+             'back; do not close this page.'),
+      copyButton(),
+    ];
   }
   if (state === 'restarted') {
-    return [el(
-        'p', {},
-        'roomtex-pick was started anew and has a new address, which it printed. What the ' +
-            'last one had not saved is only on this page.')];
+    return [
+      el('p', {},
+         'roomtex-pick was started anew and has a new address, which it printed. What the last ' +
+             'one had not saved is only on this page.'),
+      copyButton(),
+    ];
   }
   return [];
 }
