@@ -18,6 +18,8 @@
 #include "tests/support/ply_vertices.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
+#include "texture/blend.h"
+#include "texture/evidence.h"
 
 namespace roomtex {
 namespace {
@@ -128,6 +130,32 @@ TEST_F(TextureCommand, VerticesAreTheMeasuredSamplesInGridOrder) {
   size_t num_colored = 0;
   for (int views : model.views) num_colored += views > 0;
   EXPECT_EQ(ReadJson(Path("textured/report.json"))["num_colored"], num_colored);
+}
+
+TEST_F(TextureCommand, EvidenceIsThatOfTheVerticesAndOfTheReport) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const PlyVertices model = ReadPly(Path("textured/model.ply"));
+  const Evidence evidence = ReadEvidence(Path("textured/evidence.ply"));
+  ASSERT_EQ(evidence.points.size(), model.points.size());
+  double sum = 0, num_pairs = 0;
+  for (size_t i = 0; i < model.points.size(); ++i) {
+    ASSERT_EQ(evidence.points[i].cast<float>(), model.points[i]);
+    ASSERT_EQ(evidence.views[i], model.views[i]);
+    if (model.views[i] < 2) continue;
+    ASSERT_TRUE(std::isfinite(evidence.disagreement[i]));
+    const int kept = std::min(model.views[i], BlendOptions().max_views);
+    sum += evidence.disagreement[i] * kept * (kept - 1) / 2;
+    num_pairs += kept * (kept - 1) / 2;
+  }
+  // The report looks at a part of the vertices.
+  const double reported = ReadJson(Path("textured/report.json"))["disagreement"]["after"];
+  EXPECT_NEAR(sum / num_pairs, reported, 0.05 * reported);
+}
+
+TEST_F(TextureCommand, EvidenceIsLeftOutAsAsked) {
+  ASSERT_EQ(Texture("bare", "--output_evidence 0").exit_code, 0);
+  EXPECT_TRUE(fs::exists(Path("bare/model.ply")));
+  EXPECT_FALSE(fs::exists(Path("bare/evidence.ply")));
 }
 
 TEST_F(TextureCommand, ColoursAreTheTrueOnes) {
