@@ -77,7 +77,7 @@ evaluate furnished furnished
 node - <<'EOF'
 const fs = require('fs');
 const read = (path) => (fs.existsSync(path) ? JSON.parse(fs.readFileSync(path)) : null);
-const number = (value, digits) => (value == null ? '-' : value.toFixed(digits));
+const number = (value, digits, unit = '') => (value == null ? '-' : value.toFixed(digits) + unit);
 console.log('\n| room, photos for COLMAP, photos for the colours | registered | points | poses, mm (median / worst) | ' +
             'rotation | colours | wrong by > 0.1 |\n|---|---|---|---|---|---|---|');
 const row = (title, name, textured) => {
@@ -86,8 +86,8 @@ const row = (title, name, textured) => {
   const of = mapper.num_images == null ? '' : ` of ${mapper.num_images}`;
   console.log(`| ${title} | ${mapper.num_reg_images || 0}${of} | ${mapper.num_points || 0} | ` +
               `${number(poses.position_median_mm, 2)} / ${number(poses.position_max_mm, 2)} | ` +
-              `${number(poses.rotation_median_deg, 4)} deg | ${number(color.psnr_db, 1)} dB | ` +
-              `${number(100 * color.share_wrong, 2)} % |`);
+              `${number(poses.rotation_median_deg, 4, ' deg')} | ${number(color.psnr_db, 1, ' dB')} | ` +
+              `${number(color.share_wrong && 100 * color.share_wrong, 2, ' %')} |`);
 };
 row('furnished, plain, plain', 'furnished', 'textured');
 row('bare, plain, plain', 'plain', 'textured');
