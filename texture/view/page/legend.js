@@ -63,7 +63,9 @@ export function showLegend(element, mode, evidence) {
 export function drawLegend(context, mode, evidence, scale) {
   const legend = legendOf(mode, evidence);
   if (!legend) return;
-  const width = 300, height = 84, left = 12, top = context.canvas.height / scale - height - 12;
+  context.font = '600 12px system-ui, sans-serif';
+  const width = Math.max(300, context.measureText(legend.title).width + 24);
+  const height = 84, left = 12, top = context.canvas.height / scale - height - 12;
   context.save();
   context.scale(scale, scale);
   context.fillStyle = 'rgba(16, 18, 23, 0.92)';

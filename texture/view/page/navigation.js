@@ -132,24 +132,33 @@ export class Navigation extends EventTarget {
     return new THREE.Vector3(x.middle, y.middle, Math.max(x.back, y.back)).applyQuaternion(rotation);
   }
 
+  #frameFromAbove(rotation) {
+    const inverse = rotation.clone().invert();
+    const points = this.sample().room.map((p) => p.applyQuaternion(inverse));
+    const extent = (k) => {
+      const values = points.map((p) => p.getComponent(k)).sort((a, b) => a - b);
+      const stray = Math.floor(0.001 * values.length);
+      return [values[stray] ?? -1, values[values.length - 1 - stray] ?? 1];
+    };
+    const [left, right] = extent(0), [bottom, top] = extent(1);
+    this.orthographic.position.set((left + right) / 2, (bottom + top) / 2, 0)
+        .applyQuaternion(rotation);
+    this.orthographic.quaternion.copy(rotation);
+    this.#setOrthographicHeight(
+        1.16 * Math.max(top - bottom, (right - left) * this.height / this.width, 0.1));
+  }
+
   setMode(mode, fly = true) {
     if (mode === this.mode && !this.standing) return;
     const before = this.camera;
     this.leaveCamera();
     this.#switchMode(mode);
     if (mode === 'top') {
-      const size = this.bounds.getSize(new THREE.Vector3());
-      const centre = this.bounds.getCenter(new THREE.Vector3());
-      this.orthographic.position.copy(centre);
       // Along the walls; what was ahead stays ahead, to the nearest quarter turn.
       const heading = this.heading(), quarter = Math.PI / 2;
       const turns = Math.round((yawPitch(before.quaternion)[0] - heading) / quarter);
       const yaw = heading + turns * quarter;
-      this.orthographic.quaternion.copy(rotationOf(yaw, -Math.PI / 2));
-      const c = Math.abs(Math.cos(yaw)), s = Math.abs(Math.sin(yaw));
-      const across = [c * size.x + s * size.z, s * size.x + c * size.z];
-      this.#setOrthographicHeight(
-          1.04 * Math.max(across[1], across[0] * this.height / this.width));
+      this.#frameFromAbove(rotationOf(yaw, -Math.PI / 2));
     } else if (before === this.orthographic) {
       const yaw = yawPitch(before.quaternion)[0];
       if (mode === 'orbit') {
