@@ -27,6 +27,7 @@ constexpr int kMeasuredSize = 1900;    // pixels: photos are measured at this si
 constexpr int kSearched = 5;           // most alike photos that are compared
 constexpr double kClearDetail = 1.15;  // ratio of detail that tells the patterned photo
 constexpr double kEqualBrightness = 1.03;
+constexpr double kLeastAdvantage = 12;
 constexpr double kLargestError = 0.3;  // pixels: an offset known worse is none
 
 std::vector<std::string> ListPhotoNames(const std::string& folder) {
@@ -292,7 +293,9 @@ class Finder {
     for (double* value : {&camera.roll_px, &camera.scale_px, &camera.offset_px, &camera.error_px}) {
       *value *= scale;
     }
-    const bool is_known = camera.found && camera.error_px < kLargestError;
+    const bool is_known =
+        camera.found && camera.error_px < kLargestError &&
+        (camera.offset_px <= options_.max_offset || camera.advantage > kLeastAdvantage);
     if (!is_known && c->keypoints && c->keypoints->num_common > 0) {
       c->by_keypoints = true;
       camera = CameraShift();
@@ -303,8 +306,11 @@ class Finder {
     }
   }
 
+  // A camera has moved where the photos are clearly likelier so.
   bool IsKnown(const Candidate& c) const {
-    return !c.light.same_light && c.camera.found && c.camera.error_px < kLargestError;
+    if (c.light.same_light || !c.camera.found || c.camera.error_px > kLargestError) return false;
+    return c.by_keypoints || c.camera.offset_px <= options_.max_offset ||
+           c.camera.advantage > kLeastAdvantage;
   }
   bool IsUnmoved(const Candidate& c) const {
     return IsKnown(c) && c.camera.offset_px <= options_.max_offset;

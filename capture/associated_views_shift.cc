@@ -18,6 +18,9 @@ constexpr int kTile = 24;         // pixels
 constexpr int kMostTiles = 1500;  // with the strongest edges
 constexpr int kLeastTiles = 12;
 constexpr double kFine = 1.2, kCoarse = 5.0;  // Gaussian sigmas of the band that is compared
+constexpr double kDependent = 10;  // pixels of the band that count as one: neighbours are alike
+constexpr double kLeastDeviations = 2.5;  // of an edge's contrast, for it to be there at all
+constexpr int kFewTiles = 150;            // rooms with so few edges need the doubtful ones, too
 // Step of log light over an edge in the patterned photo, over that in the plain one.
 constexpr double kContrast = 0.8, kContrastSpread = 0.4;
 constexpr float kLeastEdge = 0.005f;  // root mean square of the slope of log light, per pixel
@@ -57,8 +60,22 @@ class Level {
 
   int num_tiles() const { return static_cast<int>(tiles_.size()); }
 
+  // How well the edges fit after a motion: logarithm of how much likelier the tiles are with it.
+  double Score(const Motion& motion) const {
+    const cv::Mat1f moved = MoveBack(motion);
+    double score = 0;
+    for (const cv::Rect& tile : tiles_) {
+      const Sums sums = SumUp(tile, moved);
+      const double product = sums.right[0];
+      if (!(product > 0)) continue;
+      const double share = product * product / (sums.normal(0, 0) * sums.squares + 1e-12);
+      score -= 0.5 * sums.count / kDependent * std::log(std::max(1 - share, 1e-3));
+    }
+    return score;
+  }
+
   // One linear step from `motion`.
-  std::vector<TileShift> FitTiles(Motion motion) const {
+  std::vector<TileShift> FitTiles(Motion motion, double least_deviations) const {
     // OpenCV moves by 32nds of a pixel.
     for (int k = 0; k < 2; ++k) motion[k] = std::round(32 * motion[k]) / 32;
     const cv::Mat1f moved = MoveBack(motion);
@@ -66,7 +83,7 @@ class Level {
     for (const cv::Rect& tile : tiles_) {
       TileShift shift;
       shift.place = PlaceOf(tile);
-      if (!FitTile(tile, moved, &shift)) continue;
+      if (!FitTile(tile, moved, least_deviations, &shift)) continue;
       shift.shift += JacobianAt(shift.place) * motion;
       shifts.push_back(shift);
     }
@@ -116,34 +133,48 @@ class Level {
     return moved;
   }
 
-  // patterned(x) = contrast * (plain(x) - shift . slope(x)): least squares.
-  bool FitTile(const cv::Rect& tile, const cv::Mat1f& moved, TileShift* result) const {
+  // Sums over a tile of (plain, -slope) and of the patterned photo.
+  struct Sums {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     double squares = 0, count = 0;
+  };
+  Sums SumUp(const cv::Rect& tile, const cv::Mat1f& moved) const {
+    Sums sums;
     for (int y = tile.y; y < tile.y + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         if (clipped_(y, x) != 0) continue;
         const Eigen::Vector3d row(plain_(y, x), -dx_(y, x), -dy_(y, x));
         const double seen = moved(y, x);
-        normal += row * row.transpose();
-        right += row * seen;
-        squares += seen * seen;
-        count += 1;
+        sums.normal += row * row.transpose();
+        sums.right += row * seen;
+        sums.squares += seen * seen;
+        sums.count += 1;
       }
     }
+    return sums;
+  }
+
+  // patterned(x) = contrast * (plain(x) - shift . slope(x)): least squares. False where the edge
+  // does not show in the patterned photo.
+  bool FitTile(const cv::Rect& tile, const cv::Mat1f& moved, double least_deviations,
+               TileShift* result) const {
+    const Sums sums = SumUp(tile, moved);
+    Eigen::Matrix3d normal = sums.normal;
+    Eigen::Vector3d right = sums.right;
     // A slope that is missing in one direction stays unknown.
     normal.diagonal().array() += 1e-6 * normal.trace() + 1e-12;
-    // Neighbouring pixels of the band are not independent: one in ten counts. The edge's contrast
-    // in the other light is held to kContrast +- kContrastSpread where the tile says little.
-    const double all = squares - right.dot(normal.ldlt().solve(right));
-    const double variance = std::max(all, 1e-3 * squares) / std::max(count, 1.0) * 10 + 1e-9;
+    const Eigen::Vector3d free = normal.ldlt().solve(right);
+    const double rest = std::max(sums.squares - right.dot(free), 1e-3 * sums.squares);
+    const double variance = rest / std::max(sums.count, 1.0) * kDependent + 1e-9;
+    if (free[0] * std::sqrt(normal(0, 0) / variance) < least_deviations) return false;
+    // The contrast in the other light is held to kContrast where the tile says little of it.
     const double hold = variance / (kContrastSpread * kContrastSpread);
     normal(0, 0) += hold;
     right[0] += hold * kContrast;
     const Eigen::Vector3d solution = normal.ldlt().solve(right);
     const double contrast = solution[0];
-    if (!(contrast > 0.2 && contrast < 3)) return false;
+    if (!(contrast > 0.1 && contrast < 3)) return false;
     result->shift = solution.tail<2>() / contrast;
     if (!(result->shift.norm() < 50)) return false;
     const Eigen::Vector2d mixed = normal.block<2, 1>(1, 0);
@@ -227,29 +258,57 @@ CameraShift Describe(const std::vector<TileShift>& tiles, const Motion& motion) 
   return result;
 }
 
-}  // namespace
+Motion ShiftOnly(const Eigen::Vector2d& shift) { return {shift.x(), shift.y(), 0, 0}; }
 
-CameraShift FindCameraShift(const cv::Mat1b& plain, const cv::Mat1b& patterned,
-                            const Eigen::Vector2d& start) {
-  constexpr int kLevels = 3;
-  constexpr std::array<int, kLevels> kShrink = {4, 2, 1};
-  Motion motion = Motion::Zero();
-  motion.head<2>() = start;
-  std::vector<TileShift> tiles;
-  int least_steps = 3;  // the first two of them without roll and scale
-  for (const int shrink : kShrink) {
+// The best fitting shift near `start`: the linear steps must begin within a pixel or two.
+Eigen::Vector2d BestStart(const Level& level, const Eigen::Vector2d& start) {
+  constexpr int kReach = 4;  // pixels
+  Eigen::Vector2d best = start;
+  double best_score = level.Score(ShiftOnly(start));
+  for (int y = -kReach; y <= kReach; ++y) {
+    for (int x = -kReach; x <= kReach; ++x) {
+      const Eigen::Vector2d shift = start + Eigen::Vector2d(x, y);
+      const double score = level.Score(ShiftOnly(shift));
+      if (score > best_score) {
+        best_score = score;
+        best = shift;
+      }
+    }
+  }
+  return best;
+}
+
+// Both photos smaller and smaller; the last one has full size.
+struct Pyramid {
+  std::vector<int> shrinks;
+  std::vector<Level> levels;
+};
+Pyramid MakePyramid(const cv::Mat1b& plain, const cv::Mat1b& patterned) {
+  Pyramid pyramid;
+  for (const int shrink : {4, 2, 1}) {
     if (shrink > 1 && std::min(plain.cols, plain.rows) / shrink < 150) continue;
     cv::Mat1b a = plain, b = patterned;
     if (shrink > 1) {
       cv::resize(plain, a, {}, 1.0 / shrink, 1.0 / shrink, cv::INTER_AREA);
       cv::resize(patterned, b, {}, 1.0 / shrink, 1.0 / shrink, cv::INTER_AREA);
     }
-    const Level level(a, b);
-    motion /= shrink;
+    pyramid.shrinks.push_back(shrink);
+    pyramid.levels.emplace_back(a, b);
+  }
+  return pyramid;
+}
+
+// Coarse to fine, linear steps. Not found where too few edges show in both.
+CameraShift Climb(const Pyramid& pyramid, const Eigen::Vector2d& start, double least_deviations) {
+  Motion motion = ShiftOnly(start);
+  std::vector<TileShift> tiles;
+  int least_steps = 3;  // the first two of them without roll and scale
+  for (size_t i = 0; i < pyramid.levels.size(); ++i) {
+    motion /= pyramid.shrinks[i];
     for (int step = 0; step < 8; ++step) {
-      std::vector<TileShift> fitted = level.FitTiles(motion);
+      std::vector<TileShift> fitted = pyramid.levels[i].FitTiles(motion, least_deviations);
       if (static_cast<int>(fitted.size()) < kLeastTiles) {
-        if (shrink == 1) return {};
+        if (pyramid.shrinks[i] == 1) return {};
         break;
       }
       tiles = std::move(fitted);
@@ -258,10 +317,39 @@ CameraShift FindCameraShift(const cv::Mat1b& plain, const cv::Mat1b& patterned,
       motion = next;
       if (change < 0.01 && step + 1 >= least_steps) break;
     }
-    motion *= shrink;
+    motion *= pyramid.shrinks[i];
     if (!tiles.empty()) least_steps = 1;
   }
   return Describe(tiles, motion);
+}
+
+}  // namespace
+
+CameraShift FindCameraShift(const cv::Mat1b& plain, const cv::Mat1b& patterned,
+                            const Eigen::Vector2d& start) {
+  const Pyramid pyramid = MakePyramid(plain, patterned);
+  const Level& full = pyramid.levels.back();
+  const double unmoved = full.Score(Motion::Zero());
+  CameraShift result;
+  const auto attempt = [&](const Eigen::Vector2d& from, double least_deviations) {
+    CameraShift found = Climb(pyramid, from, least_deviations);
+    if (!found.found) return;
+    Motion motion = ShiftOnly(found.shift);
+    motion.tail<2>() << found.roll_px, found.scale_px;
+    found.advantage = full.Score(motion) - unmoved;
+    if (!result.found || found.advantage > result.advantage) result = found;
+  };
+  const int shrink = pyramid.shrinks[0];
+  const Eigen::Vector2d zero = Eigen::Vector2d::Zero();
+  const Eigen::Vector2d best = shrink * BestStart(pyramid.levels[0], start / shrink);
+  // Most cameras did not move: that is always tried, and the photos decide.
+  attempt(zero, kLeastDeviations);
+  if (best.norm() > 1.5 * shrink || !result.found) attempt(best, kLeastDeviations);
+  if (!result.found || result.num_tiles < kFewTiles) {
+    attempt(zero, -1e9);
+    if (best.norm() > 1.5 * shrink) attempt(best, -1e9);
+  }
+  return result;
 }
 
 }  // namespace roomtex

@@ -31,6 +31,7 @@ struct CameraShift {
   double roll_px = 0, scale_px = 0;
   double offset_px = 0;  // root mean square of the motion over the picture
   double error_px = 0;   // standard deviation of offset_px, from how far the edges contradict
+  double advantage = 0;  // logarithm of how much likelier the photos are with it than unmoved
   int num_tiles = 0;     // pieces of edges that took part
 };
 // plain: the photo with fewer edges. Each small tile of the plain photo that holds an edge is

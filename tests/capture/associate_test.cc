@@ -399,7 +399,7 @@ TEST_F(Associate, CommandWritesTheTableAndTheLinks) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_EQ(ReadBytes(folder_ / "pairs.csv"),
             "patterned_image,plain_image,offset_px,brightness_ratio\n");
-  EXPECT_THAT(ReadBytes(folder_ / "report.json"), HasSubstr("moved by 1.2"));
+  EXPECT_THAT(ReadBytes(folder_ / "report.json"), HasSubstr("the camera moved by 1."));
 }
 
 }  // namespace
