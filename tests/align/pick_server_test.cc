@@ -1,6 +1,8 @@
 #include "align/pick/pick_server.h"
 
+#include <atomic>
 #include <filesystem>
+#include <thread>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -449,6 +451,36 @@ TEST_F(PickPage, EdgesOfTheScanLieOnThoseOfThePhoto) {
                                   std::string("edges?photo=99&revision=2")}) {
     EXPECT_EQ(Get(path).status, 422) << path;
   }
+}
+
+TEST_F(PickPage, ManyRequestsAtOnceAllGetTheirAnswer) {
+  ASSERT_EQ(Put(1, ToJson(TruePicks(6))).status, 200);
+  const std::string photo = std::to_string(ThePickRoom().clicked_photo());
+  std::atomic<int> odd{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 8; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 6; ++i) {
+        const std::string revision = std::to_string(session_->Now()->revision);
+        const int status[] = {
+            Get("tile?back=" + photo + "&scan=0&level=1&x=0&y=0&revision=" + revision).status,
+            Get("edges?photo=" + photo + "&revision=" + revision).status,
+            Get("tile?scan=0&picture=local&level=0&x=1&y=0").status,
+            Get("state").status,
+        };
+        // What the picks have overtaken is refused, nothing fails.
+        odd += status[0] != 200 && status[0] != 404;
+        odd += status[1] != 200 && status[1] != 422;
+        odd += status[2] != 200;
+        odd += status[3] != 200;
+        if (t == 0) odd += Put(2 + i, ToJson(TruePicks(4 + i % 3))).status != 200;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(odd, 0);
+  EXPECT_EQ(session_->Now()->revision, 8);
+  EXPECT_EQ(ReadPicks(picks_path_).size(), 6u);
 }
 
 // The same room as a mesh without a grid beside the scan: a page with two scans.
