@@ -293,10 +293,7 @@ class Finder {
     for (double* value : {&camera.roll_px, &camera.scale_px, &camera.offset_px, &camera.error_px}) {
       *value *= scale;
     }
-    const bool is_known =
-        camera.found && camera.error_px < kLargestError &&
-        (camera.offset_px <= options_.max_offset || camera.advantage > kLeastAdvantage);
-    if (!is_known && c->keypoints && c->keypoints->num_common > 0) {
+    if (!IsClear(camera) && c->keypoints && c->keypoints->num_common > 0) {
       c->by_keypoints = true;
       camera = CameraShift();
       camera.found = true;
@@ -308,9 +305,13 @@ class Finder {
 
   // A camera has moved where the photos are clearly likelier so.
   bool IsKnown(const Candidate& c) const {
-    if (c.light.same_light || !c.camera.found || c.camera.error_px > kLargestError) return false;
-    return c.by_keypoints || c.camera.offset_px <= options_.max_offset ||
-           c.camera.advantage > kLeastAdvantage;
+    return !c.light.same_light && (c.by_keypoints || IsClear(c.camera));
+  }
+  bool IsClear(const CameraShift& camera) const {
+    if (!camera.found || camera.error_px > kLargestError) return false;
+    if (camera.offset_px <= options_.max_offset) return true;
+    return camera.advantage > kLeastAdvantage &&
+           camera.offset_px > options_.max_offset + 2 * camera.error_px;
   }
   bool IsUnmoved(const Candidate& c) const {
     return IsKnown(c) && c.camera.offset_px <= options_.max_offset;
@@ -433,8 +434,13 @@ class Finder {
       return "the camera moved by " + std::string(offset) + " pixels against " + other(moved);
     }
     if (unclear != nullptr) {
+      char offset[64] = "";
+      if (unclear->camera.found) {
+        std::snprintf(offset, sizeof offset, " (%.2f pixels, give or take %.2f)",
+                      unclear->camera.offset_px, unclear->camera.error_px);
+      }
       return "it shows the place of " + other(unclear) +
-             ", but too few edges that both show tell whether the camera moved";
+             ", but too few edges that both show tell whether the camera moved" + offset;
     }
     if (same != nullptr) {
       return "it shows the place of " + other(same) +
