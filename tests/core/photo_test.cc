@@ -37,6 +37,19 @@ TEST_F(PhotoFile, IsReadAsStored) {
   EXPECT_EQ(ReadPhotoSize(path_), (std::array<int, 2>{64, 48}));
 }
 
+TEST_F(PhotoFile, IsReadSmallAndGrey) {
+  const cv::Mat1b whole = ReadGreyPhoto(path_, 1), half = ReadGreyPhoto(path_, 2);
+  EXPECT_EQ(whole.size(), cv::Size(64, 48));
+  EXPECT_EQ(half.size(), cv::Size(32, 24));
+  EXPECT_EQ(ReadGreyPhoto(path_, 8).size(), cv::Size(8, 6));
+  // 0.114 blue + 0.587 green + 0.299 red of the left half.
+  EXPECT_NEAR(whole(40, 5), 0.114 * 40 + 0.587 * 90 + 0.299 * 200, 4);
+  EXPECT_NEAR(half(20, 3), whole(40, 6), 4);
+  const std::string bytes = ReadBytes(path_);
+  WriteBytes(path_, bytes.substr(0, bytes.size() / 2));
+  EXPECT_INPUT_ERROR(ReadGreyPhoto(path_, 2), "ends before the picture does");
+}
+
 TEST_F(PhotoFile, OrientationIsNotApplied) {
   auto exif_image = Exiv2::ImageFactory::open(path_);
   exif_image->readMetadata();
