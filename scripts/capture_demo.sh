@@ -14,9 +14,14 @@ cmake --preset release >/dev/null
 cmake --build --preset release
 export PATH="$PWD/build/bin:$PATH" QT_QPA_PLATFORM=offscreen
 
+if [ -e "$out" ] && [ ! -e "$out/.roomtex-demo" ]; then
+  echo "capture_demo: $out is there and was not made by this script; name another folder, or remove it." >&2
+  exit 3
+fi
 rm -rf "$out"
 mkdir -p "$out"
 cd "$out"
+touch .roomtex-demo
 
 # Prints a command, runs it; what COLMAP prints goes to colmap.log.
 say() { printf '\n$ %s\n' "$*"; }
