@@ -1,8 +1,10 @@
 // roomtex-pattern: the pattern that projectors throw onto bare walls.
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 
 #include <opencv2/imgcodecs.hpp>
@@ -125,7 +127,12 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   const int num_threads = context.options.num_threads;
   PatternOptions options = arguments.pattern;
   options.random_seed = context.options.random_seed;
-  ThrowIfProblems(options.Problems());
+  std::vector<std::string> problems = options.Problems();
+  std::string extension = std::filesystem::path(arguments.output_path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension != ".png")
+    problems.push_back("--output_path must end in .png: that is what is written");
+  ThrowIfProblems(problems);
   cv::setNumThreads(num_threads > 0 ? num_threads : -1);
 
   context.progress.Stage("pattern");

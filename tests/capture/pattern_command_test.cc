@@ -70,6 +70,9 @@ TEST_F(PatternCommand, SaysWhenAPhotoIsSmallPlainOrNone) {
   EXPECT_EQ(Run("--input_path " + (folder_ / "text.jpg")).exit_code, 3);
   EXPECT_EQ(Run("--input_path " + (folder_ / "none.jpg")).exit_code, 3);
   EXPECT_EQ(Run("--blocks 0 --brightness 2").exit_code, 2);
+  result = RunCommandLine("roomtex-pattern --output_path " + (folder_ / "pattern.gif"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("must end in .png"), std::string::npos) << result.err;
 }
 
 TEST_F(PatternCommand, EvaluatesAPhotoOfTheWall) {
