@@ -7,9 +7,9 @@
 #include <optional>
 #include <sstream>
 
-#include "align/joint_picks.h"
+#include "align/clicks/pose_choice.h"
+#include "align/fit/joint_picks.h"
 #include "align/judgement.h"
-#include "align/pose_choice.h"
 #include "core/error.h"
 #include "core/parallel.h"
 

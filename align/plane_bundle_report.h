@@ -2,7 +2,7 @@
 // The plane-constrained bundle adjustment in the command: its options and its part of the report.
 
 #include "align/alignment.h"
-#include "align/plane_bundle.h"
+#include "align/fit/plane_bundle.h"
 #include "core/command_line.h"
 #include "core/report.h"
 

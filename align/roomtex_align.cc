@@ -4,13 +4,13 @@
 #include <filesystem>
 #include <optional>
 
-#include "align/agreement.h"
-#include "align/agreement_report.h"
 #include "align/alignment.h"
-#include "align/geo_output.h"
-#include "align/overlay.h"
+#include "align/geo/geo_output.h"
 #include "align/plane_bundle_report.h"
-#include "align/scan_planes_report.h"
+#include "align/surface/scan_planes_report.h"
+#include "align/trust/agreement.h"
+#include "align/trust/agreement_report.h"
+#include "align/trust/overlay.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -83,6 +84,7 @@ struct LocalServer::Impl : httplib::Server {
   void AddRoute(const Method& method, const std::string& path, Route route);
   void AddBodyRoute(const Method& method, const std::string& path,
                     std::function<Json(const Json&)> handler);
+  int Listen();
   void Bind();
   void AllowHosts();
   void CatchSignals();
@@ -231,17 +233,30 @@ void LocalServer::Impl::AddBodyRoute(const Method& method, const std::string& pa
   });
 }
 
-void LocalServer::Impl::Bind() {
-  address = ResolveHost(options.host).value();
-  address.set_port(options.port);
+// The error number, 0 if the socket listens at `address`.
+int LocalServer::Impl::Listen() {
   listen_fd = ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   // SO_REUSEPORT, httplib's default, would let two servers share a port.
   const int yes = 1;
   setsockopt(listen_fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (listen_fd < 0 || bind(listen_fd, address.get(), address.size) != 0 ||
-      ::listen(listen_fd, 64) != 0) {
-    const int error = errno;
-    if (listen_fd >= 0) close(std::exchange(listen_fd, -1));
+  if (listen_fd >= 0 && bind(listen_fd, address.get(), address.size) == 0 &&
+      ::listen(listen_fd, 64) == 0) {
+    return 0;
+  }
+  const int error = errno;
+  if (listen_fd >= 0) close(std::exchange(listen_fd, -1));
+  return error;
+}
+
+void LocalServer::Impl::Bind() {
+  address = ResolveHost(options.host).value();
+  address.set_port(options.port);
+  int error = Listen();
+  if (error == EADDRINUSE && options.port_may_differ && options.port == LocalServerOptions().port) {
+    address.set_port(0);
+    error = Listen();
+  }
+  if (error != 0) {
     const std::string port_text = "--port " + std::to_string(options.port) + ": ";
     if (error == EADDRINUSE) {
       throw UsageError(port_text + "the port is taken on " + options.host +
@@ -507,6 +522,12 @@ void AddLocalServerOptions(LocalServerOptions* options, Command* command) {
                    "Let other computers in that know the address with its token. Nothing is "
                    "encrypted: prefer ssh -L.");
   command->AddBool("open", &options->open, "Open the page in the browser.");
+}
+
+void LetPortDiffer(int argc, char** argv, LocalServerOptions* options) {
+  options->port_may_differ = std::none_of(argv, argv + argc, [](const char* text) {
+    return std::string_view(text).substr(0, 6) == "--port";
+  });
 }
 
 }  // namespace roomtex

@@ -28,6 +28,7 @@ class Command;
 struct LocalServerOptions {
   std::string host = "127.0.0.1";  // address to bind
   int port = 8080;                 // 0 = any free one
+  bool port_may_differ = false;    // any free one when the port is taken; LetPortDiffer()
   bool allow_remote = false;       // a host that other computers reach needs this
   bool open = false;               // the command opens the URL in the browser
   // Names, "name" or "name:port", that a Host header may have beside the bound address.
@@ -46,6 +47,9 @@ struct LocalServerOptions {
 
 // Adds --host, --port, --allow_remote and --open.
 void AddLocalServerOptions(LocalServerOptions* options, Command* command);
+// Two commands with pages stand side by side: a port that the user did not ask for, neither on the
+// command line nor in a file, gives way when it is taken.
+void LetPortDiffer(int argc, char** argv, LocalServerOptions* options);
 
 class LocalServer {
  public:
@@ -81,7 +85,8 @@ class LocalServer {
   void AddDelete(const std::string& path, std::function<Json(const Json&)> handler);
 
   // Binds and begins to answer. stop_on_signals: SIGINT and SIGTERM stop (a second one kills), for
-  // one server of a process. Throws UsageError when the port is taken or may not be used.
+  // one server of a process. Throws UsageError when the port is taken (and may not differ) or may
+  // not be used.
   void Start(bool stop_on_signals);
   // Returns once the server is to stop and the requests under way are answered.
   void Wait();

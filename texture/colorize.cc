@@ -4,15 +4,15 @@
 #include <cmath>
 #include <limits>
 
+#include "core/cpu_stages.h"
 #include "core/parallel.h"
 #include "core/photo.h"
-#include "texture/cpu_stages.h"
 #include "texture/debug_images.h"
-#include "texture/photo_pass.h"
-#include "texture/single_holes.h"
-#include "texture/texture_grid.h"
-#include "texture/texture_scale.h"
-#include "texture/unify_exposure.h"
+#include "texture/sampling/photo_pass.h"
+#include "texture/sampling/single_holes.h"
+#include "texture/texels/texture_grid.h"
+#include "texture/texels/texture_scale.h"
+#include "texture/tone/unify_exposure.h"
 
 namespace roomtex {
 namespace {

@@ -8,14 +8,15 @@
 #include "core/progress.h"
 #include "core/scan.h"
 #include "core/scan_mesh.h"
-#include "texture/blend.h"
-#include "texture/detail.h"
-#include "texture/exposure.h"
-#include "texture/grid_colors.h"
-#include "texture/mesh_atlas.h"
-#include "texture/photo_view.h"
-#include "texture/scan_surface.h"
-#include "texture/visibility.h"
+#include "texture/sampling/blend.h"
+#include "texture/sampling/detail.h"
+#include "texture/sampling/grid_colors.h"
+#include "texture/sampling/photo_view.h"
+#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/visibility.h"
+#include "texture/texels/colored_scan.h"
+#include "texture/texels/mesh_atlas.h"
+#include "texture/tone/exposure.h"
 
 namespace roomtex {
 
@@ -38,18 +39,6 @@ struct ColorizeOptions {
   std::string debug_path;  // folder for debug_images.h; "" = none
 
   std::vector<std::string> Problems() const;
-};
-
-struct ColoredScan {
-  std::vector<Triangle> triangles;
-  ColorGrid samples;  // one per sample of the scan
-  // texture_scale times as many columns and rows; empty when that is 1 or the scan has no grid.
-  // Texel (c, r) lies at the sample coordinates ((c + 0.5) / scale - 0.5, (r + 0.5) / scale - 0.5).
-  ColorGrid texture;
-  MeshAtlas atlas;  // of a mesh without a grid, where it is worth one
-  // One per sample: how far the photos that see it differ after the exposures were unified
-  // (SampleDisagreement); NaN where fewer than two do.
-  std::vector<float> disagreement;
 };
 
 struct ColorizeResult {

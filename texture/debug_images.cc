@@ -10,7 +10,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
-#include "texture/write_texture.h"
+#include "texture/output/write_texture.h"
 
 namespace roomtex {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "core/progress.h"
 #include "core/scan.h"
-#include "texture/grid_colors.h"
-#include "texture/photo_view.h"
+#include "texture/sampling/grid_colors.h"
+#include "texture/sampling/photo_view.h"
 
 namespace roomtex {
 

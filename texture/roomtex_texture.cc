@@ -5,21 +5,22 @@
 #include <filesystem>
 
 #include "core/command_line.h"
+#include "core/cpu_stages.h"
 #include "core/error.h"
 #include "core/option_list.h"
 #include "core/output_file.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "texture/colorize.h"
-#include "texture/cpu_stages.h"
-#include "texture/evidence.h"
-#include "texture/output_set.h"
-#include "texture/photo_list.h"
-#include "texture/texture_scale.h"
-#include "texture/write_glb.h"
-#include "texture/write_obj.h"
-#include "texture/write_ply.h"
-#include "texture/write_texture.h"
+#include "texture/output/evidence.h"
+#include "texture/output/output_set.h"
+#include "texture/output/write_glb.h"
+#include "texture/output/write_obj.h"
+#include "texture/output/write_ply.h"
+#include "texture/output/write_texture.h"
+#include "texture/sampling/photo_list.h"
+#include "texture/texels/grid_image.h"
+#include "texture/texels/texture_scale.h"
 
 namespace roomtex {
 namespace {

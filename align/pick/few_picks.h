@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "align/view_pose.h"
+#include "align/clicks/view_pose.h"
 
 namespace roomtex {
 

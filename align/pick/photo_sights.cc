@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "align/overlay.h"
+#include "align/trust/overlay.h"
 #include "core/parallel.h"
 
 namespace roomtex {

@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "align/free_space.h"
-#include "align/overlay.h"
 #include "align/pick/scan_places.h"
 #include "align/pick/scan_rays.h"
+#include "align/trust/free_space.h"
+#include "align/trust/overlay.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
 #include "core/progress.h"

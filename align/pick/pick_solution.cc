@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "align/joint_picks.h"
+#include "align/clicks/pose_choice.h"
+#include "align/fit/joint_picks.h"
 #include "align/judgement.h"
 #include "align/pick/few_picks.h"
 #include "align/pick/pick_advice.h"
-#include "align/pose_choice.h"
 
 namespace roomtex {
 namespace {

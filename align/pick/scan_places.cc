@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "align/scan_view.h"
+#include "align/trust/scan_view.h"
 
 namespace roomtex {
 namespace {

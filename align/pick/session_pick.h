@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "align/picks.h"
+#include "align/clicks/picks.h"
 
 namespace roomtex {
 

@@ -6,6 +6,7 @@
 #include "core/report.h"
 #include "tests/align/case_folder.h"
 #include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {

@@ -9,15 +9,15 @@
 
 #include <gmock/gmock.h>
 
-#include "align/picks.h"
-#include "capture/simulated_room.h"
+#include "align/clicks/picks.h"
+#include "capture/simulation/simulated_room.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/frames.h"
 #include "core/report.h"
 #include "importers/geo_frame.h"
 #include "importers/ptx.h"
 #include "importers/scan_poses.h"
-#include "tests/align/gps_photo.h"
+#include "tests/align/geo/gps_photo.h"
 #include "tests/support/matchers.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "align/alignment.h"
-#include "capture/simulated_room.h"
+#include "capture/simulation/simulated_room.h"
 
 namespace roomtex {
 

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
-#include "tests/align/surface_room.h"
+#include "tests/align/surface/surface_room.h"
 
 namespace roomtex {
 namespace {

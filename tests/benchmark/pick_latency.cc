@@ -17,8 +17,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "align/picks.h"
-#include "capture/simulated_room.h"
+#include "align/clicks/picks.h"
+#include "capture/simulation/simulated_room.h"
 #include "core/report.h"
 #include "importers/scan_writer.h"
 

@@ -3,8 +3,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "align/scan_planes.h"
-#include "capture/simulated_room.h"
+#include "align/surface/scan_planes.h"
+#include "capture/simulation/simulated_room.h"
 
 namespace roomtex {
 namespace {

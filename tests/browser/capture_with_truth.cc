@@ -9,8 +9,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "capture/capture_writer.h"
-#include "capture/simulated_room.h"
+#include "capture/simulation/capture_writer.h"
+#include "capture/simulation/simulated_room.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {

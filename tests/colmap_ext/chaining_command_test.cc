@@ -10,6 +10,7 @@
 #include "tests/colmap_ext/simulated_database.h"
 #include "tests/colmap_ext/wall_sequence.h"
 #include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {

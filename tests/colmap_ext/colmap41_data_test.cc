@@ -7,6 +7,7 @@
 #include "colmap_ext/database.h"
 #include "colmap_ext/sparse_model.h"
 #include "tests/colmap_ext/sparse_model_maker.h"
+#include "tests/support/folders.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
 
@@ -19,7 +20,7 @@ class Colmap41 : public testing::Test {
   void SetUp() override {
     if (!fs::exists(folder_)) GTEST_SKIP() << "no data: " << folder_ << " does not exist";
   }
-  const std::string folder_ = std::string(ROOMTEX_SOURCE) + "/../shared/data/colmap41";
+  const std::string folder_ = DataFolder("colmap41");
 };
 
 TEST_F(Colmap41, BinaryAndTextModelsAreTheSame) {

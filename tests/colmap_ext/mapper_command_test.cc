@@ -14,8 +14,10 @@
 #include "colmap_ext/initializer.h"
 #include "colmap_ext/sparse_model.h"
 #include "tests/colmap_ext/simulated_database.h"
+#include "tests/support/folders.h"
 #include "tests/support/matchers.h"
 #include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {
@@ -456,7 +458,7 @@ TEST_F(MapperCommand, KillsColmapAndTidiesUpWhenStopped) {
     const pid_t command = fork();
     if (command == 0) {
       ::signal(SIGINT, SIG_DFL);  // ignored when the tests run in the background
-      const std::string line = std::string("exec ") + ROOMTEX_BIN + "/" + Arguments() +
+      const std::string line = "exec " + BinFolder() + "/" + Arguments() +
                                "--quiet --Init.max_third_views 1 --colmap " +
                                (folder_ / "colmap-slow");
       execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);

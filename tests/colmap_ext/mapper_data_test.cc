@@ -10,7 +10,9 @@
 
 #include "colmap_ext/sparse_model.h"
 #include "core/frames.h"
+#include "tests/support/folders.h"
 #include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {
@@ -36,7 +38,7 @@ std::map<std::string, Rigid> ReadReferencePoses(const std::string& path) {
 // A database of COLMAP 4.1.1 with ten photos of a kitchen. COLMAP 4.1.1's own model of them is
 // wrong: 118 degrees off the recording. The reference is good to a few centimetres and degrees.
 TEST(MapperData, MapsTheKitchenOfADatabaseOf41) {
-  const std::string data = std::string(ROOMTEX_SOURCE) + "/../shared/data";
+  const std::string data = DataFolder("");
   if (!fs::exists(data)) GTEST_SKIP() << "no data: " << data << " does not exist";
   const TempFolder folder;
   const CommandResult result = RunCommandLine(

@@ -177,6 +177,28 @@ TEST_F(ServedPage, TakenPortIsNamed) {
   EXPECT_EQ(third.port(), port_);
 }
 
+TEST(LocalServerPort, GivesWayOnlyWhenNobodyAskedForIt) {
+  const auto given = [](std::vector<const char*> line) {
+    LocalServerOptions options;
+    LetPortDiffer(static_cast<int>(line.size()), const_cast<char**>(line.data()), &options);
+    return !options.port_may_differ;
+  };
+  EXPECT_FALSE(given({"roomtex-view", "--input_path", "x"}));
+  EXPECT_TRUE(given({"roomtex-view", "--port", "8080"}));
+  EXPECT_TRUE(given({"roomtex-view", "--port=8080"}));
+  LocalServerOptions options;
+  options.port_may_differ = true;
+  LocalServer first(options), second(options);
+  first.Start(false);
+  second.Start(false);
+  EXPECT_NE(first.port(), second.port());
+  EXPECT_NE(second.port(), options.port);
+  EXPECT_THAT(second.Url(), HasSubstr(":" + std::to_string(second.port()) + "/"));
+  options.port = first.port() == options.port ? second.port() : first.port();
+  LocalServer third(options);  // not the default, so somebody asked for it: in a file, say
+  EXPECT_USAGE_ERROR(third.Start(false), "is taken");
+}
+
 TEST(LocalServer, RemoteHostsNeedAWord) {
   for (const char* host : {"0.0.0.0", "::", "192.0.2.7"}) {
     LocalServerOptions options = AnyPort();

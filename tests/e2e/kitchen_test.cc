@@ -8,13 +8,14 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "align/agreement.h"
+#include "align/trust/agreement.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
 #include "importers/scan_reader.h"
 #include "tests/e2e/colmap_steps.h"
 #include "tests/e2e/kitchen_subsets.h"
+#include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 
@@ -23,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-const char kKitchen[] = ROOMTEX_SOURCE "/../shared/data/kitchen";
+const std::string kKitchen = DataFolder("kitchen");
 
 json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
 

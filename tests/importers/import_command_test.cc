@@ -12,6 +12,7 @@
 #include "tests/importers/rtpi_bytes.h"
 #include "tests/support/matchers.h"
 #include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {

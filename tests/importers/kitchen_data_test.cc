@@ -6,12 +6,13 @@
 
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
+#include "tests/support/folders.h"
 #include "tests/support/matchers.h"
 
 namespace roomtex {
 namespace {
 
-const char kKitchen[] = ROOMTEX_SOURCE "/../shared/data/kitchen";
+const std::string kKitchen = DataFolder("kitchen");
 
 TEST(Kitchen, RtpiAndPtxGiveTheSameRoom) {
   const std::string folder = kKitchen;

@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "capture/simulated_room.h"
+#include "capture/simulation/simulated_room.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/photo.h"

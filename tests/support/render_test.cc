@@ -6,8 +6,9 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "capture/capture_writer.h"
-#include "capture/simulated_room.h"
+#include "capture/simulation/capture_writer.h"
+#include "capture/simulation/simulated_room.h"
+#include "tests/support/folders.h"
 #include "tests/support/mesh_renderer.h"
 #include "tests/support/temp_folder.h"
 
@@ -15,8 +16,7 @@ namespace roomtex {
 namespace {
 
 int RunScript(const std::string& arguments) {
-  const std::string line =
-      std::string(ROOMTEX_SOURCE) + "/scripts/render.sh " + arguments + " >/dev/null 2>&1";
+  const std::string line = SourceFolder() + "/scripts/render.sh " + arguments + " >/dev/null 2>&1";
   const int status = std::system(line.c_str());
   return status < 0 ? -1 : status >> 8;
 }

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "tests/support/temp_folder.h"
-#include "tests/texture/two_walls.h"
+#include "tests/texture/sampling/two_walls.h"
 
 namespace roomtex {
 namespace {

@@ -10,16 +10,16 @@
 #include <opencv2/imgproc.hpp>
 #include <tiny_gltf.h>
 
-#include "capture/capture_writer.h"
-#include "capture/simulated_room.h"
+#include "capture/simulation/capture_writer.h"
+#include "capture/simulation/simulated_room.h"
 #include "core/photo.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_writer.h"
 #include "tests/support/ply_vertices.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
-#include "texture/blend.h"
-#include "texture/evidence.h"
+#include "texture/output/evidence.h"
+#include "texture/sampling/blend.h"
 
 namespace roomtex {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/report.h"
-#include "texture/evidence.h"
+#include "texture/output/evidence.h"
 #include "texture/view/view_model.h"
 
 namespace roomtex {

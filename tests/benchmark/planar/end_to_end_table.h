@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/benchmark/planar/planar_sets.h"
+#include "tests/support/folders.h"
 
 namespace roomtex {
 
@@ -13,7 +14,7 @@ struct EndToEndOptions {
   int sets_per_row = 50;
   std::string rows;  // only rows whose name holds this
   int jobs = 1;      // sets side by side
-  std::string roomtex_mapper = ROOMTEX_BIN "/roomtex-mapper";
+  std::string roomtex_mapper = BinFolder() + "/roomtex-mapper";
   std::string colmap = "colmap";
 };
 

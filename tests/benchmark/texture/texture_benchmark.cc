@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "capture/capture_writer.h"
+#include "capture/simulation/capture_writer.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
@@ -14,7 +14,7 @@
 #include "tests/benchmark/texture/texture_limit.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
-#include "texture/photo_list.h"
+#include "texture/sampling/photo_list.h"
 
 namespace roomtex {
 namespace {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "capture/simulated_room.h"
+#include "capture/simulation/simulated_room.h"
 #include "core/photo.h"
 #include "tests/benchmark/texture/texture_limit.h"
 #include "tests/support/run_command.h"

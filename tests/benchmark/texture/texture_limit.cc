@@ -5,9 +5,9 @@
 #include <ctime>
 
 #include "core/photo.h"
-#include "texture/mesh_tiles.h"
-#include "texture/scan_surface.h"
-#include "texture/visibility.h"
+#include "texture/sampling/mesh_tiles.h"
+#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/visibility.h"
 
 namespace roomtex {
 namespace {

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/scan.h"
-#include "texture/photo_view.h"
+#include "texture/sampling/photo_view.h"
 
 namespace roomtex {
 

@@ -1,0 +1,201 @@
+#include "align/clicks/scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/parallel.h"
+
+namespace roomtex {
+namespace {
+
+// The part of the scans that the photo can see, for the ray caster: a scan of millions of samples
+// needs hundreds of megabytes there, the share of it before one photo does not.
+struct VisiblePart {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Triangle> triangles;
+};
+
+// A sample counts as inside the photo with this share of the photo's size around it.
+constexpr double kMargin = 0.1;
+
+bool IsInView(const CameraProjection& projection, double max_radius2, const Eigen::Vector3d& p) {
+  if (!(p.z() > 1e-6)) return false;  // NaN (missing) as well
+  const double x = p.x() / p.z(), y = p.y() / p.z();
+  if (x * x + y * y > max_radius2) return false;
+  const auto x_in_img = projection.ImgFromCam(p);
+  if (!x_in_img) return false;
+  const double dx = kMargin * projection.camera().width;
+  const double dy = kMargin * projection.camera().height;
+  return x_in_img->x() > -dx && x_in_img->y() > -dy &&
+         x_in_img->x() < projection.camera().width + dx &&
+         x_in_img->y() < projection.camera().height + dy;
+}
+
+// Largest squared radius of the normalised coordinates that the photo's border reaches, with the
+// margin.
+double MaxRadius2(const CameraProjection& projection) {
+  const Camera& camera = projection.camera();
+  double radius2 = 0;
+  for (int side = 0; side < 4; ++side) {
+    for (int k = 0; k <= 16; ++k) {
+      const double u = k / 16.0;
+      const Eigen::Vector2d at(side < 2 ? u : side - 2, side < 2 ? side : u);
+      const auto x = projection.CamFromImg({at.x() * camera.width, at.y() * camera.height});
+      if (!x) return std::numeric_limits<double>::infinity();
+      radius2 = std::max(radius2, x->squaredNorm());
+    }
+  }
+  return radius2 * (1 + 4 * kMargin) * (1 + 4 * kMargin);
+}
+
+VisiblePart FindVisiblePart(const CameraProjection& projection, const Rigid& cam_from_scan,
+                            const std::vector<Scan>& scans,
+                            const std::vector<std::vector<Triangle>>& meshes) {
+  VisiblePart part;
+  const double max_radius2 = MaxRadius2(projection);
+  const Eigen::Matrix3d r = cam_from_scan.rotation.toRotationMatrix();
+  for (size_t s = 0; s < scans.size(); ++s) {
+    const std::vector<Eigen::Vector3d>& points = scans[s].points;
+    std::vector<int> renumbered(points.size(), -1);
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (!IsInView(projection, max_radius2, r * points[i] + cam_from_scan.translation)) continue;
+      renumbered[i] = static_cast<int>(part.points.size());
+      part.points.push_back(points[i]);
+    }
+    for (const Triangle& t : meshes[s]) {
+      const Triangle moved = {renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]};
+      if (moved[0] >= 0 && moved[1] >= 0 && moved[2] >= 0) part.triangles.push_back(moved);
+    }
+  }
+  return part;
+}
+
+double Median(std::vector<double> values) {
+  const size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  return values[middle];
+}
+
+class DepthFinder {
+ public:
+  DepthFinder(const CameraProjection& projection, const Rigid& cam_from_scan,
+              const RayCaster& surface)
+      : projection_(projection), cam_from_scan_(cam_from_scan), surface_(surface) {}
+
+  // Depth (z in `cam`) of the nearest scan surface behind a pixel.
+  std::optional<double> At(const Eigen::Vector2d& x_in_img) const {
+    const auto x_in_cam = projection_.CamFromImg(x_in_img);
+    if (!x_in_cam) return std::nullopt;
+    const Eigen::Vector3d direction =
+        (cam_from_scan_.rotation.conjugate() * x_in_cam->homogeneous()).normalized();
+    const auto hit = surface_.Cast(cam_from_scan_.TargetOriginInSource(), direction);
+    if (!hit) return std::nullopt;
+    return (cam_from_scan_ * hit->point).z();
+  }
+
+  // The surface around the pixel has no edge: on a plane the inverse depth is linear over the
+  // photo.
+  bool IsSmooth(const Eigen::Vector2d& x_in_img, double depth, const ScaleOptions& options) const {
+    for (const Eigen::Vector2d& side : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1),
+                                        Eigen::Vector2d(0.7, 0.7), Eigen::Vector2d(0.7, -0.7)}) {
+      const auto before = At(x_in_img - options.edge_px * side);
+      const auto after = At(x_in_img + options.edge_px * side);
+      if (!before || !after) return false;
+      const double expected = 2 / (1 / *before + 1 / *after);
+      if (!(std::abs(depth / expected - 1) < options.max_depth_step)) return false;
+      if (!(std::abs(*before / *after - 1) < 10 * options.max_depth_step)) return false;
+    }
+    return true;
+  }
+
+ private:
+  const CameraProjection& projection_;
+  Rigid cam_from_scan_;
+  const RayCaster& surface_;
+};
+
+// A feature with a sparse point: what its depth in the scan says.
+struct Feature {
+  Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
+  double sparse_depth = 0;
+  bool has_surface = false;
+  double ratio = 0;  // 0: no smooth surface
+};
+
+constexpr int kFeaturesPerChunk = 64;
+
+}  // namespace
+
+std::vector<std::string> ScaleOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (!(edge_px >= 0)) problems.push_back("--Scale.edge_px must not be negative");
+  if (!(max_depth_step > 0)) problems.push_back("--Scale.max_depth_step must be positive");
+  if (max_features < 1) problems.push_back("max_features must be positive");
+  if (!(max_deviations > 0)) problems.push_back("--Scale.max_deviations must be positive");
+  return problems;
+}
+
+ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
+                            const Rigid& cam_from_scan, const std::vector<Scan>& scans,
+                            const std::vector<std::vector<Triangle>>& meshes,
+                            const ScaleOptions& options) {
+  const CameraProjection projection(model.cameras.at(image.camera_id));
+  const VisiblePart part = FindVisiblePart(projection, cam_from_scan, scans, meshes);
+  const RayCaster surface(part.points, part.triangles);
+  return EstimateScale(model, image, cam_from_scan, surface, options, 1);
+}
+
+ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
+                            const Rigid& cam_from_scan, const RayCaster& surface,
+                            const ScaleOptions& options, int num_threads) {
+  const CameraProjection projection(model.cameras.at(image.camera_id));
+  const DepthFinder depths(projection, cam_from_scan, surface);
+  std::vector<Feature> features;
+  for (size_t i = 0; i < image.points2d.size(); ++i) {
+    if (image.point3d_ids[i] == kInvalidPoint3dId) continue;
+    const auto point = model.points.find(image.point3d_ids[i]);
+    if (point == model.points.end()) continue;
+    const double alpha = (image.cam_from_model * point->second.x_in_model).z();
+    if (alpha > 0) features.push_back({image.points2d[i], alpha, false, 0});
+  }
+  if (features.size() > static_cast<size_t>(options.max_features)) {
+    const size_t stride = (features.size() - 1) / options.max_features + 1;
+    size_t kept = 0;
+    for (size_t i = 0; i < features.size(); i += stride) features[kept++] = features[i];
+    features.resize(kept);
+  }
+  const int count = static_cast<int>(features.size());
+  ParallelFor(num_threads, 0, (count + kFeaturesPerChunk - 1) / kFeaturesPerChunk, [&](int chunk) {
+    const int end = std::min(count, (chunk + 1) * kFeaturesPerChunk);
+    for (int i = chunk * kFeaturesPerChunk; i < end; ++i) {
+      const auto beta = depths.At(features[i].x_in_img);
+      features[i].has_surface = beta.has_value();
+      if (!beta || !depths.IsSmooth(features[i].x_in_img, *beta, options)) continue;
+      features[i].ratio = *beta / features[i].sparse_depth;  // Thesis (7.3), inverted
+    }
+  });
+  ScaleEstimate estimate;
+  std::vector<double> ratios;
+  for (const Feature& feature : features) {
+    estimate.num_candidates += feature.has_surface;
+    if (feature.ratio > 0) ratios.push_back(feature.ratio);
+  }
+  if (ratios.empty()) return estimate;
+  const double median = Median(ratios);
+  std::vector<double> deviations;
+  for (const double ratio : ratios) deviations.push_back(std::abs(ratio - median));
+  const double mad = Median(deviations);
+  estimate.relative_mad = mad / median;
+  const double limit = options.max_deviations * 1.4826 * mad;
+  double sum = 0;
+  for (const double ratio : ratios) {
+    if (!(std::abs(ratio - median) <= limit)) continue;
+    sum += ratio;
+    ++estimate.num_features;
+  }
+  estimate.scale = sum / estimate.num_features;
+  return estimate;
+}
+
+}  // namespace roomtex

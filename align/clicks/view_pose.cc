@@ -1,0 +1,376 @@
+#include "align/clicks/view_pose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include "core/camera_formulas.h"
+
+namespace roomtex {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kMaxCameraParams = 12;
+constexpr double kMinDepth = 1e-6;  // metres in front of the camera
+
+// Undistorted normalised coordinates of the clicks that have any, with their scan points.
+struct NormalisedPairs {
+  Eigen::Matrix2Xd x_in_cam;  // (x/z, y/z)
+  Eigen::Matrix3Xd x_in_scan;
+};
+
+NormalisedPairs Normalise(const CameraProjection& projection, const PointPairs& pairs) {
+  NormalisedPairs result{Eigen::Matrix2Xd(2, pairs.size()), Eigen::Matrix3Xd(3, pairs.size())};
+  int count = 0;
+  for (int i = 0; i < pairs.size(); ++i) {
+    const auto x = projection.CamFromImg(pairs.x_in_img.col(i));
+    if (!x) continue;
+    result.x_in_cam.col(count) = *x;
+    result.x_in_scan.col(count) = pairs.x_in_scan.col(i);
+    ++count;
+  }
+  result.x_in_cam.conservativeResize(2, count);
+  result.x_in_scan.conservativeResize(3, count);
+  return result;
+}
+
+struct Frame {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes =
+      Eigen::Matrix3d::Identity();                    // columns, by descending extent, right-handed
+  Eigen::Vector3d extents = Eigen::Vector3d::Zero();  // RMS, metres
+};
+
+Frame PrincipalFrame(const Eigen::Matrix3Xd& points) {
+  Frame frame;
+  if (points.cols() == 0) return frame;
+  frame.centre = points.rowwise().mean();
+  const Eigen::Matrix3Xd centred = points.colwise() - frame.centre;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
+      Eigen::Matrix3d(centred * centred.transpose() / static_cast<double>(points.cols())));
+  for (int i = 0; i < 3; ++i) {
+    frame.axes.col(i) = solver.eigenvectors().col(2 - i);
+    frame.extents[i] = std::sqrt(std::max(0.0, solver.eigenvalues()[2 - i]));
+  }
+  if (frame.axes.determinant() < 0) frame.axes.col(2) *= -1;
+  return frame;
+}
+
+Eigen::Quaterniond NearestRotation(const Eigen::Matrix3d& matrix) {
+  // Thesis step 4: all singular values set to one.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
+  return Eigen::Quaterniond(
+             Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()))
+      .normalized();
+}
+
+// Thesis step 5: T for a given R, linear in the equations x z = X_x + T_x, y z = X_y + T_y.
+Eigen::Vector3d BestTranslation(const NormalisedPairs& pairs, const Eigen::Quaterniond& rotation) {
+  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  Eigen::MatrixXd a(2 * n, 3);
+  Eigen::VectorXd b(2 * n);
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d p = rotation * pairs.x_in_scan.col(i);
+    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
+    a.row(2 * i) << 1, 0, -x.x();
+    a.row(2 * i + 1) << 0, 1, -x.y();
+    b[2 * i] = x.x() * p.z() - p.x();
+    b[2 * i + 1] = x.y() * p.z() - p.y();
+  }
+  return a.colPivHouseholderQr().solve(b);
+}
+
+// Thesis steps 2 to 5. None if the projection matrix is not determined (coplanar picks).
+std::optional<Rigid> PoseFromProjectionMatrix(const NormalisedPairs& pairs, const Frame& frame) {
+  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  const double size = frame.extents.norm();
+  if (n < 6 || !(frame.extents[2] > 1e-6 * size)) return std::nullopt;
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, 12);
+  for (int i = 0; i < n; ++i) {
+    Eigen::Vector4d p;
+    p << (pairs.x_in_scan.col(i) - frame.centre) / size, 1;
+    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
+    a.block<1, 4>(2 * i, 0) = p.transpose();
+    a.block<1, 4>(2 * i, 8) = -x.x() * p.transpose();
+    a.block<1, 4>(2 * i + 1, 4) = p.transpose();
+    a.block<1, 4>(2 * i + 1, 8) = -x.y() * p.transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
+  const Eigen::VectorXd p = svd.matrixV().col(11);
+  Eigen::Matrix3d m;
+  m << p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10];
+  if (m.determinant() < 0) m = -m;  // step 3: det R > 0
+  if (!(m.norm() > 0)) return std::nullopt;
+  const Eigen::Quaterniond rotation = NearestRotation(m);
+  return Rigid{rotation, BestTranslation(pairs, rotation)};
+}
+
+// The pose that the homography between the plane through the points and the photo gives.
+std::optional<Rigid> PoseFromPlane(const NormalisedPairs& pairs, const Frame& frame) {
+  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  const double size = frame.extents.norm();
+  if (n < 4 || !(frame.extents[1] > 1e-9 * size)) return std::nullopt;
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, 9);
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d local =
+        frame.axes.transpose() * (pairs.x_in_scan.col(i) - frame.centre) / size;
+    const Eigen::RowVector3d p(local.x(), local.y(), 1);
+    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
+    a.block<1, 3>(2 * i, 0) = p;
+    a.block<1, 3>(2 * i, 6) = -x.x() * p;
+    a.block<1, 3>(2 * i + 1, 3) = p;
+    a.block<1, 3>(2 * i + 1, 6) = -x.y() * p;
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
+  const Eigen::VectorXd h = svd.matrixV().col(8);
+  const double sign = h[8] < 0 ? -1 : 1;  // the centre of the points is in front
+  Eigen::Matrix3d m;
+  m.col(0) = sign * Eigen::Vector3d(h[0], h[3], h[6]);
+  m.col(1) = sign * Eigen::Vector3d(h[1], h[4], h[7]);
+  const double scale = std::sqrt(m.col(0).norm() * m.col(1).norm());
+  if (!(scale > 0)) return std::nullopt;
+  m.col(2) = m.col(0).cross(m.col(1)) / scale;
+  const Eigen::Quaterniond rotation =
+      NearestRotation(Eigen::Matrix3d(m / scale * frame.axes.transpose()));
+  return Rigid{rotation, BestTranslation(pairs, rotation)};
+}
+
+// The other solution that nearly coplanar points have when perspective is weak: their plane
+// mirrored about the line of sight to their centre.
+Rigid ReflectedAlongSight(const NormalisedPairs& pairs, const Frame& frame, const Rigid& pose) {
+  const Eigen::Vector3d sight = (pose * frame.centre).normalized();
+  const Eigen::Matrix3d mirror_in_cam = Eigen::Matrix3d::Identity() - 2 * sight * sight.transpose();
+  const Eigen::Vector3d normal = frame.axes.col(2);
+  const Eigen::Matrix3d mirror_in_scan =
+      Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
+  const Eigen::Quaterniond rotation(
+      Eigen::Matrix3d(mirror_in_cam * pose.rotation.toRotationMatrix() * mirror_in_scan));
+  return {rotation.normalized(), BestTranslation(pairs, rotation.normalized())};
+}
+
+// Reprojection error in pixels; parameters (w, t) with x_in_cam = exp(w) R x_in_scan + t.
+struct ReprojectionCost {
+  template <typename T>
+  bool operator()(const T* const pose, T* residual) const {
+    const T rotated[3] = {T(rotated_point.x()), T(rotated_point.y()), T(rotated_point.z())};
+    T p[3];
+    ceres::AngleAxisRotatePoint(pose, rotated, p);
+    for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
+    if (p[2] < T(kMinDepth)) return false;
+    T params[kMaxCameraParams], x, y;
+    for (size_t i = 0; i < camera->params.size(); ++i) params[i] = T(camera->params[i]);
+    camera_formulas::Project(camera->model, params, T(p[0] / p[2]), T(p[1] / p[2]), &x, &y);
+    residual[0] = weight * (x - T(x_in_img.x()));
+    residual[1] = weight * (y - T(x_in_img.y()));
+    return true;
+  }
+  const Camera* camera;
+  Eigen::Vector2d x_in_img;
+  Eigen::Vector3d rotated_point;
+  double weight;
+};
+
+class PoseProblem {
+ public:
+  PoseProblem(const CameraProjection& projection, const PointPairs& pairs, const Rigid& start)
+      : start_(start) {
+    Eigen::Map<Eigen::Vector3d>(parameters_ + 3) = start.translation;
+    for (int i = 0; i < pairs.size(); ++i) {
+      problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6>(
+              new ReprojectionCost{&projection.camera(), pairs.x_in_img.col(i),
+                                   start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
+          nullptr, parameters_);
+    }
+  }
+
+  bool Solve() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_QR;
+    options.max_num_iterations = 200;
+    options.function_tolerance = 1e-14;
+    options.gradient_tolerance = 1e-14;
+    options.parameter_tolerance = 1e-12;
+    options.logging_type = ceres::SILENT;
+    options.num_threads = 1;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  Rigid Pose() const {
+    Eigen::Quaterniond turn;
+    double wxyz[4];
+    ceres::AngleAxisToQuaternion(parameters_, wxyz);
+    turn = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    return {(turn * start_.rotation).normalized(),
+            Eigen::Map<const Eigen::Vector3d>(parameters_ + 3)};
+  }
+
+  // Normal matrix; valid when the problem was made at the pose itself (w = 0).
+  Matrix6d NormalMatrix() {
+    ceres::CRSMatrix jacobian;
+    if (!problem_.Evaluate({}, nullptr, nullptr, nullptr, &jacobian)) return Matrix6d::Zero();
+    Matrix6d normal = Matrix6d::Zero();
+    for (int row = 0; row < jacobian.num_rows; ++row) {
+      Eigen::Matrix<double, 6, 1> j = Eigen::Matrix<double, 6, 1>::Zero();
+      for (int k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
+        j[jacobian.cols[k]] = jacobian.values[k];
+      }
+      normal += j * j.transpose();
+    }
+    return normal;
+  }
+
+ private:
+  Rigid start_;
+  double parameters_[6] = {0, 0, 0, 0, 0, 0};
+  ceres::Problem problem_;
+};
+
+Matrix6d InverseNormal(const Matrix6d& normal) {
+  // Rotation and metres differ in size: equilibrate before judging whether the matrix has an
+  // inverse.
+  const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseSqrt();
+  if (!(scale.minCoeff() > 0) || !normal.allFinite()) return Matrix6d::Constant(kInfinity);
+  const Matrix6d balanced =
+      scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(balanced);
+  if (!(solver.eigenvalues()[0] > 1e-13)) return Matrix6d::Constant(kInfinity);
+  const Matrix6d inverse = solver.eigenvectors() *
+                           solver.eigenvalues().cwiseInverse().asDiagonal() *
+                           solver.eigenvectors().transpose();
+  return scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
+}
+
+// Thesis steps 6 and 7, from one start. None if no point lies in front, or the solution leaves the
+// lens' field.
+std::optional<ViewPose> Refine(const CameraProjection& projection, const PointPairs& pairs,
+                               const Frame& frame, Rigid start) {
+  const auto num_in_front = [&pairs](const Rigid& pose) {
+    int count = 0;
+    for (int i = 0; i < pairs.size(); ++i) count += (pose * pairs.x_in_scan.col(i)).z() > kMinDepth;
+    return count;
+  };
+  if (num_in_front(start) == 0) {
+    const Eigen::Vector3d normal = frame.axes.col(2);
+    start = ReflectAboutPlane(start, normal, normal.dot(frame.centre));
+  }
+  if (num_in_front(start) < pairs.size()) return std::nullopt;
+  PoseProblem problem(projection, pairs, start);
+  if (!problem.Solve()) return std::nullopt;
+  ViewPose result;
+  result.cam_from_scan = problem.Pose();
+  result.residual_px = PickResiduals(projection, pairs, result.cam_from_scan);
+  result.sum_px2 = pairs.SumOfSquares(result.residual_px);
+  if (!std::isfinite(result.sum_px2)) return std::nullopt;
+  const double sum_of_weights = pairs.SumOfSquares(Eigen::VectorXd::Ones(pairs.size()));
+  result.rms_px = std::sqrt(result.sum_px2 / sum_of_weights);
+  result.sigma_px = std::sqrt(result.sum_px2 / std::max(1, 2 * pairs.size() - 6));
+  return result;
+}
+
+}  // namespace
+
+PointPairs PointPairs::Without(int index) const {
+  PointPairs rest{Eigen::Matrix2Xd(2, size() - 1), Eigen::Matrix3Xd(3, size() - 1)};
+  rest.x_in_img << x_in_img.leftCols(index), x_in_img.rightCols(size() - 1 - index);
+  rest.x_in_scan << x_in_scan.leftCols(index), x_in_scan.rightCols(size() - 1 - index);
+  if (weight.size() == 0) return rest;
+  rest.weight.resize(size() - 1);
+  rest.weight << weight.head(index), weight.tail(size() - 1 - index);
+  return rest;
+}
+
+double PointPairs::SumOfSquares(const Eigen::VectorXd& residual_px) const {
+  return weight.size() == 0 ? residual_px.squaredNorm()
+                            : residual_px.cwiseProduct(weight).squaredNorm();
+}
+
+PointPairs PointPairs::Mirrored() const {
+  PointPairs mirrored = *this;
+  mirrored.x_in_scan.row(0) *= -1;
+  return mirrored;
+}
+
+Eigen::Vector3d PrincipalExtents(const Eigen::Matrix3Xd& points) {
+  return PrincipalFrame(points).extents;
+}
+
+double ViewPose::PositionSigma() const {
+  // C = -R^T t with R = exp(w) R0: dC = -R0^T (dt + t x w), so its covariance is that of dt + [t]x
+  // w.
+  Eigen::Matrix3d cross;
+  const Eigen::Vector3d& t = cam_from_scan.translation;
+  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  Eigen::Matrix<double, 3, 6> jacobian;
+  jacobian << cross, Eigen::Matrix3d::Identity();
+  if (!covariance.allFinite()) return kInfinity;
+  return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
+}
+
+std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const PointPairs& pairs,
+                                     const std::optional<Rigid>& start) {
+  const NormalisedPairs normalised = Normalise(projection, pairs);
+  const Frame frame = PrincipalFrame(normalised.x_in_scan);
+  std::vector<Rigid> starts;
+  if (start) starts.push_back(*start);
+  for (const auto& linear :
+       {PoseFromProjectionMatrix(normalised, frame), PoseFromPlane(normalised, frame)}) {
+    if (!linear) continue;
+    starts.push_back(*linear);
+    starts.push_back(ReflectedAlongSight(normalised, frame, *linear));
+  }
+  std::vector<ViewPose> found;
+  for (const Rigid& one : starts) {
+    const auto refined = Refine(projection, pairs, frame, one);
+    if (!refined) continue;
+    // The reflected solution of the refined pose is a better start than that of the rough one.
+    found.push_back(*refined);
+    const auto reflected = Refine(projection, pairs, frame,
+                                  ReflectedAlongSight(normalised, frame, refined->cam_from_scan));
+    if (reflected) found.push_back(*reflected);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const ViewPose& a, const ViewPose& b) { return a.sum_px2 < b.sum_px2; });
+  std::vector<ViewPose> distinct;
+  for (ViewPose& pose : found) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const ViewPose& other) {
+      return RotationAngle(pose.cam_from_scan.rotation, other.cam_from_scan.rotation) < 2e-3;
+    });
+    if (known) continue;
+    pose.covariance =
+        pose.sigma_px * pose.sigma_px *
+        InverseNormal(PoseProblem(projection, pairs, pose.cam_from_scan).NormalMatrix());
+    if (!pose.covariance.allFinite()) pose.covariance.setConstant(kInfinity);
+    distinct.push_back(pose);
+  }
+  return distinct;
+}
+
+Eigen::VectorXd PickResiduals(const CameraProjection& projection, const PointPairs& pairs,
+                              const Rigid& cam_from_scan) {
+  Eigen::VectorXd residual_px(pairs.size());
+  for (int i = 0; i < pairs.size(); ++i) {
+    const auto x = projection.ImgFromCam(cam_from_scan * pairs.x_in_scan.col(i));
+    residual_px[i] = x ? (*x - pairs.x_in_img.col(i)).norm() : kInfinity;
+  }
+  return residual_px;
+}
+
+Rigid ReflectAboutPlane(const Rigid& cam_from_scan, const Eigen::Vector3d& normal, double offset) {
+  // Points of the plane are their own mirror images S x = x - 2 n (n.x - d), so -(R S x + t)
+  // projects them to the same place, on the other side of the camera; -R S is a rotation again.
+  const Eigen::Matrix3d r = cam_from_scan.rotation.toRotationMatrix();
+  const Eigen::Matrix3d mirrored =
+      -r * (Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose());
+  return {Eigen::Quaterniond(mirrored).normalized(),
+          -(cam_from_scan.translation + 2 * offset * (r * normal))};
+}
+
+}  // namespace roomtex

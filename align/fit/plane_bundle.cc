@@ -1,0 +1,376 @@
+#include "align/fit/plane_bundle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "align/fit/bent_model.h"
+#include "align/fit/plane_bundle_round.h"
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+// Fewer points on the surface than this make no adjustment.
+constexpr size_t kMinConstraints = 30;
+// Gates of the rounds, in standard deviations; the last one stays.
+constexpr double kGates[] = {6, 5, 4, 3.5};
+// A round that moves no camera farther is the last.
+constexpr double kSettledMetres = 5e-5, kSettledRadians = 2e-5;
+// A photo with fewer observations takes no part: its pose follows the others.
+constexpr int kMinObservations = 12;
+// The adjusted model may differ from the input by a similarity of this much ...
+constexpr double kMaxScaleChange = 0.10, kMaxMove = 0.5;  // share; metres, of the middle camera
+// ... and a photo may move against the others by this share of the model's extent, at least 5 cm,
+// and turn by 3 degrees: a scan bent by 1 % asks for a third of it. A photo that goes farther takes
+// no part; if more than this share of the photos do, the adjustment is not used.
+constexpr double kMaxBending = 0.04, kMinBendingLimit = 0.05, kMaxTurn_deg = 3;
+constexpr double kMaxShareRunaway = 0.05;
+// The rms reprojection error may grow by this factor, or by these pixels if that is more ...
+constexpr double kMaxReprojectionGrowth = 4, kMaxReprojectionRise_px = 4;
+// ... and the picks may miss by so many standard deviations (rms), or this share of the photo's
+// diagonal if that is more (as TrustOptions::PickRmsLimit).
+constexpr double kMaxPickDeviations = 6, kMaxPickShare = 0.004;
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  return values[middle];
+}
+
+std::string Number(double value, int digits) {
+  char text[64];
+  std::snprintf(text, sizeof(text), "%.*f", digits, value);
+  return text;
+}
+
+// Of every observation, pixels.
+std::vector<double> ReprojectionDistances(const SparseModel& model) {
+  std::map<uint32_t, CameraProjection> projections;
+  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  std::vector<double> distances;
+  for (const auto& [id, point] : model.points) {
+    for (const TrackElement& element : point.track) {
+      const SparseImage& image = model.images.at(element.image_id);
+      const auto x =
+          projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
+      if (x) distances.push_back((*x - image.points2d[element.point2d_index]).norm());
+    }
+  }
+  return distances;
+}
+
+// Standard deviation of a keypoint's coordinate, from the middle of the residuals (outliers do not
+// count), with what points and poses have taken up of them.
+double ImageNoise(const SparseModel& model) {
+  std::vector<double> errors = ReprojectionDistances(model);
+  const auto num_points =
+      std::count_if(model.points.begin(), model.points.end(),
+                    [](const auto& point) { return point.second.track.size() >= 2; });
+  const double num_equations = 2.0 * static_cast<double>(errors.size());
+  const double num_unknowns =
+      3.0 * static_cast<double>(num_points) + 6.0 * static_cast<double>(model.images.size());
+  const double free_share = std::max(0.2, 1 - num_unknowns / std::max(1.0, num_equations));
+  // Median of a Rayleigh distribution: 1.1774 sigma.
+  return std::max(0.1, Median(std::move(errors)) / 1.1774 / std::sqrt(free_share));
+}
+
+double ImageCost(const SparseModel& model, double sigma_px) {
+  constexpr double kHuber = 2.5;
+  double cost = 0;
+  for (const double distance : ReprojectionDistances(model)) {
+    const double r = distance / sigma_px;
+    cost += r < kHuber ? r * r : kHuber * (2 * r - kHuber);
+  }
+  return cost;
+}
+
+// How far a round moved the cameras.
+bool IsSettled(const SparseModel& before, const SparseModel& after) {
+  for (const auto& [id, image] : after.images) {
+    const Rigid& old_pose = before.images.at(id).cam_from_model;
+    const Rigid& pose = image.cam_from_model;
+    if ((pose.TargetOriginInSource() - old_pose.TargetOriginInSource()).norm() > kSettledMetres ||
+        RotationAngle(pose.rotation, old_pose.rotation) > kSettledRadians) {
+      return false;
+    }
+  }
+  return true;
+}
+
+double SurfaceRms(const SparseModel& model, const std::vector<SurfaceConstraint>& constraints) {
+  double sum = 0;
+  for (const SurfaceConstraint& c : constraints) {
+    sum += std::pow(c.Distance(model.points.at(c.point3d_id).x_in_model), 2);
+  }
+  return constraints.empty() ? 0 : std::sqrt(sum / static_cast<double>(constraints.size()));
+}
+
+// The similarity between two states of a model: cameras and points on the surface. The points
+// that nothing holds would outvote them by their distance.
+Similarity FitModels(const SparseModel& from, const SparseModel& to,
+                     const std::vector<SurfaceConstraint>& constraints,
+                     const std::set<uint32_t>& idle_images) {
+  const int num_cameras = static_cast<int>(from.images.size() - idle_images.size());
+  const int n = num_cameras + static_cast<int>(constraints.size());
+  Eigen::Matrix3Xd source(3, n), target(3, n);
+  int i = 0;
+  for (const auto& [id, image] : from.images) {
+    if (idle_images.count(id) > 0) continue;
+    source.col(i) = image.cam_from_model.TargetOriginInSource();
+    target.col(i++) = to.images.at(id).cam_from_model.TargetOriginInSource();
+  }
+  for (const SurfaceConstraint& c : constraints) {
+    source.col(i) = from.points.at(c.point3d_id).x_in_model;
+    target.col(i++) = to.points.at(c.point3d_id).x_in_model;
+  }
+  return FitSimilarity(source, target);
+}
+
+// RMS distance of cameras and constrained points from their middle, metres.
+double Extent(const SparseModel& model, const std::vector<SurfaceConstraint>& constraints) {
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& [id, image] : model.images) {
+    places.push_back(image.cam_from_model.TargetOriginInSource());
+  }
+  for (const SurfaceConstraint& c : constraints) {
+    places.push_back(model.points.at(c.point3d_id).x_in_model);
+  }
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& x : places) middle += x / static_cast<double>(places.size());
+  double sum = 0;
+  for (const Eigen::Vector3d& x : places) sum += (x - middle).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(places.size()));
+}
+
+// Photos that took no part get the pose of the similarity between input and adjusted model, and
+// points that did not follow it, too.
+void MoveIdle(const PlaneBundleInput& input, PlaneBundle* result) {
+  const Similarity& moved = result->adjusted_from_input;
+  for (const uint32_t id : result->idle_images) {
+    result->model.images.at(id).cam_from_model =
+        CamFromScan(input.model.images.at(id).cam_from_model, moved);
+  }
+  for (auto& [id, point] : result->model.points) {
+    const Eigen::Vector3d& before = input.model.points.at(id).x_in_model;
+    if (point.x_in_model == before || !point.x_in_model.allFinite()) {
+      point.x_in_model = moved * before;
+    }
+  }
+}
+
+// Compares the adjusted model with the input; a sentence if it went farther than a correction can.
+// Single photos that did are put back and take no part from then on.
+std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions& options,
+                        PlaneBundle* result) {
+  result->adjusted_from_input =
+      FitModels(input.model, result->model, result->constraints, result->idle_images);
+  const Similarity& moved = result->adjusted_from_input;
+  const double limit =
+      std::max(kMinBendingLimit, kMaxBending * Extent(input.model, result->constraints));
+  std::vector<double> moves;
+  double widest_turn = 0;
+  std::vector<uint32_t> runaway;
+  result->max_bending = 0;
+  for (const auto& [id, image] : input.model.images) {
+    if (result->idle_images.count(id) > 0) continue;
+    const Rigid& adjusted = result->model.images.at(id).cam_from_model;
+    const Rigid expected = CamFromScan(image.cam_from_model, moved);
+    const Eigen::Vector3d centre = adjusted.TargetOriginInSource();
+    const double bending = (centre - expected.TargetOriginInSource()).norm();
+    const double turn = RotationAngle(adjusted.rotation, expected.rotation);
+    moves.push_back((centre - image.cam_from_model.TargetOriginInSource()).norm());
+    const bool held = options.fix_clicked_view && image.name == input.clicked_image;
+    if (!held && !(bending <= limit && turn <= RadFromDeg(kMaxTurn_deg))) {
+      runaway.push_back(id);
+    } else {
+      result->max_bending = std::max(result->max_bending, bending);
+      widest_turn = std::max(widest_turn, turn);
+    }
+  }
+  if (!(std::abs(moved.scale - 1) <= kMaxScaleChange) || !(Median(moves) <= kMaxMove)) {
+    return "The adjustment to the scan's surface ran away: it moves half of the photos by more "
+           "than " +
+           Number(Median(moves), 2) + " m and changes the scale by " +
+           Number(100 * (moved.scale - 1), 1) + " %.";
+  }
+  const double share = static_cast<double>(runaway.size()) / static_cast<double>(moves.size());
+  if (runaway.size() > 1 && share > kMaxShareRunaway) {
+    return "The adjustment to the scan's surface bends the model: it moves " +
+           std::to_string(runaway.size()) + " of " + std::to_string(moves.size()) +
+           " photos against the others by more than " + Number(limit, 3) + " m or " +
+           Number(kMaxTurn_deg, 0) + " degrees.";
+  }
+  result->idle_images.insert(runaway.begin(), runaway.end());
+  if (!runaway.empty()) {
+    result->adjusted_from_input =
+        FitModels(input.model, result->model, result->constraints, result->idle_images);
+    MoveIdle(input, result);
+  }
+  return "";
+}
+
+// RMS error of the used picks over its limit.
+double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
+  double sum = 0, diagonal = 0;
+  int count = 0;
+  for (size_t i = 0; i < input.picks.size(); ++i) {
+    const SparseImage* const image = model.FindImage(input.picks[i].image_name);
+    if (!input.used[i] || image == nullptr) continue;
+    const Camera& camera = model.cameras.at(image->camera_id);
+    const auto x =
+        CameraProjection(camera).ImgFromCam(image->cam_from_model * input.picks[i].x_in_scan);
+    diagonal = std::max(diagonal, std::hypot(camera.width, camera.height));
+    sum += x ? (*x - input.picks[i].x_in_img).squaredNorm() : diagonal * diagonal;
+    ++count;
+  }
+  const double limit = std::max(kMaxPickDeviations * input.pick_sigma_px, kMaxPickShare * diagonal);
+  return count > 0 ? std::sqrt(sum / count) / limit : 0;
+}
+
+// What is wrong with the result as a whole; empty if nothing is.
+std::string FindFault(const PlaneBundleInput& input, const PlaneBundle& result) {
+  for (const auto& [id, camera] : result.model.cameras) {
+    const std::vector<std::string> problems = camera.Problems();
+    if (!problems.empty()) {
+      return "The adjustment to the scan's surface spoiled a camera: " + problems[0] + ".";
+    }
+  }
+  if (!(result.plane_rms_after <= result.plane_rms_before * 1.01 + 1e-4)) {
+    return "The adjustment to the scan's surface did not bring the points nearer to it (rms " +
+           Number(1000 * result.plane_rms_before, 1) + " mm before, " +
+           Number(1000 * result.plane_rms_after, 1) + " mm after).";
+  }
+  const double limit = std::max(kMaxReprojectionGrowth * result.reprojection_rms_before,
+                                result.reprojection_rms_before + kMaxReprojectionRise_px);
+  if (!(result.reprojection_rms_after <= limit)) {
+    return "Photos and scan contradict each other: on the scan's surface the reprojection errors "
+           "grow from " +
+           Number(result.reprojection_rms_before, 2) + " to " +
+           Number(result.reprojection_rms_after, 2) + " pixels (rms).";
+  }
+  const double pick_excess = PickExcess(input, result.model);
+  if (!(pick_excess <= 1)) {
+    return "Picks and surface contradict each other: adjusted to the scan's surface, the photos "
+           "miss the picks by " +
+           Number(pick_excess, 1) + " times what is allowed.";
+  }
+  return "";
+}
+
+// The points that lie on the surface of the scan as it is.
+std::vector<SurfaceConstraint> FindConstraints(const PlaneBundleInput& input, int min_track,
+                                               const PlaneAssociationOptions& association,
+                                               const PlaneBundle& state) {
+  std::vector<SurfacePoint> points =
+      FindSurfacePoints(state.model, min_track, state.sigma_px, std::numeric_limits<size_t>::max());
+  for (SurfacePoint& point : points) point.x_in_sparse = input.bend.Bend(point.x_in_sparse);
+  return AssociateWithSurface(points, input.planes, input.patches, association);
+}
+
+// The same for the room as it is: every surface moved back by the bend at its point.
+std::vector<SurfaceConstraint> Straightened(std::vector<SurfaceConstraint> constraints,
+                                            const SparseModel& model, const ScanBend& bend) {
+  if (bend.IsNone()) return constraints;
+  for (SurfaceConstraint& c : constraints) {
+    const Eigen::Vector3d& x_in_scan = model.points.at(c.point3d_id).x_in_model;
+    c.point -= bend.Bend(x_in_scan) - x_in_scan;
+  }
+  return constraints;
+}
+
+// Photos that the sparse points do not hold.
+void FindIdleImages(const PlaneBundleInput& input, const PlaneBundleOptions& options,
+                    PlaneBundle* result) {
+  for (const auto& [id, image] : input.model.images) {
+    if (options.fix_clicked_view && image.name == input.clicked_image) continue;
+    const auto seen =
+        std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(), [&](uint64_t point_id) {
+          return point_id != kInvalidPoint3dId && input.model.points.at(point_id).track.size() >= 2;
+        });
+    if (seen < kMinObservations) result->idle_images.insert(id);
+  }
+}
+
+// Runs the rounds; a sentence if one of them fails.
+std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& options,
+                      PlaneBundle* result) {
+  PlaneAssociationOptions association;
+  association.max_distance = options.max_distance;
+  association.surface = options.surface;
+  association.surface_noise = options.surface_noise;
+  FindIdleImages(input, options, result);
+  for (int round = 0; round < options.num_rounds; ++round) {
+    association.gate = kGates[std::min<size_t>(round, std::size(kGates) - 1)];
+    result->constraints = FindConstraints(input, options.min_track, association, *result);
+    if (result->constraints.size() < kMinConstraints) {
+      return "Only " + std::to_string(result->constraints.size()) +
+             " sparse points lie on the scan's planes" +
+             (options.surface ? " or flat patches" : "") + ", too few to adjust the poses to them.";
+    }
+    const SparseModel before = result->model;
+    const auto straight = Straightened(result->constraints, result->model, input.bend);
+    const BundleRound problem_of_round{input, options, result->sigma_px, result->idle_images,
+                                       straight};
+    if (!SolveRound(problem_of_round, &result->model)) {
+      return "The adjustment to the scan's surface found no solution.";
+    }
+    result->num_rounds = round + 1;
+    const std::string problem = StopRunaway(input, options, result);
+    if (!problem.empty()) return problem;
+    if (association.gate <= kGates[std::size(kGates) - 1] && IsSettled(before, result->model)) {
+      break;
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<std::string> PlaneBundleOptions::Problems() const {
+  std::vector<std::string> problems;
+  const auto require = [&problems](bool holds, const std::string& sentence) {
+    if (!holds) problems.push_back(sentence);
+  };
+  require(beta >= 0 && std::isfinite(beta), "--PlaneBA.beta must not be negative");
+  require(max_distance > 0, "--PlaneBA.max_distance must be positive");
+  require(surface_noise > 0, "--PlaneBA.surface_noise must be positive");
+  require(min_bend >= 0, "--PlaneBA.min_bend must not be negative");
+  require(min_track >= 2, "--PlaneBA.min_track must be at least 2");
+  require(num_rounds >= 1 && num_rounds <= 100, "--PlaneBA.num_rounds must be 1 to 100");
+  require(max_iterations >= 1, "--PlaneBA.max_iterations must be positive");
+  return problems;
+}
+
+PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options) {
+  PlaneBundle result;
+  result.model = input.model;
+  result.reprojection_rms_before = UpdateReprojectionErrors(&result.model).rms_px;
+  result.sigma_px = ImageNoise(result.model);
+  result.reason = RunRounds(input, options, &result);
+  if (result.reason.empty()) {
+    MoveIdle(input, &result);
+    result.plane_rms_before = SurfaceRms(input.model, result.constraints);
+    result.image_cost = ImageCost(result.model, result.sigma_px);
+    result.model = BendModel(result.model, input.bend);
+    result.plane_rms_after = SurfaceRms(result.model, result.constraints);
+    result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;
+    result.num_points_of_plane.assign(input.planes.size(), 0);
+    for (const SurfaceConstraint& c : result.constraints) {
+      if (c.plane >= 0) ++result.num_points_of_plane[c.plane];
+    }
+    result.reason = FindFault(input, result);
+  }
+  result.usable = result.reason.empty();
+  if (!result.usable) {
+    result.model = input.model;
+    result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;
+  }
+  return result;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,92 @@
+#pragma once
+// Bundle adjustment of the aligned model with its points held on the surface of the scan (thesis
+// 7.2, Appendix C).
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "align/clicks/picks.h"
+#include "align/fit/plane_association.h"
+#include "align/fit/scan_bend.h"
+#include "align/surface/scan_patches.h"
+#include "align/surface/scan_planes.h"
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+struct PlaneBundleOptions {
+  // Pixels per metre; weight of a point's distance from its surface against its reprojection
+  // errors, the thesis' beta. Larger = nearer to the scan. 0 = per point from the ratio of image
+  // noise and scan noise.
+  double beta = 0;
+  double max_distance = 0.10;  // metres; a point farther from a surface never belongs to it
+  bool surface = true;  // points on no plane may be held by flat patches (thesis, chapter 10)
+  // Metres; what stays unknown of a surface however many samples show it. Larger = farther from the
+  // scan.
+  double surface_noise = 0.001;
+  int min_track = 3;  // observations that a point needs to be held on a surface
+  // The photo of the picks keeps its pose, as in the thesis; else its picks hold it no more than
+  // their noise allows.
+  bool fix_clicked_view = false;
+  // Cameras are refined, too, each with one set of parameters for all its photos.
+  bool refine_intrinsics = false;
+  // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
+  // metres, rms over the points on the surface. Smaller ones are within the noise.
+  bool bend = true;
+  double min_bend = 0.001;
+  int num_rounds = 5;       // points are given to surfaces anew this often, less if nothing changes
+  int max_iterations = 25;  // of each round
+
+  std::vector<std::string> Problems() const;
+};
+
+struct PlaneBundleInput {
+  // In the scan frame, by a similarity; of a bent scan: where the room really is (BendFit).
+  const SparseModel& model;
+  const std::vector<ScanPlane>& planes;
+  const ScanPatches& patches;
+  const std::vector<Pick>& picks;  // of all photos
+  std::vector<bool> used;          // one per pick
+  double pick_sigma_px = 1.5;      // click noise, per coordinate
+  std::string clicked_image;       // for fix_clicked_view
+  ScanBend bend = ScanBend();      // where the scan has what the photos see
+};
+
+struct PlaneBundle {
+  // False: `model` is the input, and `reason` says in a sentence what went wrong.
+  bool usable = false;
+  std::string reason;
+  SparseModel model;  // adjusted, on the surface of the scan as it is; errors updated
+  // The similarity from the input model to the adjusted one (least squares over cameras and points
+  // on the surface), and what it leaves of the cameras: how much the adjustment bent the model.
+  // Metres. Both before the model is put onto a bent scan.
+  Similarity adjusted_from_input;
+  double max_bending = 0;
+
+  // Photos that took no part, because too few points hold them or because they ran away; they
+  // follow the similarity.
+  std::set<uint32_t> idle_images;
+
+  std::vector<SurfaceConstraint> constraints;  // of the last round
+  std::vector<int> num_points_of_plane;        // of these, one per plane
+  // RMS distance of these points from their surfaces, metres; the same points before and after.
+  double plane_rms_before = 0, plane_rms_after = 0;
+  // RMS over all observations, pixels.
+  double reprojection_rms_before = 0, reprojection_rms_after = 0;
+  double sigma_px = 0;  // image noise per coordinate, from the input's residuals
+  // Sum over all observations of Huber's cost of the reprojection error in units of sigma_px, of
+  // the adjusted model before it is put onto a bent scan: twice the negative log likelihood.
+  double image_cost = 0;
+  int num_rounds = 0;
+};
+
+// Minimises reprojection errors (Huber) + distances of the points from their surfaces (Cauchy) +
+// errors of the picks (Huber) over all poses and points. Points are given to surfaces anew from
+// round to round. The surfaces hold the gauge; what they leave open (one wall only) the picks hold.
+// A bent scan is straightened for that; in the end the points are bent like the scan and each photo
+// is fitted to them (its own pose cannot be bent, so that its reprojection errors grow).
+// Does not depend on the number of threads: Ceres runs on one thread.
+PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options);
+
+}  // namespace roomtex

@@ -1,0 +1,238 @@
+#include "align/fit/plane_bundle_round.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include <ceres/loss_function.h>
+#include <ceres/normal_prior.h>
+#include <ceres/ordered_groups.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include "align/fit/plane_bundle_costs.h"
+#include "core/camera_formulas.h"
+
+namespace roomtex {
+namespace {
+
+// Reprojection and click errors beyond this many standard deviations count linearly (Huber 1964).
+constexpr double kHuber = 2.5;
+// Scale of Cauchy's loss for distances from the surface, in their standard deviations.
+constexpr double kCauchy = 3.0;
+// A round stops when a step lowers the cost by less than this share; what one round leaves the next
+// one finds.
+constexpr double kFunctionTolerance = 1e-5;
+// More photos than this have a sparse reduced system.
+constexpr size_t kMaxDensePhotos = 80;
+// How well the given intrinsics are believed when they are refined: weak, but keeps parameters that
+// the photos say nothing about. Focal lengths and principal point as a share of the focal length.
+constexpr double kLinearPrior = 0.02, kDistortionPrior = 0.05;
+constexpr int kMaxCameraParams = 12;
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  return values[middle];
+}
+
+class RoundProblem {
+ public:
+  RoundProblem(const BundleRound& round, const SparseModel& model)
+      : round_(round), model_(model), reprojection_loss_(kHuber * round.sigma_px) {
+    ceres::Problem::Options options;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.disable_all_safety_checks = true;
+    problem_ = std::make_unique<ceres::Problem>(options);
+    MakeParameters();
+    AddObservations();
+    AddPicks();
+    AddSurface();
+    if (round.options.refine_intrinsics) AddIntrinsicsPriors();
+    if (round.options.fix_clicked_view) FixClickedView();
+  }
+
+  bool Solve() {
+    ceres::Solver::Options o;
+    o.linear_solver_type =
+        poses_.size() > kMaxDensePhotos ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
+    o.max_num_iterations = round_.options.max_iterations;
+    o.function_tolerance = kFunctionTolerance;
+    o.parameter_tolerance = 1e-9;
+    o.gradient_tolerance = 1e-12;
+    o.initial_trust_region_radius = 1e6;  // the start is near: almost a Gauss-Newton step
+    o.num_threads = 1;
+    o.logging_type = ceres::SILENT;
+    o.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    const auto order = [&](double* block, int group) {
+      if (problem_->HasParameterBlock(block)) {
+        o.linear_solver_ordering->AddElementToGroup(block, group);
+      }
+    };
+    for (Eigen::Vector3d& point : points_) order(point.data(), 0);
+    for (PoseParameters& pose : poses_) order(pose.values, 1);
+    for (auto& params : params_) order(params.data(), 2);
+    for (Eigen::Vector3d& point : pick_points_) order(point.data(), 3);
+    ceres::Solver::Summary summary;
+    ceres::Solve(o, problem_.get(), &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  void Write(SparseModel* model) const {
+    for (const auto& [id, index] : pose_index_) {
+      const double* const pose = poses_[index].values;
+      if (!problem_->HasParameterBlock(pose) || problem_->IsParameterBlockConstant(pose)) continue;
+      model->images.at(id).cam_from_model = poses_[index].CamFromScan();
+    }
+    for (const auto& [id, index] : point_index_) {
+      model->points.at(id).x_in_model = points_[index];
+    }
+    if (!round_.options.refine_intrinsics) return;
+    for (const auto& [id, index] : camera_index_) {
+      std::vector<double>& params = model->cameras.at(id).params;
+      std::copy_n(params_[index].begin(), params.size(), params.begin());
+    }
+  }
+
+ private:
+  void MakeParameters() {
+    for (const auto& [id, camera] : model_.cameras) {
+      projections_.emplace(id, camera);
+      camera_index_[id] = params_.size();
+      params_.push_back({});
+      std::copy(camera.params.begin(), camera.params.end(), params_.back().begin());
+    }
+    for (const auto& [id, image] : model_.images) {
+      if (round_.idle_images.count(id) > 0) continue;
+      pose_index_[id] = poses_.size();
+      poses_.emplace_back(image.cam_from_model);
+    }
+    for (const auto& [id, point] : model_.points) {
+      const auto num_seen = std::count_if(
+          point.track.begin(), point.track.end(),
+          [&](const TrackElement& element) { return Sees(element.image_id, point.x_in_model); });
+      if (num_seen < 2) continue;
+      point_index_[id] = points_.size();
+      points_.push_back(point.x_in_model);
+    }
+    pick_points_.reserve(round_.input.picks.size());  // Ceres keeps pointers into it
+  }
+
+  bool Sees(uint32_t image_id, const Eigen::Vector3d& x_in_scan) const {
+    if (pose_index_.count(image_id) == 0) return false;
+    const SparseImage& image = model_.images.at(image_id);
+    return projections_.at(image.camera_id)
+        .ImgFromCam(image.cam_from_model * x_in_scan)
+        .has_value();
+  }
+
+  void AddReprojection(uint32_t image_id, double* point, const Eigen::Vector2d& x_in_img,
+                       double weight) {
+    const Camera& camera = model_.cameras.at(model_.images.at(image_id).camera_id);
+    PoseParameters& pose = poses_[pose_index_.at(image_id)];
+    const bool refine = round_.options.refine_intrinsics;
+    auto* const cost = new ReprojectionCost(pose, camera, x_in_img, weight, refine);
+    if (refine) {
+      problem_->AddResidualBlock(cost, &reprojection_loss_, pose.values, point,
+                                 params_[camera_index_.at(camera.camera_id)].data());
+    } else {
+      problem_->AddResidualBlock(cost, &reprojection_loss_, pose.values, point);
+    }
+  }
+
+  void AddObservations() {
+    for (const auto& [id, index] : point_index_) {
+      const SparsePoint& point = model_.points.at(id);
+      for (const TrackElement& element : point.track) {
+        if (!Sees(element.image_id, point.x_in_model)) continue;
+        AddReprojection(element.image_id, points_[index].data(),
+                        model_.images.at(element.image_id).points2d[element.point2d_index], 1);
+      }
+    }
+  }
+
+  void AddPicks() {
+    for (size_t i = 0; i < round_.input.picks.size(); ++i) {
+      const Pick& pick = round_.input.picks[i];
+      const SparseImage* const image = model_.FindImage(pick.image_name);
+      const Eigen::Vector3d x_in_scan = round_.input.bend.Straighten(pick.x_in_scan);
+      if (!round_.input.used[i] || image == nullptr || !Sees(image->image_id, x_in_scan)) continue;
+      pick_points_.push_back(x_in_scan);
+      AddReprojection(image->image_id, pick_points_.back().data(), pick.x_in_img,
+                      pick.weight * round_.sigma_px / round_.input.pick_sigma_px);
+      problem_->SetParameterBlockConstant(pick_points_.back().data());
+    }
+  }
+
+  void AddSurface() {
+    // In the first round distances are large because the similarity is rough, not because the
+    // points are wrong: the loss widens with them.
+    std::vector<double> deviations;
+    for (const SurfaceConstraint& c : round_.constraints) {
+      deviations.push_back(std::abs(c.Distance(model_.points.at(c.point3d_id).x_in_model)) /
+                           c.sigma);
+    }
+    const double typical = std::max(1.0, 1.4826 * Median(deviations));
+    for (const SurfaceConstraint& c : round_.constraints) {
+      const auto at = point_index_.find(c.point3d_id);
+      if (at == point_index_.end()) continue;
+      const double fixed_beta = round_.options.beta;
+      const double beta = fixed_beta > 0 ? fixed_beta : round_.sigma_px / c.sigma;
+      surface_losses_.push_back(
+          std::make_unique<ceres::CauchyLoss>(kCauchy * typical * beta * c.sigma));
+      problem_->AddResidualBlock(new PlaneCost(beta, c.point, c.normal),
+                                 surface_losses_.back().get(), points_[at->second].data());
+    }
+  }
+
+  void AddIntrinsicsPriors() {
+    for (const auto& [id, index] : camera_index_) {
+      double* const params = params_[index].data();
+      if (!problem_->HasParameterBlock(params)) continue;
+      const Camera& given = round_.input.model.cameras.at(id);
+      const int n = static_cast<int>(given.params.size());
+      Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+      for (int i = 0; i < n; ++i) {
+        const double sigma = i < camera_formulas::NumLinearParams(given.model)
+                                 ? kLinearPrior * given.MeanFocalLength()
+                                 : kDistortionPrior;
+        a(i, i) = round_.sigma_px / sigma;
+      }
+      const Eigen::Map<const Eigen::VectorXd> b(given.params.data(), n);
+      problem_->AddResidualBlock(new ceres::NormalPrior(a, b), nullptr, params);
+    }
+  }
+
+  void FixClickedView() {
+    const SparseImage* const image = model_.FindImage(round_.input.clicked_image);
+    if (image == nullptr || pose_index_.count(image->image_id) == 0) return;
+    double* const pose = poses_[pose_index_.at(image->image_id)].values;
+    if (problem_->HasParameterBlock(pose)) problem_->SetParameterBlockConstant(pose);
+  }
+
+  const BundleRound& round_;
+  const SparseModel& model_;
+  std::map<uint32_t, CameraProjection> projections_;
+  std::map<uint32_t, size_t> camera_index_, pose_index_;
+  std::map<uint64_t, size_t> point_index_;
+  std::vector<std::array<double, kMaxCameraParams>> params_;
+  std::vector<PoseParameters> poses_;
+  std::vector<Eigen::Vector3d> points_, pick_points_;
+  ceres::HuberLoss reprojection_loss_;
+  std::vector<std::unique_ptr<ceres::LossFunction>> surface_losses_;
+  std::unique_ptr<ceres::Problem> problem_;
+};
+
+}  // namespace
+
+bool SolveRound(const BundleRound& round, SparseModel* model) {
+  RoundProblem problem(round, *model);
+  if (!problem.Solve()) return false;
+  problem.Write(model);
+  return true;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,27 @@
+#pragma once
+// How exact each photo's pose is after the adjustment to the scan's surface: the covariance of all
+// poses together, by the normal equations with the points eliminated (Schur complement).
+
+#include <cstdint>
+#include <map>
+
+#include <Eigen/Core>
+
+#include "align/fit/plane_bundle.h"
+
+namespace roomtex {
+
+// Of (w, centre) with x_in_cam = exp(w) R (x_in_scan - centre): rad^2, rad m, m^2; `scan`.
+using PoseCovariances = std::map<uint32_t, Eigen::Matrix<double, 6, 6>>;
+
+// More photos than this would need a dense matrix of more than 2400 x 2400.
+inline constexpr size_t kMaxPosesWithCovariance = 400;
+
+// By image_id, for the photos that took part. Image noise is that of the bundle; what stays unknown
+// of a surface is taken to be the same for all points within half a metre of it, so that thousands
+// of points on a wall do not make it exact. Empty for more than kMaxPosesWithCovariance photos, for
+// a bundle that is not usable, and where something stays open.
+PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
+                                    const PlaneBundleOptions& options);
+
+}  // namespace roomtex

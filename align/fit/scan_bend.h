@@ -1,0 +1,76 @@
+#pragma once
+// A scan that is itself slightly and smoothly bent (thesis 7.2): by how much, seen against the
+// sparse model, whose shape the photos fix far better.
+//
+// Beyond the thesis. Distances of points from surfaces say nothing about sliding along them. Left
+// alone with a bent scan, a similarity (or a bundle adjustment) follows the walls and slides every
+// colour on the walls across by as much. So the bend is estimated as what a scanner does wrong:
+// ranges too long or short and azimuths off, smoothly changing with the direction.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "align/clicks/picks.h"
+#include "align/fit/similarity_fit.h"
+#include "align/surface/scan_patches.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/scan.h"
+
+namespace roomtex {
+
+// Where the scan has a point of the room. Frame: `scan`.
+class ScanBend {
+ public:
+  // No bend.
+  ScanBend() = default;
+  // The scanner's place, up, and where its first column lies. scan: organised.
+  explicit ScanBend(const Scan& scan);
+
+  // Number of coefficients: ranges (a share, spherical harmonics of degree 1 to 4), then azimuths
+  // (radians: steadily growing over the turn, once and twice around).
+  static constexpr int kNumRange = 24, kNumAzimuth = 5, kNumCoefficients = kNumRange + kNumAzimuth;
+  using Coefficients = Eigen::Matrix<double, kNumCoefficients, 1>;
+  Coefficients coefficients = Coefficients::Zero();
+
+  bool IsNone() const { return coefficients.isZero(0); }
+  // From where a point is to where the scan has it.
+  Eigen::Vector3d Bend(const Eigen::Vector3d& x_in_scan) const;
+  // The inverse of Bend.
+  Eigen::Vector3d Straighten(const Eigen::Vector3d& x_in_scan) const;
+  // Derivatives of Bend(x) by the coefficients, at none; metres.
+  Eigen::Matrix<double, 3, kNumCoefficients> Basis(const Eigen::Vector3d& x_in_scan) const;
+
+  // Range share and azimuth (radians) in the direction of a point.
+  Eigen::Vector2d At(const Eigen::Vector3d& x_in_scan) const;
+
+ private:
+  Coefficients Functions(const Eigen::Vector3d& offset) const;
+
+  Eigen::Vector3d station_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();  // rows: first column, sideways, up
+  double turn_ = 1;                                     // +1: columns run counter-clockwise
+};
+
+struct BendFit {
+  Similarity scan_from_sparse;  // of the room as it is
+  ScanBend bend;
+  double bend_rms = 0;  // metres; of the bend at the points that lie on the surface
+  double rms_straight = 0, rms_bent = 0;  // distances from the surface without and with it, metres
+  int num_points = 0;
+};
+
+// Similarity and bend together, from the distances of the points from the surface and from the
+// picks. How large coefficients may be follows from the data (their variance is the one that makes
+// the data most likely, by expectation maximisation), so that a straight scan stays straight. None
+// if the scan is not bent by more than min_bend (rms, metres) or by more than any scanner does (5 %
+// of the ranges), or has no grid, or there are several scans.
+std::optional<BendFit> FitScanBend(const SparseModel& model,
+                                   const std::vector<SurfacePoint>& points,
+                                   const std::vector<Scan>& scans, const ScanPatches& surface,
+                                   const std::vector<Pick>& picks, const std::vector<bool>& used,
+                                   double pick_sigma_px, const Similarity& start, double min_bend);
+
+}  // namespace roomtex

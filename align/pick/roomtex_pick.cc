@@ -1,0 +1,117 @@
+// roomtex-pick: points seen in a photo and in the scan, clicked on a page in the browser.
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "align/pick/pick_scene.h"
+#include "align/pick/pick_server.h"
+#include "align/pick/pick_session.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/open_browser.h"
+#include "pick_page.h"
+
+namespace roomtex {
+namespace {
+
+struct Arguments {
+  PickSceneInput scene;
+  std::string output_path, aligned_path, image_name;
+  LocalServerOptions server;
+};
+
+void AddOptions(Arguments* a, Command* command) {
+  command->AddInputPath("input_path", &a->scene.input_path,
+                        "COLMAP's sparse model: a folder, .bin or .txt.");
+  command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
+  command->AddInputPaths("scan_path", &a->scene.scan_paths,
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
+  command->AddOutputPath("output_path", &a->output_path,
+                         "Picks, a CSV file for roomtex-align. Saved after every change; one that "
+                         "is there is continued, and kept as it was with .bak behind its name.");
+  command->AddString(
+      "image_name", &a->image_name,
+      "Photo to begin with, as the model names it; empty = the best one to pick in.");
+  command->AddOutputPath("aligned_path", &a->aligned_path,
+                         "Folder that the page's Align writes to; empty = aligned, beside the "
+                         "picks.",
+                         Command::Kind::kOptional);
+  command->AddInputPath("scan_poses", &a->scene.scan_poses, ScanPosesHelp(),
+                        Command::Kind::kOptional);
+  AddScanReaderOptions(&a->scene.scan_reader, command);
+  AddLocalServerOptions(&a->server, command);
+}
+
+void CheckArguments(Arguments* a) {
+  std::vector<std::string> problems = a->scene.scan_reader.Problems();
+  for (const std::string& problem : a->server.Problems()) problems.push_back(problem);
+  ThrowIfProblems(problems);
+  const std::filesystem::path picks(a->output_path);
+  if (a->aligned_path.empty()) a->aligned_path = (picks.parent_path() / "aligned").string();
+  if (std::filesystem::is_directory(picks)) {
+    throw InputError(a->output_path, "", "is a folder", "Name a file for the picks: picks.csv");
+  }
+  const std::filesystem::path folder = picks.has_parent_path() ? picks.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder)) {
+    throw InputError(folder.string(), "", "there is no such folder",
+                     "Make it, or correct --output_path");
+  }
+}
+
+void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context) {
+  int num_missing = 0;
+  std::string problem;
+  for (const PickPhoto& photo : scene.photos()) {
+    if (photo.missing && num_missing++ == 0) problem = photo.problem;
+  }
+  if (num_missing == 0) return;
+  context.Warn(std::to_string(num_missing) + " of " + std::to_string(scene.photos().size()) +
+               " photos cannot be shown. The first: " + problem);
+}
+
+void ServePicking(Arguments a, const Command::Context& context) {
+  CheckArguments(&a);
+  a.scene.num_threads = context.options.num_threads;
+  PickScene scene(a.scene, &context.progress);
+  if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
+    throw UsageError("--image_name " + a.image_name + " is not in the sparse model");
+  }
+  WarnOfMissingPhotos(scene, context);
+  PickSession session(scene, a.output_path);
+  scene.Prepare();
+  PickServer server(scene, &session, kPickPage,
+                    {a.server, a.image_name, a.aligned_path, FindAlignProgram()});
+  server.Start(true);
+  if (a.server.port != 0 && server.server().port() != a.server.port) {
+    context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +
+                          std::to_string(server.server().port()));
+  }
+  std::cout << server.server().Url() << "\n" << server.server().SshLine() << std::endl;
+  std::optional<OpenBrowser> browser;
+  if (a.server.open) browser.emplace(server.server().Url());
+  if (browser && !browser->problem().empty()) context.Warn(browser->problem());
+  server.Wait();
+  if (!session.SaveAgain()) throw InputError(a.output_path, "", session.Now()->save_error, "");
+  const auto now = session.Now();
+  context.report["num_picks"] = now->picks.size();
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::Arguments arguments;
+  roomtex::Command command(
+      "roomtex-pick", "Points seen in a photo and in the scan, clicked on a page in the browser.",
+      "roomtex-pick --input_path sparse/0 --image_path images --scan_path room.rtpi "
+      "--output_path picks.csv");
+  roomtex::AddOptions(&arguments, &command);
+  roomtex::LetPortDiffer(argc, argv, &arguments.server);
+  return command.Run(argc, argv, [&](const roomtex::Command::Context& context) {
+    roomtex::ServePicking(arguments, context);
+  });
+}

@@ -1,0 +1,200 @@
+#include "align/surface/scan_patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include <Eigen/Eigenvalues>
+
+namespace roomtex {
+namespace {
+
+constexpr int kLeafSize = 8;
+
+// Sums over the samples of one cube, relative to `origin` (the first of them), so that large
+// coordinates keep their precision.
+struct Cell {
+  Eigen::Vector3d origin;
+  Eigen::Vector3f station_side = Eigen::Vector3f::Zero();  // towards the scanner, not normalised
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d sum2 = Eigen::Matrix3d::Zero();
+  int count = 0;
+};
+
+// Cubes in the order in which the samples first meet them: the result does not depend on the hash.
+class CellGrid {
+ public:
+  explicit CellGrid(double cell_size) : cell_size_(cell_size) {}
+
+  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& station) {
+    const uint64_t key = Key(point);
+    if (key != last_key_ || cells_.empty()) {
+      const auto [at, is_new] = index_.try_emplace(key, static_cast<int>(cells_.size()));
+      if (is_new) {
+        cells_.emplace_back();
+        cells_.back().origin = point;
+        cells_.back().station_side = (station - point).cast<float>();
+      }
+      last_key_ = key;
+      last_ = at->second;
+    }
+    Cell& cell = cells_[last_];
+    const Eigen::Vector3d offset = point - cell.origin;
+    cell.sum += offset;
+    cell.sum2 += offset * offset.transpose();
+    ++cell.count;
+  }
+
+  const std::vector<Cell>& cells() const { return cells_; }
+
+ private:
+  // 21 bits per axis; cubes two million cells apart share a key only in scans of more than 100 km.
+  uint64_t Key(const Eigen::Vector3d& point) const {
+    uint64_t key = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto cell = static_cast<int64_t>(std::floor(point[k] / cell_size_));
+      key = (key << 21) | (static_cast<uint64_t>(cell) & 0x1fffff);
+    }
+    return key;
+  }
+
+  double cell_size_;
+  std::unordered_map<uint64_t, int> index_;
+  std::vector<Cell> cells_;
+  uint64_t last_key_ = 0;
+  int last_ = 0;
+};
+
+std::optional<ScanPatch> FitPatch(const Cell& cell, const ScanPatchOptions& options) {
+  if (cell.count < options.min_samples) return std::nullopt;
+  const Eigen::Vector3d mean = cell.sum / cell.count;
+  const Eigen::Matrix3d covariance = cell.sum2 / cell.count - mean * mean.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  const Eigen::Vector3d extents = solver.eigenvalues().cwiseMax(0).cwiseSqrt();
+  // Flat, and wide enough in both directions for the plane not to turn about a line of samples.
+  if (!(extents[0] < options.max_thickness_share * extents[1])) return std::nullopt;
+  if (!(extents[1] > 0.08 * options.cell_size)) return std::nullopt;
+  ScanPatch patch;
+  patch.point = cell.origin + mean;
+  patch.normal = solver.eigenvectors().col(0).normalized();
+  if (patch.normal.dot(cell.station_side.cast<double>()) < 0) patch.normal *= -1;
+  patch.thickness = extents[0];
+  patch.num_samples = cell.count;
+  return patch;
+}
+
+}  // namespace
+
+void VisitSurface(const Scan& scan, double spacing,
+                  const std::function<void(const Eigen::Vector3d& x_in_scan)>& visit) {
+  if (scan.organised || scan.triangles.empty()) {
+    for (const Eigen::Vector3d& point : scan.points) {
+      if (point.x() == point.x()) visit(point);
+    }
+    return;
+  }
+  constexpr int kMaxSteps = 2000;  // along an edge: keeps one absurd triangle from taking hours
+  for (const Triangle& t : scan.triangles) {
+    const Eigen::Vector3d& a = scan.points[t[0]];
+    const Eigen::Vector3d ab = scan.points[t[1]] - a, ac = scan.points[t[2]] - a;
+    const double longest = std::max({ab.norm(), ac.norm(), (ab - ac).norm()});
+    if (!std::isfinite(longest)) continue;
+    const int steps = std::clamp(static_cast<int>(std::ceil(longest / spacing)), 1, kMaxSteps);
+    for (int i = 0; i < steps; ++i) {
+      for (int k = 0; i + k < steps; ++k) {
+        // Centre of a small triangle: no point lies on an edge and is met twice.
+        visit(a + (i + 1.0 / 3) / steps * ab + (k + 1.0 / 3) / steps * ac);
+      }
+    }
+  }
+}
+
+std::vector<std::string> ScanPatchOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (!(cell_size > 0)) problems.push_back("--Patches.cell_size must be positive");
+  if (min_samples < 4) problems.push_back("--Patches.min_samples must be at least 4");
+  if (!(max_thickness_share > 0 && max_thickness_share < 1)) {
+    problems.push_back("--Patches.max_thickness_share must lie between 0 and 1");
+  }
+  return problems;
+}
+
+ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options)
+    : cell_size_(options.cell_size) {
+  CellGrid grid(options.cell_size);
+  for (const Scan& scan : scans) {
+    const Eigen::Vector3d station = scan.Station();
+    VisitSurface(scan, options.cell_size / 4,
+                 [&](const Eigen::Vector3d& x_in_scan) { grid.Add(x_in_scan, station); });
+  }
+  for (const Cell& cell : grid.cells()) {
+    const auto patch = FitPatch(cell, options);
+    if (patch) patches_.push_back(*patch);
+  }
+  if (!patches_.empty()) BuildTree(0, static_cast<int>(patches_.size()));
+}
+
+double ScanPatches::TypicalThickness() const {
+  if (patches_.empty()) return 0;
+  std::vector<double> thickness;
+  for (const ScanPatch& patch : patches_) thickness.push_back(patch.thickness);
+  std::nth_element(thickness.begin(), thickness.begin() + thickness.size() / 2, thickness.end());
+  return thickness[thickness.size() / 2];
+}
+
+int ScanPatches::BuildTree(int begin, int end) {
+  const int index = static_cast<int>(nodes_.size());
+  nodes_.emplace_back();
+  nodes_[index].begin = begin;
+  nodes_[index].end = end;
+  if (end - begin <= kLeafSize) return index;
+  Eigen::Vector3d low = patches_[begin].point, high = low;
+  for (int i = begin; i < end; ++i) {
+    low = low.cwiseMin(patches_[i].point);
+    high = high.cwiseMax(patches_[i].point);
+  }
+  int axis = 0;
+  (high - low).maxCoeff(&axis);
+  const int middle = begin + (end - begin) / 2;
+  std::nth_element(
+      patches_.begin() + begin, patches_.begin() + middle, patches_.begin() + end,
+      [axis](const ScanPatch& a, const ScanPatch& b) { return a.point[axis] < b.point[axis]; });
+  nodes_[index].axis = axis;
+  nodes_[index].split = patches_[middle].point[axis];
+  const int left = BuildTree(begin, middle);
+  const int right = BuildTree(middle, end);
+  nodes_[index].left = left;
+  nodes_[index].right = right;
+  return index;
+}
+
+void ScanPatches::Search(int node_index, const Eigen::Vector3d& x, double* best2, int* best) const {
+  const Node& node = nodes_[node_index];
+  if (node.axis < 0) {
+    for (int i = node.begin; i < node.end; ++i) {
+      const double distance2 = (patches_[i].point - x).squaredNorm();
+      if (distance2 < *best2) {
+        *best2 = distance2;
+        *best = i;
+      }
+    }
+    return;
+  }
+  const double side = x[node.axis] - node.split;
+  Search(side < 0 ? node.left : node.right, x, best2, best);
+  if (side * side < *best2) Search(side < 0 ? node.right : node.left, x, best2, best);
+}
+
+std::optional<ScanPatches::Nearest> ScanPatches::FindNearest(const Eigen::Vector3d& x_in_scan,
+                                                             double max_distance) const {
+  if (patches_.empty() || !x_in_scan.allFinite()) return std::nullopt;
+  double best2 = max_distance * max_distance;
+  Nearest nearest;
+  Search(0, x_in_scan, &best2, &nearest.patch);
+  if (nearest.patch < 0) return std::nullopt;
+  const ScanPatch& patch = patches_[nearest.patch];
+  nearest.distance = patch.normal.dot(x_in_scan - patch.point);
+  return nearest;
+}
+
+}  // namespace roomtex

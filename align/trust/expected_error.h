@@ -1,0 +1,49 @@
+#pragma once
+// What an alignment is worth in millimetres: the covariance of the similarity, propagated to where
+// it matters.
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "align/fit/pose_covariance.h"
+#include "align/fit/similarity_fit.h"
+#include "core/scan.h"
+
+namespace roomtex {
+
+// Standard deviation of the position of a point that moves with the similarity, metres (root of the
+// trace of J C J^T with J = [I, -(x - c)_x, x - c]); infinite if the fit leaves something open.
+double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan);
+
+struct ExpectedError {
+  double at_cameras = 0;     // median over the photos, metres
+  double at_far_corner = 0;  // the largest over the corners of the scan's bounding box, metres
+  Eigen::Vector3d far_corner = Eigen::Vector3d::Zero();  // `scan`
+  double rotation = 0;                                   // radians, root of the trace
+  double scale = 0;                                      // relative
+};
+
+struct PhotoSigma {
+  double position = 0;  // metres, root of the trace
+  double rotation = 0;  // radians, root of the trace
+};
+
+// Of the photos of an adjusted model, by image_id; empty if `covariances` is. The larger of two:
+// the photo's own covariance, and that of the similarity at its place, which knows how far sparse
+// model and scan disagree beyond their noise (a bent scan, a bent model).
+std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
+                                               const SparseModel& adjusted,
+                                               const SimilarityFit& fit);
+
+// Sets at_cameras and rotation to the medians over the photos; leaves them if there are none.
+void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, ExpectedError* error);
+
+// camera_centres: `scan`.
+ExpectedError PropagateError(const SimilarityFit& fit,
+                             const std::vector<Eigen::Vector3d>& camera_centres,
+                             const std::vector<Scan>& scans);
+
+}  // namespace roomtex

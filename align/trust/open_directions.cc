@@ -1,0 +1,109 @@
+#include "align/trust/open_directions.h"
+
+#include <cmath>
+#include <sstream>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+constexpr double kMaxSlide = 0.02;    // metres
+constexpr double kMaxTurn_deg = 0.5;  // degrees
+constexpr double kMaxGrowth = 0.01;
+// What is known without any surface: keeps the inverse finite, and is far beyond all limits.
+constexpr double kPriorSlide = 1.0, kPriorTurn = 0.5, kPriorGrowth = 0.5;  // metres, radians, share
+// The surface faces a way when at least this share of it does (an eigenvalue of the mean n n^T).
+constexpr double kMinFacing = 0.03;
+
+// Eigenvectors of a covariance whose standard deviations exceed the limit, worst first.
+std::vector<Eigen::Vector3d> Open(const Eigen::Matrix3d& covariance, double limit) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  std::vector<Eigen::Vector3d> open;
+  for (int k = 2; k >= 0; --k) {
+    if (solver.eigenvalues()[k] > limit * limit) open.push_back(solver.eigenvectors().col(k));
+  }
+  return open;
+}
+
+// Derivatives of a point's position by the seven numbers of the fit.
+Eigen::Matrix<double, 3, 7> PointJacobian(const Eigen::Vector3d& arm) {
+  Eigen::Matrix<double, 3, 7> jacobian;
+  jacobian.leftCols<3>().setIdentity();
+  jacobian.middleCols<3>(3) << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  jacobian.col(6) = arm;
+  return jacobian;
+}
+
+std::string Listed(const std::vector<Eigen::Vector3d>& directions) {
+  std::ostringstream text;
+  text.setf(std::ios::fixed);
+  text.precision(2);
+  for (size_t i = 0; i < directions.size(); ++i) {
+    // No "-0.00": adding zero makes it positive.
+    const Eigen::Vector3d d = (100 * directions[i]).array().round() / 100 + 0.0;
+    text << (i > 0 ? ", " : "") << "(" << d.x() << ", " << d.y() << ", " << d.z() << ")";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+OpenDirections FindOpenDirections(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan) {
+  OpenDirections open;
+  if (!fit.converged || !fit.covariance.allFinite()) return open;
+  Matrix7d information = fit.surface_information;
+  for (int k = 0; k < 7; ++k) {
+    const double prior = k < 3 ? kPriorSlide : k < 6 ? kPriorTurn : kPriorGrowth;
+    information(k, k) += 1 / (prior * prior);
+  }
+  const Matrix7d covariance = information.ldlt().solve(Matrix7d::Identity());
+  const Eigen::Matrix<double, 3, 7> jacobian = PointJacobian(x_in_scan - fit.pivot);
+  open.slides = Open(jacobian * covariance * jacobian.transpose(), kMaxSlide);
+  open.turns = Open(covariance.block<3, 3>(3, 3), RadFromDeg(kMaxTurn_deg));
+  open.scale = covariance(6, 6) > kMaxGrowth * kMaxGrowth;
+  const Eigen::Matrix3d together = jacobian * fit.covariance * jacobian.transpose();
+  for (const Eigen::Vector3d& slide : open.slides) {
+    open.slide_sigma = std::max(open.slide_sigma, std::sqrt(slide.dot(together * slide)));
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(fit.facing);
+  open.num_facings = static_cast<int>((facing.eigenvalues().array() > kMinFacing).count());
+  return open;
+}
+
+std::string OpenDirections::Sentence() const {
+  if (None()) return "";
+  std::ostringstream text;
+  text << "The surface of the scan that the sparse points lie on ";
+  if (num_facings == 1) {
+    text << "faces one way only (one wall, or walls opposite each other)";
+  } else if (num_facings == 2) {
+    text << "faces two ways only";
+  } else {
+    text << "is too small or too round";
+  }
+  text << " and leaves open";
+  const char* separator = " ";
+  if (!slides.empty()) {
+    text << separator << "where the model lies along " << Listed(slides);
+    separator = ", ";
+  }
+  if (!turns.empty()) {
+    text << separator << "how it is turned about " << Listed(turns);
+    separator = ", ";
+  }
+  if (scale) text << separator << "its scale";
+  text << ": there the picks alone hold it";
+  if (!slides.empty()) {
+    text.setf(std::ios::fixed);
+    text.precision(1);
+    text << ", to " << 1000 * slide_sigma << " mm at the photos (one standard deviation)";
+  }
+  text << ". More picks, or a scan of more of the room, would make it safer.";
+  return text.str();
+}
+
+}  // namespace roomtex

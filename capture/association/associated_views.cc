@@ -1,0 +1,507 @@
+#include "capture/association/associated_views.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "capture/association/associated_views_photo.h"
+#include "colmap_ext/database.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMeasuredSize = 1900;    // pixels: photos are measured at this size or up to twice it
+constexpr int kSearched = 5;           // most alike photos that are compared
+constexpr double kClearDetail = 1.15;  // ratio of detail that tells the patterned photo
+constexpr double kEqualBrightness = 1.03;
+constexpr double kLeastAdvantage = 12;
+constexpr double kLargestError = 0.3;  // pixels: an offset known worse is none
+
+std::vector<std::string> ListPhotoNames(const std::string& folder) {
+  static const std::set<std::string> kExtensions = {".jpg", ".jpeg", ".png",
+                                                    ".tif", ".tiff", ".bmp"};
+  RequireFolder(folder, "Check --image_path: it is the folder with all photos");
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string file = it->path().filename().string();
+    if (!file.empty() && file[0] == '.') {
+      if (it->is_directory(error)) it.disable_recursion_pending();
+      continue;
+    }
+    std::string extension = it->path().extension().string();
+    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (kExtensions.count(extension) == 0 || !it->is_regular_file(error)) continue;
+    names.push_back(it->path().lexically_relative(folder).generic_string());
+  }
+  if (error) throw InputError(folder, "", "cannot be listed: " + error.message(), "Check it");
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+// Keypoints of the database by image name.
+class KeypointSource {
+ public:
+  explicit KeypointSource(const std::string& path) {
+    if (path.empty()) return;
+    database_ = std::make_unique<Database>(path);
+    for (const auto& [id, image] : database_->ReadImages()) ids_[image.name] = id;
+    counts_ = database_->CountKeypoints();
+  }
+  bool Has(const std::string& name) const {
+    const auto id = ids_.find(name);
+    if (id == ids_.end()) return false;
+    const auto count = counts_.find(id->second);
+    return count != counts_.end() && count->second > 0;
+  }
+  std::vector<Eigen::Vector2d> Read(const std::string& name) const {
+    return database_->ReadKeypoints(ids_.at(name));
+  }
+  const std::map<std::string, uint32_t>& ids() const { return ids_; }
+
+ private:
+  std::unique_ptr<Database> database_;
+  std::map<std::string, uint32_t> ids_;
+  std::map<uint32_t, size_t> counts_;
+};
+
+// Two photos of one place, as far as the small pictures tell; first < second.
+struct Candidate {
+  int first = 0, second = 0;
+  std::string found_by;
+  PlaceComparison place;
+  LightComparison light;
+  // Measured if the light differs.
+  bool second_is_patterned = false;
+  CameraShift camera;  // x_in_patterned - x_in_plain, pixels of the photos
+  std::optional<KeypointShift> keypoints;
+  bool by_keypoints = false;
+
+  int patterned() const { return second_is_patterned ? second : first; }
+  int plain() const { return second_is_patterned ? first : second; }
+};
+
+cv::Mat1b ReadToMeasure(const PhotoSummary& photo, double* scale) {
+  int shrink = 1;
+  while (shrink < 8 && std::max(photo.size[0], photo.size[1]) / (2 * shrink) >= kMeasuredSize) {
+    shrink *= 2;
+  }
+  cv::Mat1b grey = ReadGreyPhoto(photo.path, shrink);
+  *scale = static_cast<double>(photo.size[0]) / grey.cols;
+  return grey;
+}
+
+class Finder {
+ public:
+  Finder(const AssociateOptions& options, Progress* progress)
+      : options_(options), progress_(*progress), keypoints_(options.database_path) {}
+
+  Associations Find() {
+    ReadPhotos();
+    progress_.Stage("compare neighbours");
+    const auto by_name = NameOrder(), by_time = TimeOrder();
+    CompareNeighbours(by_name, 1, "name order");
+    CompareNeighbours(by_time, 1, "time order");
+    CompareNeighbours(by_name, 2, "name order");
+    CompareNeighbours(by_time, 2, "time order");
+    Search();
+    Measure();
+    FollowSameLight();
+    return Collect();
+  }
+
+ private:
+  void ReadPhotos() {
+    const auto names = ListPhotoNames(options_.image_path);
+    if (names.size() < 2) {
+      throw InputError(options_.image_path, "",
+                       "holds " + std::to_string(names.size()) +
+                           " photos (JPEG, PNG, TIFF), expected pairs of them",
+                       "Give the folder with the patterned and the plain photos");
+    }
+    photos_.resize(names.size());
+    progress_.Stage("read photos", static_cast<int>(names.size()));
+    ParallelFor(options_.num_threads, 0, static_cast<int>(names.size()), [&](int i) {
+      photos_[i] = SummarizePhoto(names[i], options_.image_path + "/" + names[i]);
+      progress_.Tick();
+    });
+    int missing = 0;
+    std::string example;
+    for (const auto& [name, id] : keypoints_.ids()) {
+      if (std::binary_search(names.begin(), names.end(), name)) continue;
+      if (missing++ == 0) example = name;
+    }
+    if (missing > 0) {
+      result_.warnings.push_back(std::to_string(missing) + " images of " + options_.database_path +
+                                 " are not in " + options_.image_path + ", e.g. " + example);
+    }
+  }
+
+  bool IsUsable(int i) const { return photos_[i].unreadable.empty(); }
+
+  std::vector<int> NameOrder() const {
+    std::vector<int> order;
+    for (int i = 0; i < static_cast<int>(photos_.size()); ++i) {
+      if (IsUsable(i)) order.push_back(i);
+    }
+    return order;
+  }
+  std::vector<int> TimeOrder() const {
+    std::vector<int> order;
+    for (const int i : NameOrder()) {
+      if (!photos_[i].date_time.empty()) order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return photos_[a].date_time < photos_[b].date_time; });
+    return order;
+  }
+
+  // Photos that were seen in another light from the same place.
+  std::set<int> Settled() const {
+    std::set<int> settled;
+    for (const Candidate& c : candidates_) {
+      if (!c.light.same_light) settled.insert({c.first, c.second});
+    }
+    return settled;
+  }
+
+  void CompareNeighbours(const std::vector<int>& order, int step, const std::string& found_by) {
+    const std::set<int> settled = Settled();
+    std::vector<std::pair<int, int>> pairs;
+    for (size_t k = 0; k + step < order.size(); ++k) {
+      const int a = order[k], b = order[k + step];
+      if (step == 1 || settled.count(a) == 0 || settled.count(b) == 0) pairs.push_back({a, b});
+    }
+    Compare(pairs, found_by);
+  }
+
+  void Search() {
+    const std::set<int> settled = Settled();
+    std::vector<int> open;
+    for (const int i : NameOrder()) {
+      if (settled.count(i) == 0) open.push_back(i);
+    }
+    progress_.Stage("search", static_cast<int>(open.size()));
+    std::vector<std::vector<std::pair<int, int>>> found(open.size());
+    ParallelFor(options_.num_threads, 0, static_cast<int>(open.size()), [&](int k) {
+      std::vector<std::pair<double, int>> alike;
+      for (const int other : NameOrder()) {
+        if (other == open[k]) continue;
+        alike.push_back({-SketchLikeness(photos_[open[k]], photos_[other]), other});
+      }
+      std::sort(alike.begin(), alike.end());
+      for (size_t n = 0; n < alike.size() && n < kSearched; ++n) {
+        found[k].push_back({open[k], alike[n].second});
+      }
+      progress_.Tick();
+    });
+    std::vector<std::pair<int, int>> pairs;
+    for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+    Compare(pairs, "search");
+  }
+
+  // Adds those that show one place to the candidates.
+  void Compare(const std::vector<std::pair<int, int>>& pairs, const std::string& found_by) {
+    std::vector<Candidate> fresh;
+    for (auto [a, b] : pairs) {
+      if (a > b) std::swap(a, b);
+      if (!compared_.insert({a, b}).second) continue;
+      Candidate candidate;
+      candidate.first = a;
+      candidate.second = b;
+      candidate.found_by = found_by;
+      fresh.push_back(candidate);
+    }
+    ParallelFor(options_.num_threads, 0, static_cast<int>(fresh.size()), [&](int k) {
+      Candidate& c = fresh[k];
+      const PhotoSummary &first = photos_[c.first], &second = photos_[c.second];
+      c.place = ComparePlaces(first, second);
+      if (c.place.same_place) c.light = CompareLight(first, second, c.place.shift);
+    });
+    for (Candidate& c : fresh) {
+      if (!c.place.same_place) continue;
+      if (photos_[c.first].size != photos_[c.second].size) {
+        other_size_[c.first] = c.second;
+        other_size_[c.second] = c.first;
+      } else {
+        candidates_.push_back(std::move(c));
+      }
+    }
+  }
+
+  // The offsets of the candidates that have none yet.
+  void Measure() {
+    std::vector<Candidate*> open;
+    for (Candidate& c : candidates_) {
+      if (!c.light.same_light && !measured_.count({c.first, c.second})) {
+        measured_.insert({c.first, c.second});
+        open.push_back(&c);
+      }
+    }
+    std::sort(open.begin(), open.end(), [](const Candidate* a, const Candidate* b) {
+      return std::make_pair(a->first, a->second) < std::make_pair(b->first, b->second);
+    });
+    progress_.Stage("measure offsets", static_cast<int>(open.size()));
+    for (Candidate* c : open) ReadKeypointShift(c);  // one database, one thread
+    ParallelFor(options_.num_threads, 0, static_cast<int>(open.size()), [&](int k) {
+      MeasureOne(open[k]);
+      progress_.Tick();
+    });
+  }
+
+  void ReadKeypointShift(Candidate* c) const {
+    // Thesis 6: the one with the pattern is brighter. It has more detail, too, and that holds where
+    // the exposure or the room's light was changed.
+    const double detail = c->light.detail_ratio;
+    c->second_is_patterned = detail > kClearDetail       ? true
+                             : detail < 1 / kClearDetail ? false
+                                                         : c->light.brightness_ratio > 1;
+    const std::string &plain = photos_[c->plain()].name, &patterned = photos_[c->patterned()].name;
+    if (!keypoints_.Has(plain) || !keypoints_.Has(patterned)) return;
+    c->keypoints =
+        FindKeypointShift(keypoints_.Read(plain), keypoints_.Read(patterned), StartOf(*c));
+    if (!c->keypoints) c->keypoints = KeypointShift{};
+  }
+
+  static Eigen::Vector2d StartOf(const Candidate& c) {
+    return c.second_is_patterned ? c.place.shift : Eigen::Vector2d(-c.place.shift);
+  }
+
+  void MeasureOne(Candidate* c) const {
+    double scale = 1;
+    const cv::Mat1b plain = ReadToMeasure(photos_[c->plain()], &scale);
+    const cv::Mat1b patterned = ReadToMeasure(photos_[c->patterned()], &scale);
+    CameraShift& camera = c->camera;
+    if (plain.size() == patterned.size()) {
+      camera = FindCameraShift(plain, patterned, StartOf(*c) / scale);
+    }
+    camera.shift *= scale;
+    for (double* value : {&camera.roll_px, &camera.scale_px, &camera.offset_px, &camera.error_px}) {
+      *value *= scale;
+    }
+    if (!IsClear(camera) && c->keypoints && c->keypoints->num_common > 0) {
+      c->by_keypoints = true;
+      camera = CameraShift();
+      camera.found = true;
+      camera.shift = c->keypoints->shift;
+      camera.offset_px = camera.shift.norm();
+      camera.error_px = c->keypoints->error_px;
+    }
+  }
+
+  // A camera has moved where the photos are clearly likelier so.
+  bool IsKnown(const Candidate& c) const {
+    return !c.light.same_light && (c.by_keypoints || IsClear(c.camera));
+  }
+  bool IsClear(const CameraShift& camera) const {
+    if (!camera.found || camera.error_px > kLargestError) return false;
+    if (camera.offset_px <= options_.max_offset) return true;
+    return camera.advantage > kLeastAdvantage &&
+           camera.offset_px > options_.max_offset + 2 * camera.error_px;
+  }
+  bool IsUnmoved(const Candidate& c) const {
+    return IsKnown(c) && c.camera.offset_px <= options_.max_offset;
+  }
+
+  // A photo in the same light as one that has a partner shares the partner.
+  void FollowSameLight() {
+    std::map<int, std::vector<int>> partners;
+    for (const Candidate& c : candidates_) {
+      if (!IsUnmoved(c)) continue;
+      partners[c.first].push_back(c.second);
+      partners[c.second].push_back(c.first);
+    }
+    std::vector<std::pair<int, int>> pairs;
+    for (const Candidate& c : candidates_) {
+      if (!c.light.same_light) continue;
+      for (const auto& [a, b] : {std::make_pair(c.first, c.second), {c.second, c.first}}) {
+        if (partners.count(a) > 0 || partners.count(b) == 0) continue;
+        for (const int partner : partners.at(b)) pairs.push_back({a, partner});
+      }
+    }
+    if (pairs.empty()) return;
+    Compare(pairs, "search");
+    Measure();
+  }
+
+  Associations Collect() {
+    std::map<int, const Candidate*> best_of_patterned;
+    for (const Candidate& c : candidates_) {
+      if (!IsUnmoved(c)) continue;
+      const Candidate*& best = best_of_patterned[c.patterned()];
+      if (best == nullptr || c.camera.offset_px < best->camera.offset_px) best = &c;
+    }
+    std::map<int, const Candidate*> best_of_plain;
+    for (const auto& [patterned, c] : best_of_patterned) {
+      const Candidate*& best = best_of_plain[c->plain()];
+      if (best == nullptr || c->camera.offset_px < best->camera.offset_px) best = c;
+    }
+    for (const auto& [patterned, c] : best_of_patterned) {
+      result_.pairs.push_back(Describe(*c, best_of_plain.at(c->plain()) != c));
+    }
+    CollectMoved();
+    WarnOfBrightness();
+    for (int i = 0; i < static_cast<int>(photos_.size()); ++i) {
+      result_.num_photos += IsUsable(i);
+      if (best_of_patterned.count(i) > 0 || best_of_plain.count(i) > 0) continue;
+      result_.singles.push_back({photos_[i].name, WhySingle(i)});
+    }
+    return std::move(result_);
+  }
+
+  AssociatedPair Describe(const Candidate& c, bool is_spare) {
+    AssociatedPair pair;
+    pair.patterned_image = photos_[c.patterned()].name;
+    pair.plain_image = photos_[c.plain()].name;
+    pair.shift = c.camera.shift;
+    pair.offset_px = c.camera.offset_px;
+    pair.offset_error_px = c.camera.error_px;
+    pair.brightness_ratio = c.second_is_patterned ? c.light.brightness_ratio
+                                                  : 1 / std::max(c.light.brightness_ratio, 1e-9);
+    pair.exif_brightness = c.light.exif_brightness;
+    if (c.keypoints) pair.num_common_keypoints = c.keypoints->num_common;
+    pair.found_by = c.found_by;
+    pair.by_keypoints = c.by_keypoints;
+    pair.is_spare = is_spare;
+    if (pair.brightness_ratio < kEqualBrightness) not_brighter_.push_back(pair);
+    return pair;
+  }
+
+  void CollectMoved() {
+    for (const Candidate& c : candidates_) {
+      if (!IsKnown(c) || IsUnmoved(c)) continue;
+      const double sign = c.second_is_patterned ? 1 : -1;
+      result_.moved.push_back({photos_[c.first].name, photos_[c.second].name, sign * c.camera.shift,
+                               c.camera.offset_px, c.camera.error_px});
+    }
+    std::sort(
+        result_.moved.begin(), result_.moved.end(), [](const MovedPair& a, const MovedPair& b) {
+          return std::tie(a.first_image, a.second_image) < std::tie(b.first_image, b.second_image);
+        });
+  }
+
+  void WarnOfBrightness() {
+    if (not_brighter_.empty()) return;
+    const AssociatedPair& first = not_brighter_[0];
+    char ratio[32];
+    std::snprintf(ratio, sizeof ratio, "%.2f", first.brightness_ratio);
+    result_.warnings.push_back(
+        std::to_string(not_brighter_.size()) +
+        " patterned photos are not brighter than their plain twins and were told by their "
+        "detail: " +
+        first.patterned_image + " is " + ratio + " times as bright as " + first.plain_image +
+        (first.exif_brightness ? " (exposures taken into account)"
+                               : " (no exposures in EXIF: automatic exposure hides the light)") +
+        (not_brighter_.size() > 1 ? ", and so on" : ""));
+  }
+
+  std::string WhySingle(int i) const {
+    if (!IsUsable(i)) return "it cannot be read: " + photos_[i].unreadable;
+    const Candidate *moved = nullptr, *unclear = nullptr, *spare = nullptr, *same = nullptr;
+    for (const Candidate& c : candidates_) {
+      if (c.first != i && c.second != i) continue;
+      if (c.light.same_light) {
+        same = &c;
+      } else if (IsUnmoved(c)) {
+        spare = &c;
+      } else if (!IsKnown(c)) {
+        unclear = &c;
+      } else if (moved == nullptr || c.camera.offset_px < moved->camera.offset_px) {
+        moved = &c;
+      }
+    }
+    const auto other = [&](const Candidate* c) {
+      return photos_[c->first == i ? c->second : c->first].name;
+    };
+    if (spare != nullptr) return "a further plain photo of the place of " + other(spare);
+    if (moved != nullptr) {
+      char offset[32];
+      std::snprintf(offset, sizeof offset, "%.2f", moved->camera.offset_px);
+      return "the camera moved by " + std::string(offset) + " pixels against " + other(moved);
+    }
+    if (unclear != nullptr) {
+      char offset[64] = "";
+      if (unclear->camera.found) {
+        std::snprintf(offset, sizeof offset, " (%.2f pixels, give or take %.2f)",
+                      unclear->camera.offset_px, unclear->camera.error_px);
+      }
+      return "it shows the place of " + other(unclear) +
+             ", but too few edges that both show tell whether the camera moved" + offset;
+    }
+    if (same != nullptr) {
+      return "it shows the place of " + other(same) +
+             " in the same light: both are patterned, or both are plain";
+    }
+    const auto size = other_size_.find(i);
+    if (size != other_size_.end()) {
+      const auto text = [&](int k) {
+        return std::to_string(photos_[k].size[0]) + " x " + std::to_string(photos_[k].size[1]);
+      };
+      return "it shows the place of " + photos_[size->second].name + ", but has " + text(i) +
+             " pixels and the other " + text(size->second);
+    }
+    return "no other photo was taken from the same place";
+  }
+
+  const AssociateOptions& options_;
+  Progress& progress_;
+  KeypointSource keypoints_;
+  std::vector<PhotoSummary> photos_;
+  std::set<std::pair<int, int>> compared_, measured_;
+  std::vector<Candidate> candidates_;
+  std::map<int, int> other_size_;
+  std::vector<AssociatedPair> not_brighter_;
+  Associations result_;
+};
+
+std::string CsvField(const std::string& text) {
+  if (text.find_first_of(",\"\n#") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c;
+    if (c == '"') quoted += '"';
+  }
+  return quoted + '"';
+}
+
+}  // namespace
+
+std::vector<std::string> AssociateOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (!(max_offset > 0 && max_offset <= 20)) {
+    problems.push_back("--max_offset must lie above 0 and at most at 20 pixels");
+  }
+  return problems;
+}
+
+Associations FindAssociations(const AssociateOptions& options, Progress* progress) {
+  ThrowIfProblems(options.Problems());
+  return Finder(options, progress).Find();
+}
+
+void WriteAssociations(const std::string& path, const std::vector<AssociatedPair>& pairs) {
+  OutputFile file(path);
+  file.stream() << "patterned_image,plain_image,offset_px,brightness_ratio\n";
+  for (const AssociatedPair& pair : pairs) {
+    char numbers[64];
+    std::snprintf(numbers, sizeof numbers, ",%.3f,%.3f\n", pair.offset_px, pair.brightness_ratio);
+    file.stream() << CsvField(pair.patterned_image) << ',' << CsvField(pair.plain_image) << numbers;
+  }
+  file.Commit();
+}
+
+}  // namespace roomtex

@@ -1,0 +1,114 @@
+#include "capture/association/associated_views_links.h"
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <system_error>
+
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const kFolders[] = {"patterned", "plain"};
+
+fs::path ListOf(const fs::path& folder) { return folder / "links.txt"; }
+
+// What earlier runs wrote: paths below the folder.
+std::set<std::string> ReadList(const fs::path& folder) {
+  std::set<std::string> list;
+  std::ifstream stream(ListOf(folder));
+  for (std::string line; std::getline(stream, line);) list.insert(line);
+  return list;
+}
+
+// Refuses folders that hold something else.
+void CheckFolders(const fs::path& folder) {
+  const std::set<std::string> ours = ReadList(folder);
+  for (const char* name : kFolders) {
+    const fs::path path = folder / name;
+    const fs::file_status status = fs::symlink_status(path);
+    if (!fs::exists(status)) continue;
+    if (!fs::is_directory(status)) {
+      throw InputError(path.string(), "", "is in the way: it is no folder",
+                       "Give another --links_path or move it away");
+    }
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path)) {
+      if (entry.is_directory() && !entry.is_symlink()) continue;
+      const std::string below = entry.path().lexically_relative(folder).generic_string();
+      if (ours.count(below) > 0) continue;
+      throw InputError(path.string(), "",
+                       "holds " + below + ", which roomtex-associate did not write",
+                       "Give another --links_path or move it away");
+    }
+  }
+}
+
+void Link(const fs::path& photo, const fs::path& link) {
+  fs::create_directories(link.parent_path());
+  std::error_code error;
+  fs::create_symlink(fs::canonical(photo), link, error);
+  if (error) fs::copy_file(photo, link);
+}
+
+void Write(const fs::path& folder, const fs::path& image_path,
+           const std::vector<AssociatedPair>& pairs, const fs::path& aside) {
+  std::string list;
+  for (const AssociatedPair& pair : pairs) {
+    if (pair.is_spare) continue;
+    const std::string photos[] = {pair.patterned_image, pair.plain_image};
+    for (int k = 0; k < 2; ++k) {
+      Link(image_path / photos[k], aside / kFolders[k] / pair.patterned_image);
+      list += std::string(kFolders[k]) + "/" + pair.patterned_image + "\n";
+    }
+  }
+  // The list first, with what is there still: a run that dies here can be repeated.
+  std::string all = list;
+  for (const std::string& old : ReadList(folder)) all += old + "\n";
+  const auto write_list = [&](const std::string& text) {
+    OutputFile file(ListOf(folder).string());
+    file.stream() << text;
+    file.Commit();
+  };
+  write_list(all);
+  for (const char* name : kFolders) {
+    if (fs::exists(fs::symlink_status(folder / name))) {
+      fs::rename(folder / name, aside / ("old_" + std::string(name)));
+    }
+    fs::rename(aside / name, folder / name);
+  }
+  write_list(list);
+}
+
+}  // namespace
+
+int WriteLinks(const std::string& folder, const std::string& image_path,
+               const std::vector<AssociatedPair>& pairs) {
+  MakeFolder(folder);
+  const fs::path aside = fs::path(folder) / (".links." + std::to_string(getpid()));
+  int count = 0;
+  for (const AssociatedPair& pair : pairs) count += pair.is_spare ? 0 : 1;
+  try {
+    CheckFolders(folder);
+    for (const char* name : kFolders) fs::create_directories(aside / name);
+    Write(folder, image_path, pairs, aside);
+    fs::remove_all(aside);
+  } catch (const fs::filesystem_error& error) {
+    std::error_code ignored;
+    fs::remove_all(aside, ignored);
+    throw InputError(folder, "", "cannot be filled: " + error.code().message(),
+                     "Check that the folder may be written");
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(aside, ignored);
+    throw;
+  }
+  return count;
+}
+
+}  // namespace roomtex

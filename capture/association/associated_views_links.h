@@ -1,0 +1,19 @@
+#pragma once
+// The associated photos as two folders with the same names in both, for COLMAP and roomtex-texture.
+
+#include <string>
+#include <vector>
+
+#include "capture/association/associated_views.h"
+
+namespace roomtex {
+
+// Writes folder/patterned and folder/plain: per pair that is no spare a link named as the patterned
+// photo in both, to the photo itself (a copy where the file system has no links), and
+// folder/links.txt, the list of them. Whole or not at all. What an earlier run wrote is replaced;
+// anything else in these folders is left alone and makes an InputError. Returns the number of
+// pairs.
+int WriteLinks(const std::string& folder, const std::string& image_path,
+               const std::vector<AssociatedPair>& pairs);
+
+}  // namespace roomtex

@@ -1,0 +1,340 @@
+#include "capture/calibration/calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+
+#include "capture/calibration/calibration_models.h"
+#include "capture/calibration/calibration_output.h"
+#include "capture/calibration/calibration_trust.h"
+#include "capture/calibration/calibration_uncertainty.h"
+#include "core/error.h"
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kMinPhotos = 3;   // fewer leave the camera open whatever they show
+constexpr int kMinCorners = 8;  // of a photo
+constexpr double kHuberSigmas = 3;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+std::string Number(double value, const char* format = "%.2f") {
+  char text[40];
+  std::snprintf(text, sizeof(text), format, value);
+  return text;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Standard deviation of one coordinate from the median length of the residuals: for two Gaussian
+// coordinates the median of the squared length is 2 ln 2 sigma^2. unknowns: that the photo's
+// corners have to determine.
+double RobustSigma(const Eigen::Matrix2Xd& residuals, double unknowns) {
+  std::vector<double> squares;
+  for (int i = 0; i < residuals.cols(); ++i) {
+    const double square = residuals.col(i).squaredNorm();
+    squares.push_back(std::isfinite(square) ? square : 1e12);
+  }
+  const double coordinates = 2.0 * static_cast<double>(residuals.cols());
+  const double left = std::max(coordinates - unknowns, 1.0);
+  return std::sqrt(Median(squares) / (2 * std::log(2.0)) * coordinates / left);
+}
+
+// The photos that take part, and what became of their corners.
+class PhotoSelection {
+ public:
+  PhotoSelection(const std::vector<BoardPhoto>& photos, const Board& board,
+                 const CalibrationOptions& options)
+      : photos_(photos), options_(options) {
+    for (size_t i = 0; i < photos.size(); ++i) {
+      if (!photos[i].reason.empty()) continue;
+      if (photos[i].NumCorners() < kMinCorners) continue;
+      index_.push_back(i);
+      views_.push_back(MakeBoardView(photos[i], board));
+    }
+  }
+
+  // Fits all, leaves out the worst photo, and so on until all fit; then those left out get another
+  // chance with the camera of the rest.
+  void Select() {
+    const BoardPhoto& first = photos_[index_.front()];
+    fit_ = RoughFit(views_, first.width, first.height);
+    Fit();
+    while (true) {
+      const int worst = WorstPhoto();
+      if (worst < 0) break;
+      Drop(worst);
+      Fit();
+    }
+    if (TakeBack()) Fit();
+  }
+
+  const std::vector<size_t>& index() const { return index_; }
+  const std::vector<BoardView>& views() const { return views_; }
+  const CameraFit& fit() const { return fit_; }
+  double sigma() const { return sigma_; }
+
+  struct Dropped {
+    size_t index;
+    BoardView view;
+    Rigid cam_from_board;
+    double sigma;
+  };
+  const std::vector<Dropped>& dropped() const { return dropped_; }
+
+ private:
+  // The richest lens that so few photos can bear: what it cannot explain is not the lens.
+  LensModel JudgingLens() const { return LensModels()[views_.size() < 6 ? 2 : 3]; }
+
+  void Fit() {
+    for (int round = 0; round < 6; ++round) {
+      const double before = sigma_;
+      if (round == 0) {
+        // From simple to rich, at first with a limit that any focal length passes.
+        Measure();
+        for (const LensModel& lens : LensModels()) {
+          if (lens.num_free > JudgingLens().num_free) break;
+          if (lens.num_free < fit_.lens.num_free) continue;
+          fit_ = FitCamera(views_, lens, fit_, kHuberSigmas * sigma_);
+          Measure();
+        }
+      } else {
+        fit_ = FitCamera(views_, JudgingLens(), fit_, kHuberSigmas * sigma_);
+        Measure();
+      }
+      if (round > 1 && std::abs(sigma_ - before) < 0.01 * sigma_) break;
+    }
+  }
+
+  // Noise per photo and of the median photo; weights; corners that are off.
+  void Measure() {
+    sigmas_.clear();
+    std::vector<Eigen::Matrix2Xd> residuals;
+    const double shared =
+        static_cast<double>(fit_.lens.num_free) / static_cast<double>(views_.size());
+    for (size_t i = 0; i < views_.size(); ++i) {
+      residuals.push_back(Residuals(views_[i], fit_.camera, fit_.cam_from_board[i]));
+      sigmas_.push_back(RobustSigma(residuals.back(), 6 + shared));
+    }
+    sigma_ = std::max(Median(sigmas_), 1e-9);
+    for (size_t i = 0; i < views_.size(); ++i) {
+      BoardView& view = views_[i];
+      // Within half as much again photos differ by chance.
+      const double ratio = sigmas_[i] / sigma_;
+      view.weight = ratio > 1.5 ? 1 / (ratio * ratio) : 1;
+      const double limit = options_.bad_corner_sigmas * std::max(sigma_, sigmas_[i]);
+      for (int k = 0; k < residuals[i].cols(); ++k) {
+        const double length = residuals[i].col(k).norm();
+        view.used[k] = length <= limit;
+      }
+      // A photo whose corners mostly disagree is bad as a whole: judged by WorstPhoto().
+      if (std::count(view.used.begin(), view.used.end(), true) < kMinCorners) {
+        view.used.assign(view.used.size(), true);
+      }
+    }
+  }
+
+  bool IsBad(double sigma, const BoardView& view) const {
+    const auto num_used = std::count(view.used.begin(), view.used.end(), true);
+    if (4 * num_used < 3 * static_cast<long>(view.used.size())) return true;
+    return sigma > options_.bad_photo_ratio * sigma_ && sigma > options_.bad_photo_px;
+  }
+
+  int WorstPhoto() const {
+    if (static_cast<int>(views_.size()) <= kMinPhotos) return -1;
+    int worst = -1;
+    for (size_t i = 0; i < views_.size(); ++i) {
+      if (!IsBad(sigmas_[i], views_[i])) continue;
+      if (worst < 0 || sigmas_[i] > sigmas_[worst]) worst = static_cast<int>(i);
+    }
+    return worst;
+  }
+
+  void Drop(int i) {
+    dropped_.push_back({index_[i], views_[i], fit_.cam_from_board[i], sigmas_[i]});
+    index_.erase(index_.begin() + i);
+    views_.erase(views_.begin() + i);
+    fit_.cam_from_board.erase(fit_.cam_from_board.begin() + i);
+  }
+
+  // A photo may look bad because another one bent the camera.
+  bool TakeBack() {
+    std::vector<Dropped> remaining;
+    bool any = false;
+    for (Dropped& one : dropped_) {
+      one.view.weight = 1;
+      one.view.used.assign(one.view.used.size(), true);
+      one.cam_from_board =
+          FitPose(one.view, fit_.camera, one.cam_from_board, kHuberSigmas * sigma_);
+      const Eigen::Matrix2Xd residuals = Residuals(one.view, fit_.camera, one.cam_from_board);
+      one.sigma = RobustSigma(residuals, 6);
+      const double limit = options_.bad_corner_sigmas * std::max(sigma_, one.sigma);
+      for (int k = 0; k < residuals.cols(); ++k) {
+        one.view.used[k] = residuals.col(k).norm() <= limit;
+      }
+      if (IsBad(one.sigma, one.view)) {
+        remaining.push_back(one);
+        continue;
+      }
+      any = true;
+      const auto at = std::lower_bound(index_.begin(), index_.end(), one.index) - index_.begin();
+      index_.insert(index_.begin() + at, one.index);
+      views_.insert(views_.begin() + at, one.view);
+      fit_.cam_from_board.insert(fit_.cam_from_board.begin() + at, one.cam_from_board);
+    }
+    dropped_ = std::move(remaining);
+    return any;
+  }
+
+  const std::vector<BoardPhoto>& photos_;
+  const CalibrationOptions& options_;
+  std::vector<size_t> index_;  // into photos_, per view
+  std::vector<BoardView> views_;
+  std::vector<Dropped> dropped_;
+  CameraFit fit_;
+  std::vector<double> sigmas_;
+  double sigma_ = 0;
+};
+
+// Why a photo was left out.
+std::string ReasonOf(const PhotoSelection::Dropped& dropped, double sigma, double edge_width,
+                     double median_edge_width) {
+  const auto num_bad = std::count(dropped.view.used.begin(), dropped.view.used.end(), false);
+  const auto num_corners = static_cast<long>(dropped.view.used.size());
+  const std::string reason = 4 * num_bad > num_corners
+                                 ? std::to_string(num_bad) + " of its " +
+                                       std::to_string(num_corners) +
+                                       " corners contradict the other photos"
+                                 : "its corners miss by " + Number(dropped.sigma) +
+                                       " px, those of the median photo by " + Number(sigma) + " px";
+  if (edge_width > 1.5 * median_edge_width && median_edge_width > 0) {
+    return reason + ": blurred (edges " + Number(edge_width, "%.1f") +
+           " px wide, in the median photo " + Number(median_edge_width, "%.1f") + " px)";
+  }
+  return reason + ": another board, a bent one, or corners found wrongly";
+}
+
+void DescribePose(const Rigid& cam_from_board, const Eigen::Vector2d& middle,
+                  CalibratedPhoto* photo) {
+  photo->cam_from_board = cam_from_board;
+  const Eigen::Vector3d centre = cam_from_board * Eigen::Vector3d(middle.x(), middle.y(), 0);
+  const Eigen::Vector3d normal = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
+  photo->distance = centre.norm();
+  photo->tilt_deg =
+      DegFromRad(std::acos(std::clamp(std::abs(normal.dot(centre.normalized())), 0.0, 1.0)));
+}
+
+// What the report says of photos that take part or were left out by their residuals.
+void DescribePhotos(const std::vector<BoardPhoto>& photos, const Board& board,
+                    const PhotoSelection& selection, const CameraFit& fit, Calibration* result) {
+  const Eigen::Vector2d middle = board.CornerOnBoard(board.NumCorners() - 1) / 2;
+  std::vector<double> edge_widths;
+  for (const BoardPhoto& photo : photos) {
+    if (photo.edge_width_px > 0) edge_widths.push_back(photo.edge_width_px);
+    CalibratedPhoto one;
+    one.name = photo.name;
+    one.reason = photo.reason;
+    one.num_corners = photo.NumCorners();
+    one.rms_px = one.held_out_rms_px = one.tilt_deg = one.distance = kNaN;
+    one.x_in_img = photo.x_in_img;
+    if (one.reason.empty() && one.num_corners < kMinCorners) {
+      one.reason = "only " + std::to_string(one.num_corners) + " corners were found, " +
+                   std::to_string(kMinCorners) + " are needed";
+    }
+    result->photos.push_back(one);
+  }
+  for (size_t i = 0; i < selection.index().size(); ++i) {
+    CalibratedPhoto& one = result->photos[selection.index()[i]];
+    const BoardView& view = selection.views()[i];
+    one.used = true;
+    one.num_bad_corners = static_cast<int>(std::count(view.used.begin(), view.used.end(), false));
+    one.rms_px = fit.view_rms_px[i];
+    one.held_out_rms_px = fit.held_out_rms_px[i];
+    one.residuals = fit.residuals[i];
+    one.corner_used = view.used;
+    DescribePose(fit.cam_from_board[i], middle, &one);
+  }
+  const double median_edge_width = Median(edge_widths);
+  for (const PhotoSelection::Dropped& dropped : selection.dropped()) {
+    CalibratedPhoto& one = result->photos[dropped.index];
+    BoardView view = dropped.view;
+    const Rigid pose =
+        FitPose(view, fit.camera, dropped.cam_from_board, kHuberSigmas * selection.sigma());
+    one.residuals = Residuals(view, fit.camera, pose);
+    view.used.assign(view.used.size(), true);
+    one.corner_used = dropped.view.used;
+    one.rms_px = RmsLength(view, one.residuals);
+    one.reason = ReasonOf(dropped, selection.sigma(), photos[dropped.index].edge_width_px,
+                          median_edge_width);
+    DescribePose(pose, middle, &one);
+  }
+}
+
+}  // namespace
+
+int Calibration::NumUsed() const {
+  return static_cast<int>(std::count_if(photos.begin(), photos.end(),
+                                        [](const CalibratedPhoto& photo) { return photo.used; }));
+}
+
+std::vector<std::string> CalibrationOptions::CameraModels() {
+  return {"auto", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"};
+}
+
+std::vector<std::string> CalibrationOptions::Problems() const {
+  std::vector<std::string> problems;
+  const auto need = [&](bool good, const char* what) {
+    if (!good) problems.push_back(what);
+  };
+  need(min_gain >= 0, "--Model.min_gain must not be negative");
+  need(bad_photo_ratio > 1, "--Photos.bad_ratio must be more than 1");
+  need(bad_photo_px >= 0, "--Photos.bad_px must not be negative");
+  need(bad_corner_sigmas >= 3, "--Photos.bad_corner_sigmas must be at least 3");
+  need(min_photos >= kMinPhotos, "--Trust.min_photos must be at least 3");
+  need(min_tilt_deg >= 0 && min_tilt_deg < 90, "--Trust.min_tilt_deg must be from 0 to 90");
+  need(min_radius >= 0 && min_radius <= 1, "--Trust.min_radius must be from 0 to 1");
+  need(max_focal_sigma_percent > 0, "--Trust.max_focal_sigma_percent must be positive");
+  need(max_sigma_px > 0, "--Trust.max_sigma_px must be positive");
+  return problems;
+}
+
+Calibration Calibrate(const std::vector<BoardPhoto>& photos, const Board& board,
+                      const CalibrationOptions& options, const std::string& path) {
+  PhotoSelection selection(photos, board, options);
+  const int num_found = static_cast<int>(selection.index().size());
+  if (num_found < kMinPhotos) {
+    std::string finding = "the " + board.Name() + " was found in only " +
+                          std::to_string(num_found) + " of " + std::to_string(photos.size()) +
+                          " photos";
+    for (const BoardPhoto& photo : photos) {
+      if (photo.reason.empty()) continue;
+      finding += "; " + photo.name + ": " + photo.reason;
+      break;
+    }
+    throw InputError(path, "", finding,
+                     "At least three are needed, ten to twenty at different tilts are good");
+  }
+  selection.Select();
+
+  Calibration result;
+  const CameraFit fit =
+      ChooseModel(selection.views(), selection.fit(), options, &result.models, &result.why_model);
+  result.camera = RoundedCamera(fit.camera);
+  result.lens = fit.lens;
+  result.sigma_px = fit.sigma_px;
+  DescribePhotos(photos, board, selection, fit, &result);
+  DescribeUncertainty(fit, selection.views(), &result);
+  DescribeCoverage(&result);
+  JudgeCalibration(options, &result);
+  return result;
+}
+
+}  // namespace roomtex

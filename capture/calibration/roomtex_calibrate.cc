@@ -1,0 +1,184 @@
+// roomtex-calibrate: the camera from photos of a board. Parses, calls, reports.
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/calibration/board_detection.h"
+#include "capture/calibration/calibration.h"
+#include "capture/calibration/calibration_database.h"
+#include "capture/calibration/calibration_output.h"
+#include "capture/calibration/calibration_picture.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace {
+
+struct Arguments {
+  std::string image_path, output_path, coverage_path, database_path, database_output_path;
+  BoardOptions board;
+  CalibrationOptions calibration;
+};
+
+void AddOptions(Arguments* a, Command* command) {
+  command->AddInputPath("image_path", &a->image_path,
+                        "Folder with photos of the board, taken with the focus and zoom of the "
+                        "capture; used as they are stored (an EXIF orientation is ignored, as "
+                        "COLMAP ignores it).");
+  BoardOptions& b = a->board;
+  command->AddString("board", &b.size,
+                     "COLUMNSxROWS: inner corners of a checkerboard (where four squares meet; 9x6 "
+                     "for 10x7 squares), squares of a ChArUco board.",
+                     Command::Kind::kRequired);
+  command->AddDouble("square", &b.square,
+                     "Side of a square, metres. The intrinsics do not depend on it, only the "
+                     "distances in the report do.");
+  command->AddChoice("board_type", &b.type, BoardOptions::Types(),
+                     "A checkerboard must be seen whole; of a ChArUco board a part is enough.");
+  command->AddDouble("marker", &b.marker,
+                     "Side of a ChArUco marker with its black border, metres (in proportion to "
+                     "--square).");
+  command->AddChoice("dictionary", &b.dictionary, BoardOptions::Dictionaries(),
+                     "Dictionary of the ChArUco markers, OpenCV's name.");
+  command->AddOutputPath("output_path", &a->output_path, "The camera, as COLMAP's cameras.txt.");
+  command->AddOutputPath("coverage_path", &a->coverage_path,
+                         "Picture (PNG or JPEG) of where the corners lie, with the residuals and "
+                         "the photos left out.",
+                         Command::Kind::kOptional);
+  CalibrationOptions& c = a->calibration;
+  command->AddChoice("camera_model", &c.camera_model, CalibrationOptions::CameraModels(),
+                     "COLMAP's model of the lens; auto = the simplest that foretells photos left "
+                     "out as well as richer ones do.");
+  command->AddInputPath("apply", &a->database_path,
+                        "COLMAP's database; --apply_output gets a copy of it with this camera (the "
+                        "database itself is not changed).",
+                        Command::Kind::kOptional);
+  command->AddOutputPath("apply_output", &a->database_output_path,
+                         "The copy; default: beside the database, NAME_calibrated.db.",
+                         Command::Kind::kOptional);
+  command->AddDouble(
+      "Model.min_gain", &c.min_gain,
+      "auto takes a richer model when the log-likelihood of photos held out grows by "
+      "more than this; larger = simpler models.");
+  command->AddDouble("Photos.bad_ratio", &c.bad_photo_ratio,
+                     "A photo is left out when its corners scatter more than this many times the "
+                     "median photo's; larger = more tolerant.");
+  command->AddDouble("Photos.bad_px", &c.bad_photo_px,
+                     "Pixels; never left out when they scatter less than this.");
+  command->AddDouble("Photos.bad_corner_sigmas", &c.bad_corner_sigmas,
+                     "Corners are left out beyond this many standard deviations; larger = more "
+                     "tolerant.");
+  command->AddInt("Trust.min_photos", &c.min_photos, "Photos that must take part.");
+  command->AddDouble("Trust.min_tilt_deg", &c.min_tilt_deg,
+                     "Degrees; largest angle between two boards must be at least this.");
+  command->AddDouble("Trust.min_radius", &c.min_radius,
+                     "Boards must reach this share of the way from the middle of the picture to "
+                     "its corners.");
+  command->AddDouble("Trust.max_focal_sigma_percent", &c.max_focal_sigma_percent,
+                     "Percent; largest standard deviation of the focal length.");
+  command->AddDouble("Trust.max_sigma_px", &c.max_sigma_px,
+                     "Pixels; largest standard deviation of the whole picture (root mean square).");
+}
+
+void CheckArguments(Arguments* a) {
+  std::vector<std::string> problems = a->board.Problems();
+  for (const std::string& problem : a->calibration.Problems()) problems.push_back(problem);
+  if (a->database_path.empty() && !a->database_output_path.empty()) {
+    problems.push_back("--apply_output needs --apply, the database to copy");
+  }
+  if (!a->coverage_path.empty() && !cv::haveImageWriter(a->coverage_path)) {
+    problems.push_back("--coverage_path is \"" + a->coverage_path +
+                       "\", expected a name that ends with .png or .jpg");
+  }
+  ThrowIfProblems(problems);
+  if (a->database_path.empty()) return;
+  RequireFile(a->database_path, "Check --apply: it is COLMAP's database.db");
+  const std::filesystem::path database(a->database_path);
+  if (a->database_output_path.empty()) {
+    a->database_output_path =
+        (database.parent_path() / (database.stem().string() + "_calibrated.db")).string();
+  }
+  std::error_code ignored;
+  if (std::filesystem::equivalent(database, a->database_output_path, ignored)) {
+    throw UsageError("--apply_output is the database itself: it is never overwritten");
+  }
+}
+
+void WritePicture(const std::string& path, const cv::Mat& picture) {
+  OutputFile file(path);
+  if (!cv::imwrite(file.partial_path(), picture)) {
+    throw InputError(path, "", "could not be written", "Check the space on the disk");
+  }
+  file.Commit();
+}
+
+void Apply(const Arguments& a, const Camera& camera, const Command::Context& context) {
+  if (a.database_path.empty()) return;
+  context.progress.Stage("apply");
+  const AppliedCameras applied = ApplyToDatabase(camera, a.database_path, a.database_output_path);
+  for (const std::string& note : applied.notes) context.Warn(note);
+  const size_t count = applied.same_size.size() + applied.scaled.size();
+  context.progress.Note(std::to_string(count) + " cameras of " + a.database_path +
+                        " calibrated in " + a.database_output_path);
+  if (applied.has_pairs) {
+    context.Warn(
+        "pairs of photos in the database were verified with the cameras as they were; if their "
+        "focal "
+        "length was far off, extract and match anew with the printed options instead");
+  }
+  Json& json = context.report["applied"];
+  json["output"] = a.database_output_path;
+  json["same_size"] = applied.same_size;
+  json["scaled"] = applied.scaled;
+  json["left"] = applied.left;
+}
+
+void Run(Arguments* a, const Command::Context& context) {
+  CheckArguments(a);
+  // Photos side by side, each on one thread: OpenCV's own threads would come on top.
+  cv::setNumThreads(1);
+  const Board board = MakeBoard(a->board);
+  const std::vector<std::string> names = ListPhotos(a->image_path);
+  context.progress.Stage("find boards", static_cast<int>(names.size()));
+  const std::vector<BoardPhoto> photos =
+      FindBoards(a->image_path, names, board, context.options.num_threads, &context.progress);
+  context.progress.Stage("calibrate");
+  const Calibration calibration = Calibrate(photos, board, a->calibration, a->image_path);
+  FillReport(calibration, board, &context.report);
+  for (const std::string& warning : calibration.warnings) context.Warn(warning);
+  std::string reasons;
+  for (const std::string& reason : calibration.reasons) {
+    reasons += (reasons.empty() ? "" : "; ") + reason;
+  }
+  if (!reasons.empty()) context.report.SetUntrusted(reasons);
+  context.progress.Note(calibration.why_model);
+
+  context.progress.Stage("write");
+  WriteCamerasText(a->output_path, calibration.camera);
+  if (!a->coverage_path.empty()) WritePicture(a->coverage_path, DrawCalibration(calibration));
+  Apply(*a, calibration.camera, context);
+  std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::Arguments arguments;
+  roomtex::Command command(
+      "roomtex-calibrate",
+      "Calibrates a camera by photos of a board, for COLMAP: cameras.txt, and on stdout the "
+      "options "
+      "for colmap feature_extractor.",
+      "roomtex-calibrate --image_path boards --board 9x6 --square 0.025 --output_path camera.txt");
+  roomtex::AddOptions(&arguments, &command);
+  return command.Run(argc, argv, [&arguments](const roomtex::Command::Context& context) {
+    roomtex::Run(&arguments, context);
+  });
+}

@@ -1,0 +1,195 @@
+// roomtex-pattern: the pattern that projectors throw onto bare walls.
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/pattern/pattern.h"
+#include "capture/pattern/pattern_photo.h"
+#include "capture/pattern/pattern_quality.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kLeastPhoto = 200;  // pixels of the shorter side of a photo to make a pattern of
+
+struct Arguments {
+  std::string output_path, input_path, evaluate_path;
+  PatternOptions pattern;
+};
+
+double Rounded(double value) { return std::round(1e4 * value) / 1e4; }
+
+cv::Mat ReadDetailedPhoto(const Arguments& arguments, const Command::Context& context) {
+  const cv::Mat photo = ReadPhoto(arguments.input_path);
+  const std::string size = std::to_string(photo.cols) + " x " + std::to_string(photo.rows);
+  if (std::min(photo.cols, photo.rows) < kLeastPhoto) {
+    throw InputError(
+        arguments.input_path, "",
+        "has " + size + " pixels, expected at least " + std::to_string(kLeastPhoto) + " both ways",
+        "Give a larger photo, or none for the built-in image");
+  }
+  if (photo.cols < arguments.pattern.width || photo.rows < arguments.pattern.height) {
+    context.Warn(arguments.input_path + " has only " + size +
+                 " pixels and is enlarged: its finest detail is lost");
+  }
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(photo, mean, deviation);
+  if (std::max({deviation[0], deviation[1], deviation[2]}) < 4) {
+    throw InputError(arguments.input_path, "", "is plain: it shows nothing but one colour",
+                     "Give a photo full of detail, or none for the built-in image");
+  }
+  return photo;
+}
+
+cv::Mat1b Make(const cv::Mat& photo, const PatternOptions& options) {
+  return photo.empty() ? MakePattern(options) : MakePattern(photo, options);
+}
+
+void WritePattern(const std::string& path, const cv::Mat1b& pattern) {
+  std::vector<uchar> bytes;
+  cv::imencode(".png", pattern, bytes);
+  OutputFile file(path);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                      static_cast<std::streamsize>(bytes.size()));
+  file.Commit();
+}
+
+void ReportQuality(const PatternQuality& quality, const cv::Mat1b& pattern,
+                   const Command::Context& context) {
+  Report& report = context.report;
+  const int wanted = WantedFeatures(pattern.size());
+  report["features"] = quality.features;
+  report["num_distinct"] = quality.num_distinct;
+  report["num_distinct_wanted"] = wanted;
+  report["distinctness"] = {{"ratio_median", Rounded(quality.ratio_median)},
+                            {"share", Rounded(quality.distinct_share)}};
+  report["brightness"] = Rounded(quality.brightness);
+  report["light"] = Rounded(quality.light);
+  report["similar_neighbours"] = quality.similar_neighbours;
+  if (quality.num_distinct < wanted) {
+    report.SetUntrusted("the pattern holds " + std::to_string(quality.num_distinct) +
+                        " distinct features, " + std::to_string(wanted) +
+                        " are wanted: give a photo with more detail, or none for the built-in "
+                        "image");
+  }
+  if (quality.brightness < kLeastBrightness) {
+    context.Warn("the pattern is dark (mean grey value " +
+                 std::to_string(std::lround(100 * quality.brightness)) +
+                 " %): it will not light the room; raise --brightness");
+  }
+  if (quality.similar_neighbours > 0) {
+    context.Warn(std::to_string(quality.similar_neighbours) +
+                 " pairs of neighbouring blocks look alike: the photo has large plain parts");
+  }
+}
+
+void ReportPhoto(const PatternPhotoCheck& check, const std::string& path,
+                 const Command::Context& context) {
+  Json planes = Json::array();
+  for (const PatternPlane& plane : check.planes) {
+    planes.push_back({{"matched", plane.matched}, {"photo_pixels", Rounded(plane.photo_pixels)}});
+  }
+  context.report["photo"] = {{"path", path},
+                             {"usable", check.usable},
+                             {"verdict", check.verdict},
+                             {"features", check.features},
+                             {"matched", check.matched},
+                             {"on_planes", check.on_planes},
+                             {"planes", planes},
+                             {"blur_px", Rounded(check.blur_px)},
+                             {"blur_pattern_px", Rounded(check.blur_pattern_px)},
+                             {"contrast", Rounded(check.contrast)},
+                             {"over_exposed", Rounded(check.over_exposed)},
+                             {"mean_grey", Rounded(check.mean_grey)}};
+  if (!check.usable) {
+    context.report.SetUntrusted(path + ": " + check.verdict[0]);
+  }
+  for (size_t i = check.usable ? 0 : 1; i < check.verdict.size(); ++i) {
+    if (i == 0) {
+      context.progress.Note(check.verdict[i]);
+    } else {
+      context.Warn(path + ": " + check.verdict[i]);
+    }
+  }
+}
+
+void Run(const Arguments& arguments, const Command::Context& context) {
+  const int num_threads = context.options.num_threads;
+  PatternOptions options = arguments.pattern;
+  options.random_seed = context.options.random_seed;
+  std::vector<std::string> problems = options.Problems();
+  std::string extension = std::filesystem::path(arguments.output_path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension != ".png")
+    problems.push_back("--output_path must end in .png: that is what is written");
+  ThrowIfProblems(problems);
+  cv::setNumThreads(num_threads > 0 ? num_threads : -1);
+
+  context.progress.Stage("pattern");
+  const cv::Mat photo =
+      arguments.input_path.empty() ? cv::Mat() : ReadDetailedPhoto(arguments, context);
+  // Read before anything is written: a photo that is none shall not leave a pattern behind.
+  const cv::Mat wall =
+      arguments.evaluate_path.empty() ? cv::Mat() : ReadPhoto(arguments.evaluate_path);
+  const cv::Mat1b pattern = Make(photo, options);
+  WritePattern(arguments.output_path, pattern);
+
+  context.progress.Stage("measure");
+  const PatternFeatures features = FindFeatures(pattern);
+  ReportQuality(MeasurePattern(pattern, features, options.blocks, num_threads), pattern, context);
+  PatternOptions next = options;
+  next.random_seed += options.random_seed < std::numeric_limits<int>::max() ? 1 : -1;
+  const double cross = MatchedShare(features, FindFeatures(Make(photo, next)), num_threads);
+  context.report["cross_seed"] = {{"random_seed", next.random_seed},
+                                  {"matched_share", Rounded(cross)}};
+  if (cross > kMostMatchedShare) {
+    context.Warn(std::to_string(std::lround(1000 * cross) / 10.0) +
+                 " % of the features are found in the pattern of the next seed, too: give each "
+                 "projector a photo of its own");
+  }
+  if (!wall.empty()) {
+    context.progress.Stage("evaluate photo");
+    ReportPhoto(CheckPatternPhoto(wall, pattern, features, num_threads), arguments.evaluate_path,
+                context);
+  }
+  context.progress.Finish();
+  std::printf("%s\n", arguments.output_path.c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  using namespace roomtex;  // NOLINT
+  Arguments arguments;
+  Command command("roomtex-pattern",
+                  "Makes the pattern that a projector throws onto bare walls, so that photos of "
+                  "them hold features.",
+                  "roomtex-pattern --output_path pattern.png --width 1920 --height 1080");
+  command.AddOutputPath("output_path", &arguments.output_path,
+                        "the pattern, PNG; show it full screen, pixel by pixel");
+  command.AddInt("width", &arguments.pattern.width, "pixels of the projector");
+  command.AddInt("height", &arguments.pattern.height, "pixels of the projector");
+  command.AddInputPath("input_path", &arguments.input_path,
+                       "photo full of detail to make the pattern of; without it: a built-in image",
+                       Command::Kind::kOptional);
+  command.AddInt("blocks", &arguments.pattern.blocks,
+                 "the image is cut into this many blocks each way, which are shuffled");
+  command.AddDouble("brightness", &arguments.pattern.brightness,
+                    "mean grey value, 1 = white. Larger = more light for the room, less contrast");
+  command.AddInputPath("evaluate_path", &arguments.evaluate_path,
+                       "photo of the projected pattern (same options): says whether the features "
+                       "are found again, sharp and well exposed",
+                       Command::Kind::kOptional);
+  return command.Run(argc, argv, [&](const Command::Context& context) { Run(arguments, context); });
+}

@@ -1,0 +1,303 @@
+#include "capture/simulation/capture_writer.h"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <set>
+#include <sstream>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/simulation/simulated_projector.h"
+#include "capture/simulation/true_colors.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/output_file.h"
+#include "core/photo.h"
+#include "importers/rtpi.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kJpegQuality = 95;
+constexpr double kAperture = 8, kIso = 400;
+
+void WriteText(const std::string& path, const std::string& text) {
+  OutputFile file(path);
+  file.stream() << text;
+  file.Commit();
+}
+
+// A stream that prints doubles so that they read back exactly.
+std::ostringstream ExactStream() {
+  std::ostringstream stream;
+  stream.precision(std::numeric_limits<double>::max_digits10);
+  return stream;
+}
+
+std::string ScanName(int station) {
+  return station == 0 ? "scan.rtpi" : "scan_" + std::to_string(station) + ".rtpi";
+}
+
+void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_folder) {
+  std::set<std::string> names;
+  for (int i = 0; i < room.NumPhotos(); ++i) names.insert(room.PhotoName(i));
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(photo_folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() == ".jpg" && names.count(name) == 0) {
+      throw InputError(photo_folder, "", "holds " + name + ", which is not of this capture",
+                       "Give another --output_path, or remove the folder first");
+    }
+  }
+}
+
+// A place every 20 seconds; with projectors every minute, its plain photo 7 seconds later.
+std::string DateTime(const SimulatedRoom& room, int photo) {
+  const bool paired = !room.Projectors().empty();
+  const int place = room.PlaceOf(photo);
+  const int seconds = paired ? 60 * place + (room.IsPatterned(photo) ? 0 : 7) : 20 * place;
+  char date_time[40];
+  std::snprintf(date_time, sizeof(date_time), "2008:05:01 %02d:%02d:%02d", 12 + seconds / 3600,
+                seconds / 60 % 60, seconds % 60);
+  return date_time;
+}
+
+void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
+  const cv::Mat image = room.RenderPhoto(photo);
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  OutputFile file(path);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                      static_cast<std::streamsize>(bytes.size()));
+  file.stream().flush();
+  if (room.options().exif) {
+    ExposureData exposure;
+    exposure.exposure_time = room.NotedTime(photo);
+    exposure.f_number = kAperture;
+    exposure.iso = kIso;
+    exposure.camera = "roomtex simulated camera";
+    exposure.date_time = DateTime(room, photo);
+    WriteExposureData(file.partial_path(), exposure);
+  }
+  file.Commit();
+}
+
+std::string PoseLine(const Rigid& pose) {
+  std::ostringstream line = ExactStream();
+  const Eigen::Vector4d q = WxyzFromQuaternion(pose.rotation);
+  line << q[0] << " " << q[1] << " " << q[2] << " " << q[3] << " " << pose.translation.x() << " "
+       << pose.translation.y() << " " << pose.translation.z();
+  return line.str();
+}
+
+// As the scanner itself measured it: RTPI knows no pose.
+Scan InItsStation(Scan scan) {
+  const Rigid station_from_scan = scan.scan_from_station.Inverse();
+  for (Eigen::Vector3d& point : scan.points) point = station_from_scan * point;
+  scan.scan_from_station = Rigid();
+  return scan;
+}
+
+void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
+                Progress* progress) {
+  progress->Stage("scans", room.options().num_stations);
+  std::ostringstream poses = ExactStream();
+  poses << "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
+  for (int station = 0; station < room.options().num_stations; ++station) {
+    const Scan scan = room.MakeScan(station);
+    WriteRtpi(RtpiFromScan(InItsStation(scan)), folder + "/" + ScanName(station));
+    poses << ScanName(station) << " " << PoseLine(scan.scan_from_station) << "\n";
+    summary->num_samples += scan.points.size();
+    summary->num_missing += scan.NumMissing();
+    progress->Tick();
+  }
+  if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses.str());
+}
+
+void WritePicks(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary) {
+  std::ostringstream text = ExactStream();
+  text << "# pixel in the photo (centre of the upper-left pixel = 0.5, 0.5), point in the scan "
+          "frame in metres\n"
+       << "image_name,x,y,scan_x,scan_y,scan_z\n";
+  if (room.options().num_picks > 0) {
+    const int photo = room.BestPhotoForPicks();
+    for (const SimulatedPick& pick : room.MakePicks(photo, room.options().num_picks)) {
+      summary->picked_photo = pick.image_name;
+      ++summary->num_picks;
+      char line[200];
+      std::snprintf(line, sizeof(line), "%s,%.2f,%.2f,%.4f,%.4f,%.4f\n", pick.image_name.c_str(),
+                    pick.x_in_img.x(), pick.x_in_img.y(), pick.x_in_scan.x(), pick.x_in_scan.y(),
+                    pick.x_in_scan.z());
+      text << line;
+    }
+  }
+  WriteText(folder + "/picks.csv", text.str());
+}
+
+std::string CameraParams(const Camera& camera) {
+  std::ostringstream params = ExactStream();
+  for (size_t i = 0; i < camera.params.size(); ++i)
+    params << (i > 0 ? "," : "") << camera.params[i];
+  return params.str();
+}
+
+void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
+  const Camera& camera = room.camera();
+  const std::string params = CameraParams(camera);
+  std::ostringstream cameras;
+  cameras << "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
+          << camera.camera_id << " " << CameraModelName(camera.model) << " " << camera.width << " "
+          << camera.height;
+  for (const char c : "," + params) cameras << (c == ',' ? ' ' : c);
+  WriteText(folder + "/cameras.txt", cameras.str() + "\n");
+  WriteText(folder + "/camera_options.txt",
+            std::string("--ImageReader.single_camera 1 --ImageReader.camera_model ") +
+                CameraModelName(camera.model) + " --ImageReader.camera_params " + params + "\n");
+}
+
+// What roomtex-associate has to find, and what the projectors throw from where.
+void WriteProjectors(const SimulatedRoom& room, const std::string& folder) {
+  if (room.Projectors().empty()) return;
+  std::string pairs = "patterned_image,plain_image\n";
+  for (int photo = 0; photo < room.NumPhotos(); photo += 2) {
+    pairs += room.PhotoName(photo) + "," + room.PhotoName(photo + 1) + "\n";
+  }
+  WriteText(folder + "/associations.csv", pairs);
+  const Rigid room_from_scan = room.ScanFromRoom().Inverse();
+  std::ostringstream text = ExactStream();
+  text << "# proj_from_scan: PATTERN WIDTH HEIGHT fx fy cx cy qw qx qy qz tx ty tz\n";
+  for (const Projector& projector : room.Projectors()) {
+    const Camera& camera = projector.camera();
+    const std::string name = "pattern_" + std::to_string(camera.camera_id) + ".png";
+    text << name << " " << camera.width << " " << camera.height;
+    for (const double param : camera.params) text << " " << param;
+    text << " " << PoseLine(projector.proj_from_room() * room_from_scan) << "\n";
+    std::vector<uchar> bytes;
+    cv::imencode(".png", projector.pattern(), bytes);
+    WriteText(folder + "/" + name, std::string(bytes.begin(), bytes.end()));
+  }
+  WriteText(folder + "/projectors.txt", text.str());
+}
+
+void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
+  SparseModel model;
+  model.cameras[1] = room.camera();
+  std::ostringstream exposures = ExactStream();
+  exposures << "image_name,exposure_ev,exposure_time,red_gain,blue_gain\n";
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    SparseImage& image = model.images[photo + 1];
+    image.image_id = photo + 1;
+    image.camera_id = 1;
+    image.name = room.PhotoName(photo);
+    image.cam_from_model = room.CamFromScan(photo);
+    exposures << image.name << "," << room.ExposureEv(photo) << "," << room.ExposureTime(photo)
+              << "," << room.WhiteBalance(photo)[0] << "," << room.WhiteBalance(photo)[2] << "\n";
+  }
+  WriteSparseModelText(model, folder);
+  WriteText(folder + "/exposures.csv", exposures.str());
+  WriteProjectors(room, folder);
+  const Rigid scan_from_room = room.ScanFromRoom();
+  WriteSimilarity(folder + "/scan_from_room.txt",
+                  {1, scan_from_room.rotation, scan_from_room.translation});
+}
+
+std::string CommandsToType(bool paired, const std::string& scans) {
+  // The photos for COLMAP and those for the colours.
+  const std::string mapped = paired ? "linked/patterned" : "photos";
+  const std::string plain = paired ? "linked/plain" : "photos";
+  const auto extract = [](const std::string& database, const std::string& images) {
+    return "colmap feature_extractor --database_path " + database + " --image_path " + images +
+           " --SiftExtraction.use_gpu 0 $(cat camera_options.txt)\n";
+  };
+  std::string lines = "export QT_QPA_PLATFORM=offscreen\n";
+  if (paired) {
+    lines +=
+        "roomtex-associate --image_path photos --output_path associations.csv --links_path "
+        "linked\n";
+  }
+  return lines + extract("database.db", mapped) +
+         "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"
+         "roomtex-mapper --database_path database.db --image_path " +
+         mapped +
+         " --output_path sparse\n"
+         "roomtex-align --input_path sparse/0" +
+         scans +
+         " --picks_path picks.csv --output_path aligned\n"
+         "roomtex-texture --input_path aligned --image_path " +
+         plain + scans + " --database_path database.db --output_path textured\n";
+}
+
+void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
+  const SimulatedRoomOptions& options = room.options();
+  std::string scans;
+  for (int station = 0; station < options.num_stations; ++station) {
+    scans += " --scan_path " + ScanName(station);
+  }
+  if (options.num_stations > 1) scans += " --scan_poses scan_poses.txt";
+  std::ostringstream text;
+  const bool paired = options.projectors > 0;
+  text << "A simulated room: " << room.NumPhotos() << " photos and " << options.num_stations
+       << (options.num_stations == 1 ? " range scan" : " range scans")
+       << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
+       << "photos/             the photos"
+       << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
+       << (paired
+               ? "                    every place twice, the camera unmoved: in the light of the "
+                 "projectors,\n"
+                 "                    then without it\n"
+               : "")
+       << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
+       << (options.num_stations > 1
+               ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
+               : "")
+       << "picks.csv           clicks: a pixel of a photo and the scan point seen there\n"
+       << "cameras.txt         the calibrated camera\n"
+       << "camera_options.txt  the same as options of colmap feature_extractor\n"
+       << "truth/              what the tools have to find out: the true poses in the scan frame "
+          "(a COLMAP\n"
+       << "                    text model), exposures.csv (EV relative to nominal), "
+          "scan_from_room.txt\n"
+       << "                    (scale, quaternion w x y z, translation; room: z up, origin in a "
+          "corner\n"
+       << "                    of the floor) and true_colors.ply (scan points in grid order, "
+          "missing\n"
+       << "                    ones left out, with their true colour)\n"
+       << (paired ? "                    associations.csv (which photos belong together), "
+                    "pattern_N.png and\n"
+                    "                    projectors.txt (what the projectors throw, from where)\n"
+                  : "")
+       << "\nType, in this folder:\n\n"
+       << CommandsToType(paired, scans);
+  WriteText(folder + "/README.txt", text.str());
+}
+
+}  // namespace
+
+CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
+                            Progress* progress, bool reachable) {
+  const std::string photo_folder = folder + "/photos";
+  RequireNoOtherPhotos(room, photo_folder);
+  MakeFolder(photo_folder);
+  MakeFolder(folder + "/truth");
+  CaptureSummary summary;
+  WriteCamera(room, folder);
+  WriteTruth(room, folder + "/truth");
+  WritePicks(room, folder, &summary);
+  WriteReadme(room, folder);
+  WriteScans(room, folder, &summary, progress);
+  progress->Stage("photos", room.NumPhotos());
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    WritePhoto(room, photo, photo_folder + "/" + room.PhotoName(photo));
+    progress->Tick();
+  }
+  WriteTrueColors(room, photo_folder, reachable, folder + "/truth", progress);
+  progress->Finish();
+  return summary;
+}
+
+}  // namespace roomtex

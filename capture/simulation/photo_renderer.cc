@@ -1,0 +1,167 @@
+#include "capture/simulation/photo_renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <opencv2/imgproc.hpp>
+
+#include "capture/simulation/camera_faults.h"
+#include "capture/simulation/simulated_projector.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+#include "core/random_stream.h"
+
+namespace roomtex {
+namespace {
+
+// Mean 0, standard deviation 1: the sum of four even 16-bit numbers. Its tails end at 3.5, which
+// noise of a few grey levels does not show.
+float NearlyGaussian(uint64_t bits) {
+  const uint64_t sum =
+      (bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48);
+  return (static_cast<float>(sum) / 65536.0f - 2.0f + 2.0f / 65536.0f) * 1.7320508f;
+}
+
+}  // namespace
+
+PhotoRenderer::PhotoRenderer(const RoomScene& scene, const CameraProjection& camera)
+    : scene_(scene),
+      width_(camera.camera().width),
+      height_(camera.camera().height),
+      principal_point_(camera.ImgFromCam(Eigen::Vector3d::UnitZ())
+                           .value_or(Eigen::Vector2d(width_ / 2.0, height_ / 2.0))),
+      lattice_columns_((width_ + kStep - 1) / kStep + 2) {
+  const int rows = (height_ + kStep - 1) / kStep + 2;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < lattice_columns_; ++column) {
+      const auto ray = camera.CamFromImg(Eigen::Vector2d(column * kStep, row * kStep));
+      lattice_.push_back(ray ? *ray : Eigen::Vector2d(nan, nan));
+    }
+  }
+}
+
+Eigen::Vector2d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
+  const double x = x_in_img / kStep, y = y_in_img / kStep;
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const double s = x - column, t = y - row;
+  const Eigen::Vector2d* node = &lattice_[row * lattice_columns_ + column];
+  return (1 - t) * ((1 - s) * node[0] + s * node[1]) +
+         t * ((1 - s) * node[lattice_columns_] + s * node[lattice_columns_ + 1]);
+}
+
+PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_img,
+                                         double y_in_img, double pixel_size,
+                                         const ProjectedLight* projected) const {
+  const auto direction_at = [&](double x, double y) -> Eigen::Vector3d {
+    return room_from_cam.leftCols<3>() * RayAt(x, y).homogeneous().normalized();
+  };
+  Eigen::Vector3d origin = room_from_cam.col(3);
+  Eigen::Vector3d direction = direction_at(x_in_img, y_in_img);
+  Shot shot;
+  if (!(direction.x() == direction.x())) return shot;
+  Eigen::Vector3d next_x = direction_at(x_in_img + pixel_size, y_in_img);
+  Eigen::Vector3d next_y = direction_at(x_in_img, y_in_img + pixel_size);
+  std::optional<SceneHit> hit = scene_.Cast(origin, direction);
+  LinearRgb tint = LinearRgb::Ones();
+  if (hit && scene_.SurfaceOf(hit->patch).kind == Surface::Kind::kMirror) {
+    // What the camera's mirror image sees beyond the glass.
+    tint = scene_.SurfaceOf(hit->patch).texture->Albedo({0, 0}, 0);
+    shot.place = hit->patch * 100000;
+    const Eigen::Vector3d normal = scene_.patches()[hit->patch].Normal();
+    const Eigen::Matrix3d reflection =
+        Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
+    origin = hit->point + reflection * (origin - hit->point);
+    direction = reflection * direction;
+    next_x = reflection * next_x;
+    next_y = reflection * next_y;
+    hit = scene_.Cast(origin, direction, hit->distance + 1e-3);
+  }
+  if (!hit) {
+    shot.color = LinearRgb(0.7f, 0.8f, 0.9f);
+    return shot;
+  }
+  shot.place += hit->patch;
+  const Eigen::Vector3d normal = scene_.patches()[hit->patch].Normal();
+  const Eigen::Vector3d side_x = OffsetOnPlane(origin, next_x, hit->point, normal);
+  const Eigen::Vector3d side_y = OffsetOnPlane(origin, next_y, hit->point, normal);
+  LinearRgb added = LinearRgb::Zero();
+  if (projected != nullptr) {
+    const ProjectedLight::Arrival arrival = projected->At(*hit, side_x, side_y);
+    added.setConstant(arrival.light);
+    // A border of a shadow is a border like that of a surface.
+    shot.place = static_cast<int>(MixBits(shot.place, arrival.lit_by));
+  }
+  shot.color = tint.cwiseProduct(scene_.Color(*hit, side_x, side_y, added));
+  return shot;
+}
+
+cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& settings,
+                              int num_threads) const {
+  const Pose room_from_cam = cam_from_room.Inverse().Matrix();
+  cv::Mat linear(height_, width_, CV_32FC3);
+  cv::Mat place(height_, width_, CV_32S);
+  ParallelFor(num_threads, 0, height_, [&](int y) {
+    for (int x = 0; x < width_; ++x) {
+      const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings.projected);
+      linear.at<cv::Vec3f>(y, x) = {shot.color.z(), shot.color.y(), shot.color.x()};
+      place.at<int>(y, x) = shot.place;
+    }
+  });
+  // Where surfaces meet, a pixel is the mean of 3 x 3 rays; elsewhere the texture itself averages.
+  constexpr int kSide = 3;
+  ParallelFor(num_threads, 0, height_, [&](int y) {
+    for (int x = 0; x < width_; ++x) {
+      const int here = place.at<int>(y, x);
+      bool border = false;
+      for (int dy = std::max(0, y - 1); dy <= std::min(height_ - 1, y + 1); ++dy) {
+        for (int dx = std::max(0, x - 1); dx <= std::min(width_ - 1, x + 1); ++dx) {
+          border = border || place.at<int>(dy, dx) != here;
+        }
+      }
+      if (!border) continue;
+      LinearRgb sum = LinearRgb::Zero();
+      for (int k = 0; k < kSide * kSide; ++k) {
+        sum += Shoot(room_from_cam, x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide,
+                     1.0 / kSide, settings.projected)
+                   .color;
+      }
+      sum /= kSide * kSide;
+      linear.at<cv::Vec3f>(y, x) = {sum.z(), sum.y(), sum.x()};
+    }
+  });
+  cv::Mat photo;
+  Develop(linear, settings, num_threads, &photo);
+  return photo;
+}
+
+void PhotoRenderer::Develop(const cv::Mat& linear, const PhotoSettings& settings, int num_threads,
+                            cv::Mat* photo) const {
+  cv::Mat light = linear;
+  if (settings.blur_px > 0) cv::GaussianBlur(linear, light, {0, 0}, settings.blur_px);
+  photo->create(height_, width_, CV_8UC3);
+  const Eigen::Vector3f gain =
+      static_cast<float>(std::exp2(settings.exposure_ev)) * settings.white_balance;
+  const ResponseTable response(settings.response);
+  const double diagonal2 = (width_ * width_ + height_ * height_) / 4.0;
+  const auto noise = static_cast<float>(settings.noise);
+  ParallelFor(num_threads, 0, height_, [&](int y) {
+    RandomStream random(MixBits(settings.noise_seed, y));
+    for (int x = 0; x < width_; ++x) {
+      const cv::Vec3f& value = light.at<cv::Vec3f>(y, x);
+      const double radius2 =
+          (Eigen::Vector2d(x + 0.5, y + 0.5) - principal_point_).squaredNorm() / diagonal2;
+      const auto lens = static_cast<float>(VignettingAt(radius2, settings.vignetting));
+      cv::Vec3b& pixel = photo->at<cv::Vec3b>(y, x);
+      for (int k = 0; k < 3; ++k) {
+        float grey = response.Grey(lens * gain[2 - k] * value[k]);
+        if (noise > 0) grey += noise * NearlyGaussian(random.Bits());
+        pixel[k] = cv::saturate_cast<uchar>(grey);
+      }
+    }
+  });
+}
+
+}  // namespace roomtex

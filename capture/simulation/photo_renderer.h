@@ -1,0 +1,58 @@
+#pragma once
+// Photos of the simulated room. Frames: `room`, `cam`, `img`.
+
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "capture/simulation/room_scene.h"
+#include "core/camera_model.h"
+#include "core/similarity.h"
+
+namespace roomtex {
+
+class ProjectedLight;
+
+struct PhotoSettings {
+  double exposure_ev = 0;
+  double blur_px = 0;       // Gaussian sigma
+  double noise = 0;         // grey levels of 255, standard deviation
+  uint64_t noise_seed = 0;  // one per photo
+  // See camera_faults.h.
+  std::string response = "srgb";
+  double vignetting = 0;
+  Eigen::Vector3f white_balance = Eigen::Vector3f::Ones();  // factors on red, green, blue
+  const ProjectedLight* projected = nullptr;                // falls on top of the room's light
+};
+
+class PhotoRenderer {
+ public:
+  // Both must outlive the renderer.
+  PhotoRenderer(const RoomScene& scene, const CameraProjection& camera);
+
+  // 8-bit BGR. Rows side by side; the same for every number of threads.
+  cv::Mat Render(const Rigid& cam_from_room, const PhotoSettings& settings, int num_threads) const;
+
+ private:
+  struct Shot {
+    LinearRgb color = LinearRgb::Zero();
+    int place = -1;  // tells surfaces apart
+  };
+  Eigen::Vector2d RayAt(double x_in_img, double y_in_img) const;
+  using Pose = Eigen::Matrix<double, 3, 4>;
+  Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size,
+             const ProjectedLight* projected) const;
+  void Develop(const cv::Mat& linear, const PhotoSettings& settings, int num_threads,
+               cv::Mat* photo) const;
+
+  const RoomScene& scene_;
+  int width_, height_;
+  Eigen::Vector2d principal_point_;
+  // (x/z, y/z) of the rays through a lattice of kStep pixels, linear between: exact to 0.001 px.
+  static constexpr int kStep = 4;
+  int lattice_columns_;
+  std::vector<Eigen::Vector2d> lattice_;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,365 @@
+#include "capture/simulation/simulated_room.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <mutex>
+
+#include "capture/simulation/camera_faults.h"
+#include "capture/simulation/photo_renderer.h"
+#include "capture/simulation/room_cameras.h"
+#include "capture/simulation/room_furniture.h"
+#include "capture/simulation/room_scene.h"
+#include "capture/simulation/simulated_observations.h"
+#include "capture/simulation/simulated_projector.h"
+#include "capture/simulation/simulated_scan.h"
+#include "capture/simulation/stranger.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/random_stream.h"
+
+namespace roomtex {
+
+namespace {
+// Seconds at EV 0. The room is dimmed for projectors.
+double NominalExposureTime(const SimulatedRoomOptions& options) {
+  return options.projectors > 0 ? 1.0 / 4 : 1.0 / 30;
+}
+}  // namespace
+
+std::vector<std::string> SimulatedRoomOptions::Problems() const {
+  std::vector<std::string> problems;
+  const auto require = [&](bool holds, const std::string& problem) {
+    if (!holds) problems.push_back(problem);
+  };
+  const auto within = [](double value, double low, double high) {
+    return value >= low && value <= high;
+  };
+  require(within(width, 4.6, 20), "room_width must be 4.6 to 20 m: the furniture has to fit in");
+  require(within(depth, 3.8, 20), "room_depth must be 3.8 to 20 m: the furniture has to fit in");
+  require(within(height, 2.5, 6), "room_height must be 2.5 to 6 m");
+  require(within(finest_detail, 0, 0.1), "finest_detail must be 0 to 0.1 m");
+  require(projectors >= 0 && projectors <= kMaxProjectors,
+          "projectors must be 0 to " + std::to_string(kMaxProjectors));
+  require(projector_width >= 320 && projector_width <= 16384,
+          "projector_width must be 320 to 16384 pixels");
+  require(projector_height >= 240 && projector_height <= 16384,
+          "projector_height must be 240 to 16384 pixels");
+  require(within(projector_field_of_view_deg, 10, 120),
+          "projector_field_of_view_deg must be 10 to 120");
+  require(within(projector_light, 0, 1000), "projector_light must be 0 to 1000");
+  require(within(projector_focus, 0.3, 100), "projector_focus must be 0.3 to 100 m");
+  require(num_photos >= 1 && num_photos <= 1000, "num_photos must be 1 to 1000");
+  require(photo_width >= 64 && photo_width <= 20000, "photo_width must be 64 to 20000 pixels");
+  require(photo_height >= 64 && photo_height <= 20000, "photo_height must be 64 to 20000 pixels");
+  require(within(field_of_view_deg, 20, 100), "field_of_view_deg must be 20 to 100");
+  require(
+      CameraModelFromName(camera_model).has_value(),
+      "camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
+  require(within(exposure_range_ev, 0, 4), "exposure_range_ev must be 0 to 4");
+  require(within(photo_noise, 0, 64), "photo_noise must be 0 to 64 grey levels");
+  const std::vector<std::string>& responses = ResponseTable::Names();
+  require(std::count(responses.begin(), responses.end(), response) > 0,
+          "response must be srgb or film");
+  require(within(vignetting, 0, 0.9), "vignetting must be 0 to 0.9");
+  require(within(white_balance_ev, 0, 2), "white_balance_ev must be 0 to 2");
+  require(wrong_exif == "none" || wrong_exif == "one" || wrong_exif == "all",
+          "wrong_exif must be none, one or all");
+  require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
+  require(within(strangers, 0, 1), "strangers must be 0 to 1 (a share of the photos)");
+  require(num_stations >= 1 && num_stations <= 8, "num_stations must be 1 to 8");
+  require(scan_columns >= 16 && scan_columns <= 20000, "scan_columns must be 16 to 20000");
+  require(scan_rows >= 16 && scan_rows <= 20000, "scan_rows must be 16 to 20000");
+  require(within(range_noise, 0, 0.5), "range_noise must be 0 to 0.5 m");
+  require(within(range_noise_growth, 0, 10), "range_noise_growth must be 0 to 10 per metre");
+  require(within(bend, -0.2, 0.2), "bend must be -0.2 to 0.2");
+  require(within(azimuth_drift_deg, -10, 10), "azimuth_drift_deg must be -10 to 10");
+  require(num_picks >= 0 && num_picks <= 1000, "num_picks must be 0 to 1000");
+  require(within(click_noise_px, 0, 100), "click_noise_px must be 0 to 100");
+  return problems;
+}
+
+namespace {
+SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
+  options.bare_walls = options.bare_walls || options.bare;
+  return options;
+}
+}  // namespace
+
+struct SimulatedRoom::Impl {
+  explicit Impl(const SimulatedRoomOptions& given)
+      : options(Completed(given)), camera(MakeRoomCamera(given)), projection(camera) {
+    scene.SetFinestDetail(options.finest_detail);
+    FurnishRoom(options, &scene);
+    const std::vector<Rigid> room_from_projector = PlaceProjectors(options);
+    for (const Rigid& place : room_from_projector) AddProjectorBody(place, &scene);
+    scene.Finish(options.shading, options.bare, options.num_threads);
+    cam_from_room = PlaceCameras(options, scene);
+    room_from_station = PlaceStations(options, scene);
+    exposures = ChooseExposures(options, scene, camera, cam_from_room);
+    for (size_t k = 0; k < room_from_projector.size(); ++k) {
+      projectors.push_back(MakeProjector(options, static_cast<int>(k), room_from_projector[k]));
+    }
+    if (projectors.empty()) return;
+    projected = std::make_unique<ProjectedLight>(projectors, scene, RoomArea(options));
+    for (const Rigid& pose : cam_from_room) {
+      patterned_exposures.push_back(MeterExposure(scene, projected.get(), camera, pose));
+    }
+  }
+
+  RoomScanner Scanner(int station) const {
+    return RoomScanner(options, scene, station, room_from_station.at(station));
+  }
+  RoomPhotos Photos() const { return {options, scene, projection, cam_from_room}; }
+  std::vector<PickCandidate> Candidates(int photo) const {
+    return FindPickCandidates(Photos(), Scanner(0), room_from_station[0], photo);
+  }
+  double PhotoDiagonal() const { return std::hypot(camera.width, camera.height); }
+  const PhotoRenderer& Renderer() const {
+    std::call_once(renderer_made,
+                   [this] { renderer = std::make_unique<PhotoRenderer>(scene, projection); });
+    return *renderer;
+  }
+
+  const SimulatedRoomOptions options;
+  const Camera camera;
+  const CameraProjection projection;
+  RoomScene scene;
+  std::vector<Rigid> cam_from_room, room_from_station;
+  std::vector<double> exposures;  // per place; of the plain photos
+  std::vector<Projector> projectors;
+  std::unique_ptr<ProjectedLight> projected;  // if there are projectors
+  std::vector<double> patterned_exposures;    // per place
+  mutable std::once_flag renderer_made;
+  mutable std::unique_ptr<PhotoRenderer> renderer;
+};
+
+SimulatedRoom::SimulatedRoom(const SimulatedRoomOptions& options) {
+  ThrowIfProblems(options.Problems());
+  impl_ = std::make_unique<Impl>(options);
+}
+SimulatedRoom::~SimulatedRoom() = default;
+
+const SimulatedRoomOptions& SimulatedRoom::options() const { return impl_->options; }
+const Camera& SimulatedRoom::camera() const { return impl_->camera; }
+int SimulatedRoom::NumPhotos() const {
+  return impl_->options.num_photos * (impl_->projected ? 2 : 1);
+}
+bool SimulatedRoom::IsPatterned(int photo) const { return impl_->projected && photo % 2 == 0; }
+int SimulatedRoom::PlaceOf(int photo) const { return impl_->projected ? photo / 2 : photo; }
+const std::vector<Projector>& SimulatedRoom::Projectors() const { return impl_->projectors; }
+
+std::string SimulatedRoom::PhotoName(int photo) const {
+  char name[32];
+  if (impl_->projected) {
+    std::snprintf(name, sizeof(name), "IMG_%04d.jpg", photo + 1);
+  } else {
+    std::snprintf(name, sizeof(name), "photo_%03d.jpg", photo);
+  }
+  return name;
+}
+
+Rigid SimulatedRoom::CamFromRoom(int photo) const {
+  return impl_->cam_from_room.at(PlaceOf(photo));
+}
+Rigid SimulatedRoom::CamFromScan(int photo) const {
+  return CamFromRoom(photo) * impl_->room_from_station[0];
+}
+Rigid SimulatedRoom::ScanFromRoom() const { return impl_->room_from_station[0].Inverse(); }
+double SimulatedRoom::ExposureEv(int photo) const {
+  const auto& exposures = IsPatterned(photo) ? impl_->patterned_exposures : impl_->exposures;
+  return exposures.at(PlaceOf(photo));
+}
+double SimulatedRoom::ExposureTime(int photo) const {
+  return NominalExposureTime(impl_->options) * std::exp2(ExposureEv(photo));
+}
+
+double SimulatedRoom::NotedTime(int photo) const {
+  const std::string& wrong = impl_->options.wrong_exif;
+  if (wrong == "all") return NominalExposureTime(impl_->options);
+  return ExposureTime(photo) * (wrong == "one" && photo == NumPhotos() / 2 ? 0.25 : 1);
+}
+Eigen::Vector3f SimulatedRoom::WhiteBalance(int photo) const {
+  return WhiteBalanceOf(photo, impl_->options.random_seed, impl_->options.white_balance_ev);
+}
+
+cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
+  PhotoSettings settings;
+  settings.exposure_ev = ExposureEv(photo);
+  settings.blur_px = impl_->options.blur_px;
+  settings.response = impl_->options.response;
+  settings.vignetting = impl_->options.vignetting;
+  settings.white_balance = WhiteBalance(photo);
+  settings.noise = impl_->options.photo_noise;
+  settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
+  if (IsPatterned(photo)) settings.projected = impl_->projected.get();
+  cv::Mat image =
+      impl_->Renderer().Render(CamFromRoom(photo), settings, impl_->options.num_threads);
+  if (HasStranger(photo)) {
+    DrawStranger(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 521, photo), &image);
+  }
+  return image;
+}
+
+// Spread evenly over the photos.
+bool SimulatedRoom::HasStranger(int photo) const {
+  const double share = impl_->options.strangers;
+  return std::floor((photo + 1) * share) > std::floor(photo * share);
+}
+
+Scan SimulatedRoom::MakeScan(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  Scan scan;
+  scan.num_columns = scanner.grid().num_columns;
+  scan.num_rows = scanner.grid().num_rows;
+  scan.is_rtpi = true;
+  scan.path = "simulated scan " + std::to_string(station);
+  if (station > 0) scan.scan_from_station = ScanFromRoom() * impl_->room_from_station[station];
+  scan.points.assign(static_cast<size_t>(scan.num_columns) * scan.num_rows, Scan::MissingPoint());
+  scan.intensity.assign(scan.points.size(), 0);
+  ParallelFor(impl_->options.num_threads, 0, scan.num_rows, [&](int row) {
+    for (int column = 0; column < scan.num_columns; ++column) {
+      const int index = scan.Index(column, row);
+      const ScanSample sample = scanner.Measure(index);
+      if (sample.missing) continue;
+      scan.points[index] =
+          station > 0 ? scan.scan_from_station * sample.x_in_station : sample.x_in_station;
+      scan.intensity[index] = sample.intensity;
+    }
+  });
+  return scan;
+}
+
+std::vector<Eigen::Vector3f> SimulatedRoom::TrueColors(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  const ScanGrid& grid = scanner.grid();
+  std::vector<Eigen::Vector3f> colors(static_cast<size_t>(grid.num_columns) * grid.num_rows,
+                                      Eigen::Vector3f::Zero());
+  ParallelFor(impl_->options.num_threads, 0, grid.num_rows, [&](int row) {
+    for (int column = 0; column < grid.num_columns; ++column) {
+      const int index = row * grid.num_columns + column;
+      const ScanSample sample = scanner.Measure(index);
+      if (!sample.missing) colors[index] = impl_->scene.Color(sample.hit).cwiseMax(0).cwiseMin(1);
+    }
+  });
+  return colors;
+}
+
+TrueSamples SimulatedRoom::MakeTrueSamples(int station) const {
+  const RoomScanner scanner = impl_->Scanner(station);
+  const ScanGrid& grid = scanner.grid();
+  const size_t count = static_cast<size_t>(grid.num_columns) * grid.num_rows;
+  TrueSamples samples;
+  samples.points.assign(count, Scan::MissingPoint());
+  samples.normals.assign(count, Eigen::Vector3f::Zero());
+  samples.cell_colors.assign(count, Eigen::Vector3f::Zero());
+  const Rigid& room_from_station = impl_->room_from_station.at(station);
+  const Eigen::Vector3d& origin = room_from_station.translation;
+  ParallelFor(impl_->options.num_threads, 0, grid.num_rows, [&](int row) {
+    for (int column = 0; column < grid.num_columns; ++column) {
+      const int index = row * grid.num_columns + column;
+      const ScanSample sample = scanner.Measure(index);
+      if (sample.missing) continue;
+      const SceneHit& hit = sample.hit;
+      const Eigen::Vector3d normal = impl_->scene.patches()[hit.patch].Normal();
+      const auto side = [&](int next_column, int next_row) {
+        const Eigen::Vector3d direction =
+            room_from_station.rotation *
+            ScanGrid::Direction(grid.Theta(next_column), grid.Phi(next_row));
+        return OffsetOnPlane(origin, direction, hit.point, normal);
+      };
+      samples.points[index] = hit.point;
+      const double facing = normal.dot(origin - hit.point) < 0 ? -1 : 1;
+      samples.normals[index] = (facing * normal).cast<float>();
+      samples.cell_colors[index] =
+          impl_->scene.Color(hit, side(column + 1, row), side(column, row + 1))
+              .cwiseMax(0)
+              .cwiseMin(1);
+    }
+  });
+  return samples;
+}
+
+std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& samples,
+                                                          int photo) const {
+  constexpr double kFlattest = 0.05;
+  constexpr int kAtOnce = 4096;
+  const Rigid cam_from_room = CamFromRoom(photo);
+  const Eigen::Vector3d centre = cam_from_room.TargetOriginInSource();
+  const int count = static_cast<int>(samples.points.size());
+  std::vector<Eigen::Vector2f> sightings(
+      count, Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  ParallelFor(impl_->options.num_threads, 0, (count + kAtOnce - 1) / kAtOnce, [&](int block) {
+    for (int i = block * kAtOnce; i < std::min(count, (block + 1) * kAtOnce); ++i) {
+      const Eigen::Vector3d& point = samples.points[i];
+      const Eigen::Vector3d to_camera = (centre - point).normalized();
+      if (!(to_camera.dot(samples.normals[i].cast<double>()) > kFlattest)) continue;
+      const auto position = impl_->projection.ImgFromCam(cam_from_room * point);
+      if (!position || !impl_->projection.InImage(*position)) continue;
+      if (impl_->scene.IsOccluded(centre, point)) continue;
+      sightings[i] = position->cast<float>();
+    }
+  });
+  return sightings;
+}
+
+Similarity SimulatedRoom::ScanFromSparse() const {
+  RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 601));
+  Similarity scan_from_sparse;
+  scan_from_sparse.scale = random.Uniform(0.3, 0.6);
+  const Eigen::Vector3d axis(random.Gaussian(), random.Gaussian(), random.Gaussian());
+  scan_from_sparse.rotation = Eigen::AngleAxisd(random.Uniform(0.5, 2.5), axis.normalized());
+  scan_from_sparse.translation << random.Uniform(-2, 2), random.Uniform(-2, 2),
+      random.Uniform(-2, 2);
+  return scan_from_sparse;
+}
+
+SparseModel SimulatedRoom::MakeSparseModel(int num_points, double noise_px) const {
+  const Rigid scan_from_room = ScanFromRoom();
+  const Similarity sparse_from_room =
+      ScanFromSparse().Inverse() *
+      Similarity{1, scan_from_room.rotation, scan_from_room.translation};
+  SparseModel model = MakeRoomSparseModel(impl_->Photos(), sparse_from_room, num_points, noise_px);
+  const int photos_per_place = impl_->projected ? 2 : 1;
+  for (auto& [id, image] : model.images) {
+    image.name = PhotoName(photos_per_place * (static_cast<int>(id) - 1));
+  }
+  return model;
+}
+
+std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const {
+  RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 701, photo));
+  std::vector<SimulatedPick> picks;
+  for (const PickCandidate& candidate :
+       SpreadPicks(impl_->Candidates(PlaceOf(photo)), count, impl_->PhotoDiagonal())) {
+    const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
+    picks.push_back({PhotoName(photo), candidate.x_in_img + impl_->options.click_noise_px * noise,
+                     candidate.x_in_scan});
+  }
+  return picks;
+}
+
+int SimulatedRoom::BestPhotoForPicks() const {
+  int best_photo = 0;
+  double best = -1;
+  for (int photo = 0; photo < NumPhotos(); ++photo) {
+    if (impl_->projected && !IsPatterned(photo)) continue;
+    // How far apart the picks would lie: the smallest spread of the points in space.
+    const auto picks = SpreadPicks(impl_->Candidates(PlaceOf(photo)), 8, impl_->PhotoDiagonal());
+    if (picks.size() < 6) continue;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const auto& pick : picks) mean += pick.x_in_scan / static_cast<double>(picks.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const auto& pick : picks)
+      spread += (pick.x_in_scan - mean) * (pick.x_in_scan - mean).transpose();
+    const double volume = spread.determinant();
+    if (volume > best) {
+      best = volume;
+      best_photo = photo;
+    }
+  }
+  return best_photo;
+}
+
+}  // namespace roomtex

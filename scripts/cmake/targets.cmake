@@ -1,0 +1,76 @@
+# Libraries, commands and tests: what every target of a kind has in common.
+
+# What most files include is parsed once. A header must still include what it uses: who links the installed
+# libraries has no precompiled headers (docs/examples is built that way in a test).
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/precompiled.cc CONTENT "")
+set(precompiled_headers
+    <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <optional> <set> <string>
+    <utility> <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <nlohmann/json.hpp>
+    <opencv2/core.hpp>)
+function(roomtex_precompiled name)
+  add_library(${name} STATIC ${CMAKE_BINARY_DIR}/generated/precompiled.cc)
+  target_link_libraries(${name} PRIVATE Eigen3::Eigen nlohmann_json::nlohmann_json opencv_core Threads::Threads)
+  target_include_directories(${name} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+  target_precompile_headers(${name} PRIVATE ${precompiled_headers} ${ARGN})
+endfunction()
+roomtex_precompiled(roomtex_precompiled)
+
+# roomtex_library(NAME ROOMS folders... [EXCEPT files...] PUBLIC ... PRIVATE ...): every .cc of the rooms, apart
+# from the mains of commands (roomtex_*.cc).
+function(roomtex_library name)
+  cmake_parse_arguments(ARG "" "" "ROOMS;FILES;EXCEPT;PUBLIC;PRIVATE" ${ARGN})
+  set(sources ${ARG_FILES})
+  foreach(room ${ARG_ROOMS})
+    file(GLOB found CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${room}/*.cc)
+    list(FILTER found EXCLUDE REGEX "(^|/)roomtex_[a-z]+[.]cc$")
+    list(APPEND sources ${found})
+  endforeach()
+  if(ARG_EXCEPT)
+    list(REMOVE_ITEM sources ${ARG_EXCEPT})
+  endif()
+  add_library(roomtex_${name} STATIC ${sources})
+  add_library(roomtex::${name} ALIAS roomtex_${name})
+  target_include_directories(roomtex_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
+  target_compile_options(roomtex_${name} PRIVATE ${roomtex_warnings})
+  target_link_libraries(roomtex_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  target_precompile_headers(roomtex_${name} REUSE_FROM roomtex_precompiled)
+endfunction()
+
+# roomtex_program(NAME SOURCES files... LIBRARIES ...): a program that is not installed.
+function(roomtex_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_compile_options(${name} PRIVATE ${roomtex_warnings})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES})
+  target_precompile_headers(${name} REUSE_FROM roomtex_precompiled)
+endfunction()
+
+# roomtex_command(NAME SOURCE LIBRARIES...): the installed program roomtex-NAME.
+function(roomtex_command name source)
+  add_executable(roomtex-${name} ${source})
+  target_compile_options(roomtex-${name} PRIVATE ${roomtex_warnings})
+  target_link_libraries(roomtex-${name} PRIVATE ${ARGN})
+  target_precompile_headers(roomtex-${name} REUSE_FROM roomtex_precompiled)
+  install(TARGETS roomtex-${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# roomtex_test(NAME [WHOLE] [LABEL l] SOURCES files... LIBRARIES ...): every TEST becomes a ctest of its own,
+# labelled `unit` or l. WHOLE: the program is one ctest, because its tests share a costly fixture or are so short
+# that starting a program each would be most of the time.
+function(roomtex_test name)
+  cmake_parse_arguments(ARG "WHOLE" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT ARG_LABEL)
+    set(ARG_LABEL unit)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_compile_options(${name} PRIVATE ${roomtex_warnings})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} roomtex_test_support GTest::gmock
+                        GTest::gtest_main)
+  target_precompile_headers(${name} REUSE_FROM roomtex_precompiled_tests)
+  if(ARG_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL})
+  else()
+    gtest_discover_tests(${name} PROPERTIES LABELS ${ARG_LABEL} DISCOVERY_TIMEOUT 60)
+  endif()
+endfunction()

@@ -1,0 +1,594 @@
+#include "align/fit/plane_bundle.h"
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/dynamic_autodiff_cost_function.h>
+#include <ceres/numeric_diff_cost_function.h>
+#include <ceres/rotation.h>
+#include <gmock/gmock.h>
+
+#include "align/fit/plane_bundle_costs.h"
+#include "core/camera_formulas.h"
+#include "core/frames.h"
+#include "tests/align/clicks/pick_maker.h"
+#include "tests/align/surface/curved_room.h"
+#include "tests/align/surface/surface_room.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+using testing::HasSubstr;
+
+// Residuals and Jacobians (one per parameter block, by rows) of a cost.
+struct Evaluation {
+  Eigen::VectorXd residuals;
+  std::vector<Eigen::MatrixXd> jacobians;
+};
+Evaluation Evaluate(const ceres::CostFunction& cost, const std::vector<const double*>& parameters) {
+  using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Evaluation result;
+  result.residuals.setConstant(cost.num_residuals(), NAN);
+  std::vector<RowMatrix> by_rows;
+  std::vector<double*> pointers;
+  for (const int size : cost.parameter_block_sizes()) {
+    by_rows.push_back(RowMatrix::Constant(cost.num_residuals(), size, NAN));
+  }
+  for (RowMatrix& one : by_rows) pointers.push_back(one.data());
+  EXPECT_TRUE(cost.Evaluate(parameters.data(), result.residuals.data(), pointers.data()));
+  for (const RowMatrix& one : by_rows) result.jacobians.push_back(one);
+  return result;
+}
+
+// ---- The costs.
+
+struct OneRowPlaneCost {
+  template <typename T>
+  bool operator()(const T* q, T* residual) const {
+    residual[0] = T(0);
+    for (int i = 0; i < 3; ++i) residual[0] += T(beta * normal[i]) * (q[i] - T(point[i]));
+    return true;
+  }
+  double beta;
+  Eigen::Vector3d point, normal;
+};
+
+struct ThesisPlaneCost {
+  template <typename T>
+  bool operator()(const T* q, T* residuals) const {
+    OneRowPlaneCost{beta / std::sqrt(2.0), point, normal}(q, residuals);
+    residuals[1] = residuals[0];
+    return true;
+  }
+  double beta;
+  Eigen::Vector3d point, normal;
+};
+
+TEST(PlaneCost, HasTheDerivativesOfAutomaticAndNumericDifferences) {
+  const Eigen::Vector3d point(1, -2, 0.5), normal = Eigen::Vector3d(0.3, -0.7, 0.4).normalized();
+  const Eigen::Vector3d q(0.7, 0.2, -1.1);
+  const PlaneCost cost(730, point, normal);
+  const ceres::AutoDiffCostFunction<ThesisPlaneCost, 2, 3> automatic(
+      new ThesisPlaneCost{730, point, normal});
+  const ceres::NumericDiffCostFunction<ThesisPlaneCost, ceres::CENTRAL, 2, 3> numeric(
+      new ThesisPlaneCost{730, point, normal});
+  const Evaluation own = Evaluate(cost, {q.data()});
+  for (const ceres::CostFunction* other :
+       std::initializer_list<const ceres::CostFunction*>{&automatic, &numeric}) {
+    const Evaluation theirs = Evaluate(*other, {q.data()});
+    EXPECT_THAT(own.residuals, IsNearMatrix(theirs.residuals, 1e-9));
+    EXPECT_THAT(own.jacobians[0], IsNearMatrix(theirs.jacobians[0], 1e-5));
+  }
+}
+
+TEST(PlaneCost, HasTheCostAndGradientOfOneRow) {
+  const Eigen::Vector3d point(1, -2, 0.5), normal = Eigen::Vector3d(0.3, -0.7, 0.4).normalized();
+  const Eigen::Vector3d q(0.7, 0.2, -1.1);
+  const Evaluation two = Evaluate(PlaneCost(730, point, normal), {q.data()});
+  const Evaluation one = Evaluate(
+      ceres::AutoDiffCostFunction<OneRowPlaneCost, 1, 3>(new OneRowPlaneCost{730, point, normal}),
+      {q.data()});
+  EXPECT_NEAR(two.residuals.squaredNorm(), one.residuals.squaredNorm(), 1e-6);
+  EXPECT_NEAR(two.residuals.squaredNorm(), std::pow(730 * normal.dot(q - point), 2), 1e-6);
+  EXPECT_THAT(Eigen::MatrixXd(two.jacobians[0].transpose() * two.residuals),
+              IsNearMatrix(Eigen::MatrixXd(one.jacobians[0].transpose() * one.residuals), 1e-6));
+  EXPECT_THAT(Eigen::MatrixXd(two.jacobians[0].transpose() * two.jacobians[0]),
+              IsNearMatrix(Eigen::MatrixXd(one.jacobians[0].transpose() * one.jacobians[0]), 1e-6));
+}
+
+// The same projection, differentiated by Ceres.
+struct AutomaticReprojection {
+  template <typename T>
+  bool operator()(T const* const* parameters, T* residuals) const {
+    const T* const pose = parameters[0];
+    T offset[3], started[3], p[3];
+    for (int i = 0; i < 3; ++i) offset[i] = parameters[1][i] - pose[3 + i];
+    for (int i = 0; i < 3; ++i) {
+      started[i] = T(0);
+      for (int k = 0; k < 3; ++k) started[i] += T(start(i, k)) * offset[k];
+    }
+    ceres::AngleAxisRotatePoint(pose, started, p);
+    T x, y;
+    camera_formulas::Project(model, parameters[2], T(p[0] / p[2]), T(p[1] / p[2]), &x, &y);
+    residuals[0] = T(weight) * (x - T(x_in_img.x()));
+    residuals[1] = T(weight) * (y - T(x_in_img.y()));
+    return true;
+  }
+  CameraModel model;
+  Eigen::Matrix3d start;
+  Eigen::Vector2d x_in_img;
+  double weight;
+};
+
+TEST(ReprojectionCost, HasTheDerivativesOfAutomaticDifferencesForEveryCamera) {
+  for (int id = 0; id < kNumCameraModels; ++id) {
+    PickMaker maker(id, static_cast<CameraModel>(id));
+    const Camera camera = maker.projection.camera();
+    const PointPairs pairs = maker.General(20);
+    PoseParameters pose(maker.cam_from_scan);
+    // Also away from the pose it started from.
+    for (const double turn : {0.0, 1e-5, 0.02, 0.4}) {
+      for (int k = 0; k < 3; ++k) pose.values[k] = turn * (k - 0.7);
+      const int num_params = static_cast<int>(camera.params.size());
+      ceres::DynamicAutoDiffCostFunction<AutomaticReprojection> automatic(
+          new AutomaticReprojection{camera.model, pose.start_matrix, pairs.x_in_img.col(0), 0.6});
+      automatic.AddParameterBlock(6);
+      automatic.AddParameterBlock(3);
+      automatic.AddParameterBlock(num_params);
+      automatic.SetNumResiduals(2);
+      const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(0), 0.6, true);
+      const Eigen::Vector3d point = pairs.x_in_scan.col(0);
+      if ((pose.CamFromScan() * point).z() < 0.5) continue;
+      const std::vector<const double*> parameters{pose.values, point.data(), camera.params.data()};
+      const Evaluation own = Evaluate(cost, parameters), theirs = Evaluate(automatic, parameters);
+      EXPECT_THAT(own.residuals, IsNearMatrix(theirs.residuals, 1e-6)) << id;
+      for (int block = 0; block < 3; ++block) {
+        const double size = 1 + theirs.jacobians[block].cwiseAbs().maxCoeff();
+        EXPECT_THAT(own.jacobians[block], IsNearMatrix(theirs.jacobians[block], 1e-8 * size))
+            << CameraModelName(camera.model) << ", block " << block << ", turn " << turn;
+      }
+      // With the intrinsics held, the other blocks are the same.
+      const Evaluation held =
+          Evaluate(ReprojectionCost(pose, camera, pairs.x_in_img.col(0), 0.6, false),
+                   {pose.values, point.data()});
+      EXPECT_EQ(held.jacobians.size(), 2u);
+      EXPECT_THAT(held.jacobians[0], IsNearMatrix(own.jacobians[0], 0.0));
+    }
+  }
+}
+
+TEST(ReprojectionCost, AgreesWithTheProjectionAndRefusesPointsBehind) {
+  PickMaker maker(3);
+  const PointPairs pairs = maker.General(20);
+  PoseParameters pose(maker.cam_from_scan);
+  EXPECT_THAT(pose.CamFromScan(), IsNearRigid(maker.cam_from_scan, 1e-7, 1e-12));
+  const Camera camera = maker.projection.camera();
+  for (int i = 0; i < pairs.size(); ++i) {
+    const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(i), 1, false);
+    const Eigen::Vector3d point = pairs.x_in_scan.col(i);
+    EXPECT_LT(Evaluate(cost, {pose.values, point.data()}).residuals.norm(), 1e-6);
+    const Eigen::Vector3d behind =
+        2 * maker.cam_from_scan.TargetOriginInSource() - pairs.x_in_scan.col(i);
+    const double* const parameters[] = {pose.values, behind.data()};
+    Eigen::Vector2d residual;
+    EXPECT_FALSE(cost.Evaluate(parameters, residual.data(), nullptr));
+  }
+}
+
+// ---- The adjustment.
+
+SparseModel Moved(SparseModel model, double metres, double deg, double growth) {
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, -2, 0.5).normalized();
+  TransformModel({1 + growth, Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis)),
+                  metres * Eigen::Vector3d(0.6, -0.3, 0.74).normalized()},
+                 &model);
+  return model;
+}
+
+// The similarity that FitToSurface finds from a start some centimetres off.
+SparseModel OnSurface(const SurfaceRoom& room, const SparseModel& model) {
+  SparseModel start = Moved(model, 0.03, 0.3, 0.003);
+  const std::vector<bool> used(room.picks.size(), true);
+  const SimilarityFit fit =
+      FitToSurface(start, FindSurfacePoints(start, 3, 0.7), *room.patches, room.picks, used, 1.5,
+                   0.2, Similarity(), SimilarityFitOptions());
+  EXPECT_TRUE(fit.converged);
+  TransformModel(fit.scan_from_sparse, &start);
+  return start;
+}
+
+TEST(PlaneBundle, BringsThePosesNearerToTheTruthThanAnySimilarity) {
+  double best = 0, fitted = 0, adjusted = 0, worst_fitted = 0, worst_adjusted = 0;
+  constexpr int kNumRooms = 4;
+  for (int seed = 0; seed < kNumRooms; ++seed) {
+    const Reconstruction& one = StraightRoom(seed);
+    const SparseModel similarity = OnSurface(one.room, one.model);
+    const PlaneBundle bundle = AdjustToSurface(one.room.Input(similarity), PlaneBundleOptions());
+    ASSERT_TRUE(bundle.usable) << bundle.reason;
+    const PoseSpread before = PoseErrorsOf(one.room.room, similarity);
+    const PoseSpread after = PoseErrorsOf(one.room.room, bundle.model);
+    best += PoseErrorsOf(one.room.room, one.model).position.median / kNumRooms;
+    fitted += before.position.median / kNumRooms;
+    adjusted += after.position.median / kNumRooms;
+    worst_fitted += before.position.worst / kNumRooms;
+    worst_adjusted += after.position.worst / kNumRooms;
+    EXPECT_LT(after.position.median, 0.0015) << seed;
+    EXPECT_LT(after.rotation.median, RadFromDeg(0.02)) << seed;
+    EXPECT_LT(after.position.worst, 0.004) << seed;
+    EXPECT_LT(bundle.plane_rms_after, 0.5 * bundle.plane_rms_before);
+    EXPECT_LT(bundle.reprojection_rms_after, 1.1 * bundle.reprojection_rms_before);
+    EXPECT_NEAR(bundle.sigma_px, 0.7, 0.1);
+  }
+  EXPECT_LT(adjusted, 0.9 * fitted);
+  EXPECT_LT(worst_adjusted, worst_fitted);
+  RecordProperty("best_similarity_mm", std::to_string(1000 * best));
+  RecordProperty("fitted_mm", std::to_string(1000 * fitted));
+  RecordProperty("adjusted_mm", std::to_string(1000 * adjusted));
+}
+
+TEST(PlaneBundle, ReportsTheSamePointsBeforeAndAfter) {
+  const Reconstruction& one = StraightRoom();
+  const SparseModel similarity = OnSurface(one.room, one.model);
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(similarity), PlaneBundleOptions());
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  double before = 0, after = 0;
+  std::vector<int> counts(one.room.planes.size(), 0);
+  for (const SurfaceConstraint& c : bundle.constraints) {
+    before += std::pow(c.Distance(similarity.points.at(c.point3d_id).x_in_model), 2);
+    after += std::pow(c.Distance(bundle.model.points.at(c.point3d_id).x_in_model), 2);
+    if (c.plane >= 0) ++counts[c.plane];
+  }
+  const double n = static_cast<double>(bundle.constraints.size());
+  EXPECT_NEAR(bundle.plane_rms_before, std::sqrt(before / n), 1e-12);
+  EXPECT_NEAR(bundle.plane_rms_after, std::sqrt(after / n), 1e-12);
+  EXPECT_EQ(bundle.num_points_of_plane, counts);
+  EXPECT_GT(n, 1000);
+  SparseModel copy = bundle.model;
+  EXPECT_NEAR(UpdateReprojectionErrors(&copy).rms_px, bundle.reprojection_rms_after, 1e-12);
+  for (const auto& [id, point] : bundle.model.points) {
+    EXPECT_EQ(point.track.size(), similarity.points.at(id).track.size());
+    EXPECT_NEAR(point.error, copy.points.at(id).error, 1e-12);
+  }
+}
+
+TEST(PlaneBundle, PatchesHelpWhereThereAreFewPlanes) {
+  // Of the planes only the floor is known.
+  double without = 0, with = 0;
+  for (int seed = 0; seed < 4; ++seed) {
+    const Reconstruction& one = StraightRoom(seed);
+    const SparseModel similarity = OnSurface(one.room, one.model);
+    const std::vector<ScanPlane> floor(one.room.planes.end() - 2, one.room.planes.end() - 1);
+    PlaneBundleInput input{similarity,
+                           floor,
+                           *one.room.patches,
+                           one.room.picks,
+                           std::vector<bool>(one.room.picks.size(), true),
+                           1.5,
+                           one.room.picks[0].image_name};
+    PlaneBundleOptions options;
+    const PlaneBundle any_surface = AdjustToSurface(input, options);
+    options.surface = false;
+    const PlaneBundle planes_only = AdjustToSurface(input, options);
+    ASSERT_TRUE(any_surface.usable) << any_surface.reason;
+    with += PoseErrorsOf(one.room.room, any_surface.model).position.median / 4;
+    without += PoseErrorsOf(one.room.room, planes_only.model).position.median / 4;
+    EXPECT_GT(any_surface.constraints.size(), 2 * planes_only.constraints.size());
+  }
+  EXPECT_LT(with, 0.7 * without);
+  EXPECT_LT(with, 0.0015);
+}
+
+Spread PositionErrors(const CurvedRoom& room, const SparseModel& model) {
+  std::vector<double> errors;
+  for (const auto& [id, image] : model.images) {
+    errors.push_back(
+        (image.cam_from_model.TargetOriginInSource() - room.TruePose(id).TargetOriginInSource())
+            .norm());
+  }
+  return SpreadOf(errors);
+}
+
+TEST(PlaneBundle, ARoomWithoutAnyPlaneIsHeldByPatches) {
+  const CurvedRoom room;
+  const ScanPatches patches({room.scan}, ScanPatchOptions());
+  const SparseModel best = Reconstructed(room.model), start = Moved(best, 0.02, 0.2, 0.003);
+  const std::vector<ScanPlane> no_planes;
+  const PlaneBundleInput input{start, no_planes,    patches, room.picks, std::vector<bool>(6, true),
+                               1.5,   "photo_1.jpg"};
+  PlaneBundleOptions options;
+  const PlaneBundle bundle = AdjustToSurface(input, options);
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  // Better than the best similarity that there is.
+  EXPECT_LT(PositionErrors(room, bundle.model).median, PositionErrors(room, best).median);
+  EXPECT_LT(PositionErrors(room, bundle.model).worst, 0.7 * PositionErrors(room, best).worst);
+  EXPECT_LT(PositionErrors(room, bundle.model).median, 0.002);
+  EXPECT_GT(bundle.constraints.size(), 3500u);
+  options.surface = false;
+  const PlaneBundle nothing = AdjustToSurface(input, options);
+  EXPECT_FALSE(nothing.usable);
+  EXPECT_THAT(nothing.reason, HasSubstr("Only 0 sparse points lie on the scan's planes"));
+}
+
+TEST(PlaneBundle, PicksHoldWhatOneWallLeavesOpen) {
+  const Reconstruction& one = StraightRoom();
+  Scan wall = one.room.scan;
+  const Rigid room_from_scan = one.room.room.ScanFromRoom().Inverse();
+  for (size_t i = 0; i < wall.points.size(); ++i) {
+    if (!(std::abs((room_from_scan * one.room.true_scan.points[i]).x()) < 1e-6)) {
+      wall.points[i] = Scan::MissingPoint();
+    }
+  }
+  const ScanPatches patches({wall}, ScanPatchOptions());
+  const std::vector<ScanPlane> planes(one.room.planes.begin(), one.room.planes.begin() + 1);
+  std::vector<Pick> picks = one.room.picks;
+  for (int photo = 0; photo < 8; photo += 4) {
+    for (const Pick& pick : PicksOfPhoto(one.room.room, photo, 8)) picks.push_back(pick);
+  }
+  const SparseModel start = Moved(one.model, 0.01, 0.1, 0.002);
+  const PlaneBundle bundle =
+      AdjustToSurface({start, planes, patches, picks, std::vector<bool>(picks.size(), true), 1.5,
+                       picks[0].image_name},
+                      PlaneBundleOptions());
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  EXPECT_LT(PoseErrorsOf(one.room.room, bundle.model).position.worst, 0.015);
+  EXPECT_LT(bundle.plane_rms_after, 0.002);
+}
+
+TEST(PlaneBundle, ConvergesFromAWrongSimilarityOrSaysNo) {
+  const Reconstruction& one = StraightRoom();
+  int num_usable = 0;
+  for (const double size : {0.2, -0.5, 1.0, -1.0, 3.0, 6.0}) {
+    const SparseModel start = Moved(one.model, 0.05 * size, 1.0 * size, 0.005 * size);
+    const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+    num_usable += bundle.usable;
+    if (bundle.usable) {
+      EXPECT_LT(PoseErrorsOf(one.room.room, bundle.model).position.worst, 0.005) << size;
+    } else {
+      EXPECT_THAT(bundle.reason, testing::EndsWith("."));
+      for (const auto& [id, image] : bundle.model.images) {
+        EXPECT_EQ(image.cam_from_model.translation, start.images.at(id).cam_from_model.translation);
+      }
+    }
+  }
+  EXPECT_GE(num_usable, 4);
+}
+
+TEST(PlaneBundle, DoesNotDependOnTheFrameOfTheScan) {
+  const Reconstruction& one = StraightRoom();
+  const SparseModel start = Moved(one.model, 0.01, 0.1, 0.001);
+  const PlaneBundle before = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  const Rigid other{Eigen::Quaterniond(0.3, -0.5, 0.7, 0.2).normalized(), {120, -40, 5}};
+  SparseModel moved = start;
+  TransformModel({1, other.rotation, other.translation}, &moved);
+  std::vector<ScanPlane> planes = one.room.planes;
+  for (ScanPlane& plane : planes) {
+    plane.point = other * plane.point;
+    for (Eigen::Vector3d* axis : {&plane.normal, &plane.u, &plane.v}) {
+      *axis = other.rotation * *axis;
+    }
+  }
+  std::vector<Pick> picks = one.room.picks;
+  for (Pick& pick : picks) pick.x_in_scan = other * pick.x_in_scan;
+  // Patches depend on where their cubes lie: without them.
+  PlaneBundleOptions options;
+  options.surface = false;
+  const ScanPatches no_patches({}, ScanPatchOptions());
+  const std::vector<bool> used(picks.size(), true);
+  const std::string clicked = picks[0].image_name;
+  const PlaneBundle a = AdjustToSurface(
+      {start, one.room.planes, no_patches, one.room.picks, used, 1.5, clicked}, options);
+  const PlaneBundle b =
+      AdjustToSurface({moved, planes, no_patches, picks, used, 1.5, clicked}, options);
+  ASSERT_TRUE(a.usable && b.usable) << a.reason << b.reason;
+  EXPECT_EQ(a.constraints.size(), b.constraints.size());
+  for (const auto& [id, image] : a.model.images) {
+    EXPECT_THAT(b.model.images.at(id).cam_from_model * other,
+                IsNearRigid(image.cam_from_model, 1e-6, 1e-6));
+  }
+}
+
+TEST(PlaneBundle, AFixedClickedViewKeepsItsPoseToTheLastBit) {
+  const Reconstruction& one = StraightRoom();
+  const SparseModel start = OnSurface(one.room, one.model);
+  PlaneBundleOptions options;
+  options.fix_clicked_view = true;
+  const PlaneBundle fixed = AdjustToSurface(one.room.Input(start), options);
+  ASSERT_TRUE(fixed.usable) << fixed.reason;
+  const std::string name = one.room.picks[0].image_name;
+  for (const auto& [id, image] : start.images) {
+    const Rigid& adjusted = fixed.model.images.at(id).cam_from_model;
+    EXPECT_EQ(image.name == name,
+              adjusted.rotation.coeffs() == image.cam_from_model.rotation.coeffs() &&
+                  adjusted.translation == image.cam_from_model.translation)
+        << image.name;
+  }
+}
+
+TEST(PlaneBundle, GivesTheSameToTheLastBitEachTime) {
+  const Reconstruction& one = StraightRoom();
+  const SparseModel start = OnSurface(one.room, one.model);
+  const PlaneBundle a = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  const PlaneBundle b = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  for (const auto& [id, image] : a.model.images) {
+    const Rigid& other = b.model.images.at(id).cam_from_model;
+    EXPECT_EQ(image.cam_from_model.translation, other.translation);
+    EXPECT_EQ(image.cam_from_model.rotation.coeffs(), other.rotation.coeffs());
+  }
+}
+
+TEST(PlaneBundle, ClutterThatTheScanDoesNotHaveIsNotPulledOntoTheWall) {
+  // Every tenth point stands 6 cm in front of the surface, as if put there after the scan.
+  const Reconstruction& one = StraightRoom();
+  SparseModel truth = one.room.true_model;
+  std::map<uint64_t, Eigen::Vector3d> clutter;
+  for (auto& [id, point] : truth.points) {
+    if (id % 10 != 0) continue;
+    Eigen::Vector3d to_cameras = Eigen::Vector3d::Zero();
+    for (const TrackElement& element : point.track) {
+      to_cameras += (truth.images.at(element.image_id).cam_from_model.TargetOriginInSource() -
+                     point.x_in_model)
+                        .normalized();
+    }
+    const Eigen::Vector3d before = point.x_in_model;
+    point.x_in_model += 0.06 * to_cameras.normalized();
+    clutter[id] = point.x_in_model;
+    for (const TrackElement& element : point.track) {
+      SparseImage& image = truth.images.at(element.image_id);
+      const CameraProjection projection(truth.cameras.at(image.camera_id));
+      image.points2d[element.point2d_index] +=
+          projection.ImgFromCam(image.cam_from_model * point.x_in_model).value() -
+          projection.ImgFromCam(image.cam_from_model * before).value();
+    }
+  }
+  const SparseModel start = OnSurface(one.room, Reconstructed(truth));
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  std::vector<double> errors;
+  for (const auto& [id, x_in_scan] : clutter) {
+    errors.push_back((bundle.model.points.at(id).x_in_model - x_in_scan).norm());
+  }
+  EXPECT_LT(SpreadOf(errors).median, 0.005);
+  EXPECT_LT(PoseErrorsOf(one.room.room, bundle.model).position.median, 0.002);
+}
+
+TEST(PlaneBundle, RefinesTheCameraOnRequest) {
+  const Reconstruction& one = StraightRoom();
+  SparseModel wrong = one.room.true_model;
+  wrong.cameras.at(1).params[0] *= 1.003;
+  wrong.cameras.at(1).params[1] *= 1.003;
+  const SparseModel start = OnSurface(one.room, Reconstructed(wrong));
+  PlaneBundleOptions options;
+  options.refine_intrinsics = true;
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), options);
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  const Camera truth = one.room.room.camera();
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_NEAR(bundle.model.cameras.at(1).params[k] / truth.params[k], 1, 5e-4);
+  }
+  EXPECT_LT(PoseErrorsOf(one.room.room, bundle.model).position.median, 0.002);
+  // Held, they stay.
+  const PlaneBundle held = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  EXPECT_EQ(held.model.cameras.at(1).params, wrong.cameras.at(1).params);
+}
+
+TEST(PlaneBundle, TheFixedBetaOfTheThesisCanBeUsed) {
+  const Reconstruction& one = StraightRoom();
+  const SparseModel start = OnSurface(one.room, one.model);
+  double before = 1;
+  for (const double beta : {50.0, 500.0, 5000.0}) {
+    PlaneBundleOptions options;
+    options.beta = beta;
+    const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), options);
+    ASSERT_TRUE(bundle.usable) << bundle.reason;
+    EXPECT_LT(bundle.plane_rms_after, before) << beta;
+    before = bundle.plane_rms_after;
+  }
+}
+
+TEST(PlaneBundle, APhotoThatNothingHoldsFollowsTheOthers) {
+  const Reconstruction& one = StraightRoom();
+  SparseModel start = OnSurface(one.room, one.model);
+  // Photo 5 keeps three of its observations.
+  SparseImage& image = start.images.at(5);
+  int kept = 0;
+  for (uint64_t& id : image.point3d_ids) {
+    if (id == kInvalidPoint3dId || kept++ < 3) continue;
+    auto& track = start.points.at(id).track;
+    track.erase(std::remove_if(track.begin(), track.end(),
+                               [](const TrackElement& element) { return element.image_id == 5; }),
+                track.end());
+    id = kInvalidPoint3dId;
+  }
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  EXPECT_THAT(bundle.idle_images, testing::ElementsAre(5));
+  EXPECT_THAT(
+      bundle.model.images.at(5).cam_from_model,
+      IsNearRigid(CamFromScan(image.cam_from_model, bundle.adjusted_from_input), 1e-7, 1e-9));
+  EXPECT_LT(PoseErrorsOf(one.room.room, bundle.model).position.median, 0.0015);
+}
+
+TEST(PlaneBundle, PicksThatContradictTheSurfaceAreSaid) {
+  const Reconstruction& one = StraightRoom();
+  PlaneBundleInput input = one.room.Input(one.model);
+  std::vector<Pick> picks = one.room.picks;
+  for (Pick& pick : picks) pick.x_in_img.x() += 60;
+  const PlaneBundle bundle = AdjustToSurface(
+      {one.model, one.room.planes, *one.room.patches, picks, input.used, 1.5, input.clicked_image},
+      PlaneBundleOptions());
+  EXPECT_FALSE(bundle.usable);
+  EXPECT_THAT(bundle.reason, HasSubstr("Picks and surface contradict each other"));
+}
+
+TEST(PlaneBundle, SaysSoWhereNothingLiesOnTheSurface) {
+  const Reconstruction& one = StraightRoom();
+  SparseModel start = one.model;
+  TransformModel({1, Eigen::Quaterniond::Identity(), {50, 0, 0}}, &start);
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  EXPECT_FALSE(bundle.usable);
+  EXPECT_THAT(bundle.reason, HasSubstr("too few to adjust"));
+  EXPECT_EQ(bundle.model.points.begin()->second.x_in_model,
+            start.points.begin()->second.x_in_model);
+}
+
+TEST(PlaneBundle, ABentScanGetsTheColoursToTheirPlace) {
+  struct Case {
+    int seed;
+    double bend, drift_deg;
+  };
+  for (const Case& c : {Case{0, 0.01, 0}, Case{1, 0.005, 0.2}, Case{2, 0, 0.3}}) {
+    const Reconstruction one(SmallRoom(c.seed, c.bend, c.drift_deg));
+    const SparseModel similarity = OnSurface(one.room, one.model);
+    const Spread truth = ColourErrors(one.room, one.model);  // the best similarity to the truth
+    const Spread fitted = ColourErrors(one.room, similarity);
+    PlaneBundleOptions bundle_options;
+    bundle_options.surface = false;
+    const PlaneBundle planes = AdjustToSurface(one.room.Input(similarity), bundle_options);
+    bundle_options.surface = true;
+    const PlaneBundle any = AdjustToSurface(one.room.Input(similarity), bundle_options);
+    // Straightened.
+    const std::vector<bool> used(one.room.picks.size(), true);
+    const auto fit = FitScanBend(similarity, FindSurfacePoints(similarity, 3, 0.7), {one.room.scan},
+                                 *one.room.patches, one.room.picks, used, 1.5, Similarity(),
+                                 bundle_options.min_bend);
+    ASSERT_TRUE(fit.has_value());
+    SparseModel straight = similarity;
+    TransformModel(fit->scan_from_sparse, &straight);
+    PlaneBundleInput input = one.room.Input(straight);
+    input.bend = fit->bend;
+    const PlaneBundle bent = AdjustToSurface(input, bundle_options);
+    ASSERT_TRUE(planes.usable && any.usable && bent.usable)
+        << planes.reason << any.reason << bent.reason;
+    const Spread with_planes = ColourErrors(one.room, planes.model);
+    const Spread with_any = ColourErrors(one.room, any.model);
+    const Spread with_bend = ColourErrors(one.room, bent.model);
+    std::printf(
+        "bend %.3f, drift %.1f deg: colour off by mm (median): best similarity to the "
+        "truth %.2f, similarity on the surface %.2f, planes %.2f, any surface %.2f, "
+        "straightened %.2f\n",
+        c.bend, c.drift_deg, 1000 * truth.median, 1000 * fitted.median, 1000 * with_planes.median,
+        1000 * with_any.median, 1000 * with_bend.median);
+    EXPECT_LT(with_any.median, fitted.median);
+    EXPECT_LT(with_bend.median, 0.8 * truth.median);
+    EXPECT_LT(with_bend.median, 0.6 * fitted.median);
+    EXPECT_LT(with_bend.p90, truth.p90);
+    EXPECT_LT(with_bend.median, 0.0025);
+    EXPECT_LT(bent.reprojection_rms_after, 2.0);
+    EXPECT_LT(bent.plane_rms_after, 0.003);
+  }
+}
+
+TEST(PlaneBundleOptions, NamesEveryProblem) {
+  PlaneBundleOptions options;
+  EXPECT_THAT(options.Problems(), testing::IsEmpty());
+  options.beta = -1;
+  options.max_distance = 0;
+  options.surface_noise = 0;
+  options.min_track = 1;
+  options.min_bend = -1;
+  options.num_rounds = 0;
+  options.max_iterations = 0;
+  EXPECT_EQ(options.Problems().size(), 7u);
+}
+
+}  // namespace
+}  // namespace roomtex

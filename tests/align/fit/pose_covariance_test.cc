@@ -1,0 +1,88 @@
+#include "align/fit/pose_covariance.h"
+
+#include <Eigen/Cholesky>
+#include <gmock/gmock.h>
+
+#include "tests/align/surface/surface_room.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+struct Adjusted {
+  PlaneBundle bundle;
+  PoseCovariances covariances;
+};
+
+Adjusted Adjust(const Reconstruction& one, const PlaneBundleOptions& options = {}) {
+  const PlaneBundleInput input = one.room.Input(one.model);
+  Adjusted adjusted{AdjustToSurface(input, options), {}};
+  EXPECT_TRUE(adjusted.bundle.usable) << adjusted.bundle.reason;
+  adjusted.covariances = FindPoseCovariances(input, adjusted.bundle, options);
+  return adjusted;
+}
+
+// e^T C^-1 e of a position that is off by e has the mean 3. What is common to half a metre of
+// surface is assumed (1 mm) rather than there in this room, so that less is expected; never more.
+TEST(PoseCovariance, SaysHowFarThePosesAreOff) {
+  double position = 0, rotation = 0;
+  int count = 0, num_far = 0;
+  for (int seed = 0; seed < 3; ++seed) {
+    const Reconstruction& one = StraightRoom(seed);
+    const Adjusted adjusted = Adjust(one);
+    for (int photo = 0; photo < one.room.room.NumPhotos(); ++photo) {
+      const SparseImage* image = adjusted.bundle.model.FindImage(one.room.room.PhotoName(photo));
+      const auto& covariance = adjusted.covariances.at(image->image_id);
+      const Rigid truth = one.room.room.CamFromScan(photo);
+      const Eigen::Vector3d offset =
+          image->cam_from_model.TargetOriginInSource() - truth.TargetOriginInSource();
+      const Eigen::AngleAxisd turn(image->cam_from_model.rotation * truth.rotation.conjugate());
+      const Eigen::Vector3d w = turn.angle() * turn.axis();
+      const Eigen::Matrix3d of_position = covariance.block<3, 3>(3, 3);
+      const Eigen::Matrix3d of_rotation = covariance.block<3, 3>(0, 0);
+      const double deviations2 = offset.dot(of_position.llt().solve(offset));
+      position += deviations2;
+      rotation += w.dot(of_rotation.llt().solve(w));
+      num_far += deviations2 > 16;
+      ++count;
+    }
+  }
+  EXPECT_GT(position / count, 0.4);
+  EXPECT_LT(position / count, 3.5);
+  EXPECT_GT(rotation / count, 0.4);
+  EXPECT_LT(rotation / count, 3.5);
+  EXPECT_EQ(num_far, 0);
+}
+
+TEST(PoseCovariance, LeavesOutThePhotoThatIsFixed) {
+  const Reconstruction& one = StraightRoom();
+  PlaneBundleOptions options;
+  options.fix_clicked_view = true;
+  const Adjusted adjusted = Adjust(one, options);
+  EXPECT_EQ(adjusted.covariances.size(), one.model.images.size() - 1);
+  const uint32_t clicked = one.model.FindImage(one.room.picks[0].image_name)->image_id;
+  EXPECT_EQ(adjusted.covariances.count(clicked), 0u);
+}
+
+// Twice the noise of everything: four times the covariance.
+TEST(PoseCovariance, GrowsWithTheSquareOfTheNoise) {
+  const Reconstruction& one = StraightRoom();
+  Adjusted adjusted = Adjust(one);
+  PlaneBundleInput input = one.room.Input(one.model);
+  input.pick_sigma_px *= 2;
+  adjusted.bundle.sigma_px *= 2;
+  for (SurfaceConstraint& c : adjusted.bundle.constraints) c.sigma *= 2;
+  // Residuals are smaller against the doubled noise, so that none counts less as an outlier.
+  const PoseCovariances doubled = FindPoseCovariances(input, adjusted.bundle, {});
+  for (const auto& [id, covariance] : adjusted.covariances) {
+    EXPECT_NEAR(doubled.at(id).trace() / covariance.trace(), 4, 0.4) << id;
+  }
+}
+
+TEST(PoseCovariance, IsEmptyForABundleThatIsNotUsed) {
+  const Reconstruction& one = StraightRoom();
+  EXPECT_TRUE(FindPoseCovariances(one.room.Input(one.model), PlaneBundle(), {}).empty());
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,122 @@
+#include "align/fit/similarity_fit.h"
+
+#include <gtest/gtest.h>
+
+#include "core/frames.h"
+#include "tests/align/simulated_alignment.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+// The truth, turned by `deg`, moved by `metres` and scaled by 1 + `growth`.
+Similarity Disturbed(const Similarity& truth, double deg, double metres, double growth) {
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, -2, 0.5).normalized();
+  const Similarity off{1 + growth, Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(deg), axis)),
+                       metres * Eigen::Vector3d(0.6, -0.3, 0.74).normalized()};
+  return off * truth;
+}
+
+TEST(SimilarityFit, FindsTheSurfaceFromSeveralCentimetresAway) {
+  const SimulatedCase& one = MakeCase();
+  const ScanPatches surface(one.scans, ScanPatchOptions());
+  const auto points = FindSurfacePoints(one.model, 3, 0.7);
+  const std::vector<bool> used(one.picks.size(), true);
+  for (const double size : {0.3, 1.0, -1.0}) {
+    const Similarity start =
+        Disturbed(one.room->ScanFromSparse(), 2 * size, 0.08 * size, 0.02 * size);
+    const SimilarityFit fit = FitToSurface(one.model, points, surface, one.picks, used, 1.5, 0.4,
+                                           start, SimilarityFitOptions());
+    EXPECT_TRUE(fit.converged);
+    EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 0.002) << size;
+    EXPECT_GT(fit.rms_before, fit.rms_after);
+    EXPECT_GT(fit.num_points, 1000);
+  }
+}
+
+TEST(SimilarityFit, PicksHoldWhatOneWallLeavesOpen) {
+  // Only one wall of the scan: the surface says nothing about sliding along it.
+  const SimulatedCase& one = MakeCase();
+  std::vector<Scan> wall = one.scans;
+  const Rigid room_from_scan = one.room->ScanFromRoom().Inverse();
+  for (Eigen::Vector3d& point : wall[0].points) {
+    if (!(std::abs((room_from_scan * point).x()) < 0.02)) point = Scan::MissingPoint();
+  }
+  const ScanPatches surface(wall, ScanPatchOptions());
+  const auto points = FindSurfacePoints(one.model, 3, 0.7);
+  std::vector<Pick> picks = one.picks;
+  for (int photo = 0; photo < 8; photo += 4) {
+    for (const Pick& pick : PicksOfPhoto(*one.room, photo, 8)) picks.push_back(pick);
+  }
+  const std::vector<bool> used(picks.size(), true);
+  const Similarity start = Disturbed(one.room->ScanFromSparse(), 0.5, 0.03, 0.005);
+  const SimilarityFit fit = FitToSurface(one.model, points, surface, picks, used, 1.5, 0.2, start,
+                                         SimilarityFitOptions());
+  EXPECT_TRUE(fit.converged);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 0.02);
+}
+
+TEST(SimilarityFit, GivesUpWhereThereIsNoSurface) {
+  const SimulatedCase& one = MakeCase();
+  const ScanPatches surface(one.scans, ScanPatchOptions());
+  const auto points = FindSurfacePoints(one.model, 3, 0.7);
+  const std::vector<bool> used(one.picks.size(), true);
+  Similarity start = one.room->ScanFromSparse();
+  start.translation += Eigen::Vector3d(100, 0, 0);
+  EXPECT_FALSE(FitToSurface(one.model, points, surface, one.picks, used, 1.5, 0.2, start,
+                            SimilarityFitOptions())
+                   .converged);
+}
+
+TEST(SimilarityFit, ExactPicksInSeveralPhotosGiveTheTruth) {
+  const SimulatedCase& one = MakeCase();
+  const CameraProjection projection(one.room->camera());
+  std::vector<Pick> picks;
+  for (int photo = 0; photo < one.room->NumPhotos(); photo += 5) {
+    for (Pick pick : PicksOfPhoto(*one.room, photo, 4)) {
+      pick.x_in_img = projection.ImgFromCam(one.room->CamFromScan(photo) * pick.x_in_scan).value();
+      picks.push_back(pick);
+    }
+  }
+  const Similarity truth = one.room->ScanFromSparse();
+  EXPECT_LT(PickErrors(one.model, picks, truth).cwiseAbs().maxCoeff(), 1e-6);
+  SimilarityFitOptions options;
+  options.num_steps = 200;
+  const SimilarityFit fit = FitToPicks(one.model, picks, std::vector<bool>(picks.size(), true), 1.0,
+                                       Disturbed(truth, 1, 0.05, 0.01), options);
+  EXPECT_TRUE(fit.converged);
+  // The start's scale (1 % off) is believed to 5 %, so a trace of it stays.
+  EXPECT_NEAR(fit.scan_from_sparse.scale / truth.scale, 1, 2e-4);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 1e-3);
+}
+
+TEST(SurfacePoints, CovarianceIsThatOfTriangulation) {
+  // Two cameras 1 m apart look at a point 4 m ahead: depth sigma = sqrt(2) * sigma_px * z^2 / (f *
+  // b) / ...; here the normal matrix is inverted by hand: J^T J for both views.
+  SparseModel model;
+  const double f = 1000;
+  model.cameras[1] = {1, CameraModel::kSimplePinhole, 2000, 2000, {f, 1000, 1000}};
+  for (uint32_t id : {1u, 2u}) {
+    SparseImage image;
+    image.image_id = id;
+    image.camera_id = 1;
+    image.cam_from_model.translation = {id == 1 ? 0.5 : -0.5, 0, 0};
+    image.points2d = {{id == 1 ? 1125.0 : 875.0, 1000.0}};
+    image.point3d_ids = {1};
+    model.images[id] = image;
+  }
+  model.points[1].x_in_model = {0, 0, 4};
+  model.points[1].track = {{1, 0}, {2, 0}};
+  const auto points = FindSurfacePoints(model, 2, 2.0);
+  ASSERT_EQ(points.size(), 1u);
+  // x: 2 (f/z)^2; y the same; z: 2 (f x / z^2)^2 with x = 0.5.
+  const Eigen::Vector3d expected(4.0 / (2 * 250.0 * 250), 4.0 / (2 * 250.0 * 250),
+                                 4.0 / (2 * std::pow(f * 0.5 / 16, 2)));
+  EXPECT_THAT(points[0].covariance, IsNearMatrix(Eigen::Matrix3d(expected.asDiagonal()), 1e-12));
+  EXPECT_THAT(points[0].to_cameras,
+              IsNearMatrix(Eigen::Vector3d(0, 0, -4 / std::sqrt(16.25)), 1e-12));
+  EXPECT_TRUE(FindSurfacePoints(model, 3, 2.0).empty());
+}
+
+}  // namespace
+}  // namespace roomtex

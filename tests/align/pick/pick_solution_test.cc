@@ -1,0 +1,275 @@
+#include "align/pick/pick_solution.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/align/pick/pick_room.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Status = PickState::Status;
+
+PickSolution Solve(const std::vector<SessionPick>& picks) {
+  return PickSolver(ThePickRoom().scene()).Solve(picks);
+}
+
+std::vector<SessionPick> TruePicks(int count) {
+  return ThePickRoom().Picks(ThePickRoom().clicked_photo(), count);
+}
+std::string ClickedName() { return ThePickRoom().room().PhotoName(ThePickRoom().clicked_photo()); }
+
+// All poses of the model are where they truly are.
+void ExpectTruePoses(const PickSolution& solution, double metres) {
+  const SimulatedRoom& room = ThePickRoom().room();
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const PhotoState& state = solution.photos.at(room.PhotoName(photo));
+    ASSERT_TRUE(state.solved()) << photo;
+    EXPECT_THAT(state.cam_from_scan, IsNearRigid(room.CamFromScan(photo), metres, metres)) << photo;
+  }
+}
+
+TEST(PickSolution, SixTruePicksGiveTheTruthAndNoResiduals) {
+  const PickSolution solution = Solve(TruePicks(6));
+  const PhotoState& photo = solution.photos.at(ClickedName());
+  EXPECT_EQ(photo.by, PhotoState::By::kPicks);
+  EXPECT_EQ(photo.num_used, 6);
+  EXPECT_LT(photo.rms_px, 1e-4);
+  EXPECT_LT(photo.rms, 1e-6);
+  EXPECT_FALSE(photo.ambiguous);
+  EXPECT_THAT(photo.warnings, IsEmpty());
+  ASSERT_TRUE(solution.scan_from_sparse);
+  EXPECT_NEAR(solution.scan_from_sparse->scale / ThePickRoom().room().ScanFromSparse().scale, 1,
+              1e-3);
+  ExpectTruePoses(solution, 0.01);
+  for (const PickState& pick : solution.picks) {
+    EXPECT_EQ(pick.status, Status::kUsed);
+    EXPECT_LT(pick.residual_px, 1e-3);
+    EXPECT_LT(pick.leave_one_out_px, 1e-2);
+    EXPECT_FALSE(pick.worst);  // none is worse than another
+  }
+  EXPECT_THAT(solution.next, HasSubstr("Enough picks"));
+}
+
+TEST(PickSolution, ThreeToFivePicksAreDecidedByTheSparseModel) {
+  for (const int count : {3, 4, 5}) {
+    const PickSolution solution = Solve(TruePicks(count));
+    const PhotoState& photo = solution.photos.at(ClickedName());
+    EXPECT_EQ(photo.by, count == 3 ? PhotoState::By::kSparseModel : PhotoState::By::kPicks);
+    EXPECT_FALSE(photo.ambiguous) << count;
+    EXPECT_LT(photo.rms_px, 0.01) << count;
+    EXPECT_THAT(
+        photo.cam_from_scan,
+        IsNearRigid(ThePickRoom().room().CamFromScan(ThePickRoom().clicked_photo()), 1e-4, 1e-4))
+        << count;
+    ExpectTruePoses(solution, 0.01);
+    EXPECT_THAT(solution.next, HasSubstr(std::to_string(6 - count) + " more pair"));
+  }
+}
+
+TEST(PickSolution, TwoPicksSayNothing) {
+  const PickSolution solution = Solve(TruePicks(2));
+  EXPECT_FALSE(solution.photos.at(ClickedName()).solved());
+  EXPECT_FALSE(solution.scan_from_sparse);
+  for (const PickState& pick : solution.picks) {
+    EXPECT_EQ(pick.status, Status::kWaiting);
+    EXPECT_TRUE(std::isnan(pick.residual_px));
+  }
+  EXPECT_THAT(Solve({}).next, HasSubstr("Click a point"));
+}
+
+TEST(PickSolution, AWrongPickIsNamedAndLeftOut) {
+  std::vector<SessionPick> picks = TruePicks(8);
+  *picks[3].x_in_img += Eigen::Vector2d(40, -25);
+  const PickSolution solution = Solve(picks);
+  for (size_t i = 0; i < picks.size(); ++i) {
+    EXPECT_EQ(solution.picks[i].status, i == 3 ? Status::kBad : Status::kUsed) << i;
+  }
+  EXPECT_NEAR(solution.picks[3].residual_px, std::hypot(40, 25), 0.5);
+  EXPECT_NEAR(solution.picks[3].error_px.x(), -40, 0.5);
+  EXPECT_NEAR(solution.picks[3].leave_one_out_px, std::hypot(40, 25), 0.5);
+  EXPECT_EQ(solution.photos.at(ClickedName()).num_used, 7);
+  EXPECT_THAT(solution.photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("Pick 4 is left out")));
+  EXPECT_THAT(solution.next, HasSubstr("pick 4"));
+  ExpectTruePoses(solution, 0.01);
+}
+
+TEST(PickSolution, OfPicksThatMissALittleTheWorstIsMarked) {
+  std::vector<SessionPick> picks = TruePicks(7);
+  *picks[5].x_in_img += Eigen::Vector2d(3, 2);
+  const PickSolution solution = Solve(picks);
+  for (size_t i = 0; i < picks.size(); ++i) {
+    EXPECT_EQ(solution.picks[i].status, Status::kUsed);
+    EXPECT_EQ(solution.picks[i].worst, i == 5) << i;
+  }
+}
+
+TEST(PickSolution, APickThatIsOffCountsForNothing) {
+  std::vector<SessionPick> picks = TruePicks(7);
+  *picks[2].x_in_img += Eigen::Vector2d(60, 0);
+  picks[2].weight = 0;
+  const PickSolution solution = Solve(picks);
+  EXPECT_EQ(solution.picks[2].status, Status::kOff);
+  EXPECT_NEAR(solution.picks[2].residual_px, 60, 0.1);  // but is measured
+  EXPECT_LT(solution.photos.at(ClickedName()).rms_px, 1e-3);
+  EXPECT_EQ(solution.photos.at(ClickedName()).num_complete, 7);
+}
+
+TEST(PickSolution, ExchangedPicksAreNamed) {
+  std::vector<SessionPick> picks = TruePicks(7);
+  std::swap(picks[1].x_in_img, picks[4].x_in_img);
+  EXPECT_THAT(Solve(picks).photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("Picks 2 and 5 look exchanged")));
+}
+
+TEST(PickSolution, PicksAreNumberedAsTheyStandInTheList) {
+  std::vector<SessionPick> picks = ThePickRoom().Picks(ThePickRoom().other_photo(), 1);
+  for (const SessionPick& pick : TruePicks(9)) picks.push_back(pick);
+  picks[2].weight = 0;
+  *picks[6].x_in_img += Eigen::Vector2d(30, -40);
+  const PickSolution solution = Solve(picks);
+  EXPECT_EQ(solution.picks[6].status, Status::kBad);
+  EXPECT_THAT(solution.photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("Pick 7 is left out")));
+  EXPECT_THAT(solution.next, HasSubstr("pick 7"));
+}
+
+TEST(PickSolution, AMirroredScanIsNamedWithTheOption) {
+  std::vector<SessionPick> picks = TruePicks(7);
+  const Rigid& scan_from_station = ThePickRoom().scene().scans()[0].scan_from_station;
+  const double factor = -1;
+  for (SessionPick& pick : picks) {
+    Eigen::Vector3d x = scan_from_station.Inverse() * *pick.x_in_scan;
+    x.x() *= factor;
+    pick.x_in_scan = scan_from_station * x;
+  }
+  const PickSolution solution = Solve(picks);
+  EXPECT_THAT(solution.photos.at(ClickedName()).warnings,
+              Contains(HasSubstr("--azimuth counterclockwise")));
+}
+
+TEST(PickSolution, PicksOnOneLineAreRefusedInASentence) {
+  std::vector<SessionPick> picks = TruePicks(1);
+  const Eigen::Vector3d start = *picks[0].x_in_scan;
+  for (int i = 1; i < 6; ++i) {
+    SessionPick pick = picks[0];
+    pick.x_in_scan = start + 0.1 * i * Eigen::Vector3d(0.3, 1, 0.2);
+    pick.x_in_img = *picks[0].x_in_img + Eigen::Vector2d(20.0 * i, 40.0 * i);
+    picks.push_back(pick);
+  }
+  const PickSolution solution = Solve(picks);
+  const PhotoState& photo = solution.photos.at(ClickedName());
+  EXPECT_FALSE(photo.solved());
+  EXPECT_THAT(photo.warnings, Contains(HasSubstr("lie on one straight line")));
+}
+
+TEST(PickSolution, TheMissingPartnerOfAHalfPairIsPredicted) {
+  const std::vector<SessionPick> all = ThePickRoom().SmoothPicks(ThePickRoom().clicked_photo(), 8);
+  ASSERT_EQ(all.size(), 8u);
+  std::vector<SessionPick> picks = all;
+  picks[6].x_in_img.reset();
+  picks[7].x_in_scan.reset();
+  picks[7].spot.reset();
+  const PickSolution solution = Solve(picks);
+  EXPECT_EQ(solution.picks[6].status, Status::kHalf);
+  ASSERT_TRUE(solution.picks[6].predicted_img);
+  EXPECT_THAT(*solution.picks[6].predicted_img, IsNearMatrix(*all[6].x_in_img, 0.01));
+  ASSERT_TRUE(solution.picks[7].predicted_spot);
+  EXPECT_LT((solution.picks[7].predicted_point - *all[7].x_in_scan).norm(), 1e-3);
+  EXPECT_LT((solution.picks[7].predicted_spot->place - all[7].spot->place).norm(), 0.1);
+  // Also in a photo without a pick of its own.
+  const int other = ThePickRoom().other_photo();
+  SessionPick half = ThePickRoom().SmoothPicks(other, 1)[0];
+  const Eigen::Vector2d truth = *half.x_in_img;
+  half.x_in_img.reset();
+  picks.push_back(half);
+  const PickSolution with_other = Solve(picks);
+  ASSERT_TRUE(with_other.picks[8].predicted_img);
+  EXPECT_LT((*with_other.picks[8].predicted_img - truth).norm(), 1);
+}
+
+// The same picks through roomtex-align's code.
+Alignment Align(const std::vector<SessionPick>& session_picks) {
+  const PickScene& scene = ThePickRoom().scene();
+  std::vector<Pick> picks;
+  for (const SessionPick& pick : session_picks) {
+    picks.push_back({pick.image_name, *pick.x_in_img, *pick.x_in_scan,
+                     2 + static_cast<long>(picks.size()), pick.weight});
+  }
+  SparseModel model = scene.model();
+  UpdateReprojectionErrors(&model);
+  const FreeSpace free_space(scene.scans(), 100000);
+  AlignmentOptions options;
+  options.plane_constrained = false;
+  Progress progress(true);
+  return AlignToScan({model, scene.scans(), picks, "picks.csv", "clockwise"}, 0.3, free_space,
+                     options, &progress);
+}
+
+void ExpectSameNumbers(const PickSolution& solution, const Alignment& alignment) {
+  EXPECT_NEAR(solution.rms_px, alignment.pick_rms_px, 1e-9);
+  EXPECT_NEAR(solution.scan_from_sparse->scale, alignment.scan_from_sparse_from_picks.scale, 1e-6);
+  EXPECT_EQ(solution.scale.num_features, alignment.scale.num_features);
+  for (size_t i = 0; i < solution.picks.size(); ++i) {
+    EXPECT_NEAR(solution.picks[i].residual_px, alignment.picks[i].residual_px, 1e-9) << i;
+    EXPECT_EQ(solution.picks[i].status == Status::kUsed, alignment.picks[i].used) << i;
+  }
+}
+
+std::vector<SessionPick> WithNoise(std::vector<SessionPick> picks) {
+  for (size_t i = 0; i < picks.size(); ++i) {
+    *picks[i].x_in_img += 1.5 * Eigen::Vector2d(std::sin(7.0 * i), std::cos(3.0 * i));
+  }
+  return picks;
+}
+
+TEST(PickSolution, NumbersAreThoseOfTheAlignment) {
+  const std::vector<SessionPick> picks = WithNoise(TruePicks(8));
+  const PickSolution solution = Solve(picks);
+  const Alignment alignment = Align(picks);
+  ExpectSameNumbers(solution, alignment);
+  for (size_t i = 0; i < picks.size(); ++i) {
+    EXPECT_NEAR(solution.picks[i].leave_one_out_px, alignment.picks[i].leave_one_out_px, 1e-9);
+  }
+  EXPECT_NEAR(solution.photos.at(ClickedName()).position_sigma, alignment.position_sigma, 1e-12);
+}
+
+TEST(PickSolution, NumbersOfPicksInTwoPhotosAreThoseOfTheAlignment) {
+  std::vector<SessionPick> picks = WithNoise(TruePicks(7));
+  for (const SessionPick& pick : WithNoise(ThePickRoom().Picks(ThePickRoom().other_photo(), 3))) {
+    picks.push_back(pick);
+  }
+  *picks.back().x_in_img += Eigen::Vector2d(30, -20);  // a bad one
+  const PickSolution solution = Solve(picks);
+  ExpectSameNumbers(solution, Align(picks));
+  EXPECT_EQ(solution.picks.back().status, Status::kBad);
+  EXPECT_EQ(solution.num_clicked_photos, 2);
+}
+
+TEST(PickSolution, BeforeTheRayCasterStandsThePoseIsThereAlready) {
+  Progress progress(true);
+  const PickScene scene(ThePickRoom().input(), &progress);  // not prepared
+  const PickSolution solution = PickSolver(scene).Solve(TruePicks(6));
+  EXPECT_FALSE(solution.with_rays);
+  EXPECT_TRUE(solution.photos.at(ClickedName()).solved());
+  EXPECT_LT(solution.photos.at(ClickedName()).rms_px, 1e-3);
+  EXPECT_FALSE(solution.scan_from_sparse);
+}
+
+TEST(PickScene, ThePhotosAreRankedAndWhatIsMissingIsSaid) {
+  const PickScene& scene = ThePickRoom().scene();
+  ASSERT_EQ(scene.photos().size(), 8u);
+  const auto ranked = scene.Ranked({});
+  EXPECT_FALSE(ranked[0]->missing);
+  EXPECT_FALSE(ranked[1]->missing);
+  EXPECT_TRUE(ranked[2]->missing);
+  EXPECT_THAT(ranked[2]->problem, HasSubstr("There is no photo"));
+  EXPECT_GT(ranked[0]->num_points, 100);
+}
+
+}  // namespace
+}  // namespace roomtex

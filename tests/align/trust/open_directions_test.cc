@@ -1,0 +1,104 @@
+#include "align/trust/open_directions.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/align/simulated_alignment.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+// The scan of which only samples on these planes of the room are left (axis, coordinate in `room`),
+// with picks on them in the photo that sees the most of them.
+SimulatedCase OnlyWalls(const std::vector<std::pair<int, double>>& walls) {
+  SimulatedCase one = MakeCase(0);
+  const Rigid room_from_scan = one.room->ScanFromRoom().Inverse();
+  const auto on_wall = [&](const Eigen::Vector3d& x_in_scan) {
+    const Eigen::Vector3d x = room_from_scan * x_in_scan;
+    return std::any_of(walls.begin(), walls.end(), [&](const std::pair<int, double>& wall) {
+      return std::abs(x[wall.first] - wall.second) < 0.01;
+    });
+  };
+  for (Eigen::Vector3d& x : one.scans[0].points) {
+    if (!on_wall(x)) x = Scan::MissingPoint();
+  }
+  one.picks.clear();
+  for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+    std::vector<Pick> picks;
+    for (const Pick& pick : PicksOfPhoto(*one.room, photo, 40)) {
+      if (on_wall(pick.x_in_scan) && picks.size() < 12) picks.push_back(pick);
+    }
+    if (picks.size() > one.picks.size()) one.picks = picks;
+  }
+  EXPECT_GE(one.picks.size(), 7u);
+  return one;
+}
+
+double LargestCosine(const std::vector<Eigen::Vector3d>& directions, const Eigen::Vector3d& d) {
+  double largest = 0;
+  for (const Eigen::Vector3d& direction : directions) {
+    largest = std::max(largest, std::abs(direction.dot(d)));
+  }
+  return largest;
+}
+
+TEST(OpenDirections, AFurnishedRoomLeavesNothingOpen) {
+  const Alignment alignment = AlignCase(MakeCase(0));
+  EXPECT_TRUE(alignment.open.None());
+  EXPECT_EQ(alignment.open.num_facings, 3);
+  EXPECT_EQ(alignment.open.Sentence(), "");
+}
+
+TEST(OpenDirections, OneWallLeavesSlidingTurningAndScaleToThePicks) {
+  const SimulatedCase one = OnlyWalls({{1, 4.0}});
+  const Alignment alignment = AlignCase(one);
+  ASSERT_TRUE(alignment.refined);
+  EXPECT_EQ(alignment.open.num_facings, 1);
+  const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();  // columns
+  // Along the wall, and about its normal. The distance to it follows the scale.
+  EXPECT_EQ(alignment.open.slides.size(), 3u);
+  ASSERT_EQ(alignment.open.turns.size(), 1u);
+  EXPECT_GT(LargestCosine(alignment.open.turns, axes.col(1)), 0.999);
+  EXPECT_TRUE(alignment.open.scale);
+  EXPECT_THAT(alignment.warnings, Contains(HasSubstr("one wall, or walls opposite each other")));
+  // The truth lies within what is said of it.
+  EXPECT_GT(alignment.open.slide_sigma, 0.001);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position,
+            4 * alignment.open.slide_sigma);
+}
+
+TEST(OpenDirections, TwoParallelWallsFixTheScaleButNotSliding) {
+  const SimulatedCase one = OnlyWalls({{1, 0.0}, {1, 4.0}});
+  const Alignment alignment = AlignCase(one);
+  ASSERT_TRUE(alignment.refined);
+  EXPECT_EQ(alignment.open.num_facings, 1);
+  EXPECT_FALSE(alignment.open.scale);
+  const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();
+  ASSERT_EQ(alignment.open.slides.size(), 2u);
+  EXPECT_LT(LargestCosine(alignment.open.slides, axes.col(1)), 0.02);
+  ASSERT_EQ(alignment.open.turns.size(), 1u);
+  EXPECT_GT(LargestCosine(alignment.open.turns, axes.col(1)), 0.999);
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position,
+            4 * alignment.open.slide_sigma);
+}
+
+TEST(OpenDirections, ACornerOfTwoWallsLeavesOneDirectionOpen) {
+  const SimulatedCase one = OnlyWalls({{1, 4.0}, {0, 5.0}});
+  const Alignment alignment = AlignCase(one);
+  ASSERT_TRUE(alignment.refined);
+  EXPECT_EQ(alignment.open.num_facings, 2);
+  const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();
+  EXPECT_GT(LargestCosine(alignment.open.slides, axes.col(2)), 0.8);
+  EXPECT_THAT(alignment.warnings, Contains(HasSubstr("faces two ways only")));
+}
+
+TEST(OpenDirections, AFitWithoutSolutionSaysNothing) {
+  EXPECT_TRUE(FindOpenDirections(SimilarityFit(), {0, 0, 0}).None());
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,209 @@
+// The photos of the simulated room against its truth.
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "capture/simulation/simulated_room.h"
+#include "core/camera_model.h"
+#include "core/frames.h"
+#include "core/photo.h"
+#include "core/ray_caster.h"
+#include "core/scan_mesh.h"
+#include "tests/capture/simulation/small_room.h"
+
+namespace roomtex {
+namespace {
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return std::nan("");
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+struct ColorErrors {
+  size_t count = 0;
+  double median = 0;  // absolute, all channels, sRGB 0..1, the exposure taken out
+  double bias = 0;    // median of the signed differences
+};
+
+// Scan points that the photo sees (by a mesh of the scan) against the pixel that they fall on.
+ColorErrors CompareWithTruth(const SimulatedRoom& room, int photo, const cv::Mat& image,
+                             int station) {
+  const Scan scan = room.MakeScan(station);
+  const std::vector<Eigen::Vector3f> truth = room.TrueColors(station);
+  const RayCaster caster(scan.points, BuildScanMesh(scan, {}));
+  const CameraProjection camera(room.camera());
+  const Rigid cam_from_scan = room.CamFromScan(photo);
+  const Eigen::Vector3d centre = cam_from_scan.TargetOriginInSource();
+  const double gain = std::exp2(room.ExposureEv(photo));
+  std::vector<double> absolute, differences;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    const auto at = camera.ImgFromCam(cam_from_scan * scan.points[i]);
+    if (!at || !camera.InImage(*at)) continue;
+    if (caster.IsOccluded(centre, scan.points[i], 0.02)) continue;
+    const int x = std::min(static_cast<int>(at->x()), image.cols - 1);
+    const int y = std::min(static_cast<int>(at->y()), image.rows - 1);
+    for (int k = 0; k < 3; ++k) {
+      const double want = SrgbFromLinear(std::min(1.0, gain * truth[i][k]));
+      differences.push_back(image.at<cv::Vec3b>(y, x)[2 - k] / 255.0 - want);
+      absolute.push_back(std::abs(differences.back()));
+    }
+  }
+  return {differences.size(), Median(absolute), Median(differences)};
+}
+
+int CountSiftFeatures(const SimulatedRoom& room, int photo) {
+  cv::Mat grey;
+  cv::cvtColor(room.RenderPhoto(photo), grey, cv::COLOR_BGR2GRAY);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::SIFT::create()->detect(grey, keypoints);
+  return static_cast<int>(keypoints.size());
+}
+
+TEST(SimulatedPhotos, ShowTheTrueColorsOfTheScanPoints) {
+  for (const bool shading : {false, true}) {
+    SimulatedRoomOptions options = SmallRoom();
+    options.photo_width = 960;
+    options.photo_height = 640;
+    options.range_noise = 0;
+    options.num_stations = 2;
+    options.shading = shading;
+    const SimulatedRoom room(options);
+    for (const int photo : {0, 7}) {
+      const cv::Mat image = room.RenderPhoto(photo);
+      for (const int station : {0, 1}) {
+        const ColorErrors errors = CompareWithTruth(room, photo, image, station);
+        EXPECT_GT(errors.count, 10000u);
+        EXPECT_LT(errors.median, 0.035) << "photo " << photo << " station " << station;
+        EXPECT_NEAR(errors.bias, 0, 0.01) << "photo " << photo << " station " << station;
+      }
+    }
+  }
+}
+
+TEST(SimulatedPhotos, AgreeWithTheTruthForEveryCameraModel) {
+  for (int model = 0; model < kNumCameraModels; ++model) {
+    SimulatedRoomOptions options = SmallRoom();
+    options.camera_model = CameraModelName(static_cast<CameraModel>(model));
+    options.num_photos = 2;
+    options.furnished = false;
+    options.scan_columns = 360;
+    options.scan_rows = 180;
+    options.range_noise = 0;
+    const SimulatedRoom room(options);
+    EXPECT_TRUE(room.camera().Problems().empty()) << options.camera_model;
+    // Every pixel up to the corners is reached by a ray, and the ray projects back to it.
+    const CameraProjection camera(room.camera());
+    for (const double x : {0.0, 240.0, 480.0}) {
+      for (const double y : {0.0, 160.0, 320.0}) {
+        const auto ray = camera.CamFromImg({x, y});
+        ASSERT_TRUE(ray.has_value()) << options.camera_model << " " << x << " " << y;
+        const auto back = camera.ImgFromCam(ray->homogeneous());
+        ASSERT_TRUE(back.has_value()) << options.camera_model;
+        EXPECT_LT((*back - Eigen::Vector2d(x, y)).norm(), 1e-6) << options.camera_model;
+      }
+    }
+    const ColorErrors errors = CompareWithTruth(room, 1, room.RenderPhoto(1), 0);
+    EXPECT_GT(errors.count, 5000u) << options.camera_model;
+    EXPECT_LT(errors.median, 0.05) << options.camera_model;
+  }
+}
+
+TEST(SimulatedPhotos, MoveWithTheLensDistortion) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 1;
+  options.furnished = false;
+  options.photo_noise = 0;
+  const cv::Mat distorted = SimulatedRoom(options).RenderPhoto(0);
+  options.distortion = false;
+  const SimulatedRoom pinhole(options);
+  for (size_t i = 4; i < 8; ++i) EXPECT_EQ(pinhole.camera().params[i], 0);
+  EXPECT_GT(cv::norm(distorted, pinhole.RenderPhoto(0), cv::NORM_L1) / distorted.total(), 5);
+}
+
+TEST(SimulatedPhotos, CarryTheNoiseOfTheOptions) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 1;
+  options.furnished = false;
+  options.photo_noise = 0;
+  const cv::Mat clean = SimulatedRoom(options).RenderPhoto(0);
+  options.photo_noise = 3;
+  const cv::Mat noisy = SimulatedRoom(options).RenderPhoto(0);
+  double sum = 0, squares = 0, count = 0;
+  for (int y = 0; y < clean.rows; ++y) {
+    for (int x = 0; x < clean.cols; ++x) {
+      for (int k = 0; k < 3; ++k) {
+        const int grey = clean.at<cv::Vec3b>(y, x)[k];
+        if (grey < 20 || grey > 235) continue;
+        const double difference = noisy.at<cv::Vec3b>(y, x)[k] - grey;
+        sum += difference;
+        squares += difference * difference;
+        ++count;
+      }
+    }
+  }
+  EXPECT_NEAR(sum / count, 0, 0.05);
+  // Rounding to bytes, twice, adds about 1/6 to the variance.
+  EXPECT_NEAR(std::sqrt(squares / count), 3.0, 0.1);
+}
+
+TEST(SimulatedPhotos, BlurTakesDetailAway) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 1;
+  options.furnished = false;
+  options.photo_noise = 0;
+  const auto detail = [&] {
+    cv::Mat laplacian;
+    cv::Laplacian(SimulatedRoom(options).RenderPhoto(0), laplacian, CV_32F);
+    return cv::norm(laplacian, cv::NORM_L1);
+  };
+  const double sharp = detail();
+  options.blur_px = 2;
+  EXPECT_LT(detail(), 0.35 * sharp);
+}
+
+TEST(SimulatedPhotos, HoldFeaturesEverywhereButInABareRoom) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.photo_width = 960;
+  options.photo_height = 640;
+  options.exposure_range_ev = 0;
+  const SimulatedRoom furnished(options);
+  for (int photo = 0; photo < furnished.NumPhotos(); photo += 4) {
+    EXPECT_GT(CountSiftFeatures(furnished, photo), 1500) << "photo " << photo;
+  }
+  options.furnished = false;
+  options.bare_walls = true;
+  const SimulatedRoom bare(options);
+  for (int photo = 0; photo < bare.NumPhotos(); photo += 4) {
+    EXPECT_LT(CountSiftFeatures(bare, photo), 60) << "photo " << photo;
+  }
+}
+
+TEST(SimulatedPhotos, AreSteppedInThirdsOfAnEvWithinTheRange) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 40;
+  const SimulatedRoom room(options);
+  double least = 9, most = -9;
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const double ev = room.ExposureEv(photo);
+    EXPECT_LE(std::abs(ev), 1.0 + 1e-12);
+    EXPECT_NEAR(3 * ev, std::round(3 * ev), 1e-9);
+    EXPECT_NEAR(room.ExposureTime(photo) / room.ExposureTime(0), std::exp2(ev - room.ExposureEv(0)),
+                1e-9);
+    least = std::min(least, ev);
+    most = std::max(most, ev);
+  }
+  EXPECT_GE(most - least, 1.0);
+  options.exposure_range_ev = 0;
+  options.num_photos = 3;
+  const SimulatedRoom even(options);
+  for (int photo = 0; photo < 3; ++photo) EXPECT_EQ(even.ExposureEv(photo), 0);
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,135 @@
+#include "texture/sampling/photo_list.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/error.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+class PhotoListTest : public ::testing::Test {
+ protected:
+  PhotoListTest() {
+    Camera camera;
+    camera.camera_id = 1;
+    camera.model = CameraModel::kOpenCv;
+    camera.width = 60;
+    camera.height = 40;
+    camera.params = {50, 51, 30, 20, 0.1, 0, 0, 0};
+    model_.cameras[1] = camera;
+    for (uint32_t id = 1; id <= 3; ++id) {
+      SparseImage image;
+      image.image_id = id;
+      image.camera_id = 1;
+      image.name = std::string(1, "cba"[id - 1]) + ".png";
+      image.cam_from_model.translation.x() = id;
+      model_.images[id] = image;
+      Photo(image.name, 60, 40);
+    }
+    sources_.image_path = folder_.path();
+  }
+  void Photo(const std::string& name, int width, int height) {
+    cv::imwrite(folder_ / name, cv::Mat(height, width, CV_8UC3, cv::Scalar(1, 2, 3)));
+  }
+  std::vector<std::string> Names() {
+    std::vector<std::string> names;
+    for (const PhotoView& photo : ListPhotos(model_, sources_).photos) names.push_back(photo.name);
+    return names;
+  }
+  void Associate(const std::string& text) {
+    sources_.associations_path = folder_ / "associations.csv";
+    WriteBytes(sources_.associations_path, text);
+  }
+
+  TempFolder folder_;
+  SparseModel model_;
+  PhotoSources sources_;
+};
+
+TEST_F(PhotoListTest, OrdersPhotosByName) {
+  EXPECT_EQ(Names(), (std::vector<std::string>{"a.png", "b.png", "c.png"}));
+}
+
+TEST_F(PhotoListTest, ScalesTheCameraForResizedPhotos) {
+  Photo("b.png", 120, 80);
+  const PhotoList list = ListPhotos(model_, sources_);
+  const Camera& camera = list.photos[1].camera;
+  EXPECT_EQ(camera.width, 120);
+  EXPECT_EQ(camera.params, (std::vector<double>{100, 102, 60, 40, 0.1, 0, 0, 0}));
+  EXPECT_EQ(list.warnings.size(), 1u);
+}
+
+TEST_F(PhotoListTest, RefusesPhotosOfAnotherShapeAndMissingOnes) {
+  Photo("b.png", 40, 60);
+  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "40 x 60 pixels, its camera 60 x 40");
+  std::filesystem::remove(folder_ / "b.png");
+  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "the model names this photo");
+  WriteBytes(folder_ / "b.png", "no picture");
+  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "b.png");
+}
+
+TEST_F(PhotoListTest, TakesThePlainTwin) {
+  Photo("plain_a.png", 60, 40);
+  Associate(
+      "patterned_image,plain_image,offset_px,brightness_ratio\r\na.png,plain_a.png,0.2,1.6\r\n"
+      "b.png,c.png,0,1\r\n");
+  const PhotoList list = ListPhotos(model_, sources_);
+  ASSERT_EQ(list.photos.size(), 2u);  // c.png once, although it is registered itself
+  EXPECT_EQ(list.photos[0].name, "c.png");
+  EXPECT_EQ(list.photos[1].name, "plain_a.png");
+  EXPECT_EQ(list.photos[1].cam_from_scan.translation.x(), 3);  // the pose of a.png
+}
+
+TEST_F(PhotoListTest, LeavesPhotosWithoutATwinOutAndSaysSo) {
+  Associate("# by hand\npatterned_image,plain_image\na.png,b.png\n");
+  const PhotoList list = ListPhotos(model_, sources_);
+  ASSERT_EQ(list.photos.size(), 1u);
+  EXPECT_EQ(list.photos[0].name, "b.png");
+  ASSERT_EQ(list.warnings.size(), 1u);
+  EXPECT_NE(list.warnings[0].find("1 registered photos have no plain twin"), std::string::npos);
+}
+
+TEST_F(PhotoListTest, LeavesPhotosOutWhoseTwinIsNotInTheFolderAndNamesThem) {
+  Photo("plain_a.png", 60, 40);
+  Associate("patterned_image,plain_image\na.png,plain_a.png\nb.png,plain_b.png\nc.png,\n");
+  const PhotoList list = ListPhotos(model_, sources_);
+  ASSERT_EQ(list.photos.size(), 1u);  // never the patterned b.png or c.png
+  EXPECT_EQ(list.photos[0].name, "plain_a.png");
+  ASSERT_EQ(list.warnings.size(), 2u);
+  EXPECT_NE(list.warnings[0].find("give no colour: c.png"), std::string::npos);
+  EXPECT_NE(list.warnings[1].find("plain_b.png (twin of b.png)"), std::string::npos);
+  std::filesystem::remove(folder_ / "plain_a.png");
+  EXPECT_INPUT_ERROR(Names(), "holds none of the plain photos");
+}
+
+TEST_F(PhotoListTest, TakesAPlainPhotoOnceForTwoPatternedOnes) {
+  Photo("plain.png", 60, 40);
+  Associate("patterned_image,plain_image\na.png,plain.png\nb.png,plain.png\n");
+  EXPECT_EQ(Names(), (std::vector<std::string>{"plain.png"}));
+}
+
+TEST_F(PhotoListTest, RefusesAPhotoThatIsBothPatternedAndPlain) {
+  Associate("patterned_image,plain_image\na.png,b.png\nb.png,c.png\n");
+  EXPECT_INPUT_ERROR(Names(), "names b.png as a patterned photo and as a plain one");
+}
+
+TEST_F(PhotoListTest, RefusesBrokenTables) {
+  Associate("");
+  EXPECT_INPUT_ERROR(Names(), "is empty");
+  Associate("one,two\n");
+  EXPECT_INPUT_ERROR(Names(), "line 1");
+  Associate("patterned_image,plain_image\na.png\n");
+  EXPECT_INPUT_ERROR(Names(), "line 2");
+  Associate("patterned_image,plain_image\nx.png,y.png\n");
+  EXPECT_INPUT_ERROR(Names(), "names no photo of the model");
+}
+
+TEST_F(PhotoListTest, NamesPhotosThatTheDatabaseLacks) {
+  sources_.database_path = folder_ / "none.db";
+  EXPECT_INPUT_ERROR(Names(), "none.db");
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,179 @@
+#include "texture/view/view_model.h"
+
+#include <random>
+
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "tests/support/temp_folder.h"
+#include "tests/texture/view/view_scene.h"
+
+namespace roomtex {
+namespace {
+
+// Largest distance from a vertex of the model's triangles to the nearest sample of the scan.
+double FarthestFromScan(const ViewModel& model, const Scan& scan) {
+  double farthest = 0;
+  for (size_t t = 0; t < model.triangles.size(); t += 37) {
+    double nearest = 1e9;
+    const Eigen::Vector3d p = model.InScan(model.triangles[t][0]);
+    for (const Eigen::Vector3d& sample : scan.points)
+      nearest = std::min(nearest, (sample - p).norm());
+    farthest = std::max(farthest, nearest);
+  }
+  return farthest;
+}
+
+TEST(ViewModel, GlbComesBackInTheScanFrame) {
+  for (const Eigen::Vector3d& up : {Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
+    const TempFolder folder;
+    Scan scan = TwoWallsScan(60, 40);
+    scan.up = up;
+    WriteViewFolder(scan, folder.path());
+    const ViewModel model = ReadViewModel(folder.path());
+    EXPECT_LT(FarthestFromScan(model, scan), 1e-5);
+    EXPECT_LT((model.up - up).norm(), 1e-9);
+    EXPECT_EQ(model.triangles.size(), ColorForView(scan).triangles.size());
+    ASSERT_EQ(model.images.size(), 1u);
+    EXPECT_NEAR(model.images[0].width, 60, 1);  // the texture may go on beyond the last sample
+    EXPECT_NEAR(model.images[0].height, 40, 1);
+    for (const int page : model.page_of_triangle) ASSERT_EQ(page, 0);
+  }
+}
+
+TEST(ViewModel, KeepsMillimetresFarFromTheOrigin) {
+  const TempFolder folder;
+  Scan scan = TwoWallsScan(40, 30);
+  for (Eigen::Vector3d& p : scan.points) p += Eigen::Vector3d(512345.678, 5412345.678, 321.5);
+  WriteViewFolder(scan, folder.path());
+  EXPECT_LT(FarthestFromScan(ReadViewModel(folder / "model.glb"), scan), 1e-4);
+  EXPECT_LT(FarthestFromScan(ReadViewModel(folder / "model.ply"), scan), 1e-4);
+}
+
+TEST(ViewModel, PlyComesBackWithItsColours) {
+  const TempFolder folder;
+  const Scan scan = TwoWallsScan(60, 40);
+  WriteViewFolder(scan, folder.path());
+  const ViewModel model = ReadViewModel(folder / "model.ply");
+  ASSERT_EQ(model.points.size(), 2400u);
+  EXPECT_LT((model.InScan(61) - scan.points[61]).norm(), 1e-5);
+  EXPECT_EQ(model.colors[61][0], 1);
+  EXPECT_EQ(model.colors[61][1], 1);
+  EXPECT_EQ(model.colors[61][2], 77);
+  EXPECT_EQ(model.page_of_triangle[0], -1);
+}
+
+TEST(ViewModel, NormalsLookAtTheScannerInSpiteOfNoise) {
+  TwoWalls scene;
+  scene.board_half = 0;
+  Scan scan = scene.MakeScan(300, 300);
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 0.004);
+  for (Eigen::Vector3d& p : scan.points) p *= 1 + noise(random) / p.norm();
+  const TempFolder folder;
+  WriteViewFolder(scan, folder.path());
+  const ViewModel model = ReadViewModel(folder.path());
+  // The wall's front looks along +z: from nearly behind it nothing of it is to be seen.
+  const Eigen::Vector3d from_behind = Eigen::Vector3d(0.96, 0, 0.28).normalized();
+  int num_single = 0, num_smooth = 0;
+  for (size_t t = 0; t < model.triangles.size(); ++t) {
+    const Triangle& corners = model.triangles[t];
+    const Eigen::Vector3f& a = model.points[corners[0]];
+    const Eigen::Vector3f normal =
+        (model.points[corners[1]] - a).cross(model.points[corners[2]] - a);
+    num_single += normal.cast<double>().dot(from_behind) < 0;
+    num_smooth += ShowsFront(model, static_cast<int>(t), from_behind);
+  }
+  EXPECT_EQ(num_smooth, 0);
+  EXPECT_GT(num_single, 100);  // or the test says nothing
+  EXPECT_TRUE(ShowsFront(model, 1000, -Eigen::Vector3d::UnitZ()));
+}
+
+TEST(ViewModel, TellsTheSizeOfImages) {
+  const cv::Mat image(37, 53, CV_8UC3, cv::Scalar(1, 2, 3));
+  for (const char* extension : {".png", ".jpg"}) {
+    std::vector<unsigned char> bytes;
+    cv::imencode(extension, image, bytes);
+    const auto [width, height] = EncodedImageSize({bytes.begin(), bytes.end()});
+    EXPECT_EQ(width, 53);
+    EXPECT_EQ(height, 37);
+    for (size_t size = 0; size < 20; ++size) {
+      EncodedImageSize({bytes.begin(), bytes.begin() + static_cast<long>(size)});
+    }
+  }
+  EXPECT_EQ(EncodedImageSize("GIF89a, which is neither")[0], 0);
+}
+
+TEST(ViewModel, RefusesWhatIsNotThere) {
+  const TempFolder folder;
+  EXPECT_INPUT_ERROR(ReadViewModel(folder / "nowhere"), "does not exist");
+  EXPECT_INPUT_ERROR(ReadViewModel(folder.path()), "neither model.glb nor model.ply");
+  WriteBytes(folder / "notes.txt", "hello");
+  EXPECT_INPUT_ERROR(ReadViewModel(folder / "notes.txt"), "neither a folder nor");
+  WriteBytes(folder / "model.glb", "hello");
+  EXPECT_INPUT_ERROR(ReadViewModel(folder.path()), "is no binary glTF");
+}
+
+class DamagedGlb : public testing::Test {
+ protected:
+  void SetUp() override {
+    WriteViewFolder(TwoWallsScan(30, 20), folder_.path());
+    bytes_ = ReadBytes(folder_ / "model.glb");
+  }
+  // The file with a piece of its JSON replaced by one of the same length.
+  std::string With(const std::string& from, std::string to) const {
+    std::string bytes = bytes_;
+    const size_t at = bytes.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    to.resize(from.size(), ' ');
+    return bytes.replace(at, from.size(), to);
+  }
+  ViewModel Read(const std::string& bytes) const {
+    WriteBytes(folder_ / "damaged.glb", bytes);
+    return ReadViewModel(folder_ / "damaged.glb");
+  }
+  const TempFolder folder_;
+  std::string bytes_;
+};
+
+TEST_F(DamagedGlb, IsRefusedWhereverItIsCutOff) {
+  for (size_t size = 0; size < bytes_.size(); size += 1 + size / 7) {
+    EXPECT_THROW(Read(bytes_.substr(0, size)), InputError) << size;
+  }
+}
+
+TEST_F(DamagedGlb, NeverCrashesOnFlippedBytes) {
+  std::mt19937 random(7);
+  const size_t json_end =
+      20 + static_cast<uint8_t>(bytes_[12]) + 256 * static_cast<uint8_t>(bytes_[13]);
+  int num_refused = 0;
+  for (int i = 0; i < 600; ++i) {
+    std::string bytes = bytes_;
+    bytes[random() % json_end] = static_cast<char>(random());
+    try {
+      const ViewModel model = Read(bytes);
+      for (const Triangle& t : model.triangles) {
+        for (const int corner : t) ASSERT_LT(static_cast<size_t>(corner), model.points.size());
+      }
+    } catch (const InputError&) {
+      ++num_refused;
+    }
+  }
+  EXPECT_GT(num_refused, 100);
+}
+
+TEST_F(DamagedGlb, SaysWhatIsWrong) {
+  EXPECT_INPUT_ERROR(Read(With("\"bufferViews\":[{", "\"bufferViewX\":[{")), "\"bufferViews\"");
+  EXPECT_INPUT_ERROR(Read(With("\"componentType\":5126", "\"componentType\":5120")), "of a type");
+  EXPECT_INPUT_ERROR(Read(With("KHR_materials_unlit\"]", "KHR_materials_unlit\" ")), "JSON");
+}
+
+TEST_F(DamagedGlb, RefusesAFaceThatNamesNoVertex) {
+  std::string bytes = bytes_;
+  for (size_t i = bytes.size() - 40; i < bytes.size(); ++i) bytes[i] = '\x7f';  // indices come last
+  EXPECT_INPUT_ERROR(Read(bytes), "names vertex");
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,126 @@
+#include "texture/output/write_obj.h"
+
+#include <charconv>
+
+#include "core/output_file.h"
+#include "texture/output/textured_parts.h"
+#include "texture/output/write_texture.h"
+
+namespace roomtex {
+namespace {
+
+// Gathers text and hands it on in large pieces.
+class TextSink {
+ public:
+  explicit TextSink(std::ostream* stream) : stream_(stream) {}
+  ~TextSink() { Flush(); }
+
+  TextSink& operator<<(const std::string& text) {
+    text_ += text;
+    if (text_.size() > (1 << 20)) Flush();
+    return *this;
+  }
+  TextSink& Number(double value, int digits) {
+    char buffer[64];
+    const auto end =
+        std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, digits);
+    text_.append(buffer, end.ptr);
+    return *this;
+  }
+  TextSink& Number(size_t value) {
+    text_ += std::to_string(value);
+    return *this;
+  }
+
+ private:
+  void Flush() {
+    stream_->write(text_.data(), static_cast<std::streamsize>(text_.size()));
+    text_.clear();
+  }
+  std::ostream* stream_;
+  std::string text_;
+};
+
+void WriteVertices(const Scan& scan, const ColoredScan& colored, bool with_colors, TextSink* sink) {
+  constexpr int kMicrometres = 6;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    *sink << "v";
+    for (int k = 0; k < 3; ++k) (*sink << " ").Number(scan.points[i][k], kMicrometres);
+    if (with_colors) {
+      for (const uint8_t value : colored.samples.rgb[i]) (*sink << " ").Number(value / 255.0, 4);
+    }
+    *sink << "\n";
+  }
+}
+
+// Number of every sample's vertex, from 1 as OBJ counts; advances *next.
+std::vector<size_t> NumberVertices(const Scan& scan, size_t* next) {
+  std::vector<size_t> numbers(scan.points.size(), 0);
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (!scan.IsMissing(static_cast<int>(i))) numbers[i] = (*next)++;
+  }
+  return numbers;
+}
+
+void WriteImage(const cv::Mat& image, bool jpeg, const std::string& path) {
+  jpeg ? WriteJpeg(image, path) : WritePng(image, path);
+}
+
+}  // namespace
+
+void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+                     const GlbOptions& images,
+                     const std::function<std::string(const std::string&)>& file_path) {
+  OutputFile obj(file_path("model.obj")), mtl(file_path("model.mtl"));
+  mtl.stream() << "# roomtex-texture: photos on the scan; they hold the light already\n";
+  int num_images = 0;
+  {
+    TextSink sink(&obj.stream());
+    const Eigen::Vector3d& up = scans.at(0).up;
+    sink << "# roomtex-texture: scan frame, metres; the up axis stays the scan's\n# roomtex up";
+    for (int k = 0; k < 3; ++k) (sink << " ").Number(up[k], 6);
+    sink << "\nmtllib model.mtl\n";
+    size_t next_vertex = 1, next_uv = 1;
+    for (size_t s = 0; s < scans.size(); ++s) {
+      const std::vector<TexturedPart> parts =
+          MakeTexturedParts(scans[s], colored[s], images.max_texture_size);
+      const bool textured = scans[s].organised || !colored[s].atlas.empty();
+      (sink << "o scan_").Number(s) << "\n";
+      WriteVertices(scans[s], colored[s], !textured, &sink);
+      const std::vector<size_t> number = NumberVertices(scans[s], &next_vertex);
+      for (const TexturedPart& part : parts) {
+        const std::string name = "model_" + std::to_string(num_images++);
+        const std::string image = name + (images.jpeg ? ".jpg" : ".png");
+        WriteImage(PartImage(scans[s], colored[s], part), images.jpeg, file_path(image));
+        mtl.stream() << "newmtl " << name << "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd "
+                     << image << "\n";
+        sink << "usemtl " << name << "\n";
+        for (const Eigen::Vector2f& uv : part.uv) {  // OBJ counts rows from below
+          (sink << "vt ").Number(uv.x(), 7) << " ";
+          sink.Number(1.0 - uv.y(), 7) << "\n";
+        }
+        for (size_t i = 0; i < part.corners.size(); i += 3) {
+          sink << "f";
+          for (size_t k = 0; k < 3; ++k) {
+            const uint32_t corner = part.corners[i + k];
+            (sink << " ").Number(number[part.vertices[corner]]) << "/";
+            sink.Number(next_uv + corner);
+          }
+          sink << "\n";
+        }
+        next_uv += part.uv.size();
+      }
+      if (textured) continue;
+      for (const Triangle& t : colored[s].triangles) {
+        sink << "f";
+        for (const int corner : t) (sink << " ").Number(number[corner]);
+        sink << "\n";
+      }
+    }
+  }
+  mtl.Commit();
+  obj.Commit();
+}
+
+}  // namespace roomtex

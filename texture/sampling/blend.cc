@@ -1,0 +1,214 @@
+#include "texture/sampling/blend.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+// Bytes from here on may be clipped; JPEG smears 255 a little.
+constexpr float kClipStart = 244, kClipEnd = 254;
+// What is left of the weight of a clipped colour when another photo has it unclipped, and when the
+// best photos of a sample are chosen.
+constexpr float kClippedReliability = 0.04f, kClippedRank = 0.5f;
+
+float ReliabilityOfByte(int brightest) {
+  const float share =
+      std::clamp((kClipEnd - static_cast<float>(brightest)) / (kClipEnd - kClipStart), 0.0f, 1.0f);
+  return kClippedRank + (1 - kClippedRank) * share;
+}
+
+// Catmull-Rom spline: weights of the four pixels around a place, t = 0..1 behind the second one.
+std::array<float, 4> CubicWeights(float t) {
+  const float t2 = t * t, t3 = t2 * t;
+  return {-0.5f * t3 + t2 - 0.5f * t, 1.5f * t3 - 2.5f * t2 + 1, -1.5f * t3 + 2 * t2 + 0.5f * t,
+          0.5f * t3 - 0.5f * t2};
+}
+
+// Square roots: distances are about even to the eye.
+Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).cwiseSqrt(); }
+
+// Two photos that look from different places give the same colour only if they see the surface
+// itself and not something in front of it.
+bool TwoAgree(const Eigen::Vector3f* roots, int count) {
+  constexpr float kAlike = 0.05f;
+  for (int i = 0; i < count; ++i) {
+    for (int j = i + 1; j < count; ++j) {
+      if ((roots[i] - roots[j]).norm() < kAlike) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::string> BlendOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (max_views < 1 || max_views > 64) problems.push_back("--Blend.max_views must be 1 to 64");
+  if (!(outlier >= 0)) problems.push_back("--Blend.outlier must not be negative");
+  if (!(footprint >= 0) || !(footprint <= 4)) {
+    problems.push_back("--Blend.footprint must be 0 to 4 sample spacings");
+  }
+  return problems;
+}
+
+float ResolutionWeight(float pixels_per_sample) {
+  constexpr float kPlenty = 25;
+  return std::max(pixels_per_sample, 1e-3f) / (kPlenty + pixels_per_sample);
+}
+
+float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_scanner,
+                  const Eigen::Vector3f& normal) {
+  if (normal.isZero() || to_scanner.isZero()) return 1;
+  const float camera_cosine = std::max(normal.dot(to_camera), 0.05f);
+  const Eigen::Vector3f shift = to_scanner - to_camera * (normal.dot(to_scanner) / camera_cosine);
+  const float slant = 1 / (camera_cosine * camera_cosine) - 1;  // tan^2
+  return 1 / (1 + shift.squaredNorm() + slant);
+}
+
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y) {
+  const std::array<float, 256>& linear = LinearFromSrgbByte();
+  const float px = std::clamp(x - 0.5f, 0.0f, static_cast<float>(photo.cols - 1));
+  const float py = std::clamp(y - 0.5f, 0.0f, static_cast<float>(photo.rows - 1));
+  const int column = static_cast<int>(px), row = static_cast<int>(py);
+  const std::array<float, 4> wx = CubicWeights(px - static_cast<float>(column));
+  const std::array<float, 4> wy = CubicWeights(py - static_cast<float>(row));
+  int offset[4];
+  for (int i = 0; i < 4; ++i) offset[i] = 3 * std::clamp(column - 1 + i, 0, photo.cols - 1);
+  float sum[3] = {0, 0, 0};  // b, g, r
+  int brightest = 0;
+  for (int j = 0; j < 4; ++j) {
+    const uint8_t* line = photo.ptr<uint8_t>(std::clamp(row - 1 + j, 0, photo.rows - 1));
+    const bool inner = j == 1 || j == 2;
+    for (int k = 0; k < 3; ++k) {
+      const int a = line[offset[0] + k], b = line[offset[1] + k], c = line[offset[2] + k],
+                d = line[offset[3] + k];
+      if (inner) brightest = std::max({brightest, b, c});
+      sum[k] +=
+          wy[j] * (wx[0] * linear[a] + wx[1] * linear[b] + wx[2] * linear[c] + wx[3] * linear[d]);
+    }
+  }
+  return {Eigen::Vector3f(sum[2], sum[1], sum[0]).cwiseMax(0.0f), ReliabilityOfByte(brightest)};
+}
+
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
+  // As many lookups as the square has pixels, each way.
+  const int count = std::clamp(static_cast<int>(std::lround(side)), 1, 16);
+  if (count == 1) return LookUpPhoto(photo, x, y);
+  PhotoColor mean{Eigen::Vector3f::Zero(), 1};
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j) {
+      const float dx = ((static_cast<float>(j) + 0.5f) / static_cast<float>(count) - 0.5f) * side;
+      const float dy = ((static_cast<float>(i) + 0.5f) / static_cast<float>(count) - 0.5f) * side;
+      const PhotoColor color = LookUpPhoto(photo, x + dx, y + dy);
+      mean.linear += color.linear;
+      mean.reliability = std::min(mean.reliability, color.reliability);
+    }
+  }
+  mean.linear /= static_cast<float>(count * count);
+  return mean;
+}
+
+namespace {
+
+constexpr float kFits = 0.5f;   // agreement
+constexpr int kMostViews = 64;  // BlendOptions::Problems
+
+// The observations of one sample, brought to one exposure.
+struct SampleViews {
+  int count = 0;
+  std::array<Eigen::Vector3f, kMostViews> colors, roots;
+  std::array<Eigen::Array3i, kMostViews> clipped;  // 1 = the surface is this light or lighter
+  std::array<float, kMostViews> reliability;       // 1, less towards clipped colours
+  std::array<float, kMostViews> weights;
+
+  // 1 for equal colours, 1/2 at the distance `outlier`, flat where noise and resolution differ and
+  // steep beyond. A clipped channel agrees with everything lighter.
+  float Agreement(int i, int j, float outlier) const {
+    const Eigen::Array3f step = (roots[j] - roots[i]).array();
+    float square = 0;
+    for (int k = 0; k < 3; ++k) {
+      if ((clipped[i][k] != 0 && step[k] > 0) || (clipped[j][k] != 0 && step[k] < 0)) continue;
+      square += step[k] * step[k];
+    }
+    const float ratio = square / (outlier * outlier);
+    return 1 / (1 + ratio * ratio);
+  }
+
+  // The observation that most weight agrees with; of equals the heavier one.
+  int Central(float outlier) const {
+    int central = 0;
+    float most = -1;
+    for (int i = 0; i < count; ++i) {
+      float sum = 0;
+      for (int j = 0; j < count; ++j) sum += weights[j] * Agreement(i, j, outlier);
+      if (sum > most) {
+        most = sum;
+        central = i;
+      }
+    }
+    return central;
+  }
+};
+
+SampleViews UnpackViews(const Observation* observations, int count,
+                        const std::vector<Eigen::Vector3f>& gains) {
+  constexpr float kUnclipped = 0.75f, kClipped = 0.92f;  // linear light of the bytes 225 and 246
+  SampleViews views;
+  views.count = std::min(count, kMostViews);
+  for (int i = 0; i < views.count; ++i) {
+    const Eigen::Vector3f color = UnpackColor(observations[i].color);
+    views.colors[i] = color.cwiseProduct(gains[observations[i].photo]);
+    views.roots[i] = Root(views.colors[i]);
+    views.clipped[i] = (color.array() > kClipped).cast<int>();
+    const float share = (kClipped - color.maxCoeff()) / (kClipped - kUnclipped);
+    views.reliability[i] = std::clamp(share, kClippedReliability, 1.0f);  // even: no visible step
+    views.weights[i] = UnpackWeight(observations[i].weight);
+  }
+  return views;
+}
+
+}  // namespace
+
+BlendedSample BlendSample(const Observation* observations, int count,
+                          const std::vector<Eigen::Vector3f>& gains, double outlier,
+                          float* shares) {
+  BlendedSample result;
+  if (shares != nullptr) std::fill(shares, shares + std::max(count, 0), 0.0f);
+  if (count <= 0) return result;
+  // What is in doubt comes last and counts only where there is nothing else.
+  if (observations[0].in_doubt == 0) {
+    while (observations[count - 1].in_doubt != 0) --count;
+  }
+  SampleViews views = UnpackViews(observations, count, gains);
+  if (observations[0].in_doubt != 0 && !TwoAgree(views.roots.data(), views.count)) return result;
+  // S by the geometry alone: it changes where the best photo changes, not from sample to sample.
+  result.dominant = views.colors[0];
+  result.dominant_photo = observations[0].photo;
+  result.dominant_fits = views.reliability[0] > 0.5f;
+  if (outlier > 0 && views.count > 1) {
+    const auto scale = static_cast<float>(outlier);
+    const int central = views.Central(scale);
+    result.dominant_fits = result.dominant_fits && views.Agreement(central, 0, scale) > kFits;
+    for (int i = 0; i < views.count; ++i) {
+      const float share = views.Agreement(central, i, scale);
+      views.weights[i] *= share * share;
+    }
+  }
+  float sum = 0;
+  for (int i = 0; i < views.count; ++i) {
+    // Only now: however light a surface is, those that see it clipped outvote what is no part of
+    // it.
+    views.weights[i] *= views.reliability[i];
+    sum += views.weights[i];
+    result.blend += views.weights[i] * views.colors[i];
+  }
+  result.blend /= sum;
+  for (int i = 0; shares != nullptr && i < views.count; ++i) shares[i] = views.weights[i] / sum;
+  return result;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,86 @@
+#pragma once
+// Weighted blending (thesis 8.2.2).
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "texture/sampling/observations.h"
+
+namespace roomtex {
+
+struct BlendOptions {
+  // Photos kept per sample, the best by weight; 8 bytes each. Larger = smoother, more memory.
+  int max_views = 6;
+  // A photo that sees a sample at a slant, away from where the scanner stood, gets less weight:
+  // what is left of the range noise and of the misalignment shifts its colour most. Departure from
+  // the thesis.
+  bool angle_weight = true;
+  // A photo with more pixels per sample gets more weight: its colours are less mixed with their
+  // neighbours'. Departure from the thesis.
+  bool resolution_weight = true;
+  // Colours that contradict the others at a sample (people, moved chairs, shadows of the
+  // photographer, reflections) lose their weight; distance at which half is lost, on a scale of
+  // 0..1 that is about even to the eye. Below 0.2 what shines
+  // differently to every photo comes out in blotches. 0 = never (thesis).
+  double outlier = 0.3;
+  // Share of the spacing between samples over which a photo's pixels are averaged. 0 = the colour
+  // at the sample (thesis); 1 = the whole cell, which keeps fine print from turning into grain.
+  double footprint = 0.0;
+  // Preservation of details (8.2.3), see detail.h. Off (departure from the thesis): the weights and
+  // the consensus keep the detail already; what the dominant photo would add is mostly its noise
+  // and its own misalignment (docs/texture.md: 0.2 to 0.4 dB lost on simulated rooms, with true
+  // poses and with poses off by 0.05 degrees).
+  bool detail = false;
+
+  std::vector<std::string> Problems() const;
+};
+
+// Thesis 8.2.2: W = (1 - (((x-w)/w)^2 + ((y-h)/h)^2)/2) D (0.9 - 0.899 B) + (1 - B) 0.01 for a
+// visible sample (D = 1), at the position (x, y) in `img` of a photo of 2w x 2h pixels.
+inline float ThesisWeight(float x, float y, float photo_width, float photo_height, bool boundary) {
+  const float dx = 2 * x / photo_width - 1, dy = 2 * y / photo_height - 1;
+  const float centrality = 1 - (dx * dx + dy * dy) / 2;
+  return boundary ? centrality * (0.9f - 0.899f) : centrality * 0.9f + 0.01f;
+}
+
+// Share of its weight that a photo keeps (departure from the thesis). A sample that is off along
+// its scanner ray u by e is looked up |u - c (n.u)/(n.c)| e beside its place on a surface with the
+// normal n by a camera in the direction c; to that adds a misalignment of the same size across c,
+// seen at a slant. All three are unit vectors from the sample; zero `normal` or `to_scanner`: 1.
+float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_scanner,
+                  const Eigen::Vector3f& normal);
+
+// Share of its weight that a photo keeps (departure from the thesis): half of it with 25 pixels per
+// sample (an area, foreshortening counted).
+float ResolutionWeight(float pixels_per_sample);
+
+// Colour of a photo (8-bit BGR, sRGB) at a position in `img`, by cubic (Catmull-Rom) interpolation
+// of linear light: half a decibel nearer to the truth than bilinear on the simulated room.
+struct PhotoColor {
+  Eigen::Vector3f linear;  // r, g, b, 0..1
+  float reliability;  // 1; falls to 1/2 towards pixels whose brightest channel is clipped at 255
+};
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y);
+// Mean over a square of the given side in pixels around the position.
+PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side);
+
+// The blend of one sample: M = sum W M_i / sum W in linear light, because that is what adds up when
+// light is averaged and what the exposure gains apply to.
+struct BlendedSample {
+  Eigen::Vector3f blend = Eigen::Vector3f::Zero();     // M, linear light
+  Eigen::Vector3f dominant = Eigen::Vector3f::Zero();  // C, of the photo with the largest weight
+  int dominant_photo = -1;                             // S; -1 = no photo sees the sample
+  bool dominant_fits =
+      false;  // the dominant photo does not contradict the blend: it may give detail
+};
+// gains: linear, one 3-vector (r, g, b) per photo. A sample whose observations are all in doubt has
+// a colour only if two of them agree. shares (if given): room for `count` numbers, what each
+// observation has of the blend; they sum to 1, or are all 0 without a colour.
+BlendedSample BlendSample(const Observation* observations, int count,
+                          const std::vector<Eigen::Vector3f>& gains, double outlier,
+                          float* shares = nullptr);
+
+}  // namespace roomtex

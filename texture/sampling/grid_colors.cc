@@ -1,0 +1,102 @@
+#include "texture/sampling/grid_colors.h"
+
+#include <algorithm>
+
+#include "core/cpu_stages.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+
+namespace roomtex {
+
+size_t NumSlots(const PhotoPassInput& input) {
+  if (input.samples.empty()) return 0;
+  const SampleTile& last = input.samples.back();
+  return static_cast<size_t>(last.first_slot) + last.points.size();
+}
+
+GridOfSamples AddGrid(int columns, int rows, const std::vector<Eigen::Vector3d>& points,
+                      const std::vector<Eigen::Vector3f>& normals, const Eigen::Vector3d& station,
+                      PhotoPassInput* input) {
+  const int first_slot = static_cast<int>(NumSlots(*input));
+  GridOfSamples grid{input->samples.size(), 0, columns, rows};
+  for (SampleTile& tile : MakeSampleTiles(columns, rows, points, normals, station)) {
+    tile.first_slot += first_slot;
+    input->samples.push_back(std::move(tile));
+  }
+  grid.end_tile = input->samples.size();
+  return grid;
+}
+
+// Blend of a grid's samples, scattered from slots to grid cells.
+struct GridColorizer::BlendedGrid {
+  std::vector<Eigen::Vector3f> blend;
+  DominantMap dominant;
+};
+
+GridColorizer::BlendedGrid GridColorizer::Blend(const GridOfSamples& grid) const {
+  const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
+  const size_t count = static_cast<size_t>(grid.num_columns) * grid.num_rows;
+  BlendedGrid result;
+  result.blend.assign(count, Eigen::Vector3f::Zero());
+  result.dominant.color.assign(count, Eigen::Vector3f::Zero());
+  result.dominant.photo.assign(count, -1);
+  result.dominant.fits.assign(count, 0);
+  const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
+  ParallelFor(num_threads_, first, end, [&](int t) {
+    const SampleTile& tile = input_.samples[t];
+    for (int i = 0; i < tile.points.size(); ++i) {
+      const size_t slot = static_cast<size_t>(tile.first_slot) + i;
+      const BlendedSample sample =
+          BlendSample(store_.Begin(slot), store_.Count(slot), gains_, blend_.outlier);
+      result.blend[tile.index[i]] = sample.blend;
+      result.dominant.color[tile.index[i]] = sample.dominant;
+      result.dominant.photo[tile.index[i]] = static_cast<int16_t>(sample.dominant_photo);
+      result.dominant.fits[tile.index[i]] = sample.dominant_fits;
+    }
+  });
+  return result;
+}
+
+ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& blended,
+                                const std::vector<Rgb>& unseen) const {
+  const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
+  ColorGrid result;
+  result.num_columns = grid.num_columns;
+  result.num_rows = grid.num_rows;
+  result.rgb.assign(blended.blend.size(), {0, 0, 0});
+  result.views.assign(blended.blend.size(), 0);
+  const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
+  ParallelFor(num_threads_, first, end, [&](int t) {
+    const SampleTile& tile = input_.samples[t];
+    for (int i = 0; i < tile.points.size(); ++i) {
+      const int index = tile.index[i];
+      const int views = blended.dominant.photo[index] < 0
+                            ? 0
+                            : store_.NumViews(static_cast<size_t>(tile.first_slot) + i);
+      result.views[index] = static_cast<uint8_t>(std::min(views, 255));
+      if (views == 0) {
+        if (!unseen.empty()) result.rgb[index] = unseen[index];
+        continue;
+      }
+      for (int k = 0; k < 3; ++k) {
+        result.rgb[index][k] = SrgbByteFromLinear(blended.blend[index][k]);
+      }
+    }
+  });
+  return result;
+}
+
+ColorGrid GridColorizer::Colorize(const GridOfSamples& grid, const GridLinks& links,
+                                  const std::vector<Rgb>& unseen) const {
+  BlendedGrid blended = Blend(grid);
+  if (blend_.detail && grid.num_rows > 1) {
+    const CpuTimer timer(CpuStage::kDetail, CpuTimer::Scope::kProcess);
+    Scan shape;
+    shape.num_columns = grid.num_columns;
+    shape.num_rows = grid.num_rows;
+    PreserveDetail(shape, links, blended.dominant, detail_, num_threads_, &blended.blend);
+  }
+  return Encode(grid, blended, unseen);
+}
+
+}  // namespace roomtex

@@ -1,0 +1,48 @@
+#pragma once
+// The scan's mesh in tiles of about a thousand samples, so that a photo touches only what it may
+// see.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/scan.h"
+#include "texture/sampling/photo_view.h"
+#include "texture/sampling/scan_surface.h"
+
+namespace roomtex {
+
+struct MeshTile {
+  PointBlock points;
+  std::vector<std::array<uint16_t, 3>> triangles;  // indices into points
+};
+
+// Occluders: the mesh; the `shadows` of the scanner: triangles over the depth jumps that the mesh
+// leaves open, behind which lies space that the scanner could not see and in which anything may
+// stand; and the `fringes`: the open quads at the range of their nearest sample, because what ends
+// between two samples may reach up to the next one.
+struct OccluderTiles {
+  std::vector<MeshTile> surface;
+  std::vector<MeshTile> shadows;
+  std::vector<MeshTile> fringes;
+  double range_noise = 0;  // of the scan, metres, standard deviation; 0 = not known
+};
+
+OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface);
+
+// Samples that get a colour, in the same kind of tiles. `index` is the grid index of each.
+struct SampleTile {
+  PointBlock points;
+  std::vector<Eigen::Vector3f> normals;  // unit or zero
+  std::vector<int> index;
+  Eigen::Vector3f scanner;  // where the scanner stood, relative to points.origin; NaN = not known
+  int first_slot = 0;       // samples are numbered tile by tile
+};
+// columns x rows points (row by row; NaN = none) with their normals. Without a grid: rows = 1.
+// station: where the scanner stood, `scan` frame; NaN = not known.
+std::vector<SampleTile> MakeSampleTiles(int columns, int rows,
+                                        const std::vector<Eigen::Vector3d>& points,
+                                        const std::vector<Eigen::Vector3f>& normals,
+                                        const Eigen::Vector3d& station);
+
+}  // namespace roomtex

@@ -1,0 +1,260 @@
+#include "texture/sampling/photo_list.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "colmap_ext/database.h"
+#include "core/camera_formulas.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+std::vector<std::string> SplitCsvLine(std::string line) {
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') {
+      if (quoted && i + 1 < line.size() && line[i + 1] == '"') {
+        fields.back() += line[++i];
+      } else {
+        quoted = !quoted;
+      }
+    } else if (line[i] == ',' && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += line[i];
+    }
+  }
+  for (std::string& field : fields) {
+    const size_t first = field.find_first_not_of(" \t");
+    const size_t last = field.find_last_not_of(" \t");
+    field = first == std::string::npos ? "" : field.substr(first, last - first + 1);
+  }
+  return fields;
+}
+
+// "a.jpg, b.jpg, c.jpg and 4 more".
+std::string Enumerate(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string text;
+  for (size_t i = 0; i < names.size() && i < kShown; ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+// Plain photo by patterned photo. A photo cannot be both: the pattern would be taken for colour.
+std::map<std::string, std::string> ReadPlainOf(const std::string& path) {
+  std::map<std::string, std::string> plain_of;
+  std::set<std::string> plain;
+  for (const AssociatedPhotos& pair : ReadAssociations(path)) {
+    plain_of[pair.patterned_image] = pair.plain_image;
+    if (!pair.plain_image.empty()) plain.insert(pair.plain_image);
+  }
+  for (const auto& [patterned, twin] : plain_of) {
+    if (plain.count(patterned) > 0) {
+      throw InputError(path, "", "names " + patterned + " as a patterned photo and as a plain one",
+                       "Correct the table: the pattern would be taken for colour");
+    }
+  }
+  return plain_of;
+}
+
+// Which file gives the colour for which registered photo: registered name -> file name.
+std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
+                                               const PhotoSources& sources,
+                                               std::vector<std::string>* warnings) {
+  std::map<std::string, std::string> file_of;
+  if (sources.associations_path.empty()) {
+    for (const auto& [id, image] : model.images) file_of[image.name] = image.name;
+    return file_of;
+  }
+  const auto plain_of = ReadPlainOf(sources.associations_path);
+  std::set<std::string> plain, used;
+  for (const auto& [patterned, twin] : plain_of) plain.insert(twin);
+  std::vector<std::string> without_twin, missing;
+  for (const auto& [id, image] : model.images) {
+    const auto found = plain_of.find(image.name);
+    if (found == plain_of.end()) continue;
+    if (found->second.empty()) {
+      without_twin.push_back(image.name);
+    } else if (!std::filesystem::exists(sources.image_path + "/" + found->second)) {
+      missing.push_back(found->second + " (twin of " + image.name + ")");
+    } else if (used.insert(found->second).second) {
+      file_of[image.name] = found->second;
+    }
+  }
+  for (const auto& [id, image] : model.images) {
+    if (plain_of.count(image.name) > 0) continue;
+    if (plain.count(image.name) == 0) {
+      without_twin.push_back(image.name);
+    } else if (used.insert(image.name).second) {
+      file_of[image.name] = image.name;
+    }
+  }
+  if (!without_twin.empty()) {
+    warnings->push_back(std::to_string(without_twin.size()) +
+                        " registered photos have no plain twin in " + sources.associations_path +
+                        " and give no colour: " + Enumerate(without_twin));
+  }
+  if (!missing.empty()) {
+    warnings->push_back(std::to_string(missing.size()) + " plain photos of " +
+                        sources.associations_path + " are not in " + sources.image_path +
+                        " and give no colour: " + Enumerate(missing));
+  }
+  if (file_of.empty() && !missing.empty()) {
+    throw InputError(sources.image_path, "",
+                     "holds none of the plain photos that " + sources.associations_path + " names",
+                     "Give the folder with the patterned and the plain photos");
+  }
+  if (file_of.empty()) {
+    throw InputError(sources.associations_path, "",
+                     "names no photo of the model, expected registered images in its column "
+                     "patterned_image",
+                     "Make it from the same photos");
+  }
+  return file_of;
+}
+
+// Cameras by image name: from the database if there is one.
+class CameraSource {
+ public:
+  CameraSource(const SparseModel& model, const std::string& database_path)
+      : model_(model), database_path_(database_path) {
+    if (database_path.empty()) return;
+    const Database database(database_path);
+    cameras_ = database.ReadCameras();
+    for (const auto& [id, image] : database.ReadImages()) camera_of_[image.name] = image.camera_id;
+  }
+
+  const Camera& Find(const SparseImage& image) const {
+    if (database_path_.empty()) return model_.cameras.at(image.camera_id);
+    const auto found = camera_of_.find(image.name);
+    if (found == camera_of_.end()) {
+      throw InputError(database_path_, "",
+                       "has no image named " + image.name + ", which the model holds",
+                       "Give the database that the model was made from");
+    }
+    return cameras_.at(found->second);
+  }
+
+ private:
+  const SparseModel& model_;
+  std::string database_path_;
+  std::map<uint32_t, Camera> cameras_;
+  std::map<std::string, uint32_t> camera_of_;
+};
+
+// The camera for the file as it is.
+Camera FitCamera(const Camera& camera, const std::string& path, const std::string& name,
+                 std::vector<std::string>* warnings) {
+  auto [width, height] = ReadPhotoSize(path);
+  if (width <= 0 || height <= 0) {
+    const cv::Mat photo = ReadPhoto(path);  // throws for what is no image
+    width = photo.cols;
+    height = photo.rows;
+  }
+  if (width == camera.width && height == camera.height) return camera;
+  const std::string sizes = std::to_string(width) + " x " + std::to_string(height) +
+                            " pixels, its camera " + std::to_string(camera.width) + " x " +
+                            std::to_string(camera.height);
+  const double shape = static_cast<double>(width) / height;
+  const double camera_shape = static_cast<double>(camera.width) / camera.height;
+  if (std::abs(shape / camera_shape - 1) > 0.01) {
+    throw InputError(path, "", "has " + sizes,
+                     "Give the photos that COLMAP was given, or resized ones of the same shape");
+  }
+  warnings->push_back(name + " has " + sizes + "; the camera is scaled");
+  return ScaleCamera(camera, width, height);
+}
+
+}  // namespace
+
+std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
+  RequireFile(path, "Check --associations_path");
+  std::ifstream stream(path);
+  std::string line;
+  long number = 0;
+  int patterned = -1, plain = -1;
+  std::vector<AssociatedPhotos> pairs;
+  while (std::getline(stream, line)) {
+    ++number;
+    if (number == 1 && line.rfind("\xef\xbb\xbf", 0) == 0) line.erase(0, 3);
+    if (line.empty() || line == "\r" || line[0] == '#') continue;
+    const std::vector<std::string> fields = SplitCsvLine(line);
+    if (patterned < 0) {
+      for (int i = 0; i < static_cast<int>(fields.size()); ++i) {
+        if (fields[i] == "patterned_image") patterned = i;
+        if (fields[i] == "plain_image") plain = i;
+      }
+      if (patterned < 0 || plain < 0) {
+        throw InputError(path, LinePosition(number),
+                         "is no header with the columns patterned_image and plain_image",
+                         "Expected a CSV with the header patterned_image,plain_image");
+      }
+      continue;
+    }
+    if (static_cast<int>(fields.size()) <= std::max(patterned, plain) ||
+        fields[patterned].empty()) {
+      throw InputError(path, LinePosition(number),
+                       "has " + std::to_string(fields.size()) +
+                           " fields, expected a patterned_image and a plain_image",
+                       "Correct the line or start it with #");
+    }
+    pairs.push_back({fields[patterned], fields[plain]});
+  }
+  if (patterned < 0) {
+    throw InputError(path, "", "is empty, expected a header and pairs of photos",
+                     "Expected lines patterned_image,plain_image");
+  }
+  return pairs;
+}
+
+Camera ScaleCamera(const Camera& camera, int width, int height) {
+  Camera scaled = camera;
+  const double x = static_cast<double>(width) / camera.width;
+  const double y = static_cast<double>(height) / camera.height;
+  if (camera_formulas::HasOneFocalLength(camera.model)) {
+    scaled.params[0] *= 0.5 * (x + y);
+    scaled.params[1] *= x;
+    scaled.params[2] *= y;
+  } else {
+    scaled.params[0] *= x;
+    scaled.params[1] *= y;
+    scaled.params[2] *= x;
+    scaled.params[3] *= y;
+  }
+  scaled.width = width;
+  scaled.height = height;
+  return scaled;
+}
+
+PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sources) {
+  RequireFolder(sources.image_path, "Check --image_path: it is the folder that COLMAP was given");
+  PhotoList list;
+  const auto file_of = ChooseFiles(model_in_scan, sources, &list.warnings);
+  const CameraSource cameras(model_in_scan, sources.database_path);
+  for (const auto& [id, image] : model_in_scan.images) {
+    const auto file = file_of.find(image.name);
+    if (file == file_of.end()) continue;
+    PhotoView view;
+    view.name = file->second;
+    view.path = sources.image_path + "/" + file->second;
+    RequireFile(view.path, "Check --image_path: the model names this photo");
+    view.camera = FitCamera(cameras.Find(image), view.path, view.name, &list.warnings);
+    view.cam_from_scan = image.cam_from_model;
+    list.photos.push_back(std::move(view));
+  }
+  std::sort(list.photos.begin(), list.photos.end(),
+            [](const PhotoView& a, const PhotoView& b) { return a.name < b.name; });
+  return list;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,41 @@
+#pragma once
+// Which photos give colour, from where, with which camera.
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/sparse_model.h"
+#include "texture/sampling/photo_view.h"
+
+namespace roomtex {
+
+struct PhotoSources {
+  std::string image_path;         // folder of the photos
+  std::string database_path;      // "" = intrinsics from the model
+  std::string associations_path;  // "" = every registered photo gives colour
+};
+
+struct PhotoList {
+  std::vector<PhotoView> photos;      // ordered by name
+  std::vector<std::string> warnings;  // plain sentences
+};
+
+// The registered photos of a model in the scan frame. With associations the plain twin of every
+// registered patterned photo takes its place; registered photos that the table knows only as plain
+// ones stay, those that it does not know are left out, because the pattern may be on them, and so
+// are those whose plain twin is not in the folder. Every file is looked at: other missing files, no
+// image, another shape than the camera's make an InputError; a photo of the same shape but another
+// size gets a scaled camera.
+PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sources);
+
+// CSV with a header that names patterned_image and plain_image among its columns. Pairs in file
+// order. Throws InputError with the line.
+struct AssociatedPhotos {
+  std::string patterned_image, plain_image;
+};
+std::vector<AssociatedPhotos> ReadAssociations(const std::string& path);
+
+// The camera for photos of another size: focal lengths and principal point scale, distortion stays.
+Camera ScaleCamera(const Camera& camera, int width, int height);
+
+}  // namespace roomtex

@@ -1,0 +1,147 @@
+#include "texture/sampling/photo_pass.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/cpu_stages.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+
+namespace roomtex {
+namespace {
+
+struct SlotObservation {
+  int slot;
+  Observation observation;
+};
+
+// What one photo sees, tile by tile; tile_end[i] is the end of tile i's part.
+struct PhotoObservations {
+  std::vector<SlotObservation> all;
+  std::vector<size_t> tile_end;
+};
+
+class PhotoObserver {
+ public:
+  PhotoObserver(const PhotoPassInput& input, const PhotoView& view,
+                const OcclusionOptions& occlusion, const BlendOptions& blend)
+      : input_(input),
+        blend_(blend),
+        projector_(view),
+        visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
+        image_(Decode(view)) {
+    if (view.tone && !view.tone->vignetting.is_none()) {
+      vignetting_.emplace(view.tone->vignetting, projector_.camera());
+    }
+  }
+
+  PhotoObservations Observe(int photo) {
+    const CpuTimer timer(CpuStage::kSamples);
+    PhotoObservations seen;
+    for (const SampleTile& tile : input_.samples) {
+      if (projector_.MaySee(tile.points.origin, tile.points.radius))
+        ObserveTile(tile, photo, &seen);
+      seen.tile_end.push_back(seen.all.size());
+    }
+    return seen;
+  }
+
+ private:
+  static cv::Mat Decode(const PhotoView& view) {
+    const CpuTimer timer(CpuStage::kDecode);
+    cv::Mat photo = ReadPhoto(view.path);
+    if (view.tone) view.tone->response.ToSrgb(&photo);
+    return photo;
+  }
+
+  void ObserveTile(const SampleTile& tile, int photo, PhotoObservations* seen) {
+    projector_.Project(tile.points, &projected_);
+    const Eigen::Vector3f camera = projector_.CentreFrom(tile.points.origin);
+    const auto width = static_cast<float>(projector_.width());
+    const auto height = static_cast<float>(projector_.height());
+    const float focal_length = static_cast<float>(projector_.camera().camera().MeanFocalLength());
+    const bool scanner_known = tile.scanner.allFinite();
+    for (int i = 0; i < tile.points.size(); ++i) {
+      const float x = projected_.x[i], y = projected_.y[i], depth = projected_.depth[i];
+      if (!(depth > 0) || !(x >= 0 && y >= 0 && x <= width && y <= height)) continue;
+      const Eigen::Vector3f point(tile.points.x[i], tile.points.y[i], tile.points.z[i]);
+      const Eigen::Vector3f to_camera = camera - point;
+      if (!FacesCamera(to_camera, tile.normals[i])) continue;
+      Sight sight = visibility_.Look(x, y, depth);
+      if (sight == Sight::kHidden) continue;
+      // A sample without a triangle is a stray one at a depth jump.
+      if (tile.normals[i].isZero()) sight = std::min(sight, Sight::kBoundary);
+      const Eigen::Vector3f to_scanner =
+          scanner_known ? Eigen::Vector3f(tile.scanner - point) : Eigen::Vector3f(to_camera);
+      const float spacing_px =
+          static_cast<float>(input_.angular_spacing) * to_scanner.norm() * focal_length / depth;
+      const PhotoColor color =
+          blend_.footprint > 0
+              ? LookUpPhoto(image_, x, y, static_cast<float>(blend_.footprint) * spacing_px)
+              : LookUpPhoto(image_, x, y);
+      const Eigen::Vector3f& normal = tile.normals[i];
+      const Eigen::Vector3f camera_direction = to_camera.normalized();
+      float weight = ThesisWeight(x, y, width, height, sight != Sight::kClear) * color.reliability;
+      if (blend_.angle_weight) {
+        weight *= AngleWeight(camera_direction, to_scanner.normalized(), normal);
+      }
+      if (blend_.resolution_weight && spacing_px > 0) {
+        const float cosine = normal.isZero() ? 0.3f : normal.dot(camera_direction);
+        weight *= ResolutionWeight(spacing_px * spacing_px * cosine);
+      }
+      Observation observation;
+      observation.color =
+          PackColor(vignetting_ ? color.linear * vignetting_->At(x, y) : color.linear);
+      observation.weight = PackWeight(std::max(weight, 1e-10f));
+      observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
+      observation.in_doubt = sight < Sight::kBoundary;
+      seen->all.push_back({tile.first_slot + i, observation});
+    }
+  }
+
+  const PhotoPassInput& input_;
+  const BlendOptions& blend_;
+  PhotoProjector projector_;
+  PhotoVisibility visibility_;
+  cv::Mat image_;  // sRGB
+  std::optional<VignettingFactor> vignetting_;
+  ProjectedBlock projected_;
+};
+
+}  // namespace
+
+std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector<PhotoView>& photos,
+                                  const OcclusionOptions& occlusion, const BlendOptions& blend,
+                                  int num_threads, Progress* progress, ObservationStore* store) {
+  const int num_photos = static_cast<int>(photos.size());
+  const int num_tiles = static_cast<int>(input.samples.size());
+  const int batch_size = EffectiveThreads(num_threads);
+  std::vector<size_t> num_seen(num_photos, 0);
+  std::vector<PhotoObservations> batch(batch_size);
+  for (int first = 0; first < num_photos; first += batch_size) {
+    const int count = std::min(batch_size, num_photos - first);
+    ParallelFor(num_threads, 0, count, [&](int i) {
+      const int photo = first + i;
+      batch[i] = PhotoObserver(input, photos[photo], occlusion, blend).Observe(photo);
+      num_seen[photo] = batch[i].all.size();
+      progress->Tick();
+    });
+    constexpr int kTilesAtOnce = 64;
+    const int num_blocks = (num_tiles + kTilesAtOnce - 1) / kTilesAtOnce;
+    ParallelFor(num_threads, 0, num_blocks, [&](int block) {
+      const CpuTimer timer(CpuStage::kMerge);
+      const int begin_tile = block * kTilesAtOnce;
+      const int end_tile = std::min(num_tiles, begin_tile + kTilesAtOnce);
+      for (int i = 0; i < count; ++i) {
+        const size_t begin = begin_tile == 0 ? 0 : batch[i].tile_end[begin_tile - 1];
+        for (size_t k = begin; k < batch[i].tile_end[end_tile - 1]; ++k) {
+          store->Add(batch[i].all[k].slot, batch[i].all[k].observation);
+        }
+      }
+    });
+  }
+  return num_seen;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,82 @@
+#include "texture/sampling/scan_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "texture/sampling/range_smoothing.h"
+
+namespace roomtex {
+namespace {
+
+double Median(std::vector<float>* values) {
+  if (values->empty()) return 0;
+  const auto middle = values->begin() + values->size() / 2;
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+double MedianAngularSpacing(const Scan& scan, const GridLinks& links) {
+  std::vector<float> angles;
+  const size_t stride = std::max<size_t>(1, links.bits.size() / 100000);
+  for (size_t i = 0; i < links.bits.size(); i += stride) {
+    if (!(links.bits[i] & GridLinks::kDown)) continue;
+    const Eigen::Vector3d a = scan.points[i] - scan.Station();
+    const Eigen::Vector3d b = scan.points[i + scan.num_columns] - scan.Station();
+    angles.push_back(static_cast<float>(std::atan2(a.cross(b).norm(), a.dot(b))));
+  }
+  return Median(&angles);
+}
+
+}  // namespace
+
+std::vector<std::string> ScanSurfaceOptions::Problems() const {
+  if (smoothing_radius < 1 || smoothing_radius > 50) {
+    return {"--Surface.smoothing_radius must be 1 to 50 samples"};
+  }
+  return {};
+}
+
+GridLinks FindGridLinks(const Scan& scan, const std::vector<Triangle>& triangles) {
+  GridLinks links;
+  links.bits.assign(scan.points.size(), 0);
+  if (!scan.organised) return links;
+  const int columns = scan.num_columns;
+  for (const Triangle& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
+      if (b - a == columns) {
+        links.bits[a] |= GridLinks::kDown;
+      } else if (a / columns == b / columns) {
+        if (b - a == 1) links.bits[a] |= GridLinks::kRight;
+        if (b - a == columns - 1 && columns > 2) links.bits[b] |= GridLinks::kRight;  // closed turn
+      }
+    }
+  }
+  return links;
+}
+
+ScanSurface MakeScanSurface(const Scan& scan, const ScanMeshOptions& mesh_options,
+                            const ScanSurfaceOptions& options, int num_threads) {
+  ScanSurface surface;
+  surface.triangles = BuildScanMesh(scan, mesh_options);
+  surface.links = FindGridLinks(scan, surface.triangles);
+  surface.points = scan.points;
+  if (!scan.organised) {
+    surface.normals = VertexNormals(scan, surface.triangles);
+    return surface;
+  }
+  surface.angular_spacing = MedianAngularSpacing(scan, surface.links);
+  RangeSmoother smoother(scan, surface.links, options.smoothing_radius, num_threads);
+  surface.range_noise = smoother.noise();
+  if (options.reduce_range_noise) smoother.Smooth(&surface.points);
+  Scan smooth;
+  smooth.num_columns = scan.num_columns;
+  smooth.num_rows = scan.num_rows;
+  smooth.points.swap(surface.points);
+  surface.normals = VertexNormals(smooth, surface.triangles);
+  surface.points.swap(smooth.points);
+  if (options.reduce_range_noise) smoother.Straighten(surface.normals, &surface.points);
+  return surface;
+}
+
+}  // namespace roomtex

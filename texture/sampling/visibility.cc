@@ -1,0 +1,300 @@
+#include "texture/sampling/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/cpu_stages.h"
+#include "texture/sampling/rasterizer.h"
+
+namespace roomtex {
+namespace {
+
+// A triangle with a corner that has no image is split until the parts have one or are too small to
+// matter.
+constexpr int kMaxSplits = 16;
+constexpr double kMinSize = 0.02;  // radians
+// Half the widest gap that counts as a crack in the scan and not as a hole, sample spacings.
+constexpr double kGapSpacings = 1.5;
+// Shadows need not be exact to the pixel.
+constexpr float kShadowEdgePx = 1e6f;
+// No lens sees nearer; keeps a surface that touches the camera from hiding everything.
+constexpr double kNearDepth = 0.01;
+// Automatic depth tolerance, shares of the depth.
+constexpr float kNearlyExact = 0.001f, kUnknownNoise = 0.004f;
+// Automatic width of the band beside depth boundaries, pixels of the photo.
+constexpr double kBoundaryPx = 2;
+
+cv::Mat Square(int radius) {
+  return cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1});
+}
+
+class TriangleSplitter {
+ public:
+  TriangleSplitter(const PhotoProjector& projector, float scale_x, float scale_y, float max_edge_px,
+                   cv::Mat1f* out)
+      : projector_(projector),
+        scale_x_(scale_x),
+        scale_y_(scale_y),
+        max_edge_px_(max_edge_px),
+        out_(out) {}
+
+  void Draw(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) const {
+    const auto in_cam = [this](const Eigen::Vector3d& x_in_scan) {
+      return Eigen::Vector3d(projector_.cam_from_scan() * x_in_scan);
+    };
+    Split(in_cam(a), in_cam(b), in_cam(c), 0);
+  }
+
+ private:
+  // Corners in `cam`.
+  void Split(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+             int depth) const {
+    const Eigen::Vector3d corners[3] = {a, b, c};
+    RasterVertex drawn[3];
+    int num_valid = 0, num_behind = 0;
+    for (int k = 0; k < 3; ++k) {
+      num_behind += corners[k].z() < kNearDepth;
+      if (corners[k].z() < kNearDepth) continue;
+      const auto position = projector_.camera().ImgFromCam(corners[k]);
+      if (!position) continue;
+      ++num_valid;
+      drawn[k] = {static_cast<float>(position->x()) * scale_x_,
+                  static_cast<float>(position->y()) * scale_y_,
+                  static_cast<float>(1 / corners[k].z())};
+    }
+    if (num_behind == 3) return;
+    const Eigen::Vector3d centre = (a + b + c) / 3;
+    const double size =
+        2 * std::sqrt(std::max({(a - centre).squaredNorm(), (b - centre).squaredNorm(),
+                                (c - centre).squaredNorm()}));
+    if (num_valid == 3) {
+      const float low_x = std::min({drawn[0].x, drawn[1].x, drawn[2].x});
+      const float high_x = std::max({drawn[0].x, drawn[1].x, drawn[2].x});
+      const float low_y = std::min({drawn[0].y, drawn[1].y, drawn[2].y});
+      const float high_y = std::max({drawn[0].y, drawn[1].y, drawn[2].y});
+      // Far outside nothing is drawn, however the sides are bent.
+      const float margin = std::max(high_x - low_x, high_y - low_y);
+      if (high_x + margin < 0 || high_y + margin < 0 || low_x - margin > out_->cols ||
+          low_y - margin > out_->rows) {
+        return;
+      }
+      if (margin <= max_edge_px_ || depth >= kMaxSplits) {
+        DrawTriangle(drawn[0], drawn[1], drawn[2], out_);
+        return;
+      }
+    } else if (depth >= kMaxSplits || size < kMinSize * centre.norm() ||
+               !projector_.MaySeeInCam(centre, size)) {
+      return;
+    }
+    SplitLongestEdge(a, b, c, depth);
+  }
+
+  void SplitLongestEdge(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                        const Eigen::Vector3d& c, int depth) const {
+    const double ab = (a - b).squaredNorm(), bc = (b - c).squaredNorm(), ca = (c - a).squaredNorm();
+    if (ab >= bc && ab >= ca) {
+      const Eigen::Vector3d middle = 0.5 * (a + b);
+      Split(a, middle, c, depth + 1);
+      Split(middle, b, c, depth + 1);
+    } else if (bc >= ca) {
+      SplitLongestEdge(b, c, a, depth);
+    } else {
+      SplitLongestEdge(c, a, b, depth);
+    }
+  }
+
+  const PhotoProjector& projector_;
+  float scale_x_, scale_y_, max_edge_px_;
+  cv::Mat1f* out_;
+};
+
+double MapScale(const PhotoProjector& projector, double angular_spacing,
+                const OcclusionOptions& options) {
+  const double photo_size = std::max(projector.width(), projector.height());
+  const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
+  double size = options.depth_map_size;
+  if (spacing_px > 0) size = std::max(size, 3 * photo_size / spacing_px);  // three pixels a sample
+  return std::min(1.0, size / photo_size);
+}
+
+}  // namespace
+
+std::vector<std::string> OcclusionOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (depth_tolerance != -1 && (!(depth_tolerance > 0) || !(depth_tolerance < 1))) {
+    problems.push_back(
+        "--Occlusion.depth_tolerance must be -1 (automatic) or lie between 0 and 1 (a share of the "
+        "depth)");
+  }
+  if (!(boundary_px >= 0) && boundary_px != -1) {
+    problems.push_back("--Occlusion.boundary_px must be -1 (automatic) or not negative");
+  }
+  if (!(boundary_px <= 500)) problems.push_back("--Occlusion.boundary_px must be at most 500");
+  if (!(boundary_jump > 0)) problems.push_back("--Occlusion.boundary_jump must be positive");
+  if (depth_map_size < 64 || depth_map_size > 65536) {
+    problems.push_back("--Occlusion.depth_map_size must be 64 to 65536 pixels");
+  }
+  return problems;
+}
+
+DepthMap::DepthMap(int photo_width, int photo_height, double scale) {
+  const int width = std::max(1, static_cast<int>(std::lround(photo_width * scale)));
+  const int height = std::max(1, static_cast<int>(std::lround(photo_height * scale)));
+  inverse_depth_ = cv::Mat1f(height, width, 0.0f);
+  scale_x_ = static_cast<float>(width) / static_cast<float>(photo_width);
+  scale_y_ = static_cast<float>(height) / static_cast<float>(photo_height);
+}
+
+void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
+                    float max_edge_px) {
+  const CpuTimer timer(CpuStage::kDepthMap);
+  const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &inverse_depth_);
+  const auto width = static_cast<float>(inverse_depth_.cols);
+  const auto height = static_cast<float>(inverse_depth_.rows);
+  ProjectedBlock projected;
+  std::vector<RasterVertex> vertices;
+  for (const MeshTile& tile : tiles) {
+    const PointBlock& points = tile.points;
+    if (!projector.MaySee(points.origin, points.radius)) continue;
+    projector.Project(points, &projected);
+    vertices.resize(points.size());
+    for (int i = 0; i < points.size(); ++i) {
+      const float depth = projected.depth[i];
+      vertices[i] = {projected.x[i] * scale_x_, projected.y[i] * scale_y_,
+                     depth > static_cast<float>(kNearDepth) ? 1 / depth : 0.0f};
+    }
+    for (const auto& [ia, ib, ic] : tile.triangles) {
+      const RasterVertex &a = vertices[ia], &b = vertices[ib], &c = vertices[ic];
+      if (a.w > 0 && b.w > 0 && c.w > 0) {
+        const float low_x = std::min({a.x, b.x, c.x}), high_x = std::max({a.x, b.x, c.x});
+        const float low_y = std::min({a.y, b.y, c.y}), high_y = std::max({a.y, b.y, c.y});
+        const float size = std::max(high_x - low_x, high_y - low_y);
+        if (size <= max_edge_px) {
+          if (high_x < 0 || high_y < 0 || low_x > width || low_y > height) continue;
+          DrawTriangle(a, b, c, &inverse_depth_);
+          continue;
+        }
+      }
+      const auto corner = [&points](int i) {
+        return Eigen::Vector3d(points.origin +
+                               Eigen::Vector3d(points.x[i], points.y[i], points.z[i]));
+      };
+      splitter.Draw(corner(ia), corner(ib), corner(ic));
+    }
+  }
+}
+
+void DepthMap::CloseGaps(int radius_px) {
+  if (radius_px <= 0) return;
+  const CpuTimer timer(CpuStage::kBoundaries);
+  const cv::Mat square = Square(radius_px);
+  const cv::Mat1b holes = inverse_depth_ == 0;
+  if (cv::countNonZero(holes) == 0) return;
+  cv::Mat1b remaining;
+  cv::morphologyEx(holes, remaining, cv::MORPH_OPEN, square);
+  cv::Mat1f nearest;
+  cv::dilate(inverse_depth_, nearest, square);
+  nearest.copyTo(inverse_depth_, holes & ~remaining);
+}
+
+cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_px) {
+  const CpuTimer timer(CpuStage::kBoundaries);
+  // 255 where there is a surface, or a hole too small to matter.
+  cv::Mat1b covered = inverse_depth > 0;
+  if (hole_px > 0) cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, Square(hole_px));
+  const auto threshold = static_cast<float>(jump);
+  const auto is_jump = [&](float before, float here, float after) {
+    return std::abs(before - 2 * here + after) > threshold * std::max({before, here, after});
+  };
+  cv::Mat1b edges(inverse_depth.size(), uint8_t{0});
+  for (int row = 0; row < edges.rows; ++row) {
+    const int up = std::max(row - 1, 0), down = std::min(row + 1, edges.rows - 1);
+    const float *above = inverse_depth[up], *w = inverse_depth[row], *below = inverse_depth[down];
+    for (int column = 0; column < edges.cols; ++column) {
+      const int left = std::max(column - 1, 0), right = std::min(column + 1, edges.cols - 1);
+      const bool whole =
+          w[column] > 0 && w[left] > 0 && w[right] > 0 && above[column] > 0 && below[column] > 0;
+      bool edge;
+      if (whole) {
+        edge = (left < column && column < right && is_jump(w[left], w[column], w[right])) ||
+               (up < row && row < down && is_jump(above[column], w[column], below[column]));
+      } else {
+        // Behind the border of a large hole lies anything.
+        edge =
+            covered(row, column) != 0 && (covered(row, left) == 0 || covered(row, right) == 0 ||
+                                          covered(up, column) == 0 || covered(down, column) == 0);
+      }
+      if (edge) edges(row, column) = 255;
+    }
+  }
+  return edges;
+}
+
+cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px) {
+  const CpuTimer timer(CpuStage::kBoundaries);
+  if (cv::countNonZero(boundaries) == 0) return cv::Mat1b(boundaries.size(), uint8_t{0});
+  cv::Mat1f distance;
+  cv::distanceTransform(boundaries == 0, distance, cv::DIST_L2, 3);
+  return distance <= radius_px;
+}
+
+PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
+                                 const std::vector<OccluderTiles>& occluders,
+                                 double angular_spacing, const OcclusionOptions& options)
+    : surface_(projector.width(), projector.height(),
+               MapScale(projector, angular_spacing, options)),
+      share_(static_cast<float>(options.depth_tolerance)) {
+  if (options.depth_tolerance < 0) {
+    double noise = 0;
+    for (const OccluderTiles& tiles : occluders) noise = std::max(noise, tiles.range_noise);
+    share_ = noise > 0 ? kNearlyExact : kUnknownNoise;
+    distance_ = static_cast<float>(3 * noise);
+  }
+  const double spacing_px = angular_spacing * projector.camera().camera().MeanFocalLength();
+  const auto map_px = [this](double px) {
+    return static_cast<int>(std::ceil(px * surface_.scale_x()));
+  };
+  for (const OccluderTiles& tiles : occluders) surface_.Draw(projector, tiles.surface);
+  surface_.CloseGaps(map_px(kGapSpacings * spacing_px));
+  if (options.shadows) {
+    DepthMap shadow(projector.width(), projector.height(),
+                    MapScale(projector, angular_spacing, options));
+    for (const OccluderTiles& tiles : occluders)
+      shadow.Draw(projector, tiles.shadows, kShadowEdgePx);
+    shadow_ = shadow.inverse_depth();
+    DepthMap fringe(projector.width(), projector.height(),
+                    MapScale(projector, angular_spacing, options));
+    for (const OccluderTiles& tiles : occluders)
+      fringe.Draw(projector, tiles.fringes, kShadowEdgePx);
+    fringe_ = fringe.inverse_depth();
+  }
+  const double radius = options.boundary_px >= 0 ? options.boundary_px : kBoundaryPx;
+  mask_ = BoundaryMask(DepthBoundaries(surface_.inverse_depth(), options.boundary_jump,
+                                       map_px(kGapSpacings * spacing_px)),
+                       radius * surface_.scale_x());
+}
+
+Sight PhotoVisibility::Look(float x, float y, float depth) const {
+  const cv::Mat1f& map = surface_.inverse_depth();
+  const float map_x = x * surface_.scale_x(), map_y = y * surface_.scale_y();
+  const int column = std::clamp(static_cast<int>(std::floor(map_x - 0.5f)), 0, map.cols - 1);
+  const int row = std::clamp(static_cast<int>(std::floor(map_y - 0.5f)), 0, map.rows - 1);
+  const int right = std::min(column + 1, map.cols - 1), below = std::min(row + 1, map.rows - 1);
+  const float farthest =
+      std::min({map(row, column), map(row, right), map(below, column), map(below, right)});
+  // Thesis (8.4): |z_r / z - 1| < tau, for the surface in front of the sample.
+  if (IsBehind(farthest, depth, 1)) return Sight::kHidden;
+  const int nearest_column = std::clamp(static_cast<int>(map_x), 0, map.cols - 1);
+  const int nearest_row = std::clamp(static_cast<int>(map_y), 0, map.rows - 1);
+  if (!shadow_.empty()) {
+    // They end at the samples around a depth jump, which are not behind them.
+    if (IsBehind(shadow_(nearest_row, nearest_column), depth, 2)) return Sight::kShadow;
+    if (IsBehind(fringe_(nearest_row, nearest_column), depth, 2)) return Sight::kFringe;
+  }
+  if (mask_(nearest_row, nearest_column) != 0) return Sight::kBoundary;
+  return Sight::kClear;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,370 @@
+#include "texture/texels/mesh_atlas.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <opencv2/imgproc.hpp>
+
+#include "texture/texels/grid_image.h"
+#include "texture/texels/gutters.h"
+#include "texture/texels/mesh_charts.h"
+#include "texture/texels/rectangle_packing.h"
+
+namespace roomtex {
+namespace {
+
+// Texels around a chart, and the grid that charts begin on: no mixing in the first three mipmaps.
+constexpr int kGutter = 8;
+constexpr double kMostGutters = 3;  // texels with gutters, of those allowed without
+constexpr double kWorthTexels = 8;  // from vertex to vertex, in mode "auto"
+
+int RoundUp(double length) {
+  return static_cast<int>(std::ceil(length / kGutter - 1e-9)) * kGutter;
+}
+
+double TriangleArea(const std::vector<Eigen::Vector3d>& points, const Triangle& t) {
+  return 0.5 * (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]).norm();
+}
+
+// A chart before it has a place: axes in its plane, along which its rectangle is smallest.
+struct FlatChart {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 2, 3> axes = Eigen::Matrix<double, 2, 3>::Zero();
+  Eigen::Vector2d low, high;  // metres along the axes, from the centre
+};
+
+FlatChart FlattenChart(const std::vector<Eigen::Vector3d>& points,
+                       const std::vector<Triangle>& triangles, const std::vector<int>& members,
+                       const Eigen::Vector3d& normal) {
+  FlatChart chart;
+  chart.centre = points[triangles[members[0]][0]];
+  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  std::vector<cv::Point2f> flat;
+  for (const int t : members) {
+    for (const int corner : triangles[t]) {
+      const Eigen::Vector3d p = points[corner] - chart.centre;
+      flat.emplace_back(static_cast<float>(u.dot(p)), static_cast<float>(v.dot(p)));
+    }
+  }
+  const double angle = cv::minAreaRect(flat).angle * CV_PI / 180;
+  // Image rows run against v, so that the chart is seen from its front.
+  chart.axes.row(0) = (std::cos(angle) * u + std::sin(angle) * v).transpose();
+  chart.axes.row(1) = (std::sin(angle) * u - std::cos(angle) * v).transpose();
+  chart.low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  chart.high = -chart.low;
+  for (const int t : members) {
+    for (const int corner : triangles[t]) {
+      const Eigen::Vector2d p = chart.axes * (points[corner] - chart.centre);
+      chart.low = chart.low.cwiseMin(p);
+      chart.high = chart.high.cwiseMax(p);
+    }
+  }
+  return chart;
+}
+
+// Corners of a triangle in its page, and walks over the texels whose centres lie in it.
+struct FlatTriangle {
+  Eigen::Vector2d corner[3];
+
+  // Calls body(column, row, shares of the corners) for rows in [first, end); shares sum to 1.
+  template <typename Body>
+  void ForEachTexel(int first, int end, const Body& body) const {
+    const Eigen::Vector2d ab = corner[1] - corner[0], ac = corner[2] - corner[0];
+    const double area = ab.x() * ac.y() - ab.y() * ac.x();
+    if (area == 0 || !std::isfinite(area)) return;
+    const Eigen::Vector2d low = corner[0].cwiseMin(corner[1]).cwiseMin(corner[2]);
+    const Eigen::Vector2d high = corner[0].cwiseMax(corner[1]).cwiseMax(corner[2]);
+    const int row_begin = std::max(first, static_cast<int>(std::ceil(low.y() - 0.5)));
+    const int row_end = std::min(end, static_cast<int>(std::floor(high.y() - 0.5)) + 1);
+    const int column_begin = std::max(0, static_cast<int>(std::ceil(low.x() - 0.5)));
+    const int column_last = static_cast<int>(std::floor(high.x() - 0.5));
+    constexpr double kSlack = -1e-9;
+    for (int row = row_begin; row < row_end; ++row) {
+      for (int column = column_begin; column <= column_last; ++column) {
+        const Eigen::Vector2d p = Eigen::Vector2d(column + 0.5, row + 0.5) - corner[0];
+        const double b = (p.x() * ac.y() - p.y() * ac.x()) / area;
+        const double c = (ab.x() * p.y() - ab.y() * p.x()) / area;
+        if (b < kSlack || c < kSlack || b + c > 1 - kSlack) continue;
+        body(column, row, Eigen::Vector3d(1 - b - c, b, c));
+      }
+    }
+  }
+};
+
+// Triangles of a chart that lie over others of it when they are laid flat (a spiral stair): they
+// leave it.
+std::vector<int> FindFolds(const std::vector<Eigen::Vector3d>& points,
+                           const std::vector<Triangle>& triangles, const std::vector<int>& members,
+                           const FlatChart& chart, double texel_size) {
+  const Eigen::Vector2d size = (chart.high - chart.low) / texel_size;
+  constexpr double kLargest = 4096;  // coarser is enough to find out
+  const double step = texel_size * std::max(1.0, size.maxCoeff() / kLargest);
+  const int columns = static_cast<int>((chart.high - chart.low).x() / step) + 2;
+  const int rows = static_cast<int>((chart.high - chart.low).y() / step) + 2;
+  cv::Mat1b taken(rows, columns, uint8_t{0});
+  std::vector<int> folds;
+  for (const int t : members) {
+    FlatTriangle flat;
+    for (int k = 0; k < 3; ++k) {
+      flat.corner[k] = (chart.axes * (points[triangles[t][k]] - chart.centre) - chart.low) / step;
+    }
+    constexpr double kInside = 0.02;  // not on the border that neighbours share
+    int num_taken = 0, num = 0;
+    flat.ForEachTexel(0, rows, [&](int column, int row, const Eigen::Vector3d& shares) {
+      if (shares.minCoeff() < kInside) return;
+      ++num;
+      num_taken += taken(row, column);
+    });
+    if (num_taken > 0.02 * num) {
+      folds.push_back(t);
+      continue;
+    }
+    flat.ForEachTexel(0, rows, [&](int column, int row, const Eigen::Vector3d& shares) {
+      if (shares.minCoeff() >= kInside) taken(row, column) = 1;
+    });
+  }
+  return folds;
+}
+
+// Members of every chart; triangles without a chart are left out.
+std::vector<std::vector<int>> ListMembers(const MeshCharts& charts) {
+  std::vector<std::vector<int>> members(charts.normals.size());
+  for (size_t t = 0; t < charts.chart_of.size(); ++t) {
+    if (charts.chart_of[t] >= 0) members[charts.chart_of[t]].push_back(static_cast<int>(t));
+  }
+  return members;
+}
+
+// Charts that do not fold: what folds is made into charts of its own.
+MeshCharts MakeFlatCharts(const std::vector<Eigen::Vector3d>& points,
+                          const std::vector<Triangle>& triangles, const ChartOptions& options,
+                          double texel_size, std::vector<FlatChart>* flat) {
+  MeshCharts charts = GrowCharts(points, triangles, options);
+  std::vector<std::vector<int>> members = ListMembers(charts);
+  for (size_t c = 0; c < members.size(); ++c) {
+    flat->push_back(FlattenChart(points, triangles, members[c], charts.normals[c]));
+    if (members[c].size() < 3) continue;
+    const std::vector<int> folds =
+        FindFolds(points, triangles, members[c], flat->back(), texel_size);
+    if (folds.empty()) continue;
+    std::vector<int> kept;
+    std::set_difference(members[c].begin(), members[c].end(), folds.begin(), folds.end(),
+                        std::back_inserter(kept));
+    const auto number = static_cast<int>(members.size());
+    for (const int t : folds) charts.chart_of[t] = number;
+    members.push_back(folds);
+    charts.normals.push_back(charts.normals[c]);
+    members[c] = kept;
+  }
+  return charts;
+}
+
+// The power of two (or the largest size allowed) that wastes least on at most four pages.
+int ChoosePageSize(double num_texels, int widest, int max_size) {
+  int best = max_size;
+  double least = std::numeric_limits<double>::infinity();
+  for (int size = 64; size <= max_size; size *= 2) {
+    const double area = static_cast<double>(size) * size;
+    const double pages = std::ceil(1.1 * num_texels / area);
+    if (size < widest || pages > 4 || pages * area > least) continue;
+    least = pages * area;
+    best = size;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<std::string> AtlasOptions::Problems() const {
+  std::vector<std::string> problems;
+  if (mode != "auto" && mode != "1" && mode != "0") {
+    problems.push_back("--Texture.atlas must be auto, 1 or 0");
+  }
+  if (!(texel_size >= 0) || !(texel_size <= 10)) {
+    problems.push_back("--Texture.texel_mm must be 0 (auto) to 10000");
+  }
+  return problems;
+}
+
+SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
+                           const std::vector<Triangle>& triangles, int max_count) {
+  SurfaceProbes probes;
+  double total = 0;
+  for (const Triangle& t : triangles) {
+    const double area = TriangleArea(points, t);
+    if (std::isfinite(area)) total += area;
+  }
+  if (!(total > 0)) return probes;
+  const double area_per_probe = total / max_count;
+  // Roberts' R2 sequence inside the triangles: even, and the same in every run.
+  constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
+  double owed = 0.5 * area_per_probe, x = 0.5, y = 0.5;
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d a = points[t[0]], ab = points[t[1]] - a, ac = points[t[2]] - a;
+    const Eigen::Vector3d normal = ab.cross(ac);
+    const double area = 0.5 * normal.norm();
+    if (!std::isfinite(area)) continue;
+    for (owed += area; owed >= area_per_probe; owed -= area_per_probe) {
+      x = std::fmod(x + kStepX, 1.0);
+      y = std::fmod(y + kStepY, 1.0);
+      const bool beyond = x + y > 1;
+      probes.points.push_back(a + (beyond ? 1 - x : x) * ab + (beyond ? 1 - y : y) * ac);
+      probes.normals.push_back(normal.normalized().cast<float>());
+    }
+  }
+  return probes;
+}
+
+double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>& photos) {
+  const size_t stride = std::max<size_t>(1, probes.points.size() / 10000);
+  std::vector<double> finest;  // per probe
+  std::vector<PhotoProjector> projectors(photos.begin(), photos.end());
+  for (size_t i = 0; i < probes.points.size(); i += stride) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const PhotoProjector& photo : projectors) {
+      const Eigen::Vector3d to_camera = photo.centre() - probes.points[i];
+      if (to_camera.cast<float>().dot(probes.normals[i]) <= 0) continue;
+      const Eigen::Vector3d in_cam = photo.cam_from_scan() * probes.points[i];
+      const double size = in_cam.z() / photo.camera().camera().MeanFocalLength();
+      if (!(in_cam.z() > 0) || size >= least) continue;
+      const auto position = photo.camera().ImgFromCam(in_cam);
+      if (position && photo.camera().InImage(*position)) least = size;
+    }
+    if (std::isfinite(least)) finest.push_back(least);
+  }
+  if (finest.empty()) return 0;
+  std::nth_element(finest.begin(), finest.begin() + finest.size() / 2, finest.end());
+  return finest[finest.size() / 2];
+}
+
+MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
+                      const std::vector<Triangle>& triangles, double pixel_on_surface,
+                      double max_texels, const AtlasOptions& options) {
+  MeshAtlas atlas;
+  if (options.mode == "0") return atlas;
+  double area = 0;
+  for (const Triangle& t : triangles) area += TriangleArea(points, t);
+  double texel = options.texel_size > 0 ? options.texel_size : pixel_on_surface;
+  if (!(texel > 0) || !(area > 0) || !std::isfinite(area)) return atlas;
+  texel = std::max(texel, std::sqrt(area / max_texels));
+  const double edge = std::sqrt(2 * area / static_cast<double>(triangles.size()));
+  if (options.mode == "auto" && edge < kWorthTexels * texel) return atlas;
+
+  const int room = options.max_page_size - 3 * kGutter;
+  ChartOptions chart_options;
+  chart_options.max_extent = room * texel / std::sqrt(2.0);  // a chart may lie askew in its box
+  chart_options.smooth_below = kWorthTexels * texel;
+  std::vector<FlatChart> flat;
+  MeshCharts charts = MakeFlatCharts(points, triangles, chart_options, texel, &flat);
+  std::vector<std::array<int, 2>> sizes;
+  std::vector<double> texel_of;
+  double total = 0;
+  int widest = 0;
+  for (const FlatChart& chart : flat) {
+    const Eigen::Vector2d extent = chart.high - chart.low;
+    texel_of.push_back(std::max(texel, extent.maxCoeff() / room));
+    sizes.push_back({RoundUp(extent.x() / texel_of.back() + 2 * kGutter),
+                     RoundUp(extent.y() / texel_of.back() + 2 * kGutter)});
+    total += static_cast<double>(sizes.back()[0]) * sizes.back()[1];
+    widest = std::max({widest, sizes.back()[0], sizes.back()[1]});
+  }
+  if (total > kMostGutters * max_texels) return atlas;
+  atlas.page_size = ChoosePageSize(total, widest, options.max_page_size);
+  const Packing packing = PackRectangles(sizes, atlas.page_size);
+  atlas.texel_size = texel;
+  atlas.num_pages = packing.num_pages;
+  atlas.chart_of = std::move(charts.chart_of);
+  for (size_t c = 0; c < flat.size(); ++c) {
+    const PackedRectangle& place = packing.places[c];
+    AtlasChart chart;
+    chart.page = place.page;
+    chart.page_from_scan.leftCols<3>() = flat[c].axes / texel_of[c];
+    chart.page_from_scan.col(3) = Eigen::Vector2d(place.x + kGutter, place.y + kGutter) -
+                                  (flat[c].axes * flat[c].centre + flat[c].low) / texel_of[c];
+    atlas.charts.push_back(chart);
+  }
+  return atlas;
+}
+
+AtlasTexels::AtlasTexels(const std::vector<Eigen::Vector3d>& points,
+                         const std::vector<Triangle>& triangles, const MeshAtlas& atlas,
+                         const std::vector<Rgb>& vertex_colors, int page)
+    : points_(points), triangles_(triangles), atlas_(atlas), vertex_colors_(vertex_colors) {
+  for (size_t t = 0; t < triangles.size(); ++t) {
+    const int chart = atlas.chart_of[t];
+    if (chart >= 0 && atlas.charts[chart].page == page) on_page_.push_back(static_cast<int>(t));
+  }
+}
+
+TexelBlock AtlasTexels::Rows(int first, int end) const {
+  const int size = atlas_.page_size;
+  const size_t count = static_cast<size_t>(size) * (end - first);
+  TexelBlock block;
+  block.points.assign(count, Scan::MissingPoint());
+  block.normals.assign(count, Eigen::Vector3f::Zero());
+  block.links.bits.assign(count, 0);
+  block.unseen.assign(count, Rgb{0, 0, 0});
+  std::vector<int> chart_at(count, -1);
+  for (const int t : on_page_) {
+    const int number = atlas_.chart_of[t];
+    const AtlasChart& chart = atlas_.charts[number];
+    const Triangle& corners = triangles_[t];
+    const Eigen::Vector3d &a = points_[corners[0]], &b = points_[corners[1]],
+                          &c = points_[corners[2]];
+    const Eigen::Vector3f normal = (b - a).cross(c - a).normalized().cast<float>();
+    const auto set = [&](int column, int row, const Eigen::Vector3d& shares) {
+      const size_t i = static_cast<size_t>(row - first) * size + column;
+      if (chart_at[i] >= 0) return;
+      chart_at[i] = number;
+      block.points[i] = shares[0] * a + shares[1] * b + shares[2] * c;
+      block.normals[i] = normal;
+      for (int k = 0; k < 3; ++k) {
+        double value = 0;
+        for (int j = 0; j < 3; ++j) value += shares[j] * vertex_colors_[corners[j]][k];
+        block.unseen[i][k] = static_cast<uint8_t>(std::lround(value));
+      }
+    };
+    const FlatTriangle flat{{chart.InPage(a), chart.InPage(b), chart.InPage(c)}};
+    flat.ForEachTexel(first, end, set);
+    // A sliver between the texels' centres has a colour, too.
+    const Eigen::Vector2d middle = (flat.corner[0] + flat.corner[1] + flat.corner[2]) / 3;
+    const int column = std::clamp(static_cast<int>(middle.x()), 0, size - 1);
+    const int row = static_cast<int>(middle.y());
+    if (row >= first && row < end) set(column, row, Eigen::Vector3d::Constant(1.0 / 3));
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (chart_at[i] < 0) continue;
+    const bool right = (i + 1) % size != 0 && chart_at[i + 1] == chart_at[i];
+    const bool down = i + size < count && chart_at[i + size] == chart_at[i];
+    block.links.bits[i] =
+        static_cast<uint8_t>((right ? GridLinks::kRight : 0) | (down ? GridLinks::kDown : 0));
+  }
+  return block;
+}
+
+void FinishPage(const TexelSource& texels, ColorGrid* page, double* num_texels, double* num_seen) {
+  constexpr int kRowsAtOnce = 256;
+  cv::Mat1b known(page->num_rows, page->num_columns, uint8_t{0});
+  for (int first = 0; first < page->num_rows; first += kRowsAtOnce) {
+    const int end = std::min(page->num_rows, first + kRowsAtOnce);
+    const TexelBlock block = texels.Rows(first, end);
+    for (size_t i = 0; i < block.points.size(); ++i) {
+      const bool covered = block.points[i].x() == block.points[i].x();
+      const size_t texel = static_cast<size_t>(first) * page->num_columns + i;
+      known.data[texel] = covered;
+      *num_texels += covered;
+      *num_seen += page->views[texel] > 0;
+    }
+  }
+  cv::Mat image = ImageOfGrid(*page);
+  PaintGutters(known, std::max(known.rows, known.cols), &image);
+  auto pixel = image.begin<cv::Vec3b>();
+  for (Rgb& rgb : page->rgb) {
+    rgb = {(*pixel)[2], (*pixel)[1], (*pixel)[0]};
+    ++pixel;
+  }
+}
+
+}  // namespace roomtex

@@ -1,0 +1,169 @@
+// roomtex-view: a look at the coloured scan in a browser.
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <optional>
+
+#include <Eigen/Geometry>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/local_server.h"
+#include "core/open_browser.h"
+#include "core/output_file.h"
+#include "texture/view/view_server.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ViewOptions {
+  std::string input_path, aligned, image_path;
+  LocalServerOptions server;
+};
+
+// A value of a report that roomtex wrote, e.g. {"options", "image_path"}; "" = not there.
+std::string FromReport(const fs::path& path, const std::vector<std::string>& keys) {
+  std::ifstream stream(path);
+  Json json = Json::parse(stream, nullptr, false);
+  for (const std::string& key : keys) {
+    if (!json.is_object() || !json.contains(key)) return "";
+    json = Json(json[key]);
+  }
+  if (json.is_array() && !json.empty()) json = Json(json[0]);
+  return json.is_string() ? json.get<std::string>() : "";
+}
+
+// Where the photos were when the model was aligned or coloured; "" = nobody says, or they are gone.
+std::string FindPhotos(const ViewOptions& options, const Command::Context& context) {
+  if (!options.image_path.empty()) {
+    RequireFolder(options.image_path, "Give the folder of the photos");
+    return options.image_path;
+  }
+  std::string said;
+  for (const fs::path& report : {fs::path(options.aligned) / "alignment.json",
+                                 fs::path(options.input_path) / "report.json"}) {
+    for (const char* section : {"inputs", "options"}) {
+      std::string folder = FromReport(report, {section, "image_path"});
+      if (folder.empty()) continue;
+      std::error_code error;
+      if (fs::is_directory(folder, error)) return folder;
+      // The command may have run elsewhere: beside its output folder, mostly.
+      for (const fs::path& base : {report.parent_path(), report.parent_path() / ".."}) {
+        const fs::path moved = (base / folder).lexically_normal();
+        if (fs::is_directory(moved, error)) return moved.string();
+      }
+      said = folder;
+    }
+  }
+  context.Warn(said.empty()
+                   ? "nothing says where the photos are; give --image_path to see them"
+                   : "the photos are no longer in " + said + "; give --image_path to see them");
+  return "";
+}
+
+ViewCameras ReadCameras(const ViewOptions& options, const Command::Context& context) {
+  if (options.aligned.empty()) return {};
+  context.progress.Stage("read cameras");
+  ViewCameras cameras(ReadSparseModel(options.aligned), FindPhotos(options, context));
+  if (cameras.size() == 0) {
+    throw InputError(options.aligned, "", "holds no registered photo",
+                     "Give the folder that roomtex-align wrote");
+  }
+  return cameras;
+}
+
+// Cameras far from everything: the model is not in the scan's frame.
+std::optional<std::string> FrameProblem(const ViewModel& model, const ViewCameras& cameras) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : model.points) {
+    if (p.allFinite()) box.extend(p.cast<double>());
+  }
+  const double diagonal = box.diagonal().norm();
+  size_t num_far = 0;
+  for (const auto& [id, image] : cameras.model().images) {
+    const Eigen::Vector3d at = image.cam_from_model.TargetOriginInSource() - model.origin;
+    num_far += box.exteriorDistance(at) > diagonal;
+  }
+  if (2 * num_far <= cameras.size()) return std::nullopt;
+  return "most cameras of --aligned stand far outside the scan: is the model aligned? Run "
+         "roomtex-align.";
+}
+
+void View(const ViewOptions& options, const Command::Context& context) {
+  ThrowIfProblems(options.server.Problems());
+  context.progress.Stage("read model");
+  ViewContent content;
+  content.model = ReadViewModel(options.input_path);
+  content.cameras = ReadCameras(options, context);
+  if (const auto problem = FrameProblem(content.model, content.cameras)) {
+    context.Warn(*problem);
+    content.warnings.push_back(*problem);
+  }
+  if (content.cameras.size() > content.cameras.num_photos()) {
+    content.warnings.push_back(
+        std::to_string(content.cameras.size() - content.cameras.num_photos()) + " of " +
+        std::to_string(content.cameras.size()) +
+        " photos are not there; give --image_path to see them.");
+  }
+  const fs::path evidence = fs::path(content.model.path).parent_path() / "evidence.ply";
+  std::error_code error;
+  if (fs::is_regular_file(evidence, error)) {
+    content.evidence_path = evidence.string();
+  } else {
+    content.no_evidence_reason =
+        "There is no evidence.ply beside the model: an older roomtex-texture wrote it, or one with "
+        "--output_evidence 0. Run roomtex-texture again.";
+  }
+
+  context.progress.Stage("prepare");
+  context.report["num_vertices"] = content.model.points.size();
+  context.report["num_triangles"] = content.model.triangles.size();
+  context.report["num_cameras"] = content.cameras.size();
+  context.report["num_photos"] = content.cameras.num_photos();
+  LocalServer server(options.server);
+  const ViewServer view(std::move(content), &server, context.options.num_threads);
+  server.Start(true);
+  if (options.server.port != 0 && server.port() != options.server.port) {
+    context.progress.Note("port " + std::to_string(options.server.port) + " is taken: using " +
+                          std::to_string(server.port()));
+  }
+  context.progress.Finish();
+  std::cout << server.Url() << std::endl << server.SshLine() << std::endl;
+  std::optional<OpenBrowser> browser;
+  if (options.server.open) {
+    browser.emplace(server.Url());
+    if (!browser->problem().empty()) context.Warn(browser->problem());
+  }
+  context.progress.Note("Ctrl-C ends");
+  server.Wait();
+}
+
+int Main(int argc, char** argv) {
+  ViewOptions options;
+  Command command("roomtex-view",
+                  "Shows the coloured scan, its cameras and photos in a browser; measures in it.",
+                  "roomtex-view --input_path textured --aligned aligned --open 1");
+  command.AddInputPath("input_path", &options.input_path,
+                       "Folder that roomtex-texture wrote; or a .glb or .ply file.");
+  command.AddInputPath(
+      "aligned", &options.aligned,
+      "Folder that roomtex-align wrote, or any COLMAP model in the scan frame: its "
+      "cameras and points are shown.",
+      Command::Kind::kOptional);
+  command.AddInputPath("image_path", &options.image_path,
+                       "Folder of the photos; default: where alignment.json or report.json says "
+                       "they were.",
+                       Command::Kind::kOptional);
+  AddLocalServerOptions(&options.server, &command);
+  LetPortDiffer(argc, argv, &options.server);
+  return command.Run(argc, argv,
+                     [&options](const Command::Context& context) { View(options, context); });
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) { return roomtex::Main(argc, argv); }
