@@ -5,7 +5,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "capture/pattern/pattern.h"
 #include "core/frames.h"
 #include "core/photo.h"
 
@@ -147,19 +146,17 @@ void AddProjectorBody(const Rigid& room_from_proj, RoomScene* scene) {
 }
 
 Projector MakeProjector(const SimulatedRoomOptions& options, int k, const Rigid& room_from_proj) {
-  PatternOptions pattern;
-  pattern.width = options.projector_width;
-  pattern.height = options.projector_height;
-  pattern.random_seed = options.same_pattern ? 1 : k + 1;
+  const cv::Mat1b pattern = options.pattern(options.projector_width, options.projector_height,
+                                            options.same_pattern ? 1 : k + 1);
   Camera camera;
   camera.camera_id = static_cast<uint32_t>(k + 1);
   camera.model = CameraModel::kPinhole;
-  camera.width = pattern.width;
-  camera.height = pattern.height;
+  camera.width = pattern.cols;
+  camera.height = pattern.rows;
   const double focal =
       0.5 * camera.width / std::tan(RadFromDeg(options.projector_field_of_view_deg) / 2);
   camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
-  return Projector(camera, room_from_proj.Inverse(), MakePattern(pattern), options.projector_light,
+  return Projector(camera, room_from_proj.Inverse(), pattern, options.projector_light,
                    options.projector_focus, kAperture);
 }
 

@@ -58,7 +58,7 @@ class Projector {
 std::vector<Rigid> PlaceProjectors(const SimulatedRoomOptions& options);
 // The dark box and the stand that carry the lens. They are in the scan and in the photos.
 void AddProjectorBody(const Rigid& room_from_proj, RoomScene* scene);
-// Projector k throws the pattern of `roomtex-pattern --random_seed k + 1`, or that of the first.
+// Projector k throws SimulatedRoomOptions::pattern of seed k + 1, or that of the first.
 Projector MakeProjector(const SimulatedRoomOptions& options, int k, const Rigid& room_from_proj);
 // Walls, floor and ceiling, m2.
 double RoomArea(const SimulatedRoomOptions& options);

@@ -42,6 +42,7 @@ std::vector<std::string> SimulatedRoomOptions::Problems() const {
   require(within(finest_detail, 0, 0.1), "finest_detail must be 0 to 0.1 m");
   require(projectors >= 0 && projectors <= kMaxProjectors,
           "projectors must be 0 to " + std::to_string(kMaxProjectors));
+  require(projectors == 0 || pattern != nullptr, "projectors need a pattern to throw");
   require(projector_width >= 320 && projector_width <= 16384,
           "projector_width must be 320 to 16384 pixels");
   require(projector_height >= 240 && projector_height <= 16384,

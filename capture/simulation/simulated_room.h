@@ -5,6 +5,7 @@
 // Frames: `room` (metres, z up, origin in a corner of the floor, x along the width, y along the
 // depth) and, per station, `scan` (RTPI: y up, origin in the scanner).
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,6 +41,8 @@ struct SimulatedRoomOptions {
   double projector_light = 15;
   double projector_focus = 3.2;  // metres from the lens to where the pattern is sharp
   bool same_pattern = false;     // a mistake: all projectors throw the pattern of the first
+  // The 8-bit grey picture that projector k throws, with seed k + 1; needed if there are projectors.
+  std::function<cv::Mat1b(int width, int height, int seed)> pattern;
   // Photos.
   int num_photos = 30;                          // places, if there are projectors
   int photo_width = 1936, photo_height = 1288;  // pixels

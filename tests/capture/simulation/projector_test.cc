@@ -8,6 +8,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "capture/pattern/pattern.h"
 #include "capture/simulation/simulated_projector.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
@@ -227,6 +228,13 @@ SimulatedRoomOptions SmallProjectedRoom() {
   options.projectors = 2;
   options.projector_width = 960;
   options.projector_height = 540;
+  options.pattern = [](int width, int height, int seed) {
+    PatternOptions pattern;
+    pattern.width = width;
+    pattern.height = height;
+    pattern.random_seed = seed;
+    return MakePattern(pattern);
+  };
   return options;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "capture/pattern/pattern.h"
 #include "capture/simulation/camera_faults.h"
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
@@ -80,6 +81,15 @@ void AddOptions(SimulatedRoomOptions* options, Command* command) {
                      "noise of the clicks, standard deviation per coordinate in pixels");
 }
 
+// As `roomtex-pattern --random_seed SEED` makes it.
+cv::Mat1b ThrownPattern(int width, int height, int seed) {
+  PatternOptions pattern;
+  pattern.width = width;
+  pattern.height = height;
+  pattern.random_seed = seed;
+  return MakePattern(pattern);
+}
+
 void Describe(const SimulatedRoom& room, const CaptureSummary& summary, Report* report) {
   (*report)["num_photos"] = room.NumPhotos();
   (*report)["num_projectors"] = room.options().projectors;
@@ -128,6 +138,7 @@ int main(int argc, char** argv) {
     options.random_seed = seed >= 0 ? seed : context.options.random_seed;
     options.bare = bare == "1" || (bare == "auto" && options.projectors > 0);
     options.num_threads = context.options.num_threads;
+    options.pattern = ThrownPattern;
     ThrowIfProblems(options.Problems());
     context.progress.Stage("room");
     const SimulatedRoom room(options);
