@@ -1,33 +1,38 @@
 #pragma once
 // Every frame, unit, pixel and quaternion convention of roomtex, on one page.
 //
-// Units     metres, radians, pixels, seconds. A name says anything else: `_deg`, `_mm`, `_px2`.
+// UNITS. Metres, radians, pixels, seconds. What differs says so in its name: _deg, _mm, _px2.
 //
-// Frames    `sparse`   COLMAP's reconstruction: right-handed, arbitrary origin, rotation and scale.
-//           `scan`     the range scan: right-handed, metres. RTPI: x right, y up, z backward
-//                      (thesis 5.1.1); PTX: z up, the file's own pose already applied. With
-//                      surveyed stations: the `enu` frame about the first of them.
-//           `station`  one scanner set-up, its origin in the scanner; the scan frame if there is
-//           one only. `cam`      x right, y down, z forward, as COLMAP. `img`      pixels of the
-//           photo as taken, x right, y down. The CENTRE of the upper-left pixel
-//                      is (0.5, 0.5), as COLMAP; the image covers [0, width] x [0, height].
-//           `enu`      local east-north-up, metres.
-//           There is no `world`: every file that says "world" means one of these.
+// FRAMES. All are right-handed.
 //
-// Transforms read `target_from_source`, points `x_in_frame`:  x_in_cam = cam_from_scan * x_in_scan.
-// COLMAP's image pose (qvec, tvec) is `cam_from_sparse`, and `cam_from_scan` in an aligned model.
+//   sparse   COLMAP's reconstruction. Origin, rotation and scale are arbitrary.
+//   scan     The range scan, metres. RTPI: x right, y up, z backward (thesis 5.1.1). PTX: z up,
+//            the pose that the file gives applied. With surveyed stations: `enu` about the first.
+//   station  One set-up of the scanner. Its origin is the point that all ranges start from. One
+//            set-up without a pose: the same as `scan`.
+//   cam      A camera, as in COLMAP: x right, y down, z forward.
+//   img      Pixels of a photo as taken: x right, y down. As in COLMAP the CENTRE of the
+//            upper-left pixel is (0.5, 0.5), and the photo covers [0, width] x [0, height].
+//   enu      Local east-north-up about a place on the Earth, metres.
 //
-// Quaternions in files are w x y z (COLMAP); Eigen's constructor takes w x y z too, but Eigen's
-// coeffs() are x y z w: only the functions below touch the difference.
+// There is no `world`: other programs give that name to any of these.
 //
-// Images of OpenCV count the centre of the upper-left pixel as (0, 0): the functions below convert.
+// TRANSFORMS are called target_from_source, points x_in_frame; a wrong product looks wrong then:
+//     x_in_cam = cam_from_scan * x_in_scan
+// The pose that COLMAP stores with an image (qvec, tvec) is cam_from_sparse; in an aligned model
+// it is cam_from_scan.
+//
+// QUATERNIONS. Files have them as w x y z, as COLMAP, and so does Eigen's constructor. Eigen's
+// coeffs() are x y z w. The functions below convert; nothing else may.
+//
+// PIXELS OF OPENCV. There the centre of the upper-left pixel is (0, 0). The functions below convert.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 namespace roomtex {
 
-// Position for cv::remap, cv::Mat::at and friends, of a position in `img`.
+// The position that cv::remap, cv::Mat::at and the like want for a position in `img`, and back.
 inline Eigen::Vector2d OpenCvFromImg(const Eigen::Vector2d& x_in_img) {
   return x_in_img - Eigen::Vector2d(0.5, 0.5);
 }
@@ -35,12 +40,13 @@ inline Eigen::Vector2d ImgFromOpenCv(const Eigen::Vector2d& x_in_opencv) {
   return x_in_opencv + Eigen::Vector2d(0.5, 0.5);
 }
 
-// glTF texture coordinate (origin at the upper-left corner of the image, v down) of a position in
-// an image of width x height pixels that follows the `img` convention.
+// glTF texture coordinate (u right, v down, (0, 0) in the upper-left corner of the image, (1, 1) in
+// the lower right one) of a position in an image of width x height pixels, counted as in `img`.
 inline Eigen::Vector2d GltfUvFromImg(const Eigen::Vector2d& x_in_img, int width, int height) {
   return {x_in_img.x() / width, x_in_img.y() / height};
 }
 
+// w x y z, as in files.
 inline Eigen::Quaterniond QuaternionFromWxyz(const Eigen::Vector4d& wxyz) {
   return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
 }
