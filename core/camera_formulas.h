@@ -27,8 +27,8 @@ T AngleOverRadius(const T& r2) {
   return atan(r) / r;
 }
 
-// Distorted normalised coordinates (xd, yd) of undistorted ones (x, y); k = parameters after cx,
-// cy.
+// Distorted normalised coordinates (xd, yd) of undistorted ones (x, y). k: the parameters that
+// follow cx, cy.
 template <typename T>
 void Distort(CameraModel model, const T* k, const T& x, const T& y, T* xd, T* yd) {
   using std::atan;

@@ -41,8 +41,8 @@ struct Camera {
   bool has_prior_focal_length = false;  // known from the database only
 
   double MeanFocalLength() const;  // pixels
-  // Everything that keeps this camera from being used: wrong number of parameters, not finite, f <=
-  // 0 ...
+  // Everything that keeps this camera from being used: a wrong number of parameters, one that is
+  // not finite, a focal length that is not positive ...
   std::vector<std::string> Problems() const;
 };
 

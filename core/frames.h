@@ -23,9 +23,10 @@
 // it is cam_from_scan.
 //
 // QUATERNIONS. Files have them as w x y z, as COLMAP, and so does Eigen's constructor. Eigen's
-// coeffs() are x y z w. The functions below convert; nothing else may.
+// coeffs() are x y z w: convert by the functions below, never by hand.
 //
-// PIXELS OF OPENCV. There the centre of the upper-left pixel is (0, 0). The functions below convert.
+// PIXELS OF OPENCV. There the centre of the upper-left pixel is (0, 0): convert by the functions
+// below.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

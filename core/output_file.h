@@ -18,8 +18,8 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  // Binary stream to the file beside. For writers that want a path: partial_path() (same
-  // extension).
+  // Binary stream to the file beside. Writers that want a path take partial_path(), which has the
+  // same extension.
   std::ostream& stream();
   const std::string& partial_path() const { return partial_path_; }
 
@@ -36,8 +36,7 @@ class OutputFile {
 // way.
 void MakeFolder(const std::string& path);
 
-// The given file must exist and be a regular, readable file; otherwise throws InputError with
-// `remedy`.
+// Throws InputError with `remedy` unless the path is that of a regular, readable file.
 void RequireFile(const std::string& path, const std::string& remedy);
 // The same for a folder.
 void RequireFolder(const std::string& path, const std::string& remedy);

@@ -1,5 +1,6 @@
 #pragma once
-// The files of a web page, built into the binary by roomtex_page() of the top CMakeLists.txt.
+// The files of a web page, built into the binary by roomtex_page() of
+// scripts/cmake/pages.cmake.
 
 #include <string_view>
 #include <vector>

@@ -47,8 +47,8 @@ struct GpsData {
   std::optional<double> horizontal_error;  // metres, as the camera states it
   std::string datum;                       // "WGS-84", "TOKYO" ... or ""
 };
-// None without a position: not written, broken, marked as void, or the 0, 0 of cameras without a
-// fix.
+// None without a position: not written, broken, marked as void, or the 0, 0 that cameras write
+// that have found none yet.
 std::optional<GpsData> ReadGpsData(const std::string& path);
 
 // sRGB transfer function (IEC 61966-2-1): value in [0, 1], linear light in [0, 1].

@@ -1,5 +1,6 @@
 #pragma once
-// Nearest surface along a ray, by Embree.
+// Nearest surface along a ray, by Embree (Wald et al. 2014, "Embree: A Kernel Framework for
+// Efficient CPU Ray Tracing").
 
 #include <memory>
 #include <optional>

@@ -13,15 +13,15 @@
 
 namespace roomtex {
 
-using Triangle =
-    std::array<int, 3>;  // indices into Scan::points, counter-clockwise seen from outside
+// Indices into Scan::points, counter-clockwise seen from the front.
+using Triangle = std::array<int, 3>;
 
 struct Scan {
   std::string path;  // the file it came from, for messages and reports
 
   // The grid. Sample (column, row) has the index row * num_columns + column; row 0 is the TOP row
-  // (largest elevation), columns keep the order of the file. A mesh without a grid has organised ==
-  // false, num_columns == points.size() and num_rows == 1.
+  // (largest elevation), columns keep the order of the file. A mesh without a grid is not
+  // organised: num_columns == points.size(), num_rows == 1.
   bool organised = true;
   int num_columns = 0;
   int num_rows = 0;
@@ -34,8 +34,7 @@ struct Scan {
   // Triangles of a mesh without a grid. Empty when organised: see scan_mesh.h.
   std::vector<Triangle> triangles;
 
-  // Where the scanner stood: the origin of the `station` frame is the point that all ranges start
-  // from.
+  // Where the scanner stood. The origin of `station` is the point that all ranges start from.
   Rigid scan_from_station;
   // Unit vector of the scan frame that points up (RTPI: y; PTX: z).
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();

@@ -8,8 +8,8 @@
 
 namespace roomtex {
 
-// x_in_target = rotation * x_in_source + translation. COLMAP's image pose is a Rigid
-// cam_from_sparse.
+// x_in_target = rotation * x_in_source + translation. The pose of an image in COLMAP is such a
+// Rigid: cam_from_sparse.
 struct Rigid {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // unit length
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();

@@ -1,7 +1,8 @@
 #pragma once
 // Places on the Earth and the local east-north-up frame about one of them. The only user of
-// GeographicLib. Everything is double precision and WGS84; heights are above the ELLIPSOID (not
-// above sea level: no geoid model is used).
+// GeographicLib (geodesics: Karney 2013; transverse Mercator: Karney 2011). Everything is double
+// precision and WGS84; heights are above the ELLIPSOID (not above sea level: no geoid model is
+// used).
 
 #include <optional>
 #include <string>

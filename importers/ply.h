@@ -10,8 +10,8 @@ namespace roomtex {
 
 struct PlyOptions {
   double meters_per_unit = 1;
-  double max_range =
-      0;  // metres from the origin (or the station that our own files name); 0 = no limit
+  // Metres from the origin, or from the station that our own files name; 0 = no limit.
+  double max_range = 0;
 };
 
 // Values of vertex properties that ReadPly itself has no use for, e.g. colours.

@@ -35,8 +35,8 @@ struct RtpiFile {
   RtpiHeader header;
   ByteOrder byte_order = ByteOrder::kLittle;
   int64_t body_offset = 0;  // of the first column count in the file read, for messages
-  // Samples of all columns one after the other; column c holds [column_begin[c], column_begin[c +
-  // 1]).
+  // Samples of all columns, one column behind the other. Column c holds those from column_begin[c]
+  // up to, but without, column_begin[c + 1].
   std::vector<int64_t> column_begin = {0};
   std::vector<RtpiSample> samples;
 

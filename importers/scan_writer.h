@@ -19,12 +19,14 @@ struct ScanWriterOptions {
   bool counterclockwise = false;
 };
 
-// .ply   triangle mesh (ply.h); `triangles` index scan.points, see BuildScanMesh.
-// .pcd   organised cloud (pcd.h).
-// .png   intensity in the grid, 8 bits, percentiles 1 and 99 become black and white
-// (IntensityAsGrey). .rtpi  RTPI 3.0 (RtpiFromScan says how intensities are scaled). .ptx   PTX
-// (ptx.h), intensity 0..1. A mesh without a grid can become a .ply only: others throw InputError.
-// Throws UsageError for another extension.
+//   .ply   triangle mesh (ply.h); `triangles` index scan.points, see BuildScanMesh
+//   .pcd   organised cloud (pcd.h)
+//   .png   intensity in the grid, 8 bits: percentiles 1 and 99 become black and white
+//          (IntensityAsGrey)
+//   .rtpi  RTPI 3.0 (RtpiFromScan says how intensities are scaled)
+//   .ptx   PTX (ptx.h), intensity 0..1
+// A mesh without a grid can become a .ply only; for the others it is an InputError. Throws
+// UsageError for another extension.
 void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,
                const ScanWriterOptions& options = {});
 

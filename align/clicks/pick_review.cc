@@ -68,9 +68,9 @@ PointPairs Selected(const PointPairs& pairs, const std::vector<int>& indices) {
 }
 
 struct LeaveOneOut {
-  Eigen::VectorXd
-      distance_px;  // one per pick; infinite where the rest has no pose, NaN where not tried
-  int best = -1;    // pick without which the others fit best
+  // One per pick; infinite where the rest has no pose, NaN where not tried.
+  Eigen::VectorXd distance_px;
+  int best = -1;  // pick without which the others fit best
   double best_sum_px2 = std::numeric_limits<double>::infinity();
 };
 

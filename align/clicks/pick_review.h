@@ -1,6 +1,7 @@
 #pragma once
 // What is wrong with the picks of one photo: lying on a line, one of them far off, two exchanged,
-// all of them mirrored. Says what it finds; the command decides (trust.h).
+// all of them mirrored. Says what it finds; the command decides (trust.h). Geodesy calls the search
+// for bad picks data snooping (Baarda 1968, "A Testing Procedure for Use in Geodetic Networks").
 
 #include <limits>
 #include <optional>
@@ -41,14 +42,13 @@ struct PickReview {
   std::vector<ViewPose> poses;
   std::vector<bool> used;       // one per pick
   Eigen::VectorXd residual_px;  // of every pick, under poses[0]
-  Eigen::VectorXd
-      leave_one_out_px;  // distance of a pick from the pose that the other used picks give
+  // Distance of every pick from the pose that the other used picks give.
+  Eigen::VectorXd leave_one_out_px;
   // Two picks that fit min_gain times better when they exchange their places in the photo.
   std::optional<std::pair<int, int>> exchanged;
   double exchanged_rms_px = std::numeric_limits<double>::infinity();
   // Root mean square residual of the used picks when x of the scan is mirrored, and whether that is
-  // so much better that the scan must be mirrored. Coplanar picks cannot tell: both fit equally
-  // well.
+  // so much better that the scan must be mirrored. Coplanar picks cannot tell: they fit either way.
   double mirrored_rms_px = std::numeric_limits<double>::infinity();
   bool mirrored = false;
 

@@ -1,5 +1,6 @@
 #pragma once
-// The picks file: points that a user saw both in a photo and in the scan.
+// The picks file: points that a user saw both in a photo and in the scan. Photogrammetry calls them
+// control points (known in the scan) or tie points.
 //
 // CSV with the header image_name,x,y,scan_x,scan_y,scan_z and, if wanted, a seventh column weight;
 // `#` starts a comment line; a name with a comma stands in double quotes. x, y in `img` of the

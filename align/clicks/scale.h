@@ -28,10 +28,9 @@ struct ScaleOptions {
 };
 
 struct ScaleEstimate {
-  double scale = 0;      // metres per sparse unit: depth in the scan / depth in the sparse model
-  int num_features = 0;  // that the average rests on
-  int num_candidates =
-      0;  // features with a sparse point in front of the scan, before any was left out
+  double scale = 0;        // metres per sparse unit: depth in the scan / depth in the sparse model
+  int num_features = 0;    // that the average rests on
+  int num_candidates = 0;  // features with a sparse point in front of the scan, with those left out
   double relative_mad = 0;  // median |ratio - median| / median, before outliers are left out
 };
 

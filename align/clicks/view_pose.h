@@ -1,5 +1,9 @@
 #pragma once
-// The pose of one photo from clicked points: the seven steps of thesis 7.1.1.
+// The pose of one photo from clicked points (resection; perspective-n-point): the seven steps of
+// thesis 7.1.1. They are the DLT (Abdel-Aziz and Karara 1971; Hartley and Zisserman 2004, 7.1) and
+// Levenberg-Marquardt on the reprojection error. For points on or near a plane the error can have
+// two minima (Schweighofer and Pinz 2006, "Robust Pose Estimation from a Planar Target"), so both
+// are looked for.
 
 #include <limits>
 #include <optional>

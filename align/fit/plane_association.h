@@ -18,9 +18,10 @@ struct SurfaceConstraint {
   uint64_t point3d_id = 0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();   // on the surface
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit length, towards the scanner
-  double sigma = 0;  // metres; how far the true surface may lie from this plane, the sparse point's
-                     // own uncertainty not included
-  int plane = -1;    // index of the plane that the point belongs to; -1 = none
+  // Metres; how far the true surface may lie from this plane. The sparse point's own uncertainty is
+  // not in it.
+  double sigma = 0;
+  int plane = -1;         // index of the plane that the point belongs to; -1 = none
   bool on_patch = false;  // point and normal are those of a patch, not of the plane
 
   // Signed distance, metres, positive on the scanner's side.

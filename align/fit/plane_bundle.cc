@@ -64,8 +64,9 @@ std::vector<double> ReprojectionDistances(const SparseModel& model) {
   return distances;
 }
 
-// Standard deviation of a keypoint's coordinate, from the middle of the residuals (outliers do not
-// count), with what points and poses have taken up of them.
+// Standard deviation of a keypoint's coordinate: from the median of the residuals, because outliers
+// do not move it, and enlarged, because the fitted points and poses have made residuals smaller
+// than the noise (degrees of freedom).
 double ImageNoise(const SparseModel& model) {
   std::vector<double> errors = ReprojectionDistances(model);
   const auto num_points =

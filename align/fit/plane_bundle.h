@@ -1,6 +1,7 @@
 #pragma once
-// Bundle adjustment of the aligned model with its points held on the surface of the scan (thesis
-// 7.2, Appendix C).
+// Bundle adjustment (Triggs et al. 2000, "Bundle Adjustment - A Modern Synthesis") of the aligned
+// model with its points held on the surface of the scan: plane-constrained bundle adjustment
+// (thesis 7.2, Appendix C).
 
 #include <set>
 #include <string>
@@ -84,8 +85,8 @@ struct PlaneBundle {
 // Minimises reprojection errors (Huber) + distances of the points from their surfaces (Cauchy) +
 // errors of the picks (Huber) over all poses and points. Points are given to surfaces anew from
 // round to round. The surfaces hold the gauge; what they leave open (one wall only) the picks hold.
-// A bent scan is straightened for that; in the end the points are bent like the scan and each photo
-// is fitted to them (its own pose cannot be bent, so that its reprojection errors grow).
+// A bent scan is straightened for that. In the end the points are bent like the scan and each photo
+// is fitted to them; a photo itself cannot be bent, so its reprojection errors grow.
 // Does not depend on the number of threads: Ceres runs on one thread.
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options);
 

@@ -1,6 +1,7 @@
 #pragma once
 // How exact each photo's pose is after the adjustment to the scan's surface: the covariance of all
-// poses together, by the normal equations with the points eliminated (Schur complement).
+// poses together, by the normal equations with the points eliminated (Schur complement; Triggs et
+// al. 2000).
 
 #include <cstdint>
 #include <map>

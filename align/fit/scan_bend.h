@@ -1,10 +1,13 @@
 #pragma once
 // A scan that is itself slightly and smoothly bent (thesis 7.2): by how much, seen against the
-// sparse model, whose shape the photos fix far better.
+// sparse model, whose shape the photos fix far better. The field's words: non-rigid distortion of a
+// scan (Brown and Rusinkiewicz 2007, "Global Non-Rigid Alignment of 3-D Scans"), and for what
+// causes it, the scanner's systematic errors (Lichti 2007, "Error Modelling, Calibration and
+// Analysis of an AM-CW Terrestrial Laser Scanner System").
 //
-// Beyond the thesis. Distances of points from surfaces say nothing about sliding along them. Left
-// alone with a bent scan, a similarity (or a bundle adjustment) follows the walls and slides every
-// colour on the walls across by as much. So the bend is estimated as what a scanner does wrong:
+// Beyond the thesis. Distances of points from surfaces say nothing about sliding along them. Fitted
+// to a bent scan, a similarity (or a bundle adjustment) follows the walls and shifts every colour
+// along the walls by as much. So the bend is estimated as what a scanner does wrong:
 // ranges too long or short and azimuths off, smoothly changing with the direction.
 
 #include <optional>
@@ -63,10 +66,11 @@ struct BendFit {
 };
 
 // Similarity and bend together, from the distances of the points from the surface and from the
-// picks. How large coefficients may be follows from the data (their variance is the one that makes
-// the data most likely, by expectation maximisation), so that a straight scan stays straight. None
-// if the scan is not bent by more than min_bend (rms, metres) or by more than any scanner does (5 %
-// of the ranges), or has no grid, or there are several scans.
+// picks. How large coefficients may be follows from the data: their variance is the one that makes
+// the data most likely (evidence, MacKay 1992), found by expectation maximisation (Dempster et al.
+// 1977), so that a straight scan stays straight. None if the scan is not bent by more than min_bend
+// (rms, metres) or by more than any scanner does (5 % of the ranges), or has no grid, or there are
+// several scans.
 std::optional<BendFit> FitScanBend(const SparseModel& model,
                                    const std::vector<SurfacePoint>& points,
                                    const std::vector<Scan>& scans, const ScanPatches& surface,

@@ -1,7 +1,12 @@
 #pragma once
 // The similarity that takes the sparse model into the scan, refined on all its seven numbers: on
 // the picks of any number of photos, and on the distances of the sparse points from the scan's
-// surface.
+// surface. The latter is robust point-to-plane ICP with scale: ICP by Besl and McKay 1992 ("A
+// Method for Registration of 3-D Shapes"), point to plane by Chen and Medioni 1992 ("Object
+// Modelling by Registration of Multiple Range Images"), scale by Zinsser et al. 2005 ("Point Set
+// Registration with Integrated Scale Estimation") and Du et al. 2010 ("Scaling Iterative Closest
+// Point Algorithm for Registration of m-D Point Sets"), robust by Tukey's biweight (Beaton and
+// Tukey 1974). Beyond these: every distance is weighed by what is known of its point and its patch.
 
 #include <string>
 #include <vector>
@@ -48,9 +53,8 @@ struct SimilarityFit {
   Similarity scan_from_sparse;
   bool converged = false;
   int num_points = 0;  // sparse points on the surface at the end
-  double rms_before =
-      0;  // RMS distance from the surface of the points that are on it at the end ...
-  double rms_after = 0;  // ... under the start and under the result, metres
+  // RMS distance of these points from the surface, metres: under the start, and under the result.
+  double rms_before = 0, rms_after = 0;
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   // Of (dt, w, ds); infinite without a solution. What stays unknown of a surface, and how the model
   // bends against it, is taken to be the same for all points of half a metre of it.

@@ -1,6 +1,8 @@
 #pragma once
 // The scan as small flat patches: a point's nearest patch gives the distance to the surface, with
-// the range noise averaged out.
+// the range noise averaged out. Graphics calls such patches surfels (Pfister et al. 2000, "Surfels:
+// Surface Elements as Rendering Primitives"); the normal is that of PCA (Hoppe et al. 1992), the
+// tree a k-d tree (Bentley 1975).
 
 #include <functional>
 #include <optional>

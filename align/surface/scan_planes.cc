@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kFragmentShare = 0.1;  // of min_area_m2: what may still join a plane
 constexpr double kWaveArea = 0.04;      // m2; samples nearer to each other share the waves
-constexpr double kEdgeWeight =
-    0.05;  // of samples beside an edge or another plane: they may be mixed
+// Of samples beside an edge or another plane: they may be mixed.
+constexpr double kEdgeWeight = 0.05;
 constexpr double kLeastCell = 0.02, kMostCells = 4000;  // metres; along a plane
 constexpr int kNumChunks = 64;  // sums are made per chunk, whatever the number of threads
 

@@ -1,5 +1,8 @@
 #pragma once
-// The large planes of the scan (thesis 7.2, "detect large planes by PCA"), as bounded patches.
+// The large planes of the scan (thesis 7.2, "detect large planes by PCA"), as bounded patches:
+// segmentation by region growing, as of range images (Besl and Jain 1988, "Segmentation through
+// Variable-Order Surface Fitting") and of point clouds (Rabbani et al. 2006, "Segmentation of Point
+// Clouds Using Smoothness Constraint").
 
 #include <cstdint>
 #include <string>
@@ -38,13 +41,15 @@ struct ScanPlane {
 // Defaults: chosen on simulated rooms (flat, noisy, bent by 1 %) and on a real kitchen.
 struct ScanPlaneOptions {
   double min_area_m2 = 0.2;  // smaller planes are not given; larger = fewer planes
-  // Metres; how far the surface, its noise averaged out, may lie from its plane: what a wall may be
-  // wavy and the scan bent. Larger = more tolerant. Steps are found however large this is.
+  // Metres; how far the surface may lie from its plane once the range noise is averaged out: a wall
+  // may be wavy, and the scan may be bent. Larger = more tolerant. This does not hide steps,
+  // however large it is: min_step says which of them part two surfaces.
   double max_distance = 0.01;
-  double max_angle_deg = 3;  // between the local normal, its noise apart, and the plane's; larger =
-                             // more tolerant. A surface whose ends turn by 0.6 of it is no plane.
-  double min_step = 0.0015;  // metres; smaller steps between surfaces are never seen; larger = two
-                             // surfaces so near are one
+  // Between the normal of a cell and that of the plane, beyond what the noise explains. Larger =
+  // more tolerant. A surface whose ends are turned by more than 0.6 of it is curved, no plane.
+  double max_angle_deg = 3;
+  // Metres; surfaces with a smaller step between them count as one.
+  double min_step = 0.0015;
   double max_noise = 3;      // standard deviations up to which a sample belongs; larger = more do
   double min_window = 0.04;  // metres; smallest window for a local normal; it grows with the noise
   double max_incidence_deg = 80;  // samples seen at a flatter angle are left out; 90 = none

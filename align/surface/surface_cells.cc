@@ -30,7 +30,8 @@ SurfaceCells::SurfaceCells(const std::vector<Eigen::Vector3d>& points,
                            const std::vector<Eigen::Vector3d>& normals) {
   std::vector<Eigen::Vector3d> facings = normals;
   std::vector<Nearest> nearest(normals.size());
-  // Three times: those that most normals are near to come first and take in the others.
+  // The first facing that a normal is near to takes it in, so the order decides: each pass puts the
+  // facings with most normals first for the next one.
   for (int pass = 0; pass < 3; ++pass) {
     std::vector<Eigen::Vector3d> apart;
     for (const Eigen::Vector3d& facing : facings) {

@@ -19,8 +19,8 @@ class SurfaceCells {
   int NumPoints(int cell) const { return num_points_[cell]; }
   int NumCells() const { return static_cast<int>(num_points_.size()); }
   // The way a point's surface faces, shared by all points whose normals, or their opposites, differ
-  // by less than 15 degrees. Normals of small patches scatter, and opposite walls of a noisy scan
-  // are never quite parallel: as if that fixed what slides along them.
+  // by less than 15 degrees. The normals as they are scatter, and opposite walls of a noisy scan
+  // are never quite parallel: the fit would take that for a hold against sliding along the walls.
   const Eigen::Vector3d& SharedNormal(size_t index) const { return shared_normals_[index]; }
   int NumPointsAlike(size_t index) const { return num_alike_[facing_[index]]; }  // that share it
 

@@ -1,6 +1,8 @@
 #pragma once
 // How well photos and scan intensity agree: the three measures of the thesis' Appendix A and the
 // local shifts of gradient_shift.h, at the solution and at poses turned and moved away from it.
+// Mutual information as a measure of registration: Viola and Wells 1997, "Alignment by Maximization
+// of Mutual Information".
 
 #include <cstdint>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
 // What an alignment is worth in millimetres: the covariance of the similarity, propagated to where
-// it matters.
+// it matters (forward propagation; Hartley and Zisserman 2004, 5.2).
 
 #include <cstdint>
 #include <map>

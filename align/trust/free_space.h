@@ -1,6 +1,7 @@
 #pragma once
 // A coarse mesh of the scans for questions that do not need every sample: what the scanner looked
-// through to see the surface behind (free space), and the intensity that a camera would see.
+// through to see the surface behind (free space, as in Curless and Levoy 1996, "A Volumetric Method
+// for Building Complex Models from Range Images"), and the intensity that a camera would see.
 
 #include <memory>
 #include <optional>
@@ -22,8 +23,7 @@ class FreeSpace {
   bool HasStations() const { return !stations_.empty(); }
 
   enum class Place {
-    kUnknown,  // no scanner has a surface in that direction, or there is no scanner (mesh without a
-               // grid)
+    kUnknown,   // no scanner has a surface in that direction, or none is known (meshes only)
     kFloating,  // nearer to a scanner, by more than the tolerance, than the surface it saw there
     kSurface,   // within the tolerance of a surface, along a scanner's ray
     kHidden,    // farther from every scanner than the surface
@@ -59,8 +59,8 @@ class FreeSpace {
   std::vector<Triangle> triangles_;
   std::vector<uint8_t> grey_;
   std::unique_ptr<RayCaster> caster_;
-  std::vector<std::unique_ptr<RayCaster>>
-      station_casters_;  // one per station: only what it saw itself
+  // One per station: only what it saw itself.
+  std::vector<std::unique_ptr<RayCaster>> station_casters_;
 };
 
 }  // namespace roomtex

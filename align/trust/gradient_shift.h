@@ -3,10 +3,11 @@
 // an alignment that needs no picks and no sparse points.
 //
 // Intensity (infrared, reflected) and brightness differ, also in sign, but both change at the same
-// places. So patches of gradient magnitude are compared, only at corners, where a shift shows in
-// every direction. What the shifts are worth is told by two controls that are measured beside them:
-// the same patches at poses that are surely wrong, and the same patches at other places of the
-// photo (chance).
+// places. So patches of gradient magnitude are compared by normalised cross correlation, and only
+// at corners (Shi and Tomasi 1994, "Good Features to Track"), where a shift shows in every
+// direction. What the shifts are worth is told by two controls that are measured beside them: the
+// same patches at poses that are surely wrong, and the same patches at other places of the photo
+// (chance).
 
 #include <string>
 #include <vector>

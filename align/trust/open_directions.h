@@ -1,7 +1,10 @@
 #pragma once
 // What the surface of the scan leaves open in an alignment: in front of one wall, or between two
 // parallel ones, the model could slide, turn or grow without leaving the surface. The picks alone
-// hold it there.
+// hold it there. The field speaks of degeneracy, or of weakly constrained directions: they are the
+// eigenvectors with small eigenvalues of the information matrix (Gelfand et al. 2003,
+// "Geometrically Stable Sampling for the ICP Algorithm"; Zhang, Kaess and Singh 2016, "On
+// Degeneracy of Optimization-based State Estimation Problems").
 
 #include <string>
 #include <vector>

@@ -47,8 +47,7 @@ struct Placement {
   int num_floating = 0;  // in space that the scanner saw to be empty
   int num_hidden = 0;    // behind the surface that the scanner saw
   int num_cameras = 0;
-  int num_cameras_free =
-      0;  // in space that the scanner saw to be empty, or that it did not see at all
+  int num_cameras_free = 0;  // in space that the scanner saw to be empty, or did not see at all
 
   // num_on_surface / (num_on_surface + num_floating); 0 without any.
   double SurfaceShare() const;

@@ -1,6 +1,6 @@
 #pragma once
-// ChArUco boards: markers tell which corners are seen, so that a part of the board is enough. Used
-// by board_detection only.
+// ChArUco boards: markers tell which corners are seen (ArUco, Garrido-Jurado et al. 2014), so that
+// a part of the board is enough. Used by board_detection only.
 
 #include <string>
 #include <vector>

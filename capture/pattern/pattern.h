@@ -23,7 +23,7 @@ struct PatternOptions {
   std::vector<std::string> Problems() const;
 };
 
-// The pattern made of a built-in image: shapes of 3 pixels up to a tenth of the picture, at every
+// The pattern made of a built-in image: shapes of 5 pixels up to a fifth of its height, at every
 // scale about as many as fit, so that cameras near and far find features. Bytes depend on the
 // options only. Throws UsageError for Problems().
 cv::Mat1b MakePattern(const PatternOptions& options);

@@ -9,7 +9,8 @@
 namespace roomtex {
 
 // The built-in detailed image: shapes of random grey lying over each other, coarse to fine, of
-// `finest` pixels up to a fifth of the height. The same bytes for the same arguments.
+// `finest` pixels up to a fifth of the height: the "dead leaves" of image statistics (Lee, Mumford
+// and Huang 2001). The same bytes for the same arguments.
 cv::Mat1b DrawDetail(int width, int height, double finest, uint64_t seed);
 
 // Grey values by rank: the darkest pixel becomes 0, the brightest 255, and between them each grey

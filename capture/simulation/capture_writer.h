@@ -17,16 +17,16 @@ struct CaptureSummary {
 
 // Writes into `folder` (made if needed):
 //   photos/           JPEG, with EXIF if the options say so
-//   scan.rtpi         station 0; further ones scan_1.rtpi ... with scan_poses.txt
-//   (scan_from_station) picks.csv         clicks in one photo, in the format of docs/commands.md
+//   scan.rtpi         station 0; further ones are scan_1.rtpi ... with scan_poses.txt
+//                     (scan_from_station)
+//   picks.csv         clicks in one photo, in the format of docs/commands.md
 //   cameras.txt       the true camera, as COLMAP writes it
-//   camera_options.txt  the same as options of `colmap feature_extractor`
-//   truth/            cameras.txt, images.txt, points3D.txt (true poses in the scan frame, no
-//   points),
-//                     scan_from_room.txt, exposures.csv, true_colors.ply
+//   camera_options.txt   the same as options of `colmap feature_extractor`
+//   truth/            cameras.txt, images.txt, points3D.txt (true poses in the scan frame, without
+//                     points), scan_from_room.txt, exposures.csv, true_colors.ply and, if asked
+//                     for, reachable.ply (true_colors.h)
 //   README.txt        what is what, and the commands to type
-// true_colors.ply, and reachable.ply if asked for: true_colors.h. Throws InputError if the folder
-// cannot be written or its photos/ holds JPEGs of another capture.
+// Throws InputError if the folder cannot be written or its photos/ holds JPEGs of another capture.
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
                             Progress* progress, bool reachable = false);
 

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kSpacing = 0.05;  // metres between the nodes of a grid
 constexpr int kLightSide = 4;      // shadow rays per light: its square
-constexpr double kLift =
-    0.01;  // metres above a surface: what hangs flat on a wall throws no shadow
+// Metres above a surface: what hangs flat on a wall throws no shadow.
+constexpr double kLift = 0.01;
 constexpr double kAmbientReach = 1.0;  // metres: what is farther away takes no ambient light
 
 // Directions over the half-sphere around `normal`, equally weighted under the cosine law.

@@ -13,7 +13,7 @@ namespace roomtex {
 
 class LightMap {
  public:
-  // Nothing is nearer than `distance` in this direction from a point.
+  // Nothing stands between the two points.
   using IsFree = std::function<bool(const Eigen::Vector3d& from, const Eigen::Vector3d& to)>;
   // Distance to what is nearest in a (unit) direction from a point; infinity for nothing.
   using Sight =

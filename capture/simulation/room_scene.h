@@ -103,8 +103,8 @@ class RoomScene {
   bool IsOccluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
   // Linear light, EV 0, averaged over the parallelogram that side_x and side_y span around the hit
-  // (tangential; zero = the finest detail there is).
-  // added: light on top of the room's, on the scale of its light.
+  // (tangential; zero = the finest detail there is). added: light on top of the room's, on the same
+  // scale.
   LinearRgb Color(const SceneHit& hit, const Eigen::Vector3d& side_x, const Eigen::Vector3d& side_y,
                   const LinearRgb& added = LinearRgb::Zero()) const;
   LinearRgb Color(const SceneHit& hit) const;

@@ -41,7 +41,8 @@ struct SimulatedRoomOptions {
   double projector_light = 15;
   double projector_focus = 3.2;  // metres from the lens to where the pattern is sharp
   bool same_pattern = false;     // a mistake: all projectors throw the pattern of the first
-  // The 8-bit grey picture that projector k throws, with seed k + 1; needed if there are projectors.
+  // The 8-bit grey picture that projector k throws, with seed k + 1; needed if there are
+  // projectors.
   std::function<cv::Mat1b(int width, int height, int seed)> pattern;
   // Photos.
   int num_photos = 30;                          // places, if there are projectors
@@ -65,8 +66,8 @@ struct SimulatedRoomOptions {
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
   double range_noise = 0.002;                 // metres, standard deviation
   bool missing_samples = true;                // window and mirror give no echo; a few random ones
-  double range_noise_growth =
-      0;            // the noise is range_noise * (1 + growth * range), growth per metre
+  // Per metre: the noise is range_noise * (1 + range_noise_growth * range).
+  double range_noise_growth = 0;
   double bend = 0;  // ranges are too long or short by up to this fraction, smoothly changing
   double azimuth_drift_deg = 0;  // error of the azimuth that grows from 0 over the full turn
   // Picks.
