@@ -27,8 +27,8 @@ struct ColorizeOptions {
   ExposureOptions exposure;
   BlendOptions blend;
   DetailOptions detail;
-  std::string unseen =
-      "intensity";  // colour of samples that no photo sees: "intensity" (grey) or "black"
+  // Colour of samples that no photo sees: "intensity" (grey) or "black".
+  std::string unseen = "intensity";
   // Texels per sample and direction of the texture image. 1 = one texel a sample; more colour the
   // surface between the samples as well. 0 = by the photos' resolution, see ChooseTextureScale.
   int texture_scale = 1;

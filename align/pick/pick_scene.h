@@ -35,13 +35,13 @@ struct PickPhoto {
   const SparseImage* image = nullptr;
   const CameraProjection* projection = nullptr;
   std::string path;
-  // The file that can be shown: there, inside the folder of the photos, of its camera's size;
-  // otherwise why it is not, in a sentence.
+  // It cannot be shown, and why, in a sentence: no file there, one outside the folder of the
+  // photos, or one of another size than its camera's.
   bool missing = false;
   std::string problem;
   int num_points = 0;  // sparse points it sees
-  double score = 0;    // how good it is to pick in: many sparse points, all over the photo, that
-                       // other photos see as well
+  // How good it is to pick in: many sparse points, all over the photo, that other photos see too.
+  double score = 0;
 
   const std::string& name() const { return image->name; }
 };

@@ -75,8 +75,9 @@ class ScanPlaces {
   double aspect_ = 1;
   double column_step_ = 0, row_step_ = 0;  // radians, the median; of columns where farthest apart
   std::vector<uint8_t> smooth_;
-  int thin_ = 1;                   // every thin_-th column and row is one of ...
-  std::vector<int> thin_samples_;  // ... these: measured samples that a search starts from
+  // The measured samples of every thin_-th column and row, for a search to start from.
+  int thin_ = 1;
+  std::vector<int> thin_samples_;
   std::vector<Eigen::Vector3f> thin_directions_;
 };
 

@@ -1,4 +1,6 @@
 #pragma once
+// Coloured scans as binary glTF.
+
 #include <string>
 #include <vector>
 

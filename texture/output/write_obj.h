@@ -1,4 +1,6 @@
 #pragma once
+// Coloured scans as Wavefront OBJ.
+
 #include <functional>
 #include <string>
 #include <vector>

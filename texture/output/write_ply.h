@@ -1,4 +1,6 @@
 #pragma once
+// Coloured scans as PLY.
+
 #include <string>
 #include <vector>
 

@@ -1,4 +1,6 @@
 #pragma once
+// Texture images as files.
+
 #include <string>
 
 #include <opencv2/core/mat.hpp>

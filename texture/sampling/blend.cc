@@ -200,8 +200,8 @@ BlendedSample BlendSample(const Observation* observations, int count,
   }
   float sum = 0;
   for (int i = 0; i < views.count; ++i) {
-    // Only now: however light a surface is, those that see it clipped outvote what is no part of
-    // it.
+    // Clipped colours lose their weight only here, after the vote: on a bright surface most photos
+    // are clipped, and they must be able to outvote the one that shows something else.
     views.weights[i] *= views.reliability[i];
     sum += views.weights[i];
     result.blend += views.weights[i] * views.colors[i];

@@ -1,5 +1,6 @@
 #pragma once
-// Weighted blending (thesis 8.2.2).
+// Weighted blending (thesis 8.2.2), with a check that the photos agree on the colour of a sample
+// (photo-consistency, as in Waechter, Moehrle and Goesele 2014, "Let There Be Color!").
 
 #include <string>
 #include <vector>
@@ -22,9 +23,9 @@ struct BlendOptions {
   // neighbours'. Departure from the thesis.
   bool resolution_weight = true;
   // Colours that contradict the others at a sample (people, moved chairs, shadows of the
-  // photographer, reflections) lose their weight; distance at which half is lost, on a scale of
-  // 0..1 that is about even to the eye. Below 0.2 what shines
-  // differently to every photo comes out in blotches. 0 = never (thesis).
+  // photographer, reflections) lose their weight: the distance at which half of it is lost, on a
+  // scale of 0..1 that is about even to the eye. Larger = more tolerant; below 0.2, shiny surfaces,
+  // which look different in every photo, come out in blotches. 0 = never (thesis).
   double outlier = 0.3;
   // Share of the spacing between samples over which a photo's pixels are averaged. 0 = the colour
   // at the sample (thesis); 1 = the whole cell, which keeps fine print from turning into grain.
@@ -46,10 +47,10 @@ inline float ThesisWeight(float x, float y, float photo_width, float photo_heigh
   return boundary ? centrality * (0.9f - 0.899f) : centrality * 0.9f + 0.01f;
 }
 
-// Share of its weight that a photo keeps (departure from the thesis). A sample that is off along
-// its scanner ray u by e is looked up |u - c (n.u)/(n.c)| e beside its place on a surface with the
-// normal n by a camera in the direction c; to that adds a misalignment of the same size across c,
-// seen at a slant. All three are unit vectors from the sample; zero `normal` or `to_scanner`: 1.
+// Share of its weight that a photo keeps (departure from the thesis). Directions from the sample,
+// unit: u to the scanner, c to the camera, n the normal. A sample whose range is wrong by e is
+// looked up |u - c (n.u)/(n.c)| e beside its place on the surface. A misalignment of the same size
+// across the line of sight, larger at a slant, is added to that. Zero `normal` or `to_scanner`: 1.
 float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_scanner,
                   const Eigen::Vector3f& normal);
 
@@ -57,8 +58,9 @@ float AngleWeight(const Eigen::Vector3f& to_camera, const Eigen::Vector3f& to_sc
 // sample (an area, foreshortening counted).
 float ResolutionWeight(float pixels_per_sample);
 
-// Colour of a photo (8-bit BGR, sRGB) at a position in `img`, by cubic (Catmull-Rom) interpolation
-// of linear light: half a decibel nearer to the truth than bilinear on the simulated room.
+// Colour of a photo (8-bit BGR, sRGB) at a position in `img`, by cubic interpolation (Catmull-Rom;
+// Keys 1981, "Cubic Convolution Interpolation for Digital Image Processing") of linear light: half
+// a decibel nearer to the truth than bilinear on the simulated room.
 struct PhotoColor {
   Eigen::Vector3f linear;  // r, g, b, 0..1
   float reliability;  // 1; falls to 1/2 towards pixels whose brightest channel is clipped at 255
@@ -73,8 +75,7 @@ struct BlendedSample {
   Eigen::Vector3f blend = Eigen::Vector3f::Zero();     // M, linear light
   Eigen::Vector3f dominant = Eigen::Vector3f::Zero();  // C, of the photo with the largest weight
   int dominant_photo = -1;                             // S; -1 = no photo sees the sample
-  bool dominant_fits =
-      false;  // the dominant photo does not contradict the blend: it may give detail
+  bool dominant_fits = false;  // it does not contradict the blend, so that it may give detail
 };
 // gains: linear, one 3-vector (r, g, b) per photo. A sample whose observations are all in doubt has
 // a colour only if two of them agree. shares (if given): room for `count` numbers, what each

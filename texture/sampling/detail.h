@@ -1,5 +1,7 @@
 #pragma once
-// Preservation of details (thesis 8.2.3).
+// Preservation of details (thesis 8.2.3): coarse parts blended, fine parts from one photo, as in
+// two-band blending (Burt and Adelson 1983, "A Multiresolution Spline with Application to Image
+// Mosaics"; Brown and Lowe 2007).
 
 #include <cstdint>
 #include <string>
@@ -35,7 +37,8 @@ struct DominantMap {
 // Departure from the thesis' M + H(C) (8.5): that adds the detail to what the blend has kept of it,
 // and with well registered photos this is nearly all, so that detail would come out twice as
 // strong. On a blend without any detail both are the same. The convolution runs within connected
-// surface only (normalised). Meshes without a grid are left as they are.
+// surface only (normalised convolution, Knutsson and Westin 1993). Meshes without a grid are left
+// as they are.
 void PreserveDetail(const Scan& scan, const GridLinks& links, const DominantMap& dominant,
                     const DetailOptions& options, int num_threads,
                     std::vector<Eigen::Vector3f>* blend);

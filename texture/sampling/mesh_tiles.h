@@ -17,13 +17,14 @@ struct MeshTile {
   std::vector<std::array<uint16_t, 3>> triangles;  // indices into points
 };
 
-// Occluders: the mesh; the `shadows` of the scanner: triangles over the depth jumps that the mesh
-// leaves open, behind which lies space that the scanner could not see and in which anything may
-// stand; and the `fringes`: the open quads at the range of their nearest sample, because what ends
-// between two samples may reach up to the next one.
+// What may hide a sample from a photo.
 struct OccluderTiles {
-  std::vector<MeshTile> surface;
+  std::vector<MeshTile> surface;  // the mesh
+  // Triangles over the depth jumps that the mesh leaves open. Behind them lies space that the
+  // scanner could not see, in which anything may stand.
   std::vector<MeshTile> shadows;
+  // The open quads at the range of their nearest sample: what ends between two samples may reach up
+  // to the next one.
   std::vector<MeshTile> fringes;
   double range_noise = 0;  // of the scan, metres, standard deviation; 0 = not known
 };

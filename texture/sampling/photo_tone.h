@@ -20,8 +20,8 @@ class ResponseCurve {
   using Table = std::array<std::array<float, 3>, kLevels>;
 
   ResponseCurve();  // sRGB
-  // Scales the table so that no level is lighter than 1, 255 is 1, and sets what falls to the level
-  // before.
+  // Scales the table so that 255 is 1 and no level is lighter; a level that is darker than the one
+  // before it is set to that.
   explicit ResponseCurve(Table table);
 
   // A text file: one line per level 0..255 with the linear light at any scale, one number or three
@@ -46,7 +46,8 @@ class ResponseCurve {
 // exp(a1 r^2 + a2 r^4 + a3 r^6), r = 1 at half the photo's diagonal from the principal point.
 struct Vignetting {
   Eigen::Vector3d a = Eigen::Vector3d::Zero();
-  // It goes on straight (in r^2) beyond, to twice what it is there at most.
+  // Up to this r^2 the polynomial holds; beyond, its logarithm goes on straight in r^2, to at most
+  // twice its value there.
   double largest_radius2 = 1;
 
   double LogFactor(double radius2) const {

@@ -27,8 +27,8 @@ class RangeSmoother {
   double noise() const;
   // Moves points (grid order, at first those of the scan) along their rays.
   void Smooth(std::vector<Eigen::Vector3d>* points);
-  // Between rays of even angles inverse range is a cosine, not a line: moves the smoothed points by
-  // what that makes, given their normals (unit or zero).
+  // Between rays of even angles the inverse range of a plane is a cosine, not a line. Takes out of
+  // the smoothed points what that makes, given their normals (unit or zero).
   void Straighten(const std::vector<Eigen::Vector3f>& normals,
                   std::vector<Eigen::Vector3d>* points) const;
 

@@ -1,5 +1,6 @@
 #pragma once
-// Draws triangles into a raster of inverse depths.
+// Draws triangles into a raster of inverse depths (z-buffer, Catmull 1974; small triangles by edge
+// functions, Pineda 1988, "A Parallel Algorithm for Polygon Rasterization").
 
 #include <opencv2/core/mat.hpp>
 

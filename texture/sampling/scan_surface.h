@@ -46,7 +46,7 @@ struct ScanSurface {
 
 GridLinks FindGridLinks(const Scan& scan, const std::vector<Triangle>& triangles);
 
-// scan must outlive nothing: everything is copied.
+// The result keeps no reference to `scan`.
 ScanSurface MakeScanSurface(const Scan& scan, const ScanMeshOptions& mesh_options,
                             const ScanSurfaceOptions& options, int num_threads);
 

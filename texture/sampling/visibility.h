@@ -1,6 +1,7 @@
 #pragma once
 // What a photo sees of the scan (thesis 8.1): depth map by an own rasteriser, depth test, normal
-// test, depth-boundary mask.
+// test, depth-boundary mask. A depth map seen from elsewhere tested per point: shadow mapping
+// (Williams 1978, "Casting Curved Shadows on Curved Surfaces").
 
 #include <cstdint>
 #include <string>
@@ -74,10 +75,14 @@ cv::Mat1b DepthBoundaries(const cv::Mat1f& inverse_depth, double jump, int hole_
 // thesis dilates by a square: as wide in every direction.
 cv::Mat1b BoundaryMask(const cv::Mat1b& boundaries, double radius_px);
 
-// How a photo sees one sample: not at all; through a shadow of the scanner, so that something that
-// is not in the scan may stand in front of it; past the last sample of something nearer, closer
-// than it may reach; in the depth-boundary mask (B = 1); without any doubt.
-enum class Sight : uint8_t { kHidden, kShadow, kFringe, kBoundary, kClear };
+// How a photo sees one sample.
+enum class Sight : uint8_t {
+  kHidden,    // not at all
+  kShadow,    // through space that the scanner could not see: something may stand there
+  kFringe,    // so near past the last sample of something that it may reach that far
+  kBoundary,  // in the depth-boundary mask (B = 1)
+  kClear,     // without any doubt
+};
 
 class PhotoVisibility {
  public:

@@ -1,4 +1,6 @@
 #pragma once
+// A grid of colours as a picture.
+
 #include <opencv2/core/mat.hpp>
 
 #include "texture/sampling/grid_colors.h"

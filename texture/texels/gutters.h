@@ -1,4 +1,6 @@
 #pragma once
+// Gutters: the painted rim around what a texture image shows.
+
 #include <opencv2/core/mat.hpp>
 
 namespace roomtex {

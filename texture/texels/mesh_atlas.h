@@ -1,7 +1,8 @@
 #pragma once
 // A texture atlas for meshes without a grid: charts of nearly plane, connected triangles, each laid
-// flat into a page of texels. Meshes of few large triangles (decimated, drawn by hand) get the
-// photos' detail this way.
+// flat into a page of texels (the words are those of Levy et al. 2002, "Least Squares Conformal
+// Maps for Automatic Texture Atlas Generation"; our charts are projected, not conformal). Meshes of
+// few large triangles (decimated, drawn by hand) get the photos' detail this way.
 
 #include <string>
 #include <vector>

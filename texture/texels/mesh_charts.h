@@ -15,8 +15,8 @@ struct ChartOptions {
   double max_angle_deg = 40;
   // Longest side of a chart's bounding box, metres.
   double max_extent = 1e9;
-  // Triangles with a mean side below this, metres, are taken as turned like their surroundings:
-  // the noise of dense meshes would make a chart of every few triangles.
+  // Metres; triangles with a mean side below this get the mean normal of their surroundings,
+  // because the noise of dense meshes would make a chart of every few triangles.
   double smooth_below = 0;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
-// Rectangles side by side on as few pages as a simple rule finds.
+// Rectangles side by side on as few pages as a simple rule finds (Jylanki 2010, "A Thousand Ways to
+// Pack the Bin").
 
 #include <array>
 #include <vector>

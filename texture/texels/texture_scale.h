@@ -19,9 +19,9 @@ double MedianPixelsPerSample(const PhotoPassInput& input, const ObservationStore
 inline constexpr int kMaxTextureScale = 16;
 
 // Texels per sample and direction, the --Texture.scale 0 of roomtex-texture: pixels per sample,
-// rounded up, so that half of the samples lose nothing of the photos; but no more than
-// kMaxAutoScale, than fit into max_bytes in kMaxAutoBands bands, and than kMaxAutoTexels in all: an
-// ordinary run stays one of about a minute.
+// rounded up, so that half of the samples lose nothing of the photos. At most kMaxAutoScale, at
+// most what fits into max_bytes in kMaxAutoBands bands, and at most kMaxAutoTexels in all, so that
+// an ordinary run takes about a minute.
 inline constexpr int kMaxAutoScale = 4, kMaxAutoBands = 4;
 inline constexpr double kMaxAutoTexels = 40e6;
 int ChooseTextureScale(const std::vector<Scan>& scans, double pixels_per_sample,

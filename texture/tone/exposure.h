@@ -1,5 +1,7 @@
 #pragma once
-// Exposure unification (thesis 8.2.1): one factor per photo (and channel), in linear light.
+// Exposure unification (thesis 8.2.1): one factor per photo (and channel), in linear light. From
+// what photos see in common: gain compensation (Brown and Lowe 2007, "Automatic Panoramic Image
+// Stitching Using Invariant Features"), here robust and with EXIF as a prior.
 
 #include <array>
 #include <cstddef>
@@ -54,9 +56,9 @@ std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_sam
 struct ExposureSolution {
   std::vector<Eigen::Vector3f> gains;  // per photo: r, g, b factors in linear light
   int reference_photo = -1;            // gain 1 before `output_scale`; the photo of median exposure
-  // Photos that overlap none of the largest group that overlaps hold together ...
-  std::vector<int> by_exif;      // ... but EXIF ties them to it
-  std::vector<int> unconnected;  // ... and EXIF says nothing: their median gain is that of the rest
+  // Photos outside the largest group that chains of overlaps hold together: those that EXIF ties to
+  // it, and those that nothing does; the median gain of the latter is that of the rest.
+  std::vector<int> by_exif, unconnected;
   std::vector<int> contradicted;  // photos whose EXIF the overlaps contradict by half an EV
   bool exif_ignored = false;      // EXIF as a whole contradicts the overlaps and was left out
   // How each photo's bytes become light; none = sRGB without vignetting.

@@ -1,5 +1,8 @@
 #pragma once
-// Vignetting and response curve from what photos that see the same samples say differently.
+// Vignetting and response curve from what photos that see the same samples say differently (Goldman
+// and Chen 2005, "Vignette and Exposure Calibration and Compensation"). What such photos leave open
+// is a power of the curve (Grossberg and Nayar 2003, "Determining the Camera Response from Images:
+// What Is Knowable?").
 
 #include <string>
 #include <vector>
@@ -10,11 +13,11 @@
 
 namespace roomtex {
 
-// The logarithm of the light at a sample is the same in all photos once corrected: log light + log
-// gain of the photo + vignetting(radius) is linear in what is not known, so is a response curve
-// given as log light + b0 log srgb(u) + b1 log u + b2 (u - 1) + b3 (u^2 - 1) + ... over the level
-// u, 0..1. Least squares with Cauchy weights over all samples; the light of each sample is
-// eliminated.
+// All photos show the same light at a sample once they are corrected:
+//     log light + log gain of the photo + vignetting(radius)
+// is linear in what is not known. So is a response curve over the level u (0..1) in the form
+//     log light + b0 log srgb(u) + b1 log u + b2 (u - 1) + b3 (u^2 - 1) + ...
+// Least squares with Cauchy weights over all samples; the light of each sample is eliminated.
 
 // lens: number of the lens per photo, 0 .. num_lenses - 1. log_gains: start values per photo. A
 // lens whose views do not show it (too few, or less than 1 % in the corners) gets none.

@@ -1,5 +1,7 @@
 #pragma once
-// A large mesh in pieces that a browser takes one by one: near pieces whole, far ones coarse.
+// A large mesh in pieces that a browser takes one by one: near pieces whole, far ones coarse
+// (levels of detail, by meshoptimizer's quadric error: Garland and Heckbert 1997, "Surface
+// Simplification Using Quadric Error Metrics").
 
 #include <cstdint>
 #include <memory>
@@ -31,9 +33,9 @@ struct ViewChunk {
   int page = -1;  // index into ViewModel::images; -1 = colours of the points
   size_t first = 0, end = 0;
   int num_vertices = 0;
-  Eigen::Vector3f low = Eigen::Vector3f::Zero(),
-                  high = Eigen::Vector3f::Zero();  // box, relative to ViewModel::origin
-  float spacing = 0;                               // metres, a typical edge of its triangles
+  // Box, relative to ViewModel::origin.
+  Eigen::Vector3f low = Eigen::Vector3f::Zero(), high = Eigen::Vector3f::Zero();
+  float spacing = 0;  // metres, a typical edge of its triangles
 
   size_t num_triangles() const { return end - first; }
 };
