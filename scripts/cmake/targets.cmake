@@ -17,10 +17,10 @@ roomtex_precompiled(roomtex_precompiled)
 # Tests are compiled more often than they run: a third of the time goes into optimising them.
 set(roomtex_test_options ${roomtex_warnings} -O1)
 
-# roomtex_library(NAME ROOMS folders... [EXCEPT files...] PUBLIC ... PRIVATE ...): every .cc of the rooms, apart
-# from the mains of commands (roomtex_*.cc).
+# roomtex_library(NAME [INSTALLED] ROOMS folders... [EXCEPT files...] PUBLIC ... PRIVATE ...): every .cc of the
+# rooms, apart from the mains of commands (roomtex_*.cc). INSTALLED: users may link it, see install.cmake.
 function(roomtex_library name)
-  cmake_parse_arguments(ARG "" "" "ROOMS;FILES;EXCEPT;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "INSTALLED" "" "ROOMS;FILES;EXCEPT;PUBLIC;PRIVATE" ${ARGN})
   set(sources ${ARG_FILES})
   foreach(room ${ARG_ROOMS})
     file(GLOB found CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${room}/*.cc)
@@ -36,6 +36,9 @@ function(roomtex_library name)
   target_compile_options(roomtex_${name} PRIVATE ${roomtex_warnings})
   target_link_libraries(roomtex_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   target_precompile_headers(roomtex_${name} REUSE_FROM roomtex_precompiled)
+  if(ARG_INSTALLED)
+    roomtex_install_library(${name} ROOMS ${ARG_ROOMS} EXCEPT ${ARG_EXCEPT})
+  endif()
 endfunction()
 
 # roomtex_program(NAME SOURCES files... LIBRARIES ...): a program that is not installed.
@@ -53,7 +56,8 @@ function(roomtex_command name source)
   target_compile_options(roomtex-${name} PRIVATE ${roomtex_warnings})
   target_link_libraries(roomtex-${name} PRIVATE ${ARGN})
   target_precompile_headers(roomtex-${name} REUSE_FROM roomtex_precompiled)
-  install(TARGETS roomtex-${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS roomtex-${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR}
+          COMPONENT commands)
 endfunction()
 
 # roomtex_test(NAME [WHOLE] [LABEL l] SOURCES files... LIBRARIES ...): every TEST becomes a ctest of its own,
