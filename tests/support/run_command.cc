@@ -10,9 +10,13 @@
 namespace roomtex {
 
 CommandResult RunCommandLine(const std::string& line) {
+  return RunProgram(BinFolder() + "/" + line);
+}
+
+CommandResult RunProgram(const std::string& line) {
   const TempFolder folder;
   const std::string full =
-      BinFolder() + "/" + line + " >" + (folder / "out") + " 2>" + (folder / "err") + " </dev/null";
+      line + " >" + (folder / "out") + " 2>" + (folder / "err") + " </dev/null";
   const int status = std::system(full.c_str());
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -11,5 +11,7 @@ struct CommandResult {
 // Runs a built command as a user would, arguments as in a shell, e.g.
 // RunCommandLine("roomtex-import --help"); the command is taken from the build folder.
 CommandResult RunCommandLine(const std::string& line);
+// The same for any program, by its path or found on PATH: RunProgram("cmake --version").
+CommandResult RunProgram(const std::string& line);
 
 }  // namespace roomtex
