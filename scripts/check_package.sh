@@ -2,7 +2,7 @@
 # Makes the Debian package from the build folder, installs it in a bare Debian 12 with nothing but what it declares,
 # and runs every command there, the job from a capture to a coloured scan included. Then roomtex-dev: the example of
 # docs/examples/ is built and run. Needs root and debootstrap; the packages come from where this machine's apt has
-# them. Not part of the gate: 1.5 GB of downloads and about ten minutes.
+# them. Not part of the gate: it downloads 0.7 GB.
 #   scripts/check_package.sh [--keep FOLDER] [--without-dev]
 # --keep: the bare Debian stays in FOLDER and is taken again next time, the packages installed anew.
 set -euo pipefail
