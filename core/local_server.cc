@@ -4,16 +4,18 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <new>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
 #include <utility>
 
-#include <httplib.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <pwd.h>
@@ -26,12 +28,12 @@
 #include "core/error.h"
 #include "core/local_server_address.h"
 #include "core/local_server_connection.h"
+#include "core/local_server_http.h"
 
 namespace roomtex {
 namespace {
 
 constexpr int kMaxConnections = 128;  // open at a time
-constexpr int kMaxRequests = 1000;    // of one connection
 constexpr int kMaxJsonDepth = 64;     // deeper nesting would use up the stack
 constexpr size_t kBlockBytes = size_t{1} << 16;
 
@@ -73,16 +75,18 @@ extern "C" void StopOnSignal(int) {
 
 }  // namespace
 
-struct LocalServer::Impl : httplib::Server {
-  // Fills in the answer to a request that may ask.
-  using Route = std::function<void(const httplib::Request&, httplib::Response&)>;
-  using Method = std::string;
+// The gate in front of httplib: it owns the sockets of the browsers, reads their requests within
+// the limits and hands them on, each at a connection of its own, to httplib's server, which looks
+// whether it may answer and routes. httplib alone bounds neither the time nor the header of a
+// request, waits for idle connections when it stops, and hands out no socket by which one could.
+struct LocalServer::Impl {
+  using Route = httplib::Server::Handler;
 
   explicit Impl(const LocalServerOptions& server_options);
-  ~Impl() override;
+  ~Impl();
 
-  void AddRoute(const Method& method, const std::string& path, Route route);
-  void AddBodyRoute(const Method& method, const std::string& path,
+  void AddRoute(const std::string& method, const std::string& path, const Route& route);
+  void AddBodyRoute(const std::string& method, const std::string& path,
                     std::function<Json(const Json&)> handler);
   int Listen();
   void Bind();
@@ -90,7 +94,9 @@ struct LocalServer::Impl : httplib::Server {
   void CatchSignals();
   void Accept();
   void Serve(int socket);
-  void Respond(const httplib::Request& request, httplib::Response& response);
+  // Answers what may not be asked and what is not there; else it is left to the route.
+  httplib::Server::HandlerResponse Check(const httplib::Request& request,
+                                         httplib::Response& response) const;
   // Why the request may not be answered, or "".
   std::string Objection(const httplib::Request& request) const;
   bool IsAllowedHost(const std::string& host) const;
@@ -101,8 +107,9 @@ struct LocalServer::Impl : httplib::Server {
   const std::string token = MakeToken();
   int listen_fd = -1, stop_fd = -1, port = 0;
   LocalAddress address;
-  std::vector<std::string> hosts;                         // "name:port", lower case
-  std::map<std::string, std::map<Method, Route>> routes;  // by path
+  std::vector<std::string> hosts;                       // "name:port", lower case
+  std::map<std::string, std::set<std::string>> routes;  // methods by path
+  HiddenHttp http;
   std::unique_ptr<httplib::ThreadPool> pool;
   std::thread acceptor;
   std::atomic<int> num_connections{0};
@@ -149,10 +156,10 @@ void SetContent(const httplib::Request& request, const LocalServer::Content& con
       });
 }
 
-// Calls a handler; whatever it throws becomes an answer.
-void Guarded(httplib::Response& response, const std::function<void()>& handler) {
+// Whatever a handler throws becomes an answer.
+void SetException(httplib::Response& response, const std::exception_ptr& thrown) {
   try {
-    handler();
+    std::rethrow_exception(thrown);
   } catch (const InputError& error) {
     SetError(response, 422, error.what());
   } catch (const UsageError& error) {
@@ -164,6 +171,20 @@ void Guarded(httplib::Response& response, const std::function<void()>& handler) 
   } catch (...) {
     SetError(response, 500, "internal error of an unknown kind");
   }
+}
+
+// httplib's routes are regular expressions.
+std::string Literally(const std::string& path) {
+  std::string pattern;
+  for (const char c : path) {
+    if (std::strchr("^$\\.*+?()[]{}|", c) != nullptr) pattern += '\\';
+    pattern += c;
+  }
+  return pattern;
+}
+
+bool IsJson(const httplib::Request& request) {
+  return LowerCase(request.get_header_value("Content-Type")).rfind("application/json", 0) == 0;
 }
 
 LocalServer::Query QueryOf(const httplib::Request& request) {
@@ -195,14 +216,20 @@ LocalServer::Impl::Impl(const LocalServerOptions& server_options) : options(serv
   ThrowIfProblems(options.Problems());
   stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (stop_fd < 0) throw std::runtime_error(std::string("eventfd: ") + std::strerror(errno));
-  set_default_headers(SafetyHeaders());
-  set_keep_alive_max_count(kMaxRequests);
-  set_keep_alive_timeout(static_cast<time_t>(std::max(1.0, options.idle_seconds)));
-  // Everything is answered here; httplib's own routing is never reached.
-  set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
-    Respond(request, response);
-    return HandlerResponse::Handled;
-  });
+  const auto to_time = [](double seconds) { return static_cast<time_t>(std::ceil(seconds)); };
+  http.server()
+      .set_default_headers(SafetyHeaders())
+      .set_payload_max_length(static_cast<size_t>(options.max_body_bytes))
+      .set_read_timeout(to_time(options.request_seconds))
+      // The gate gives up a browser that takes nothing before httplib gives up the gate.
+      .set_write_timeout(2 * to_time(options.stall_seconds))
+      .set_pre_routing_handler(
+          [this](const httplib::Request& request, httplib::Response& response) {
+            return Check(request, response);
+          })
+      .set_exception_handler(
+          [](const httplib::Request&, httplib::Response& response,
+             const std::exception_ptr& thrown) { SetException(response, thrown); });
 }
 
 LocalServer::Impl::~Impl() {
@@ -211,22 +238,23 @@ LocalServer::Impl::~Impl() {
   close(stop_fd);
 }
 
-void LocalServer::Impl::AddRoute(const Method& method, const std::string& path, Route route) {
+void LocalServer::Impl::AddRoute(const std::string& method, const std::string& path,
+                                 const Route& route) {
   if (path.empty() || path[0] != '/') throw std::logic_error("a path begins with /: " + path);
   if (acceptor.joinable()) throw std::logic_error("the server runs already: " + path);
-  if (!routes[path].emplace(method, std::move(route)).second) {
+  if (!routes[path].insert(method).second) {
     throw std::logic_error("the path is added twice: " + method + " " + path);
   }
+  const std::string pattern = Literally("/" + token + path);
+  if (method == "GET") http.server().Get(pattern, route);
+  if (method == "POST") http.server().Post(pattern, route);
+  if (method == "PUT") http.server().Put(pattern, route);
+  if (method == "DELETE") http.server().Delete(pattern, route);
 }
 
-void LocalServer::Impl::AddBodyRoute(const Method& method, const std::string& path,
+void LocalServer::Impl::AddBodyRoute(const std::string& method, const std::string& path,
                                      std::function<Json(const Json&)> handler) {
   AddRoute(method, path, [handler](const httplib::Request& request, httplib::Response& response) {
-    const bool is_json =
-        LowerCase(request.get_header_value("Content-Type")).rfind("application/json", 0) == 0;
-    if (!is_json && !request.body.empty()) {
-      return SetError(response, 415, "The request must be application/json.");
-    }
     const std::optional<Json> body = ParseBody(request.body);
     if (!body) return SetError(response, 400, "The request is not JSON that can be read.");
     SetJson(response, 200, Dump(handler(*body)));
@@ -271,7 +299,6 @@ void LocalServer::Impl::Bind() {
   bound.size = sizeof bound.storage;
   getsockname(listen_fd, bound.get(), &bound.size);
   port = bound.port();
-  svr_sock_ = listen_fd;  // httplib looks here whether it is to go on sending
 }
 
 void LocalServer::Impl::AllowHosts() {
@@ -350,15 +377,14 @@ void LocalServer::Impl::Serve(int socket) {
   LocalConnection connection(socket, stop_fd, options);
   try {
     for (int count = 1; count <= kMaxRequests; ++count) {
-      std::optional<std::string> body = connection.NextRequest();
-      if (!body) return;
+      const std::optional<LocalRequest> request = connection.NextRequest();
+      if (!request) return;
       // Nobody waits for a thread while this one waits for a browser's next wish.
-      const bool is_last =
-          count == kMaxRequests || IsReadable(stop_fd) || num_connections > options.num_threads;
-      bool wants_close = false;
-      const bool ok = process_request(connection, is_last, wants_close,
-                                      [&](httplib::Request& r) { r.body = std::move(*body); });
-      if (!ok || wants_close || is_last) return;
+      const bool is_last = count == kMaxRequests || request->wants_close || IsReadable(stop_fd) ||
+                           num_connections > options.num_threads;
+      const LocalSocket to_http = http.Connect();
+      if (to_http.get() < 0) return;
+      if (!connection.Relay(*request, is_last, to_http) || is_last) return;
     }
   } catch (const std::exception&) {
     // Out of memory while reading or answering: this connection ends, the server does not.
@@ -386,32 +412,40 @@ std::string LocalServer::Impl::Objection(const httplib::Request& request) const 
   return "";
 }
 
-void LocalServer::Impl::Respond(const httplib::Request& request, httplib::Response& response) {
+httplib::Server::HandlerResponse LocalServer::Impl::Check(const httplib::Request& request,
+                                                          httplib::Response& response) const {
+  const auto refuse = [&](int status, const std::string& sentence) {
+    SetError(response, status, sentence);
+    return httplib::Server::HandlerResponse::Handled;
+  };
   const std::string objection = Objection(request);
-  if (!objection.empty()) return SetError(response, 403, objection);
+  if (!objection.empty()) return refuse(403, objection);
   const std::string path = request.path.substr(token.size() + 1);
   if (path.empty()) {  // the page's relative URLs need the slash
     response.set_header("Location", "/" + token + "/");
-    return SetError(response, 308, "The address ends with a slash.");
+    return refuse(308, "The address ends with a slash.");
   }
   const auto found = routes.find(path);
-  if (found == routes.end()) return SetError(response, 404, "There is nothing at this address.");
-  const auto route = found->second.find(request.method == "HEAD" ? "GET" : request.method);
-  if (route == found->second.end()) {
-    std::string methods;
-    for (const auto& [method, ignored] : found->second) {
-      methods += (methods.empty() ? "" : ", ") + method;
-    }
-    response.set_header("Allow", methods);
-    return SetError(response, 405, "This address does not take " + request.method + ".");
+  if (found == routes.end()) return refuse(404, "There is nothing at this address.");
+  const std::set<std::string>& methods = found->second;
+  if (methods.count(request.method == "HEAD" ? "GET" : request.method) == 0) {
+    std::string allowed;
+    for (const std::string& method : methods) allowed += (allowed.empty() ? "" : ", ") + method;
+    response.set_header("Allow", allowed);
+    return refuse(405, "This address does not take " + request.method + ".");
   }
-  Guarded(response, [&] { route->second(request, response); });
+  const bool reads_body = request.method != "GET" && request.method != "HEAD";
+  if (reads_body && request.get_header_value("Content-Length") != "0" && !IsJson(request)) {
+    return refuse(415, "The request must be application/json.");
+  }
+  return httplib::Server::HandlerResponse::Unhandled;
 }
 
 void LocalServer::Impl::Join() {
   if (acceptor.joinable()) acceptor.join();
   if (pool) pool->shutdown();
   pool.reset();
+  http.Stop();
   if (std::exchange(catches_signals, false)) {
     sigaction(SIGINT, &old_interrupt, nullptr);
     sigaction(SIGTERM, &old_terminate, nullptr);
@@ -464,6 +498,7 @@ void LocalServer::Start(bool stop_on_signals) {
   impl_->Bind();
   impl_->AllowHosts();
   if (stop_on_signals) impl_->CatchSignals();
+  impl_->http.Start(impl_->options.num_threads);
   impl_->pool = std::make_unique<httplib::ThreadPool>(impl_->options.num_threads);
   impl_->acceptor = std::thread([this] { impl_->Accept(); });
 }

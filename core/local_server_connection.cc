@@ -5,12 +5,12 @@
 #include <cctype>
 #include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
 #include <poll.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 namespace roomtex {
 namespace {
@@ -19,8 +19,9 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxFields = 100;         // header lines of a request
 constexpr double kFarewellSeconds = 2;  // for the last bytes when stopping or refusing
 constexpr size_t kBlockBytes = size_t{1} << 16;
-const std::array<const char*, 6> kUsedFields = {"host",          "origin",     "content-type",
-                                                "if-none-match", "connection", "accept-encoding"};
+const char kHeadEnd[] = "\r\n\r\n";
+const std::array<const char*, 5> kUsedFields = {"host", "origin", "content-type", "if-none-match",
+                                                "accept-encoding"};
 // Scripts, styles and pictures only from us; blob: is how three.js hands textures on.
 const char kContentPolicy[] =
     "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' blob:; "
@@ -36,6 +37,45 @@ int MillisecondsTo(Clock::time_point deadline) {
   using std::chrono::milliseconds;
   const auto left = std::chrono::duration_cast<milliseconds>(deadline - Clock::now()).count();
   return static_cast<int>(std::clamp<int64_t>(left + 1, 0, 1000000));
+}
+
+// A GET has no body that anybody would read. What of the body is not taken (the request was
+// answered without it) is no failure.
+void SendRequest(const LocalRequest& request, int http) {
+  const bool has_body = request.head.rfind("GET ", 0) != 0 && request.head.rfind("HEAD ", 0) != 0;
+  const std::string_view body = has_body ? std::string_view(request.body) : "";
+  const std::string text = request.head + "content-length: " + std::to_string(body.size()) +
+                           kHeadEnd + std::string(body);
+  size_t sent = 0;
+  while (sent < text.size()) {
+    const ssize_t count = send(http, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return;
+    sent += static_cast<size_t>(count);
+  }
+}
+
+bool EndsWith(std::string_view text, std::string_view end) {
+  return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
+}
+
+// What follows the head of httplib's answer.
+size_t BodyBytes(const std::string& head, const LocalRequest& request) {
+  const std::string field = "\r\nContent-Length: ";
+  const size_t begin = head.find(field);
+  if (begin == std::string::npos || request.head.rfind("HEAD ", 0) == 0) return 0;
+  return static_cast<size_t>(std::strtoull(head.c_str() + begin + field.size(), nullptr, 10));
+}
+
+// False at the end.
+bool AppendFrom(int http, std::string* answer) {
+  char block[kBlockBytes];
+  ssize_t size = -1;
+  do {
+    size = recv(http, block, sizeof block, 0);
+  } while (size < 0 && errno == EINTR);
+  if (size > 0) answer->append(block, static_cast<size_t>(size));
+  return size > 0;
 }
 
 }  // namespace
@@ -63,23 +103,14 @@ bool IsReadable(int fd, int milliseconds) {
   return poll(&poll_fd, 1, milliseconds) > 0;
 }
 
-LocalConnection::~LocalConnection() { close(socket_); }
-
-ssize_t LocalConnection::read(char* to, size_t size) {
-  const size_t count = std::min(size, head_.size() - next_);
-  std::memcpy(to, head_.data() + next_, count);
-  next_ += count;
-  return static_cast<ssize_t>(count);
-}
-
 bool LocalConnection::Receive(Clock::time_point deadline) {
   while (true) {
-    pollfd fds[2] = {{socket_, POLLIN, 0}, {stop_fd_, POLLIN, 0}};
+    pollfd fds[2] = {{browser_.get(), POLLIN, 0}, {stop_fd_, POLLIN, 0}};
     const int ready = poll(fds, 2, MillisecondsTo(deadline));
     if (ready < 0 && errno == EINTR) continue;
     if (ready <= 0 || fds[1].revents != 0) return false;
     char block[kBlockBytes];
-    const ssize_t size = recv(socket_, block, sizeof block, MSG_DONTWAIT);
+    const ssize_t size = recv(browser_.get(), block, sizeof block, MSG_DONTWAIT);
     if (size < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (size <= 0) return false;
     received_.append(block, static_cast<size_t>(size));
@@ -87,32 +118,33 @@ bool LocalConnection::Receive(Clock::time_point deadline) {
   }
 }
 
-std::optional<std::string> LocalConnection::NextRequest() {
+std::optional<LocalRequest> LocalConnection::NextRequest() {
   if (received_.empty() && !Receive(After(options_.idle_seconds))) return std::nullopt;
   const Clock::time_point deadline = After(options_.request_seconds);
   const auto late = [&] { return Clock::now() >= deadline; };
   const size_t max_head = static_cast<size_t>(options_.max_header_bytes);
-  size_t end = received_.find("\r\n\r\n");
-  for (; end == std::string::npos; end = received_.find("\r\n\r\n")) {
+  size_t end = received_.find(kHeadEnd);
+  for (; end == std::string::npos; end = received_.find(kHeadEnd)) {
     if (received_.size() > max_head) return Refuse(431);
     if (late() || !Receive(deadline)) return late() ? Refuse(408) : std::nullopt;
   }
   if (end > max_head) return Refuse(431);
   const std::string head = received_.substr(0, end + 2);
   received_.erase(0, end + 4);
-  if (const int status = ParseHead(head)) return Refuse(status);
+  LocalRequest request;
+  if (const int status = ParseHead(head, &request)) return Refuse(status);
   if (expects_continue_ && received_.size() < content_length_) {
-    Stream::write(std::string("HTTP/1.1 100 Continue\r\n\r\n"));
+    Send("HTTP/1.1 100 Continue\r\n\r\n");
   }
   while (received_.size() < content_length_) {
     if (late() || !Receive(deadline)) return late() ? Refuse(408) : std::nullopt;
   }
-  std::string body = received_.substr(0, content_length_);
+  request.body = received_.substr(0, content_length_);
   received_.erase(0, content_length_);
-  return body;
+  return request;
 }
 
-int LocalConnection::ParseHead(const std::string& head) {
+int LocalConnection::ParseHead(const std::string& head, LocalRequest* request) {
   std::map<std::string, std::string> fields;
   size_t begin = head.find("\r\n") + 2;
   const std::string request_line = head.substr(0, begin);
@@ -129,17 +161,17 @@ int LocalConnection::ParseHead(const std::string& head) {
   if (length.size() > 12 || std::stoll(length) > options_.max_body_bytes) return 413;
   content_length_ = static_cast<size_t>(std::stoll(length));
   expects_continue_ = fields.count("expect") > 0;
-  head_ = request_line;
-  next_ = 0;
+  request->wants_close = LowerCase(fields["connection"]).find("close") != std::string::npos ||
+                         EndsWith(request_line, " HTTP/1.0\r\n");
+  request->head = request_line;
   for (const char* name : kUsedFields) {
     const auto field = fields.find(name);
     if (field == fields.end()) continue;
     // gzip or nothing: httplib's brotli takes seconds for a script.
     const bool is_encoding = field->first == "accept-encoding";
     if (is_encoding && field->second.find("gzip") == std::string::npos) continue;
-    head_ += field->first + ": " + (is_encoding ? "gzip" : field->second) + "\r\n";
+    request->head += field->first + ": " + (is_encoding ? "gzip" : field->second) + "\r\n";
   }
-  head_ += "\r\n";
   return 0;
 }
 
@@ -165,24 +197,55 @@ int LocalConnection::ParseField(const std::string& line,
   return is_new || !decides ? 0 : 400;
 }
 
-ssize_t LocalConnection::write(const char* from, size_t size) {
-  size_t sent = 0;
+bool LocalConnection::Send(std::string_view bytes) const {
   Clock::time_point deadline = After(options_.stall_seconds);
   Clock::time_point farewell = Clock::time_point::max();
-  while (sent < size) {
-    const ssize_t count = send(socket_, from + sent, size - sent, MSG_DONTWAIT | MSG_NOSIGNAL);
+  while (!bytes.empty()) {
+    const ssize_t count =
+        send(browser_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
     if (count > 0) {
-      sent += static_cast<size_t>(count);
+      bytes.remove_prefix(static_cast<size_t>(count));
       deadline = After(options_.stall_seconds);
       continue;
     }
-    if (count < 0 && errno != EAGAIN && errno != EINTR) return -1;
+    if (count < 0 && errno != EAGAIN && errno != EINTR) return false;
     if (IsReadable(stop_fd_)) farewell = std::min(farewell, After(kFarewellSeconds));
-    if (Clock::now() >= std::min(deadline, farewell)) return -1;
-    pollfd poll_fd{socket_, POLLOUT, 0};
+    if (Clock::now() >= std::min(deadline, farewell)) return false;
+    pollfd poll_fd{browser_.get(), POLLOUT, 0};
     poll(&poll_fd, 1, std::min(100, MillisecondsTo(deadline)));
   }
-  return static_cast<ssize_t>(size);
+  return true;
+}
+
+bool LocalConnection::Relay(const LocalRequest& request, bool is_last,
+                            const LocalSocket& http) const {
+  SendRequest(request, http.get());
+  std::string answer;
+  size_t end = std::string::npos;
+  while ((end = answer.find(kHeadEnd)) == std::string::npos) {
+    if (!AppendFrom(http.get(), &answer)) return false;
+  }
+  std::string head = answer.substr(0, end);
+  answer.erase(0, end + std::strlen(kHeadEnd));
+  size_t left = BodyBytes(head, request);
+  // httplib's connection ends with this answer, the browser's may stay.
+  const std::string closes = "\r\nConnection: close";
+  const size_t field = head.find(closes);
+  if (field != std::string::npos && !is_last) {
+    const int seconds = std::max(1, static_cast<int>(options_.idle_seconds));
+    head.replace(field, closes.size(),
+                 "\r\nKeep-Alive: timeout=" + std::to_string(seconds) +
+                     ", max=" + std::to_string(kMaxRequests));
+  }
+  answer.insert(0, head + kHeadEnd);
+  left += head.size() + std::strlen(kHeadEnd);
+  while (true) {
+    if (answer.size() > left || !Send(answer)) return false;
+    left -= answer.size();
+    if (left == 0) return true;
+    answer.clear();
+    if (!AppendFrom(http.get(), &answer)) return false;
+  }
 }
 
 std::nullopt_t LocalConnection::Refuse(int status) {
@@ -199,9 +262,9 @@ std::nullopt_t LocalConnection::Refuse(int status) {
   for (const auto& [name, value] : SafetyHeaders()) text += name + ": " + value + "\r\n";
   text += "Content-Type: application/json\r\nConnection: close\r\nContent-Length: " +
           std::to_string(body.size()) + "\r\n\r\n" + body;
-  if (write(text.data(), text.size()) < 0) return std::nullopt;
+  if (!Send(text)) return std::nullopt;
   // Closing with unread bytes would take the answer away from a client that is still sending.
-  shutdown(socket_, SHUT_WR);
+  shutdown(browser_.get(), SHUT_WR);
   const Clock::time_point deadline = After(kFarewellSeconds);
   do {
     received_.clear();
