@@ -1,9 +1,9 @@
 // What every test of a page needs: a command that serves it, a browser that opens it, and folders.
 
-import { spawn } from 'node:child_process';
-import { mkdtempSync, mkdirSync, rmSync } from 'node:fs';
-import { createRequire } from 'node:module';
-import { tmpdir } from 'node:os';
+import {spawn} from 'node:child_process';
+import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
+import {createRequire} from 'node:module';
+import {tmpdir} from 'node:os';
 import path from 'node:path';
 
 function fromEnvironment(name) {
@@ -13,15 +13,15 @@ function fromEnvironment(name) {
 }
 
 const bin = fromEnvironment('ROOMTEX_BIN');
-const require = createRequire(
-    path.join(fromEnvironment('ROOMTEX_BROWSER_PACKAGES'), 'package.json'));
-const { chromium } = require('playwright-core');
+const require =
+    createRequire(path.join(fromEnvironment('ROOMTEX_BROWSER_PACKAGES'), 'package.json'));
+const {chromium} = require('playwright-core');
 
 export function makeFolder() {
   const folder = mkdtempSync(path.join(tmpdir(), 'roomtex-browser-'));
   return {
     path: (...parts) => path.join(folder, ...parts),
-    remove: () => rmSync(folder, { recursive: true, force: true }),
+    remove: () => rmSync(folder, {recursive: true, force: true}),
   };
 }
 
@@ -29,11 +29,15 @@ export function makeFolder() {
 export function run(command, args) {
   return new Promise((resolve, reject) => {
     const child = spawn(path.join(bin, command), args);
-    const result = { code: null, stdout: '', stderr: '' };
-    child.stdout.on('data', (data) => { result.stdout += data; });
-    child.stderr.on('data', (data) => { result.stderr += data; });
+    const result = {code: null, stdout: '', stderr: ''};
+    child.stdout.on('data', (data) => {
+      result.stdout += data;
+    });
+    child.stderr.on('data', (data) => {
+      result.stderr += data;
+    });
     child.on('error', reject);
-    child.on('close', (code) => resolve({ ...result, code }));
+    child.on('close', (code) => resolve({...result, code}));
   });
 }
 
@@ -52,7 +56,9 @@ export function serve(command, args) {
       },
     };
     const closed = new Promise((done) => child.on('close', done));
-    child.stderr.on('data', (data) => { server.stderr += data; });
+    child.stderr.on('data', (data) => {
+      server.stderr += data;
+    });
     child.stdout.on('data', (data) => {
       server.stdout += data;
       const found = server.stdout.match(/http:\/\/\S+\n/);
@@ -62,14 +68,15 @@ export function serve(command, args) {
       }
     });
     child.on('error', reject);
-    closed.then((code) => reject(new Error(
-        `${command} ended with ${code} before it served: ${server.stderr}`)));
+    closed.then(
+        (code) =>
+            reject(new Error(`${command} ended with ${code} before it served: ${server.stderr}`)));
   });
 }
 
 // A page that remembers what went wrong in it: errors() must be empty at the end of a test.
-export async function openPage(browser, url, { width = 1600, height = 1000 } = {}) {
-  const page = await browser.newPage({ viewport: { width, height } });
+export async function openPage(browser, url, {width = 1600, height = 1000} = {}) {
+  const page = await browser.newPage({viewport: {width, height}});
   const errors = [];
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => {
@@ -85,20 +92,21 @@ export async function openPage(browser, url, { width = 1600, height = 1000 } = {
     if (to.protocol === 'http:' && to.host !== new URL(url).host) errors.push(`asked ${to.host}`);
   });
   if (url !== 'about:blank') await page.goto(url);
-  return { page, errors: () => errors };
+  return {page, errors: () => errors};
 }
 
 export function launchBrowser() {
   // --no-sandbox: containers run as root. SwiftShader: WebGL without a GPU.
   return chromium.launch({
     executablePath: fromEnvironment('ROOMTEX_CHROMIUM'),
-    args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
-           '--enable-unsafe-swiftshader'],
+    args: [
+      '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'
+    ],
   });
 }
 
 export async function screenshot(page, name) {
   const folder = fromEnvironment('ROOMTEX_SCREENSHOTS');
-  mkdirSync(folder, { recursive: true });
-  await page.screenshot({ path: path.join(folder, `${name}.png`) });
+  mkdirSync(folder, {recursive: true});
+  await page.screenshot({path: path.join(folder, `${name}.png`)});
 }

@@ -4,18 +4,7 @@ import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, run, screenshot} from './browser.mjs';
-import {
-  capture,
-  distance,
-  fileOf,
-  kSampleSpacing,
-  lowestContrast,
-  onPage,
-  PickPage,
-  servePicks,
-  until,
-  usablePlaces
-} from './pick_page.mjs';
+import {capture, distance, fileOf, kSampleSpacing, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
 
 let browser;
 let places;  // of the photo that suits best, those that can be picked
@@ -54,14 +43,14 @@ test('six pairs by mouse: numbers come, the file follows every step', async () =
       assert.ok(distance(picks[index].point, place.point) < kSampleSpacing);
     }
     const milliseconds =
-        await until(() => page.page.evaluate(() => window.residuals_after), 'the sixth residual');
+        await until(() => page.page.evaluate(() => window.residualsAfter), 'the sixth residual');
     console.log(
         `from the sixth click to its residual on the screen: ${milliseconds.toFixed(0)} ms`);
     await until(async () => (await page.rows()).every((row) => row.status === 'used'), 'all used');
     for (const row of await page.rows()) {
       assert.ok(row.px !== null && row.px < 2.5, `pick ${row.number}: ${row.px} px`);
       assert.ok(row.mm !== null && row.mm < 30, `pick ${row.number}: ${row.mm} mm`);
-      assert.ok(row.left_out !== null && row.left_out >= row.px);
+      assert.ok(row.leftOut !== null && row.leftOut >= row.px);
     }
     assert.match(await page.text('#summary-body'), /6 used of 6/);
     assert.match(await page.text('#photo-fit'), /px rms/);
@@ -80,9 +69,9 @@ function watchForResiduals(page) {
     }, true);
     new MutationObserver(() => {
       const cell = document.querySelector('#rows tr:nth-child(6) .value');
-      if (released === 0 || window.residuals_after || !/\d/.test(cell?.textContent)) return;
+      if (released === 0 || window.residualsAfter || !/\d/.test(cell?.textContent)) return;
       requestAnimationFrame(() => {
-        window.residuals_after = performance.now() - released;
+        window.residualsAfter = performance.now() - released;
       });
     })
         .observe(
@@ -96,16 +85,16 @@ test('a pick dragged far off is marked, dragged back it is good again; undo and 
     await page.rowsAre(8);
     const from = first[2].img;
     const to = [from[0] < 480 ? from[0] + 60 : from[0] - 60, from[1]];
-    let on_the_way = null;
+    let onTheWay = null;
     await page.page.click('#photo-whole');
     await page.drag('photo', from, to, async () => {
       // The numbers follow before the button is let go.
-      on_the_way = await page.rowIs(2, (row) => row.px > 10, 'its residual grows');
+      onTheWay = await page.rowIs(2, (row) => row.px > 10, 'its residual grows');
     });
-    assert.ok(on_the_way);
+    assert.ok(onTheWay);
     await page.saved();
     const bad = await page.rowIs(
-        2, (row) => row.left_out > 30 && (row.status === 'bad' || /worst/.test(row.state)),
+        2, (row) => row.leftOut > 30 && (row.status === 'bad' || /worst/.test(row.state)),
         'marked');
     assert.match(bad.state, /✕|▲/, 'not by colour alone');
     assert.ok(distance(page.file()[2].img, to) < 2.5, `${page.file()[2].img}`);
@@ -118,7 +107,7 @@ test('a pick dragged far off is marked, dragged back it is good again; undo and 
     assert.ok(distance(page.file()[2].img, from) < 2.5);
 
     await page.page.keyboard.press('Control+z');
-    await page.rowIs(2, (row) => row.left_out > 30, 'far again');
+    await page.rowIs(2, (row) => row.leftOut > 30, 'far again');
     await page.saved();
     assert.deepEqual(page.file()[2].img, far);
     await page.page.keyboard.press('Control+z');
@@ -127,12 +116,12 @@ test('a pick dragged far off is marked, dragged back it is good again; undo and 
     assert.ok(distance(page.file()[2].img, from) < 1e-6);
     assert.ok(await page.page.isDisabled('#undo'));
     await page.page.keyboard.press('Control+Shift+Z');
-    await page.rowIs(2, (row) => row.left_out > 30, 'far once more');
+    await page.rowIs(2, (row) => row.leftOut > 30, 'far once more');
     await page.page.keyboard.press('Control+y');
     await page.rowIs(2, (row) => row.status === 'used', 'back once more');
     assert.ok(await page.page.isDisabled('#redo'));
     await page.saved();
-  }, {picks_file: fileOf(first)});
+  }, {picksFile: fileOf(first)});
 });
 
 test('a point in the scan is dragged: the new place counts; undo brings back the old', async () => {
@@ -154,7 +143,7 @@ test('a point in the scan is dragged: the new place counts; undo brings back the
     await page.page.keyboard.press('Control+z');
     await until(() => distance(page.file()[1].point, places[1].point) < 1e-6, 'as in the file');
     await page.saved();
-  }, {picks_file: fileOf(places.slice(0, 7))});
+  }, {picksFile: fileOf(places.slice(0, 7))});
 });
 
 test('off and on, remove and bring back, next and previous', async () => {
@@ -185,17 +174,17 @@ test('off and on, remove and bring back, next and previous', async () => {
     await page.page.locator('#rows tr').nth(3).locator('input').click();
     await page.rowIs(3, (row) => row.status === 'used', 'on by its box');
 
-    const before = page.file();
+    const earlier = page.file();
     await page.page.focus('#photo-pane');
     await page.page.keyboard.press('Delete');
     await page.rowsAre(6);
     await page.saved();
-    assert.deepEqual(page.file(), before.filter((pick, index) => index !== 1));
+    assert.deepEqual(page.file(), earlier.filter((pick, index) => index !== 1));
     await page.page.keyboard.press('Control+z');
     await page.rowsAre(7);
     await page.saved();
-    assert.deepEqual(page.file(), before);
-  }, {picks_file: fileOf(places.slice(0, 7))});
+    assert.deepEqual(page.file(), earlier);
+  }, {picksFile: fileOf(places.slice(0, 7))});
 });
 
 test('the missing half is predicted near the truth, and taken by Enter', async () => {
@@ -228,39 +217,40 @@ test('the missing half is predicted near the truth, and taken by Enter', async (
     await page.click('scan', places[7].scan);
     await page.rowIs(7, (row) => row.status === 'half', 'half finished');
     await page.saved();
-    const in_photo =
+    const inPhoto =
         await until(async () => (await page.session()).picks[7].predicted_img, 'a prediction');
-    assert.ok(distance(in_photo, places[7].img) < 5, `${in_photo}: ${places[7].img}`);
+    assert.ok(distance(inPhoto, places[7].img) < 5, `${inPhoto}: ${places[7].img}`);
     await page.page.keyboard.press('Enter');
     await page.rowIs(7, (row) => row.status === 'used', 'completed by the prediction');
     await page.saved();
     assert.ok(distance(page.file()[7].img, places[7].img) < 5);
-  }, {picks_file: fileOf(places.slice(0, 6))});
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test('reloading the page goes on with the picks, and so does a new server', async () => {
-  await pageOn(async (page, {server, picks_path}) => {
+  await pageOn(async (page, {picksPath}) => {
     await page.rowsAre(6);
     await page.pick(places[6]);
     await page.rowIs(6, (row) => row.px !== null, 'has its numbers');
-    const before = (await page.rows()).map(({photo, px, status}) => [photo, px, status]);
+    const earlier = (await page.rows()).map(({photo, px, status}) => [photo, px, status]);
     const file = page.file();
     await page.page.reload();
     await page.page.waitForSelector('body[data-ready]');
     await page.rowsAre(7);
     await page.rowIs(6, (row) => row.px !== null, 'has its numbers');
-    assert.deepEqual((await page.rows()).map(({photo, px, status}) => [photo, px, status]), before);
+    assert.deepEqual(
+        (await page.rows()).map(({photo, px, status}) => [photo, px, status]), earlier);
     assert.deepEqual(page.file(), file);
-    const second = await servePicks(picks_path);
-    const again = await PickPage.open(browser, second, picks_path);
+    const second = await servePicks(picksPath);
+    const again = await PickPage.open(browser, second, picksPath);
     await again.rowsAre(7);
     await until(async () => (await again.rows())[6].px !== null, 'numbers');
     const [row] = (await again.rows()).slice(6);
-    assert.ok(Math.abs(row.px - before[6][1]) < 0.02, `${row.px} after ${before[6][1]}`);
+    assert.ok(Math.abs(row.px - earlier[6][1]) < 0.02, `${row.px} after ${earlier[6][1]}`);
     assert.deepEqual(again.errors(), []);
     await again.close();
     assert.equal(await second.stop(), 0);
-  }, {picks_file: fileOf(places.slice(0, 6))});
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test('picks in a second photo', async () => {
@@ -279,7 +269,7 @@ test('picks in a second photo', async () => {
     assert.equal(row.photo, name);
     assert.ok(row.px < 8, `${row.px}`);
     assert.equal(page.file().filter((pick) => pick.image_name === name).length, 2);
-  }, {picks_file: fileOf(places.slice(0, 6))});
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test('two scans: what is predicted in the other one is taken there', async () => {
@@ -312,7 +302,7 @@ test('two scans: what is predicted in the other one is taken there', async () =>
     await page.saved();
     // The point is in the frame of the first scan, whichever scan it was picked in.
     assert.ok(distance(page.file()[6].point, places[6].point) < 3 * kSampleSpacing);
-  }, {picks_file: fileOf(places.slice(0, 6)), more});
+  }, {picksFile: fileOf(places.slice(0, 6)), more});
 });
 
 test('one pick by the keyboard alone', async () => {
@@ -405,7 +395,7 @@ test('Align says trusted, and the model lies where it should', async () => {
     await page.page.keyboard.press('Escape');
     await until(async () => !await page.page.isVisible('#align'), 'Escape closes the dialog');
     assert.equal(await page.page.evaluate(() => document.activeElement.id), 'align-open');
-  }, {picks_file: fileOf(places.slice(0, 8))});
+  }, {picksFile: fileOf(places.slice(0, 8))});
 });
 
 test('picks that are wrong are refused in words', async () => {
@@ -421,7 +411,7 @@ test('picks that are wrong are refused in words', async () => {
     assert.match(text, /▲|✕/);
     assert.match(await page.text('#align .headline'), /\w+ \w+ \w+/);
     await screenshot(page.page, 'pick-refused');
-  }, {picks_file: fileOf(wrong)});
+  }, {picksFile: fileOf(wrong)});
 });
 
 test('too few picks: Align says so without running', async () => {
@@ -429,7 +419,7 @@ test('too few picks: Align says so without running', async () => {
     await page.rowsAre(3);
     await page.page.click('#align-open');
     assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);
-  }, {picks_file: fileOf(places.slice(0, 3))});
+  }, {picksFile: fileOf(places.slice(0, 3))});
 });
 
 test('Align can be cancelled, and run again', async () => {
@@ -447,5 +437,5 @@ test('Align can be cancelled, and run again', async () => {
     await page.page.click('#align-open');
     await page.page.waitForSelector('#align .verdict', {timeout: 240000});
     assert.match(await page.text('#align .verdict'), /Trusted/);
-  }, {picks_file: fileOf(places.slice(0, 8))});
+  }, {picksFile: fileOf(places.slice(0, 8))});
 });

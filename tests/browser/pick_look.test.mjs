@@ -6,16 +6,7 @@ import {writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, makeFolder, screenshot} from './browser.mjs';
-import {
-  distance,
-  fileOf,
-  lowestContrast,
-  onPage,
-  PickPage,
-  servePicks,
-  until,
-  usablePlaces
-} from './pick_page.mjs';
+import {distance, fileOf, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
 
 let browser;
 let places;
@@ -115,13 +106,13 @@ test('views stay when the window is resized and the divider dragged', async () =
   await pageOn(async (page) => {
     await page.zoomTo('photo', places[0].img, 3);
     await page.zoomTo('scan', places[0].scan, 3);
-    const before = [await page.view('photo'), await page.view('scan')];
+    const earlier = [await page.view('photo'), await page.view('scan')];
     await page.page.setViewportSize({width: 1100, height: 640});
-    await until(async () => (await page.view('photo')).box.width < before[0].box.width, 'smaller');
+    await until(async () => (await page.view('photo')).box.width < earlier[0].box.width, 'smaller');
     await page.redrawn();
     assert.deepEqual(
         [(await page.view('photo')).text, (await page.view('scan')).text],
-        before.map((view) => view.text));
+        earlier.map((view) => view.text));
     const bar = await page.page.locator('#divider').boundingBox();
     const width = (await page.view('photo')).box.width;
     await page.page.mouse.move(bar.x + 3, bar.y + 100);
@@ -133,7 +124,7 @@ test('views stay when the window is resized and the divider dragged', async () =
     await page.redrawn();
     assert.deepEqual(
         [(await page.view('photo')).text, (await page.view('scan')).text],
-        before.map((view) => view.text));
+        earlier.map((view) => view.text));
     // By keys, too.
     await page.page.focus('#divider');
     await page.page.keyboard.press('ArrowRight');
@@ -145,12 +136,12 @@ test('a press that moves pans, one that does not sets a point', async () => {
   await pageOn(async (page) => {
     const img = [480, 320];
     await page.zoomTo('photo', img, 2);
-    const before = await page.view('photo');
+    const earlier = await page.view('photo');
     await page.drag('photo', img, [img[0] + 30, img[1] + 20]);
-    await until(async () => (await page.view('photo')).text !== before.text, 'panned');
+    await until(async () => (await page.view('photo')).text !== earlier.text, 'panned');
     const view = await page.view('photo');
-    assert.ok(Math.abs(view.centre[0] - before.centre[0] + 30) < 0.6);
-    assert.ok(Math.abs(view.centre[1] - before.centre[1] + 20) < 0.6);
+    assert.ok(Math.abs(view.centre[0] - earlier.centre[0] + 30) < 0.6);
+    assert.ok(Math.abs(view.centre[1] - earlier.centre[1] + 20) < 0.6);
     assert.equal((await page.rows()).length, 0);
     // Less than four pixels is still a click.
     await page.drag('photo', img, [img[0] + 0.5, img[1]]);
@@ -242,14 +233,14 @@ test(
         await page.page.locator('#back-range').fill('70');
         await until(async () => await saturation() > 20, 'over it again');
         await screenshot(page.page, 'pick-back');
-      }, {picks_file: fileOf(places.slice(0, 8))});
+      }, {picksFile: fileOf(places.slice(0, 8))});
     });
 
 test('a tab that another one has overtaken says so, and can reload or keep', async () => {
   const refusals = {allowed: [/status of 4\d\d/]};
-  await pageOn(async (page, {server, picks_path}) => {
+  await pageOn(async (page, {server, picksPath}) => {
     await page.rowsAre(6);
-    const other = await PickPage.open(browser, server, picks_path);
+    const other = await PickPage.open(browser, server, picksPath);
     await other.rowsAre(6);
     await other.page.keyboard.press('n');
     await other.page.keyboard.press('x');
@@ -282,7 +273,7 @@ test('a tab that another one has overtaken says so, and can reload or keep', asy
     await until(
         () => other.file().filter((pick) => pick.weight === 0).length === 2, 'kept its own');
     await other.close();
-  }, {picks_file: fileOf(places.slice(0, 6)), ...refusals});
+  }, {picksFile: fileOf(places.slice(0, 6)), ...refusals});
 });
 
 test('a server that does not answer loses nothing', async () => {
@@ -299,17 +290,17 @@ test('a server that does not answer loses nothing', async () => {
     await page.saved();
     await until(() => page.file().length === 5, 'saved once the server is back');
     assert.ok(!await page.page.isVisible('#banner'));
-  }, {picks_file: fileOf(places.slice(0, 6)), allowed: [/ERR_CONNECTION_REFUSED/, /failed$/]});
+  }, {picksFile: fileOf(places.slice(0, 6)), allowed: [/ERR_CONNECTION_REFUSED/, /failed$/]});
 });
 
 test(
     'a server that was started anew is told from one that is gone; picks can be copied',
     async () => {
       const folder = makeFolder();
-      const picks_path = folder.path('picks.csv');
-      writeFileSync(picks_path, fileOf(places.slice(0, 6)));
-      const server = await servePicks(picks_path);
-      const page = await PickPage.open(browser, server, picks_path);
+      const picksPath = folder.path('picks.csv');
+      writeFileSync(picksPath, fileOf(places.slice(0, 6)));
+      const server = await servePicks(picksPath);
+      const page = await PickPage.open(browser, server, picksPath);
       await page.page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
       await page.rowsAre(6);
       assert.equal(await server.stop(), 0);
@@ -317,12 +308,12 @@ test(
       await page.page.keyboard.press('n');
       await page.page.keyboard.press('Delete');
       await until(async () => /does not answer/.test(await page.text('#save')), 'gone');
-      const again = await servePicks(picks_path, [], new URL(server.url).port);
+      const again = await servePicks(picksPath, [], new URL(server.url).port);
       await until(async () => /started anew/.test(await page.text('#banner')), 'started anew');
       assert.match(await page.text('#save'), /not saved/);
       await page.page.click('#banner button');
       await until(async () => /Copied 5/.test(await page.text('#banner')), 'copied');
-      writeFileSync(picks_path, await page.page.evaluate(() => navigator.clipboard.readText()));
+      writeFileSync(picksPath, await page.page.evaluate(() => navigator.clipboard.readText()));
       assert.deepEqual(page.file().map(({img}) => img), places.slice(1, 6).map(({img}) => img));
       await page.close();
       assert.equal(await again.stop(), 0);
@@ -354,7 +345,7 @@ test('all text has a contrast of 4.5 or more, at every size', async () => {
     assert.ok(lowest.ratio >= 4.5, JSON.stringify(lowest));
     await page.page.keyboard.press('Escape');
     await until(async () => !await page.page.isVisible('#help'), 'closed');
-  }, {picks_file: fileOf(places.slice(0, 6))});
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test('every control has a name, and shows when it has the focus', async () => {
@@ -394,14 +385,14 @@ test('every control has a name, and shows when it has the focus', async () => {
              of ['photo-pane', 'scan-pane', 'divider', 'thumbs', 'align-open', 'gamma', 'Pick 1']) {
       assert.ok(stops.has(name), `${name} is not reached by Tab: ${[...stops]}`);
     }
-  }, {picks_file: fileOf(places.slice(0, 6))});
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test('tiles: few at a time, and those out of view are given up', async () => {
   await pageOn(async (page) => {
     await page.page.waitForLoadState('networkidle');
     // Held back here, so that they pile up as over a slow line.
-    let asked = 0, given_up = 0;
+    let asked = 0, givenUp = 0;
     let holding = true;
     const held = [];
     await page.page.route('**/tile?*', async (route) => {
@@ -410,7 +401,7 @@ test('tiles: few at a time, and those out of view are given up', async () => {
       await route.continue().catch(() => {});  // it may have been given up meanwhile
     });
     page.page.on('requestfailed', (request) => {
-      given_up += /tile\?/.test(request.url());
+      givenUp += /tile\?/.test(request.url());
     });
     const isEmpty = async () => {
       const [color] = await colorsAt(page, 'scan', [[400.5, 200.5]]);
@@ -422,7 +413,7 @@ test('tiles: few at a time, and those out of view are given up', async () => {
     assert.equal(asked, 3, 'three at a time, the picks do not wait behind them');
     assert.ok(await isEmpty());
     await page.page.selectOption('#scan-picture', 'shaded');
-    await until(() => given_up >= 3, 'those of the first are given up');
+    await until(() => givenUp >= 3, 'those of the first are given up');
     assert.ok(await isEmpty());
     holding = false;
     for (const go of held) go();
@@ -446,5 +437,5 @@ test('with reduced motion B changes the picture once for each press', async () =
       await page.page.keyboard.press('b');
       await until(async () => await saturation() < 4, 'the scan');
     }
-  }, {picks_file: fileOf(places.slice(0, 8))});
+  }, {picksFile: fileOf(places.slice(0, 8))});
 });

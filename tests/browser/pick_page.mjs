@@ -19,9 +19,9 @@ export async function until(probe, what, seconds = 30) {
 }
 
 // Picks of a file: [{image_name, img, point, weight}].
-export function readPicks(path) {
-  if (!existsSync(path)) return [];
-  const lines = readFileSync(path, 'utf8').split('\n').filter((line) => line && line[0] !== '#');
+export function readPicks(file) {
+  if (!existsSync(file)) return [];
+  const lines = readFileSync(file, 'utf8').split('\n').filter((line) => line && line[0] !== '#');
   assert.match(lines[0], /^image_name,x,y,scan_x,scan_y,scan_z(,weight)?$/);
   return lines.slice(1).map((line) => {
     const fields = line.split(',');
@@ -42,7 +42,7 @@ export function capture(...parts) {
 }
 
 // Starts roomtex-pick on it.
-export function servePicks(picks_path, more = [], port = 0) {
+export function servePicks(picksPath, more = [], port = 0) {
   return serve('roomtex-pick', [
     '--input_path',
     capture('sparse'),
@@ -51,7 +51,7 @@ export function servePicks(picks_path, more = [], port = 0) {
     '--scan_path',
     capture('capture', 'scan.rtpi'),
     '--output_path',
-    picks_path,
+    picksPath,
     '--port',
     String(port),
     ...more,
@@ -59,11 +59,11 @@ export function servePicks(picks_path, more = [], port = 0) {
 }
 
 export class PickPage {
-  static async open(browser, server, picks_path, size = {}) {
+  static async open(browser, server, picksPath, size = {}) {
     const {page, errors} = await openPage(browser, server.url, size);
     await page.waitForSelector('body[data-ready]');
     const result = new PickPage();
-    Object.assign(result, {page, errors, picks_path, url: server.url});
+    Object.assign(result, {page, errors, picksPath, url: server.url});
     await result.view('photo');
     await result.view('scan');
     return result;
@@ -113,12 +113,12 @@ export class PickPage {
   }
 
   // Presses on one place of a side and lets go on another; both must be in view.
-  async drag(side, from, to, on_the_way = async () => {}) {
+  async drag(side, from, to, onTheWay = async () => {}) {
     await this.page.mouse.move(...await this.toScreen(side, from));
     await this.page.mouse.down();
     const [x, y] = await this.toScreen(side, to);
     await this.page.mouse.move(x, y, {steps: 12});
-    await on_the_way();
+    await onTheWay();
     await this.page.mouse.up();
   }
 
@@ -142,7 +142,7 @@ export class PickPage {
         photo: cells[1],
         px: value(cells[2]),
         mm: value(cells[3]),
-        left_out: value(cells[4]),
+        leftOut: value(cells[4]),
         state: cells[5],
         status: line.dataset.status,
         selected: line.hasAttribute('data-selected'),
@@ -169,7 +169,7 @@ export class PickPage {
   }
 
   file() {
-    return readPicks(this.picks_path);
+    return readPicks(this.picksPath);
   }
 
   text(selector) {
@@ -187,17 +187,16 @@ export class PickPage {
 }
 
 // Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
-// what `allowed` names. picks_file: what the picks file holds before; more: options of the command.
-export async function onPage(
-    browser, body, {image_name, picks_file = '', allowed = [], more = []}) {
+// what `allowed` names. picksFile: what the picks file holds before; more: options of the command.
+export async function onPage(browser, body, {image_name, picksFile = '', allowed = [], more = []}) {
   const folder = makeFolder();
-  const picks_path = folder.path('picks.csv');
-  if (picks_file) writeFileSync(picks_path, picks_file);
-  const server = await servePicks(picks_path, ['--image_name', image_name, ...more]);
+  const picksPath = folder.path('picks.csv');
+  if (picksFile) writeFileSync(picksPath, picksFile);
+  const server = await servePicks(picksPath, ['--image_name', image_name, ...more]);
   // Small: without a graphics processor the time goes into pixels.
-  const page = await PickPage.open(browser, server, picks_path, {width: 1280, height: 720});
+  const page = await PickPage.open(browser, server, picksPath, {width: 1280, height: 720});
   try {
-    await body(page, {folder, server, picks_path});
+    await body(page, {folder, server, picksPath});
     const unexpected = page.errors().filter((one) => !allowed.some((known) => known.test(one)));
     assert.deepEqual(unexpected, []);
   } catch (error) {

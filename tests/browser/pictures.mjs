@@ -1,10 +1,11 @@
 // Pictures and models made and read by hand, so that a test knows every byte of them.
 
-import { deflateSync, inflateSync } from 'node:zlib';
+import {deflateSync, inflateSync} from 'node:zlib';
 
 // PNG, 8 bits, not interlaced -> {width, height, at(x, y) -> [r, g, b]}.
 export function readPng(bytes) {
-  let at = 8, header, parts = [];
+  const parts = [];
+  let at = 8, header;
   while (at < bytes.length) {
     const size = bytes.readUInt32BE(at), type = bytes.toString('latin1', at + 4, at + 8);
     const body = bytes.subarray(at + 8, at + 8 + size);
@@ -13,7 +14,7 @@ export function readPng(bytes) {
     at += 12 + size;
   }
   const width = header.readUInt32BE(0), height = header.readUInt32BE(4);
-  const channels = { 2: 3, 6: 4 }[header[9]];
+  const channels = {2: 3, 6: 4}[header[9]];
   if (header[8] !== 8 || !channels || header[12] !== 0) throw new Error('a PNG of another kind');
   const raw = inflateSync(Buffer.concat(parts)), row = width * channels;
   const pixels = Buffer.alloc(row * height);
@@ -31,7 +32,8 @@ export function readPng(bytes) {
     }
   }
   return {
-    width, height,
+    width,
+    height,
     at: (x, y) => {
       const i = Math.floor(y) * row + Math.floor(x) * channels;
       return [pixels[i], pixels[i + 1], pixels[i + 2]];
@@ -39,7 +41,7 @@ export function readPng(bytes) {
   };
 }
 
-const crcTable = Array.from({ length: 256 }, (_, n) => {
+const crcTable = Array.from({length: 256}, (_, n) => {
   for (let k = 0; k < 8; ++k) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
   return n >>> 0;
 });
@@ -49,7 +51,9 @@ function pngChunk(type, body) {
   bytes.write(type, 4, 'latin1');
   body.copy(bytes, 8);
   let crc = 0xffffffff;
-  for (const byte of bytes.subarray(4, 8 + body.length)) crc = crcTable[(crc ^ byte) & 255] ^ (crc >>> 8);
+  for (const byte of bytes.subarray(4, 8 + body.length)) {
+    crc = crcTable[(crc ^ byte) & 255] ^ (crc >>> 8);
+  }
   bytes.writeUInt32BE((crc ^ 0xffffffff) >>> 0, 8 + body.length);
   return bytes;
 }
@@ -63,8 +67,10 @@ export function writePng(width, height, color) {
   header.writeUInt32BE(width, 0);
   header.writeUInt32BE(height, 4);
   header.set([8, 2, 0, 0, 0], 8);
-  return Buffer.concat([Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'), pngChunk('IHDR', header),
-                        pngChunk('IDAT', deflateSync(raw)), pngChunk('IEND', Buffer.alloc(0))]);
+  return Buffer.concat([
+    Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'), pngChunk('IHDR', header),
+    pngChunk('IDAT', deflateSync(raw)), pngChunk('IEND', Buffer.alloc(0))
+  ]);
 }
 
 // A square in the plane z = 0, from -1 to 1, that looks along +z and carries the picture.
@@ -77,21 +83,33 @@ export function writeSquareGlb(png) {
   const views = [];
   let at = 0;
   for (const part of parts) {
-    views.push({ buffer: 0, byteOffset: at, byteLength: part.length });
+    views.push({buffer: 0, byteOffset: at, byteLength: part.length});
     at += part.length;
   }
   views[3].byteLength = png.length;
   let text = JSON.stringify({
-    asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }],
-    meshes: [{ primitives: [{ attributes: { POSITION: 0, TEXCOORD_0: 1 }, indices: 2, material: 0 }] }],
-    materials: [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }],
-    textures: [{ source: 0 }], images: [{ bufferView: 3, mimeType: 'image/png' }],
+    asset: {version: '2.0'},
+    scene: 0,
+    scenes: [{nodes: [0]}],
+    nodes: [{mesh: 0}],
+    meshes: [{primitives: [{attributes: {POSITION: 0, TEXCOORD_0: 1}, indices: 2, material: 0}]}],
+    materials: [{pbrMetallicRoughness: {baseColorTexture: {index: 0}}}],
+    textures: [{source: 0}],
+    images: [{bufferView: 3, mimeType: 'image/png'}],
     accessors: [
-      { bufferView: 0, componentType: 5126, count: 4, type: 'VEC3', min: [-1, -1, 0], max: [1, 1, 0] },
-      { bufferView: 1, componentType: 5126, count: 4, type: 'VEC2' },
-      { bufferView: 2, componentType: 5125, count: 6, type: 'SCALAR' },
+      {
+        bufferView: 0,
+        componentType: 5126,
+        count: 4,
+        type: 'VEC3',
+        min: [-1, -1, 0],
+        max: [1, 1, 0]
+      },
+      {bufferView: 1, componentType: 5126, count: 4, type: 'VEC2'},
+      {bufferView: 2, componentType: 5125, count: 6, type: 'SCALAR'},
     ],
-    bufferViews: views, buffers: [{ byteLength: at }],
+    bufferViews: views,
+    buffers: [{byteLength: at}],
   });
   text += ' '.repeat((4 - text.length % 4) % 4);
   const head = Buffer.alloc(20), middle = Buffer.alloc(8);

@@ -54,10 +54,11 @@ export class AlignDialog {
     if (!this.dialog.open) this.dialog.showModal();
     const known = this.#status && this.#status.state !== 'idle' &&
         (this.#status.state === 'running' || this.#revision === this.picks.session.revision);
-    if (known)
+    if (known) {
       this.#show();
-    else
+    } else {
       this.#start();
+    }
   }
 
   async #start() {
@@ -138,10 +139,11 @@ export class AlignDialog {
   }
 
   #show() {
-    if (this.#status.state === 'running')
+    if (this.#status.state === 'running') {
       this.#showRunning();
-    else
+    } else {
       this.#showDone();
+    }
   }
 
   #showRunning() {
@@ -156,14 +158,15 @@ export class AlignDialog {
     }
     body.querySelector('.stage').textContent = stage || 'Starting…';
     if (live.textContent !== stage) live.textContent = stage;
-    if (typeof share === 'number')
+    if (typeof share === 'number') {
       progress.value = share;
-    else
+    } else {
       progress.removeAttribute('value');
+    }
     const box = body.querySelector('.log');
-    const at_end = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
+    const atEnd = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
     box.textContent = log.join('\n');
-    if (at_end) box.scrollTop = box.scrollHeight;
+    if (atEnd) box.scrollTop = box.scrollHeight;
   }
 
   #showDone() {
@@ -212,7 +215,7 @@ export class AlignDialog {
             try {
               await navigator.clipboard.writeText(line);
               copy.textContent = 'Copied';
-            } catch (error) {
+            } catch {
               copy.textContent = 'Marked: press Ctrl+C';
             }
           }

@@ -17,7 +17,7 @@ export const app = {
   strip: null,
   results: null,
   // "mouse" or "keys": what the crosshair and the loupe of each side follow.
-  last_input: {photo: 'mouse', scan: 'mouse'},
+  lastInput: {photo: 'mouse', scan: 'mouse'},
   refresh: null,      // () => all that is shown, with the next frame
   choosePhoto: null,  // (id)
   chooseScan: null,   // (id)

@@ -29,10 +29,11 @@ export class BackProjection {
     pane.drawings.push((context, view) => this.#drawLine(context, view));
     this.select.addEventListener('change', () => this.setMode(this.select.value));
     this.range.addEventListener('input', () => {
-      if (this.mode === 'swipe')
+      if (this.mode === 'swipe') {
         this.#line = this.range.value / 100;
-      else
+      } else {
         this.#opacity = this.range.value / 100;
+      }
       pane.redraw();
     });
     // The line can be taken with the mouse.
@@ -68,8 +69,9 @@ export class BackProjection {
         url: api.backTile(photo.id, scan.id, revision)
       };
       const now = this.#next ?? this.#shown;
-      if (now && now.photo === next.photo && now.scan === next.scan && now.revision === revision)
+      if (now && now.photo === next.photo && now.scan === next.scan && now.revision === revision) {
         return;
+      }
       if (this.#shown && (this.#shown.photo !== next.photo || this.#shown.scan !== next.scan)) {
         this.#shown = null;
       }

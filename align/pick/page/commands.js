@@ -7,7 +7,7 @@ import {crossShown} from './scene.js';
 // dx, dy: -1, 0 or 1. Ctrl moves the picture, Shift makes it a tenth.
 function arrows(dx, dy) {
   return (event) => {
-    const {editor, picks, panes, last_input} = app;
+    const {editor, picks, panes, lastInput} = app;
     const {side} = editor;
     const pane = panes[side];
     if (event.ctrlKey || event.metaKey) {
@@ -15,7 +15,7 @@ function arrows(dx, dy) {
       return;
     }
     if (document.activeElement !== pane.element) pane.element.focus();
-    last_input[side] = 'keys';
+    lastInput[side] = 'keys';
     const size = event.shiftKey ? 0.1 : 1;
     editor.move(side, dx * size, dy * size, pane.view);
     const place =
@@ -25,18 +25,18 @@ function arrows(dx, dy) {
 }
 
 function setPoint() {
-  const {editor, picks, panes, last_input} = app;
+  const {editor, picks, panes, lastInput} = app;
   const {side} = editor;
   const {view, cursor, element} = panes[side];
   if (document.activeElement !== element) return false;
-  const by_mouse = last_input[side] === 'mouse' && cursor;
-  if (!by_mouse && editor.placeOf(picks.find(editor.selected), side) !== null) {
+  const byMouse = lastInput[side] === 'mouse' && cursor;
+  if (!byMouse && editor.placeOf(picks.find(editor.selected), side) !== null) {
     // A point is selected here: a second one on top of it is hardly meant.
     say('Escape first; then the arrows move the crosshair for a new point');
     return true;
   }
-  const place = by_mouse ? view.toImg(cursor) : editor.crossOf(side, view);
-  last_input[side] = 'keys';
+  const place = byMouse ? view.toImg(cursor) : editor.crossOf(side, view);
+  lastInput[side] = 'keys';
   if (view.contains(place)) editor.set(side, place);
   return true;
 }

@@ -13,7 +13,7 @@ function listenTo(id, variable, shareAt, keys) {
     divider.setAttribute('aria-valuenow', value.toFixed(2));
     try {
       localStorage.setItem(`roomtex-pick ${variable}`, String(value));
-    } catch (error) {
+    } catch {
       // Storage is switched off: then it is not remembered.
     }
   };
@@ -21,7 +21,7 @@ function listenTo(id, variable, shareAt, keys) {
   try {
     const known = Number(localStorage.getItem(`roomtex-pick ${variable}`));
     if (known) set(known);
-  } catch (error) {
+  } catch {
     // As above.
   }
   let grabbed = 0;  // share between where the bar is and where it was taken

@@ -6,12 +6,13 @@ export function el(name, attributes = {}, ...children) {
   const element = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
-    if (key.startsWith('on'))
+    if (key.startsWith('on')) {
       element.addEventListener(key.slice(2), value);
-    else if (key === 'class')
+    } else if (key === 'class') {
       element.className = value;
-    else
+    } else {
       element.setAttribute(key, value === true ? '' : value);
+    }
   }
   element.append(...children.filter((child) => child !== null && child !== undefined));
   return element;
@@ -45,15 +46,16 @@ export function typing(target) {
 }
 
 // At most one sentence at a time, read out by screen readers.
-let toast_timer = 0;
+let toastTimer = 0;
 export function say(text, {seconds = 5, urgent = false} = {}) {
   const toast = byId('toast');
   toast.setAttribute('role', urgent ? 'alert' : 'status');
   toast.textContent = text;
   toast.hidden = text === '';
-  clearTimeout(toast_timer);
-  if (text && seconds)
-    toast_timer = setTimeout(() => {
+  clearTimeout(toastTimer);
+  if (text && seconds) {
+    toastTimer = setTimeout(() => {
       toast.hidden = true;
     }, seconds * 1000);
+  }
 }

@@ -17,7 +17,7 @@ export class Editor {
   // {uid (null: a new pick), place: [x, y], scan: id, message, snap: [x, y] | null}
   tried = null;
   cross = {photo: null, scan: null};  // img of the crosshair that keys move, once they did
-  #try_count = 0;
+  #tryCount = 0;
   #drag = null;  // {side, uid, last, busy, next}
 
   // on: {changed(), choosePhoto(name), chooseScan(id), centre(side, img)}
@@ -53,8 +53,9 @@ export class Editor {
   placeOf(pick, side) {
     if (!pick) return null;
     if (side === 'photo') return pick.image_name === this.photo?.name ? pick.img : null;
-    if (this.tried && this.tried.uid === pick.uid && this.tried.scan === this.scan?.id)
+    if (this.tried && this.tried.uid === pick.uid && this.tried.scan === this.scan?.id) {
       return this.tried.place;
+    }
     return pick.scan && pick.scan.id === this.scan?.id ? [pick.scan.x, pick.scan.y] : null;
   }
 
@@ -151,12 +152,12 @@ export class Editor {
 
   // merge: see Picks.change().
   async #tryPlace(uid, place, merge = '') {
-    const count = ++this.#try_count;
+    const count = ++this.#tryCount;
     const scan = this.scan.id;
     this.tried = {uid, place, scan, message: '', snap: null};
     this.on.changed();
     const answer = await this.#ask(scan, place);
-    if (count !== this.#try_count) return;  // another place has been tried since
+    if (count !== this.#tryCount) return;  // another place has been tried since
     if (!answer.ok) {
       const snap = answer.snap ? [answer.snap.x, answer.snap.y] : null;
       this.tried = {uid, place, scan, message: answer.message, snap};
@@ -189,7 +190,7 @@ export class Editor {
   }
 
   forgetTried() {
-    ++this.#try_count;
+    ++this.#tryCount;
     if (!this.tried) return false;
     this.tried = null;
     return true;
@@ -216,8 +217,9 @@ export class Editor {
   showGhost() {
     const half = this.half;
     const row = half && this.picks.rows.get(half.uid);
-    if (row?.predicted_scan && row.predicted_scan.id !== this.scan?.id)
+    if (row?.predicted_scan && row.predicted_scan.id !== this.scan?.id) {
       this.on.chooseScan(row.predicted_scan.id);
+    }
     for (const side of ['photo', 'scan']) {
       const ghost = this.ghostOf(half, side);
       if (ghost) this.on.centre(side, ghost);
@@ -241,7 +243,7 @@ export class Editor {
     const number = this.picks.numberOf(uid);
     this.picks.set(
         `pick ${number} ${on ? 'on' : 'off'}`, uid,
-        {weight: on ? pick.on_weight ?? 1 : 0, on_weight: pick.weight});
+        {weight: on ? pick.onWeight ?? 1 : 0, onWeight: pick.weight});
     this.on.changed();
   }
 
@@ -280,7 +282,7 @@ export class Editor {
   move(side, dx, dy, view) {
     const pick = this.picks.find(this.selected);
     const place = this.placeOf(pick, side);
-    const width = view.picture_width, height = view.picture_height;
+    const width = view.pictureWidth, height = view.pictureHeight;
     if (!place) {
       const from = this.crossOf(side, view);
       const step = Math.max(1, 10 / view.scale);
@@ -290,12 +292,13 @@ export class Editor {
       return;
     }
     const to = [clamp(place[0] + dx, 0, width), clamp(place[1] + dy, 0, height)];
-    if (side === 'scan')
+    if (side === 'scan') {
       this.#tryPlace(pick.uid, to, `nudge scan ${pick.uid}`);
-    else
+    } else {
       this.picks.set(
           `pick ${this.picks.numberOf(pick.uid)} moved`, pick.uid, {img: to},
           `nudge photo ${pick.uid}`);
+    }
     this.on.changed();
   }
 
@@ -314,7 +317,7 @@ export class Editor {
   drag(side, uid, img, view) {
     const drag = this.#drag;
     if (!drag) return;
-    const to = [clamp(img[0], 0, view.picture_width), clamp(img[1], 0, view.picture_height)];
+    const to = [clamp(img[0], 0, view.pictureWidth), clamp(img[1], 0, view.pictureHeight)];
     if (side === 'photo') {
       this.picks.live(uid, {img: to});
     } else {
@@ -338,14 +341,15 @@ export class Editor {
     const answer = this.#drag === drag ? await this.#ask(scan, place) : null;
     drag.busy = false;
     if (this.#drag !== drag) return;
-    if (answer.ok)
+    if (answer.ok) {
       this.picks.live(drag.uid, {scan: {id: scan, x: place[0], y: place[1]}, point: null});
+    }
     drag.message = answer.ok ? '' : answer.message;
     this.on.changed();
     this.#dragScan(drag);
   }
 
-  get drag_message() {
+  get dragMessage() {
     return this.#drag?.message ?? '';
   }
   get dragging() {
@@ -355,7 +359,7 @@ export class Editor {
   async drop(side, uid, img, view) {
     const drag = this.#drag;
     if (!drag) return;
-    const to = [clamp(img[0], 0, view.picture_width), clamp(img[1], 0, view.picture_height)];
+    const to = [clamp(img[0], 0, view.pictureWidth), clamp(img[1], 0, view.pictureHeight)];
     this.#drag = null;
     if (side === 'photo') {
       this.picks.live(uid, {img: to});

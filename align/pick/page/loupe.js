@@ -38,8 +38,8 @@ export class Loupe {
     if (canvas.width !== Math.round(size * ratio)) {
       canvas.width = canvas.height = Math.round(size * ratio);
     }
-    view.picture_width = picture.width;
-    view.picture_height = picture.height;
+    view.pictureWidth = picture.width;
+    view.pictureHeight = picture.height;
     view.aspect = picture.aspect ?? 1;
     view.width = view.height = size;
     view.scale = kMagnification;

@@ -27,7 +27,7 @@ const kMinPickScale = 2;   // CSS pixels per pixel when a pick is looked at
 const views = new Map();  // photo id -> how it was looked at last
 
 function makePane(side) {
-  const {editor, picks, last_input} = app;
+  const {editor, picks, lastInput} = app;
   const pane = new Pane(byId(`${side}-pane`), app.store, {
     click: (img) => editor.set(side, img),
     markerAt: (screen) => markerAt(pane.view, editor.markers(side), screen),
@@ -41,7 +41,7 @@ function makePane(side) {
     drop: (uid, img) => editor.drop(side, uid, img, pane.view),
     dragCancel: () => editor.dragCancel(),
     hover: () => {
-      last_input[side] = 'mouse';
+      lastInput[side] = 'mouse';
       showLoupe(side);
     },
     drawn: () => showZoom(side),
@@ -62,7 +62,7 @@ function showZoom(side) {
 }
 
 function choosePhoto(id) {
-  const {editor, picks, panes} = app;
+  const {editor, panes} = app;
   const photo = app.server.photos.find((one) => one.id === id);
   if (!photo || photo === editor.photo) return;
   const {view} = panes.photo;
@@ -146,7 +146,7 @@ function showAll() {
   setText(byId('photo-fit'), solution?.solved ? `${number(solution.rms_px, 2)} px rms` : '');
   setText(byId('next'), session.next);
   byId('next').title = session.next;
-  const steps = [['undo', 'Undo', picks.undo_label], ['redo', 'Redo', picks.redo_label]];
+  const steps = [['undo', 'Undo', picks.undoLabel], ['redo', 'Redo', picks.redoLabel]];
   for (const [id, name, label] of steps) {
     byId(id).disabled = !label;
     byId(id).title = label ? `${name}: ${label}` : `Nothing to ${id}`;
@@ -199,7 +199,7 @@ async function heartbeat() {
   if (document.hidden || app.picks.state === 'gone' || app.picks.state === 'restarted') return;
   try {
     await api.align();
-  } catch (error) {
+  } catch {
     app.picks.check();
   }
 }
@@ -232,7 +232,7 @@ async function waitUntilReady() {
       }
       if (now.ready) app.picks.refresh(now.session);
       refresh();
-    } catch (error) {
+    } catch {
       // The heartbeat says that the server is gone.
     }
   }
@@ -248,7 +248,7 @@ function build() {
     choosePhoto: (name) => choosePhoto(app.server.photos.find((one) => one.name === name)?.id),
     chooseScan: (id) => chooseScan(id),
     centre: (side, img) => {
-      app.last_input[side] = 'keys';
+      app.lastInput[side] = 'keys';
       app.panes[side].centreOn(img, kMinPickScale);
     },
   });

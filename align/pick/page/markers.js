@@ -168,7 +168,7 @@ export function drawResiduals(context, view, picks) {
       0,
       ...picks.filter((pick) => pick.status === 'used')
           .map((pick) => Math.hypot(...pick.residual)));
-  const limit = Math.hypot(view.picture_width, view.picture_height) / 20;
+  const limit = Math.hypot(view.pictureWidth, view.pictureHeight) / 20;
   const factor = [200, 100, 50, 20, 10, 5, 2].find((one) => one * longest <= limit) ?? 1;
   for (const {place, residual} of picks) {
     const length = Math.hypot(...residual) * factor;
@@ -237,12 +237,12 @@ function addVisible(path, view, points) {
 // The marker of a list that a press at `screen` takes: its id, or null.
 export function markerAt(view, markers, screen) {
   let best = null;
-  let best_distance = kMarkerReach;
+  let bestDistance = kMarkerReach;
   for (const marker of markers) {
     if (marker.dim) continue;
     const [x, y] = view.toScreen(marker.place);
     const distance = Math.hypot(screen[0] - x, screen[1] - y) - (marker.selected ? 0.5 : 0);
-    if (distance < best_distance) [best, best_distance] = [marker.id, distance];
+    if (distance < bestDistance) [best, bestDistance] = [marker.id, distance];
   }
   return best;
 }

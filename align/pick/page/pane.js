@@ -74,8 +74,8 @@ export class Pane {
     this.redraw();
   }
 
-  centreOn(img, at_least = 0) {
-    this.view.centreOn(img, at_least);
+  centreOn(img, atLeast = 0) {
+    this.view.centreOn(img, atLeast);
     this.redraw();
   }
 
@@ -167,7 +167,7 @@ export class Pane {
     this.press = {at, last: at, marker, grip, offset, button: event.button, moved: false};
     try {
       this.element.setPointerCapture(event.pointerId);
-    } catch (error) {
+    } catch {
       // The pointer is gone already: the press ends with the next event.
     }
   }
@@ -182,12 +182,13 @@ export class Pane {
         if (press.marker !== null) this.on.dragStart(press.marker);
       }
       if (press.moved || press.grip) {
-        if (press.grip)
+        if (press.grip) {
           press.grip.drag(at);
-        else if (press.marker !== null)
+        } else if (press.marker !== null) {
           this.on.drag(press.marker, this.#target(press, at));
-        else
+        } else {
           this.pan(at[0] - press.last[0], at[1] - press.last[1]);
+        }
       }
       press.last = at;
     }
@@ -202,10 +203,11 @@ export class Pane {
     const at = this.#place(event);
     if (press.grip) return;
     if (press.marker !== null) {
-      if (press.moved)
+      if (press.moved) {
         this.on.drop(press.marker, this.#target(press, at));
-      else
+      } else {
         this.on.select(press.marker);
+      }
     } else if (!press.moved && press.button === 0) {
       const img = this.view.toImg(at);
       if (this.view.contains(img)) this.on.click(img);
@@ -229,14 +231,15 @@ export class Pane {
   #setCursor(at) {
     const press = this.press;
     let cursor = 'crosshair';
-    if (press?.moved && press.marker === null && !press.grip)
+    if (press?.moved && press.marker === null && !press.grip) {
       cursor = 'grabbing';
-    else if (press?.marker !== null && press?.moved)
+    } else if (press?.marker !== null && press?.moved) {
       cursor = 'none';
-    else if (this.on.grips?.some((grip) => grip.hit(at)))
+    } else if (this.on.grips?.some((grip) => grip.hit(at))) {
       cursor = 'ew-resize';
-    else if (this.on.markerAt(at) !== null)
+    } else if (this.on.markerAt(at) !== null) {
       cursor = 'move';
+    }
     this.element.style.cursor = cursor;
   }
 }

@@ -11,7 +11,7 @@ const kMinInterval = 80;   // milliseconds between two requests while something 
 const kRetryAfter = 1500;  // milliseconds
 const kHistory = 500;      // changes that can be undone
 
-const sent_fields = ({image_name, img, scan, point, weight}) =>
+const sentFields = ({image_name, img, scan, point, weight}) =>
     ({image_name, img, scan, point, weight});
 
 function samePicks(a, b) {
@@ -32,22 +32,22 @@ export class Picks extends EventTarget {
   // "stale" (another tab was faster)
   state = 'saved';
   why = '';
-  #next_uid = 1;
+  #nextUid = 1;
   #undo = [];
   #redo = [];
   #draft = null;  // {label, uid, before}: a drag under way
   #version = 0;   // of the list
   #accepted = 0;  // version that the server has
-  #accepted_list = [];
+  #acceptedList = [];
   #busy = false;
-  #last_sent = 0;
+  #lastSent = 0;
   #timer = 0;
   #retry = 0;     // timer of the next question to a server that is gone
   #other = null;  // session of the faster tab
 
   // Takes the server's picks as they are; nothing to undo from here.
   adopt(session) {
-    this.list = session.picks.map((pick) => ({uid: this.#next_uid++, ...sent_fields(pick)}));
+    this.list = session.picks.map((pick) => ({uid: this.#nextUid++, ...sentFields(pick)}));
     this.#undo = [];
     this.#redo = [];
     this.#draft = null;
@@ -93,7 +93,7 @@ export class Picks extends EventTarget {
   }
 
   add(label, fields) {
-    const uid = this.#next_uid++;
+    const uid = this.#nextUid++;
     const pick = {uid, image_name: '', img: null, scan: null, point: null, weight: 1, ...fields};
     this.change(label, uid, (list) => [...list, pick]);
     return uid;
@@ -135,16 +135,16 @@ export class Picks extends EventTarget {
     return true;
   }
 
-  get can_undo() {
+  get canUndo() {
     return this.#undo.length > 0;
   }
-  get can_redo() {
+  get canRedo() {
     return this.#redo.length > 0;
   }
-  get undo_label() {
+  get undoLabel() {
     return this.#undo.at(-1)?.label ?? '';
   }
-  get redo_label() {
+  get redoLabel() {
     return this.#redo.at(-1)?.label ?? '';
   }
 
@@ -185,7 +185,7 @@ export class Picks extends EventTarget {
 
   #schedule() {
     if (this.#busy || this.#timer || this.state === 'stale' || !this.pending) return;
-    const wait = this.#draft ? Math.max(0, this.#last_sent + kMinInterval - Date.now()) : 0;
+    const wait = this.#draft ? Math.max(0, this.#lastSent + kMinInterval - Date.now()) : 0;
     if (wait === 0) {
       this.#send();
       return;
@@ -198,11 +198,11 @@ export class Picks extends EventTarget {
 
   async #send() {
     this.#busy = true;
-    this.#last_sent = Date.now();
+    this.#lastSent = Date.now();
     const version = this.#version;
     const list = this.list;
     try {
-      const session = await api.putPicks(this.session.revision, list.map(sent_fields));
+      const session = await api.putPicks(this.session.revision, list.map(sentFields));
       this.#accepted = version;
       this.#busy = false;
       this.#take(session, list);
@@ -210,17 +210,18 @@ export class Picks extends EventTarget {
     } catch (error) {
       this.#busy = false;
       if (!(error instanceof ServerError)) throw error;
-      if (error.kind === 'refused')
+      if (error.kind === 'refused') {
         await this.#refused(error, list);
-      else
+      } else {
         this.#gone(error);
+      }
     }
   }
 
   // The numbers for `list`, which may be older than the one that is shown.
   #take(session, list) {
     this.session = session;
-    this.#accepted_list = list;
+    this.#acceptedList = list;
     this.rows = new Map(list.map((pick, index) => [pick.uid, session.picks[index]]));
     // The point of a place comes from the server.
     this.list = this.list.map((pick) => {
@@ -229,12 +230,13 @@ export class Picks extends EventTarget {
       if (!row || !sent || sent.scan !== pick.scan || pick.point || !row.point) return pick;
       return {...pick, point: row.point};
     });
-    if (this.pending)
+    if (this.pending) {
       this.#setState('saving');
-    else if (session.saved)
+    } else if (session.saved) {
       this.#setState('saved');
-    else
+    } else {
       this.#setState('unsaved', session.save_error);
+    }
     this.dispatchEvent(new Event('change'));
   }
 
@@ -253,9 +255,9 @@ export class Picks extends EventTarget {
       return;
     }
     while (this.#undo.length > 0 && this.#undo.at(-1).after === this.list) {
-      if (this.#undo.pop().before === this.#accepted_list) break;
+      if (this.#undo.pop().before === this.#acceptedList) break;
     }
-    this.list = this.#accepted_list;
+    this.list = this.#acceptedList;
     this.#draft = null;
     this.#accepted = this.#version;
     this.#setState(this.session.saved ? 'saved' : 'unsaved', this.session.save_error);

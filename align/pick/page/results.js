@@ -57,7 +57,7 @@ export class Results {
       px: el('span'),
       bar: el('span', {class: 'bar'}),
       mm: el('td', {class: 'right'}),
-      left_out: el('td', {class: 'right'}),
+      leftOut: el('td', {class: 'right'}),
       state: el('td', {class: 'state'}),
       on:
           el('input',
@@ -71,18 +71,17 @@ export class Results {
           },
              '✕'),
     };
-    cells.line =
-        el('tr', {
+    cells.line = el(
+        'tr', {
           'data-uid': uid,
           onclick: (event) => {
             if (!event.target.closest('.actions')) this.on.choose(uid);
           },
         },
-           el('td', {}, cells.number), cells.photo,
-           el('td', {class: 'right value'}, cells.bar, cells.px), cells.mm, cells.left_out,
-           cells.state,
-           el('td', {class: 'actions'},
-              el('label', {title: 'Count this pick (X)'}, cells.on, ' on'), cells.remove));
+        el('td', {}, cells.number), cells.photo,
+        el('td', {class: 'right value'}, cells.bar, cells.px), cells.mm, cells.leftOut, cells.state,
+        el('td', {class: 'actions'}, el('label', {title: 'Count this pick (X)'}, cells.on, ' on'),
+           cells.remove));
     this.#rows.set(uid, cells);
     return cells;
   }
@@ -101,7 +100,7 @@ export class Results {
     cells.photo.title = pick.image_name;
     setText(cells.px, number(numbers.residual_px, 2));
     setText(cells.mm, number(numbers.residual_mm, 1));
-    setText(cells.left_out, number(numbers.leave_one_out_px, 2));
+    setText(cells.leftOut, number(numbers.leave_one_out_px, 2));
     const share = status === 'used' ? (numbers.residual_px ?? 0) / largest : 0;
     cells.bar.style.width = `${Math.round(share * 44)}px`;
     setText(cells.state, worst ? '▲ worst' : kStates[status] ?? status);

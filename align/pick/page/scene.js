@@ -30,32 +30,32 @@ export function drawPicks(side, context, view) {
 
 // Keys move the crosshair where they have no point to move.
 export function crossShown(side) {
-  const {editor, picks, panes, last_input} = app;
-  return last_input[side] === 'keys' && document.activeElement === panes[side].element &&
+  const {editor, picks, panes, lastInput} = app;
+  return lastInput[side] === 'keys' && document.activeElement === panes[side].element &&
       editor.placeOf(picks.find(editor.selected), side) === null;
 }
 
 function showLegend(factor) {
   const {edges} = app;
   const legend = byId('photo-legend');
-  const with_edges = edges.on && edges.edges.length > 0;
-  const key = `${factor} ${with_edges}`;
+  const withEdges = edges.on && edges.edges.length > 0;
+  const key = `${factor} ${withEdges}`;
   if (legend.dataset.key === key) return;
   legend.dataset.key = key;
   const lines = [];
   if (factor > 0) lines.push(el('div', {}, `residuals × ${factor}`));
-  if (with_edges) lines.push(...markers.edgeLegend());
+  if (withEdges) lines.push(...markers.edgeLegend());
   legend.replaceChildren(...lines);
   legend.hidden = lines.length === 0;
 }
 
 // The cursor, or where keys work: the selected point, the crosshair, the predicted partner.
 export function showLoupe(side) {
-  const {editor, picks, panes, loupes, last_input} = app;
+  const {editor, picks, panes, loupes, lastInput} = app;
   const pane = panes[side];
   const pick = picks.find(editor.selected);
   let place = null;
-  if (last_input[side] === 'mouse' && pane.cursor) {
+  if (lastInput[side] === 'mouse' && pane.cursor) {
     const dragged = editor.dragging && editor.side === side;
     place = dragged ? editor.placeOf(pick, side) : pane.view.toImg(pane.cursor);
     if (place && !pane.view.contains(place)) place = null;

@@ -19,8 +19,8 @@ export function showSync() {
   box.dataset.state = picks.state;
   box.title = server ? server.picks_path : '';
   // Nothing is unsaved when the server is gone and nothing was changed since.
-  const nothing_lost = !picks.pending && ['gone', 'restarted'].includes(picks.state);
-  setText(byId('save-text'), nothing_lost ? picks.why : kSaveTexts[picks.state](picks.why));
+  const nothingLost = !picks.pending && ['gone', 'restarted'].includes(picks.state);
+  setText(byId('save-text'), nothingLost ? picks.why : kSaveTexts[picks.state](picks.why));
   const banner = byId('banner');
   if (banner.dataset.state === picks.state) return;
   banner.dataset.state = picks.state;
@@ -81,7 +81,7 @@ function copyButton() {
           try {
             await navigator.clipboard.writeText(text);
             button.textContent = `Copied ${lines.length} picks`;
-          } catch (error) {
+          } catch {
             button.textContent = 'The browser does not allow it';
           }
         }
@@ -95,7 +95,7 @@ export function showHint() {
   const {editor, panes} = app;
   const hint = byId('hint');
   const {tried} = editor;
-  const message = tried?.message || (tried ? editor.drag_message : '');
+  const message = tried?.message || (tried ? editor.dragMessage : '');
   if (!message || tried.scan !== editor.scan.id) {
     hint.hidden = true;
     return;
@@ -111,10 +111,10 @@ export function showHint() {
   // Beside the place, never over it.
   const left = box.left + x + 20;
   const top = box.top + y + 20;
-  const fits_right = left + hint.offsetWidth < innerWidth - 8;
-  const fits_below = top + hint.offsetHeight < innerHeight - 8;
-  hint.style.left = `${Math.max(8, fits_right ? left : left - hint.offsetWidth - 40)}px`;
-  hint.style.top = `${Math.max(50, fits_below ? top : top - hint.offsetHeight - 40)}px`;
+  const fitsRight = left + hint.offsetWidth < innerWidth - 8;
+  const fitsBelow = top + hint.offsetHeight < innerHeight - 8;
+  hint.style.left = `${Math.max(8, fitsRight ? left : left - hint.offsetWidth - 40)}px`;
+  hint.style.top = `${Math.max(50, fitsBelow ? top : top - hint.offsetHeight - 40)}px`;
 }
 
 function hintActions(tried) {

@@ -140,7 +140,7 @@ export class Strip {
         thumb.image.src = URL.createObjectURL(await response.blob());
         thumb.loaded = true;
       }
-    } catch (error) {
+    } catch {
       // The server is gone: the next time the thumbnail comes into view it is asked for again.
     }
     this.#loading = false;

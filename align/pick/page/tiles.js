@@ -141,13 +141,13 @@ export function visibleTiles(picture, view, level) {
   const size = picture.tile_size * 2 ** level;
   const [left, top] = view.toImg([0, 0]);
   const [right, bottom] = view.toImg([view.width, view.height]);
-  const last_x = Math.ceil(picture.width / size) - 1;
-  const last_y = Math.ceil(picture.height / size) - 1;
+  const lastX = Math.ceil(picture.width / size) - 1;
+  const lastY = Math.ceil(picture.height / size) - 1;
   const tiles = [];
-  for (let y = Math.max(0, Math.floor(top / size));
-       y <= Math.min(last_y, Math.floor(bottom / size)); ++y) {
+  for (let y = Math.max(0, Math.floor(top / size)); y <= Math.min(lastY, Math.floor(bottom / size));
+       ++y) {
     for (let x = Math.max(0, Math.floor(left / size));
-         x <= Math.min(last_x, Math.floor(right / size)); ++x) {
+         x <= Math.min(lastX, Math.floor(right / size)); ++x) {
       const distance =
           Math.hypot((x + 0.5) * size - view.centre[0], (y + 0.5) * size - view.centre[1]);
       tiles.push({level, x, y, distance});
@@ -159,13 +159,13 @@ export function visibleTiles(picture, view, level) {
 // Draws what is there, coarser where the finer has not come, onto a canvas whose pixels are
 // 1 / ratio CSS pixels. Returns the URLs that are needed, most urgent first.
 export function drawTiles(context, picture, view, store, {ratio, tone = null, level = null}) {
-  const wanted_level = level ?? levelFor(picture, view, ratio);
+  const wantedLevel = level ?? levelFor(picture, view, ratio);
   const coarsest = picture.num_levels - 1;
-  const tiles = visibleTiles(picture, view, wanted_level);
+  const tiles = visibleTiles(picture, view, wantedLevel);
   const device = (x, y) => view.toScreen([x, y]).map((value) => Math.round(value * ratio));
   const [left, top] = device(0, 0);
   const [right, bottom] = device(picture.width, picture.height);
-  const urls = tiles.length > 0 && wanted_level < coarsest ? [picture.url(coarsest, 0, 0)] : [];
+  const urls = tiles.length > 0 && wantedLevel < coarsest ? [picture.url(coarsest, 0, 0)] : [];
   context.save();
   context.beginPath();
   context.rect(left, top, right - left, bottom - top);
@@ -175,8 +175,8 @@ export function drawTiles(context, picture, view, store, {ratio, tone = null, le
   context.imageSmoothingQuality = 'medium';
   for (const tile of tiles) {
     urls.push(picture.url(tile.level, tile.x, tile.y));
-    for (let coarser = wanted_level; coarser <= coarsest; ++coarser) {
-      const shift = coarser - wanted_level;
+    for (let coarser = wantedLevel; coarser <= coarsest; ++coarser) {
+      const shift = coarser - wantedLevel;
       const bitmap = store.get(picture.url(coarser, tile.x >> shift, tile.y >> shift), tone);
       if (!bitmap) continue;
       drawPart(context, picture, bitmap, tile, coarser, device);
@@ -194,17 +194,16 @@ function drawPart(context, picture, bitmap, tile, coarser, device) {
   const step = 2 ** tile.level;
   const shift = coarser - tile.level;
   const share = 2 ** shift;
-  const source_size = size / share;
-  const source_x = (tile.x % share) * source_size;
-  const source_y = (tile.y % share) * source_size;
-  const source_width = Math.min(source_size, bitmap.width - source_x);
-  const source_height = Math.min(source_size, bitmap.height - source_y);
-  if (source_width <= 0 || source_height <= 0) return;
+  const sourceSize = size / share;
+  const sourceX = (tile.x % share) * sourceSize;
+  const sourceY = (tile.y % share) * sourceSize;
+  const sourceWidth = Math.min(sourceSize, bitmap.width - sourceX);
+  const sourceHeight = Math.min(sourceSize, bitmap.height - sourceY);
+  if (sourceWidth <= 0 || sourceHeight <= 0) return;
   const x = tile.x * size * step;
   const y = tile.y * size * step;
   const [left, top] = device(x, y);
-  const [right, bottom] = device(x + source_width * share * step, y + source_height * share * step);
+  const [right, bottom] = device(x + sourceWidth * share * step, y + sourceHeight * share * step);
   context.drawImage(
-      bitmap, source_x, source_y, source_width, source_height, left, top, right - left,
-      bottom - top);
+      bitmap, sourceX, sourceY, sourceWidth, sourceHeight, left, top, right - left, bottom - top);
 }

@@ -11,7 +11,7 @@ const kMaxScale = 64;
 
 export class View {
   constructor() {
-    this.picture_width = this.picture_height = 1;
+    this.pictureWidth = this.pictureHeight = 1;
     this.aspect = 1;
     this.width = this.height = 1;  // of the pane, CSS pixels
     this.scale = 1;
@@ -20,8 +20,8 @@ export class View {
   }
 
   setPicture(width, height, aspect) {
-    this.picture_width = width;
-    this.picture_height = height;
+    this.pictureWidth = width;
+    this.pictureHeight = height;
     this.aspect = aspect;
     this.fit();
   }
@@ -33,18 +33,18 @@ export class View {
     if (this.fitted) this.fit();
   }
 
-  get fit_scale() {
+  get fitScale() {
     const margin = 24;
     return Math.max(
         1e-4,
         Math.min(
-            (this.width - margin) / this.picture_width,
-            (this.height - margin) / (this.picture_height * this.aspect)));
+            (this.width - margin) / this.pictureWidth,
+            (this.height - margin) / (this.pictureHeight * this.aspect)));
   }
 
   fit() {
-    this.scale = this.fit_scale;
-    this.centre = [this.picture_width / 2, this.picture_height / 2];
+    this.scale = this.fitScale;
+    this.centre = [this.pictureWidth / 2, this.pictureHeight / 2];
     this.fitted = true;
   }
 
@@ -63,7 +63,7 @@ export class View {
   }
 
   contains([x, y]) {
-    return x >= 0 && y >= 0 && x <= this.picture_width && y <= this.picture_height;
+    return x >= 0 && y >= 0 && x <= this.pictureWidth && y <= this.pictureHeight;
   }
 
   // Whether a place is seen, at least `margin` CSS pixels inside the pane.
@@ -81,23 +81,22 @@ export class View {
   // What is at `screen` stays there.
   zoomAt(screen, factor) {
     const fixed = this.toImg(screen);
-    this.scale = clamp(this.scale * factor, Math.min(this.fit_scale, 1) / 2, kMaxScale);
+    this.scale = clamp(this.scale * factor, Math.min(this.fitScale, 1) / 2, kMaxScale);
     const now = this.toImg(screen);
     this.centre = [this.centre[0] + fixed[0] - now[0], this.centre[1] + fixed[1] - now[1]];
     this.#moved();
   }
 
-  // at_least: CSS pixels per pixel; a finer scale is kept.
-  centreOn(img, at_least = 0) {
+  // atLeast: CSS pixels per pixel; a finer scale is kept.
+  centreOn(img, atLeast = 0) {
     this.centre = [...img];
-    this.scale = clamp(Math.max(this.scale, at_least), 1e-4, kMaxScale);
+    this.scale = clamp(Math.max(this.scale, atLeast), 1e-4, kMaxScale);
     this.#moved();
   }
 
   #moved() {
     this.fitted = false;
-    this.centre = [
-      clamp(this.centre[0], 0, this.picture_width), clamp(this.centre[1], 0, this.picture_height)
-    ];
+    this.centre =
+        [clamp(this.centre[0], 0, this.pictureWidth), clamp(this.centre[1], 0, this.pictureHeight)];
   }
 }

@@ -1,15 +1,20 @@
 // The cameras of the aligned model as frusta, their photos, and the sparse points.
 
 import * as THREE from 'three';
-import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
-import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
-import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
+import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
+import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
+import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
 
-import { getBitmap, getBytes, getJson } from './api.js';
+import {getBitmap, getBytes, getJson} from './api.js';
 
-const kColors = { plain: 0x4fb3ff, chosen: 0xffc247, hovered: 0xffffff, missing: 0x8b95a5 };
-const kThumbnail = 256;      // pixels
-const kMaxNear = 24;         // cameras that show their photo small
+const kColors = {
+  plain: 0x4fb3ff,
+  chosen: 0xffc247,
+  hovered: 0xffffff,
+  missing: 0x8b95a5
+};
+const kThumbnail = 256;  // pixels
+const kMaxNear = 24;     // cameras that show their photo small
 
 function bitmapTexture(bitmap) {
   const texture = new THREE.Texture(bitmap);
@@ -23,33 +28,34 @@ function bitmapTexture(bitmap) {
 
 export class Cameras {
   // list: of the server. parts: {frames, invalidate, fail, maxTexture}.
-  constructor(list, { frames, invalidate, fail, maxTexture }) {
+  constructor(list, {frames, invalidate, fail, maxTexture}) {
     this.frames = frames;
     this.invalidate = invalidate;
     this.fail = fail;
     this.maxTexture = Math.min(maxTexture, 4096);
     this.group = new THREE.Group();
     this.overlay = new THREE.Group();  // the photo of the camera one stands in
-    this.list = list.map((camera) => ({
-      ...camera,
-      position: frames.toPage(new THREE.Vector3(...camera.center)),
-      quaternion: frames.cameraRotation(camera.rotation_wxyz),
-      // In the camera of three.js: y up, z backward; at depth 1.
-      corners: camera.corners.map(([x, y, z]) => new THREE.Vector3(x, -y, -z).divideScalar(
-          Math.max(z, 0.2))),
-    }));
+    this.list =
+        list.map((camera) => ({
+                   ...camera,
+                   position: frames.toPage(new THREE.Vector3(...camera.center)),
+                   quaternion: frames.cameraRotation(camera.rotation_wxyz),
+                   // In the camera of three.js: y up, z backward; at depth 1.
+                   corners: camera.corners.map(
+                       ([x, y, z]) => new THREE.Vector3(x, -y, -z).divideScalar(Math.max(z, 0.2))),
+                 }));
     this.visible = true;
     this.pictures = true;
     this.hovered = null;
     this.chosen = null;
     this.opacity = 1;
     this.size = 0.2;
-    this.material = new LineMaterial({ vertexColors: true, linewidth: 1.6 });
+    this.material = new LineMaterial({vertexColors: true, linewidth: 1.6});
     this.lines = new LineSegments2(new LineSegmentsGeometry(), this.material);
     this.lines.frustumCulled = false;
     this.group.add(this.lines);
     this.thumbnails = new Map();  // id -> mesh
-    this.near = new Set();  // so near to the eye that they would only be in the way
+    this.near = new Set();        // so near to the eye that they would only be in the way
     this.points = null;
   }
 
@@ -62,10 +68,14 @@ export class Cameras {
     this.visible = visible;
     this.#draw();
   }
-  resize(width, height) { this.material.resolution.set(width, height); }
+  resize(width, height) {
+    this.material.resolution.set(width, height);
+  }
 
   #corner(camera, k, out) {
-    return out.copy(camera.corners[k]).multiplyScalar(this.size).applyQuaternion(camera.quaternion)
+    return out.copy(camera.corners[k])
+        .multiplyScalar(this.size)
+        .applyQuaternion(camera.quaternion)
         .add(camera.position);
   }
 
@@ -82,9 +92,11 @@ export class Cameras {
       // To who stands in a camera the others would only be in the way.
       if (this.standing && camera !== this.hovered) continue;
       if (camera === this.standing || this.near.has(camera)) continue;
-      color.set(camera === this.hovered ? kColors.hovered
-          : camera === this.chosen ? kColors.chosen
-          : camera.photo ? kColors.plain : kColors.missing);
+      color.set(
+          camera === this.hovered    ? kColors.hovered :
+              camera === this.chosen ? kColors.chosen :
+              camera.photo           ? kColors.plain :
+                                       kColors.missing);
       corners.forEach((corner, k) => this.#corner(camera, k, corner));
       for (let k = 0; k < 4; ++k) {
         add(camera.position, corners[k]);
@@ -149,9 +161,9 @@ export class Cameras {
 
   #placeThumbnail(mesh, camera) {
     const corners = [0, 1, 2, 3].map((k) => this.#corner(camera, k, new THREE.Vector3()));
-    const { position } = mesh.geometry.attributes;
-    [corners[0], corners[1], corners[3], corners[2]].forEach((corner, i) =>
-      position.setXYZ(i, corner.x, corner.y, corner.z));
+    const {position} = mesh.geometry.attributes;
+    [corners[0], corners[1], corners[3], corners[2]].forEach(
+        (corner, i) => position.setXYZ(i, corner.x, corner.y, corner.z));
     position.needsUpdate = true;
     mesh.geometry.computeBoundingSphere();
   }
@@ -163,8 +175,9 @@ export class Cameras {
       const geometry = new THREE.PlaneGeometry(1, 1);
       const uv = [[0, 0], [1, 0], [0, 1], [1, 1]];
       uv.forEach(([u, v], i) => geometry.attributes.uv.setXY(i, u, v));
-      const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial(
-          { map: texture, side: THREE.DoubleSide, toneMapped: false }));
+      const mesh = new THREE.Mesh(
+          geometry,
+          new THREE.MeshBasicMaterial({map: texture, side: THREE.DoubleSide, toneMapped: false}));
       this.#placeThumbnail(mesh, camera);
       this.thumbnails.set(camera.id, mesh);
       this.group.add(mesh);
@@ -179,15 +192,16 @@ export class Cameras {
   // Before every picture: small photos in the cameras near the eye.
   update(eye) {
     if (!this.visible) return;
-    const inTheWay = this.list.filter(
-        (camera) => camera.position.distanceTo(eye) < 1.6 * this.size);
+    const inTheWay =
+        this.list.filter((camera) => camera.position.distanceTo(eye) < 1.6 * this.size);
     if (inTheWay.length !== this.near.size || inTheWay.some((camera) => !this.near.has(camera))) {
       this.near = new Set(inTheWay);
       this.#draw();
     }
-    const near = this.list.filter((camera) => camera.photo)
-        .sort((a, b) => a.position.distanceToSquared(eye) - b.position.distanceToSquared(eye))
-        .slice(0, kMaxNear);
+    const near =
+        this.list.filter((camera) => camera.photo)
+            .sort((a, b) => a.position.distanceToSquared(eye) - b.position.distanceToSquared(eye))
+            .slice(0, kMaxNear);
     for (const [id, mesh] of this.thumbnails) {
       const camera = this.list[id];
       mesh.visible = !this.standing && !this.near.has(camera) &&
@@ -205,8 +219,9 @@ export class Cameras {
 
   // Tangents of the half angles that hold the photo, whatever its distortion.
   lens(camera) {
-    const tan = (k) => Math.max(...camera.corners.map((corner) => Math.abs(corner.getComponent(k))));
-    return { tanX: 1.01 * tan(0), tanY: 1.01 * tan(1) };
+    const tan = (k) =>
+        Math.max(...camera.corners.map((corner) => Math.abs(corner.getComponent(k))));
+    return {tanX: 1.01 * tan(0), tanY: 1.01 * tan(1)};
   }
 
   // Draws the photo where it was taken: on a lattice of the directions of its pixels.
@@ -226,7 +241,7 @@ export class Cameras {
       this.leave(true);
       const mesh = new THREE.Mesh(latticeGeometry(lattice), new THREE.ShaderMaterial({
         glslVersion: THREE.GLSL3,
-        uniforms: { photo: { value: bitmapTexture(bitmap) }, opacity: { value: this.opacity } },
+        uniforms: {photo: {value: bitmapTexture(bitmap)}, opacity: {value: this.opacity}},
         vertexShader: `
           out vec2 v_uv;
           void main() {
@@ -239,7 +254,10 @@ export class Cameras {
           in vec2 v_uv;
           out vec4 pixel;
           void main() { pixel = vec4(texture(photo, v_uv).rgb, opacity); }`,
-        transparent: true, depthTest: false, depthWrite: false, side: THREE.DoubleSide,
+        transparent: true,
+        depthTest: false,
+        depthWrite: false,
+        side: THREE.DoubleSide,
       }));
       mesh.position.copy(camera.position);
       mesh.quaternion.copy(camera.quaternion);
@@ -252,7 +270,9 @@ export class Cameras {
       this.fail(error.message);
     }
   }
-  get photoShown() { return this.overlay.children.length > 0; }
+  get photoShown() {
+    return this.overlay.children.length > 0;
+  }
   // onlyPhoto: stays in the camera.
   leave(onlyPhoto = false) {
     for (const mesh of [...this.overlay.children]) {
@@ -287,8 +307,10 @@ export class Cameras {
       geometry.setAttribute('position', new THREE.InterleavedBufferAttribute(interleaved, 3, 0));
       geometry.setAttribute('color', new THREE.InterleavedBufferAttribute(colors, 3, 12, true));
       geometry.setDrawRange(0, count);
-      this.points = new THREE.Points(geometry, new THREE.PointsMaterial(
-          { size: 3, sizeAttenuation: false, vertexColors: true, toneMapped: false }));
+      this.points = new THREE.Points(
+          geometry,
+          new THREE.PointsMaterial(
+              {size: 3, sizeAttenuation: false, vertexColors: true, toneMapped: false}));
       this.points.quaternion.copy(this.frames.pageFromScan);
       this.points.frustumCulled = false;
       this.overlay.parent?.add(this.points);
@@ -299,7 +321,7 @@ export class Cameras {
 }
 
 // The nodes of the lattice at unit distance; cells of which a corner has no direction are left out.
-function latticeGeometry({ columns, rows, directions }) {
+function latticeGeometry({columns, rows, directions}) {
   const positions = new Float32Array(3 * columns * rows), uv = new Float32Array(2 * columns * rows);
   const known = new Uint8Array(columns * rows), corners = [];
   for (let row = 0, i = 0; row < rows; ++row) {

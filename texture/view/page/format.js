@@ -3,7 +3,8 @@
 const kDigits = 4;  // of a metre: tenths of a millimetre say nothing, the next digit rounds fairly
 
 export function length(metres) {
-  return Math.abs(metres) < 1 ? `${(1000 * metres).toFixed(1)} mm` : `${metres.toFixed(kDigits - 1)} m`;
+  return Math.abs(metres) < 1 ? `${(1000 * metres).toFixed(1)} mm` :
+                                `${metres.toFixed(kDigits - 1)} m`;
 }
 export function coordinates(point) {
   return [point.x, point.y, point.z].map((value) => value.toFixed(kDigits)).join(', ');

@@ -14,7 +14,9 @@ export function writeFragment(look, frames, extra) {
     q: [q.w, q.x, q.y, q.z].map((value) => round(value, 5)).join(','),
   });
   if (look.mode === 'top') parts.set('height', round(look.height, 3));
-  for (const [name, value] of Object.entries(extra)) if (value) parts.set(name, value);
+  for (const [name, value] of Object.entries(extra)) {
+    if (value) parts.set(name, value);
+  }
   return '#' + parts.toString().replaceAll('%2C', ',');
 }
 
@@ -28,9 +30,9 @@ export function readFragment(text, frames) {
   const at = numbers('at', 3), q = numbers('q', 4), mode = parts.get('mode');
   const extra = Object.fromEntries(
       [...parts].filter(([name]) => !['mode', 'at', 'q', 'height'].includes(name)));
-  if (!at || !q || !['orbit', 'walk', 'top'].includes(mode)) return { look: null, extra };
+  if (!at || !q || !['orbit', 'walk', 'top'].includes(mode)) return {look: null, extra};
   const quaternion = new THREE.Quaternion(q[1], q[2], q[3], q[0]);
-  if (!(quaternion.length() > 0.1)) return { look: null, extra };
+  if (!(quaternion.length() > 0.1)) return {look: null, extra};
   return {
     look: {
       mode,

@@ -1,5 +1,5 @@
-// Between the scan frame (numbers for the user, metres) and the page's frame (metres relative to the
-// scan's origin, turned so that up is +Y).
+// Between the scan frame (numbers for the user, metres) and the page's frame (metres relative to
+// the scan's origin, turned so that up is +Y).
 
 import * as THREE from 'three';
 
@@ -17,8 +17,12 @@ export class Frames {
     return point.clone().applyQuaternion(this.scanFromPage).add(this.origin);
   }
   // Directions.
-  turnToPage(direction) { return direction.clone().applyQuaternion(this.pageFromScan); }
-  turnToScan(direction) { return direction.clone().applyQuaternion(this.scanFromPage); }
+  turnToPage(direction) {
+    return direction.clone().applyQuaternion(this.pageFromScan);
+  }
+  turnToScan(direction) {
+    return direction.clone().applyQuaternion(this.scanFromPage);
+  }
 
   // A camera of COLMAP (x right, y down, z forward) as one of three.js (y up, z backward).
   cameraRotation(rotationWxyz) {

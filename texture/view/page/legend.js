@@ -1,21 +1,33 @@
 // What the colours of the surface mean.
 
-import { colorMap, kUnknownColor } from './surface.js';
+import {colorMap, kUnknownColor} from './surface.js';
 
 // {title, ends: [low, high], steps (0 = smooth), unknown}; null where the colours are the photos'.
 export function legendOf(mode, evidence) {
   if (mode === 'intensity') {
-    return { title: 'Scan intensity (unit of the scanner)', steps: 0, unknown: 'no sample',
-             ends: evidence.intensity.map((value) => `${Number(value.toPrecision(4))}`) };
+    return {
+      title: 'Scan intensity (unit of the scanner)',
+      steps: 0,
+      unknown: 'no sample',
+      ends: evidence.intensity.map((value) => `${Number(value.toPrecision(4))}`)
+    };
   }
   if (mode === 'views') {
     const most = Math.max(evidence.max_views, 2);
-    return { title: 'Photos that see the place', steps: most <= 40 ? most : 0, unknown: 'none',
-             ends: ['1', `${most}`] };
+    return {
+      title: 'Photos that see the place',
+      steps: most <= 40 ? most : 0,
+      unknown: 'none',
+      ends: ['1', `${most}`]
+    };
   }
   if (mode === 'disagreement') {
-    return { title: 'Mean difference between the photos (levels, 0–255)', steps: 0,
-             unknown: 'fewer than two photos', ends: ['0', `${Math.round(evidence.disagreement_high)} and more`] };
+    return {
+      title: 'Mean difference between the photos (levels, 0–255)',
+      steps: 0,
+      unknown: 'fewer than two photos',
+      ends: ['0', `${Math.round(evidence.disagreement_high)} and more`]
+    };
   }
   return null;
 }

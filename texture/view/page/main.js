@@ -2,23 +2,26 @@
 
 import * as THREE from 'three';
 
-import { getJson } from './api.js';
-import { Cameras } from './cameras.js';
-import { length } from './format.js';
-import { readFragment, writeFragment } from './fragment.js';
-import { Frames } from './frames.js';
-import { drawLegend } from './legend.js';
-import { Measures } from './measure.js';
-import { Navigation } from './navigation.js';
-import { Panel, showFailure } from './panel.js';
-import { Room } from './room.js';
+import {getJson} from './api.js';
+import {Cameras} from './cameras.js';
+import {length} from './format.js';
+import {readFragment, writeFragment} from './fragment.js';
+import {Frames} from './frames.js';
+import {drawLegend} from './legend.js';
+import {Measures} from './measure.js';
+import {Navigation} from './navigation.js';
+import {Panel, showFailure} from './panel.js';
+import {Room} from './room.js';
 
-const kSlowFrame = 60;       // milliseconds of the graphics card: coarse while moving
-const kLongestFrame = 800;   // milliseconds: coarser at rest, too, up to kMaxTolerance
-const kShortFrame = 150;     // milliseconds: as fine as it should be again
+const kSlowFrame = 60;      // milliseconds of the graphics card: coarse while moving
+const kLongestFrame = 800;  // milliseconds: coarser at rest, too, up to kMaxTolerance
+const kShortFrame = 150;    // milliseconds: as fine as it should be again
 const kMaxTolerance = 4;
 const kFragmentPause = 300;  // milliseconds between two changes of the address
-const kBackgrounds = { dark: 0x1b1e24, light: 0xf2f3f5 };
+const kBackgrounds = {
+  dark: 0x1b1e24,
+  light: 0xf2f3f5
+};
 
 THREE.ColorManagement.enabled = false;
 
@@ -42,13 +45,13 @@ class Viewer {
     const invalidate = () => this.invalidate();
     this.panel = new Panel(this);
     const fail = (sentence) => this.panel.fail(sentence);
-    this.room = new Room(scene, renderer, { invalidate, refine: () => this.refine(), fail });
+    this.room = new Room(scene, renderer, {invalidate, refine: () => this.refine(), fail});
     this.world.add(this.room.group);
     this.navigation = new Navigation(this.canvas, {
       cast: (ray) => this.room.cast(ray),
       floor: () => this.floorHeight(),
       heading: () => this.wallHeading(),
-      sample: () => ({ room: this.room.samplePoints(), cameras: this.#camerasAround() }),
+      sample: () => ({room: this.room.samplePoints(), cameras: this.#camerasAround()}),
       invalidate,
     });
     const box = new THREE.Box3();
@@ -57,9 +60,9 @@ class Viewer {
     }
     this.navigation.setBounds(box);
     this.measures = new Measures(
-        { frames: this.frames, up: new THREE.Vector3(...scene.up).normalize(), invalidate });
+        {frames: this.frames, up: new THREE.Vector3(...scene.up).normalize(), invalidate});
     this.world.add(this.measures.group);
-    this.cameras = new Cameras([], { frames: this.frames, invalidate, fail, maxTexture: 4096 });
+    this.cameras = new Cameras([], {frames: this.frames, invalidate, fail, maxTexture: 4096});
     this.#listen();
   }
 
@@ -68,15 +71,21 @@ class Viewer {
     this.resize();
     this.setBackground('dark');
     const fromAddress = readFragment(location.hash, this.frames);
-    if (fromAddress.look) this.navigation.setView(fromAddress.look);
-    else this.navigation.home(false);
+    if (fromAddress.look) {
+      this.navigation.setView(fromAddress.look);
+    } else {
+      this.navigation.home(false);
+    }
     this.panel.describe();
     const invalidate = () => this.invalidate(), fail = (sentence) => this.panel.fail(sentence);
     const room = this.room.load();
     if (this.data.num_cameras > 0) {
       const gl = this.renderer.getContext();
       this.cameras = new Cameras(await getJson('cameras'), {
-        frames: this.frames, invalidate, fail, maxTexture: gl.getParameter(gl.MAX_TEXTURE_SIZE),
+        frames: this.frames,
+        invalidate,
+        fail,
+        maxTexture: gl.getParameter(gl.MAX_TEXTURE_SIZE),
       });
       this.world.add(this.cameras.group, this.cameras.overlay);
       this.cameras.setSize(THREE.MathUtils.clamp(0.03 * this.navigation.size, 0.02, 1));
@@ -90,7 +99,7 @@ class Viewer {
     try {
       this.evidence = await getJson('evidence');
     } catch (error) {
-      this.evidence = { available: false, reason: error.message };
+      this.evidence = {available: false, reason: error.message};
     }
     this.panel.showEvidence();
     if (fromAddress.extra.surface) this.setMode(fromAddress.extra.surface);
@@ -98,17 +107,21 @@ class Viewer {
   }
 
   floorHeight() {
-    if (this.knownFloor === undefined || !this.room.loaded) this.knownFloor = this.room.floorHeight();
+    if (this.knownFloor === undefined || !this.room.loaded) {
+      this.knownFloor = this.room.floorHeight();
+    }
     return this.knownFloor;
   }
 
   // Where the cameras stand, but for those that are far from everything.
   #camerasAround() {
     const around = this.navigation.bounds.clone().expandByScalar(0.5 * this.navigation.size);
-    return this.cameras.list.map(({ position }) => position).filter((p) => around.containsPoint(p));
+    return this.cameras.list.map(({position}) => position).filter((p) => around.containsPoint(p));
   }
   wallHeading() {
-    if (this.knownHeading === undefined || !this.room.loaded) this.knownHeading = this.room.wallHeading();
+    if (this.knownHeading === undefined || !this.room.loaded) {
+      this.knownHeading = this.room.wallHeading();
+    }
     return this.knownHeading;
   }
 
@@ -138,8 +151,11 @@ class Viewer {
     this.room.coarseOnly = this.room.slow && this.navigation.moving;
     const more = this.draw();
     this.drewLast = goesOn;
-    if (goesOn) this.invalidate();
-    else if (more) this.refine();
+    if (goesOn) {
+      this.invalidate();
+    } else if (more) {
+      this.refine();
+    }
     this.panel.showProgress();
   }
 
@@ -148,22 +164,27 @@ class Viewer {
     if (!this.fence) return false;
     const gl = this.renderer.getContext();
     if (gl.getSyncParameter(this.fence.sync, gl.SYNC_STATUS) !== gl.SIGNALED &&
-        performance.now() - this.fence.started < 10000) return true;
+        performance.now() - this.fence.started < 10000) {
+      return true;
+    }
     gl.deleteSync(this.fence.sync);
     this.cost = performance.now() - this.fence.started;
     this.fence = null;
     // Handing over takes its time once.
     if (!this.room.loaded || this.room.coarseOnly || this.room.handedOver) return false;
     if (this.cost > kSlowFrame) this.room.slow = true;
-    const { room } = this;
-    if (this.cost > kLongestFrame) room.tolerance = Math.min(room.tolerance * 1.4, kMaxTolerance);
-    else if (this.cost < kShortFrame) room.tolerance = Math.max(room.tolerance / 1.4, 1);
+    const {room} = this;
+    if (this.cost > kLongestFrame) {
+      room.tolerance = Math.min(room.tolerance * 1.4, kMaxTolerance);
+    } else if (this.cost < kShortFrame) {
+      room.tolerance = Math.max(room.tolerance / 1.4, 1);
+    }
     return false;
   }
 
   // Gives whether there is more to hand over to the graphics card.
   draw() {
-    const { camera } = this.navigation;
+    const {camera} = this.navigation;
     const started = performance.now();
     camera.updateMatrixWorld();
     const more = this.room.update(camera, this.heightPx);
@@ -173,7 +194,7 @@ class Viewer {
     this.#placeLabels();
     const gl = this.renderer.getContext();
     if (this.fence) gl.deleteSync(this.fence.sync);
-    this.fence = { sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), started };
+    this.fence = {sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), started};
     gl.flush();
     if (!this.scheduled) this.#watch();
     ++this.numPictures;
@@ -188,7 +209,7 @@ class Viewer {
   }
 
   resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    const {clientWidth: width, clientHeight: height} = this.canvas.parentElement;
     if (width === 0 || height === 0) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
@@ -202,18 +223,24 @@ class Viewer {
 
   // Labels of distances and of the camera under the pointer: [{at (page), text, className}].
   labelList() {
-    const list = this.measures.labels().map(({ at, metres }) =>
-      ({ at, text: length(metres), className: 'distance' }));
+    const list = this.measures.labels().map(
+        ({at, metres}) => ({at, text: length(metres), className: 'distance'}));
     if (this.cameras.hovered && this.cameras.visible) {
-      const { position, name } = this.cameras.hovered;
-      list.push({ at: position, text: name, className: 'camera', below: true });
+      const {position, name} = this.cameras.hovered;
+      list.push({at: position, text: name, className: 'camera', below: true});
     }
-    const { camera, width, height } = this.navigation;
-    return list.map((label) => {
-      const place = label.at.clone().project(camera);
-      return { ...label, x: (place.x + 1) * width / 2, y: (1 - place.y) * height / 2,
-               inFront: place.z < 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2 };
-    }).filter((label) => label.inFront);
+    const {camera, width, height} = this.navigation;
+    return list
+        .map((label) => {
+          const place = label.at.clone().project(camera);
+          return {
+            ...label,
+            x: (place.x + 1) * width / 2,
+            y: (1 - place.y) * height / 2,
+            inFront: place.z < 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2
+          };
+        })
+        .filter((label) => label.inFront);
   }
   #placeLabels() {
     const list = this.labelList();
@@ -233,7 +260,7 @@ class Viewer {
 
   // What is seen as a PNG of `scale` pixels per CSS pixel, with labels and legend.
   async picture(scale) {
-    const { width, height } = this.navigation;
+    const {width, height} = this.navigation;
     const canvas = document.createElement('canvas');
     canvas.width = Math.round(width * scale);
     canvas.height = Math.round(height * scale);
@@ -251,7 +278,7 @@ class Viewer {
     context.font = `600 ${13 * scale}px system-ui, sans-serif`;
     context.textAlign = 'center';
     context.textBaseline = 'middle';
-    for (const { x, y, text } of this.labelList()) {
+    for (const {x, y, text} of this.labelList()) {
       const half = context.measureText(text).width / 2 + 8 * scale;
       context.fillStyle = 'rgba(16, 18, 23, 0.9)';
       context.beginPath();
@@ -307,19 +334,24 @@ class Viewer {
     this.remember();
   }
   stepCamera(step) {
-    const { list } = this.cameras;
+    const {list} = this.cameras;
     if (list.length === 0) return;
     const now = list.indexOf(this.target ?? this.cameras.chosen);
-    this.standIn(list[(now < 0 ? (step > 0 ? 0 : list.length - 1) : now + step + list.length) % list.length]);
+    const first = step > 0 ? 0 : list.length - 1;
+    this.standIn(list[now < 0 ? first : (now + step + list.length) % list.length]);
   }
-  leaveCamera() { this.navigation.leaveCamera(); }
+  leaveCamera() {
+    this.navigation.leaveCamera();
+  }
 
   // --- pointer --------------------------------------------------------------------------------
 
   #listen() {
-    const { navigation, canvas } = this;
+    const {navigation, canvas} = this;
     for (const type of ['pointerdown', 'wheel', 'keydown']) {
-      addEventListener(type, () => { this.touched = true; }, { capture: true, passive: true });
+      addEventListener(type, () => {
+        this.touched = true;
+      }, {capture: true, passive: true});
     }
     navigation.addEventListener('move', () => {
       this.remember();
@@ -334,7 +366,7 @@ class Viewer {
       this.panel.showStanding(null);
       this.remember();
     });
-    navigation.addEventListener('pick', ({ detail }) => this.#pick(detail.x, detail.y));
+    navigation.addEventListener('pick', ({detail}) => this.#pick(detail.x, detail.y));
     this.measures.addEventListener('change', () => this.panel.showMeasures());
     canvas.addEventListener('pointermove', (event) => this.#hover(event.offsetX, event.offsetY));
     canvas.addEventListener('pointerleave', () => {
@@ -346,7 +378,7 @@ class Viewer {
       showFailure('The graphics card has given up on this page. Reload it.');
     });
     addEventListener('hashchange', () => {
-      const { look, extra } = readFragment(location.hash, this.frames);
+      const {look, extra} = readFragment(location.hash, this.frames);
       if (location.hash === this.written) return;
       if (look) navigation.setView(look);
       this.applyExtra(extra);
@@ -366,7 +398,7 @@ class Viewer {
     this.canvas.parentElement.classList.toggle('on-camera', this.cameras.hovered !== null);
   }
   #cameraAt(ray, hit) {
-    const { camera, height } = this.navigation;
+    const {camera, height} = this.navigation;
     const pixelAngle = camera.isPerspectiveCamera ? camera.fov * Math.PI / 180 / height : 1e-4;
     return this.cameras.find(ray, hit?.distance ?? Infinity, pixelAngle);
   }
@@ -381,9 +413,10 @@ class Viewer {
       const point = await this.measures.pick(this.navigation.rayAt(x, y), this.room);
       if (!this.measuring) return;
       if (point) this.measures.add(point);
-      this.panel.hint(point
-        ? this.measures.first ? 'Now the second point.' : 'Click the first point of the next distance; Esc ends.'
-        : 'There is no surface. Click another place.');
+      this.panel.hint(
+          point ? this.measures.first ? 'Now the second point.' :
+                                        'Click the first point of the next distance; Esc ends.' :
+                  'There is no surface. Click another place.');
     } catch (error) {
       this.panel.fail(error.message);
     }
@@ -404,7 +437,7 @@ class Viewer {
   }
   applyExtra(extra) {
     if (!extra.camera) return;
-    const camera = this.cameras.list.find(({ name }) => name === extra.camera);
+    const camera = this.cameras.list.find(({name}) => name === extra.camera);
     if (camera) this.standIn(camera);
   }
 }
@@ -413,8 +446,10 @@ class Viewer {
 function isSoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   if (!gl) return false;
-  const name = gl.getParameter(gl.RENDERER) + (gl.getExtension('WEBGL_debug_renderer_info')
-      ? gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info').UNMASKED_RENDERER_WEBGL) : '');
+  const name = gl.getParameter(gl.RENDERER) +
+      (gl.getExtension('WEBGL_debug_renderer_info') ?
+           gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info').UNMASKED_RENDERER_WEBGL) :
+           '');
   gl.getExtension('WEBGL_lose_context')?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
@@ -424,13 +459,15 @@ async function main() {
   try {
     const software = isSoftware();
     renderer = new THREE.WebGLRenderer({
-      canvas: document.getElementById('canvas'), antialias: !software,
+      canvas: document.getElementById('canvas'),
+      antialias: !software,
       powerPreference: 'high-performance',
     });
     renderer.isSoftware = software;
   } catch {
-    return showFailure('This browser shows no three-dimensional graphics (WebGL 2 is missing or ' +
-                       'switched off). Use a recent Firefox, Chrome, Edge or Safari.');
+    return showFailure(
+        'This browser shows no three-dimensional graphics (WebGL 2 is missing or ' +
+        'switched off). Use a recent Firefox, Chrome, Edge or Safari.');
   }
   renderer.outputColorSpace = THREE.LinearSRGBColorSpace;  // bytes as they are
   try {

@@ -2,11 +2,11 @@
 // the whole mesh; the page only draws.
 
 import * as THREE from 'three';
-import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
-import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
-import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
+import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
+import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
+import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
 
-import { getJson } from './api.js';
+import {getJson} from './api.js';
 
 const kColor = 0xffc247;
 
@@ -29,7 +29,8 @@ export function describe(from, to, up) {
   const difference = to.clone().sub(from);
   const height = difference.dot(up);
   return {
-    from, to,
+    from,
+    to,
     distance: difference.length(),
     difference,
     height,
@@ -38,7 +39,7 @@ export function describe(from, to, up) {
 }
 
 export class Measures extends EventTarget {
-  constructor({ frames, up, invalidate }) {
+  constructor({frames, up, invalidate}) {
     super();
     this.frames = frames;
     this.up = up;  // scan frame
@@ -47,14 +48,14 @@ export class Measures extends EventTarget {
     this.first = null;  // of a half distance, scan frame
     this.hover = null;  // page frame
     this.group = new THREE.Group();
-    this.material = new LineMaterial({ color: kColor, linewidth: 2.5, depthTest: false });
+    this.material = new LineMaterial({color: kColor, linewidth: 2.5, depthTest: false});
     this.material.transparent = true;
     this.lines = new LineSegments2(new LineSegmentsGeometry(), this.material);
     this.lines.renderOrder = 900;
     this.lines.frustumCulled = false;
     this.dots = [];
     this.dotMaterial = new THREE.SpriteMaterial(
-        { map: dotTexture(), depthTest: false, sizeAttenuation: false, transparent: true });
+        {map: dotTexture(), depthTest: false, sizeAttenuation: false, transparent: true});
     this.group.add(this.lines);
     this.#draw();
   }
@@ -64,10 +65,15 @@ export class Measures extends EventTarget {
   }
 
   // The point of the surface along a ray of the page, scan frame; null without.
-  async pick(ray, { frontOnly, top }) {
+  async pick(ray, {frontOnly, top}) {
     const from = this.frames.toScan(ray.origin), along = this.frames.turnToScan(ray.direction);
     const query = new URLSearchParams({
-      x: from.x, y: from.y, z: from.z, dx: along.x, dy: along.y, dz: along.z,
+      x: from.x,
+      y: from.y,
+      z: from.z,
+      dx: along.x,
+      dy: along.y,
+      dz: along.z,
       front: frontOnly ? 1 : 0,
     });
     if (top < 1e8) query.set('top', top + this.frames.origin.dot(this.up));
@@ -111,25 +117,26 @@ export class Measures extends EventTarget {
   csv() {
     const row = (m) => [m.from.x, m.from.y, m.from.z, m.to.x, m.to.y, m.to.z, m.distance,
                         m.difference.x, m.difference.y, m.difference.z, m.height, m.horizontal]
-        .map((value) => value.toFixed(5)).join(',');
+                           .map((value) => value.toFixed(5))
+                           .join(',');
     return 'from_x,from_y,from_z,to_x,to_y,to_z,distance,dx,dy,dz,height,horizontal\n' +
         this.list.map((measure) => row(measure) + '\n').join('');
   }
 
   // Middle of each distance (page frame) with its length, for labels.
   labels() {
-    const all = this.list.map((m) => ({ from: m.from, to: m.to }));
-    if (this.first && this.hover) all.push({ from: this.first, to: this.frames.toScan(this.hover) });
-    return all.map(({ from, to }) => ({
-      at: this.frames.toPage(from.clone().add(to).multiplyScalar(0.5)),
-      metres: from.distanceTo(to),
-    }));
+    const all = this.list.map((m) => ({from: m.from, to: m.to}));
+    if (this.first && this.hover) all.push({from: this.first, to: this.frames.toScan(this.hover)});
+    return all.map(({from, to}) => ({
+                     at: this.frames.toPage(from.clone().add(to).multiplyScalar(0.5)),
+                     metres: from.distanceTo(to),
+                   }));
   }
 
   #draw() {
     const positions = [], points = [];
     const add = (a, b) => positions.push(a.x, a.y, a.z, b.x, b.y, b.z);
-    for (const { from, to } of this.list) {
+    for (const {from, to} of this.list) {
       const a = this.frames.toPage(from), b = this.frames.toPage(to);
       add(a, b);
       points.push(a, b);
@@ -157,9 +164,9 @@ export class Measures extends EventTarget {
   // Dots keep their size on the screen.
   update(camera) {
     const px = 14;
-    const scale = camera.isOrthographicCamera
-        ? px * (camera.top - camera.bottom) / camera.zoom / this.heightPx
-        : 2 * px * Math.tan(camera.fov * Math.PI / 360) / this.heightPx;
+    const scale = camera.isOrthographicCamera ?
+        px * (camera.top - camera.bottom) / camera.zoom / this.heightPx :
+        2 * px * Math.tan(camera.fov * Math.PI / 360) / this.heightPx;
     for (const dot of this.dots) dot.scale.setScalar(scale);
   }
 }

@@ -5,7 +5,7 @@ import * as THREE from 'three';
 
 const kUp = new THREE.Vector3(0, 1, 0);
 const kMaxPitch = 89.5 * Math.PI / 180;
-const kFov = 60;  // degrees, of the shorter side of the picture
+const kFov = 60;     // degrees, of the shorter side of the picture
 const kClickPx = 4;  // a pointer that moved less has clicked
 const kMinDistance = 0.05;
 
@@ -14,7 +14,7 @@ const reducedMotion = matchMedia('(prefers-reduced-motion: reduce)');
 export class Navigation extends EventTarget {
   // canvas takes pointer and keys; cast(ray) gives {distance, point} | null; floor() a height.
   // heading() that of the walls; sample() gives {room, cameras}, points.
-  constructor(canvas, { cast, floor, heading, sample, invalidate }) {
+  constructor(canvas, {cast, floor, heading, sample, invalidate}) {
     super();
     this.canvas = canvas;
     this.cast = cast;
@@ -25,7 +25,7 @@ export class Navigation extends EventTarget {
     this.perspective = new THREE.PerspectiveCamera(kFov, 1, 0.02, 500);
     this.orthographic = new THREE.OrthographicCamera(-1, 1, 1, -1, -500, 500);
     this.camera = this.perspective;
-    this.mode = 'orbit';  // 'orbit' | 'walk' | 'top'
+    this.mode = 'orbit';   // 'orbit' | 'walk' | 'top'
     this.standing = null;  // of a photo: {fov of the smaller half-angle ...}
     this.eyeHeight = 1.6;
     this.speed = 1.4;  // metres a second
@@ -43,8 +43,12 @@ export class Navigation extends EventTarget {
     this.perspective.far = Math.max(50, 6 * size);
     this.perspective.near = Math.max(0.01, size / 2000);
   }
-  get size() { return Math.max(this.bounds.getSize(new THREE.Vector3()).length(), 0.1); }
-  get moving() { return this.flight !== null || performance.now() < this.motionUntil; }
+  get size() {
+    return Math.max(this.bounds.getSize(new THREE.Vector3()).length(), 0.1);
+  }
+  get moving() {
+    return this.flight !== null || performance.now() < this.motionUntil;
+  }
 
   resize(width, height) {
     this.width = width;
@@ -62,7 +66,7 @@ export class Navigation extends EventTarget {
   #applyFov() {
     const aspect = this.perspective.aspect || 1;
     if (this.standing) {
-      const { tanX, tanY } = this.standing;
+      const {tanX, tanY} = this.standing;
       const tan = Math.max(tanY, tanX / aspect) * this.standing.zoom;
       this.perspective.fov = 2 * Math.atan(tan) * 180 / Math.PI;
     } else {
@@ -73,7 +77,7 @@ export class Navigation extends EventTarget {
 
   #freeLens() {
     const aspect = this.perspective.aspect || 1;
-    return { aspect, tan: Math.tan(kFov * Math.PI / 360) / Math.max(Math.min(aspect, 1), 0.4) };
+    return {aspect, tan: Math.tan(kFov * Math.PI / 360) / Math.max(Math.min(aspect, 1), 0.4)};
   }
 
   // --- points of view -------------------------------------------------------------------------
@@ -89,7 +93,7 @@ export class Navigation extends EventTarget {
   }
 
   // Goes there at once.
-  setView({ mode, position, quaternion, height }) {
+  setView({mode, position, quaternion, height}) {
     this.#endFlight();
     this.leaveCamera();
     this.#switchMode(mode);
@@ -112,10 +116,10 @@ export class Navigation extends EventTarget {
   }
   // From where a camera turned so sees all of the room, but for the few strays beyond it.
   #framing(rotation) {
-    const { tan, aspect } = this.#freeLens();
+    const {tan, aspect} = this.#freeLens();
     const inverse = rotation.clone().invert();
     const turned = (points) => points.map((p) => p.clone().applyQuaternion(inverse));
-    const { room, cameras } = this.sample();
+    const {room, cameras} = this.sample();
     const points = turned(room), all = turned(cameras);
     // Of the planes through the borders of the picture each has all points on one side: where they
     // meet, the eye is. u = x or y, depth -z: u <= eye + t (eye_z - z), so eye_z >= ...
@@ -126,10 +130,11 @@ export class Navigation extends EventTarget {
         return Math.max(bound(points.map(of)), ...all.map(of));
       };
       const high = reach(1), low = reach(-1);
-      return { middle: (high - low) / 2, back: (high + low) / (2 * t) };
+      return {middle: (high - low) / 2, back: (high + low) / (2 * t)};
     };
     const x = side(0, 0.93 * tan * aspect), y = side(1, 0.9 * tan);
-    return new THREE.Vector3(x.middle, y.middle, Math.max(x.back, y.back)).applyQuaternion(rotation);
+    return new THREE.Vector3(x.middle, y.middle, Math.max(x.back, y.back))
+        .applyQuaternion(rotation);
   }
 
   #frameFromAbove(rotation) {
@@ -171,12 +176,15 @@ export class Navigation extends EventTarget {
     if (mode === 'walk') {
       // From where one is, unless that is far outside.
       const near = this.bounds.clone().expandByScalar(2).containsPoint(this.perspective.position);
-      const position = near ? this.perspective.position.clone()
-          : this.bounds.getCenter(new THREE.Vector3());
+      const position =
+          near ? this.perspective.position.clone() : this.bounds.getCenter(new THREE.Vector3());
       position.y = this.floor() + this.eyeHeight;
       const yaw = yawPitch(this.perspective.quaternion)[0];
-      if (fly) this.flyTo(position, rotationOf(yaw, 0));
-      else this.perspective.position.copy(position);
+      if (fly) {
+        this.flyTo(position, rotationOf(yaw, 0));
+      } else {
+        this.perspective.position.copy(position);
+      }
     }
     this.moved();
   }
@@ -189,8 +197,11 @@ export class Navigation extends EventTarget {
   #setOrthographicHeight(height) {
     const half = height / 2;
     Object.assign(this.orthographic, {
-      top: half, bottom: -half, zoom: 1,
-      left: -half * this.width / this.height, right: half * this.width / this.height,
+      top: half,
+      bottom: -half,
+      zoom: 1,
+      left: -half * this.width / this.height,
+      right: half * this.width / this.height,
     });
     this.orthographic.updateProjectionMatrix();
   }
@@ -217,15 +228,18 @@ export class Navigation extends EventTarget {
 
   flyTo(position, quaternion, lens = null, done = () => {}) {
     this.#endFlight();
-    const from = { position: this.camera.position.clone(),
-                   quaternion: this.camera.quaternion.clone(),
-                   tan: Math.tan(this.perspective.fov * Math.PI / 360) };
-    this.standing = lens ? { ...lens, zoom: 1 } : null;
+    const from = {
+      position: this.camera.position.clone(),
+      quaternion: this.camera.quaternion.clone(),
+      tan: Math.tan(this.perspective.fov * Math.PI / 360)
+    };
+    this.standing = lens ? {...lens, zoom: 1} : null;
     this.#applyFov();
     const tan = Math.tan(this.perspective.fov * Math.PI / 360);
     const distance = from.position.distanceTo(position);
-    const seconds = reducedMotion.matches || this.camera === this.orthographic
-        ? 0 : Math.min(1.4, 0.5 + 0.12 * distance);
+    const seconds = reducedMotion.matches || this.camera === this.orthographic ?
+        0 :
+        Math.min(1.4, 0.5 + 0.12 * distance);
     const started = performance.now();
     this.flight = () => {
       const t = seconds > 0 ? Math.min((performance.now() - started) / (1000 * seconds), 1) : 1;
@@ -269,8 +283,8 @@ export class Navigation extends EventTarget {
   rayAt(x, y) {
     this.camera.updateMatrixWorld();
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(new THREE.Vector2(2 * x / this.width - 1, 1 - 2 * y / this.height),
-                         this.camera);
+    caster.setFromCamera(
+        new THREE.Vector2(2 * x / this.width - 1, 1 - 2 * y / this.height), this.camera);
     if (this.camera === this.orthographic) {
       caster.ray.origin.addScaledVector(caster.ray.direction, -2 * this.size);
     }
@@ -289,17 +303,20 @@ export class Navigation extends EventTarget {
     const [oldYaw, oldPitch] = yawPitch(camera.quaternion);
     const newPitch = THREE.MathUtils.clamp(oldPitch + pitch, -kMaxPitch, kMaxPitch);
     const before = rotationOf(oldYaw, oldPitch), after = rotationOf(oldYaw + yaw, newPitch);
-    const offset = camera.position.clone().sub(pivot).applyQuaternion(before.invert())
-        .applyQuaternion(after);
+    const offset =
+        camera.position.clone().sub(pivot).applyQuaternion(before.invert()).applyQuaternion(after);
     camera.position.copy(pivot).add(offset);
     camera.quaternion.copy(after);
     this.moved();
   }
-  look(yaw, pitch) { this.orbit(this.perspective.position.clone(), yaw, pitch); }
+  look(yaw, pitch) {
+    this.orbit(this.perspective.position.clone(), yaw, pitch);
+  }
   // right and up in metres.
   pan(right, up) {
     this.#straighten();
-    this.camera.position.add(new THREE.Vector3(right, up, 0).applyQuaternion(this.camera.quaternion));
+    this.camera.position.add(
+        new THREE.Vector3(right, up, 0).applyQuaternion(this.camera.quaternion));
     this.moved();
   }
   // steps > 0: nearer, to the point under the place in the canvas.
@@ -362,7 +379,7 @@ export class Navigation extends EventTarget {
   // --- pointer and keys -----------------------------------------------------------------------
 
   #listen() {
-    const { canvas } = this;
+    const {canvas} = this;
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('pointerdown', (event) => this.#pointerDown(event));
     canvas.addEventListener('pointermove', (event) => this.#pointerMove(event));
@@ -373,16 +390,16 @@ export class Navigation extends EventTarget {
       event.preventDefault();
       const lines = event.deltaY / (event.deltaMode === 0 ? 100 : event.deltaMode === 1 ? 3 : 1);
       this.zoom(event.offsetX, event.offsetY, -THREE.MathUtils.clamp(lines, -4, 4) * 1.5);
-    }, { passive: false });
+    }, {passive: false});
     addEventListener('keyup', (event) => this.keys.delete(event.code));
     addEventListener('blur', () => this.keys.clear());
   }
 
   #pointerDown(event) {
-    this.canvas.focus({ preventScroll: true });
+    this.canvas.focus({preventScroll: true});
     this.canvas.setPointerCapture(event.pointerId);
     const at = new THREE.Vector2(event.offsetX, event.offsetY);
-    this.pointers.set(event.pointerId, { at: at.clone(), from: at, moved: false });
+    this.pointers.set(event.pointerId, {at: at.clone(), from: at, moved: false});
     if (this.pointers.size === 1) {
       const hit = this.cast(this.rayAt(at.x, at.y));
       this.drag = {
@@ -397,7 +414,9 @@ export class Navigation extends EventTarget {
     const pointer = this.pointers.get(event.pointerId);
     if (!pointer) return;
     const at = new THREE.Vector2(event.offsetX, event.offsetY);
-    if (!pointer.moved && at.distanceTo(pointer.from) < kClickPx && this.pointers.size === 1) return;
+    if (!pointer.moved && at.distanceTo(pointer.from) < kClickPx && this.pointers.size === 1) {
+      return;
+    }
     pointer.moved = true;
     const delta = at.clone().sub(pointer.at);
     if (this.pointers.size === 2) {
@@ -411,16 +430,19 @@ export class Navigation extends EventTarget {
       this.#panBy(delta);
     } else {
       const perPixel = this.perspective.fov * Math.PI / 180 / this.height;
-      if (this.mode === 'walk') this.look(delta.x * perPixel, delta.y * perPixel);
-      else this.orbit(this.drag.pivot, -delta.x * 0.006, -delta.y * 0.006);
+      if (this.mode === 'walk') {
+        this.look(delta.x * perPixel, delta.y * perPixel);
+      } else {
+        this.orbit(this.drag.pivot, -delta.x * 0.006, -delta.y * 0.006);
+      }
     }
     pointer.at.copy(at);
   }
 
   #panBy(delta) {
-    const perPixel = this.camera === this.orthographic
-        ? (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom / this.height
-        : 2 * this.drag.distance * Math.tan(this.perspective.fov * Math.PI / 360) / this.height;
+    const perPixel = this.camera === this.orthographic ?
+        (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom / this.height :
+        2 * this.drag.distance * Math.tan(this.perspective.fov * Math.PI / 360) / this.height;
     this.pan(-delta.x * perPixel, delta.y * perPixel);
   }
 
@@ -428,17 +450,18 @@ export class Navigation extends EventTarget {
     const pointer = this.pointers.get(event.pointerId);
     this.pointers.delete(event.pointerId);
     if (!pointer || pointer.moved || event.type === 'pointercancel' || event.button !== 0) return;
-    this.dispatchEvent(new CustomEvent('pick', { detail: { x: pointer.at.x, y: pointer.at.y } }));
+    this.dispatchEvent(new CustomEvent('pick', {detail: {x: pointer.at.x, y: pointer.at.y}}));
   }
 
   // A key that moves; false if it is none.
   key(event) {
-    const steps = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    const steps = {ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
     if (event.ctrlKey || event.metaKey || event.altKey) return false;
     if (steps[event.key]) {
       const [x, y] = steps[event.key];
       if (this.camera === this.orthographic) {
-        const step = (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom / 12;
+        const step =
+            (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom / 12;
         this.pan(-x * step, y * step);
       } else if (event.shiftKey) {
         this.pan(-x * this.size / 60, y * this.size / 60);
@@ -454,8 +477,10 @@ export class Navigation extends EventTarget {
       this.zoom(this.width / 2, this.height / 2, event.key === '-' ? -1 : 1);
       return true;
     }
-    if (['KeyW', 'KeyA', 'KeyS', 'KeyD', 'KeyQ', 'KeyE', 'PageUp', 'PageDown', 'ShiftLeft',
-         'ShiftRight'].includes(event.code)) {
+    if ([
+          'KeyW', 'KeyA', 'KeyS', 'KeyD', 'KeyQ', 'KeyE', 'PageUp', 'PageDown', 'ShiftLeft',
+          'ShiftRight'
+        ].includes(event.code)) {
       this.keys.add(event.code);
       this.invalidate();
       return !event.code.startsWith('Shift');
@@ -468,8 +493,11 @@ export class Navigation extends EventTarget {
 export function yawPitch(quaternion) {
   const direction = new THREE.Vector3(0, 0, -1).applyQuaternion(quaternion);
   const pitch = Math.asin(THREE.MathUtils.clamp(direction.y, -1, 1));
-  if (Math.abs(pitch) < 89.9 * Math.PI / 180) return [Math.atan2(-direction.x, -direction.z), pitch];
-  const up = new THREE.Vector3(0, 1, 0).applyQuaternion(quaternion).multiplyScalar(-Math.sign(pitch));
+  if (Math.abs(pitch) < 89.9 * Math.PI / 180) {
+    return [Math.atan2(-direction.x, -direction.z), pitch];
+  }
+  const up =
+      new THREE.Vector3(0, 1, 0).applyQuaternion(quaternion).multiplyScalar(-Math.sign(pitch));
   return [Math.atan2(-up.x, -up.z), pitch];
 }
 export function rotationOf(yaw, pitch) {

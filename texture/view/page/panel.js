@@ -1,8 +1,8 @@
 // Everything on the page that is not the picture: buttons, lists, keys, sentences.
 
-import { coordinates, count, length } from './format.js';
-import { showLegend } from './legend.js';
-import { kModes } from './surface.js';
+import {coordinates, count, length} from './format.js';
+import {showLegend} from './legend.js';
+import {kModes} from './surface.js';
 
 const $ = (id) => document.getElementById(id);
 const radios = (name) => [...document.querySelectorAll(`input[name="${name}"]`)];
@@ -10,7 +10,7 @@ const check = (name, value) => {
   for (const radio of radios(name)) radio.checked = radio.value === value;
 };
 
-function make(tag, { text, className, ...properties } = {}, ...children) {
+function make(tag, {text, className, ...properties} = {}, ...children) {
   const element = document.createElement(tag);
   if (text !== undefined) element.textContent = text;
   if (className) element.className = className;
@@ -22,7 +22,7 @@ function make(tag, { text, className, ...properties } = {}, ...children) {
 // Instead of the picture.
 export function showFailure(sentence) {
   $('loading').hidden = true;
-  const box = make('div', { className: 'failed', text: sentence });
+  const box = make('div', {className: 'failed', text: sentence});
   box.setAttribute('role', 'alert');
   $('stage').append(box);
 }
@@ -37,9 +37,9 @@ export class Panel {
 
   fail(sentence) {
     if ([...$('errors').children].some((box) => box.dataset.sentence === sentence)) return;
-    const close = make('button', { text: '×', type: 'button', title: 'Close' });
+    const close = make('button', {text: '×', type: 'button', title: 'Close'});
     close.setAttribute('aria-label', 'Close');
-    const box = make('div', {}, make('span', { text: sentence }), close);
+    const box = make('div', {}, make('span', {text: sentence}), close);
     box.dataset.sentence = sentence;
     close.addEventListener('click', () => box.remove());
     $('errors').append(box);
@@ -47,13 +47,17 @@ export class Panel {
   hint(sentence) {
     $('hint').textContent = sentence;
     clearTimeout(this.hintTimer);
-    if (!this.viewer.measuring) this.hintTimer = setTimeout(() => { $('hint').textContent = ''; }, 4000);
+    if (!this.viewer.measuring) {
+      this.hintTimer = setTimeout(() => {
+        $('hint').textContent = '';
+      }, 4000);
+    }
   }
 
   // --- controls -------------------------------------------------------------------------------
 
   #bind() {
-    const { viewer } = this;
+    const {viewer} = this;
     const onRadio = (name, set) => {
       for (const radio of radios(name)) radio.addEventListener('change', () => set(radio.value));
     };
@@ -68,25 +72,29 @@ export class Panel {
     onClick('next', () => viewer.stepCamera(1));
     onClick('leave', () => viewer.leaveCamera());
     onClick('clear-measures', () => viewer.measures.clear());
-    onClick('copy-measures', () => this.#copy(viewer.measures.csv(), 'The distances are in the clipboard.'));
+    onClick(
+        'copy-measures',
+        () => this.#copy(viewer.measures.csv(), 'The distances are in the clipboard.'));
     onClick('save-picture', () => this.savePicture());
-    onClick('copy-link', () => this.#copy(location.href, 'The address of this view is in the clipboard.'));
+    onClick(
+        'copy-link',
+        () => this.#copy(location.href, 'The address of this view is in the clipboard.'));
     const onInput = (id, set) => $(id).addEventListener('input', (event) => set(event.target));
-    onInput('both-sides', ({ checked }) => viewer.room.setBothSides(checked));
-    onInput('opacity', ({ value }) => viewer.cameras.setOpacity(Number(value)));
+    onInput('both-sides', ({checked}) => viewer.room.setBothSides(checked));
+    onInput('opacity', ({value}) => viewer.cameras.setOpacity(Number(value)));
     onInput('top', () => this.#setTop());
-    onInput('eye', ({ value }) => {
+    onInput('eye', ({value}) => {
       viewer.navigation.setEyeHeight(Number(value));
       this.showEye();
     });
-    onInput('speed', ({ value }) => {
+    onInput('speed', ({value}) => {
       viewer.navigation.speed = Number(value);
       $('speed-value').textContent = `${Number(value).toFixed(1)} m/s`;
     });
-    onInput('show-cameras', ({ checked }) => viewer.cameras.setVisible(checked));
-    onInput('show-pictures', ({ checked }) => viewer.cameras.setPictures(checked));
-    onInput('show-points', ({ checked }) => this.#showPoints(checked));
-    onInput('camera-size', ({ value }) => this.#setCameraSize(Number(value)));
+    onInput('show-cameras', ({checked}) => viewer.cameras.setVisible(checked));
+    onInput('show-pictures', ({checked}) => viewer.cameras.setPictures(checked));
+    onInput('show-points', ({checked}) => this.#showPoints(checked));
+    onInput('camera-size', ({value}) => this.#setCameraSize(Number(value)));
     $('help').addEventListener('click', (event) => {
       if (event.target === $('help')) $('help').close();
     });
@@ -112,20 +120,22 @@ export class Panel {
   }
   // The slider runs from floor to ceiling.
   #setTop() {
-    const { viewer } = this, share = Number($('top').value);
-    const { min, max } = viewer.navigation.bounds;
+    const {viewer} = this, share = Number($('top').value);
+    const {min, max} = viewer.navigation.bounds;
     const floor = viewer.floorHeight();
     const height = share >= 1 ? 1e9 : min.y + share * (max.y - min.y);
     $('top-value').textContent = share >= 1 ? 'off' : `${(height - floor).toFixed(2)} m`;
     viewer.room.setTop(height);
   }
   async savePicture() {
-    const { viewer } = this;
+    const {viewer} = this;
     const scale = Number(radios('scale').find((radio) => radio.checked).value);
     const blob = await viewer.picture(scale);
     if (!blob) return this.fail('The picture is too large for this browser.');
-    const link = make('a', { href: URL.createObjectURL(blob),
-                             download: `${viewer.data.name.replace(/\.[^.]*$/, '')}-view.png` });
+    const link = make('a', {
+      href: URL.createObjectURL(blob),
+      download: `${viewer.data.name.replace(/\.[^.]*$/, '')}-view.png`
+    });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
     this.hint('The picture is saved.');
@@ -134,15 +144,16 @@ export class Panel {
   // --- what is shown --------------------------------------------------------------------------
 
   describe() {
-    const { data } = this.viewer;
+    const {data} = this.viewer;
     document.title = `${data.name} – roomtex-view`;
     $('name').textContent = data.name;
-    $('facts').textContent = `${count(data.num_vertices)} points, ${count(data.num_triangles)} triangles` +
+    $('facts').textContent =
+        `${count(data.num_vertices)} points, ${count(data.num_triangles)} triangles` +
         (data.num_cameras ? `, ${data.num_cameras} cameras` : '');
-    for (const warning of data.warnings) $('warnings').append(make('p', { text: warning }));
+    for (const warning of data.warnings) $('warnings').append(make('p', {text: warning}));
   }
   showProgress() {
-    const { room } = this.viewer;
+    const {room} = this.viewer;
     const first = room.loaded && room.pages.every((page) => page.texture || page.complete);
     $('loading').classList.toggle('quiet', first);
     $('loading').hidden = first && room.settled;
@@ -155,12 +166,12 @@ export class Panel {
     }
   }
   showMode() {
-    const { mode, evidence } = this.viewer;
+    const {mode, evidence} = this.viewer;
     check('surface', mode);
     showLegend($('legend'), mode, evidence);
   }
   showEvidence() {
-    const { evidence } = this.viewer;
+    const {evidence} = this.viewer;
     for (const radio of radios('surface')) {
       radio.disabled = radio.value !== 'colour' && !evidence.available;
     }
@@ -168,17 +179,17 @@ export class Panel {
     $('no-evidence').textContent = evidence.reason;
   }
   showMovement() {
-    const { mode } = this.viewer.navigation;
+    const {mode} = this.viewer.navigation;
     check('mode', mode);
     $('walk-section').hidden = mode !== 'walk';
   }
   showEye() {
-    const { eyeHeight } = this.viewer.navigation;
+    const {eyeHeight} = this.viewer.navigation;
     $('eye').value = eyeHeight;
     $('eye-value').textContent = `${eyeHeight.toFixed(2)} m`;
   }
   showMeasuring() {
-    const { measuring } = this.viewer;
+    const {measuring} = this.viewer;
     $('measure').setAttribute('aria-pressed', measuring);
     $('stage').classList.toggle('measuring', measuring);
     $('crosshair').hidden = !measuring || !this.byKeys;
@@ -198,7 +209,7 @@ export class Panel {
   }
 
   showCameras() {
-    const { list, size } = this.viewer.cameras;
+    const {list, size} = this.viewer.cameras;
     $('no-cameras').hidden = list.length > 0;
     $('camera-controls').hidden = list.length === 0;
     if (list.length === 0) return;
@@ -206,10 +217,11 @@ export class Panel {
     $('camera-size').max = Math.max(1, 2 * size);
     this.#setCameraSize(size);
     this.options = list.map((camera) => {
-      const image = make('img', { alt: '', loading: 'lazy', width: 54, height: 36 });
+      const image = make('img', {alt: '', loading: 'lazy', width: 54, height: 36});
       if (camera.photo) image.src = `photo?id=${camera.id}&max=128`;
-      const option = make('li', { id: `camera-${camera.id}`, camera }, image,
-                          make('span', { text: camera.name, title: camera.name }));
+      const option = make(
+          'li', {id: `camera-${camera.id}`, camera}, image,
+          make('span', {text: camera.name, title: camera.name}));
       option.setAttribute('role', 'option');
       option.setAttribute('aria-selected', 'false');
       option.addEventListener('click', () => this.viewer.standIn(camera));
@@ -223,36 +235,47 @@ export class Panel {
   #activate(option) {
     for (const other of this.options) other.classList.toggle('active', other === option);
     $('camera-list').setAttribute('aria-activedescendant', option.id);
-    option.scrollIntoView({ block: 'nearest' });
+    option.scrollIntoView({block: 'nearest'});
   }
   #listKey(event) {
     const now = this.options.findIndex((option) => option.classList.contains('active'));
     const last = this.options.length - 1;
-    const to = { ArrowDown: Math.min(now + 1, last), ArrowUp: Math.max(now - 1, 0), Home: 0,
-                 End: last }[event.key];
-    if (to !== undefined) this.#activate(this.options[to]);
-    else if ((event.key === 'Enter' || event.key === ' ') && now >= 0) {
+    const to = {
+      ArrowDown: Math.min(now + 1, last),
+      ArrowUp: Math.max(now - 1, 0),
+      Home: 0,
+      End: last
+    }[event.key];
+    if (to !== undefined) {
+      this.#activate(this.options[to]);
+    } else if ((event.key === 'Enter' || event.key === ' ') && now >= 0) {
       this.viewer.standIn(this.options[now].camera);
-    } else return;
+    } else {
+      return;
+    }
     event.preventDefault();
     event.stopPropagation();
   }
 
   showMeasures() {
-    const { list } = this.viewer.measures;
+    const {list} = this.viewer.measures;
     $('no-measures').hidden = list.length > 0;
     $('copy-measures').disabled = $('clear-measures').disabled = list.length === 0;
     $('measures').replaceChildren(...list.map((m, i) => {
-      const remove = make('button', { text: 'Delete', type: 'button' });
+      const remove = make('button', {text: 'Delete', type: 'button'});
       remove.setAttribute('aria-label', `Delete distance ${i + 1}, ${length(m.distance)}`);
       remove.addEventListener('click', () => this.viewer.measures.remove(i));
-      const rows = [['height', length(m.height)], ['level', length(m.horizontal)],
-                    ['dx dy dz', `${coordinates(m.difference)} m`],
-                    ['from', `${coordinates(m.from)} m`], ['to', `${coordinates(m.to)} m`]];
+      const rows = [
+        ['height', length(m.height)], ['level', length(m.horizontal)],
+        ['dx dy dz', `${coordinates(m.difference)} m`], ['from', `${coordinates(m.from)} m`],
+        ['to', `${coordinates(m.to)} m`]
+      ];
       const details = make('dl');
-      for (const [term, text] of rows) details.append(make('dt', { text: term }), make('dd', { text }));
-      return make('li', {}, make('div', { className: 'head' },
-          make('strong', { text: length(m.distance) }), remove), details);
+      for (const [term, text] of rows) details.append(make('dt', {text: term}), make('dd', {text}));
+      return make(
+          'li', {},
+          make('div', {className: 'head'}, make('strong', {text: length(m.distance)}), remove),
+          details);
     }));
   }
 
@@ -267,19 +290,28 @@ export class Panel {
   }
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || $('help').open) return;
-    const { viewer } = this, on = event.target;
+    const {viewer} = this, on = event.target;
     const inSlider = on.matches?.('input[type="range"], input[type="radio"]');
     const onButton = on.matches?.('button, input, a, summary, [role="listbox"]');
     const toggle = (id) => $(id).click();
     const acts = {
-      o: () => viewer.navigation.setMode('orbit'), g: () => viewer.navigation.setMode('walk'),
-      t: () => viewer.navigation.setMode('top'), h: () => viewer.navigation.home(),
-      m: () => { this.byKeys = true; viewer.setMeasuring(!viewer.measuring); },
-      f: () => toggle('show-cameras'), p: () => toggle('show-points'),
-      ',': () => viewer.stepCamera(-1), '.': () => viewer.stepCamera(1),
+      o: () => viewer.navigation.setMode('orbit'),
+      g: () => viewer.navigation.setMode('walk'),
+      t: () => viewer.navigation.setMode('top'),
+      h: () => viewer.navigation.home(),
+      m: () => {
+        this.byKeys = true;
+        viewer.setMeasuring(!viewer.measuring);
+      },
+      f: () => toggle('show-cameras'),
+      p: () => toggle('show-points'),
+      ',': () => viewer.stepCamera(-1),
+      '.': () => viewer.stepCamera(1),
       l: () => radios('background').find((radio) => !radio.checked).click(),
-      x: () => this.savePicture(), '?': () => $('help').showModal(),
-      '[': () => this.#fade(-0.1), ']': () => this.#fade(0.1),
+      x: () => this.savePicture(),
+      '?': () => $('help').showModal(),
+      '[': () => this.#fade(-0.1),
+      ']': () => this.#fade(0.1),
       Escape: () => this.#escape(),
     };
     if (!onButton) {
@@ -291,7 +323,9 @@ export class Panel {
         viewer.measureAt(viewer.navigation.width / 2, viewer.navigation.height / 2);
       };
     }
-    kModes.forEach((mode, i) => { acts[i + 1] = () => viewer.setMode(mode); });
+    kModes.forEach((mode, i) => {
+      acts[i + 1] = () => viewer.setMode(mode);
+    });
     const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (act && !(event.repeat && !'[],.'.includes(event.key))) {
       act();
@@ -307,10 +341,13 @@ export class Panel {
     this.viewer.cameras.setOpacity(opacity);
   }
   #escape() {
-    const { viewer } = this;
+    const {viewer} = this;
     if (viewer.measuring) {
-      if (!viewer.measures.cancel()) viewer.setMeasuring(false);
-      else this.hint('Click the first point; Esc ends.');
+      if (!viewer.measures.cancel()) {
+        viewer.setMeasuring(false);
+      } else {
+        this.hint('Click the first point; Esc ends.');
+      }
     } else if (viewer.target) {
       viewer.leaveCamera();
     }

@@ -3,11 +3,11 @@
 
 import * as THREE from 'three';
 
-import { getBitmap, getBytes, Queue } from './api.js';
-import { kFrontMargin, kModes, SurfaceLook } from './surface.js';
+import {getBitmap, getBytes, Queue} from './api.js';
+import {kFrontMargin, kModes, SurfaceLook} from './surface.js';
 
 const kMagic = 0x31435452;
-const kUploadBytes = 3 << 20;       // handed to the graphics card per picture; where a picture takes
+const kUploadBytes = 3 << 20;  // handed to the graphics card per picture; where a picture takes
 const kSlowUploadBytes = 24 << 20;  // longer than that takes anyway, more
 const kMaxTriangles = 12e6;         // of the finer levels kept; 16 bytes each
 const kPreviewTexture = 1024;       // texels of the first, quick texture
@@ -26,19 +26,19 @@ function parseChunk(bytes, chunk) {
   at += positions.byteLength;
   geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
   if (flags & 1) {
-    geometry.setAttribute('uv',
-        new THREE.BufferAttribute(new Uint16Array(bytes, at, 2 * numPoints), 2, true));
+    geometry.setAttribute(
+        'uv', new THREE.BufferAttribute(new Uint16Array(bytes, at, 2 * numPoints), 2, true));
   } else {
-    geometry.setAttribute('tint',
-        new THREE.BufferAttribute(new Uint8Array(bytes, at, 4 * numPoints), 4, true));
+    geometry.setAttribute(
+        'tint', new THREE.BufferAttribute(new Uint8Array(bytes, at, 4 * numPoints), 4, true));
   }
   at += 4 * numPoints;
-  geometry.setAttribute('normal',
-      new THREE.BufferAttribute(new Int8Array(bytes, at, 4 * numPoints), 4, true));
+  geometry.setAttribute(
+      'normal', new THREE.BufferAttribute(new Int8Array(bytes, at, 4 * numPoints), 4, true));
   at += 4 * numPoints;
   geometry.setIndex(new THREE.BufferAttribute(new Uint16Array(bytes, at, numCorners), 1));
-  geometry.boundingBox = new THREE.Box3(new THREE.Vector3(...chunk.min),
-                                        new THREE.Vector3(...chunk.max));
+  geometry.boundingBox =
+      new THREE.Box3(new THREE.Vector3(...chunk.min), new THREE.Vector3(...chunk.max));
   geometry.boundingSphere = geometry.boundingBox.getBoundingSphere(new THREE.Sphere());
   return geometry;
 }
@@ -85,7 +85,8 @@ class PageTexture {
   async loadPreview() {
     const bitmap = await getBitmap(`texture?page=${this.page.id}&max=${kPreviewTexture}`);
     this.#begin(bitmap);
-    while (!this.step());
+    while (!this.step())
+      ;
     this.complete = Math.max(this.page.width, this.page.height) <= kPreviewTexture;
   }
   async loadWhole(max) {
@@ -98,8 +99,9 @@ class PageTexture {
     const texture = gl.createTexture();
     this.renderer.state.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, levels, gl.RGBA8, bitmap.width, bitmap.height);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER,
-                     this.renderer.isSoftware ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(
+        gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER,
+        this.renderer.isSoftware ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
@@ -109,13 +111,13 @@ class PageTexture {
       gl.texParameterf(gl.TEXTURE_2D, anisotropy.TEXTURE_MAX_ANISOTROPY_EXT, Math.min(8, most));
     }
     this.renderer.state.unbindTexture();
-    this.pending = { bitmap, texture, row: 0 };
+    this.pending = {bitmap, texture, row: 0};
   }
   // Hands over the next strip; true when the whole texture is there.
   step() {
     if (!this.pending) return true;
     const gl = this.renderer.getContext();
-    const { bitmap, texture } = this.pending;
+    const {bitmap, texture} = this.pending;
     const rows = Math.min(kStripRows, bitmap.height - this.pending.row);
     this.renderer.state.bindTexture(gl.TEXTURE_2D, texture);
     gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
@@ -123,8 +125,9 @@ class PageTexture {
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
     gl.pixelStorei(gl.UNPACK_SKIP_ROWS, this.pending.row);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, this.pending.row, bitmap.width, rows, gl.RGBA,
-                     gl.UNSIGNED_BYTE, bitmap);
+    gl.texSubImage2D(
+        gl.TEXTURE_2D, 0, 0, this.pending.row, bitmap.width, rows, gl.RGBA, gl.UNSIGNED_BYTE,
+        bitmap);
     gl.pixelStorei(gl.UNPACK_SKIP_ROWS, 0);
     this.pending.row += rows;
     const done = this.pending.row >= bitmap.height;
@@ -143,15 +146,15 @@ class PageTexture {
 export class Room {
   // scene: of the server. invalidate: asks for a new picture. fail: takes a sentence.
   // refine: the same, when the graphics card has time.
-  constructor(scene, renderer, { invalidate, refine, fail }) {
+  constructor(scene, renderer, {invalidate, refine, fail}) {
     this.scene = scene;
     this.refine = refine;
     this.renderer = renderer;
     this.invalidate = invalidate;
     this.fail = fail;
     this.group = new THREE.Group();  // `scan` relative to its origin, turned so that up is +Y
-    this.group.quaternion.setFromUnitVectors(new THREE.Vector3(...scene.up).normalize(),
-                                             new THREE.Vector3(0, 1, 0));
+    this.group.quaternion.setFromUnitVectors(
+        new THREE.Vector3(...scene.up).normalize(), new THREE.Vector3(0, 1, 0));
     this.group.updateMatrixWorld();
     this.look = new SurfaceLook();
     this.materials = new Map();
@@ -162,18 +165,25 @@ export class Room {
     this.queue = new Queue(4);
     this.arrived = [];  // meshes to be handed over
     this.pages = scene.pages.map((page) => new PageTexture(renderer, page));
-    this.chunks = scene.chunks.map((chunk) => ({
-      ...chunk, levels: [null, null, null], asked: [true, false, false], wanted: 0, lastWanted: 0,
-      box: new THREE.Box3(new THREE.Vector3(...chunk.min), new THREE.Vector3(...chunk.max)),
-    }));
+    this.chunks = scene.chunks.map(
+        (chunk) => ({
+          ...chunk,
+          levels: [null, null, null],
+          asked: [true, false, false],
+          wanted: 0,
+          lastWanted: 0,
+          box: new THREE.Box3(new THREE.Vector3(...chunk.min), new THREE.Vector3(...chunk.max)),
+        }));
     this.numCoarse = 0;
     this.numTriangles = 0;
-    this.slow = false;  // the graphics card takes long
+    this.slow = false;   // the graphics card takes long
     this.tolerance = 1;  // times kWantedEdgePx: larger on slow graphics cards
     this.longestUpload = 0;
   }
 
-  get loaded() { return this.numCoarse === this.chunks.length; }
+  get loaded() {
+    return this.numCoarse === this.chunks.length;
+  }
   // Nothing more is on its way for this point of view.
   get settled() {
     return this.loaded && this.queue.idle && this.arrived.length === 0 && !this.dirty &&
@@ -192,8 +202,9 @@ export class Room {
   async load() {
     for (const page of this.pages) this.#loadPage(page);
     await Promise.all(this.chunks.map((chunk) => new Promise((done) => {
-      this.queue.add(chunk.id, () => this.#load(chunk, 0).finally(done));
-    })));
+                                        this.queue.add(
+                                            chunk.id, () => this.#load(chunk, 0).finally(done));
+                                      })));
   }
 
   async #loadPage(page) {
@@ -221,7 +232,7 @@ export class Room {
       if (this.mode !== 'colour') await this.#loadEvidence(chunk, level, geometry);
       const mesh = new THREE.Mesh(geometry, this.#material(chunk.page));
       mesh.matrixAutoUpdate = false;
-      this.arrived.push({ chunk, level, mesh });
+      this.arrived.push({chunk, level, mesh});
       this.dirty = true;
       this.refine();
     } catch (error) {
@@ -245,8 +256,10 @@ export class Room {
       for (const chunk of this.chunks) {
         for (const [level, mesh] of chunk.levels.entries()) {
           if (mesh && !mesh.geometry.attributes.evidence) {
-            tasks.push(new Promise((done, failed) => this.queue.add(level, () =>
-              this.#loadEvidence(chunk, level, mesh.geometry).then(done, failed))));
+            tasks.push(new Promise(
+                (done, failed) => this.queue.add(
+                    level,
+                    () => this.#loadEvidence(chunk, level, mesh.geometry).then(done, failed))));
           }
         }
       }
@@ -275,7 +288,7 @@ export class Room {
     let bytes = 0;
     const mayTake = this.slow ? kSlowUploadBytes : kUploadBytes;
     while (this.arrived.length > 0 && bytes < mayTake) {
-      const { chunk, level, mesh } = this.arrived.shift();
+      const {chunk, level, mesh} = this.arrived.shift();
       this.#accept(chunk, level, mesh);
       bytes += 20 * mesh.geometry.attributes.position.count + 2 * mesh.geometry.index.count;
     }
@@ -301,20 +314,25 @@ export class Room {
       this.numTriangles += mesh.geometry.index.count / 3;
       // The graphics card has them then; rays are cast at the coarse level and by the server.
       for (const attribute of [...Object.values(mesh.geometry.attributes), mesh.geometry.index]) {
-        attribute.onUpload(() => { attribute.array = null; });
+        attribute.onUpload(() => {
+          attribute.array = null;
+        });
       }
     }
     this.group.add(mesh);
     if (this.mode !== 'colour' && !mesh.geometry.attributes.evidence) {  // chosen meanwhile
-      this.queue.add(level, () => this.#loadEvidence(chunk, level, mesh.geometry)
-          .then(this.invalidate, (error) => this.fail(error.message)));
+      this.queue.add(
+          level,
+          () => this.#loadEvidence(chunk, level, mesh.geometry)
+                    .then(this.invalidate, (error) => this.fail(error.message)));
     }
   }
 
   // The level whose edges are short enough on the screen, and the nearest to it that is there.
   #choose(camera, heightPx) {
     const frustum = new THREE.Frustum().setFromProjectionMatrix(
-        new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
+        new THREE.Matrix4()
+            .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
             .multiply(this.group.matrixWorld));
     const eye = this.group.worldToLocal(camera.position.clone());
     const now = performance.now();
@@ -341,7 +359,9 @@ export class Room {
       }
       let shown = level;
       while (shown > 0 && !chunk.levels[shown]) --shown;
-      chunk.levels.forEach((mesh, i) => { if (mesh) mesh.visible = i === shown; });
+      chunk.levels.forEach((mesh, i) => {
+        if (mesh) mesh.visible = i === shown;
+      });
       if (inView && chunk.levels[shown]) {
         this.shownTriangles += chunk.levels[shown].geometry.index.count / 3;
       }
@@ -391,21 +411,22 @@ export class Room {
         best = distance;
       }
     }
-    return best < Infinity ? { distance: best, point: ray.at(best, new THREE.Vector3()) } : null;
+    return best < Infinity ? {distance: best, point: ray.at(best, new THREE.Vector3())} : null;
   }
 
   // Some points of the room, page frame; before it is loaded the corners of its boxes.
   samplePoints() {
     const points = [];
-    for (const { levels: [coarse], box } of this.chunks) {
+    for (const {levels: [coarse], box} of this.chunks) {
       if (!coarse) {
         for (let i = 0; i < 8; ++i) {
-          points.push(new THREE.Vector3(i & 1 ? box.min.x : box.max.x, i & 2 ? box.min.y : box.max.y,
-                                        i & 4 ? box.min.z : box.max.z));
+          points.push(new THREE.Vector3(
+              i & 1 ? box.min.x : box.max.x, i & 2 ? box.min.y : box.max.y,
+              i & 4 ? box.min.z : box.max.z));
         }
         continue;
       }
-      const { position } = coarse.geometry.attributes;
+      const {position} = coarse.geometry.attributes;
       for (let i = 0; i < position.count; i += 1 + (position.count >> 7)) {
         points.push(new THREE.Vector3().fromBufferAttribute(position, i));
       }
@@ -417,9 +438,9 @@ export class Room {
   wallHeading() {
     const bins = new Float64Array(90);
     const vector = new THREE.Vector3();
-    for (const { levels: [coarse] } of this.chunks) {
+    for (const {levels: [coarse]} of this.chunks) {
       if (!coarse) continue;
-      const { position, normal } = coarse.geometry.attributes;
+      const {position, normal} = coarse.geometry.attributes;
       const corners = coarse.geometry.index.array;
       const area = new THREE.Triangle();
       for (let i = 0; i < corners.length; i += 3) {
@@ -442,17 +463,20 @@ export class Room {
   floorHeight() {
     const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3();
     const box = new THREE.Box3();
-    for (const chunk of this.chunks) box.union(chunk.box.clone().applyMatrix4(this.group.matrixWorld));
+    for (const chunk of this.chunks) {
+      box.union(chunk.box.clone().applyMatrix4(this.group.matrixWorld));
+    }
     if (box.isEmpty()) return 0;
     const middle = (box.min.y + box.max.y) / 2;
     const step = 0.02, areas = new Map();
-    for (const { levels: [coarse] } of this.chunks) {
+    for (const {levels: [coarse]} of this.chunks) {
       if (!coarse) continue;
-      const { position } = coarse.geometry.attributes;
+      const {position} = coarse.geometry.attributes;
       const corners = coarse.geometry.index.array;
       for (let i = 0; i < corners.length; i += 3) {
         for (const [vector, k] of [[a, 0], [b, 1], [c, 2]]) {
-          vector.fromBufferAttribute(position, corners[i + k]).applyQuaternion(this.group.quaternion);
+          vector.fromBufferAttribute(position, corners[i + k])
+              .applyQuaternion(this.group.quaternion);
         }
         const height = (a.y + b.y + c.y) / 3;
         const normal = b.sub(a).cross(c.sub(a));
@@ -462,7 +486,7 @@ export class Room {
       }
     }
     const sumAt = (bin) => areas.get(bin) + (areas.get(bin + 1) ?? 0);
-    const bins = [...areas.keys()].sort((a, b) => a - b);
+    const bins = [...areas.keys()].sort((low, high) => low - high);
     const most = Math.max(0, ...bins.map(sumAt));
     let bin = bins.find((candidate) => sumAt(candidate) >= 0.2 * most);
     if (bin === undefined) return box.min.y;

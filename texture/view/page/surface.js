@@ -12,9 +12,11 @@ function srgbFromOklch(lightness, chroma, hueDeg) {
   const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;
   const m = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3;
   const s = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3;
-  const linear = [4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s,
-                  -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s,
-                  -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s];
+  const linear = [
+    4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s,
+    -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s,
+    -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s
+  ];
   if (linear.some((value) => value < -1e-4 || value > 1.0001)) return null;
   return linear.map((value) => {
     const v = Math.min(Math.max(value, 0), 1);
@@ -22,8 +24,8 @@ function srgbFromOklch(lightness, chroma, hueDeg) {
   });
 }
 
-// A colour map whose lightness rises evenly from end to end, so that more always looks like more, in
-// grey and to the colour-blind as well. t: 0..1. hues: of both ends.
+// A colour map whose lightness rises evenly from end to end, so that more always looks like more,
+// in grey and to the colour-blind as well. t: 0..1. hues: of both ends.
 function mapColor(t, [from, to]) {
   const lightness = 0.27 + 0.66 * t;
   const hue = from + (to - from) * t;
@@ -35,14 +37,18 @@ function mapColor(t, [from, to]) {
 }
 
 // Blue to yellow by way of green; violet to yellow by way of red.
-const kHues = { views: [285, 105], disagreement: [290, 450] };
+const kHues = {
+  views: [285, 105],
+  disagreement: [290, 450]
+};
 
 // Bytes r g b of the map of a mode, from low to high.
 export function colorMap(mode, steps) {
   const colors = [];
   for (let i = 0; i < steps; ++i) {
     const t = steps > 1 ? i / (steps - 1) : 0;
-    colors.push(mode === 'intensity' ? Array(3).fill(Math.round(255 * t)) : mapColor(t, kHues[mode]));
+    colors.push(
+        mode === 'intensity' ? Array(3).fill(Math.round(255 * t)) : mapColor(t, kHues[mode]));
   }
   return colors;
 }
@@ -60,7 +66,8 @@ function mapTexture(mode) {
   return texture;
 }
 
-// The front is what the scanner saw; the normals are smooth, so that at edges they lean (view_model.h).
+// The front is what the scanner saw; the normals are smooth, so that at edges they lean
+// (view_model.h).
 export const kFrontMargin = 0.05;
 
 const kVertex = `
@@ -126,18 +133,20 @@ void main() {
 
 // The materials of all pages and what they have in common.
 export class SurfaceLook {
-  #ramps = { views: mapTexture('views'), disagreement: mapTexture('disagreement') };
+  #ramps = {views: mapTexture('views'), disagreement: mapTexture('disagreement')};
   #blank = new THREE.DataTexture(new Uint8Array([120, 120, 120, 255]), 1, 1);
   #shared = {
-    mode: { value: 0 },
-    ramp: { value: this.#ramps.views },
-    top: { value: 1e9 },
-    front_only: { value: true },
-    high: { value: 1 },
-    unknown: { value: new THREE.Vector3(...kUnknownColor).divideScalar(255) },
+    mode: {value: 0},
+    ramp: {value: this.#ramps.views},
+    top: {value: 1e9},
+    front_only: {value: true},
+    high: {value: 1},
+    unknown: {value: new THREE.Vector3(...kUnknownColor).divideScalar(255)},
   };
 
-  constructor() { this.#blank.needsUpdate = true; }
+  constructor() {
+    this.#blank.needsUpdate = true;
+  }
 
   // page: a texture or null = colours of the points.
   makeMaterial(textured) {
@@ -146,7 +155,7 @@ export class SurfaceLook {
       vertexShader: kVertex,
       fragmentShader: kFragment,
       side: THREE.DoubleSide,
-      uniforms: { ...this.#shared, textured: { value: textured }, page: { value: this.#blank } },
+      uniforms: {...this.#shared, textured: {value: textured}, page: {value: this.#blank}},
     });
   }
 
@@ -159,6 +168,10 @@ export class SurfaceLook {
     }
     this.#shared.ramp.value = this.#ramps[mode] ?? this.#ramps.views;
   }
-  setTop(height) { this.#shared.top.value = height; }
-  setBothSides(both) { this.#shared.front_only.value = !both; }
+  setTop(height) {
+    this.#shared.top.value = height;
+  }
+  setBothSides(both) {
+    this.#shared.front_only.value = !both;
+  }
 }
