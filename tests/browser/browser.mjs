@@ -95,14 +95,14 @@ export async function openPage(browser, url, {width = 1600, height = 1000} = {})
   return {page, errors: () => errors};
 }
 
-export function launchBrowser() {
-  // --no-sandbox: containers run as root. SwiftShader: WebGL without a GPU.
-  return chromium.launch({
-    executablePath: fromEnvironment('ROOMTEX_CHROMIUM'),
-    args: [
-      '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'
-    ],
-  });
+// webgl: SwiftShader draws it, there need be no GPU. Pages without are drawn faster without.
+export function launchBrowser({webgl = false} = {}) {
+  const graphics = webgl ?
+      ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'] :
+      ['--disable-gpu'];
+  // --no-sandbox: containers run as root.
+  return chromium.launch(
+      {executablePath: fromEnvironment('ROOMTEX_CHROMIUM'), args: ['--no-sandbox', ...graphics]});
 }
 
 export async function screenshot(page, name) {

@@ -7,7 +7,7 @@ import {launchBrowser, makeFolder, openPage, run} from './browser.mjs';
 
 let browser;
 before(async () => {
-  browser = await launchBrowser();
+  browser = await launchBrowser({webgl: true});
 });
 after(async () => {
   await browser.close();

@@ -71,10 +71,14 @@ export class PickPage {
 
   // CSS pixels of the window per pixel and where things are: {scale, aspect, centre, box}.
   async view(side) {
-    const pane = this.page.locator(`#${side}-pane`);
-    const text = await until(() => pane.getAttribute('data-view'), `${side} is drawn`);
+    const {text, box} = await until(() => this.page.evaluate((id) => {
+      const pane = document.getElementById(id);
+      const {x, y, width, height} = pane.getBoundingClientRect();
+      const shown = pane.getAttribute('data-view');
+      return shown && {text: shown, box: {x, y, width, height}};
+    }, `${side}-pane`), `${side} is drawn`);
     const [scale, aspect, x, y] = text.split(' ').map(Number);
-    return {scale, aspect, centre: [x, y], box: await pane.boundingBox(), text};
+    return {scale, aspect, centre: [x, y], box, text};
   }
 
   async toScreen(side, img) {
@@ -86,19 +90,21 @@ export class PickPage {
   }
 
   // By the wheel, from the whole picture; so far that a CSS pixel is less than a quarter of a
-  // pixel.
+  // pixel. What is under the mouse stays there.
   async zoomTo(side, img, scale = 5) {
     const button = side === 'photo' ? '#photo-whole' : '#scan-whole';
     await this.page.click(button);
     await this.redrawn();
-    for (let step = 0; step < 40; ++step) {
-      const view = await this.view(side);
-      if (view.scale >= scale) return;
-      await this.page.mouse.move(...await this.toScreen(side, img));
+    await this.page.mouse.move(...await this.toScreen(side, img));
+    let view = await this.view(side);
+    for (let step = 0; view.scale < scale; ++step) {
+      assert.ok(step < 40, 'the wheel does not zoom');
       await this.page.mouse.wheel(0, -400);
-      await until(async () => (await this.view(side)).text !== view.text, 'the wheel zooms');
+      view = await until(async () => {
+        const now = await this.view(side);
+        return now.text !== view.text && now;
+      }, 'the wheel zooms');
     }
-    assert.fail('the wheel does not zoom');
   }
 
   // Two frames: what was changed is drawn.

@@ -34,7 +34,7 @@ const serveView = (...args) => serve('roomtex-view', [...args, '--port', '0', '-
 
 before(async () => {
   folder = makeFolder();
-  browser = await launchBrowser();
+  browser = await launchBrowser({webgl: true});
   const capture = await simulate('room', [
     '--num_photos', '6', '--photo_width', '800', '--photo_height', '534', '--scan_columns', '720',
     '--scan_rows', '360'
