@@ -326,5 +326,33 @@ TEST_F(ServedPage, OneConnectionTakesSeveralRequests) {
   EXPECT_EQ(count, 3u);
 }
 
+// Answers with and without a body, bodies that nobody reads: each ends where the next begins.
+TEST_F(ServedPage, AnswersOfOneConnectionDoNotRunIntoEachOther) {
+  const auto request = [&](const std::string& line, const std::string& fields,
+                           const std::string& body) {
+    return line + " HTTP/1.1\r\n" + HostLine() + fields +
+           "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
+  };
+  const std::string sum = "GET " + base_ + "/sum?a=1&b=2", tile = base_ + "/tile?x=1";
+  const std::string json = "Content-Type: application/json\r\n";
+  const std::string large(1 << 19, 'x');
+  const std::string answer = SendRaw(
+      port_, request("HEAD " + tile, "", "") + request(sum, "", large) +
+                 request("GET " + tile, "If-None-Match: \"tile-1\"\r\n", "") +
+                 request(sum, "", "") +
+                 request("POST " + base_ + "/echo", json, request(sum, "", "") + large) +
+                 request("POST " + base_ + "/echo", "Origin: " + origin_ + "\r\n" + json, "[4]") +
+                 request(sum, "Connection: close\r\n", ""));
+  std::string statuses;
+  for (size_t at = answer.find("HTTP/1.1 "); at != std::string::npos;
+       at = answer.find("HTTP/1.1 ", at + 1)) {
+    statuses += answer.substr(at + 9, 3) + " ";
+  }
+  EXPECT_EQ(statuses, "200 200 304 200 403 200 200 ");
+  EXPECT_THAT(answer, HasSubstr("\r\n\r\n[4]HTTP/1.1 200"));
+  EXPECT_THAT(answer, HasSubstr("Keep-Alive: timeout=10, max=1000"));
+  EXPECT_EQ(num_posts_, 1);
+}
+
 }  // namespace
 }  // namespace roomtex
