@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/option_list.h"
 #include "core/version.h"
 
@@ -58,6 +59,20 @@ struct Command::Impl {
     options.Add(std::move(option));
   }
 
+  // An integer whose 0 has a word.
+  void AddIntOrWord(const OptionField& field, int* value) {
+    const std::string word = field.word_of_zero();
+    const auto text = [value, word] { return *value == 0 ? word : std::to_string(*value); };
+    Option option{field.name(), "TEXT", field.help(), text()};
+    option.may_be_empty = true;
+    option.set = [name = field.name(), value, word](const std::vector<std::string>& texts) {
+      *value = texts.back() == word ? 0 : ParseInt(name, texts.back());
+    };
+    option.value = [text] { return Json(text()); };
+    options.Add(std::move(option));
+  }
+
+  void AddField(const OptionField& field, Command* command);
   void AddCommonOptions(Command* command);
   // What --help and --version print; "" when neither is asked for.
   std::string Answer(const std::vector<std::string>& arguments) const;
@@ -155,6 +170,12 @@ void Command::AddOutputPaths(const std::string& name, std::vector<std::string>* 
   impl_->AddTexts(name, values, help, kind);
 }
 
+void Command::Add(const OptionFields& fields) {
+  for (const OptionField& field : fields.fields()) {
+    if (!field.internal()) impl_->AddField(field, this);
+  }
+}
+
 void Command::PassThrough(const std::string& prefix, std::vector<std::string>* arguments,
                           const std::string& help) {
   impl_->options.Add(PassedThrough{prefix, help, arguments});
@@ -163,6 +184,31 @@ void Command::PassThrough(const std::string& prefix, std::vector<std::string>* a
 void Command::Context::Warn(const std::string& message) const {
   progress.Warning(message);
   report.AddWarning(message);
+}
+
+void Command::Impl::AddField(const OptionField& field, Command* command) {
+  const std::string &option_name = field.name(), &help = field.help();
+  const Kind kind = field.required() ? Kind::kRequired : Kind::kOptional;
+  if (const auto* const flag = std::get_if<bool*>(&field.value())) {
+    command->AddBool(option_name, *flag, help);
+  } else if (const auto* const number = std::get_if<double*>(&field.value())) {
+    command->AddDouble(option_name, *number, help);
+  } else if (const auto* const integer = std::get_if<int*>(&field.value())) {
+    if (field.word_of_zero().empty()) {
+      command->AddInt(option_name, *integer, help);
+    } else {
+      AddIntOrWord(field, *integer);
+    }
+  } else {
+    std::string* const text = std::get<std::string*>(field.value());
+    if (!field.choices().empty()) {
+      command->AddChoice(option_name, text, field.choices(), help);
+    } else if (field.kind() == OptionField::Kind::kInputPath) {
+      command->AddInputPath(option_name, text, help, kind);
+    } else {
+      command->AddString(option_name, text, help, kind);
+    }
+  }
 }
 
 void Command::Impl::AddCommonOptions(Command* command) {

@@ -12,6 +12,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct CommonOptions {
   bool quiet = false;
   int num_threads = -1;  // -1 = all
@@ -44,6 +46,8 @@ class Command {
                      Kind kind = Kind::kRequired);
   void AddOutputPaths(const std::string& name, std::vector<std::string>* values,
                       const std::string& help, Kind kind = Kind::kRequired);
+  // The fields that an options struct declares: command.Add(FieldsOf(&options)).
+  void Add(const OptionFields& fields);
   // Takes every option whose name starts with `prefix` (e.g. "--Mapper.") together with its value
   // and hands them on in order: {"--Mapper.x", "1", ...}. For options of another program.
   void PassThrough(const std::string& prefix, std::vector<std::string>* arguments,
