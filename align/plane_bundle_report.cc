@@ -7,39 +7,6 @@
 
 namespace roomtex {
 
-void AddPlaneBundleOptions(PlaneBundleOptions* options, Command* command) {
-  PlaneBundleOptions& o = *options;
-  command->AddDouble("PlaneBA.beta", &o.beta,
-                     "Pixels per metre; weight of a point's distance from its plane against its "
-                     "reprojection errors, the thesis' beta; larger = nearer to the scan; 0 = from "
-                     "the ratio of image noise and scan noise.");
-  command->AddDouble("PlaneBA.max_distance", &o.max_distance,
-                     "Metres; a sparse point farther from a surface never belongs to it; larger = "
-                     "more tolerant.");
-  command->AddBool("PlaneBA.surface", &o.surface,
-                   "Points on no plane are held by flat patches of the scan; 0 = planes alone.");
-  command->AddDouble("PlaneBA.surface_noise", &o.surface_noise,
-                     "Metres; what stays unknown of a surface however many samples show it; larger "
-                     "= farther from the scan.");
-  command->AddInt("PlaneBA.min_track", &o.min_track,
-                  "Observations that a sparse point needs to be held on a surface.");
-  command->AddBool("PlaneBA.fix_clicked_view", &o.fix_clicked_view,
-                   "The photo of the picks keeps the pose that they give, as in the thesis (and no "
-                   "bend of the scan is looked for); 0 = its picks hold it as far as their noise "
-                   "allows.");
-  command->AddBool("PlaneBA.refine_intrinsics", &o.refine_intrinsics,
-                   "Refine the cameras, too, each with one set of parameters for its photos.");
-  command->AddBool(
-      "PlaneBA.bend", &o.bend,
-      "Look for a smooth bend of the scan (ranges, azimuths; one scan with a grid) and "
-      "fit the photos to the bent scan.");
-  command->AddDouble("PlaneBA.min_bend", &o.min_bend,
-                     "Metres, rms over the sparse points; a smaller bend counts as none.");
-  command->AddInt("PlaneBA.num_rounds", &o.num_rounds,
-                  "Rounds in which points are given to surfaces anew; fewer if nothing changes.");
-  command->AddInt("PlaneBA.max_iterations", &o.max_iterations, "Steps of each round.");
-}
-
 namespace {
 
 Json BendToJson(const Alignment& alignment) {

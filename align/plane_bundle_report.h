@@ -1,15 +1,11 @@
 #pragma once
-// The plane-constrained bundle adjustment in the command: its options and its part of the report.
+// The plane-constrained bundle adjustment in the report of the command.
 
 #include "align/alignment.h"
 #include "align/fit/plane_bundle.h"
-#include "core/command_line.h"
 #include "core/report.h"
 
 namespace roomtex {
-
-// Registers --PlaneBA.beta and so on.
-void AddPlaneBundleOptions(PlaneBundleOptions* options, Command* command);
 
 // The report's `plane_bundle`; null if the adjustment was not tried. {used, reason, num_points,
 // num_on_patches, sigma_px, num_rounds, bending_m, not_adjusted [image names], scan_bend {rms_m,

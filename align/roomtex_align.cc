@@ -11,8 +11,10 @@
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
+#include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
 
@@ -64,58 +66,23 @@ void AddOptions(Arguments* a, Command* command) {
                         Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
-  AddScanReaderOptions(&a->scan_reader, command);
+  command->Add(FieldsOf(&a->scan_reader));
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
                    "to it; 0 = one similarity by the picks alone.");
-  AddPlaneBundleOptions(&o.bundle, command);
-  AddScanPlaneOptions(&a->planes, command);
+  command->Add(FieldsOf(&o.bundle));
+  command->Add(FieldsOf(&a->planes));
   command->AddOutputPath("Plane.output_path", &a->planes_path,
                          "Point cloud of the scan, a colour for each of its planes and grey where "
                          "there is none: a .ply for CloudCompare or MeshLab.",
                          Command::Kind::kOptional);
-  command->AddDouble(
-      "Picks.max_chance", &o.picks.max_chance,
-      "A pick is left out when chance makes one as bad less often than this; larger = "
-      "leaves out more easily.");
-  command->AddDouble(
-      "Picks.min_bad_pick_px", &o.picks.min_bad_pick_px,
-      "Pixels; a pick nearer than this to where the others put it is never left out.");
-  command->AddDouble(
-      "Picks.min_gain", &o.picks.min_gain,
-      "A mirrored scan or two exchanged picks must fit this many times better to be named.");
-  command->AddDouble(
-      "Scale.edge_px", &o.scale.edge_px,
-      "Pixels; features nearer to a depth edge do not count for the scale (at least twice "
-      "the error of the picks is kept); larger = stricter.");
-  command->AddDouble(
-      "Trust.max_pick_rms_px", &o.trust.max_pick_rms_px,
-      "Pixels; picks that miss by more (rms) are not trusted; 0 = 10, or 0.4 % of the "
-      "photo's diagonal if that is more; larger = more tolerant.");
-  command->AddDouble("Trust.max_scale_mad", &o.trust.max_scale_mad,
-                     "Spread of the scale over the features (relative); larger = more tolerant.");
-  command->AddInt("Trust.min_scale_features", &o.trust.min_scale_features,
-                  "Features that the scale must rest on; larger = stricter.");
-  command->AddDouble(
-      "Trust.surface_tolerance", &o.trust.surface_tolerance,
-      "Metres; sparse points this near to the surface are on it; larger = more tolerant.");
-  command->AddDouble(
-      "Trust.min_surface_share", &o.trust.min_surface_share,
-      "Share of the sparse points visible to the scanner that must be on the surface; "
-      "larger = stricter.");
-  command->AddDouble(
-      "Trust.max_changed_share", &o.trust.max_changed_share,
-      "Share of the sparse points that may float in space the scanner saw to be empty while as "
-      "many "
-      "lie behind its surface: another room, or things moved; larger = more tolerant.");
-  command->AddDouble(
-      "Trust.min_camera_share", &o.trust.min_camera_share,
-      "Share of the photos that must not lie behind the surface; larger = stricter.");
-  command->AddDouble(
-      "Trust.max_position_sigma", &o.trust.max_position_sigma,
-      "Metres; how uncertain the picks may leave the camera's position; larger = more "
-      "tolerant.");
+  command->Add(FieldsOf(&o.picks));
+  command->Add(FieldsOf(&o.scale));
+  command->Add(FieldsOf(&o.trust));
+  command->Add(FieldsOf(&o.surface));
+  command->Add(FieldsOf(&o.fit));
+  command->Add(FieldsOf(&o.mesh));
 }
 
 void CheckArguments(const Arguments& a) {
@@ -126,8 +93,8 @@ void CheckArguments(const Arguments& a) {
         "lines");
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
-  for (const std::string& problem : a.alignment.Problems()) problems.push_back(problem);
-  for (const std::string& problem : a.planes.Problems()) problems.push_back(problem);
+  AppendProblems(a.alignment.Problems(), &problems);
+  AppendProblems(a.planes.Problems(), &problems);
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {
     problems.push_back("--overlays needs the photos: give --image_path");

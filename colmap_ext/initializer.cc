@@ -7,6 +7,7 @@
 
 #include "colmap_ext/seed_model.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 #include "core/parallel.h"
 
 namespace roomtex {
@@ -43,26 +44,59 @@ struct SolvedPair {
 
 }  // namespace
 
-std::vector<std::string> InitOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&](bool fine, const char* problem) {
-    if (!fine) problems.push_back(problem);
-  };
-  require(min_num_inliers >= 8, "--Init.min_num_inliers must be at least 8");
-  require(keypoint_noise_px > 0, "--Init.keypoint_noise_px must be positive");
-  require(max_error_px >= 0, "--Init.max_error_px must be 0 (automatic) or positive");
-  require(min_tri_angle_deg > 0 && min_tri_angle_deg < 90,
-          "--Init.min_tri_angle_deg must lie between 0 and 90");
-  require(degenerate_ratio > 0 && degenerate_ratio <= 1,
-          "--Init.degenerate_ratio must lie between 0 and 1");
-  require(min_confidence >= 1, "--Init.min_confidence must be at least 1");
-  require(max_third_views >= 0, "--Init.max_third_views must not be negative");
-  require(max_candidates >= 1, "--Init.max_candidates must be at least 1");
-  require(max_pairs >= 1, "--Init.max_pairs must be at least 1");
-  require(image_name1.empty() || image_name1 != image_name2,
-          "--Init.image_name1 and --Init.image_name2 must be two different images");
-  return problems;
+void InitOptions::Declare(OptionFields* fields) {
+  fields
+      ->Int("Init.min_num_inliers", &min_num_inliers,
+            "Verified matches a pair must have, and points it must keep; larger = stricter.")
+      .AtLeast(8);
+  fields
+      ->Number("Init.keypoint_noise_px", &keypoint_noise_px,
+               "Standard deviation of a keypoint's coordinates in pixels; larger = more tolerant.")
+      .Positive();
+  fields
+      ->Number(
+          "Init.max_error_px", &max_error_px,
+          "Largest reprojection error of an inlier in pixels; larger = more tolerant. 0 = 3.03 "
+          "times --Init.keypoint_noise_px, which one true match in a hundred exceeds.")
+      .NotNegative()
+      .Says("must be 0 (automatic) or positive");
+  fields
+      ->Number("Init.min_tri_angle_deg", &min_tri_angle_deg,
+               "Smallest median angle between a pair's rays in degrees; larger = stricter.")
+      .Between(0, 90);
+  fields
+      ->Number("Init.degenerate_ratio", &degenerate_ratio,
+               "Share of the inliers of F on one homography above which the structure is reported "
+               "as degenerate. Changes the report only: a third view decides.")
+      .Above(0)
+      .AtMost(1);
+  fields
+      ->Number("Init.min_confidence", &min_confidence,
+               "How many times better than its rival a solution of the pair must explain the third "
+               "views to be believed; larger = stricter.")
+      .AtLeast(1);
+  fields
+      ->Int("Init.max_third_views", &max_third_views,
+            "Further photos that check a pair and start the model with it; 0 = none.")
+      .NotNegative();
+  fields
+      ->Int("Init.max_candidates", &max_candidates,
+            "Pairs that are solved in search of one that third photos confirm, before the "
+            "most confident of the others is taken; larger = slower.")
+      .AtLeast(1);
+  fields
+      ->Int("Init.max_pairs", &max_pairs,
+            "Pairs handed to COLMAP, one after the other, while fewer than half of the photos "
+            "register.")
+      .AtLeast(1);
+  fields->Text("Init.image_name1", &image_name1,
+               "Photo to start from, as named in the database; empty = chosen.");
+  fields->Text("Init.image_name2", &image_name2, "The photo to pair it with; empty = chosen.");
+  fields->Require(image_name1.empty() || image_name1 != image_name2,
+                  "--Init.image_name1 and --Init.image_name2 must be two different images");
 }
+
+std::vector<std::string> InitOptions::Problems() const { return ProblemsOf(*this); }
 
 struct Initializer::Impl {
   MatchedImages* images;

@@ -15,6 +15,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct InitOptions {
   // Verified matches a pair must have, and inliers it must keep; larger = stricter.
   int min_num_inliers = 30;
@@ -41,6 +43,7 @@ struct InitOptions {
   // chosen.
   std::string image_name1, image_name2;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -14,6 +14,7 @@
 #include "colmap_ext/view_chaining.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -27,26 +28,6 @@ struct Options {
   MapperOptions mapper;
   ChainOptions chain;
 };
-
-void AddChainOptions(ChainOptions* chain, Command* command) {
-  command->AddBool("Chain.enabled", &chain->enabled,
-                   "Register photos that COLMAP's mapper leaves out by their motion relative to a "
-                   "registered neighbour; 0 leaves them out.");
-  command->AddInt(
-      "Chain.min_num_inliers", &chain->min_num_inliers,
-      "Matches with the neighbour that must obey that motion, and points that the photo "
-      "must hold; larger = stricter.");
-  command->AddInt("Chain.min_common_points", &chain->min_common_points,
-                  "Points of the model that give the scale; larger = stricter.");
-  command->AddDouble("Chain.max_scale_spread", &chain->max_scale_spread,
-                     "Largest relative spread of the scale over these points; larger = more "
-                     "tolerant.");
-  command->AddDouble("Chain.min_confidence", &chain->min_confidence,
-                     "How many times better than its rival a pose must explain these points to be "
-                     "believed; larger = stricter.");
-  command->AddInt("Chain.max_neighbors", &chain->max_neighbors,
-                  "Registered neighbours that are tried per photo; larger = slower.");
-}
 
 void AddOptions(Options* options, Command* command) {
   using Kind = Command::Kind;
@@ -63,40 +44,8 @@ void AddOptions(Options* options, Command* command) {
                      Kind::kOptional);
   command->AddBool("refine_intrinsics", &options->mapper.refine_intrinsics,
                    "Refine focal length and distortion; 0 keeps the calibrated camera as it is.");
-  InitOptions& init = options->init;
-  command->AddInt("Init.min_num_inliers", &init.min_num_inliers,
-                  "Verified matches a pair must have, and points it must keep; larger = stricter.");
-  command->AddDouble(
-      "Init.keypoint_noise_px", &init.keypoint_noise_px,
-      "Standard deviation of a keypoint's coordinates in pixels; larger = more tolerant.");
-  command->AddDouble(
-      "Init.max_error_px", &init.max_error_px,
-      "Largest reprojection error of an inlier in pixels; larger = more tolerant. 0 = 3.03 "
-      "times --Init.keypoint_noise_px, which one true match in a hundred exceeds.");
-  command->AddDouble("Init.min_tri_angle_deg", &init.min_tri_angle_deg,
-                     "Smallest median angle between a pair's rays in degrees; larger = stricter.");
-  command->AddDouble(
-      "Init.degenerate_ratio", &init.degenerate_ratio,
-      "Share of the inliers of F on one homography above which the structure is reported "
-      "as degenerate. Changes the report only: a third view decides.");
-  command->AddDouble(
-      "Init.min_confidence", &init.min_confidence,
-      "How many times better than its rival a solution of the pair must explain the third "
-      "views to be believed; larger = stricter.");
-  command->AddInt("Init.max_third_views", &init.max_third_views,
-                  "Further photos that check a pair and start the model with it; 0 = none.");
-  command->AddInt("Init.max_candidates", &init.max_candidates,
-                  "Pairs that are solved in search of one that third photos confirm, before the "
-                  "most confident of the others is taken; larger = slower.");
-  command->AddInt(
-      "Init.max_pairs", &init.max_pairs,
-      "Pairs handed to COLMAP, one after the other, while fewer than half of the photos "
-      "register.");
-  command->AddString("Init.image_name1", &init.image_name1,
-                     "Photo to start from, as named in the database; empty = chosen.");
-  command->AddString("Init.image_name2", &init.image_name2,
-                     "The photo to pair it with; empty = chosen.");
-  AddChainOptions(&options->chain, command);
+  command->Add(FieldsOf(&options->init));
+  command->Add(FieldsOf(&options->chain));
   command->PassThrough(
       "--Mapper.", &options->mapper.mapper_arguments,
       "Handed on to colmap mapper (see colmap mapper -h). --Mapper.init_* have no effect: "
@@ -455,7 +404,7 @@ std::vector<Outcome> TrySeeds(const Database& database, MatchedImages* images, M
 
 void MapPhotos(const Options& options, const Command::Context& context) {
   std::vector<std::string> problems = options.init.Problems();
-  for (const std::string& problem : options.chain.Problems()) problems.push_back(problem);
+  AppendProblems(options.chain.Problems(), &problems);
   ThrowIfProblems(problems);
   RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
   context.progress.Stage("read database");

@@ -8,6 +8,7 @@
 
 #include "colmap_ext/two_view_geometry.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 #include "core/parallel.h"
 
 namespace roomtex {
@@ -136,18 +137,36 @@ bool SurerThan(const ChainedView& a, const ChainedView& b) {
 
 }  // namespace
 
-std::vector<std::string> ChainOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&](bool fine, const char* problem) {
-    if (!fine) problems.push_back(problem);
-  };
-  require(min_num_inliers >= 8, "--Chain.min_num_inliers must be at least 8");
-  require(min_common_points >= 3, "--Chain.min_common_points must be at least 3");
-  require(max_scale_spread > 0, "--Chain.max_scale_spread must be positive");
-  require(min_confidence >= 1, "--Chain.min_confidence must be at least 1");
-  require(max_neighbors >= 1, "--Chain.max_neighbors must be at least 1");
-  return problems;
+void ChainOptions::Declare(OptionFields* fields) {
+  fields->Bool("Chain.enabled", &enabled,
+               "Register photos that COLMAP's mapper leaves out by their motion relative to a "
+               "registered neighbour; 0 leaves them out.");
+  fields
+      ->Int("Chain.min_num_inliers", &min_num_inliers,
+            "Matches with the neighbour that must obey that motion, and points that the photo "
+            "must hold; larger = stricter.")
+      .AtLeast(8);
+  fields
+      ->Int("Chain.min_common_points", &min_common_points,
+            "Points of the model that give the scale; larger = stricter.")
+      .AtLeast(3);
+  fields
+      ->Number("Chain.max_scale_spread", &max_scale_spread,
+               "Largest relative spread of the scale over these points; larger = more "
+               "tolerant.")
+      .Positive();
+  fields
+      ->Number("Chain.min_confidence", &min_confidence,
+               "How many times better than its rival a pose must explain these points to be "
+               "believed; larger = stricter.")
+      .AtLeast(1);
+  fields
+      ->Int("Chain.max_neighbors", &max_neighbors,
+            "Registered neighbours that are tried per photo; larger = slower.")
+      .AtLeast(1);
 }
+
+std::vector<std::string> ChainOptions::Problems() const { return ProblemsOf(*this); }
 
 RatioAverage AverageRatios(const std::vector<double>& ratios) {
   RatioAverage average;

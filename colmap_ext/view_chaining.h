@@ -16,6 +16,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ChainOptions {
   bool enabled = true;
   // Matches that must obey the motion to the neighbour, and points the view must hold in the end;
@@ -31,6 +33,7 @@ struct ChainOptions {
   double min_confidence = 1.3;
   int max_neighbors = 4;  // per view, those with most matches; larger = slower
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

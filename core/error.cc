@@ -25,6 +25,10 @@ void ThrowIfProblems(const std::vector<std::string>& problems) {
   throw UsageError(text);
 }
 
+void AppendProblems(const std::vector<std::string>& more, std::vector<std::string>* problems) {
+  problems->insert(problems->end(), more.begin(), more.end());
+}
+
 std::string LinePosition(long line) { return "line " + std::to_string(line); }
 std::string BytePosition(long long byte) { return "byte " + std::to_string(byte); }
 

@@ -35,6 +35,8 @@ class UsageError : public std::runtime_error {
 
 // Throws a UsageError that lists every problem, one a line. Does nothing without problems.
 void ThrowIfProblems(const std::vector<std::string>& problems);
+// Adds `more` behind `problems`.
+void AppendProblems(const std::vector<std::string>& more, std::vector<std::string>* problems);
 
 std::string LinePosition(long line);
 std::string BytePosition(long long byte);

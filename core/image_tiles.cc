@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -63,18 +64,20 @@ struct ImageTiles::Decodes {
   }
 };
 
-std::vector<std::string> ImageTilesOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (tile_size < 16 || tile_size > 4096) {
-    problems.push_back("tile_size must be between 16 and 4096 pixels");
-  }
-  if (jpeg_quality < 1 || jpeg_quality > 100) {
-    problems.push_back("jpeg_quality must be between 1 and 100");
-  }
-  if (max_megabytes < 1) problems.push_back("max_megabytes must be positive");
-  if (max_decodes < 1) problems.push_back("max_decodes must be positive");
-  return problems;
+void ImageTilesOptions::Declare(OptionFields* fields) {
+  fields->Int("tile_size", &tile_size, "Pixels, both ways.")
+      .Within(16, 4096)
+      .Says("must be between 16 and 4096 pixels")
+      .Internal();
+  fields->Int("jpeg_quality", &jpeg_quality, "Larger = finer.")
+      .Within(1, 100)
+      .Says("must be between 1 and 100")
+      .Internal();
+  fields->Int("max_megabytes", &max_megabytes, "Of levels and tiles kept.").Positive().Internal();
+  fields->Int("max_decodes", &max_decodes, "Pictures decoded side by side.").Positive().Internal();
 }
+
+std::vector<std::string> ImageTilesOptions::Problems() const { return ProblemsOf(*this); }
 
 int TilePyramid::LevelWidth(int level) const { return LevelSize(width, level); }
 int TilePyramid::LevelHeight(int level) const { return LevelSize(height, level); }

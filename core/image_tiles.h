@@ -15,12 +15,15 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ImageTilesOptions {
   int tile_size = 512;      // pixels, both ways
   int jpeg_quality = 90;    // 1..100, larger = finer
   int max_megabytes = 512;  // of decoded levels and tiles kept; a 20 MP photo with its levels: 80
   int max_decodes = 2;      // pictures decoded side by side, which come on top of max_megabytes
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

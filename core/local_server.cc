@@ -24,11 +24,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "core/command_line.h"
 #include "core/error.h"
 #include "core/local_server_address.h"
 #include "core/local_server_connection.h"
 #include "core/local_server_http.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -526,6 +526,35 @@ std::string LocalServer::SshLine() const {
          (user != nullptr ? std::string(user->pw_name) + "@" : "") + HostName();
 }
 
+void LocalServerOptions::Declare(OptionFields* fields) {
+  fields->Text("host", &host,
+               "Address to serve on; one that other computers reach needs --allow_remote 1.");
+  fields->Int("port", &port, "Port to serve on; 0 = any free one.")
+      .Within(0, 65535)
+      .Says("must be between 0 (any free one) and 65535");
+  fields->Bool("allow_remote", &allow_remote,
+               "Let other computers in that know the address with its token. Nothing is "
+               "encrypted: prefer ssh -L.");
+  fields->Bool("open", &open, "Open the page in the browser.");
+
+  fields->Int("max_body_bytes", &max_body_bytes, "Largest request.").Positive().Internal();
+  fields->Int("max_header_bytes", &max_header_bytes, "Largest header.").Positive().Internal();
+  fields->Int("num_threads", &num_threads, "Requests answered side by side.").Positive().Internal();
+  const std::string seconds = "request_seconds, idle_seconds and stall_seconds must be positive";
+  fields->Number("request_seconds", &request_seconds, "For a request to arrive.")
+      .Positive()
+      .SaysSentence(seconds)
+      .Internal();
+  fields->Number("idle_seconds", &idle_seconds, "For a connection without a request.")
+      .Positive()
+      .SaysSentence(seconds)
+      .Internal();
+  fields->Number("stall_seconds", &stall_seconds, "For an answer of which nothing is taken.")
+      .Positive()
+      .SaysSentence(seconds)
+      .Internal();
+}
+
 std::vector<std::string> LocalServerOptions::Problems() const {
   std::vector<std::string> problems;
   const std::optional<LocalAddress> address = ResolveHost(host);
@@ -537,26 +566,8 @@ std::vector<std::string> LocalServerOptions::Problems() const {
                        " lets other computers in; say --allow_remote 1 if that is meant, or keep " +
                        LocalServerOptions().host + " and use ssh -L");
   }
-  const auto require = [&](bool holds, const char* text) {
-    if (!holds) problems.push_back(text);
-  };
-  require(port >= 0 && port <= 65535, "--port must be between 0 (any free one) and 65535");
-  require(max_body_bytes > 0, "max_body_bytes must be positive");
-  require(max_header_bytes > 0, "max_header_bytes must be positive");
-  require(num_threads > 0, "num_threads must be positive");
-  require(request_seconds > 0 && idle_seconds > 0 && stall_seconds > 0,
-          "request_seconds, idle_seconds and stall_seconds must be positive");
+  AppendProblems(ProblemsOf(*this), &problems);
   return problems;
-}
-
-void AddLocalServerOptions(LocalServerOptions* options, Command* command) {
-  command->AddString("host", &options->host,
-                     "Address to serve on; one that other computers reach needs --allow_remote 1.");
-  command->AddInt("port", &options->port, "Port to serve on; 0 = any free one.");
-  command->AddBool("allow_remote", &options->allow_remote,
-                   "Let other computers in that know the address with its token. Nothing is "
-                   "encrypted: prefer ssh -L.");
-  command->AddBool("open", &options->open, "Open the page in the browser.");
 }
 
 void LetPortDiffer(int argc, char** argv, LocalServerOptions* options) {

@@ -23,7 +23,7 @@
 
 namespace roomtex {
 
-class Command;
+class OptionFields;
 
 struct LocalServerOptions {
   std::string host = "127.0.0.1";  // address to bind
@@ -41,12 +41,11 @@ struct LocalServerOptions {
   double idle_seconds = 10;         // a connection without a request is closed
   double stall_seconds = 30;        // an answer of which nothing is taken is given up
 
+  void Declare(OptionFields* fields);
   // Also finds out whether the host is of this machine and whether others reach it.
   std::vector<std::string> Problems() const;
 };
 
-// Adds --host, --port, --allow_remote and --open.
-void AddLocalServerOptions(LocalServerOptions* options, Command* command);
 // Two commands with pages stand side by side: a port that the user did not ask for, neither on the
 // command line nor in a file, gives way when it is taken.
 void LetPortDiffer(int argc, char** argv, LocalServerOptions* options);

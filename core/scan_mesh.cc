@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/frames.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -143,12 +144,21 @@ Triangle FacingStation(const Scan& scan, Triangle triangle) {
 
 }  // namespace
 
-std::vector<std::string> ScanMeshOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(max_edge_ratio > 1)) problems.push_back("--Mesh.max_edge_ratio must be greater than 1");
-  if (!(max_bend >= 0)) problems.push_back("--Mesh.max_bend must not be negative");
-  return problems;
+void ScanMeshOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Mesh.max_edge_ratio", &max_edge_ratio,
+               "Neighbouring samples are connected if they are at most this many times as far "
+               "apart as on a surface that faces the scanner. Larger = connects over larger "
+               "depth steps.")
+      .Above(1);
+  fields
+      ->Number("Mesh.max_bend", &max_bend,
+               "An edge on a slanted surface is kept if the step in inverse range beside it "
+               "differs by at most this share. Larger = more tolerant.")
+      .NotNegative();
 }
+
+std::vector<std::string> ScanMeshOptions::Problems() const { return ProblemsOf(*this); }
 
 std::vector<Triangle> BuildScanMesh(const Scan& scan, const ScanMeshOptions& options) {
   if (!scan.organised) return scan.triangles;

@@ -11,6 +11,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ScanMeshOptions {
   // An edge between neighbouring samples is dropped when it is longer than this many times the
   // distance that the same two rays span on a surface facing the scanner. 1 = only facing surfaces;
@@ -21,6 +23,7 @@ struct ScanMeshOptions {
   // tolerant.
   double max_bend = 0.5;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

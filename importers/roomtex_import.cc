@@ -5,6 +5,7 @@
 
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
 #include "importers/length_unit.h"
@@ -51,8 +52,8 @@ void CheckOutputs(const ImportOptions& options) {
       }
     }
   }
-  for (const std::string& problem : options.reader.Problems()) problems.push_back(problem);
-  for (const std::string& problem : options.mesh.Problems()) problems.push_back(problem);
+  AppendProblems(options.reader.Problems(), &problems);
+  AppendProblems(options.mesh.Problems(), &problems);
   ThrowIfProblems(problems);
   // An output that cannot be written is better known before a large scan was read.
   for (const std::string& path : options.output_paths) OutputFile probe(path);
@@ -213,14 +214,8 @@ int main(int argc, char** argv) {
   command.AddOutputPaths("output_path", &options.output_paths,
                          "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
                          "image, .rtpi (RTPI 3.0) or .ptx.");
-  AddScanReaderOptions(&options.reader, &command);
-  command.AddDouble("Mesh.max_edge_ratio", &options.mesh.max_edge_ratio,
-                    "Neighbouring samples are connected if they are at most this many times as far "
-                    "apart as on a surface that faces the scanner. Larger = connects over larger "
-                    "depth steps.");
-  command.AddDouble("Mesh.max_bend", &options.mesh.max_bend,
-                    "An edge on a slanted surface is kept if the step in inverse range beside it "
-                    "differs by at most this share. Larger = more tolerant.");
+  command.Add(FieldsOf(&options.reader));
+  command.Add(FieldsOf(&options.mesh));
   return command.Run(argc, argv, [&options](const Command::Context& context) {
     roomtex::Importer(options, context).Run();
   });

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 #include "importers/file_reader.h"
 #include "importers/length_unit.h"
 #include "importers/obj.h"
@@ -104,33 +105,26 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
 
 }  // namespace
 
-std::vector<std::string> ScanReaderOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (azimuth != "clockwise" && azimuth != "counterclockwise") {
-    problems.push_back("--azimuth must be clockwise or counterclockwise, is " + azimuth);
-  }
-  if (!units.empty() && !MetersPerUnit(units)) {
-    problems.push_back("--units must be meters, millimeters, centimeters, feet or inches, is " +
-                       units);
-  }
-  if (!(max_range >= 0) || !std::isfinite(max_range)) {
-    problems.push_back("--max_range must be 0 (no limit) or a number of metres");
-  }
-  return problems;
+void ScanReaderOptions::Declare(OptionFields* fields) {
+  fields->Choice("azimuth", &azimuth, {"clockwise", "counterclockwise"},
+                 "RTPI: sense in which the azimuth grows, seen from above. clockwise is the "
+                 "thesis' formula; files of real scanners are counterclockwise. The wrong one "
+                 "mirrors the room.");
+  fields
+      ->Choice("units", &units, LengthUnitNames(),
+               "Unit of the lengths in the scan file; not given = what the file says, metres "
+               "if it does not.")
+      .Also(units.empty() || MetersPerUnit(units));
+  fields
+      ->Number("max_range", &max_range,
+               "Metres; samples farther from the scanner count as missing. 0 = the limit "
+               "that the file gives, if any.")
+      .NotNegative()
+      .Finite()
+      .Says("must be 0 (no limit) or a number of metres");
 }
 
-void AddScanReaderOptions(ScanReaderOptions* options, Command* command) {
-  command->AddChoice("azimuth", &options->azimuth, {"clockwise", "counterclockwise"},
-                     "RTPI: sense in which the azimuth grows, seen from above. clockwise is the "
-                     "thesis' formula; files of real scanners are counterclockwise. The wrong one "
-                     "mirrors the room.");
-  command->AddChoice("units", &options->units, LengthUnitNames(),
-                     "Unit of the lengths in the scan file; not given = what the file says, metres "
-                     "if it does not.");
-  command->AddDouble("max_range", &options->max_range,
-                     "Metres; samples farther from the scanner count as missing. 0 = the limit "
-                     "that the file gives, if any.");
-}
+std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf(*this); }
 
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
   ThrowIfProblems(options.Problems());

@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "core/command_line.h"
 #include "core/scan.h"
 #include "importers/geo_frame.h"
 
 namespace roomtex {
+
+class OptionFields;
 
 struct ScanReaderOptions {
   // RTPI: sense of the azimuth seen from above. "clockwise" is the thesis' formula (5.1.1), files
@@ -21,11 +22,9 @@ struct ScanReaderOptions {
   // Metres; samples farther away count as missing. 0 = the limit that the file gives, if any.
   double max_range = 0;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
-
-// Registers --azimuth, --units and --max_range.
-void AddScanReaderOptions(ScanReaderOptions* options, Command* command);
 
 // All scans of one file (a PTX may hold several), and what the file is.
 struct ScanFile {

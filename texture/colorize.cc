@@ -5,6 +5,8 @@
 #include <limits>
 
 #include "core/cpu_stages.h"
+#include "core/error.h"
+#include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/photo.h"
 #include "texture/debug_images.h"
@@ -44,8 +46,32 @@ PhotoPassInput MakeInput(const std::vector<Scan>& scans, std::vector<ScanSurface
 
 }  // namespace
 
-void AppendProblems(const std::vector<std::string>& more, std::vector<std::string>* problems) {
-  problems->insert(problems->end(), more.begin(), more.end());
+void ColorizeOptions::Declare(OptionFields* fields) {
+  fields->Choice("Texture.unseen", &unseen, {"intensity", "black"},
+                 "Colour of samples that no photo sees: their scan intensity as grey, or black.");
+  fields
+      ->Int("Texture.scale", &texture_scale,
+            "Texels per sample and direction of texture.png and model.glb, 1 to " +
+                std::to_string(kMaxTextureScale) +
+                "; above 1 the surface between the samples is coloured, too. auto (or 0): as fine "
+                "as the "
+                "photos, pixels per sample rounded up, but at most " +
+                std::to_string(kMaxAutoScale) + ", " +
+                std::to_string(static_cast<int>(kMaxAutoTexels / 1e6)) +
+                " million texels, and what --Texture.max_memory_mb lets do in " +
+                std::to_string(kMaxAutoBands) +
+                " passes over the photos. Larger = sharper; time and memory grow with its square. "
+                "model.ply does not depend on it.")
+      .ZeroIs("auto")
+      .Within(0, kMaxTextureScale)
+      .Says("must be 1 to " + std::to_string(kMaxTextureScale) + ", or 0 (auto)");
+  fields
+      ->Number("Texture.max_memory_mb", &texture_memory_mb,
+               "Working memory for texture images with a scale above 1, megabytes, beside "
+               "the scan and 7 bytes a texel. Less = more passes over the photos, same "
+               "result.")
+      .Within(64, 1e6)
+      .Says("must be 64 to 1e6 megabytes");
 }
 
 std::vector<std::string> ColorizeOptions::Problems() const {
@@ -56,16 +82,8 @@ std::vector<std::string> ColorizeOptions::Problems() const {
   AppendProblems(exposure.Problems(), &problems);
   AppendProblems(blend.Problems(), &problems);
   AppendProblems(detail.Problems(), &problems);
-  if (unseen != "intensity" && unseen != "black") {
-    problems.push_back("--Texture.unseen must be intensity or black");
-  }
-  if (texture_scale < 0 || texture_scale > kMaxTextureScale) {
-    problems.push_back("--Texture.scale must be 1 to " + std::to_string(kMaxTextureScale) +
-                       ", or 0 (auto)");
-  }
-  if (!(texture_memory_mb >= 64) || !(texture_memory_mb <= 1e6)) {
-    problems.push_back("--Texture.max_memory_mb must be 64 to 1e6 megabytes");
-  }
+  AppendProblems(ProblemsOf(*this), &problems);
+  AppendProblems(atlas.Problems(), &problems);
   return problems;
 }
 

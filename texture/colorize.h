@@ -20,6 +20,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ColorizeOptions {
   ScanMeshOptions mesh;
   ScanSurfaceOptions surface;
@@ -38,6 +40,7 @@ struct ColorizeOptions {
   AtlasOptions atlas;      // of meshes without a grid
   std::string debug_path;  // folder for debug_images.h; "" = none
 
+  void Declare(OptionFields* fields);  // its own, not those of the structs in it
   std::vector<std::string> Problems() const;
 };
 
@@ -57,8 +60,5 @@ struct ColorizeResult {
 // num_threads. Throws InputError for a photo that cannot be read.
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress);
-
-// Adds `more` behind `problems`.
-void AppendProblems(const std::vector<std::string>& more, std::vector<std::string>* problems);
 
 }  // namespace roomtex

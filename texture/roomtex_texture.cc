@@ -7,7 +7,7 @@
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
 #include "core/error.h"
-#include "core/option_list.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
@@ -31,12 +31,10 @@ struct TextureOptions {
   PhotoSources sources;
   ScanReaderOptions scan_reader;
   ColorizeOptions colorize;
-  std::string texture_scale = "auto";  // or a whole number
   GlbOptions glb;
   std::string image_format = "png";
   bool output_obj = false;
   bool output_evidence = true;
-  double texel_mm = 0;
 };
 
 void AddPathOptions(TextureOptions* o, Command* command) {
@@ -60,34 +58,14 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "registered patterned photo.",
       Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
-  AddScanReaderOptions(&o->scan_reader, command);
+  command->Add(FieldsOf(&o->scan_reader));
 }
 
 void AddTextureOptions(TextureOptions* o, Command* command) {
-  command->AddString(
-      "Texture.scale", &o->texture_scale,
-      "Texels per sample and direction of texture.png and model.glb, 1 to " +
-          std::to_string(kMaxTextureScale) +
-          "; above 1 the surface between the samples is coloured, too. auto (or 0): as fine as the "
-          "photos, pixels per sample rounded up, but at most " +
-          std::to_string(kMaxAutoScale) + ", " +
-          std::to_string(static_cast<int>(kMaxAutoTexels / 1e6)) +
-          " million texels, and what --Texture.max_memory_mb lets do in " +
-          std::to_string(kMaxAutoBands) +
-          " passes over the photos. Larger = sharper; time and memory grow with its square. "
-          "model.ply does not depend on it.");
-  command->AddChoice(
-      "Texture.atlas", &o->colorize.atlas.mode, {"auto", "1", "0"},
-      "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
-      "colours. auto: unless --Texture.scale is 1, where the photos show more than the "
-      "vertices can hold (eight texels from one to the next).");
-  command->AddDouble("Texture.texel_mm", &o->texel_mm,
-                     "Millimetres a texel of that atlas; 0 = what a photo's pixel covers on the "
-                     "surface (median), within the bounds of --Texture.scale auto.");
-  command->AddDouble("Texture.max_memory_mb", &o->colorize.texture_memory_mb,
-                     "Working memory for texture images with a scale above 1, megabytes, beside "
-                     "the scan and 7 bytes a texel. Less = more passes over the photos, same "
-                     "result.");
+  const OptionFields colorize = FieldsOf(&o->colorize);
+  command->Add(colorize.Only({"Texture.scale"}));
+  command->Add(FieldsOf(&o->colorize.atlas));
+  command->Add(colorize.Only({"Texture.max_memory_mb"}));
 }
 
 void AddWriteOptions(TextureOptions* o, Command* command) {
@@ -109,76 +87,17 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
       "Texture images of model.glb and model.obj. png keeps every texel and draws no "
       "rings around print; jpeg (quality 95) takes a fourth of its room. The mesh "
       "mostly weighs more than either.");
-  command->AddInt("Texture.max_size", &o->glb.max_texture_size,
-                  "Longest side of one texture image of model.glb and model.obj, 256 to 16384; a "
-                  "larger texture "
-                  "is tiled. Larger = fewer images; not every viewer loads more than 4096.");
-}
-
-// Throws UsageError.
-int TextureScale(const std::string& text) {
-  if (text == "auto") return 0;
-  return ParseInt("Texture.scale", text);
+  command->Add(FieldsOf(&o->glb));
 }
 
 void AddColorOptions(ColorizeOptions* o, Command* command) {
-  command->AddChoice(
-      "Texture.unseen", &o->unseen, {"intensity", "black"},
-      "Colour of samples that no photo sees: their scan intensity as grey, or black.");
-  command->AddChoice("Exposure.mode", &o->exposure.mode, {"exif", "match", "none"},
-                     "exif: shutter time, aperture and ISO; match: from what several photos see, "
-                     "with EXIF as a prior; none: photos as they are.");
-  command->AddBool("Exposure.white_balance", &o->exposure.white_balance,
-                   "Match red, green and blue one by one (white balance that changed); with "
-                   "--Exposure.mode match.");
-  command->AddBool("Exposure.vignetting", &o->exposure.vignetting,
-                   "Find and undo the darkening towards the photos' corners.");
-  command->AddString("Exposure.response", &o->exposure.response,
-                     "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
-                     "exposures that differ by an EV); or a file with a line per level 0-255: its "
-                     "linear light, one number or three (red green blue).");
-  command->AddInputPath("Exposure.bracket_path", &o->exposure.bracket_path,
-                        "Folder with photos of one still scene, exposed differently (EXIF): the "
-                        "response is found from them.",
-                        Command::Kind::kOptional);
-  command->AddDouble("Occlusion.depth_tolerance", &o->occlusion.depth_tolerance,
-                     "Share of its depth by which a surface in front hides a sample; -1 = by the "
-                     "range noise of the scan. Larger = more tolerant.");
-  command->AddDouble("Occlusion.boundary_px", &o->occlusion.boundary_px,
-                     "Width of the untrusted band beside depth boundaries, photo pixels; -1 = 2. "
-                     "Poses that are off by more need more.");
-  command->AddDouble("Occlusion.boundary_jump", &o->occlusion.boundary_jump,
-                     "Share of the depth that makes a jump a depth boundary. Larger = fewer.");
-  command->AddBool("Occlusion.shadows", &o->occlusion.shadows,
-                   "Distrust lines of sight through space that the scanner could not see.");
-  command->AddInt("Occlusion.depth_map_size", &o->occlusion.depth_map_size,
-                  "Least length of a depth map's longer side, pixels.");
-  command->AddInt("Blend.max_views", &o->blend.max_views,
-                  "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "
-                  "each.");
-  command->AddBool("Blend.angle_weight", &o->blend.angle_weight,
-                   "Less weight for photos that see a sample at a slant.");
-  command->AddBool("Blend.resolution_weight", &o->blend.resolution_weight,
-                   "More weight for photos with more pixels per sample.");
-  command->AddDouble("Blend.outlier", &o->blend.outlier,
-                     "Colour difference (0..1) from the other photos at which half the weight is "
-                     "lost; 0 = never.");
-  command->AddDouble("Blend.footprint", &o->blend.footprint,
-                     "Share of the sample spacing over which photo pixels are averaged. Larger = "
-                     "smoother; 0 = the colour at the sample.");
-  command->AddBool("Blend.detail", &o->blend.detail,
-                   "Put back the detail that blending loses, from the dominant photo (thesis).");
-  command->AddDouble("Blend.detail_sigma", &o->detail.sigma,
-                     "What counts as detail: Gaussian sigma in samples. Larger = coarser.");
-  command->AddInt("Blend.detail_border", &o->detail.border,
-                  "Samples beside a change of the dominant photo that get no detail.");
-  command->AddBool("Surface.reduce_range_noise", &o->surface.reduce_range_noise,
-                   "Look colours up at the sample's place on the smoothed surface.");
-  command->AddInt("Surface.smoothing_radius", &o->surface.smoothing_radius,
-                  "Samples on either side used for smoothing.");
-  command->AddDouble("Mesh.max_edge_ratio", &o->mesh.max_edge_ratio,
-                     "An edge longer than this many times what it spans on a facing surface is a "
-                     "depth jump. Larger = more tolerant.");
+  command->Add(FieldsOf(o).Only({"Texture.unseen"}));
+  command->Add(FieldsOf(&o->exposure));
+  command->Add(FieldsOf(&o->occlusion));
+  command->Add(FieldsOf(&o->blend));
+  command->Add(FieldsOf(&o->detail));
+  command->Add(FieldsOf(&o->surface));
+  command->Add(FieldsOf(&o->mesh));
 }
 
 void CheckScans(const std::vector<Scan>& scans) {
@@ -386,9 +305,7 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
 
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
-  colorize.texture_scale = TextureScale(options.texture_scale);
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
-  colorize.atlas.texel_size = options.texel_mm / 1000;
   colorize.atlas.max_page_size = options.glb.max_texture_size;
   std::vector<std::string> problems = options.scan_reader.Problems();
   AppendProblems(colorize.Problems(), &problems);
@@ -443,6 +360,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
 
 int main(int argc, char** argv) {
   roomtex::TextureOptions options;
+  options.colorize.texture_scale = 0;  // the command chooses it
   roomtex::Command command(
       "roomtex-texture", "Colours a range scan from registered photos (thesis chapter 8).",
       "roomtex-texture --input_path aligned --image_path images --scan_path room.rtpi "

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <sstream>
 
+#include "core/option_fields.h"
+
 namespace roomtex {
 namespace {
 
@@ -145,15 +147,36 @@ std::vector<int> LeaveOutBadPicks(const CameraProjection& projection, const Poin
 
 }  // namespace
 
-std::vector<std::string> PickReviewOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(max_chance > 0 && max_chance < 1)) {
-    problems.push_back("--Picks.max_chance must lie between 0 and 1");
-  }
-  if (!(min_bad_pick_px >= 0)) problems.push_back("--Picks.min_bad_pick_px must not be negative");
-  if (!(min_gain > 1)) problems.push_back("--Picks.min_gain must be greater than 1");
-  return problems;
+void PickReviewOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Picks.max_chance", &max_chance,
+               "A pick is left out when chance makes one as bad less often than this; larger = "
+               "leaves out more easily.")
+      .Between(0, 1);
+  fields
+      ->Number("Picks.min_bad_pick_px", &min_bad_pick_px,
+               "Pixels; a pick nearer than this to where the others put it is never left out.")
+      .NotNegative();
+  fields
+      ->Number(
+          "Picks.min_gain", &min_gain,
+          "A mirrored scan or two exchanged picks must fit this many times better to be named.")
+      .Above(1);
+  fields
+      ->Number("Picks.min_line_share", &min_line_share,
+               "Picks whose second extent in the scan is below this share of the first lie on a "
+               "line; larger = stricter.")
+      .AtLeast(0)
+      .Below(1);
+  fields
+      ->Number("Picks.min_photo_share", &min_photo_share,
+               "Picks whose second extent in the photo is below this share of its diagonal lie on "
+               "one spot or line; larger = stricter.")
+      .AtLeast(0)
+      .Below(1);
 }
+
+std::vector<std::string> PickReviewOptions::Problems() const { return ProblemsOf(*this); }
 
 std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
                               const PickReviewOptions& options) {

@@ -13,6 +13,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct PickReviewOptions {
   // A pick is left out as bad when residuals as large as its own would come by chance less often
   // than this, given the other picks (F test, corrected for the number of picks). Larger = leaves
@@ -28,6 +30,7 @@ struct PickReviewOptions {
   // The mirrored scan, or two exchanged picks, must fit this many times better (rms) to be named.
   double min_gain = 2.0;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/option_fields.h"
 #include "core/parallel.h"
 
 namespace roomtex {
@@ -127,14 +128,29 @@ constexpr int kFeaturesPerChunk = 64;
 
 }  // namespace
 
-std::vector<std::string> ScaleOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(edge_px >= 0)) problems.push_back("--Scale.edge_px must not be negative");
-  if (!(max_depth_step > 0)) problems.push_back("--Scale.max_depth_step must be positive");
-  if (max_features < 1) problems.push_back("max_features must be positive");
-  if (!(max_deviations > 0)) problems.push_back("--Scale.max_deviations must be positive");
-  return problems;
+void ScaleOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Scale.edge_px", &edge_px,
+               "Pixels; features nearer to a depth edge do not count for the scale (at least twice "
+               "the error of the picks is kept); larger = stricter.")
+      .NotNegative();
+  fields
+      ->Number("Scale.max_depth_step", &max_depth_step,
+               "A surface is smooth where its depth differs from the mean of those on both sides "
+               "by less than this share; larger = more tolerant.")
+      .Positive();
+  fields
+      ->Number("Scale.max_deviations", &max_deviations,
+               "Features whose scale is off the median by more than this many robust standard "
+               "deviations are left out; larger = more tolerant.")
+      .Positive();
+  fields
+      ->Int("Scale.max_features", &max_features,
+            "Of more features than this every k-th is looked at; larger = slower.")
+      .Positive();
 }
+
+std::vector<std::string> ScaleOptions::Problems() const { return ProblemsOf(*this); }
 
 ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
                             const Rigid& cam_from_scan, const std::vector<Scan>& scans,

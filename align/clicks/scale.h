@@ -10,6 +10,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ScaleOptions {
   // Pixels; a feature counts only if the scan continues smoothly this far around it: nearer to a
   // depth edge a slightly wrong pose takes the foreground for the background. Larger = stricter.
@@ -24,6 +26,7 @@ struct ScaleOptions {
   // they spread by 1e-3, far better than clicks fix the pose, and roomtex-pick asks at every click.
   int max_features = 2000;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

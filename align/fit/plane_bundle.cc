@@ -10,6 +10,7 @@
 #include "align/fit/bent_model.h"
 #include "align/fit/plane_bundle_round.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -332,20 +333,51 @@ std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& o
 
 }  // namespace
 
-std::vector<std::string> PlaneBundleOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&problems](bool holds, const std::string& sentence) {
-    if (!holds) problems.push_back(sentence);
-  };
-  require(beta >= 0 && std::isfinite(beta), "--PlaneBA.beta must not be negative");
-  require(max_distance > 0, "--PlaneBA.max_distance must be positive");
-  require(surface_noise > 0, "--PlaneBA.surface_noise must be positive");
-  require(min_bend >= 0, "--PlaneBA.min_bend must not be negative");
-  require(min_track >= 2, "--PlaneBA.min_track must be at least 2");
-  require(num_rounds >= 1 && num_rounds <= 100, "--PlaneBA.num_rounds must be 1 to 100");
-  require(max_iterations >= 1, "--PlaneBA.max_iterations must be positive");
-  return problems;
+void PlaneBundleOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("PlaneBA.beta", &beta,
+               "Pixels per metre; weight of a point's distance from its plane against its "
+               "reprojection errors, the thesis' beta; larger = nearer to the scan; 0 = from "
+               "the ratio of image noise and scan noise.")
+      .NotNegative()
+      .Finite();
+  fields
+      ->Number("PlaneBA.max_distance", &max_distance,
+               "Metres; a sparse point farther from a surface never belongs to it; larger = "
+               "more tolerant.")
+      .Positive();
+  fields->Bool("PlaneBA.surface", &surface,
+               "Points on no plane are held by flat patches of the scan; 0 = planes alone.");
+  fields
+      ->Number("PlaneBA.surface_noise", &surface_noise,
+               "Metres; what stays unknown of a surface however many samples show it; larger "
+               "= farther from the scan.")
+      .Positive();
+  fields
+      ->Int("PlaneBA.min_track", &min_track,
+            "Observations that a sparse point needs to be held on a surface.")
+      .AtLeast(2);
+  fields->Bool("PlaneBA.fix_clicked_view", &fix_clicked_view,
+               "The photo of the picks keeps the pose that they give, as in the thesis (and no "
+               "bend of the scan is looked for); 0 = its picks hold it as far as their noise "
+               "allows.");
+  fields->Bool("PlaneBA.refine_intrinsics", &refine_intrinsics,
+               "Refine the cameras, too, each with one set of parameters for its photos.");
+  fields->Bool("PlaneBA.bend", &bend,
+               "Look for a smooth bend of the scan (ranges, azimuths; one scan with a grid) and "
+               "fit the photos to the bent scan.");
+  fields
+      ->Number("PlaneBA.min_bend", &min_bend,
+               "Metres, rms over the sparse points; a smaller bend counts as none.")
+      .NotNegative();
+  fields
+      ->Int("PlaneBA.num_rounds", &num_rounds,
+            "Rounds in which points are given to surfaces anew; fewer if nothing changes.")
+      .Within(1, 100);
+  fields->Int("PlaneBA.max_iterations", &max_iterations, "Steps of each round.").Positive();
 }
+
+std::vector<std::string> PlaneBundleOptions::Problems() const { return ProblemsOf(*this); }
 
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options) {
   PlaneBundle result;

@@ -16,6 +16,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct PlaneBundleOptions {
   // Pixels per metre; weight of a point's distance from its surface against its reprojection
   // errors, the thesis' beta. Larger = nearer to the scan. 0 = per point from the ratio of image
@@ -39,6 +41,7 @@ struct PlaneBundleOptions {
   int num_rounds = 5;       // points are given to surfaces anew this often, less if nothing changes
   int max_iterations = 25;  // of each round
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

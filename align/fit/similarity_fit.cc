@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "align/surface/surface_cells.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -254,18 +255,35 @@ void JudgeAccuracy(const std::vector<Match>& matches, const std::vector<SurfaceP
 
 }  // namespace
 
-std::vector<std::string> SimilarityFitOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (min_track < 2) problems.push_back("--Fit.min_track must be at least 2");
-  if (!(min_gate > 0 && max_gate >= min_gate)) {
-    problems.push_back("--Fit.min_gate must be positive and not above --Fit.max_gate");
-  }
-  if (!(max_scale_change > 0 && max_scale_change < 1)) {
-    problems.push_back("--Fit.max_scale_change must lie between 0 and 1");
-  }
-  if (num_steps < 1) problems.push_back("--Fit.num_steps must be positive");
-  return problems;
+void SimilarityFitOptions::Declare(OptionFields* fields) {
+  const std::string gates = "--Fit.min_gate must be positive and not above --Fit.max_gate";
+  fields
+      ->Int("Fit.min_track", &min_track,
+            "Observations that a sparse point needs to take part in the fit to the surface; larger "
+            "= fewer, better points.")
+      .AtLeast(2);
+  fields
+      ->Number("Fit.max_gate", &max_gate,
+               "Metres; a sparse point farther from the surface never takes part; larger = more "
+               "tolerant of picks that are off.")
+      .Positive()
+      .SaysSentence(gates);
+  fields
+      ->Number("Fit.min_gate", &min_gate,
+               "Metres; the fit's last steps still take points this near to the surface; larger = "
+               "more tolerant.")
+      .Positive()
+      .SaysSentence(gates);
+  fields->Require(max_gate >= min_gate, gates);
+  fields
+      ->Number(
+          "Fit.max_scale_change", &max_scale_change,
+          "Share by which the scale may move away from that of the picks; larger = more tolerant.")
+      .Between(0, 1);
+  fields->Int("Fit.num_steps", &num_steps, "Steps of the fit at most.").Positive();
 }
+
+std::vector<std::string> SimilarityFitOptions::Problems() const { return ProblemsOf(*this); }
 
 std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_track,
                                             double sigma_px, size_t max_points) {

@@ -19,6 +19,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 // A sparse point that takes part, with what its observations say about its own accuracy. (Of a
 // model that is in the scan frame already, read `scan` for `sparse`.)
 struct SurfacePoint {
@@ -43,6 +45,7 @@ struct SimilarityFitOptions {
   double max_scale_change = 0.10;
   int num_steps = 40;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -13,6 +13,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/open_browser.h"
+#include "core/option_fields.h"
 #include "pick_page.h"
 
 namespace roomtex {
@@ -42,13 +43,13 @@ void AddOptions(Arguments* a, Command* command) {
                          Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scene.scan_poses, ScanPosesHelp(),
                         Command::Kind::kOptional);
-  AddScanReaderOptions(&a->scene.scan_reader, command);
-  AddLocalServerOptions(&a->server, command);
+  command->Add(FieldsOf(&a->scene.scan_reader));
+  command->Add(FieldsOf(&a->server));
 }
 
 void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->scene.scan_reader.Problems();
-  for (const std::string& problem : a->server.Problems()) problems.push_back(problem);
+  AppendProblems(a->server.Problems(), &problems);
   ThrowIfProblems(problems);
   const std::filesystem::path picks(a->output_path);
   if (a->aligned_path.empty()) a->aligned_path = (picks.parent_path() / "aligned").string();

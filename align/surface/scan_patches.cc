@@ -6,6 +6,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/option_fields.h"
+
 namespace roomtex {
 namespace {
 
@@ -109,15 +111,24 @@ void VisitSurface(const Scan& scan, double spacing,
   }
 }
 
-std::vector<std::string> ScanPatchOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(cell_size > 0)) problems.push_back("--Patches.cell_size must be positive");
-  if (min_samples < 4) problems.push_back("--Patches.min_samples must be at least 4");
-  if (!(max_thickness_share > 0 && max_thickness_share < 1)) {
-    problems.push_back("--Patches.max_thickness_share must lie between 0 and 1");
-  }
-  return problems;
+void ScanPatchOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Patches.cell_size", &cell_size,
+               "Metres; edge of the cubes whose samples make one flat patch of the surface; larger "
+               "= coarser.")
+      .Positive();
+  fields
+      ->Int("Patches.min_samples", &min_samples,
+            "Samples that a cube needs to make a patch; larger = fewer patches.")
+      .AtLeast(4);
+  fields
+      ->Number("Patches.max_thickness_share", &max_thickness_share,
+               "Thickness of a patch, as a share of its second extent, up to which it counts as "
+               "flat; larger = more tolerant.")
+      .Between(0, 1);
 }
+
+std::vector<std::string> ScanPatchOptions::Problems() const { return ProblemsOf(*this); }
 
 ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options)
     : cell_size_(options.cell_size) {

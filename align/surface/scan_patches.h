@@ -15,6 +15,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ScanPatch {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();   // centre of gravity of its samples, `scan`
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit length, towards the scanner
@@ -34,6 +36,7 @@ struct ScanPatchOptions {
   // extent.
   double max_thickness_share = 0.25;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -12,6 +12,7 @@
 #include "align/surface/plane_regions.h"
 #include "align/surface/scan_surface.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 #include "core/parallel.h"
 
 namespace roomtex {
@@ -396,44 +397,45 @@ bool ScanPlane::Covers(const Eigen::Vector3d& x_in_scan) const {
   return false;
 }
 
-std::vector<std::string> ScanPlaneOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&](bool holds, const std::string& problem) {
-    if (!holds) problems.push_back("--Plane." + problem);
-  };
-  require(min_area_m2 > 0, "min_area_m2 must be positive");
-  require(max_distance > 0, "max_distance must be positive");
-  require(max_angle_deg > 0 && max_angle_deg <= 30, "max_angle_deg must lie between 0 and 30");
-  require(min_step >= 0, "min_step must not be negative");
-  require(max_noise >= 1, "max_noise must be at least 1");
-  require(min_window > 0, "min_window must be positive");
-  require(max_incidence_deg > 0 && max_incidence_deg <= 90,
-          "max_incidence_deg must lie between 0 and 90");
-  return problems;
+void ScanPlaneOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Plane.min_area_m2", &min_area_m2,
+               "Square metres; smaller planes of the scan are left out.")
+      .Positive();
+  fields
+      ->Number("Plane.max_distance", &max_distance,
+               "Metres; how far a surface, its noise averaged out, may lie from its plane "
+               "(wavy walls, bent scans); larger = more tolerant.")
+      .Positive();
+  fields
+      ->Number("Plane.max_angle_deg", &max_angle_deg,
+               "Degrees between a surface's local normal and its plane's; a surface whose ends "
+               "turn by 0.6 of this is no plane; larger = more tolerant.")
+      .Above(0)
+      .AtMost(30);
+  fields
+      ->Number("Plane.min_step", &min_step,
+               "Metres; parallel surfaces nearer to each other than this are one plane; "
+               "larger = fewer planes.")
+      .NotNegative();
+  fields
+      ->Number("Plane.max_noise", &max_noise,
+               "Standard deviations of the scan's own noise up to which a sample belongs to "
+               "a plane; larger = more samples.")
+      .AtLeast(1);
+  fields
+      ->Number("Plane.min_window", &min_window,
+               "Metres; smallest window for a local normal (it grows with the noise).")
+      .Positive();
+  fields
+      ->Number("Plane.max_incidence_deg", &max_incidence_deg,
+               "Degrees from the surface's normal; surfaces that the scanner saw at a "
+               "flatter angle are left out; 90 = none.")
+      .Above(0)
+      .AtMost(90);
 }
 
-void AddScanPlaneOptions(ScanPlaneOptions* options, Command* command) {
-  command->AddDouble("Plane.min_area_m2", &options->min_area_m2,
-                     "Square metres; smaller planes of the scan are left out.");
-  command->AddDouble("Plane.max_distance", &options->max_distance,
-                     "Metres; how far a surface, its noise averaged out, may lie from its plane "
-                     "(wavy walls, bent scans); larger = more tolerant.");
-  command->AddDouble(
-      "Plane.max_angle_deg", &options->max_angle_deg,
-      "Degrees between a surface's local normal and its plane's; a surface whose ends "
-      "turn by 0.6 of this is no plane; larger = more tolerant.");
-  command->AddDouble("Plane.min_step", &options->min_step,
-                     "Metres; parallel surfaces nearer to each other than this are one plane; "
-                     "larger = fewer planes.");
-  command->AddDouble("Plane.max_noise", &options->max_noise,
-                     "Standard deviations of the scan's own noise up to which a sample belongs to "
-                     "a plane; larger = more samples.");
-  command->AddDouble("Plane.min_window", &options->min_window,
-                     "Metres; smallest window for a local normal (it grows with the noise).");
-  command->AddDouble("Plane.max_incidence_deg", &options->max_incidence_deg,
-                     "Degrees from the surface's normal; surfaces that the scanner saw at a "
-                     "flatter angle are left out; 90 = none.");
-}
+std::vector<std::string> ScanPlaneOptions::Problems() const { return ProblemsOf(*this); }
 
 std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
                                       const ScanPlaneOptions& options, int num_threads) {

@@ -10,10 +10,11 @@
 
 #include <Eigen/Core>
 
-#include "core/command_line.h"
 #include "core/scan.h"
 
 namespace roomtex {
+
+class OptionFields;
 
 struct ScanPlane {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();   // centre of gravity of its samples, `scan`
@@ -54,11 +55,9 @@ struct ScanPlaneOptions {
   double min_window = 0.04;  // metres; smallest window for a local normal; it grows with the noise
   double max_incidence_deg = 80;  // samples seen at a flatter angle are left out; 90 = none
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
-
-// Registers --Plane.min_area_m2 and so on.
-void AddScanPlaneOptions(ScanPlaneOptions* options, Command* command);
 
 // The planes of all scans, largest area first; the same for every number of threads. Local normals
 // by PCA over windows of the grid, regions grown over it, joined across what stands in front where

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/option_fields.h"
+
 namespace roomtex {
 
 double TrustOptions::PickRmsLimit(const Camera& camera) const {
@@ -10,24 +12,50 @@ double TrustOptions::PickRmsLimit(const Camera& camera) const {
   return std::max(10.0, 0.004 * std::hypot(camera.width, camera.height));
 }
 
-std::vector<std::string> TrustOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&problems](bool holds, const std::string& sentence) {
-    if (!holds) problems.push_back(sentence);
-  };
-  require(max_pick_rms_px >= 0, "--Trust.max_pick_rms_px must not be negative");
-  require(max_scale_mad > 0, "--Trust.max_scale_mad must be positive");
-  require(min_scale_features >= 1, "--Trust.min_scale_features must be positive");
-  require(surface_tolerance > 0, "--Trust.surface_tolerance must be positive");
-  require(min_surface_share >= 0 && min_surface_share <= 1,
-          "--Trust.min_surface_share must lie between 0 and 1");
-  require(max_changed_share >= 0 && max_changed_share <= 1,
-          "--Trust.max_changed_share must lie between 0 and 1");
-  require(min_camera_share >= 0 && min_camera_share <= 1,
-          "--Trust.min_camera_share must lie between 0 and 1");
-  require(max_position_sigma > 0, "--Trust.max_position_sigma must be positive");
-  return problems;
+void TrustOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Trust.max_pick_rms_px", &max_pick_rms_px,
+               "Pixels; picks that miss by more (rms) are not trusted; 0 = 10, or 0.4 % of the "
+               "photo's diagonal if that is more; larger = more tolerant.")
+      .NotNegative();
+  fields
+      ->Number("Trust.max_scale_mad", &max_scale_mad,
+               "Spread of the scale over the features (relative); larger = more tolerant.")
+      .Positive();
+  fields
+      ->Int("Trust.min_scale_features", &min_scale_features,
+            "Features that the scale must rest on; larger = stricter.")
+      .Positive();
+  fields
+      ->Number("Trust.surface_tolerance", &surface_tolerance,
+               "Metres; sparse points this near to the surface are on it; larger = more tolerant.")
+      .Positive();
+  fields
+      ->Number("Trust.min_surface_share", &min_surface_share,
+               "Share of the sparse points visible to the scanner that must be on the surface; "
+               "larger = stricter.")
+      .AtLeast(0)
+      .AtMost(1);
+  fields
+      ->Number(
+          "Trust.max_changed_share", &max_changed_share,
+          "Share of the sparse points that may float in space the scanner saw to be empty while as "
+          "many lie behind its surface: another room, or things moved; larger = more tolerant.")
+      .AtLeast(0)
+      .AtMost(1);
+  fields
+      ->Number("Trust.min_camera_share", &min_camera_share,
+               "Share of the photos that must not lie behind the surface; larger = stricter.")
+      .AtLeast(0)
+      .AtMost(1);
+  fields
+      ->Number("Trust.max_position_sigma", &max_position_sigma,
+               "Metres; how uncertain the picks may leave the camera's position; larger = more "
+               "tolerant.")
+      .Positive();
 }
+
+std::vector<std::string> TrustOptions::Problems() const { return ProblemsOf(*this); }
 
 double Placement::SurfaceShare() const {
   const int known = num_on_surface + num_floating;

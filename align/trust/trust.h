@@ -12,6 +12,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct TrustOptions {
   // Pixels; root mean square distance of the picks from the best pose above which the alignment is
   // not trusted. 0 = 10 pixels or 0.4 % of the photo's diagonal, whichever is more. Larger = more
@@ -37,6 +39,7 @@ struct TrustOptions {
 
   // max_pick_rms_px with its default resolved for one camera.
   double PickRmsLimit(const Camera& camera) const;
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

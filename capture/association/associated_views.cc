@@ -14,6 +14,7 @@
 #include "capture/association/associated_views_photo.h"
 #include "colmap_ext/database.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
@@ -480,13 +481,17 @@ std::string CsvField(const std::string& text) {
 
 }  // namespace
 
-std::vector<std::string> AssociateOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(max_offset > 0 && max_offset <= 20)) {
-    problems.push_back("--max_offset must lie above 0 and at most at 20 pixels");
-  }
-  return problems;
+void AssociateOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("max_offset", &max_offset,
+               "pixels by which the camera may have moved between the two photos; larger = "
+               "more tolerant")
+      .Above(0)
+      .AtMost(20)
+      .Says("must lie above 0 and at most at 20 pixels");
 }
+
+std::vector<std::string> AssociateOptions::Problems() const { return ProblemsOf(*this); }
 
 Associations FindAssociations(const AssociateOptions& options, Progress* progress) {
   ThrowIfProblems(options.Problems());

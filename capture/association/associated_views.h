@@ -12,6 +12,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct AssociateOptions {
   std::string image_path;     // folder with all photos; names are relative to it
   std::string database_path;  // "" = none; may lack photos and keypoints
@@ -19,6 +21,7 @@ struct AssociateOptions {
   double max_offset = 0.5;
   int num_threads = -1;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

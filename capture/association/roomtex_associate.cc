@@ -10,6 +10,7 @@
 #include "capture/association/associated_views_links.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -119,8 +120,6 @@ int main(int argc, char** argv) {
   command.AddOutputPath("links_path", &arguments.links_path,
                         "folder for patterned/ and plain/: links under common names",
                         Command::Kind::kOptional);
-  command.AddDouble("max_offset", &arguments.options.max_offset,
-                    "pixels by which the camera may have moved between the two photos; larger = "
-                    "more tolerant");
+  command.Add(FieldsOf(&arguments.options));
   return command.Run(argc, argv, [&](const Command::Context& context) { Run(arguments, context); });
 }

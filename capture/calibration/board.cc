@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/option_fields.h"
+
 namespace roomtex {
 namespace {
 
@@ -55,41 +57,52 @@ std::vector<std::string> BoardOptions::Dictionaries() {
   return names;
 }
 
-std::vector<std::string> BoardOptions::Problems() const {
-  std::vector<std::string> problems;
+void BoardOptions::Declare(OptionFields* fields) {
   const bool charuco = type == "charuco";
   const std::string what = charuco ? "squares" : "inner corners";
   const auto counts = ParseSize(size);
-  if (!counts) {
-    problems.push_back("--board is \"" + size + "\", expected COLUMNSxROWS of " + what +
-                       ", such as 9x6" + (charuco ? "" : " for a board of 10x7 squares"));
-  } else {
-    const int least = charuco ? kMinCorners + 1 : kMinCorners;
-    if (std::min(counts->first, counts->second) < least ||
-        std::max(counts->first, counts->second) > kMaxCorners) {
-      problems.push_back("--board is \"" + size + "\", expected " + std::to_string(least) + " to " +
-                         std::to_string(kMaxCorners) + " " + what + " each way");
-    }
-  }
-  if (!(square > 0) || !std::isfinite(square)) {
-    problems.push_back("--square must be positive: the side of a square in metres, e.g. 0.025");
-  }
-  if (charuco && (!(marker > 0) || !(marker < square))) {
-    problems.push_back(
-        "--marker must be positive and less than --square: the side of a marker in metres, black "
-        "border included");
-  }
+  const int least = charuco ? kMinCorners + 1 : kMinCorners;
+  fields
+      ->Text("board", &size,
+             "COLUMNSxROWS: inner corners of a checkerboard (where four squares meet; 9x6 "
+             "for 10x7 squares), squares of a ChArUco board.")
+      .Required();
+  fields->Require(counts.has_value(), "--board is \"" + size + "\", expected COLUMNSxROWS of " +
+                                          what + ", such as 9x6" +
+                                          (charuco ? "" : " for a board of 10x7 squares"));
+  fields->Require(!counts || (std::min(counts->first, counts->second) >= least &&
+                              std::max(counts->first, counts->second) <= kMaxCorners),
+                  "--board is \"" + size + "\", expected " + std::to_string(least) + " to " +
+                      std::to_string(kMaxCorners) + " " + what + " each way");
+  fields
+      ->Number("square", &square,
+               "Side of a square, metres. The intrinsics do not depend on it, only the "
+               "distances in the report do.")
+      .Positive()
+      .Finite()
+      .Says("must be positive: the side of a square in metres, e.g. 0.025");
+  fields->Choice("board_type", &type, Types(),
+                 "A checkerboard must be seen whole; of a ChArUco board a part is enough.");
+  fields->Number("marker", &marker,
+                 "Side of a ChArUco marker with its black border, metres (in proportion to "
+                 "--square).");
+  fields->Require(
+      !charuco || (marker > 0 && marker < square),
+      "--marker must be positive and less than --square: the side of a marker in metres, black "
+      "border included");
+  fields
+      ->Choice("dictionary", &dictionary, Dictionaries(),
+               "Dictionary of the ChArUco markers, OpenCV's name.")
+      .Says("is \"" + dictionary + "\", expected OpenCV's name of one");
   const Dictionary* const markers = FindDictionary(dictionary);
-  if (markers == nullptr) {
-    problems.push_back("--dictionary is \"" + dictionary + "\", expected OpenCV's name of one");
-  } else if (charuco && counts && counts->first * counts->second / 2 > markers->num_markers) {
-    problems.push_back("--board has " + std::to_string(counts->first * counts->second / 2) +
-                       " markers, but " + dictionary + " only " +
-                       std::to_string(markers->num_markers));
-  }
-  if (!charuco && marker != 0) problems.push_back("--marker is for --board_type charuco");
-  return problems;
+  const int num_markers = counts ? counts->first * counts->second / 2 : 0;
+  fields->Require(!charuco || markers == nullptr || num_markers <= markers->num_markers,
+                  "--board has " + std::to_string(num_markers) + " markers, but " + dictionary +
+                      " only " + std::to_string(markers == nullptr ? 0 : markers->num_markers));
+  fields->Require(charuco || marker == 0, "--marker is for --board_type charuco");
 }
+
+std::vector<std::string> BoardOptions::Problems() const { return ProblemsOf(*this); }
 
 std::string Board::Name() const {
   const auto size = [](int c, int r) { return std::to_string(c) + "x" + std::to_string(r); };

@@ -11,6 +11,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 enum class BoardType { kCheckerboard, kCharuco };
 
 struct BoardOptions {
@@ -22,6 +24,7 @@ struct BoardOptions {
   double marker = 0;      // metres, side of a ChArUco marker (with its black border)
   std::string dictionary = "DICT_4X4_50";  // of the ChArUco markers, OpenCV's name
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
   static std::vector<std::string> Types() { return {"checkerboard", "charuco"}; }
   static std::vector<std::string> Dictionaries();  // OpenCV's names

@@ -12,6 +12,7 @@
 #include "capture/calibration/calibration_uncertainty.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
@@ -289,22 +290,55 @@ std::vector<std::string> CalibrationOptions::CameraModels() {
   return {"auto", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"};
 }
 
-std::vector<std::string> CalibrationOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto need = [&](bool good, const char* what) {
-    if (!good) problems.push_back(what);
-  };
-  need(min_gain >= 0, "--Model.min_gain must not be negative");
-  need(bad_photo_ratio > 1, "--Photos.bad_ratio must be more than 1");
-  need(bad_photo_px >= 0, "--Photos.bad_px must not be negative");
-  need(bad_corner_sigmas >= 3, "--Photos.bad_corner_sigmas must be at least 3");
-  need(min_photos >= kMinPhotos, "--Trust.min_photos must be at least 3");
-  need(min_tilt_deg >= 0 && min_tilt_deg < 90, "--Trust.min_tilt_deg must be from 0 to 90");
-  need(min_radius >= 0 && min_radius <= 1, "--Trust.min_radius must be from 0 to 1");
-  need(max_focal_sigma_percent > 0, "--Trust.max_focal_sigma_percent must be positive");
-  need(max_sigma_px > 0, "--Trust.max_sigma_px must be positive");
-  return problems;
+void CalibrationOptions::Declare(OptionFields* fields) {
+  fields->Choice("camera_model", &camera_model, CameraModels(),
+                 "COLMAP's model of the lens; auto = the simplest that foretells photos left "
+                 "out as well as richer ones do.");
+  fields
+      ->Number("Model.min_gain", &min_gain,
+               "auto takes a richer model when the log-likelihood of photos held out grows by "
+               "more than this; larger = simpler models.")
+      .NotNegative();
+  fields
+      ->Number("Photos.bad_ratio", &bad_photo_ratio,
+               "A photo is left out when its corners scatter more than this many times the "
+               "median photo's; larger = more tolerant.")
+      .Above(1)
+      .Says("must be more than 1");
+  fields
+      ->Number("Photos.bad_px", &bad_photo_px,
+               "Pixels; never left out when they scatter less than this.")
+      .NotNegative();
+  fields
+      ->Number("Photos.bad_corner_sigmas", &bad_corner_sigmas,
+               "Corners are left out beyond this many standard deviations; larger = more "
+               "tolerant.")
+      .AtLeast(3);
+  fields->Int("Trust.min_photos", &min_photos, "Photos that must take part.").AtLeast(kMinPhotos);
+  fields
+      ->Number("Trust.min_tilt_deg", &min_tilt_deg,
+               "Degrees; largest angle between two boards must be at least this.")
+      .AtLeast(0)
+      .Below(90)
+      .Says("must be from 0 to 90");
+  fields
+      ->Number("Trust.min_radius", &min_radius,
+               "Boards must reach this share of the way from the middle of the picture to "
+               "its corners.")
+      .AtLeast(0)
+      .AtMost(1)
+      .Says("must be from 0 to 1");
+  fields
+      ->Number("Trust.max_focal_sigma_percent", &max_focal_sigma_percent,
+               "Percent; largest standard deviation of the focal length.")
+      .Positive();
+  fields
+      ->Number("Trust.max_sigma_px", &max_sigma_px,
+               "Pixels; largest standard deviation of the whole picture (root mean square).")
+      .Positive();
 }
+
+std::vector<std::string> CalibrationOptions::Problems() const { return ProblemsOf(*this); }
 
 Calibration Calibrate(const std::vector<BoardPhoto>& photos, const Board& board,
                       const CalibrationOptions& options, const std::string& path) {

@@ -14,6 +14,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct CalibrationOptions {
   // SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV; auto: the simplest that foretells photos left out
   // as well as any richer one.
@@ -35,6 +37,7 @@ struct CalibrationOptions {
   double max_focal_sigma_percent = 1;  // standard deviation of the focal length
   double max_sigma_px = 1;  // and what all of them make of the picture (root mean square)
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
   static std::vector<std::string> CameraModels();
 };

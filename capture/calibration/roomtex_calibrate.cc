@@ -15,6 +15,7 @@
 #include "capture/calibration/calibration_picture.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -31,30 +32,14 @@ void AddOptions(Arguments* a, Command* command) {
                         "Folder with photos of the board, taken with the focus and zoom of the "
                         "capture; used as they are stored (an EXIF orientation is ignored, as "
                         "COLMAP ignores it).");
-  BoardOptions& b = a->board;
-  command->AddString("board", &b.size,
-                     "COLUMNSxROWS: inner corners of a checkerboard (where four squares meet; 9x6 "
-                     "for 10x7 squares), squares of a ChArUco board.",
-                     Command::Kind::kRequired);
-  command->AddDouble("square", &b.square,
-                     "Side of a square, metres. The intrinsics do not depend on it, only the "
-                     "distances in the report do.");
-  command->AddChoice("board_type", &b.type, BoardOptions::Types(),
-                     "A checkerboard must be seen whole; of a ChArUco board a part is enough.");
-  command->AddDouble("marker", &b.marker,
-                     "Side of a ChArUco marker with its black border, metres (in proportion to "
-                     "--square).");
-  command->AddChoice("dictionary", &b.dictionary, BoardOptions::Dictionaries(),
-                     "Dictionary of the ChArUco markers, OpenCV's name.");
+  command->Add(FieldsOf(&a->board));
   command->AddOutputPath("output_path", &a->output_path, "The camera, as COLMAP's cameras.txt.");
   command->AddOutputPath("coverage_path", &a->coverage_path,
                          "Picture (PNG or JPEG) of where the corners lie, with the residuals and "
                          "the photos left out.",
                          Command::Kind::kOptional);
-  CalibrationOptions& c = a->calibration;
-  command->AddChoice("camera_model", &c.camera_model, CalibrationOptions::CameraModels(),
-                     "COLMAP's model of the lens; auto = the simplest that foretells photos left "
-                     "out as well as richer ones do.");
+  const OptionFields calibration = FieldsOf(&a->calibration);
+  command->Add(calibration.Only({"camera_model"}));
   command->AddInputPath("apply", &a->database_path,
                         "COLMAP's database; --apply_output gets a copy of it with this camera (the "
                         "database itself is not changed).",
@@ -62,33 +47,12 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddOutputPath("apply_output", &a->database_output_path,
                          "The copy; default: beside the database, NAME_calibrated.db.",
                          Command::Kind::kOptional);
-  command->AddDouble(
-      "Model.min_gain", &c.min_gain,
-      "auto takes a richer model when the log-likelihood of photos held out grows by "
-      "more than this; larger = simpler models.");
-  command->AddDouble("Photos.bad_ratio", &c.bad_photo_ratio,
-                     "A photo is left out when its corners scatter more than this many times the "
-                     "median photo's; larger = more tolerant.");
-  command->AddDouble("Photos.bad_px", &c.bad_photo_px,
-                     "Pixels; never left out when they scatter less than this.");
-  command->AddDouble("Photos.bad_corner_sigmas", &c.bad_corner_sigmas,
-                     "Corners are left out beyond this many standard deviations; larger = more "
-                     "tolerant.");
-  command->AddInt("Trust.min_photos", &c.min_photos, "Photos that must take part.");
-  command->AddDouble("Trust.min_tilt_deg", &c.min_tilt_deg,
-                     "Degrees; largest angle between two boards must be at least this.");
-  command->AddDouble("Trust.min_radius", &c.min_radius,
-                     "Boards must reach this share of the way from the middle of the picture to "
-                     "its corners.");
-  command->AddDouble("Trust.max_focal_sigma_percent", &c.max_focal_sigma_percent,
-                     "Percent; largest standard deviation of the focal length.");
-  command->AddDouble("Trust.max_sigma_px", &c.max_sigma_px,
-                     "Pixels; largest standard deviation of the whole picture (root mean square).");
+  command->Add(calibration.Without({"camera_model"}));
 }
 
 void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->board.Problems();
-  for (const std::string& problem : a->calibration.Problems()) problems.push_back(problem);
+  AppendProblems(a->calibration.Problems(), &problems);
   if (a->database_path.empty() && !a->database_output_path.empty()) {
     problems.push_back("--apply_output needs --apply, the database to copy");
   }

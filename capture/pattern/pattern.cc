@@ -7,6 +7,7 @@
 
 #include "capture/pattern/pattern_steps.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/random_stream.h"
 
 namespace roomtex {
@@ -68,17 +69,23 @@ cv::Mat1b Cover(const cv::Mat& photo, cv::Size size) {
 
 }  // namespace
 
-std::vector<std::string> PatternOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (width < 320 || width > 16384 || height < 240 || height > 16384) {
-    problems.push_back("--width must lie in 320..16384 and --height in 240..16384 pixels");
-  }
-  if (blocks < 1 || blocks > 64) problems.push_back("--blocks must lie in 1..64");
-  if (!(brightness >= 0.3 && brightness <= 0.9)) {
-    problems.push_back("--brightness must lie in 0.3..0.9");
-  }
-  return problems;
+void PatternOptions::Declare(OptionFields* fields) {
+  const std::string size = "--width must lie in 320..16384 and --height in 240..16384 pixels";
+  fields->Int("width", &width, "pixels of the projector").Within(320, 16384).SaysSentence(size);
+  fields->Int("height", &height, "pixels of the projector").Within(240, 16384).SaysSentence(size);
+  fields
+      ->Int("blocks", &blocks,
+            "the image is cut into this many blocks each way, which are shuffled")
+      .Within(1, 64)
+      .Says("must lie in 1..64");
+  fields
+      ->Number("brightness", &brightness,
+               "mean grey value, 1 = white. Larger = more light for the room, less contrast")
+      .Within(0.3, 0.9)
+      .Says("must lie in 0.3..0.9");
 }
+
+std::vector<std::string> PatternOptions::Problems() const { return ProblemsOf(*this); }
 
 cv::Mat1b MakePattern(const PatternOptions& options) {
   ThrowIfProblems(options.Problems());

@@ -9,6 +9,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct PatternOptions {
   // Pixels of the projector. The pattern must be shown pixel by pixel, not scaled.
   int width = 1920, height = 1080;
@@ -20,6 +22,7 @@ struct PatternOptions {
   // light of a white picture.
   double brightness = 0.65;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

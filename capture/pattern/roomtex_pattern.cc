@@ -14,6 +14,7 @@
 #include "capture/pattern/pattern_quality.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 
@@ -178,15 +179,12 @@ int main(int argc, char** argv) {
                   "roomtex-pattern --output_path pattern.png --width 1920 --height 1080");
   command.AddOutputPath("output_path", &arguments.output_path,
                         "the pattern, PNG; show it full screen, pixel by pixel");
-  command.AddInt("width", &arguments.pattern.width, "pixels of the projector");
-  command.AddInt("height", &arguments.pattern.height, "pixels of the projector");
+  const OptionFields pattern = FieldsOf(&arguments.pattern);
+  command.Add(pattern.Only({"width", "height"}));
   command.AddInputPath("input_path", &arguments.input_path,
                        "photo full of detail to make the pattern of; without it: a built-in image",
                        Command::Kind::kOptional);
-  command.AddInt("blocks", &arguments.pattern.blocks,
-                 "the image is cut into this many blocks each way, which are shuffled");
-  command.AddDouble("brightness", &arguments.pattern.brightness,
-                    "mean grey value, 1 = white. Larger = more light for the room, less contrast");
+  command.Add(pattern.Without({"width", "height"}));
   command.AddInputPath("evaluate_path", &arguments.evaluate_path,
                        "photo of the projected pattern (same options): says whether the features "
                        "are found again, sharp and well exposed",

@@ -16,6 +16,7 @@
 #include "capture/simulation/simulated_scan.h"
 #include "capture/simulation/stranger.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
 
@@ -28,58 +29,105 @@ double NominalExposureTime(const SimulatedRoomOptions& options) {
 }
 }  // namespace
 
-std::vector<std::string> SimulatedRoomOptions::Problems() const {
-  std::vector<std::string> problems;
-  const auto require = [&](bool holds, const std::string& problem) {
-    if (!holds) problems.push_back(problem);
-  };
-  const auto within = [](double value, double low, double high) {
-    return value >= low && value <= high;
-  };
-  require(within(width, 4.6, 20), "room_width must be 4.6 to 20 m: the furniture has to fit in");
-  require(within(depth, 3.8, 20), "room_depth must be 3.8 to 20 m: the furniture has to fit in");
-  require(within(height, 2.5, 6), "room_height must be 2.5 to 6 m");
-  require(within(finest_detail, 0, 0.1), "finest_detail must be 0 to 0.1 m");
-  require(projectors >= 0 && projectors <= kMaxProjectors,
-          "projectors must be 0 to " + std::to_string(kMaxProjectors));
-  require(projectors == 0 || pattern != nullptr, "projectors need a pattern to throw");
-  require(projector_width >= 320 && projector_width <= 16384,
-          "projector_width must be 320 to 16384 pixels");
-  require(projector_height >= 240 && projector_height <= 16384,
-          "projector_height must be 240 to 16384 pixels");
-  require(within(projector_field_of_view_deg, 10, 120),
-          "projector_field_of_view_deg must be 10 to 120");
-  require(within(projector_light, 0, 1000), "projector_light must be 0 to 1000");
-  require(within(projector_focus, 0.3, 100), "projector_focus must be 0.3 to 100 m");
-  require(num_photos >= 1 && num_photos <= 1000, "num_photos must be 1 to 1000");
-  require(photo_width >= 64 && photo_width <= 20000, "photo_width must be 64 to 20000 pixels");
-  require(photo_height >= 64 && photo_height <= 20000, "photo_height must be 64 to 20000 pixels");
-  require(within(field_of_view_deg, 20, 100), "field_of_view_deg must be 20 to 100");
-  require(
+void SimulatedRoomOptions::Declare(OptionFields* fields) {
+  fields->Number("room_width", &width, "size of the room along x, metres")
+      .Within(4.6, 20, "m: the furniture has to fit in");
+  fields->Number("room_depth", &depth, "size of the room along y, metres")
+      .Within(3.8, 20, "m: the furniture has to fit in");
+  fields->Number("room_height", &height, "height of the room, metres").Within(2.5, 6, "m");
+  fields->Bool("furnished", &furnished, "table, shelf, sofa, pictures and so on");
+  fields->Bool("bare_walls", &bare_walls,
+               "plain walls, floor and ceiling: nothing for features to hold on to");
+  fields
+      ->Int("projectors", &projectors,
+            "projectors that throw patterns; every place is then photographed twice, "
+            "patterned and plain, and the room is bare unless --bare says otherwise")
+      .Within(0, kMaxProjectors);
+  fields->Require(projectors == 0 || pattern != nullptr, "projectors need a pattern to throw");
+  fields->Int("projector_width", &projector_width, "pixels").Within(320, 16384, "pixels");
+  fields->Int("projector_height", &projector_height, "pixels").Within(240, 16384, "pixels");
+  fields
+      ->Number("projector_field_of_view_deg", &projector_field_of_view_deg,
+               "horizontal, degrees; smaller = finer pattern on less of the walls")
+      .Within(10, 120);
+  fields
+      ->Number("projector_light", &projector_light,
+               "light of a white pattern at 1 m, room light = 1")
+      .Within(0, 1000);
+  fields
+      ->Number("projector_focus", &projector_focus,
+               "metres from the projector to where its pattern is sharp")
+      .Within(0.3, 100, "m");
+  fields->Bool("same_pattern", &same_pattern,
+               "a mistake to study: all projectors throw the same pattern");
+  fields
+      ->Number("finest_detail", &finest_detail,
+               "metres: no surface has finer detail; larger = smoother pictures and prints")
+      .Within(0, 0.1, "m");
+  fields->Bool("shading", &shading, "light from a lamp and the window instead of even light");
+  fields->Int("num_photos", &num_photos, "number of photos; with projectors: of places")
+      .Within(1, 1000);
+  fields->Int("photo_width", &photo_width, "pixels").Within(64, 20000, "pixels");
+  fields->Int("photo_height", &photo_height, "pixels").Within(64, 20000, "pixels");
+  fields->Number("field_of_view_deg", &field_of_view_deg, "horizontal, degrees").Within(20, 100);
+  fields->Text("camera_model", &camera_model, "any of COLMAP's camera models");
+  fields->Require(
       CameraModelFromName(camera_model).has_value(),
-      "camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
-  require(within(exposure_range_ev, 0, 4), "exposure_range_ev must be 0 to 4");
-  require(within(photo_noise, 0, 64), "photo_noise must be 0 to 64 grey levels");
-  const std::vector<std::string>& responses = ResponseTable::Names();
-  require(std::count(responses.begin(), responses.end(), response) > 0,
-          "response must be srgb or film");
-  require(within(vignetting, 0, 0.9), "vignetting must be 0 to 0.9");
-  require(within(white_balance_ev, 0, 2), "white_balance_ev must be 0 to 2");
-  require(wrong_exif == "none" || wrong_exif == "one" || wrong_exif == "all",
-          "wrong_exif must be none, one or all");
-  require(within(blur_px, 0, 50), "blur_px must be 0 to 50");
-  require(within(strangers, 0, 1), "strangers must be 0 to 1 (a share of the photos)");
-  require(num_stations >= 1 && num_stations <= 8, "num_stations must be 1 to 8");
-  require(scan_columns >= 16 && scan_columns <= 20000, "scan_columns must be 16 to 20000");
-  require(scan_rows >= 16 && scan_rows <= 20000, "scan_rows must be 16 to 20000");
-  require(within(range_noise, 0, 0.5), "range_noise must be 0 to 0.5 m");
-  require(within(range_noise_growth, 0, 10), "range_noise_growth must be 0 to 10 per metre");
-  require(within(bend, -0.2, 0.2), "bend must be -0.2 to 0.2");
-  require(within(azimuth_drift_deg, -10, 10), "azimuth_drift_deg must be -10 to 10");
-  require(num_picks >= 0 && num_picks <= 1000, "num_picks must be 0 to 1000");
-  require(within(click_noise_px, 0, 100), "click_noise_px must be 0 to 100");
-  return problems;
+      "--camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
+  fields->Bool("distortion", &distortion, "lens distortion (0 = all its parameters zero)");
+  fields
+      ->Number("exposure_range_ev", &exposure_range_ev,
+               "exposures vary by up to plus or minus this, in thirds of an EV")
+      .Within(0, 4);
+  fields->Bool("exif", &exif, "write exposure time, aperture and ISO into the photos");
+  fields
+      ->Number("photo_noise", &photo_noise,
+               "noise of the photos, standard deviation in grey levels of 255")
+      .Within(0, 64, "grey levels");
+  fields->Number("blur_px", &blur_px, "blur of the photos, Gaussian sigma in pixels").Within(0, 50);
+  fields->Choice("response", &response, ResponseTable::Names(),
+                 "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
+                 "shoulder");
+  fields->Number("vignetting", &vignetting, "share of the light that the lens loses in the corners")
+      .Within(0, 0.9);
+  fields
+      ->Number("white_balance_ev", &white_balance_ev,
+               "red and blue vary from photo to photo by up to plus or minus this, EV")
+      .Within(0, 2);
+  fields->Choice("wrong_exif", &wrong_exif, {"none", "one", "all"},
+                 "one: the middle photo notes a quarter of its exposure time; all: every photo "
+                 "notes the same");
+  fields
+      ->Number("strangers", &strangers,
+               "share of the photos in which somebody stands who is not in the scan")
+      .Within(0, 1, "(a share of the photos)");
+  fields->Int("num_stations", &num_stations, "number of scans").Within(1, 8);
+  fields->Int("scan_columns", &scan_columns, "samples over the full turn").Within(16, 20000);
+  fields->Int("scan_rows", &scan_rows, "samples from -60 to +75 degrees of elevation")
+      .Within(16, 20000);
+  fields->Number("range_noise", &range_noise, "noise of the ranges, standard deviation in metres")
+      .Within(0, 0.5, "m");
+  fields
+      ->Number("range_noise_growth", &range_noise_growth,
+               "the noise is range_noise * (1 + this * range), per metre")
+      .Within(0, 10, "per metre");
+  fields
+      ->Number("bend", &bend, "smooth distortion of the scan: ranges wrong by up to this fraction")
+      .Within(-0.2, 0.2);
+  fields
+      ->Number("azimuth_drift_deg", &azimuth_drift_deg,
+               "error of the azimuth that grows to this over the full turn, degrees")
+      .Within(-10, 10);
+  fields->Bool("missing_samples", &missing_samples,
+               "no echo from the window, the mirror and a few random samples");
+  fields->Int("num_picks", &num_picks, "clicks in the photo that suits best").Within(0, 1000);
+  fields
+      ->Number("click_noise_px", &click_noise_px,
+               "noise of the clicks, standard deviation per coordinate in pixels")
+      .Within(0, 100);
 }
+
+std::vector<std::string> SimulatedRoomOptions::Problems() const { return ProblemsOf(*this); }
 
 namespace {
 SimulatedRoomOptions Completed(SimulatedRoomOptions options) {

@@ -20,6 +20,7 @@
 
 namespace roomtex {
 
+class OptionFields;
 class Projector;
 
 struct SimulatedRoomOptions {
@@ -75,6 +76,7 @@ struct SimulatedRoomOptions {
   double click_noise_px = 1.5;  // standard deviation per coordinate
   int num_threads = -1;         // -1 = all; changes nothing in the results
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

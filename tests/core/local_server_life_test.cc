@@ -11,6 +11,7 @@
 
 #include "core/command_line.h"
 #include "core/local_server.h"
+#include "core/option_fields.h"
 #include "tests/core/served_page.h"
 
 namespace roomtex {
@@ -253,7 +254,7 @@ TEST(LocalServer, OptionsOfACommandArriveAndTheHelpKnowsTheDefaults) {
   for (const bool help : {false, true}) {
     LocalServerOptions options;
     Command command("roomtex-test", "Serves.", "roomtex-test");
-    AddLocalServerOptions(&options, &command);
+    command.Add(FieldsOf(&options));
     std::vector<std::string> words = {"roomtex-test",   "--host", "::1", "--port", "0",
                                       "--allow_remote", "--open", "1"};
     if (help) words = {"roomtex-test", "--help"};

@@ -7,6 +7,7 @@
 #include <tiny_gltf.h>
 
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "texture/output/textured_parts.h"
@@ -208,10 +209,16 @@ tinygltf::Primitive GlbBuilder::VertexColorPrimitive(const Scan& scan, const Col
 
 }  // namespace
 
-std::vector<std::string> GlbOptions::Problems() const {
-  if (max_texture_size >= 256 && max_texture_size <= 16384) return {};
-  return {"--Texture.max_size must be 256 to 16384 texels"};
+void GlbOptions::Declare(OptionFields* fields) {
+  fields
+      ->Int(
+          "Texture.max_size", &max_texture_size,
+          "Longest side of one texture image of model.glb and model.obj, 256 to 16384; a "
+          "larger texture is tiled. Larger = fewer images; not every viewer loads more than 4096.")
+      .Within(256, 16384, "texels");
 }
+
+std::vector<std::string> GlbOptions::Problems() const { return ProblemsOf(*this); }
 
 void WriteColoredGlb(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
                      const std::string& path, const GlbOptions& options) {

@@ -9,6 +9,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct GlbOptions {
   // Longest side of one texture image; a larger grid is split into several primitives with a
   // texture each. 4096: what every browser and phone loads.
@@ -18,6 +20,7 @@ struct GlbOptions {
   // room.
   bool jpeg = false;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

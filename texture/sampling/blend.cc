@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/option_fields.h"
 #include "core/photo.h"
 
 namespace roomtex {
@@ -45,15 +46,31 @@ bool TwoAgree(const Eigen::Vector3f* roots, int count) {
 
 }  // namespace
 
-std::vector<std::string> BlendOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (max_views < 1 || max_views > 64) problems.push_back("--Blend.max_views must be 1 to 64");
-  if (!(outlier >= 0)) problems.push_back("--Blend.outlier must not be negative");
-  if (!(footprint >= 0) || !(footprint <= 4)) {
-    problems.push_back("--Blend.footprint must be 0 to 4 sample spacings");
-  }
-  return problems;
+void BlendOptions::Declare(OptionFields* fields) {
+  fields
+      ->Int("Blend.max_views", &max_views,
+            "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "
+            "each.")
+      .Within(1, 64);
+  fields->Bool("Blend.angle_weight", &angle_weight,
+               "Less weight for photos that see a sample at a slant.");
+  fields->Bool("Blend.resolution_weight", &resolution_weight,
+               "More weight for photos with more pixels per sample.");
+  fields
+      ->Number("Blend.outlier", &outlier,
+               "Colour difference (0..1) from the other photos at which half the weight is "
+               "lost; 0 = never.")
+      .NotNegative();
+  fields
+      ->Number("Blend.footprint", &footprint,
+               "Share of the sample spacing over which photo pixels are averaged. Larger = "
+               "smoother; 0 = the colour at the sample.")
+      .Within(0, 4, "sample spacings");
+  fields->Bool("Blend.detail", &detail,
+               "Put back the detail that blending loses, from the dominant photo (thesis).");
 }
+
+std::vector<std::string> BlendOptions::Problems() const { return ProblemsOf(*this); }
 
 float ResolutionWeight(float pixels_per_sample) {
   constexpr float kPlenty = 25;

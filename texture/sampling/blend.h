@@ -12,6 +12,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct BlendOptions {
   // Photos kept per sample, the best by weight; 8 bytes each. Larger = smoother, more memory.
   int max_views = 6;
@@ -36,6 +38,7 @@ struct BlendOptions {
   // poses and with poses off by 0.05 degrees).
   bool detail = false;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

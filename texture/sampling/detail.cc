@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/option_fields.h"
 #include "texture/sampling/grid_runs.h"
 
 namespace roomtex {
@@ -43,16 +44,20 @@ void BlurAlong(const Scan& scan, const GridLinks& links, bool columns,
 
 }  // namespace
 
-std::vector<std::string> DetailOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (!(sigma > 0) || !(sigma <= 100)) {
-    problems.push_back("--Blend.detail_sigma must be positive, at most 100 samples");
-  }
-  if (border < 0 || border > 100) {
-    problems.push_back("--Blend.detail_border must be 0 to 100 dilations");
-  }
-  return problems;
+void DetailOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Blend.detail_sigma", &sigma,
+               "What counts as detail: Gaussian sigma in samples. Larger = coarser.")
+      .Above(0)
+      .AtMost(100)
+      .Says("must be positive, at most 100 samples");
+  fields
+      ->Int("Blend.detail_border", &border,
+            "Samples beside a change of the dominant photo that get no detail.")
+      .Within(0, 100, "dilations");
 }
+
+std::vector<std::string> DetailOptions::Problems() const { return ProblemsOf(*this); }
 
 std::vector<uint8_t> DominanceBorders(int num_columns, int num_rows,
                                       const std::vector<int16_t>& photo, int times) {

@@ -14,6 +14,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct DetailOptions {
   // Standard deviation of the Gaussian that parts detail from the rest, samples. Larger = coarser
   // detail is taken from the dominant photo. (The thesis names none.)
@@ -22,6 +24,7 @@ struct DetailOptions {
   // Larger = wider seams without detail. (The thesis names none.)
   int border = 2;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

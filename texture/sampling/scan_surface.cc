@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/option_fields.h"
 #include "texture/sampling/range_smoothing.h"
 
 namespace roomtex {
@@ -29,12 +30,16 @@ double MedianAngularSpacing(const Scan& scan, const GridLinks& links) {
 
 }  // namespace
 
-std::vector<std::string> ScanSurfaceOptions::Problems() const {
-  if (smoothing_radius < 1 || smoothing_radius > 50) {
-    return {"--Surface.smoothing_radius must be 1 to 50 samples"};
-  }
-  return {};
+void ScanSurfaceOptions::Declare(OptionFields* fields) {
+  fields->Bool("Surface.reduce_range_noise", &reduce_range_noise,
+               "Look colours up at the sample's place on the smoothed surface.");
+  fields
+      ->Int("Surface.smoothing_radius", &smoothing_radius,
+            "Samples on either side used for smoothing.")
+      .Within(1, 50, "samples");
 }
+
+std::vector<std::string> ScanSurfaceOptions::Problems() const { return ProblemsOf(*this); }
 
 GridLinks FindGridLinks(const Scan& scan, const std::vector<Triangle>& triangles) {
   GridLinks links;

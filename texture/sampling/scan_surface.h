@@ -13,6 +13,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ScanSurfaceOptions {
   // Photos are looked up at the sample moved along its scanner ray onto a plane fitted to the
   // samples around it: range noise would shift the lookup wherever a photo was not taken from the
@@ -24,6 +26,7 @@ struct ScanSurfaceOptions {
   // Larger = smoother.
   int smoothing_radius = 6;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

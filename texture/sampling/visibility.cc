@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/cpu_stages.h"
+#include "core/option_fields.h"
 #include "texture/sampling/rasterizer.h"
 
 namespace roomtex {
@@ -121,23 +122,35 @@ double MapScale(const PhotoProjector& projector, double angular_spacing,
 
 }  // namespace
 
-std::vector<std::string> OcclusionOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (depth_tolerance != -1 && (!(depth_tolerance > 0) || !(depth_tolerance < 1))) {
-    problems.push_back(
-        "--Occlusion.depth_tolerance must be -1 (automatic) or lie between 0 and 1 (a share of the "
-        "depth)");
-  }
-  if (!(boundary_px >= 0) && boundary_px != -1) {
-    problems.push_back("--Occlusion.boundary_px must be -1 (automatic) or not negative");
-  }
-  if (!(boundary_px <= 500)) problems.push_back("--Occlusion.boundary_px must be at most 500");
-  if (!(boundary_jump > 0)) problems.push_back("--Occlusion.boundary_jump must be positive");
-  if (depth_map_size < 64 || depth_map_size > 65536) {
-    problems.push_back("--Occlusion.depth_map_size must be 64 to 65536 pixels");
-  }
-  return problems;
+void OcclusionOptions::Declare(OptionFields* fields) {
+  fields
+      ->Number("Occlusion.depth_tolerance", &depth_tolerance,
+               "Share of its depth by which a surface in front hides a sample; -1 = by the "
+               "range noise of the scan. Larger = more tolerant.")
+      .Between(0, 1)
+      .Or(-1)
+      .Says("must be -1 (automatic) or lie between 0 and 1 (a share of the depth)");
+  fields
+      ->Number("Occlusion.boundary_px", &boundary_px,
+               "Width of the untrusted band beside depth boundaries, photo pixels; -1 = 2. "
+               "Poses that are off by more need more.")
+      .NotNegative()
+      .Or(-1)
+      .Says("must be -1 (automatic) or not negative");
+  fields->Require(boundary_px <= 500, "--Occlusion.boundary_px must be at most 500");
+  fields
+      ->Number("Occlusion.boundary_jump", &boundary_jump,
+               "Share of the depth that makes a jump a depth boundary. Larger = fewer.")
+      .Positive();
+  fields->Bool("Occlusion.shadows", &shadows,
+               "Distrust lines of sight through space that the scanner could not see.");
+  fields
+      ->Int("Occlusion.depth_map_size", &depth_map_size,
+            "Least length of a depth map's longer side, pixels.")
+      .Within(64, 65536, "pixels");
 }
+
+std::vector<std::string> OcclusionOptions::Problems() const { return ProblemsOf(*this); }
 
 DepthMap::DepthMap(int photo_width, int photo_height, double scale) {
   const int width = std::max(1, static_cast<int>(std::lround(photo_width * scale)));

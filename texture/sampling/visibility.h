@@ -15,6 +15,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct OcclusionOptions {
   // A sample is hidden when the surface rendered at its pixel is nearer by more than this share of
   // its depth. Larger = more tolerant. Thesis 8.1.2: 0.008. -1 = three standard deviations of the
@@ -36,6 +38,7 @@ struct OcclusionOptions {
   // that raises it, up to the photo's size.
   int depth_map_size = 1024;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "core/option_fields.h"
 #include "texture/texels/grid_image.h"
 #include "texture/texels/gutters.h"
 #include "texture/texels/mesh_charts.h"
@@ -177,16 +178,20 @@ int ChoosePageSize(double num_texels, int widest, int max_size) {
 
 }  // namespace
 
-std::vector<std::string> AtlasOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (mode != "auto" && mode != "1" && mode != "0") {
-    problems.push_back("--Texture.atlas must be auto, 1 or 0");
-  }
-  if (!(texel_size >= 0) || !(texel_size <= 10)) {
-    problems.push_back("--Texture.texel_mm must be 0 (auto) to 10000");
-  }
-  return problems;
+void AtlasOptions::Declare(OptionFields* fields) {
+  fields->Choice("Texture.atlas", &mode, {"auto", "1", "0"},
+                 "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
+                 "colours. auto: unless --Texture.scale is 1, where the photos show more than the "
+                 "vertices can hold (eight texels from one to the next).");
+  fields
+      ->Number("Texture.texel_mm", &texel_mm,
+               "Millimetres a texel of that atlas; 0 = what a photo's pixel covers on the "
+               "surface (median), within the bounds of --Texture.scale auto.")
+      .Within(0, 10000)
+      .Says("must be 0 (auto) to 10000");
 }
+
+std::vector<std::string> AtlasOptions::Problems() const { return ProblemsOf(*this); }
 
 SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
                            const std::vector<Triangle>& triangles, int max_count) {
@@ -246,7 +251,7 @@ MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
   if (options.mode == "0") return atlas;
   double area = 0;
   for (const Triangle& t : triangles) area += TriangleArea(points, t);
-  double texel = options.texel_size > 0 ? options.texel_size : pixel_on_surface;
+  double texel = options.texel_mm > 0 ? options.texel_mm / 1000 : pixel_on_surface;
   if (!(texel > 0) || !(area > 0) || !std::isfinite(area)) return atlas;
   texel = std::max(texel, std::sqrt(area / max_texels));
   const double edge = std::sqrt(2 * area / static_cast<double>(triangles.size()));

@@ -16,6 +16,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 // Triangles that are projected along one direction.
 struct AtlasChart {
   int page = 0;
@@ -44,11 +46,12 @@ struct AtlasOptions {
   // "auto": where the photos show more than the vertices can hold (eight texels or more from vertex
   // to vertex); "1": always; "0": never.
   std::string mode = "auto";
-  // Metres a texel; 0 = what a photo's pixel covers on the surface, median.
-  double texel_size = 0;
-  // Largest side of a page, texels.
+  // Millimetres a texel; 0 = what a photo's pixel covers on the surface, median.
+  double texel_mm = 0;
+  // Largest side of a page, texels. No option of its own: commands give it GlbOptions' largest.
   int max_page_size = 4096;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

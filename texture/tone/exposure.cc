@@ -10,6 +10,7 @@
 #include <Eigen/Cholesky>
 
 #include "core/cpu_stages.h"
+#include "core/option_fields.h"
 #include "texture/sampling/blend.h"
 #include "texture/tone/exposure_prior.h"
 
@@ -182,19 +183,29 @@ void FindContradictions(const ExposurePrior& prior, const std::vector<double>& l
 
 }  // namespace
 
-std::vector<std::string> ExposureOptions::Problems() const {
-  std::vector<std::string> problems;
-  if (mode != "exif" && mode != "match" && mode != "none") {
-    problems.push_back("--Exposure.mode must be exif, match or none");
-  }
-  if (response.empty()) problems.push_back("--Exposure.response must be srgb, estimate or a file");
-  if (!bracket_path.empty() && response != "srgb") {
-    problems.push_back(
-        "--Exposure.bracket_path and --Exposure.response are two sources of one "
-        "curve: give one of them");
-  }
-  return problems;
+void ExposureOptions::Declare(OptionFields* fields) {
+  fields->Choice("Exposure.mode", &mode, {"exif", "match", "none"},
+                 "exif: shutter time, aperture and ISO; match: from what several photos see, "
+                 "with EXIF as a prior; none: photos as they are.");
+  fields->Bool("Exposure.white_balance", &white_balance,
+               "Match red, green and blue one by one (white balance that changed); with "
+               "--Exposure.mode match.");
+  fields->Bool("Exposure.vignetting", &vignetting,
+               "Find and undo the darkening towards the photos' corners.");
+  fields->Text("Exposure.response", &response,
+               "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
+               "exposures that differ by an EV); or a file with a line per level 0-255: its "
+               "linear light, one number or three (red green blue).");
+  fields->Require(!response.empty(), "--Exposure.response must be srgb, estimate or a file");
+  fields->InputPath("Exposure.bracket_path", &bracket_path,
+                    "Folder with photos of one still scene, exposed differently (EXIF): the "
+                    "response is found from them.");
+  fields->Require(bracket_path.empty() || response == "srgb",
+                  "--Exposure.bracket_path and --Exposure.response are two sources of one "
+                  "curve: give one of them");
 }
+
+std::vector<std::string> ExposureOptions::Problems() const { return ProblemsOf(*this); }
 
 std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_samples) {
   const std::vector<LogRatio> ratios = ListRatios(samples);

@@ -19,6 +19,8 @@
 
 namespace roomtex {
 
+class OptionFields;
+
 struct ExposureOptions {
   // "exif": the ratio of shutter time * ISO / aperture^2 (thesis 8.2.1); photos without EXIF are
   // matched. "match": least squares over what several photos see, with EXIF as a prior where there
@@ -37,6 +39,7 @@ struct ExposureOptions {
   // from; "" = none.
   std::string bracket_path;
 
+  void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/local_server.h"
 #include "core/open_browser.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "texture/view/view_server.h"
 
@@ -157,7 +158,7 @@ int Main(int argc, char** argv) {
                        "Folder of the photos; default: where alignment.json or report.json says "
                        "they were.",
                        Command::Kind::kOptional);
-  AddLocalServerOptions(&options.server, &command);
+  command.Add(FieldsOf(&options.server));
   LetPortDiffer(argc, argv, &options.server);
   return command.Run(argc, argv,
                      [&options](const Command::Context& context) { View(options, context); });

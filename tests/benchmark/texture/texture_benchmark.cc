@@ -9,6 +9,7 @@
 #include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "importers/scan_reader.h"
 #include "tests/benchmark/texture/texture_limit.h"
@@ -142,7 +143,7 @@ int main(int argc, char** argv) {
                        Command::Kind::kOptional);
   command.AddInputPath("image_path", &o.image_path, "photos instead", Command::Kind::kOptional);
   command.AddInputPath("scan_path", &o.scan_path, "scan instead", Command::Kind::kOptional);
-  AddScanReaderOptions(&o.scan_reader, &command);
+  command.Add(FieldsOf(&o.scan_reader));
   command.AddInt("num_photos", &o.room.num_photos, "simulated photos");
   command.AddInt("photo_width", &o.room.photo_width, "of simulated photos, pixels");
   command.AddInt("photo_height", &o.room.photo_height, "of simulated photos, pixels");

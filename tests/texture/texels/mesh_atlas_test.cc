@@ -125,7 +125,7 @@ TEST(LayOutAtlas, GivesUpWhereGuttersWouldFillThePages) {
   const Scan box = Box();
   AtlasOptions options;
   options.mode = "1";
-  options.texel_size = 0.1;  // 2200 texels, six charts with 8 texels around
+  options.texel_mm = 100;  // 2200 texels, six charts with 8 texels around
   EXPECT_TRUE(LayOutAtlas(box.points, box.triangles, 0, 2200, options).empty());
   EXPECT_FALSE(LayOutAtlas(box.points, box.triangles, 0, 22000, options).empty());
 }
@@ -193,7 +193,7 @@ TEST(LayOutAtlas, EveryTriangleHasItsOwnTexels) {
   Scan box = Box();
   box.triangles.push_back({0, 0, 1});
   AtlasOptions options;
-  options.texel_size = 0.01;
+  options.texel_mm = 10;
   const MeshAtlas atlas = LayOutAtlas(box.points, box.triangles, 0, 1e8, options);
   ASSERT_EQ(atlas.charts.size(), 6u);
   EXPECT_EQ(atlas.chart_of.back(), -1);
@@ -222,7 +222,7 @@ TEST(LayOutAtlas, EveryTriangleHasItsOwnTexels) {
 TEST(LayOutAtlas, StaysWithinTheTexelsAndThePages) {
   const Scan box = Box();
   AtlasOptions options;
-  options.texel_size = 1e-4;  // wants 2200 million texels
+  options.texel_mm = 0.1;  // wants 2200 million texels
   options.max_page_size = 1024;
   const MeshAtlas atlas = LayOutAtlas(box.points, box.triangles, 0, 1e6, options);
   EXPECT_NEAR(atlas.texel_size, std::sqrt(22 / 1e6), 1e-6);
@@ -266,7 +266,7 @@ TEST(LayOutAtlas, UnfoldsWhatLiesOverItself) {
     ramp.triangles.push_back({2 * i + 2, 2 * i + 1, 2 * i + 3});
   }
   AtlasOptions options;
-  options.texel_size = 0.01;
+  options.texel_mm = 10;
   const MeshAtlas atlas = LayOutAtlas(ramp.points, ramp.triangles, 0, 1e8, options);
   double area = 0, covered = 0;
   for (size_t t = 0; t < ramp.triangles.size(); ++t) {
@@ -354,7 +354,7 @@ TEST_F(ColorizeMesh, FourTrianglesShowWhatThePhotosShow) {
 TEST_F(ColorizeMesh, IsTheSameForAnyNumberOfThreads) {
   Progress progress(true);
   ColorizeOptions options;
-  options.atlas.texel_size = 0.02;
+  options.atlas.texel_mm = 20;
   const ColorizeResult one = ColorizeScans({mesh_}, photos_, options, 1, &progress);
   const ColorizeResult three = ColorizeScans({mesh_}, photos_, options, 3, &progress);
   ASSERT_EQ(one.scans[0].atlas.pages.size(), 1u);
