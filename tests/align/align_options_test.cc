@@ -1,0 +1,22 @@
+#include <gtest/gtest.h>
+
+#include "align/alignment.h"
+#include "importers/scan_reader.h"
+#include "tests/support/option_check.h"
+
+namespace roomtex {
+namespace {
+
+TEST(AlignCommand, ChecksItsOptions) {
+  AlignmentOptions o;
+  ScanPlaneOptions planes;
+  ScanReaderOptions reader;
+  ExpectChecksItsOptions("roomtex-align",
+                         "--input_path none --scan_path none --picks_path none --output_path none",
+                         {FieldsOf(&reader), FieldsOf(&o.bundle), FieldsOf(&planes),
+                          FieldsOf(&o.picks), FieldsOf(&o.scale), FieldsOf(&o.trust),
+                          FieldsOf(&o.surface), FieldsOf(&o.fit), FieldsOf(&o.mesh)});
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,20 @@
+#include <gtest/gtest.h>
+
+#include "core/local_server.h"
+#include "importers/scan_reader.h"
+#include "tests/support/option_check.h"
+
+namespace roomtex {
+namespace {
+
+TEST(PickCommand, ChecksItsOptions) {
+  ScanReaderOptions reader;
+  LocalServerOptions server;
+  ExpectChecksItsOptions(
+      "roomtex-pick",
+      "--input_path none --image_path none --scan_path none --output_path none/none",
+      {FieldsOf(&reader), FieldsOf(&server)});
+}
+
+}  // namespace
+}  // namespace roomtex

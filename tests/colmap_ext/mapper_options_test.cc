@@ -1,0 +1,19 @@
+#include <gtest/gtest.h>
+
+#include "colmap_ext/initializer.h"
+#include "colmap_ext/view_chaining.h"
+#include "tests/support/option_check.h"
+
+namespace roomtex {
+namespace {
+
+TEST(MapperCommand, ChecksItsOptions) {
+  InitOptions init;
+  ChainOptions chain;
+  ExpectChecksItsOptions("roomtex-mapper",
+                         "--database_path none --image_path none --output_path none",
+                         {FieldsOf(&init), FieldsOf(&chain)});
+}
+
+}  // namespace
+}  // namespace roomtex
