@@ -19,13 +19,13 @@
 namespace roomtex {
 namespace {
 
-PhotoPassInput MakeInput(const std::vector<Scan>& scans, std::vector<ScanSurface>* surfaces,
+PhotoPassInput MakeInput(const std::vector<Scan>& scans, std::vector<SmoothedScan>* surfaces,
                          const ColorizeOptions& options, int num_threads,
                          std::vector<GridOfSamples>* grids) {
   const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
   PhotoPassInput input;
   for (const Scan& scan : scans) {
-    ScanSurface surface = MakeScanSurface(scan, options.mesh, options.surface, num_threads);
+    SmoothedScan surface = MakeSmoothedScan(scan, options.mesh, options.surface, num_threads);
     input.occluders.push_back(MakeOccluderTiles(scan, surface));
     const Eigen::Vector3d station =
         scan.organised ? scan.Station() : Eigen::Vector3d(Scan::MissingPoint());
@@ -127,7 +127,7 @@ std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) 
 // asked about: few vertices would say little about exposures.
 std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
                                    const std::vector<PhotoView>& photos,
-                                   const std::vector<ScanSurface>& surfaces,
+                                   const std::vector<SmoothedScan>& surfaces,
                                    const ColorizeOptions& options, PhotoPassInput* input) {
   constexpr int kNumProbes = 200000;
   const double max_texels =
@@ -150,8 +150,8 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
 // Texture images finer than the samples, from the exposures found on the samples.
 void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                       const ColorizeOptions& options, int num_threads,
-                      std::vector<ScanSurface>* surfaces, PhotoPassInput* input, Progress* progress,
-                      ColorizeResult* result) {
+                      std::vector<SmoothedScan>* surfaces, PhotoPassInput* input,
+                      Progress* progress, ColorizeResult* result) {
   const TexelPassOptions texels{options.occlusion, options.blend, options.detail,
                                 1e6 * options.texture_memory_mb};
   // A mesh has no spacing of samples that says how fine a depth map must be.
@@ -167,7 +167,7 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
       FinishPage(source, &atlas.pages.back(), &atlas.num_texels, &atlas.num_seen);
     }
     if (!scans[s].organised || result->texture_scale == 1) continue;
-    ScanSurface& surface = (*surfaces)[s];
+    SmoothedScan& surface = (*surfaces)[s];
     FillHoles(scans[s], FindSingleHoles(scans[s], surface.links), &surface);
     const ScanTexels source(scans[s], surface, result->scans[s].samples, result->texture_scale);
     result->scans[s].texture = ColorizeTexels(source, photos, result->exposure.gains, texels,
@@ -183,7 +183,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   std::vector<PhotoView> photos = given_photos;  // their tones are found here
   SetResponse(options.exposure, &photos);
   progress->Stage("mesh");
-  std::vector<ScanSurface> surfaces;
+  std::vector<SmoothedScan> surfaces;
   std::vector<GridOfSamples> grids;
   PhotoPassInput input = MakeInput(scans, &surfaces, options, num_threads, &grids);
   std::vector<MeshAtlas> atlases = PlanAtlases(scans, photos, surfaces, options, &input);

@@ -12,7 +12,7 @@
 #include "texture/sampling/detail.h"
 #include "texture/sampling/grid_colors.h"
 #include "texture/sampling/photo_view.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 #include "texture/sampling/visibility.h"
 #include "texture/texels/colored_scan.h"
 #include "texture/texels/mesh_atlas.h"
@@ -24,7 +24,7 @@ class OptionFields;
 
 struct ColorizeOptions {
   ScanMeshOptions mesh;
-  ScanSurfaceOptions surface;
+  SmoothedScanOptions surface;
   OcclusionOptions occlusion;
   ExposureOptions exposure;
   BlendOptions blend;

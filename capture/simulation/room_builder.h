@@ -4,7 +4,7 @@
 
 #include "capture/simulation/room_pictures.h"
 #include "capture/simulation/room_scene.h"
-#include "capture/simulation/simulated_room.h"
+#include "capture/simulation/simulated_room_options.h"
 #include "core/frames.h"
 #include "core/random_stream.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "capture/simulation/room_scene.h"
-#include "capture/simulation/simulated_room.h"
+#include "capture/simulation/simulated_room_options.h"
 #include "core/camera_model.h"
 #include "core/similarity.h"
 

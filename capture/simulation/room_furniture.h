@@ -3,7 +3,7 @@
 // (simulated_room.h).
 
 #include "capture/simulation/room_scene.h"
-#include "capture/simulation/simulated_room.h"
+#include "capture/simulation/simulated_room_options.h"
 
 namespace roomtex {
 

@@ -2,12 +2,15 @@
 // What a reconstruction and a user would find in the photos of the simulated room: sparse points
 // with tracks, and clicks. Frames: `room`, `cam`, `img`, `scan` (simulated_room.h).
 
+#include <optional>
 #include <vector>
 
 #include "capture/simulation/room_scene.h"
-#include "capture/simulation/simulated_room.h"
+#include "capture/simulation/simulated_room_options.h"
 #include "capture/simulation/simulated_scan.h"
+#include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
+#include "core/similarity.h"
 
 namespace roomtex {
 

@@ -9,13 +9,11 @@
 #include <opencv2/core/mat.hpp>
 
 #include "capture/simulation/room_scene.h"
-#include "capture/simulation/simulated_room.h"
+#include "capture/simulation/simulated_room_options.h"
 #include "core/camera_model.h"
 #include "core/similarity.h"
 
 namespace roomtex {
-
-inline constexpr int kMaxProjectors = 8;
 
 // A pinhole that sends light out instead of taking it in.
 class Projector {

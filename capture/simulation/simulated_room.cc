@@ -16,124 +16,22 @@
 #include "capture/simulation/simulated_scan.h"
 #include "capture/simulation/stranger.h"
 #include "core/error.h"
-#include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
 
 namespace roomtex {
-
 namespace {
+
 // Seconds at EV 0. The room is dimmed for projectors.
 double NominalExposureTime(const SimulatedRoomOptions& options) {
   return options.projectors > 0 ? 1.0 / 4 : 1.0 / 30;
 }
-}  // namespace
 
-void SimulatedRoomOptions::Declare(OptionFields* fields) {
-  fields->Number("room_width", &width, "size of the room along x, metres")
-      .Within(4.6, 20, "m: the furniture has to fit in");
-  fields->Number("room_depth", &depth, "size of the room along y, metres")
-      .Within(3.8, 20, "m: the furniture has to fit in");
-  fields->Number("room_height", &height, "height of the room, metres").Within(2.5, 6, "m");
-  fields->Bool("furnished", &furnished, "table, shelf, sofa, pictures and so on");
-  fields->Bool("bare_walls", &bare_walls,
-               "plain walls, floor and ceiling: nothing for features to hold on to");
-  fields
-      ->Int("projectors", &projectors,
-            "projectors that throw patterns; every place is then photographed twice, "
-            "patterned and plain, and the room is bare unless --bare says otherwise")
-      .Within(0, kMaxProjectors);
-  fields->Require(projectors == 0 || pattern != nullptr, "projectors need a pattern to throw");
-  fields->Int("projector_width", &projector_width, "pixels").Within(320, 16384, "pixels");
-  fields->Int("projector_height", &projector_height, "pixels").Within(240, 16384, "pixels");
-  fields
-      ->Number("projector_field_of_view_deg", &projector_field_of_view_deg,
-               "horizontal, degrees; smaller = finer pattern on less of the walls")
-      .Within(10, 120);
-  fields
-      ->Number("projector_light", &projector_light,
-               "light of a white pattern at 1 m, room light = 1")
-      .Within(0, 1000);
-  fields
-      ->Number("projector_focus", &projector_focus,
-               "metres from the projector to where its pattern is sharp")
-      .Within(0.3, 100, "m");
-  fields->Bool("same_pattern", &same_pattern,
-               "a mistake to study: all projectors throw the same pattern");
-  fields
-      ->Number("finest_detail", &finest_detail,
-               "metres: no surface has finer detail; larger = smoother pictures and prints")
-      .Within(0, 0.1, "m");
-  fields->Bool("shading", &shading, "light from a lamp and the window instead of even light");
-  fields->Int("num_photos", &num_photos, "number of photos; with projectors: of places")
-      .Within(1, 1000);
-  fields->Int("photo_width", &photo_width, "pixels").Within(64, 20000, "pixels");
-  fields->Int("photo_height", &photo_height, "pixels").Within(64, 20000, "pixels");
-  fields->Number("field_of_view_deg", &field_of_view_deg, "horizontal, degrees").Within(20, 100);
-  fields->Text("camera_model", &camera_model, "any of COLMAP's camera models");
-  fields->Require(
-      CameraModelFromName(camera_model).has_value(),
-      "--camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
-  fields->Bool("distortion", &distortion, "lens distortion (0 = all its parameters zero)");
-  fields
-      ->Number("exposure_range_ev", &exposure_range_ev,
-               "exposures vary by up to plus or minus this, in thirds of an EV")
-      .Within(0, 4);
-  fields->Bool("exif", &exif, "write exposure time, aperture and ISO into the photos");
-  fields
-      ->Number("photo_noise", &photo_noise,
-               "noise of the photos, standard deviation in grey levels of 255")
-      .Within(0, 64, "grey levels");
-  fields->Number("blur_px", &blur_px, "blur of the photos, Gaussian sigma in pixels").Within(0, 50);
-  fields->Choice("response", &response, ResponseTable::Names(),
-                 "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
-                 "shoulder");
-  fields->Number("vignetting", &vignetting, "share of the light that the lens loses in the corners")
-      .Within(0, 0.9);
-  fields
-      ->Number("white_balance_ev", &white_balance_ev,
-               "red and blue vary from photo to photo by up to plus or minus this, EV")
-      .Within(0, 2);
-  fields->Choice("wrong_exif", &wrong_exif, {"none", "one", "all"},
-                 "one: the middle photo notes a quarter of its exposure time; all: every photo "
-                 "notes the same");
-  fields
-      ->Number("strangers", &strangers,
-               "share of the photos in which somebody stands who is not in the scan")
-      .Within(0, 1, "(a share of the photos)");
-  fields->Int("num_stations", &num_stations, "number of scans").Within(1, 8);
-  fields->Int("scan_columns", &scan_columns, "samples over the full turn").Within(16, 20000);
-  fields->Int("scan_rows", &scan_rows, "samples from -60 to +75 degrees of elevation")
-      .Within(16, 20000);
-  fields->Number("range_noise", &range_noise, "noise of the ranges, standard deviation in metres")
-      .Within(0, 0.5, "m");
-  fields
-      ->Number("range_noise_growth", &range_noise_growth,
-               "the noise is range_noise * (1 + this * range), per metre")
-      .Within(0, 10, "per metre");
-  fields
-      ->Number("bend", &bend, "smooth distortion of the scan: ranges wrong by up to this fraction")
-      .Within(-0.2, 0.2);
-  fields
-      ->Number("azimuth_drift_deg", &azimuth_drift_deg,
-               "error of the azimuth that grows to this over the full turn, degrees")
-      .Within(-10, 10);
-  fields->Bool("missing_samples", &missing_samples,
-               "no echo from the window, the mirror and a few random samples");
-  fields->Int("num_picks", &num_picks, "clicks in the photo that suits best").Within(0, 1000);
-  fields
-      ->Number("click_noise_px", &click_noise_px,
-               "noise of the clicks, standard deviation per coordinate in pixels")
-      .Within(0, 100);
-}
-
-std::vector<std::string> SimulatedRoomOptions::Problems() const { return ProblemsOf(*this); }
-
-namespace {
 SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
   options.bare_walls = options.bare_walls || options.bare;
   return options;
 }
+
 }  // namespace
 
 struct SimulatedRoom::Impl {

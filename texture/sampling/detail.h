@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/scan.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/grid_links.h"
 
 namespace roomtex {
 

@@ -7,7 +7,7 @@
 
 #include "core/parallel.h"
 #include "core/scan.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/grid_links.h"
 
 namespace roomtex {
 

@@ -129,7 +129,7 @@ std::vector<MeshTile> TileTriangles(const Scan& scan, bool on_grid,
 // Calls body(corners, count) for every quad that the mesh leaves open although at least three of
 // its corners were measured; only those are given.
 template <typename Body>
-void ForEachOpenQuad(const Scan& scan, const ScanSurface& surface, const Body& body) {
+void ForEachOpenQuad(const Scan& scan, const SmoothedScan& surface, const Body& body) {
   if (!scan.organised || scan.num_columns < 2) return;
   std::vector<uint8_t> filled(scan.points.size(), 0);  // triangles per quad
   bool closed = false;
@@ -155,7 +155,7 @@ void ForEachOpenQuad(const Scan& scan, const ScanSurface& surface, const Body& b
 }
 
 // Triangles over the open quads.
-std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) {
+std::vector<Triangle> FindShadows(const Scan& scan, const SmoothedScan& surface) {
   std::vector<Triangle> shadows;
   ForEachOpenQuad(scan, surface, [&](const int* corner, int count) {
     shadows.push_back({corner[0], corner[1], corner[2]});
@@ -165,7 +165,7 @@ std::vector<Triangle> FindShadows(const Scan& scan, const ScanSurface& surface) 
 }
 
 // The open quads at the range of their nearest corner; `points` gets their corners.
-std::vector<Triangle> FindFringes(const Scan& scan, const ScanSurface& surface,
+std::vector<Triangle> FindFringes(const Scan& scan, const SmoothedScan& surface,
                                   std::vector<Eigen::Vector3d>* points) {
   constexpr double kSameSurface = 0.01;  // of the range
   std::vector<Triangle> fringes;
@@ -189,7 +189,7 @@ std::vector<Triangle> FindFringes(const Scan& scan, const ScanSurface& surface,
 
 // Where the neighbours of a sample are missing there is no quad: what ends there may reach one
 // spacing on, at the sample's range.
-void AddFringesAtHoles(const Scan& scan, const ScanSurface& surface,
+void AddFringesAtHoles(const Scan& scan, const SmoothedScan& surface,
                        std::vector<Eigen::Vector3d>* points, std::vector<Triangle>* fringes) {
   const auto measured = [&scan](int column, int row) {
     return column >= 0 && row >= 0 && column < scan.num_columns && row < scan.num_rows &&
@@ -290,7 +290,7 @@ std::vector<Triangle> FillGaps(const Scan& scan, std::vector<Eigen::Vector3d>* p
 
 }  // namespace
 
-OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface) {
+OccluderTiles MakeOccluderTiles(const Scan& scan, const SmoothedScan& surface) {
   OccluderTiles tiles;
   tiles.range_noise = surface.range_noise;
   tiles.surface = TileTriangles(scan, scan.organised, surface.points, surface.triangles);

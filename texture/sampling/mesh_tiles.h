@@ -8,7 +8,7 @@
 
 #include "core/scan.h"
 #include "texture/sampling/photo_view.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 
 namespace roomtex {
 
@@ -29,7 +29,7 @@ struct OccluderTiles {
   double range_noise = 0;  // of the scan, metres, standard deviation; 0 = not known
 };
 
-OccluderTiles MakeOccluderTiles(const Scan& scan, const ScanSurface& surface);
+OccluderTiles MakeOccluderTiles(const Scan& scan, const SmoothedScan& surface);
 
 // Samples that get a colour, in the same kind of tiles. `index` is the grid index of each.
 struct SampleTile {

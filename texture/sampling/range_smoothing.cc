@@ -122,9 +122,9 @@ double Median(std::vector<float>* values) {
 // Standard deviation of one sample's range by range: the second difference of inverse range
 // vanishes on a plane, its noise is sqrt(6) times that of one sample. The median shrugs off edges
 // and corners.
-class RangeNoise {
+class NoiseByRange {
  public:
-  RangeNoise(const Scan& scan, const GridLinks& links, const std::vector<float>& inverse_range) {
+  NoiseByRange(const Scan& scan, const GridLinks& links, const std::vector<float>& inverse_range) {
     struct Deviation {
       float range, size;
     };
@@ -201,7 +201,7 @@ RangeSmoother::RangeSmoother(const Scan& scan, const GridLinks& links, int radiu
     const double range = (scan.points[i] - scan.Station()).norm();
     if (range > 0) inverse_range_[i] = static_cast<float>(1 / range);
   }
-  const RangeNoise noise(scan, links, inverse_range_);
+  const NoiseByRange noise(scan, links, inverse_range_);
   noise_ = noise.overall();
   for (size_t i = 0; i < count; ++i) {
     const float w = inverse_range_[i];

@@ -7,10 +7,9 @@
 #include <Eigen/Core>
 
 #include "core/scan.h"
+#include "texture/sampling/grid_links.h"
 
 namespace roomtex {
-
-struct GridLinks;
 
 struct SmoothingWindow {
   int8_t before = 0, after = 0;  // samples on either side

@@ -55,7 +55,7 @@ void AppendTrianglesOverHoles(const Scan& scan, const std::vector<int>& holes,
   }
 }
 
-void FillHoles(const Scan& scan, const std::vector<int>& holes, ScanSurface* surface) {
+void FillHoles(const Scan& scan, const std::vector<int>& holes, SmoothedScan* surface) {
   for (const int hole : holes) {
     const Neighbours n(scan, hole);
     const std::array<int, 4> beside{n.left, n.right, n.up, n.down};

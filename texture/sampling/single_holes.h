@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/scan.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 
 namespace roomtex {
 
@@ -18,6 +18,6 @@ void AppendTrianglesOverHoles(const Scan& scan, const std::vector<int>& holes,
                               std::vector<Triangle>* triangles);
 
 // Gives the holes a place between their neighbours, for textures finer than the samples.
-void FillHoles(const Scan& scan, const std::vector<int>& holes, ScanSurface* surface);
+void FillHoles(const Scan& scan, const std::vector<int>& holes, SmoothedScan* surface);
 
 }  // namespace roomtex

@@ -8,6 +8,7 @@
 
 #include "core/progress.h"
 #include "texture/sampling/grid_colors.h"
+#include "texture/sampling/grid_links.h"
 #include "texture/sampling/photo_view.h"
 
 namespace roomtex {

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "core/scan.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 #include "texture/texels/texel_pass.h"
 
 namespace roomtex {
@@ -18,7 +18,7 @@ class ScanTexels : public TexelSource {
  public:
   // Scan, surface and colors must outlive this. colors: of the samples; a texel that no photo sees
   // takes its sample's.
-  ScanTexels(const Scan& scan, const ScanSurface& surface, const ColorGrid& colors, int scale)
+  ScanTexels(const Scan& scan, const SmoothedScan& surface, const ColorGrid& colors, int scale)
       : scan_(scan), surface_(surface), colors_(colors), scale_(scale) {}
 
   int num_columns() const override { return scan_.num_columns * scale_; }
@@ -34,7 +34,7 @@ class ScanTexels : public TexelSource {
   void SetTexel(size_t texel, const Place& x, const Place& y, TexelBlock* block) const;
 
   const Scan& scan_;
-  const ScanSurface& surface_;
+  const SmoothedScan& surface_;
   const ColorGrid& colors_;
   int scale_;
 };

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
 #include <Eigen/Cholesky>
 
@@ -31,65 +30,6 @@ constexpr double kUselessExif = 0.23;
 constexpr double kBestExif = 0.03;
 // Half an EV.
 constexpr double kContradiction = 0.35;
-
-struct LogRatio {
-  uint32_t pair;  // photo_a * num_photos + photo_b
-  float trust;
-  Eigen::Vector4f value;
-};
-
-// The value at which half of the trust lies below; reorders.
-float WeightedMedian(std::vector<std::pair<float, float>>* values_and_trust) {
-  std::sort(values_and_trust->begin(), values_and_trust->end());
-  double total = 0, sum = 0;
-  for (const auto& [value, trust] : *values_and_trust) total += trust;
-  for (const auto& [value, trust] : *values_and_trust) {
-    sum += trust;
-    if (sum >= total / 2) return value;
-  }
-  return values_and_trust->back().first;
-}
-
-Overlap SummariseOverlap(const std::vector<LogRatio>& ratios, int num_photos) {
-  Overlap overlap;
-  overlap.photo_a = static_cast<int>(ratios[0].pair) / num_photos;
-  overlap.photo_b = static_cast<int>(ratios[0].pair) % num_photos;
-  for (const LogRatio& ratio : ratios) overlap.num_samples += ratio.trust;
-  std::vector<std::pair<float, float>> values(ratios.size());
-  for (int channel = 0; channel < 4; ++channel) {
-    for (size_t i = 0; i < ratios.size(); ++i)
-      values[i] = {ratios[i].value[channel], ratios[i].trust};
-    overlap.log_ratio[channel] = WeightedMedian(&values);
-  }
-  for (auto& [value, trust] : values) value = std::abs(value - overlap.log_ratio[3]);
-  overlap.spread = 1.4826f * WeightedMedian(&values);
-  return overlap;
-}
-
-Eigen::Vector4f LogsOf(const Eigen::Vector3f& light) {
-  Eigen::Vector4f logs;
-  logs << light.array().log().matrix(), std::log(light.sum());
-  return logs;
-}
-
-std::vector<LogRatio> ListRatios(const ExposureSamples& samples) {
-  std::vector<LogRatio> ratios;
-  std::vector<Eigen::Vector4f> logs;
-  for (size_t k = 0; k < samples.size(); ++k) {
-    const size_t begin = samples.begin[k], end = samples.begin[k + 1];
-    logs.clear();
-    for (size_t i = begin; i < end; ++i) logs.push_back(LogsOf(samples.views[i].light));
-    for (size_t i = begin; i < end; ++i) {
-      for (size_t j = begin; j < end; ++j) {
-        const ExposureView &a = samples.views[i], &b = samples.views[j];
-        if (a.photo >= b.photo) continue;
-        const auto pair = static_cast<uint32_t>(a.photo * samples.num_photos + b.photo);
-        ratios.push_back({pair, std::min(a.trust, b.trust), logs[i - begin] - logs[j - begin]});
-      }
-    }
-  }
-  return ratios;
-}
 
 // One statement: x[plus] - x[minus] = value, known to sigma.
 struct Equation {
@@ -181,54 +121,13 @@ void FindContradictions(const ExposurePrior& prior, const std::vector<double>& l
   std::sort(solution->contradicted.begin(), solution->contradicted.end());
 }
 
-}  // namespace
+// What ties the photos' exposures together.
+struct ExposureTies {
+  ExposurePrior prior;
+  std::vector<int> overlap_groups, groups;  // by overlaps alone, with EXIF
+};
 
-void ExposureOptions::Declare(OptionFields* fields) {
-  fields->Choice("Exposure.mode", &mode, {"exif", "match", "none"},
-                 "exif: shutter time, aperture and ISO; match: from what several photos see, "
-                 "with EXIF as a prior; none: photos as they are.");
-  fields->Bool("Exposure.white_balance", &white_balance,
-               "Match red, green and blue one by one (white balance that changed); with "
-               "--Exposure.mode match.");
-  fields->Bool("Exposure.vignetting", &vignetting,
-               "Find and undo the darkening towards the photos' corners.");
-  fields->Text("Exposure.response", &response,
-               "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
-               "exposures that differ by an EV); or a file with a line per level 0-255: its "
-               "linear light, one number or three (red green blue).");
-  fields->Require(!response.empty(), "--Exposure.response must be srgb, estimate or a file");
-  fields->InputPath("Exposure.bracket_path", &bracket_path,
-                    "Folder with photos of one still scene, exposed differently (EXIF): the "
-                    "response is found from them.");
-  fields->Require(bracket_path.empty() || response == "srgb",
-                  "--Exposure.bracket_path and --Exposure.response are two sources of one "
-                  "curve: give one of them");
-}
-
-std::vector<std::string> ExposureOptions::Problems() const { return ProblemsOf(*this); }
-
-std::vector<Overlap> FindOverlaps(const ExposureSamples& samples, double min_samples) {
-  const std::vector<LogRatio> ratios = ListRatios(samples);
-  std::vector<uint32_t> order(ratios.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return ratios[a].pair != ratios[b].pair ? ratios[a].pair < ratios[b].pair : a < b;
-  });
-  std::vector<Overlap> overlaps;
-  std::vector<LogRatio> of_pair;
-  for (size_t begin = 0; begin < order.size();) {
-    of_pair.clear();
-    size_t end = begin;
-    while (end < order.size() && ratios[order[end]].pair == ratios[order[begin]].pair) {
-      of_pair.push_back(ratios[order[end++]]);
-    }
-    const Overlap overlap = SummariseOverlap(of_pair, samples.num_photos);
-    if (overlap.num_samples >= min_samples) overlaps.push_back(overlap);
-    begin = end;
-  }
-  return overlaps;
-}
-
+// Also fills in what the solution says about them.
 ExposureTies TieExposures(const std::vector<ExposureData>& exposures,
                           const std::vector<Overlap>& overlaps, const ExposureOptions& options,
                           ExposureSolution* solution) {
@@ -264,6 +163,8 @@ ExposureTies TieExposures(const std::vector<ExposureData>& exposures,
   return ties;
 }
 
+// Gains of log gains per channel and photo: the photo of median exposure gets 1, in the largest
+// group and in every group that nothing ties to it.
 void FinishGains(const ExposureTies& ties, const std::array<std::vector<double>, 3>& log_gains,
                  ExposureSolution* solution) {
   const int n = static_cast<int>(ties.groups.size());
@@ -291,6 +192,32 @@ void FinishGains(const ExposureTies& ties, const std::array<std::vector<double>,
     }
   }
 }
+
+}  // namespace
+
+void ExposureOptions::Declare(OptionFields* fields) {
+  fields->Choice("Exposure.mode", &mode, {"exif", "match", "none"},
+                 "exif: shutter time, aperture and ISO; match: from what several photos see, "
+                 "with EXIF as a prior; none: photos as they are.");
+  fields->Bool("Exposure.white_balance", &white_balance,
+               "Match red, green and blue one by one (white balance that changed); with "
+               "--Exposure.mode match.");
+  fields->Bool("Exposure.vignetting", &vignetting,
+               "Find and undo the darkening towards the photos' corners.");
+  fields->Text("Exposure.response", &response,
+               "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
+               "exposures that differ by an EV); or a file with a line per level 0-255: its "
+               "linear light, one number or three (red green blue).");
+  fields->Require(!response.empty(), "--Exposure.response must be srgb, estimate or a file");
+  fields->InputPath("Exposure.bracket_path", &bracket_path,
+                    "Folder with photos of one still scene, exposed differently (EXIF): the "
+                    "response is found from them.");
+  fields->Require(bracket_path.empty() || response == "srgb",
+                  "--Exposure.bracket_path and --Exposure.response are two sources of one "
+                  "curve: give one of them");
+}
+
+std::vector<std::string> ExposureOptions::Problems() const { return ProblemsOf(*this); }
 
 ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
                                const std::vector<Overlap>& overlaps,

@@ -2,12 +2,11 @@
 // What EXIF says about the photos' exposures, how far that can be trusted, and which photos are
 // tied to each other at all.
 
-#include <array>
 #include <optional>
 #include <vector>
 
 #include "core/photo.h"
-#include "texture/tone/exposure.h"
+#include "texture/tone/exposure_overlaps.h"
 
 namespace roomtex {
 
@@ -37,20 +36,6 @@ std::vector<int> GroupPhotos(int num_photos, const std::vector<Overlap>& overlap
                              const ExposurePrior* prior);
 // The number of the largest group; of equals the one of the earliest photo.
 int LargestGroup(const std::vector<int>& groups);
-
-// What ties the photos' exposures together.
-struct ExposureTies {
-  ExposurePrior prior;
-  std::vector<int> overlap_groups, groups;  // by overlaps alone, with EXIF
-};
-// Also fills in what the solution says about them.
-ExposureTies TieExposures(const std::vector<ExposureData>& exposures,
-                          const std::vector<Overlap>& overlaps, const ExposureOptions& options,
-                          ExposureSolution* solution);
-// Gains of log gains per channel and photo: the photo of median exposure gets 1, in the largest
-// group and in every group that nothing ties to it.
-void FinishGains(const ExposureTies& ties, const std::array<std::vector<double>, 3>& log_gains,
-                 ExposureSolution* solution);
 
 double Median(std::vector<double> values);  // 0 for none; the upper one of two
 

@@ -6,7 +6,7 @@
 
 #include "core/photo.h"
 #include "texture/sampling/mesh_tiles.h"
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 #include "texture/sampling/visibility.h"
 
 namespace roomtex {
@@ -51,7 +51,7 @@ size_t AddSamples(const PhotoProjector& projector, const std::vector<SampleTile>
 }  // namespace
 
 TextureLimit MeasureTextureLimit(const Scan& scan, const std::vector<PhotoView>& photos) {
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   const OccluderTiles occluders = MakeOccluderTiles(scan, surface);
   const std::vector<SampleTile> samples = MakeSampleTiles(
       scan.num_columns, scan.num_rows, scan.points, surface.normals, scan.Station());

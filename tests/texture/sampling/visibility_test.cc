@@ -113,7 +113,7 @@ class TwoWallsVisibility : public ::testing::Test {
   // Colours the sight of every sample from a camera.
   std::vector<Sight> LookFrom(const Eigen::Vector3d& centre, const OcclusionOptions& options) {
     scan_ = scene_.MakeScan(240, 240);
-    const ScanSurface surface = MakeScanSurface(scan_, {}, {}, 1);
+    const SmoothedScan surface = MakeSmoothedScan(scan_, {}, {}, 1);
     const PhotoView view = scene_.View(centre, "a");
     const PhotoProjector projector(view);
     const PhotoVisibility visibility(projector, {MakeOccluderTiles(scan_, surface)},
@@ -191,7 +191,7 @@ TEST_F(TwoWallsVisibility, AHoleInTheScanHidesNothing) {
         scan_.points[scan_.Index(column, row)] = Scan::MissingPoint();
     }
   }
-  const ScanSurface surface = MakeScanSurface(scan_, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan_, {}, {}, 1);
   const PhotoView view = scene_.View({0, 0, 0}, "a");
   const PhotoProjector projector(view);
   const PhotoVisibility visibility(projector, {MakeOccluderTiles(scan_, surface)},
@@ -213,7 +213,7 @@ TEST(PhotoVisibility, DrawsTrianglesThatReachBehindTheCamera) {
   mesh.num_columns = 4;
   mesh.num_rows = 1;
   mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
-  const ScanSurface surface = MakeScanSurface(mesh, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(mesh, {}, {}, 1);
   const TwoWalls scene;
   PhotoView view = scene.View({0, 0, 0}, "a");
   const PhotoProjector projector(view);

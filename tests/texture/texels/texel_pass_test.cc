@@ -57,9 +57,9 @@ class TexelPass : public ::testing::Test {
 
 TEST_F(TexelPass, TexelsLieOnTheSurfaceBetweenTheSamples) {
   const Scan scan = scene_.MakeScan(60, 50, kHalfAngle);
-  ScanSurfaceOptions as_measured;
+  SmoothedScanOptions as_measured;
   as_measured.reduce_range_noise = false;
-  const ScanSurface surface = MakeScanSurface(scan, {}, as_measured, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, as_measured, 1);
   ColorGrid colors;
   colors.rgb.assign(scan.points.size(), {1, 2, 3});
   for (int scale : {2, 3, 5}) {
@@ -85,7 +85,7 @@ TEST_F(TexelPass, TexelsLieOnTheSurfaceBetweenTheSamples) {
 TEST_F(TexelPass, SurfaceEndsHalfWayToADepthJump) {
   scene_.board_half = 0.4;
   const Scan scan = scene_.MakeScan(60, 60, kHalfAngle);
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   ColorGrid colors;
   colors.rgb.assign(scan.points.size(), {0, 0, 0});
   const ScanTexels texels(scan, surface, colors, 4);
@@ -140,7 +140,7 @@ TEST_F(TexelPass, SingleMissingSamplesAreNoPinholes) {
   for (const int i : lost) scan.points[i] = Scan::MissingPoint();
   for (const int i : gap) scan.points[i] = Scan::MissingPoint();
   scan.points[scan.Index(0, 30)] = Scan::MissingPoint();  // at the border
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   EXPECT_EQ(FindSingleHoles(scan, surface.links), lost);
   const ColorizeResult result = Run(scan, 4);
   // As much surface as without the holes, all of it turned to the scanner.
@@ -182,7 +182,7 @@ TEST_F(TexelPass, SamplesDoNotDependOnTheScale) {
 TEST_F(TexelPass, BandsDoNotShow) {
   Shoot();
   const Scan scan = scene_.MakeScan(50, 120, kHalfAngle);
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   ColorGrid colors;
   colors.rgb.assign(scan.points.size(), {9, 9, 9});
   const ScanTexels source(scan, surface, colors, 2);

@@ -2,7 +2,6 @@
 // What colouring needs to know of one scan beyond its samples: which of them lie on one surface,
 // where the surface is without the range noise, and how it is turned.
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,12 +9,13 @@
 
 #include "core/scan.h"
 #include "core/scan_mesh.h"
+#include "texture/sampling/grid_links.h"
 
 namespace roomtex {
 
 class OptionFields;
 
-struct ScanSurfaceOptions {
+struct SmoothedScanOptions {
   // Photos are looked up at the sample moved along its scanner ray onto a plane fitted to the
   // samples around it: range noise would shift the lookup wherever a photo was not taken from the
   // scanner's place. Departure from the thesis, which uses the measured points. The written
@@ -30,15 +30,7 @@ struct ScanSurfaceOptions {
   std::vector<std::string> Problems() const;
 };
 
-// Neighbours in the grid that the mesh connects. Bit kRight of sample i: connected with the sample
-// one column on (the last column with the first one when the scan is a full turn); kDown: one row
-// on.
-struct GridLinks {
-  static constexpr uint8_t kRight = 1, kDown = 2;
-  std::vector<uint8_t> bits;  // one per grid cell; all 0 for a mesh without a grid
-};
-
-struct ScanSurface {
+struct SmoothedScan {
   std::vector<Triangle> triangles;  // BuildScanMesh
   GridLinks links;
   std::vector<Eigen::Vector3d> points;   // `scan` frame, range noise reduced; NaN = missing
@@ -47,10 +39,8 @@ struct ScanSurface {
   double angular_spacing = 0;  // radians between neighbouring samples, median; 0 = no grid
 };
 
-GridLinks FindGridLinks(const Scan& scan, const std::vector<Triangle>& triangles);
-
 // The result keeps no reference to `scan`.
-ScanSurface MakeScanSurface(const Scan& scan, const ScanMeshOptions& mesh_options,
-                            const ScanSurfaceOptions& options, int num_threads);
+SmoothedScan MakeSmoothedScan(const Scan& scan, const ScanMeshOptions& mesh_options,
+                              const SmoothedScanOptions& options, int num_threads);
 
 }  // namespace roomtex

@@ -1,4 +1,4 @@
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 
 #include <random>
 
@@ -22,14 +22,14 @@ double PlaneRms(const std::vector<Eigen::Vector3d>& points,
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-TEST(ScanSurface, TakesMostOfTheRangeNoiseOut) {
+TEST(SmoothedScan, TakesMostOfTheRangeNoiseOut) {
   const TwoWalls scene;
   const Scan truth = scene.MakeScan(200, 200);
   Scan noisy = truth;
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0, 0.003);
   for (Eigen::Vector3d& p : noisy.points) p += noise(random) * p.normalized();
-  const ScanSurface surface = MakeScanSurface(noisy, {}, {}, 2);
+  const SmoothedScan surface = MakeSmoothedScan(noisy, {}, {}, 2);
   EXPECT_NEAR(surface.range_noise, 0.003, 0.0006);
   EXPECT_NEAR(surface.angular_spacing, 1.0 / 199, 1e-4);
   EXPECT_LT(PlaneRms(surface.points, truth.points), 0.35 * PlaneRms(noisy.points, truth.points));
@@ -40,24 +40,24 @@ TEST(ScanSurface, TakesMostOfTheRangeNoiseOut) {
   }
 }
 
-TEST(ScanSurface, LeavesAnExactScanWhereItIs) {
+TEST(SmoothedScan, LeavesAnExactScanWhereItIs) {
   const TwoWalls scene;
   const Scan scan = scene.MakeScan(150, 150);
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   for (size_t i = 0; i < scan.points.size(); ++i) {
     ASSERT_LT((surface.points[i] - scan.points[i]).norm(), 5e-4);
   }
 }
 
-TEST(ScanSurface, CanKeepTheMeasuredPoints) {
+TEST(SmoothedScan, CanKeepTheMeasuredPoints) {
   Scan scan = TwoWalls().MakeScan(50, 50);
-  ScanSurfaceOptions options;
+  SmoothedScanOptions options;
   options.reduce_range_noise = false;
-  const ScanSurface surface = MakeScanSurface(scan, {}, options, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, options, 1);
   for (size_t i = 0; i < scan.points.size(); ++i) ASSERT_EQ(surface.points[i], scan.points[i]);
 }
 
-TEST(ScanSurface, KeepsACornerSharpInSpiteOfNoise) {
+TEST(SmoothedScan, KeepsACornerSharpInSpiteOfNoise) {
   // Two walls that meet in a vertical edge, seen from inside.
   Scan scan;
   scan.num_columns = scan.num_rows = 160;
@@ -78,7 +78,7 @@ TEST(ScanSurface, KeepsACornerSharpInSpiteOfNoise) {
       scan.intensity.push_back(1);
     }
   }
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   double all = 0, at_corner = 0;
   int num_at_corner = 0;
   for (int r = 0; r < 160; ++r) {
@@ -113,7 +113,7 @@ TEST(GridLinks, EndAtDepthEdges) {
 
 TEST(OccluderTiles, HoldEveryTriangleAndASampleTileEverySampleOnce) {
   const Scan scan = TwoWalls().MakeScan(130, 70);
-  const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+  const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
   const OccluderTiles tiles = MakeOccluderTiles(scan, surface);
   size_t triangles = 0;
   for (const MeshTile& tile : tiles.surface) {
@@ -140,7 +140,7 @@ TEST(OccluderTiles, FringesReachOneSpacingBeyondTheLastSample) {
   const TwoWalls scene;
   Scan scan = scene.MakeScan(130, 130);
   const auto reach = [&scan]() {  // of the fringes at the board's range
-    const ScanSurface surface = MakeScanSurface(scan, {}, {}, 1);
+    const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, 1);
     double x = 0, y = 0;
     for (const MeshTile& tile : MakeOccluderTiles(scan, surface).fringes) {
       for (int i = 0; i < tile.points.size(); ++i) {

@@ -1,4 +1,4 @@
-#include "texture/sampling/scan_surface.h"
+#include "texture/sampling/smoothed_scan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ double MedianAngularSpacing(const Scan& scan, const GridLinks& links) {
 
 }  // namespace
 
-void ScanSurfaceOptions::Declare(OptionFields* fields) {
+void SmoothedScanOptions::Declare(OptionFields* fields) {
   fields->Bool("Surface.reduce_range_noise", &reduce_range_noise,
                "Look colours up at the sample's place on the smoothed surface.");
   fields
@@ -39,30 +39,11 @@ void ScanSurfaceOptions::Declare(OptionFields* fields) {
       .Within(1, 50, "samples");
 }
 
-std::vector<std::string> ScanSurfaceOptions::Problems() const { return ProblemsOf(*this); }
+std::vector<std::string> SmoothedScanOptions::Problems() const { return ProblemsOf(*this); }
 
-GridLinks FindGridLinks(const Scan& scan, const std::vector<Triangle>& triangles) {
-  GridLinks links;
-  links.bits.assign(scan.points.size(), 0);
-  if (!scan.organised) return links;
-  const int columns = scan.num_columns;
-  for (const Triangle& t : triangles) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
-      if (b - a == columns) {
-        links.bits[a] |= GridLinks::kDown;
-      } else if (a / columns == b / columns) {
-        if (b - a == 1) links.bits[a] |= GridLinks::kRight;
-        if (b - a == columns - 1 && columns > 2) links.bits[b] |= GridLinks::kRight;  // closed turn
-      }
-    }
-  }
-  return links;
-}
-
-ScanSurface MakeScanSurface(const Scan& scan, const ScanMeshOptions& mesh_options,
-                            const ScanSurfaceOptions& options, int num_threads) {
-  ScanSurface surface;
+SmoothedScan MakeSmoothedScan(const Scan& scan, const ScanMeshOptions& mesh_options,
+                              const SmoothedScanOptions& options, int num_threads) {
+  SmoothedScan surface;
   surface.triangles = BuildScanMesh(scan, mesh_options);
   surface.links = FindGridLinks(scan, surface.triangles);
   surface.points = scan.points;
