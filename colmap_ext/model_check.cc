@@ -8,6 +8,7 @@
 #include "colmap_ext/two_view_geometry.h"
 #include "core/frames.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -97,9 +98,8 @@ void CountSupport(MatchedImages* images, const SparseModel& model, const ModelCh
   if (shares.empty()) return;
   // The better photos tell what the matches are worth; the median may be dragged down by what is
   // looked for.
-  const size_t upper_quartile = shares.size() * 3 / 4;
-  std::nth_element(shares.begin(), shares.begin() + upper_quartile, shares.end());
-  const double limit = std::max(kLeastSupport, options.min_support * shares[upper_quartile]);
+  const double upper_quartile = AtRank(&shares, shares.size() * 3 / 4);
+  const double limit = std::max(kLeastSupport, options.min_support * upper_quartile);
   for (const auto& [image_id, share] : check->support) {
     if (share < limit) check->doubtful.push_back(image_id);
   }

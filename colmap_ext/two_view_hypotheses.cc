@@ -7,6 +7,7 @@
 
 #include "colmap_ext/two_view_geometry.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -48,13 +49,6 @@ std::vector<SeedObservation> PairObservations(const std::vector<RayMatch>& match
     observations.push_back({1, static_cast<int>(i), matches[among[i]].right});
   }
   return observations;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The poses to start from, each once refined.

@@ -10,6 +10,7 @@
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -101,12 +102,6 @@ std::string Percent(double share) {
   return text;
 }
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The unit-baseline motion of EvaluatePose and the essential matrix.
 Rigid UnitBaseline(Rigid right_from_left) {
   right_from_left.translation.normalize();
@@ -171,11 +166,10 @@ std::vector<std::string> ChainOptions::Problems() const { return ProblemsOf(*thi
 RatioAverage AverageRatios(const std::vector<double>& ratios) {
   RatioAverage average;
   if (ratios.empty()) return average;
-  std::vector<double> logs, deviations;
+  std::vector<double> logs;
   for (const double ratio : ratios) logs.push_back(std::log(ratio));
-  const double median = MedianOf(logs);
-  for (const double value : logs) deviations.push_back(std::abs(value - median));
-  average.spread = 1.4826 * MedianOf(deviations);
+  const double median = Median(logs);
+  average.spread = kSigmaPerMad * MedianAbsoluteDeviation(logs, median);
   double sum = 0;
   int count = 0;
   for (const double value : logs) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 
 int Scan::NumMissing() const {
@@ -35,8 +37,7 @@ std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile,
   if (measured.empty()) return grey;
   const auto percentile = [&measured](double percent) {
     const size_t rank = static_cast<size_t>(percent / 100.0 * (measured.size() - 1) + 0.5);
-    std::nth_element(measured.begin(), measured.begin() + rank, measured.end());
-    return measured[rank];
+    return AtRank(&measured, rank);
   };
   const float low = percentile(low_percentile);
   const float high = percentile(high_percentile);

@@ -5,6 +5,7 @@
 
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -96,11 +97,8 @@ class GridConnector {
       differences.push_back(std::abs(1 / before - 2 / at + 1 / behind) * at * at);
     }
     if (differences.size() < 100) return 0;
-    std::nth_element(differences.begin(), differences.begin() + differences.size() / 2,
-                     differences.end());
-    // Median of the absolute value of a normal variable: 0.6745 deviations; 1 + 4 + 1 = 6
-    // variances.
-    return differences[differences.size() / 2] / 0.6745f / std::sqrt(6.0f);
+    // The second difference has 1 + 4 + 1 = 6 variances.
+    return Median(&differences) / static_cast<float>(kMadPerSigma) / std::sqrt(6.0f);
   }
 
   // The last and the first column are as near as two neighbouring columns (median over the rows).
@@ -119,11 +117,7 @@ class GridConnector {
       }
     }
     if (inside.size() < 8 || across.size() < 8) return false;
-    const auto median = [](std::vector<float>& values) {
-      std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-      return values[values.size() / 2];
-    };
-    const float inside_chord = median(inside), across_chord = median(across);
+    const float inside_chord = Median(&inside), across_chord = Median(&across);
     return across_chord < 1.75f * inside_chord && across_chord > 0.25f * inside_chord;
   }
 

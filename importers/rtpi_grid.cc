@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -69,11 +70,6 @@ std::vector<double> ElevationSteps(const RtpiFile& file) {
     }
   }
   return steps;
-}
-
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 // Mean step per row over the steps of a few rows; `spacing` is the first guess.

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 #include "importers/length_unit.h"
 #include "importers/rtpi.h"
 #include "importers/rtpi_grid.h"
@@ -131,8 +132,7 @@ void DescribeAngles(const std::vector<double>& theta_of_cell,
   if (!(n > 0)) return;
   header->az_fov = {DegFromRad(az_low), DegFromRad(az_high)};
   if (!az_steps.empty()) {
-    std::nth_element(az_steps.begin(), az_steps.begin() + az_steps.size() / 2, az_steps.end());
-    const double step = az_steps[az_steps.size() / 2];
+    const double step = Median(&az_steps);
     if (step > 1e-9) header->samples_per_degree_az = 1 / DegFromRad(step);
   }
   const double spread = n * k2 - k1 * k1;

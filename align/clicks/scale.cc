@@ -6,6 +6,7 @@
 
 #include "core/option_fields.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -70,12 +71,6 @@ VisiblePart FindVisiblePart(const CameraProjection& projection, const Rigid& cam
     }
   }
   return part;
-}
-
-double Median(std::vector<double> values) {
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
 }
 
 class DepthFinder {
@@ -199,11 +194,9 @@ ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
   }
   if (ratios.empty()) return estimate;
   const double median = Median(ratios);
-  std::vector<double> deviations;
-  for (const double ratio : ratios) deviations.push_back(std::abs(ratio - median));
-  const double mad = Median(deviations);
+  const double mad = MedianAbsoluteDeviation(ratios, median);
   estimate.relative_mad = mad / median;
-  const double limit = options.max_deviations * 1.4826 * mad;
+  const double limit = options.max_deviations * kSigmaPerMad * mad;
   double sum = 0;
   for (const double ratio : ratios) {
     if (!(std::abs(ratio - median) <= limit)) continue;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <optional>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -17,13 +19,6 @@ constexpr double kParallel = 0.9;
 constexpr double kLeavesPlane = 2.5;
 // A patch thicker than this many times the typical one is not flat.
 constexpr double kMaxThickness = 3.0;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
 
 // How far the surface itself leaves the plane, metres (root mean square): the distances of the
 // patches on it, in which the noise of the samples is averaged out.
@@ -158,7 +153,7 @@ std::vector<SurfaceConstraint> AssociateWithSurface(const std::vector<SurfacePoi
       if (on_patch) deviations.push_back(on_patch->deviations);
     }
   }
-  const double gate = options.gate * std::max(1.0, 1.4826 * Median(deviations));
+  const double gate = options.gate * std::max(1.0, kSigmaPerMad * Median(deviations));
 
   std::vector<SurfaceConstraint> constraints;
   for (const SurfacePoint& point : points) {

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -30,14 +31,6 @@ std::optional<double> NumberFrom(std::string text) {
     return std::nullopt;
   }
   return value;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
 }
 
 Eigen::Vector3d CameraInEnu(const SparseImage& image, const GeoReference& geo) {
@@ -259,8 +252,8 @@ GpsCheck CheckGps(const SparseModel& aligned, const GeoReference& geo,
                                : options.max_unstated;
     over_allowed.push_back(distance / allowed);
   }
-  check.median_horizontal = Median(distances);
-  check.median_over_allowed = Median(over_allowed);
+  check.median_horizontal = MidpointMedian(distances);
+  check.median_over_allowed = MidpointMedian(over_allowed);
   return check;
 }
 
@@ -293,8 +286,8 @@ std::vector<std::string> GeoWarnings(const SparseModel& aligned, const GeoRefere
   for (const auto& [id, image] : aligned.images) {
     distances.push_back(CameraInEnu(image, geo).norm());
   }
-  if (Median(distances) > kFarFromOrigin) {
-    warnings.push_back("the photos lie " + Length(Median(distances)) +
+  if (MidpointMedian(distances) > kFarFromOrigin) {
+    warnings.push_back("the photos lie " + Length(MidpointMedian(distances)) +
                        " from the geographic origin: check --geo_origin and the scan's "
                        "coordinates");
   }

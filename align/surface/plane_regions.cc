@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -133,7 +134,8 @@ class RegionGrower {
     mean_ = fit.mean;
   }
 
-  // Median distance of the members from the plane, by area.
+  // Median distance of the members from the plane, by area. (Not WeightedMedian(): it sums the
+  // weights upwards, and the last bit decides between regions.)
   double MedianDistance(const std::vector<int>& members) const {
     std::vector<std::pair<double, float>> distances;
     double area = 0;
@@ -175,8 +177,7 @@ class RegionGrower {
       normal_ = normal;
       mean_ = mean;
     }
-    // Median of the absolute value of a normal variable: 0.6745 deviations.
-    limit_ = std::min(options_.max_distance, options_.min_step / 2 + 3 / 0.6745 * trimmed);
+    limit_ = std::min(options_.max_distance, options_.min_step / 2 + 3 / kMadPerSigma * trimmed);
   }
 
   static double Angle(const Eigen::Vector3d& normal, const SurfaceCell& cell) {

@@ -14,6 +14,7 @@
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -186,8 +187,8 @@ class PlaneFitter {
       sum->distances.Add(kBinsPerDeviation * deviations);
     });
     for (PlaneInWork& plane : planes_) {
-      // Median of the absolute value of a normal variable: 0.6745 deviations.
-      plane.deviations = std::max(0.3, plane.distances.Quantile(0.5) / kBinsPerDeviation / 0.6745);
+      plane.deviations =
+          std::max(0.3, plane.distances.Quantile(0.5) / kBinsPerDeviation / kMadPerSigma);
     }
   }
 

@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -46,9 +48,8 @@ RangeNoise::RangeNoise(std::vector<std::pair<float, float>> observations) {
     for (size_t i = begin; i < end; ++i) noise.push_back(observations[i].second);
     // Windows over edges and clutter look noisier than they are, never quieter: a value below the
     // median.
-    const size_t at = noise.size() * 2 / 5;
-    std::nth_element(noise.begin(), noise.begin() + static_cast<long>(at), noise.end());
-    knots_.emplace_back(observations[(begin + end) / 2].first, noise[at]);
+    knots_.emplace_back(observations[(begin + end) / 2].first,
+                        AtRank(&noise, noise.size() * 2 / 5));
   }
 }
 

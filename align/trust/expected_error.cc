@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 
 double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan) {
@@ -38,12 +40,8 @@ void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, Exp
     positions.push_back(sigma.position);
     rotations.push_back(sigma.rotation);
   }
-  const auto median = [](std::vector<double>* values) {
-    std::nth_element(values->begin(), values->begin() + values->size() / 2, values->end());
-    return (*values)[values->size() / 2];
-  };
-  error->at_cameras = median(&positions);
-  error->rotation = median(&rotations);
+  error->at_cameras = Median(&positions);
+  error->rotation = Median(&rotations);
 }
 
 ExpectedError PropagateError(const SimilarityFit& fit,
@@ -67,10 +65,7 @@ ExpectedError PropagateError(const SimilarityFit& fit,
   std::vector<double> sigmas;
   for (const Eigen::Vector3d& centre : camera_centres)
     sigmas.push_back(PositionSigmaAt(fit, centre));
-  if (!sigmas.empty()) {
-    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
-    error.at_cameras = sigmas[sigmas.size() / 2];
-  }
+  error.at_cameras = Median(&sigmas, error.at_cameras);
   const double rotation2 = fit.covariance.block<3, 3>(3, 3).trace();
   error.rotation = rotation2 >= 0 ? std::sqrt(rotation2) : std::numeric_limits<double>::infinity();
   error.scale = std::sqrt(std::max(fit.covariance(6, 6), 0.0));

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -43,12 +44,6 @@ cv::Mat1f GradientMagnitude(const cv::Mat1f& grey) {
   cv::Scharr(smooth, down, CV_32F, 0, 1, 1.0 / 32);
   cv::magnitude(across, down, magnitude);
   return magnitude;
-}
-
-double Quantile(std::vector<float>* values, double share) {
-  const size_t rank = static_cast<size_t>(share * static_cast<double>(values->size() - 1));
-  std::nth_element(values->begin(), values->begin() + rank, values->end());
-  return (*values)[rank];
 }
 
 bool IsClear(const cv::Mat1f& gradient) {
@@ -248,12 +243,6 @@ class PhotoMatcher {
   std::vector<Patch> patches_;
 };
 
-double MedianOf(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
-
 // By how many standard deviations the share of `a` is higher than that of `b`. Either counts with
 // one more hit and one more miss, so that no hits among few trials are not taken for certain.
 double SigmasAbove(const Tally& a, const Tally& b) {
@@ -264,6 +253,7 @@ double SigmasAbove(const Tally& a, const Tally& b) {
 
 }  // namespace
 
+// By hand: Boost.Math bounds a binomial share by Clopper and Pearson or Jeffreys, not by Wilson.
 double Tally::Low(double sigmas) const {
   if (num == 0) return 0;
   const double n = static_cast<double>(num), p = Share(), z2 = sigmas * sigmas;
@@ -302,8 +292,8 @@ GradientShifts MeasureGradientShifts(const ScanView& view, const cv::Mat& photo,
 GradientAgreement JudgeGradientShifts(const GradientShifts& shifts) {
   GradientAgreement result;
   result.shifts = shifts;
-  result.median_shift_px = MedianOf(shifts.shifts_px);
-  result.median_shift_deg = MedianOf(shifts.shifts_deg);
+  result.median_shift_px = Median(shifts.shifts_px);
+  result.median_shift_deg = Median(shifts.shifts_deg);
   // The ring has three times the area of the disc that it surrounds.
   result.supports = shifts.at_pose.num >= kMinPatches &&
                     SigmasAbove(shifts.at_pose, shifts.elsewhere) >= kClearly &&

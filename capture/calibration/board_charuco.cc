@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -84,8 +85,7 @@ Fit FitLayout(const Board& board, const CharucoLayout& layout,
   cv::perspectiveTransform(in_img, mapped, homography);
   std::vector<double> misses;
   for (size_t i = 0; i < mapped.size(); ++i) misses.push_back(cv::norm(mapped[i] - on_board[i]));
-  std::nth_element(misses.begin(), misses.begin() + misses.size() / 2, misses.end());
-  fit.miss = misses[misses.size() / 2];
+  fit.miss = Median(&misses);
   return fit;
 }
 

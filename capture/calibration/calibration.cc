@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -26,13 +27,6 @@ std::string Number(double value, const char* format = "%.2f") {
   char text[40];
   std::snprintf(text, sizeof(text), format, value);
   return text;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Standard deviation of one coordinate from the median length of the residuals: for two Gaussian

@@ -7,6 +7,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -65,8 +67,7 @@ std::vector<PatternPlane> FindPlanes(std::vector<Point> in_pattern, std::vector<
     }
     plane.matched = static_cast<int>(scales.size());
     if (plane.matched < kLeastOnPlane) break;
-    std::nth_element(scales.begin(), scales.begin() + scales.size() / 2, scales.end());
-    plane.photo_pixels = scales[scales.size() / 2];
+    plane.photo_pixels = Median(&scales);
     planes.push_back(plane);
     in_pattern.swap(rest_pattern);
     in_photo.swap(rest_photo);

@@ -9,6 +9,7 @@
 #include "capture/pattern/pattern_steps.h"
 #include "core/photo.h"
 #include "core/random_stream.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -66,8 +67,7 @@ PatternQuality MeasurePattern(const cv::Mat1b& pattern, const PatternFeatures& f
     ratios.push_back(ratio);
     distinct += ratio < kRatio;
   }
-  std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
-  quality.ratio_median = ratios[ratios.size() / 2];
+  quality.ratio_median = Median(&ratios);
   quality.distinct_share = static_cast<double>(distinct) / static_cast<double>(matches.size());
   quality.num_distinct = static_cast<int>(quality.distinct_share * quality.features);
   return quality;

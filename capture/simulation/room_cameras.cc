@@ -8,6 +8,7 @@
 #include "core/camera_formulas.h"
 #include "core/frames.h"
 #include "core/random_stream.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -102,9 +103,7 @@ std::vector<float> MeterPlaces(const RoomScene& scene, const ProjectedLight* pro
 
 // The value that only 1 % of the places exceed.
 float Brightest(std::vector<float> brightest) {
-  const size_t rank = brightest.size() * 99 / 100;
-  std::nth_element(brightest.begin(), brightest.begin() + rank, brightest.end());
-  return brightest[rank];
+  return AtRank(&brightest, brightest.size() * 99 / 100);
 }
 
 constexpr double kBurnsOut = 0.95;

@@ -3,7 +3,6 @@
 // 0.7 px; poses and points by bundle adjustment), in memory.
 //   build/bin/align_accuracy [rooms, 20]
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -11,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/align/surface/surface_room.h"
 
@@ -115,12 +115,6 @@ const Row kRows[] = {
     {"scan of a similar room", WithScanOfSimilarRoom, false},
     {"similar room, picks on what is the same", WithPicksThatFitSimilarRoom, false},
 };
-
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
-}
 
 struct Counts {
   int trusted = 0, untrusted = 0, refused = 0, wrong_and_trusted = 0;

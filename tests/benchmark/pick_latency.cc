@@ -1,7 +1,6 @@
 // How long the page of roomtex-pick has to wait, on 3 M samples and photos of 20 MP:
 //   pick_latency [FOLDER]    (a folder keeps the simulated capture for the next run)
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -20,6 +19,7 @@
 #include "align/clicks/picks.h"
 #include "capture/simulation/simulated_room.h"
 #include "core/report.h"
+#include "core/statistics.h"
 #include "importers/scan_writer.h"
 
 // After Eigen: what it includes defines a macro _res, a name that Eigen uses.
@@ -129,11 +129,6 @@ class Server {
 
 void Say(const std::string& what, double seconds) {
   std::printf("%-58s %8.0f ms\n", what.c_str(), 1000 * seconds);
-}
-
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 // Repeated changes of the picks: median of what the browser waits, and of what the server says.

@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include <Eigen/Dense>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <gtest/gtest.h>
 
 #include "tests/colmap_ext/simulated_views.h"
@@ -103,6 +104,12 @@ TEST(TwoViewGeometry, ErrorsOfTrueModelsFollowTheChiSquareOfTheNoise) {
     EXPECT_NEAR(epipolar / static_cast<double>(matches.size()), 1.0, 0.12);
     EXPECT_NEAR(position / static_cast<double>(matches.size()), 2.0, 0.2);
   }
+}
+
+// To the digits that they are written with.
+TEST(ChiSquare, QuantilesAreThoseOfTheDistribution) {
+  EXPECT_NEAR(kChiSquare1, quantile(boost::math::chi_squared(1), 0.99), 5e-4);
+  EXPECT_NEAR(kChiSquare2, quantile(boost::math::chi_squared(2), 0.99), 5e-4);
 }
 
 TEST(TwoViewGeometry, RansacFindsTheTrueMatchesAmongOutliers) {

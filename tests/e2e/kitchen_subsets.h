@@ -17,6 +17,7 @@
 #include "colmap_ext/matched_images.h"
 #include "colmap_ext/sparse_model.h"
 #include "colmap_ext/two_view_geometry.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 
@@ -34,8 +35,7 @@ inline std::vector<ModelPlane> LargestPlanes(const SparseModel& model, int count
   const Eigen::Vector3d centre = model.images.begin()->second.cam_from_model.TargetOriginInSource();
   std::vector<double> distances;
   for (const Eigen::Vector3d& x : points) distances.push_back((x - centre).norm());
-  std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-  const double tolerance = 0.006 * distances[distances.size() / 2];
+  const double tolerance = 0.006 * Median(&distances);
   std::mt19937_64 random(1);
   std::vector<ModelPlane> planes;
   for (int k = 0; k < count; ++k) {

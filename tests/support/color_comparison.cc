@@ -9,17 +9,12 @@
 
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
 
 using Bytes = Eigen::Matrix<uint8_t, 3, 1>;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return std::nan("");
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 
 // Median of the ratios, so that wrong vertices do not pull it.
 double FindGain(const std::vector<Bytes>& truth, const PlyVertices& model,
@@ -181,7 +176,7 @@ Json CompareColors(const PlyVertices& truth, const PlyVertices& model,
   json["gain"] = gain;
   json["psnr_db"] = all.Psnr();  // sRGB values, peak 1
   json["psnr_linear_db"] = -10 * std::log10(linear_squares / (3 * count));
-  json["median_difference"] = Median(differences);  // largest channel, sRGB 0..1
+  json["median_difference"] = Median(differences, std::nan(""));  // largest channel, sRGB 0..1
   json["share_wrong"] = all.ShareWrong();
   json["vertex_distance_max_m"] = farthest;
   if (scans.empty()) return json;

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
+#include "core/statistics.h"
 #include "importers/scan_reader.h"
 #include "tests/support/color_comparison.h"
 #include "tests/support/ply_vertices.h"
@@ -23,11 +24,6 @@
 namespace roomtex {
 namespace {
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return std::nan("");
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 double Max(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : *std::max_element(values.begin(), values.end());
 }
@@ -65,9 +61,9 @@ Json ComparePoses(const SparseModel& truth, SparseModel model, bool fit) {
   Json json = Json::object();
   json["num_images"] = truth.images.size();
   json["num_registered"] = position_mm.size();
-  json["position_median_mm"] = Median(position_mm);
+  json["position_median_mm"] = Median(position_mm, std::nan(""));
   json["position_max_mm"] = Max(position_mm);
-  json["rotation_median_deg"] = Median(rotation_deg);
+  json["rotation_median_deg"] = Median(rotation_deg, std::nan(""));
   json["rotation_max_deg"] = Max(rotation_deg);
   json["worst_image"] = worst;
   return json;

@@ -13,6 +13,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -43,8 +44,7 @@ void Compare(const cv::Mat3f& truth, const cv::Mat3f& texture, float* gain, doub
     if (have > 0.05f) ratios.push_back(Sum(truth(i / truth.cols, i % truth.cols)) / have);
   }
   if (ratios.empty()) throw UsageError("the texture is black");
-  std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
-  *gain = ratios[ratios.size() / 2];
+  *gain = Median(&ratios);
   double squares = 0, count = 0, num_wrong = 0;
   auto t = truth.begin();
   for (auto m = texture.begin(); m != texture.end(); ++m, ++t) {

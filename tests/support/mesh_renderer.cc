@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "tests/support/ply_vertices.h"
 
 namespace roomtex {
@@ -89,14 +90,8 @@ RoomBox FindRoomBox(const ColoredMesh& mesh) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Eigen::Vector3d& point : mesh.points) values.push_back(point[axis]);
-    const auto rank = [&](double share) {
-      const auto place =
-          values.begin() + static_cast<long>(share * static_cast<double>(values.size() - 1));
-      std::nth_element(values.begin(), place, values.end());
-      return *place;
-    };
-    box.low[axis] = rank(0.01);
-    box.high[axis] = rank(0.99);
+    box.low[axis] = Quantile(&values, 0.01);
+    box.high[axis] = Quantile(&values, 0.99);
   }
   return box;
 }

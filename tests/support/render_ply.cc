@@ -17,6 +17,7 @@
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/statistics.h"
 #include "tests/support/mesh_renderer.h"
 
 namespace roomtex {
@@ -84,8 +85,7 @@ double EyeHeight(const SparseModel& model, const Eigen::Vector3d& up) {
   for (const auto& [id, image] : model.images) {
     heights.push_back(up.dot(image.cam_from_model.TargetOriginInSource()));
   }
-  std::nth_element(heights.begin(), heights.begin() + heights.size() / 2, heights.end());
-  return heights[heights.size() / 2];
+  return Median(&heights);
 }
 
 Camera PlainCamera(int width, int height, double field_of_view_deg) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "texture/sampling/grid_runs.h"
 
 namespace roomtex {
@@ -112,13 +113,6 @@ void SmoothRuns(const Scan& scan, const GridLinks& links, bool columns, int radi
   });
 }
 
-double Median(std::vector<float>* values) {
-  if (values->empty()) return 0;
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
 // Standard deviation of one sample's range by range: the second difference of inverse range
 // vanishes on a plane, its noise is sqrt(6) times that of one sample. The median shrugs off edges
 // and corners.
@@ -172,7 +166,7 @@ class NoiseByRange {
     float range, sigma;
   };
   static float Sigma(std::vector<float>* sizes) {
-    return static_cast<float>(1.4826 * Median(sizes) / std::sqrt(6.0));
+    return static_cast<float>(kSigmaPerMad * Median(sizes) / std::sqrt(6.0));
   }
   float overall_ = 0;
   std::vector<Node> nodes_;

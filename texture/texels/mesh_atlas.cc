@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/option_fields.h"
+#include "core/statistics.h"
 #include "texture/texels/grid_image.h"
 #include "texture/texels/gutters.h"
 #include "texture/texels/mesh_charts.h"
@@ -239,9 +240,7 @@ double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>&
     }
     if (std::isfinite(least)) finest.push_back(least);
   }
-  if (finest.empty()) return 0;
-  std::nth_element(finest.begin(), finest.begin() + finest.size() / 2, finest.end());
-  return finest[finest.size() / 2];
+  return Median(&finest);
 }
 
 MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics.h"
 #include "texture/texels/texel_pass.h"
 
 namespace roomtex {
@@ -26,9 +27,7 @@ double MedianPixelsPerSample(const PhotoPassInput& input, const ObservationStore
       }
     }
   }
-  if (pixels.empty()) return 0;
-  std::nth_element(pixels.begin(), pixels.begin() + pixels.size() / 2, pixels.end());
-  return pixels[pixels.size() / 2];
+  return Median(&pixels);
 }
 
 int ChooseTextureScale(const std::vector<Scan>& scans, double pixels_per_sample,

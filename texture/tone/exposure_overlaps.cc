@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -14,18 +16,6 @@ struct LogRatio {
   float trust;
   Eigen::Vector4f value;
 };
-
-// The value at which half of the trust lies below; reorders.
-float WeightedMedian(std::vector<std::pair<float, float>>* values_and_trust) {
-  std::sort(values_and_trust->begin(), values_and_trust->end());
-  double total = 0, sum = 0;
-  for (const auto& [value, trust] : *values_and_trust) total += trust;
-  for (const auto& [value, trust] : *values_and_trust) {
-    sum += trust;
-    if (sum >= total / 2) return value;
-  }
-  return values_and_trust->back().first;
-}
 
 Overlap SummariseOverlap(const std::vector<LogRatio>& ratios, int num_photos) {
   Overlap overlap;
@@ -39,7 +29,7 @@ Overlap SummariseOverlap(const std::vector<LogRatio>& ratios, int num_photos) {
     overlap.log_ratio[channel] = WeightedMedian(&values);
   }
   for (auto& [value, trust] : values) value = std::abs(value - overlap.log_ratio[3]);
-  overlap.spread = 1.4826f * WeightedMedian(&values);
+  overlap.spread = static_cast<float>(kSigmaPerMad) * WeightedMedian(&values);
   return overlap;
 }
 

@@ -9,6 +9,8 @@
 
 #include <meshoptimizer.h>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -93,9 +95,7 @@ void Measure(const ViewModel& model, const uint32_t* triangles, ViewChunk* chunk
     }
     if (i % 16 == 0) edges.push_back((model.points[t[0]] - model.points[t[1]]).norm());
   }
-  const auto middle = edges.begin() + static_cast<long>(edges.size() / 2);
-  std::nth_element(edges.begin(), middle, edges.end());
-  chunk->spacing = *middle;
+  chunk->spacing = Median(&edges);
 }
 
 // Triangles in an order in which a graphics card computes each point once or twice, points in the

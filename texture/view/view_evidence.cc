@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -68,14 +70,6 @@ class NearestPoint {
   std::vector<size_t> begin_;
 };
 
-double Percentile(std::vector<float> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<long>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 std::vector<float> Finite(const std::vector<float>& values) {
   std::vector<float> finite;
   std::copy_if(values.begin(), values.end(), std::back_inserter(finite),
@@ -90,9 +84,9 @@ uint8_t Byte(double value, double largest) {
 }  // namespace
 
 ViewEvidence::ViewEvidence(const ViewModel& model, const Evidence& evidence) {
-  intensity_low_ = Percentile(Finite(evidence.intensity), 0.01);
-  intensity_high_ = Percentile(Finite(evidence.intensity), 0.99);
-  disagreement_high_ = std::max(1.0, Percentile(Finite(evidence.disagreement), 0.98));
+  intensity_low_ = Quantile(Finite(evidence.intensity), 0.01);
+  intensity_high_ = Quantile(Finite(evidence.intensity), 0.99);
+  disagreement_high_ = std::max<double>(1.0, Quantile(Finite(evidence.disagreement), 0.98));
   for (const uint8_t views : evidence.views) max_views_ = std::max<int>(max_views_, views);
   const double width = std::max(intensity_high_ - intensity_low_, 1e-9);
   const NearestPoint nearest(evidence.points, model.origin, kMaxDistance);

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "tests/benchmark/planar/in_process_table.h"
 #include "tests/benchmark/planar/pose_judge.h"
 #include "tests/benchmark/planar/program_run.h"
@@ -121,12 +122,10 @@ std::vector<BothOutcomes> RunRow(const PlanarSet& set, const EndToEndOptions& op
   return outcomes;
 }
 
-double MedianOf(std::vector<double> values) {
+double MedianOfKnown(std::vector<double> values) {
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return std::isnan(v); }),
                values.end());
-  if (values.empty()) return std::nan("");
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
+  return Median(&values, std::nan(""));
 }
 
 // Sums and medians of one program over the sets of a row.
@@ -163,9 +162,9 @@ struct RowNumbers {
         worst_centre_error = std::max(worst_centre_error, outcome.verdict.centre_errors.back());
       }
     }
-    centre_error = MedianOf(centre);
-    rotation_error_deg = MedianOf(rotation);
-    reprojection_error_px = MedianOf(reprojection);
+    centre_error = MedianOfKnown(centre);
+    rotation_error_deg = MedianOfKnown(rotation);
+    reprojection_error_px = MedianOfKnown(reprojection);
   }
 };
 

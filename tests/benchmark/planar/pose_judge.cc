@@ -8,14 +8,12 @@
 #include <Eigen/Eigenvalues>
 
 #include "colmap_ext/seed_bundle.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
 
-double Median(const std::vector<double>& ascending) {
-  return ascending.empty() ? std::numeric_limits<double>::quiet_NaN()
-                           : ascending[ascending.size() / 2];
-}
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // The true motion and its right observations.
 struct TrueSeed {
@@ -167,7 +165,7 @@ Similarity AlignToTruth(const SparseModel& model, const SimulatedViews& views,
     result = all.Fit(rotation);
     std::vector<double> sorted = PointErrors(known, views, result);
     std::sort(sorted.begin(), sorted.end());
-    limit = Median(sorted);
+    limit = Median(sorted, kNaN);
   }
   return result;
 }
@@ -207,8 +205,8 @@ bool PairVerdict::Identifiable() const {
          3 * uncertainty.baseline_deg <= kMaxUncertainBaselineDeg && Within(optimum_from_truth);
 }
 
-double ModelVerdict::MedianCentreError() const { return Median(centre_errors); }
-double ModelVerdict::MedianRotationErrorDeg() const { return Median(rotation_errors_deg); }
+double ModelVerdict::MedianCentreError() const { return Median(centre_errors, kNaN); }
+double ModelVerdict::MedianRotationErrorDeg() const { return Median(rotation_errors_deg, kNaN); }
 
 ModelVerdict JudgeModel(SparseModel model, const SimulatedViews& views) {
   ModelVerdict verdict;
@@ -243,7 +241,7 @@ ModelVerdict JudgeModel(SparseModel model, const SimulatedViews& views) {
   std::sort(verdict.rotation_errors_deg.begin(), verdict.rotation_errors_deg.end());
   std::vector<double> point_errors = PointErrors(known, views, scene_from_model);
   std::sort(point_errors.begin(), point_errors.end());
-  verdict.median_point_error = Median(point_errors);
+  verdict.median_point_error = Median(point_errors, kNaN);
   verdict.poses_right = scene_from_model.scale > 0 &&
                         verdict.centre_errors.back() < std::min(kMaxCentreError, 0.2 * extent) &&
                         verdict.max_relative_rotation_error_deg < kMaxViewRotationDeg &&

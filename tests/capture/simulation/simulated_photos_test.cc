@@ -13,16 +13,11 @@
 #include "core/photo.h"
 #include "core/ray_caster.h"
 #include "core/scan_mesh.h"
+#include "core/statistics.h"
 #include "tests/capture/simulation/small_room.h"
 
 namespace roomtex {
 namespace {
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return std::nan("");
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 
 struct ColorErrors {
   size_t count = 0;
@@ -54,7 +49,7 @@ ColorErrors CompareWithTruth(const SimulatedRoom& room, int photo, const cv::Mat
       absolute.push_back(std::abs(differences.back()));
     }
   }
-  return {differences.size(), Median(absolute), Median(differences)};
+  return {differences.size(), Median(absolute, std::nan("")), Median(differences, std::nan(""))};
 }
 
 int CountSiftFeatures(const SimulatedRoom& room, int photo) {

@@ -14,6 +14,7 @@
 #include "capture/simulation/simulated_room.h"
 #include "core/frames.h"
 #include "core/photo.h"
+#include "core/statistics.h"
 #include "tests/support/temp_folder.h"
 #include "texture/colorize.h"
 
@@ -108,8 +109,7 @@ class CameraFaults : public testing::Test {
         ratios.push_back(truth[i][1] / linear[grid.rgb[i][1]]);
       }
     }
-    std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
-    const double gain = ratios[ratios.size() / 2];
+    const double gain = Median(&ratios);
     double squares = 0, count = 0;
     for (size_t i = 0; i < truth.size(); ++i) {
       if (grid.views[i] == 0) continue;
