@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "colmap_ext/two_view_geometry.h"
+#include "core/similarity.h"
 
 namespace roomtex {
 namespace {
@@ -182,7 +183,7 @@ double MedianParallax(const std::vector<RayMatch>& matches) {
     for (size_t i = 0; i < matches.size(); ++i) {
       const Eigen::Vector3d turned = *rotation * matches[i].left.Direction();
       const Eigen::Vector3d seen = matches[i].right.Direction();
-      angles[i] = std::atan2(turned.cross(seen).norm(), turned.dot(seen));
+      angles[i] = AngleBetween(turned, seen);
     }
     std::iota(used.begin(), used.end(), 0);
     std::stable_sort(used.begin(), used.end(), [&](int a, int b) { return angles[a] < angles[b]; });

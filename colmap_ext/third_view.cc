@@ -9,6 +9,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include "core/frames.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -38,11 +39,7 @@ std::vector<Rigid> SolveThreePoints(const Points& points,
     cv::cv2eigen(rotations[i], axis);
     cv::cv2eigen(translations[i], translation);
     if (!axis.allFinite() || !translation.allFinite()) continue;
-    const double angle = axis.norm();
-    Rigid pose;
-    if (angle > 1e-12) pose.rotation = Eigen::AngleAxisd(angle, axis / angle);
-    pose.translation = translation;
-    poses.push_back(pose);
+    poses.push_back({RotationFromVector(axis), translation});
   }
   return poses;
 }

@@ -44,7 +44,7 @@ double TriangulationAngle(const Rigid& right_from_left, const InverseDepthPoint&
   const Eigen::Vector3d to_left(point.x(), point.y(), 1.0);
   // From the right camera's centre, times w: the same formula for near and far points.
   const Eigen::Vector3d to_right = to_left - point.z() * right_from_left.TargetOriginInSource();
-  return std::atan2(to_left.cross(to_right).norm(), to_left.dot(to_right));
+  return AngleBetween(to_left, to_right);
 }
 
 }  // namespace roomtex

@@ -25,6 +25,7 @@ enum class CameraModel {
   kThinPrismFisheye = 10,    // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
 };
 inline constexpr int kNumCameraModels = 11;
+inline constexpr int kMaxCameraParams = 12;  // that any of them has
 
 // Number of parameters; model ids outside 0..10 give -1.
 int NumCameraParams(int model_id);

@@ -91,6 +91,10 @@ Similarity FitSimilarity(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd&
   return similarity;
 }
 
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
 double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return a.angularDistance(b);
 }

@@ -53,6 +53,8 @@ Similarity ScanFromSparse(const Rigid& cam_from_scan, const Rigid& cam_from_spar
 // least three, not collinear.
 Similarity FitSimilarity(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target);
 
+// Angle between two directions of any length, radians in [0, pi]; exact for small ones, too.
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 // Angle of the rotation between two, radians in [0, pi].
 double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 

@@ -18,7 +18,6 @@ namespace {
 constexpr char kHeader[] = "image_name,x,y,scan_x,scan_y,scan_z";
 constexpr int kNumFields = 6;  // and a seventh, the weight, where the header has it
 constexpr char kWeight[] = "weight";
-constexpr double kMaxWeight = 1000;
 constexpr size_t kMaxLineLength = 64 * 1024;
 const char* const kFieldNames[kNumFields] = {"image_name", "x", "y", "scan_x", "scan_y", "scan_z"};
 
@@ -133,7 +132,7 @@ Pick ParsePick(const std::string& path, long line_number, const std::string& lin
     }
     values[i - 1] = *value;
   }
-  if (!(values[5] >= 0 && values[5] <= kMaxWeight)) {
+  if (!(values[5] >= 0 && values[5] <= kMaxPickWeight)) {
     throw InputError(
         path, LinePosition(line_number),
         std::string(kWeight) + " is " + Quoted((*fields)[kNumFields]),

@@ -27,6 +27,8 @@ struct Pick {
 
 // The fewest picks in one photo that fix its pose (thesis 7.1.1).
 inline constexpr int kMinPicksPerPhoto = 6;
+// The largest weight that a file or the window may give: a typing error is larger.
+inline constexpr double kMaxPickWeight = 1000;
 
 // Throws InputError with the line: no header, wrong number of fields, not a finite number, a
 // negative weight, the same pixel or the same scan point picked twice in one photo.

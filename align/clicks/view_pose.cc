@@ -14,7 +14,6 @@ namespace roomtex {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kMaxCameraParams = 12;
 constexpr double kMinDepth = 1e-6;  // metres in front of the camera
 
 // Undistorted normalised coordinates of the clicks that have any, with their scan points.

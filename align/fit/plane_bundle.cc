@@ -8,9 +8,12 @@
 #include <set>
 
 #include "align/fit/bent_model.h"
+#include "align/fit/plane_bundle_costs.h"
 #include "align/fit/plane_bundle_round.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -35,13 +38,6 @@ constexpr double kMaxReprojectionGrowth = 4, kMaxReprojectionRise_px = 4;
 // ... and the picks may miss by so many standard deviations (rms), or this share of the photo's
 // diagonal if that is more (as TrustOptions::PickRmsLimit).
 constexpr double kMaxPickDeviations = 6, kMaxPickShare = 0.004;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
 
 std::string Number(double value, int digits) {
   char text[64];
@@ -77,16 +73,13 @@ double ImageNoise(const SparseModel& model) {
   const double num_unknowns =
       3.0 * static_cast<double>(num_points) + 6.0 * static_cast<double>(model.images.size());
   const double free_share = std::max(0.2, 1 - num_unknowns / std::max(1.0, num_equations));
-  // Median of a Rayleigh distribution: 1.1774 sigma.
-  return std::max(0.1, Median(std::move(errors)) / 1.1774 / std::sqrt(free_share));
+  return std::max(0.1, Median(std::move(errors)) / kMedianLengthPerSigma / std::sqrt(free_share));
 }
 
 double ImageCost(const SparseModel& model, double sigma_px) {
-  constexpr double kHuber = 2.5;
   double cost = 0;
   for (const double distance : ReprojectionDistances(model)) {
-    const double r = distance / sigma_px;
-    cost += r < kHuber ? r * r : kHuber * (2 * r - kHuber);
+    cost += HuberCost(distance / sigma_px, kReprojectionHuber);
   }
   return cost;
 }

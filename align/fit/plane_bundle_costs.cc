@@ -2,65 +2,16 @@
 
 #include <cmath>
 
-#include <ceres/jet.h>
-
-#include "core/camera_formulas.h"
+#include "core/projection_jacobian.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
 
-constexpr int kMaxCameraParams = 12;
 constexpr double kMinDepth = 1e-3;  // metres in front of the camera
 
 using RowMatrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using RowMatrix26 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
-
-Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d cross;
-  cross << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return cross;
-}
-
-// exp(w) and the matrix L of exp(w + L^-1 e) ~ exp(e) exp(w): the left Jacobian of the rotations.
-void Rotation(const Eigen::Vector3d& w, Eigen::Matrix3d* rotation, Eigen::Matrix3d* left) {
-  const double angle2 = w.squaredNorm();
-  double a = 1 - angle2 / 6, b = 0.5 - angle2 / 24, c = 1.0 / 6 - angle2 / 120;
-  if (angle2 > 1e-6) {
-    const double angle = std::sqrt(angle2);
-    a = std::sin(angle) / angle;
-    b = (1 - std::cos(angle)) / angle2;
-    c = (1 - a) / angle2;
-  }
-  const Eigen::Matrix3d cross = Cross(w), cross2 = cross * cross;
-  *rotation = Eigen::Matrix3d::Identity() + a * cross + b * cross2;
-  *left = Eigen::Matrix3d::Identity() + b * cross + c * cross2;
-}
-
-// Position in `img` of the ray (x, y, 1) and its derivatives by (x, y).
-void Project(const Camera& camera, const double* params, double x, double y,
-             Eigen::Vector2d* x_in_img, Eigen::Matrix2d* by_ray) {
-  using Jet = ceres::Jet<double, 2>;
-  Jet jets[kMaxCameraParams], img[2];
-  for (size_t i = 0; i < camera.params.size(); ++i) jets[i] = Jet(params[i]);
-  camera_formulas::Project(camera.model, jets, Jet(x, 0), Jet(y, 1), &img[0], &img[1]);
-  for (int i = 0; i < 2; ++i) {
-    (*x_in_img)[i] = img[i].a;
-    by_ray->row(i) = img[i].v.transpose();
-  }
-}
-
-// Derivatives of the position in `img` by the camera's parameters; 2 x n, by rows.
-void ProjectByParams(const Camera& camera, const double* params, double x, double y, double weight,
-                     double* jacobian) {
-  using Jet = ceres::Jet<double, kMaxCameraParams>;
-  const int n = static_cast<int>(camera.params.size());
-  Jet jets[kMaxCameraParams], img[2];
-  for (int i = 0; i < n; ++i) jets[i] = Jet(params[i], i);
-  camera_formulas::Project(camera.model, jets, Jet(x), Jet(y), &img[0], &img[1]);
-  for (int row = 0; row < 2; ++row) {
-    for (int i = 0; i < n; ++i) jacobian[row * n + i] = weight * img[row].v[i];
-  }
-}
 
 }  // namespace
 
@@ -84,11 +35,8 @@ PoseParameters::PoseParameters(const Rigid& cam_from_scan)
 
 Rigid PoseParameters::CamFromScan() const {
   const Eigen::Map<const Eigen::Vector3d> w(values), centre(values + 3);
-  const double angle = w.norm();
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  if (angle > 0) turn = Eigen::AngleAxisd(angle, w / angle);
   Rigid cam_from_scan;
-  cam_from_scan.rotation = (turn * start_rotation).normalized();
+  cam_from_scan.rotation = (RotationFromVector(w) * start_rotation).normalized();
   cam_from_scan.translation = -(cam_from_scan.rotation * centre);
   return cam_from_scan;
 }
@@ -113,33 +61,34 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   const Eigen::Map<const Eigen::Vector3d> w(parameters[0]), centre(parameters[0] + 3);
   const Eigen::Map<const Eigen::Vector3d> q(parameters[1]);
   const double* const intrinsics = refine_intrinsics_ ? parameters[2] : camera_.params.data();
-  Eigen::Matrix3d turn, left;
-  Rotation(w, &turn, &left);
-  const Eigen::Matrix3d rotation = turn * pose_.start_matrix;
+  const RotationAndJacobian turn = RotationWithJacobian(w);
+  const Eigen::Matrix3d rotation = turn.rotation * pose_.start_matrix;
   const Eigen::Vector3d p = rotation * (q - centre);
   if (!(p.z() > kMinDepth)) return false;
   const double x = p.x() / p.z(), y = p.y() / p.z();
-  Eigen::Vector2d x_in_img;
-  Eigen::Matrix2d by_ray;
-  Project(camera_, intrinsics, x, y, &x_in_img, &by_ray);
+  const int num_params = static_cast<int>(camera_.params.size());
+  const auto seen = ProjectRay<0>(camera_.model, intrinsics, num_params, x, y);
   Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = weight_ * (x_in_img - x_in_img_);
+  residual = weight_ * (seen.x_in_img - x_in_img_);
   if (!residual.allFinite()) return false;
   if (jacobians == nullptr) return true;
 
   RowMatrix23 ray_by_p;
   ray_by_p << 1, 0, -x, 0, 1, -y;
-  const RowMatrix23 by_p = weight_ / p.z() * by_ray * ray_by_p;
+  const RowMatrix23 by_p = weight_ / p.z() * seen.by_ray * ray_by_p;
   const RowMatrix23 by_q = by_p * rotation;
   if (jacobians[0] != nullptr) {
     Eigen::Map<RowMatrix26> by_pose(jacobians[0]);
     // p = exp(w) p0: a small step dw turns p by L dw, which moves it by (L dw) x p.
-    by_pose.leftCols<3>() = -by_p * Cross(p) * left;
+    by_pose.leftCols<3>() = -by_p * CrossMatrix(p) * turn.left_jacobian;
     by_pose.rightCols<3>() = -by_q;
   }
   if (jacobians[1] != nullptr) Eigen::Map<RowMatrix23>{jacobians[1]} = by_q;
   if (refine_intrinsics_ && jacobians[2] != nullptr) {
-    ProjectByParams(camera_, intrinsics, x, y, weight_, jacobians[2]);
+    using ByParams = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto seen_by = ProjectRay<kMaxCameraParams>(camera_.model, intrinsics, num_params, x, y);
+    Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
+        weight_ * seen_by.by_params.leftCols(num_params);
   }
   return true;
 }

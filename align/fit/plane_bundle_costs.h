@@ -11,6 +11,10 @@
 
 namespace roomtex {
 
+// Reprojection and click errors beyond this many standard deviations count linearly (Huber 1964),
+// in the adjustment and in what is said of its result.
+inline constexpr double kReprojectionHuber = 2.5;
+
 // Thesis (C.3): (beta / sqrt 2) * n . (q - t), twice: point q (3 parameters, `scan`, metres) off
 // the plane (t, n); beta in pixels per metre, residuals in pixels. Jacobian: twice (beta / sqrt 2)
 // * n^T. One row beta * n . (q - t) would have the same cost and gradient; two rows, like those of

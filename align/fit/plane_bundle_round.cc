@@ -14,12 +14,11 @@
 
 #include "align/fit/plane_bundle_costs.h"
 #include "core/camera_formulas.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
 
-// Reprojection and click errors beyond this many standard deviations count linearly (Huber 1964).
-constexpr double kHuber = 2.5;
 // Scale of Cauchy's loss for distances from the surface, in their standard deviations.
 constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
@@ -30,19 +29,11 @@ constexpr size_t kMaxDensePhotos = 80;
 // How well the given intrinsics are believed when they are refined: weak, but keeps parameters that
 // the photos say nothing about. Focal lengths and principal point as a share of the focal length.
 constexpr double kLinearPrior = 0.02, kDistortionPrior = 0.05;
-constexpr int kMaxCameraParams = 12;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
 
 class RoundProblem {
  public:
   RoundProblem(const BundleRound& round, const SparseModel& model)
-      : round_(round), model_(model), reprojection_loss_(kHuber * round.sigma_px) {
+      : round_(round), model_(model), reprojection_loss_(kReprojectionHuber * round.sigma_px) {
     ceres::Problem::Options options;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;
@@ -175,7 +166,7 @@ class RoundProblem {
       deviations.push_back(std::abs(c.Distance(model_.points.at(c.point3d_id).x_in_model)) /
                            c.sigma);
     }
-    const double typical = std::max(1.0, 1.4826 * Median(deviations));
+    const double typical = std::max(1.0, kSigmaPerMad * Median(deviations));
     for (const SurfaceConstraint& c : round_.constraints) {
       const auto at = point_index_.find(c.point3d_id);
       if (at == point_index_.end()) continue;

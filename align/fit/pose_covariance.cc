@@ -1,6 +1,5 @@
 #include "align/fit/pose_covariance.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -10,12 +9,10 @@
 
 #include "align/fit/plane_bundle_costs.h"
 #include "align/surface/surface_cells.h"
+#include "core/robust_kernel.h"
 
 namespace roomtex {
 namespace {
-
-// Residuals beyond this many standard deviations count less, as in the adjustment.
-constexpr double kHuber = 2.5;
 
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
 
@@ -97,7 +94,7 @@ class ReducedSystem {
     double* jacobians[2] = {terms->by_pose.data(), terms->by_point.data()};
     if (!cost.Evaluate(parameters, residual.data(), jacobians)) return false;
     const double deviations = residual.norm();
-    const double weight = deviations > kHuber ? std::sqrt(kHuber / deviations) : 1;
+    const double weight = std::sqrt(HuberWeight(deviations, kReprojectionHuber));
     terms->by_pose *= weight;
     terms->by_point *= weight;
     return terms->by_pose.allFinite() && terms->by_point.allFinite();

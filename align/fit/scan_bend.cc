@@ -7,6 +7,9 @@
 #include <Eigen/Cholesky>
 
 #include "core/frames.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -19,24 +22,13 @@ using Matrix = Eigen::Matrix<double, kNumUnknowns, kNumUnknowns>;
 
 constexpr int kNumSteps = 40;
 constexpr size_t kMinMatches = 200;
-// Metres; what remains of every distance beyond the known noise.
-constexpr double kSurfaceNoise = 0.001;
 constexpr double kReach = 0.12;  // metres; matches farther off are none
 constexpr double kGate = 4.0;    // standard deviations, Tukey's biweight
-constexpr double kHuber = 2.0;   // of clicks
-constexpr double kScalePrior = 0.05;
 // Standard deviations of the coefficients to start from: larger than any that is expected.
 constexpr double kStartSigma = 0.005;
 constexpr double kLeastSigma = 1e-6;
 // A bend of more than this share of the ranges (rms) is no bend but a wrong alignment.
 constexpr double kMaxBend = 0.05;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
 
 // Real spherical harmonics of degree 1 to 4, of mean square 1 over the sphere.
 void Harmonics(const Eigen::Vector3d& u, double* values) {
@@ -191,14 +183,7 @@ class BendSolver {
  private:
   State Moved(const State& state, const Vector& step) const {
     State moved = state;
-    const Eigen::Vector3d w = step.segment<3>(3);
-    const double angle = w.norm();
-    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-    if (angle > 0) turn = Eigen::AngleAxisd(angle, w / angle);
-    const Similarity& s = state.scan_from_sparse;
-    const double growth = std::exp(step[6]);
-    moved.scan_from_sparse = {s.scale * growth, (turn * s.rotation).normalized(),
-                              pivot_ + growth * (turn * (s.translation - pivot_)) + step.head<3>()};
+    moved.scan_from_sparse = roomtex::Moved(state.scan_from_sparse, pivot_, step.head<7>());
     moved.bend.coefficients += step.tail<kNumBend>();
     return moved;
   }
@@ -227,7 +212,7 @@ class BendSolver {
           {static_cast<int>(i), nearest->patch, nearest->distance, std::sqrt(variance)});
       deviations.push_back(std::abs(nearest->distance) / matches_.back().sigma);
     }
-    inflation_ = std::max(1.0, 1.4826 * Median(deviations));
+    inflation_ = std::max(1.0, kSigmaPerMad * Median(deviations));
   }
 
   void AddMatches(const State& state, Matrix* normal, Vector* gradient) const {
@@ -236,9 +221,9 @@ class BendSolver {
       const Eigen::Vector3d q = state.scan_from_sparse * points_[match.point].x_in_sparse;
       const Eigen::Vector3d arm = q - pivot_;
       const double sigma = inflation_ * match.sigma;
-      const double u = match.distance / (kGate * sigma);
-      if (!(u * u < 1)) continue;
-      const double weight = std::pow((1 - u * u) / sigma, 2);
+      const double root = TukeyRootWeight(match.distance, kGate * sigma);
+      if (!(root > 0)) continue;
+      const double weight = std::pow(root / sigma, 2);
       Eigen::Matrix<double, 1, kNumUnknowns> jacobian;
       jacobian << patch.normal.transpose(), arm.cross(patch.normal).transpose(),
           patch.normal.dot(arm), patch.normal.transpose() * state.bend.Basis(q);
@@ -275,8 +260,7 @@ class BendSolver {
       if (!valid) continue;
       const double sigma_px = pick_sigma_px_ / picks_[i].weight;
       const double deviations = error->norm() / sigma_px;
-      const double weight =
-          (deviations > kHuber ? kHuber / deviations : 1.0) / (sigma_px * sigma_px);
+      const double weight = HuberWeight(deviations, kClickHuber) / (sigma_px * sigma_px);
       *normal += weight * jacobian.transpose() * jacobian;
       *gradient += weight * jacobian.transpose() * *error;
     }

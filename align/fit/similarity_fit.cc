@@ -9,44 +9,22 @@
 #include <Eigen/Eigenvalues>
 
 #include "align/surface/surface_cells.h"
+#include "core/frames.h"
 #include "core/option_fields.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
 
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// A click farther off than this many standard deviations counts linearly (Huber 1964: 1.345 to 2).
-constexpr double kHuber = 2.0;
-// How well the start's scale is believed, as a share: only speaks where nothing else fixes the
-// scale.
-constexpr double kScalePrior = 0.05;
 // The gate shrinks by this factor per step.
 constexpr double kGateShrink = 0.8;
-// Metres; what remains of every distance beyond the known noise (waviness of patches, slight
-// bends).
-constexpr double kSurfaceNoise = 0.001;
 // Cells of the surface with fewer points say nothing about the accuracy of the fit.
 constexpr int kMinPointsOfCell = 5;
 constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
-
-// x' = x + dt + w x (x - pivot) + ds (x - pivot), for small w and ds; exact rotation and scale.
-Similarity Moved(const Similarity& s, const Eigen::Vector3d& pivot, const Vector7d& step) {
-  const Eigen::Vector3d w = step.segment<3>(3);
-  const double angle = w.norm();
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  if (angle > 0) turn = Eigen::AngleAxisd(angle, w / angle);
-  const double growth = std::exp(step[6]);
-  return {s.scale * growth, (turn * s.rotation).normalized(),
-          pivot + growth * (turn * (s.translation - pivot)) + step.head<3>()};
-}
 
 // Picks with what their projection needs.
 class PickTerms {
@@ -115,7 +93,7 @@ void AddPicks(const PickTerms& terms, const std::vector<bool>& used, double sigm
     if (!error.allFinite() || !jacobian.allFinite()) continue;
     const double own_sigma_px = sigma_px / terms.Weight(i);
     const double deviations = error.norm() / own_sigma_px;
-    const double weight = deviations > kHuber ? kHuber / deviations : 1.0;
+    const double weight = HuberWeight(deviations, kClickHuber);
     normal->Add<2>(jacobian, error, weight / (own_sigma_px * own_sigma_px));
   }
 }
@@ -195,8 +173,8 @@ void AddDistance(const Match& match, const Eigen::Vector3d& x_in_scan,
 
 // Tukey's biweight: what lies beyond the gate does not pull.
 double TukeyWeight(double distance, double gate) {
-  const double u = distance / gate;
-  return u * u < 1 ? (1 - u * u) * (1 - u * u) : 0;
+  const double root = TukeyRootWeight(distance, gate);
+  return root * root;
 }
 
 // How far the surface is off as a whole within a cell, metres^2: the spread of the cells' median
@@ -213,10 +191,9 @@ double CommonVariance(const std::vector<Match>& matches, const SurfaceCells& cel
   for (auto& [cell, values] : distances) {
     const auto n = static_cast<double>(values.size());
     // The variance of a median is pi / 2 times that of a mean.
-    excess.push_back(std::pow(Median(values), 2) - M_PI / 2 * Median(variances[cell]) / n);
+    excess.push_back(std::pow(Median(values), 2) - kPi / 2 * Median(variances[cell]) / n);
   }
-  // Median of the square of a normal variable: 0.4549 variances.
-  return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / 0.4549);
+  return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / kMedianSquarePerVariance);
 }
 
 // Fills what the fit knows about its own accuracy, at its solution.
@@ -382,7 +359,7 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
     }
     // What the distances say about themselves: a model that is bent, or a scan with more noise than
     // assumed, must not outvote the picks.
-    const double inflation = std::max(1.0, 1.4826 * Median(deviations));
+    const double inflation = std::max(1.0, kSigmaPerMad * Median(deviations));
     Normal normal;
     for (const Match& match : matches) {
       const double own_gate = std::min(options.max_gate, std::max(gate, 3 * match.sigma));
@@ -398,7 +375,7 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
     if (!(std::abs(fit.scan_from_sparse.scale / start.scale - 1) < options.max_scale_change)) {
       return fit;
     }
-    const double last_gate = std::max(options.min_gate, 4 * 1.4826 * Median(distances));
+    const double last_gate = std::max(options.min_gate, 4 * kSigmaPerMad * Median(distances));
     fit.converged = IsTiny(step) && gate <= last_gate;
     gate = std::max(kGateShrink * gate, std::min(gate, last_gate));
   }

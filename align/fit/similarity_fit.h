@@ -20,6 +20,15 @@
 namespace roomtex {
 
 class OptionFields;
+// What every fit of a model to the scan assumes, with and without a bend (scan_bend.h).
+// A click farther off than this many standard deviations counts linearly (Huber 1964: 1.345 to 2).
+inline constexpr double kClickHuber = 2.0;
+// How well the start's scale is believed, as a share: only speaks where nothing else fixes the
+// scale.
+inline constexpr double kScalePrior = 0.05;
+// Metres; what remains of every distance beyond the known noise (waviness of patches, slight
+// bends).
+inline constexpr double kSurfaceNoise = 0.001;
 
 // A sparse point that takes part, with what its observations say about its own accuracy. (Of a
 // model that is in the scan frame already, read `scan` for `sparse`.)

@@ -7,6 +7,8 @@
 #include <Eigen/LU>
 #include <opencv2/calib3d.hpp>
 
+#include "core/twist.h"
+
 namespace roomtex {
 namespace {
 
@@ -49,16 +51,6 @@ Vector6d Errors(const CameraProjection& projection, const PointPairs& pairs, con
     if (x) errors.segment<2>(2 * i) = *x - pairs.x_in_img.col(i);
   }
   return errors;
-}
-
-Rigid Moved(const Rigid& pose, const Vector6d& step) {
-  const Eigen::Vector3d w = step.head<3>();
-  Rigid moved = pose;
-  if (w.norm() > 0) {
-    moved.rotation = (Eigen::AngleAxisd(w.norm(), w.normalized()) * pose.rotation).normalized();
-  }
-  moved.translation += step.tail<3>();
-  return moved;
 }
 
 // Six equations, six unknowns: Newton's steps take away what the closed form leaves by rounding.
@@ -107,8 +99,7 @@ std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const 
     }
     if (!axis.allFinite() || !translation.allFinite()) continue;
     ViewPose pose;
-    const double angle = axis.norm();
-    if (angle > 0) pose.cam_from_scan.rotation = Eigen::AngleAxisd(angle, axis / angle);
+    pose.cam_from_scan.rotation = RotationFromVector(axis);
     pose.cam_from_scan.translation = translation - pose.cam_from_scan.rotation * centre;
     Polish(projection, pairs, &pose.cam_from_scan);
     pose.residual_px = PickResiduals(projection, pairs, pose.cam_from_scan);

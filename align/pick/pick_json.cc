@@ -8,7 +8,6 @@ namespace roomtex {
 namespace {
 
 constexpr size_t kMaxPicks = 2000;
-constexpr double kMaxWeight = 1000;     // as in a picks file
 constexpr double kMaxCoordinate = 1e8;  // metres; the Earth is 1.3e7 across
 constexpr int kMaxShownName = 60;
 
@@ -139,7 +138,7 @@ SessionPick ParsePick(const Json& json, const std::string& what, const PickScene
     throw UsageError(what + " has a place neither in the photo nor in the scan.");
   }
   if (const Json& weight = Member(json, "weight"); !weight.is_null()) {
-    pick.weight = ParseNumber(weight, what + ".weight", 0, kMaxWeight);
+    pick.weight = ParseNumber(weight, what + ".weight", 0, kMaxPickWeight);
   }
   return pick;
 }

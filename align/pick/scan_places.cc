@@ -5,6 +5,8 @@
 #include <limits>
 
 #include "align/trust/scan_view.h"
+#include "core/similarity.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -16,16 +18,6 @@ constexpr int kThinSamples = 20000;       // that the search for a direction sta
 constexpr double kMaxOffGrid = 3;         // steps between samples that a direction may be off
 constexpr double kSlack = 1e-6;           // share of a cell that its solution may be outside
 constexpr double kMaxRowsMissing = 0.02;  // of all: rows with fewer neighbours do not tell steps
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-double MedianOf(std::vector<double>* values) {
-  if (values->empty()) return 0;
-  std::nth_element(values->begin(), values->begin() + values->size() / 2, values->end());
-  return (*values)[values->size() / 2];
-}
 
 // What the neighbours in the grid say about how it lies before the viewer.
 struct Layout {
@@ -62,15 +54,13 @@ Layout FindLayout(const Scan& scan) {
       }
     }
     if (steps.size() > kMaxRowsMissing * columns / column_stride) {
-      steps_of_rows.push_back(MedianOf(&steps));
+      steps_of_rows.push_back(Median(&steps));
     }
   }
-  layout.row_step = MedianOf(&row_steps);
+  layout.row_step = Median(&row_steps);
   if (!steps_of_rows.empty()) {
     // Columns meet at the poles; near the horizon they are farthest apart.
-    const size_t at = steps_of_rows.size() * 95 / 100;
-    std::nth_element(steps_of_rows.begin(), steps_of_rows.begin() + at, steps_of_rows.end());
-    layout.column_step = steps_of_rows[at];
+    layout.column_step = AtRank(&steps_of_rows, steps_of_rows.size() * 95 / 100);
   }
   return layout;
 }

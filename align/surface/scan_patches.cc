@@ -6,7 +6,9 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "align/surface/visit_triangle.h"
 #include "core/option_fields.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -95,19 +97,9 @@ void VisitSurface(const Scan& scan, double spacing,
     }
     return;
   }
-  constexpr int kMaxSteps = 2000;  // along an edge: keeps one absurd triangle from taking hours
   for (const Triangle& t : scan.triangles) {
-    const Eigen::Vector3d& a = scan.points[t[0]];
-    const Eigen::Vector3d ab = scan.points[t[1]] - a, ac = scan.points[t[2]] - a;
-    const double longest = std::max({ab.norm(), ac.norm(), (ab - ac).norm()});
-    if (!std::isfinite(longest)) continue;
-    const int steps = std::clamp(static_cast<int>(std::ceil(longest / spacing)), 1, kMaxSteps);
-    for (int i = 0; i < steps; ++i) {
-      for (int k = 0; i + k < steps; ++k) {
-        // Centre of a small triangle: no point lies on an edge and is met twice.
-        visit(a + (i + 1.0 / 3) / steps * ab + (k + 1.0 / 3) / steps * ac);
-      }
-    }
+    VisitTriangle(scan.points[t[0]], scan.points[t[1]], scan.points[t[2]], spacing,
+                  [&visit](const Eigen::Vector3d& x, double) { visit(x); });
   }
 }
 
@@ -146,11 +138,9 @@ ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions&
 }
 
 double ScanPatches::TypicalThickness() const {
-  if (patches_.empty()) return 0;
   std::vector<double> thickness;
   for (const ScanPatch& patch : patches_) thickness.push_back(patch.thickness);
-  std::nth_element(thickness.begin(), thickness.begin() + thickness.size() / 2, thickness.end());
-  return thickness[thickness.size() / 2];
+  return Median(&thickness);
 }
 
 int ScanPatches::BuildTree(int begin, int end) {

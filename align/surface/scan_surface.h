@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "align/surface/scan_planes.h"
+#include "core/frames.h"
 #include "core/scan.h"
 
 namespace roomtex {
@@ -44,6 +45,11 @@ class RangeNoise {
  private:
   std::vector<std::pair<double, double>> knots_;  // range, noise; between them linear
 };
+
+// Fewer samples make no cell, and a cell whose normal is less certain (radians) belongs to no
+// plane.
+inline constexpr int kFewestSamples = 6;
+inline constexpr double kWorstNormalSigma = RadFromDeg(4.0);
 
 struct SurfaceCell {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();   // on the local plane, amid its samples

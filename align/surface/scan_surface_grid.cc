@@ -10,6 +10,7 @@
 #include "align/surface/scan_surface.h"
 #include "core/frames.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -17,8 +18,6 @@ namespace {
 constexpr double kCells = 400000;                 // about as many cells are made of a large scan
 constexpr double kNormalSigma = RadFromDeg(1.0);  // windows grow until normals are this exact
 constexpr double kLargestWindow = 0.4;            // metres
-constexpr int kFewestSamples = 6;
-constexpr double kWorstNormalSigma = RadFromDeg(4.0);
 // RMS of a window over the expected noise: a larger one makes windows beside the cell be tried, a
 // much larger one is no plane (surfaces differ in noise: dark ones have more).
 constexpr double kSuspicious = 1.1, kNotFlat = 3;
@@ -100,13 +99,6 @@ class CellSums {
   std::vector<Sums> sums_;
   std::vector<Ray> rays_;
 };
-
-float Median(std::vector<float>* values) {
-  if (values->empty()) return 0;
-  const auto middle = values->begin() + static_cast<long>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
 
 // Angles between neighbouring cells, per row; 0 where it cannot be told.
 struct CellSteps {
@@ -344,7 +336,7 @@ double FindCorrelation(const ScanSurface& surface, const LocalPlanes& planes, in
     }
   }
   if (ratios.size() < 50) return 1;
-  // Median of the length of a vector of two normal variables: 1.177 deviations.
+  // kMedianLengthPerSigma with fewer digits: the planes that are found depend on it.
   return std::clamp(Median(&ratios) / 1.177, 1.0, 5.0);
 }
 

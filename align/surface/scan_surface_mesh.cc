@@ -5,18 +5,16 @@
 #include <unordered_map>
 
 #include "align/surface/scan_surface.h"
+#include "align/surface/visit_triangle.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 
 namespace roomtex {
 namespace {
 
-constexpr int kMaxSteps = 2000;      // along an edge: keeps one absurd triangle from taking hours
-constexpr double kMostCubes = 1500;  // along the longest side of the scan's box
+constexpr double kMostCubes = 1500;         // along the longest side of the scan's box
 constexpr double kLeastMeshNoise = 0.0005;  // metres; flat triangles show none of theirs
-constexpr int kFewestSamples = 6;
 constexpr double kNotFlat = 3;
-constexpr double kWorstNormalSigma = RadFromDeg(4.0);
 constexpr int kNumNeighbours = 26;
 
 using Cube = Eigen::Vector3i;
@@ -37,23 +35,6 @@ Cube CubeOf(const Eigen::Vector3d& x, double size) {
 Cube Beside(const Cube& cube, int i) {
   const int k = i < kNumNeighbours / 2 ? i : i + 1;
   return cube + Cube(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-}
-
-// Calls visit(point, area) with points all over a triangle, at most `spacing` metres apart.
-template <typename Visit>
-void VisitTriangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                   double spacing, const Visit& visit) {
-  const Eigen::Vector3d ab = b - a, ac = c - a;
-  const double longest = std::max({ab.norm(), ac.norm(), (ab - ac).norm()});
-  if (!std::isfinite(longest)) return;
-  const int steps = std::clamp(static_cast<int>(std::ceil(longest / spacing)), 1, kMaxSteps);
-  const double area = ab.cross(ac).norm() / 2 / (steps * (steps + 1) / 2);
-  for (int i = 0; i < steps; ++i) {
-    for (int k = 0; i + k < steps; ++k) {
-      // Centre of a small triangle: no point lies on an edge and is met twice.
-      visit(Eigen::Vector3d(a + (i + 1.0 / 3) / steps * ab + (k + 1.0 / 3) / steps * ac), area);
-    }
-  }
 }
 
 struct Fit {

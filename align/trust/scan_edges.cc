@@ -9,6 +9,7 @@
 
 #include "align/trust/scan_view.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -97,9 +98,8 @@ class GridEdgeFinder {
       const int row = static_cast<int>(i) / scan_.num_columns;
       slopes.push_back(std::abs(across_(row, static_cast<int>(i) % scan_.num_columns)));
     }
-    if (slopes.empty()) return 0;
-    std::nth_element(slopes.begin(), slopes.begin() + slopes.size() / 2, slopes.end());
-    return 1.48 * slopes[slopes.size() / 2];
+    // kSigmaPerMad with fewer digits: what is found depends on it.
+    return 1.48 * Median(&slopes);
   }
 
   // The surface point between two samples: in the direction of the share `s` from a to b.

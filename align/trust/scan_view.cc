@@ -7,6 +7,8 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/photo.h"
+#include "core/similarity.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -30,16 +32,6 @@ std::vector<float> InverseRanges(const Scan& scan) {
   return inverse;
 }
 
-double MedianOf(std::vector<double>* values) {
-  if (values->empty()) return 0;
-  std::nth_element(values->begin(), values->begin() + values->size() / 2, values->end());
-  return (*values)[values->size() / 2];
-}
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
 double GridSampleAngle(const Scan& scan) {
   std::vector<double> across, down;
   const size_t stride = scan.points.size() / 20000 + 1;
@@ -56,7 +48,7 @@ double GridSampleAngle(const Scan& scan) {
     if (column + 1 < scan.num_columns) add(index + 1, &across);
     if (row + 1 < scan.num_rows) add(index + scan.num_columns, &down);
   }
-  return std::max(MedianOf(&across), MedianOf(&down));
+  return std::max(Median(&across), Median(&down));
 }
 
 double MeshSampleAngle(const Scan& scan) {
@@ -70,8 +62,8 @@ double MeshSampleAngle(const Scan& scan) {
     edges.push_back((scan.points[t[0]] - scan.points[t[1]]).norm());
     distances.push_back((scan.points[t[0]] - centre).norm());
   }
-  const double distance = MedianOf(&distances);
-  return distance > 0 ? MedianOf(&edges) / distance : 0;
+  const double distance = Median(&distances);
+  return distance > 0 ? Median(&edges) / distance : 0;
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "capture/association/associated_views_light.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -198,11 +200,6 @@ double Contradiction(const TileShift& tile, const Motion& motion) {
   return r.dot(tile.information * r);
 }
 
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
-
 // Robust weighted mean motion.
 Joined Join(const std::vector<TileShift>& tiles, const Motion& start, bool shift_only) {
   Joined joined;
@@ -219,7 +216,7 @@ Joined Join(const std::vector<TileShift>& tiles, const Motion& start, bool shift
     Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     for (size_t i = 0; i < tiles.size(); ++i) {
-      const double weight = 1 / spread / std::pow(1 + contradictions[i] / (4 * spread), 2);
+      const double weight = GemanMcClureWeight(contradictions[i] / (4 * spread), 1 / spread);
       const auto j = JacobianAt(tiles[i].place);
       normal += weight * j.transpose() * tiles[i].information * j;
       right += weight * j.transpose() * tiles[i].information * tiles[i].shift;

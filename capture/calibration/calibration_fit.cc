@@ -12,13 +12,15 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/camera_formulas.h"
+#include "core/projection_jacobian.h"
+#include "core/robust_kernel.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-constexpr int kMaxParams = 12;
 constexpr int kMaxIterations = 100;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -31,36 +33,25 @@ struct Projected {
   Eigen::Matrix<double, 2, 6> by_pose;
 };
 
-// kParams: 0 or kMaxParams (parameters that the model lacks have zero derivatives).
+// kParams: 0 or kMaxCameraParams (parameters that the model lacks have zero derivatives).
 template <int kParams>
 std::optional<Projected<kParams>> ProjectCorner(const Camera& camera, const Rigid& cam_from_board,
                                                 const Eigen::Vector2d& x_on_board) {
-  using Jet = ceres::Jet<double, kParams + 2>;
   const Eigen::Vector3d turned =
       cam_from_board.rotation * Eigen::Vector3d(x_on_board.x(), x_on_board.y(), 0);
   const Eigen::Vector3d x = turned + cam_from_board.translation;
   if (!(x.z() > 1e-9)) return std::nullopt;
-  std::array<Jet, kMaxParams> params;
-  for (size_t i = 0; i < camera.params.size(); ++i) {
-    params[i] = Jet(camera.params[i]);
-    if constexpr (kParams > 0) params[i].v[static_cast<int>(i)] = 1;
-  }
-  const Jet u(x.x() / x.z(), kParams), v(x.y() / x.z(), kParams + 1);
-  Jet img_x, img_y;
-  camera_formulas::Project(camera.model, params.data(), u, v, &img_x, &img_y);
+  const double u = x.x() / x.z(), v = x.y() / x.z();
+  const auto seen = ProjectRay<kParams>(camera.model, camera.params.data(),
+                                        static_cast<int>(camera.params.size()), u, v);
+  if (!seen.x_in_img.allFinite()) return std::nullopt;
   Projected<kParams> result;
-  result.x_in_img = {img_x.a, img_y.a};
-  if (!result.x_in_img.allFinite()) return std::nullopt;
-  result.by_params.row(0) = img_x.v.template head<kParams>();
-  result.by_params.row(1) = img_y.v.template head<kParams>();
-  Eigen::Matrix2d by_uv;
-  by_uv << img_x.v[kParams], img_x.v[kParams + 1], img_y.v[kParams], img_y.v[kParams + 1];
+  result.x_in_img = seen.x_in_img;
+  result.by_params = seen.by_params;
   Eigen::Matrix<double, 2, 3> uv_by_x;
-  uv_by_x << 1 / x.z(), 0, -u.a / x.z(), 0, 1 / x.z(), -v.a / x.z();
-  Eigen::Matrix3d cross;
-  cross << 0, -turned.z(), turned.y(), turned.z(), 0, -turned.x(), -turned.y(), turned.x(), 0;
-  const Eigen::Matrix<double, 2, 3> by_x = by_uv * uv_by_x;
-  result.by_pose << -by_x * cross, by_x;
+  uv_by_x << 1 / x.z(), 0, -u / x.z(), 0, 1 / x.z(), -v / x.z();
+  const Eigen::Matrix<double, 2, 3> by_x = seen.by_ray * uv_by_x;
+  result.by_pose << -by_x * CrossMatrix(turned), by_x;
   return result;
 }
 
@@ -74,7 +65,7 @@ struct Equations {
   Vector6 b = Vector6::Zero();
   double cost = 0;  // infinite when a corner has no projection
 };
-using Block = Equations<kMaxParams>;
+using Block = Equations<kMaxCameraParams>;
 using PoseBlock = Equations<0>;
 
 template <int kParams>
@@ -91,9 +82,8 @@ Equations<kParams> MakeEquations(const BoardView& view, const Camera& camera,
     }
     const Eigen::Vector2d residual = view.x_in_img.col(i) - projected->x_in_img;
     const double length = residual.norm();
-    const bool far = length > limit;
-    const double weight = view.weight * (far ? limit / length : 1);
-    block.cost += view.weight * (far ? limit * (2 * length - limit) : length * length);
+    const double weight = view.weight * HuberWeight(length, limit);
+    block.cost += view.weight * HuberCost(length, limit);
     if constexpr (kParams > 0) {
       block.A.noalias() += weight * projected->by_params.transpose() * projected->by_params;
       block.B.noalias() += weight * projected->by_params.transpose() * projected->by_pose;
@@ -103,18 +93,6 @@ Equations<kParams> MakeEquations(const BoardView& view, const Camera& camera,
     block.b.noalias() += weight * projected->by_pose.transpose() * residual;
   }
   return block;
-}
-
-Rigid Moved(const Rigid& cam_from_board, const Vector6& step) {
-  Rigid moved = cam_from_board;
-  const Eigen::Vector3d turn = step.head<3>();
-  const double angle = turn.norm();
-  if (angle > 0) {
-    moved.rotation =
-        (Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * moved.rotation).normalized();
-  }
-  moved.translation += step.tail<3>();
-  return moved;
 }
 
 // A + damping times its diagonal.
@@ -171,7 +149,7 @@ std::vector<Block> MakeBlocks(const std::vector<BoardView>& views, const CameraF
   std::vector<Block> blocks;
   for (size_t i = 0; i < views.size(); ++i) {
     blocks.push_back(
-        MakeEquations<kMaxParams>(views[i], fit.camera, fit.cam_from_board[i], huber_px));
+        MakeEquations<kMaxCameraParams>(views[i], fit.camera, fit.cam_from_board[i], huber_px));
   }
   return blocks;
 }
@@ -231,9 +209,7 @@ Rigid RoughPose(const BoardView& view, const Camera& camera) {
                                turns[i].at<double>(2));
     if (!turn.allFinite()) continue;
     Rigid pose;
-    if (turn.norm() > 0) {
-      pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
-    }
+    pose.rotation = RotationFromVector(turn);
     pose.translation = {shifts[i].at<double>(0), shifts[i].at<double>(1), shifts[i].at<double>(2)};
     pose = FitPose(view, camera, pose, 0);
     const double rms = RmsLength(view, Residuals(view, camera, pose));

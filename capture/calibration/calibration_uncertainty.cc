@@ -7,42 +7,28 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <ceres/jet.h>
 
-#include "core/camera_formulas.h"
+#include "core/projection_jacobian.h"
 
 namespace roomtex {
 namespace {
 
-constexpr int kMaxParams = 12;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // How the position of a viewing ray changes with the parameters and with a turn of the camera.
 struct Derivatives {
-  Eigen::Matrix<double, 2, kMaxParams> by_params;
+  Eigen::Matrix<double, 2, kMaxCameraParams> by_params;
   Eigen::Matrix<double, 2, 3> by_turn;
 };
 
 Derivatives DeriveAt(const Camera& camera, const Eigen::Vector2d& ray) {
-  using Jet = ceres::Jet<double, kMaxParams + 2>;
-  std::array<Jet, kMaxParams> params;
-  for (size_t i = 0; i < camera.params.size(); ++i) {
-    params[i] = Jet(camera.params[i], static_cast<int>(i));
-  }
-  Jet img_x, img_y;
-  camera_formulas::Project(camera.model, params.data(), Jet(ray.x(), kMaxParams),
-                           Jet(ray.y(), kMaxParams + 1), &img_x, &img_y);
-  Derivatives result;
-  result.by_params << img_x.v.head<kMaxParams>().transpose(),
-      img_y.v.head<kMaxParams>().transpose();
-  Eigen::Matrix2d by_ray;
-  by_ray << img_x.v.tail<2>().transpose(), img_y.v.tail<2>().transpose();
+  const auto seen = ProjectRay<kMaxCameraParams>(
+      camera.model, camera.params.data(), static_cast<int>(camera.params.size()), ray.x(), ray.y());
   // (x, y, 1) turned by w: (x, y, 1) + w x (x, y, 1), divided by its third coordinate.
   const double x = ray.x(), y = ray.y();
   Eigen::Matrix<double, 2, 3> ray_by_turn;
   ray_by_turn << -x * y, 1 + x * x, -y, -1 - y * y, x * y, x;
-  result.by_turn = by_ray * ray_by_turn;
-  return result;
+  return {seen.by_params, seen.by_ray * ray_by_turn};
 }
 
 Eigen::Vector2d NoPosition() {

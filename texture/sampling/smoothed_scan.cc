@@ -4,17 +4,12 @@
 #include <cmath>
 
 #include "core/option_fields.h"
+#include "core/similarity.h"
+#include "core/statistics.h"
 #include "texture/sampling/range_smoothing.h"
 
 namespace roomtex {
 namespace {
-
-double Median(std::vector<float>* values) {
-  if (values->empty()) return 0;
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
 
 double MedianAngularSpacing(const Scan& scan, const GridLinks& links) {
   std::vector<float> angles;
@@ -23,7 +18,7 @@ double MedianAngularSpacing(const Scan& scan, const GridLinks& links) {
     if (!(links.bits[i] & GridLinks::kDown)) continue;
     const Eigen::Vector3d a = scan.points[i] - scan.Station();
     const Eigen::Vector3d b = scan.points[i + scan.num_columns] - scan.Station();
-    angles.push_back(static_cast<float>(std::atan2(a.cross(b).norm(), a.dot(b))));
+    angles.push_back(static_cast<float>(AngleBetween(a, b)));
   }
   return Median(&angles);
 }

@@ -10,6 +10,8 @@
 
 #include "core/cpu_stages.h"
 #include "core/option_fields.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
 #include "texture/sampling/blend.h"
 #include "texture/tone/exposure_prior.h"
 
@@ -48,7 +50,7 @@ Eigen::VectorXd SolveRobust(const std::vector<Equation>& equations, int num_unkn
       double weight = 1 / (e.sigma * e.sigma);
       if (iteration > 0) {
         const double r = (x[e.plus] - x[e.minus] - e.value) / e.sigma / kRobustScale;
-        weight /= 1 + r * r;
+        weight = CauchyWeight(r, weight);
       }
       right[e.plus] += weight * e.value;
       right[e.minus] -= weight * e.value;
@@ -254,10 +256,7 @@ float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector
     if (blended.dominant_photo >= 0) lightest.push_back(blended.blend.maxCoeff());
   }
   if (lightest.empty()) return 1;
-  const auto high =
-      lightest.begin() + static_cast<long>(0.99 * static_cast<double>(lightest.size() - 1));
-  std::nth_element(lightest.begin(), high, lightest.end());
-  return std::clamp(1 / std::max(*high, 1e-6f), 0.5f, 1.0f);
+  return std::clamp(1 / std::max(Quantile(&lightest, 0.99), 1e-6f), 0.5f, 1.0f);
 }
 
 namespace {

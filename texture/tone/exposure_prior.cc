@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 
 void ExposurePrior::Forget() {
@@ -31,13 +33,6 @@ ExposurePrior PriorFromExif(const std::vector<ExposureData>& exposures, bool one
   }
   prior.num_kinds = static_cast<int>(kinds.size());
   return prior;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::optional<double> ExifScatter(const ExposurePrior& prior, const std::vector<int>& groups,

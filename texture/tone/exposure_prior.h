@@ -37,6 +37,4 @@ std::vector<int> GroupPhotos(int num_photos, const std::vector<Overlap>& overlap
 // The number of the largest group; of equals the one of the earliest photo.
 int LargestGroup(const std::vector<int>& groups);
 
-double Median(std::vector<double> values);  // 0 for none; the upper one of two
-
 }  // namespace roomtex

@@ -7,6 +7,8 @@
 #include <Eigen/Cholesky>
 
 #include "core/frames.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
 #include "texture/tone/exposure.h"
 #include "texture/tone/exposure_prior.h"
 
@@ -49,17 +51,6 @@ struct Row {
   }
 };
 
-double WeightedMedian(std::vector<std::pair<double, double>> values_and_weights) {
-  std::sort(values_and_weights.begin(), values_and_weights.end());
-  double total = 0, sum = 0;
-  for (const auto& [value, weight] : values_and_weights) total += weight;
-  for (const auto& [value, weight] : values_and_weights) {
-    sum += weight;
-    if (sum >= total / 2) return value;
-  }
-  return values_and_weights.back().first;
-}
-
 // Views that see the same light: rows [begin[k], begin[k + 1]).
 class LightFit {
  public:
@@ -101,16 +92,16 @@ class LightFit {
         light += weights_[i] * residuals[i];
         total += weights_[i];
       }
-      light = first || !(total > 0) ? WeightedMedian(values) : light / total;
+      light = first || !(total > 0) ? WeightedMedian(&values) : light / total;
       for (size_t i = begin_[k]; i < begin_[k + 1]; ++i) residuals[i] -= light;
     }
     std::vector<double> sizes(residuals.size());
     std::transform(residuals.begin(), residuals.end(), sizes.begin(),
                    [](double r) { return std::abs(r); });
-    sigma_ = std::max(1.4826 * Median(std::move(sizes)), 1e-3);
+    sigma_ = std::max(kSigmaPerMad * Median(std::move(sizes)), 1e-3);
     for (size_t i = 0; i < rows_.size(); ++i) {
       const double r = residuals[i] / (kCauchyScale * sigma_);
-      weights_[i] = rows_[i].trust / (1 + r * r);
+      weights_[i] = CauchyWeight(r, rows_[i].trust);
     }
   }
 
@@ -183,9 +174,7 @@ double LargestRadius2(const ExposureSamples& samples, const std::vector<int>& le
   }
   constexpr size_t kFewest = 2000;
   if (radii.size() < kFewest) return 0;
-  const auto high = radii.begin() + static_cast<long>(radii.size() * 199 / 200);
-  std::nth_element(radii.begin(), high, radii.end());
-  return std::min(*high, 1.0f);
+  return std::min(AtRank(&radii, radii.size() * 199 / 200), 1.0f);
 }
 
 // None where there is little to correct, or where the fit is no vignetting: brighter corners.
