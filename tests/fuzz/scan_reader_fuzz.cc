@@ -4,29 +4,13 @@
 
 #include <cstdint>
 #include <cstdlib>
-#include <string>
-
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include "core/error.h"
 #include "core/scan_mesh.h"
 #include "importers/scan_reader.h"
+#include "tests/fuzz/memory_file.h"
 
 namespace {
-
-// A file that lives in memory only.
-class MemoryFile {
- public:
-  MemoryFile(const uint8_t* data, size_t size) : fd_(memfd_create("scan", 0)) {
-    if (fd_ < 0 || write(fd_, data, size) != static_cast<ssize_t>(size)) std::abort();
-  }
-  ~MemoryFile() { close(fd_); }
-  std::string path() const { return "/proc/self/fd/" + std::to_string(fd_); }
-
- private:
-  int fd_;
-};
 
 void RequireWhole(const roomtex::Scan& scan) {
   const size_t cells = static_cast<size_t>(scan.num_columns) * scan.num_rows;
@@ -49,7 +33,7 @@ void RequireWhole(const roomtex::Scan& scan) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  const MemoryFile file(data, size);
+  const roomtex::MemoryFile file(data, size);
   try {
     for (const roomtex::Scan& scan : roomtex::ReadScanFile(file.path(), {}).scans)
       RequireWhole(scan);

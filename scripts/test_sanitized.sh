@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# What reads files that somebody else wrote, under the address and undefined behaviour sanitizers: the unit tests of
+# core, importers, colmap_ext and picks, and the fuzz corpora.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tests=(colmap_ext_test core_test importers_test align_clicks_test)
+corpora=(picks scan_reader sparse_model)
+cmake --preset asan >/dev/null
+cmake --build --preset asan --target "${tests[@]}" "${corpora[@]/%/_replay}" roomtex-import
+# Readers must refuse what does not fit into memory: an allocation that fails is theirs to handle.
+export ASAN_OPTIONS=allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1
+
+run() {
+  local log=build-asan/$1.log
+  if build-asan/bin/"$@" >"$log" 2>&1; then
+    echo "$1: $(tail -n 1 "$log")"
+  else
+    tail -n 60 "$log"
+    echo "$1: FAILED"
+    return 1
+  fi
+}
+export -f run
+{
+  printf '%s\n' "${tests[@]}"
+  for corpus in "${corpora[@]}"; do echo "${corpus}_replay tests/fuzz/corpus/$corpus"; done
+} | xargs -P "$(nproc)" -I{} bash -c 'run {}'
