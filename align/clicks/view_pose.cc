@@ -205,6 +205,7 @@ class PoseProblem {
   Rigid Pose() const {
     Eigen::Quaterniond turn;
     double wxyz[4];
+    // Not RotationFromVector(): the counterpart of the cost's ceres::AngleAxisRotatePoint().
     ceres::AngleAxisToQuaternion(parameters_, wxyz);
     turn = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     return {(turn * start_.rotation).normalized(),

@@ -48,6 +48,8 @@ std::optional<Projected<kParams>> ProjectCorner(const Camera& camera, const Rigi
   Projected<kParams> result;
   result.x_in_img = seen.x_in_img;
   result.by_params = seen.by_params;
+  // As in align's ReprojectionCost, which divides by z in another order and has a pose of another
+  // form: to unite them would change both results in the last bits.
   Eigen::Matrix<double, 2, 3> uv_by_x;
   uv_by_x << 1 / x.z(), 0, -u / x.z(), 0, 1 / x.z(), -v / x.z();
   const Eigen::Matrix<double, 2, 3> by_x = seen.by_ray * uv_by_x;

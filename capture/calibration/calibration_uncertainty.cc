@@ -108,6 +108,7 @@ Eigen::Matrix2Xd MappingDifference(const Camera& camera, const Camera& other,
     }
     const Eigen::Vector3d step = normal.ldlt().solve(right);
     if (!step.allFinite() || !(step.norm() > 1e-10)) break;
+    // Not RotationFromVector(): products of matrices, in the order that the report's numbers have.
     turn = Eigen::AngleAxisd(step.norm(), step.normalized()).toRotationMatrix() * turn;
   }
   Eigen::Matrix2Xd difference(2, x_in_img.cols());
