@@ -7,95 +7,104 @@
 namespace roomtex {
 namespace {
 
-double Weighted(const PickOutcome& outcome) {
-  return outcome.pick.weight * outcome.refined_residual_px;
+// Metres, rms; a scanner that measures 1 % wrong (the worst that the thesis speaks of) at 2 to 3 m.
+constexpr double kMaxLaserBend = 0.025;
+constexpr double kMaxRoughness = 0.2;  // metres; what the uncertainty of clicks may excuse
+constexpr int kMinJudged = 20;         // sparse points
+
+double Weighted(const PickOutcome& outcome, double residual_px) {
+  return outcome.pick.weight * residual_px;
 }
 
 // The refined pose is far more exact than the clicks: a used pick that is off shows there even
 // among six.
-void JudgePicksAgainstSurface(double rms_limit, Alignment* result) {
+std::string ContradictionOnSurface(const AlignmentStart& start, const AlignmentFit& fit,
+                                   double rms_limit) {
   std::vector<double> residuals;
-  const PickOutcome* farthest = nullptr;
-  for (const PickOutcome& outcome : result->picks) {
-    if (!outcome.used) continue;
-    residuals.push_back(Weighted(outcome));
-    if (farthest == nullptr || Weighted(outcome) > Weighted(*farthest)) {
-      farthest = &outcome;
-    }
+  int farthest = -1;
+  const auto weighted = [&](int i) { return Weighted(start.picks[i], fit.pick_px[i]); };
+  for (int i = 0; i < static_cast<int>(start.picks.size()); ++i) {
+    if (!start.picks[i].used) continue;
+    residuals.push_back(weighted(i));
+    if (farthest < 0 || weighted(i) > weighted(farthest)) farthest = i;
   }
+  if (farthest < 0) return "";
   std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
   const double median = residuals[residuals.size() / 2];
+  const Pick& pick = start.picks[farthest].pick;
   const std::string place = "where the sparse points lie on the scan's surface, ";
-  if (Weighted(*farthest) > std::max(1.5 * rms_limit, 5 * median)) {
-    result->reasons.push_back(
-        "The pick on " + LineOf(farthest->pick) + " (" + farthest->pick.image_name +
-        ") is far off: " + place + "it misses by " + Number(farthest->refined_residual_px, 1) +
-        " pixels, half of the picks by less than " + Number(median, 1) + ". Correct or remove it.");
-  } else if (!(result->refined_pick_rms_px <= std::max(1.5 * rms_limit, 2 * result->pick_rms_px))) {
-    result->reasons.push_back("Picks and surface contradict each other: " + place +
-                              "the picks miss by " + Number(result->refined_pick_rms_px, 1) +
-                              " pixels (rms), the one on " + LineOf(farthest->pick) + " by " +
-                              Number(farthest->refined_residual_px, 1) + " pixels.");
+  if (weighted(farthest) > std::max(1.5 * rms_limit, 5 * median)) {
+    return "The pick on " + LineOf(pick) + " (" + pick.image_name + ") is far off: " + place +
+           "it misses by " + Number(fit.pick_px[farthest], 1) +
+           " pixels, half of the picks by less than " + Number(median, 1) +
+           ". Correct or remove it.";
   }
+  if (fit.pick_rms_px <= std::max(1.5 * rms_limit, 2 * start.pick_rms_px)) return "";
+  return "Picks and surface contradict each other: " + place + "the picks miss by " +
+         Number(fit.pick_rms_px, 1) + " pixels (rms), the one on " + LineOf(pick) + " by " +
+         Number(fit.pick_px[farthest], 1) + " pixels.";
 }
 
-void JudgePicks(const AlignmentInput& input, const TrustOptions& trust, Alignment* result) {
-  const SparseImage* image = input.model.FindImage(result->clicked_image);
-  const double limit = trust.PickRmsLimit(input.model.cameras.at(image->camera_id));
+double PickRmsLimit(const AlignmentInput& input, const AlignmentStart& start,
+                    const TrustOptions& trust) {
+  const SparseImage* image = input.model.FindImage(start.image_name);
+  return trust.PickRmsLimit(input.model.cameras.at(image->camera_id));
+}
+
+void JudgePicks(const AlignmentStart& start, double limit, const TrustOptions& trust,
+                std::vector<std::string>* reasons) {
   const auto worst = std::max_element(
-      result->picks.begin(), result->picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
+      start.picks.begin(), start.picks.end(), [](const PickOutcome& a, const PickOutcome& b) {
         return (a.used ? a.residual_px : -1) < (b.used ? b.residual_px : -1);
       });
-  if (!(result->pick_rms_px <= limit)) {
-    result->reasons.push_back("The picks miss by " + Number(result->pick_rms_px, 1) +
-                              " pixels (rms), more than the limit of " + Number(limit, 1) +
-                              "; the worst is on " + LineOf(worst->pick) + " with " +
-                              Number(worst->residual_px, 1) +
-                              " pixels. Pick again, or pick more points so that a bad one shows.");
+  if (!(start.pick_rms_px <= limit)) {
+    reasons->push_back("The picks miss by " + Number(start.pick_rms_px, 1) +
+                       " pixels (rms), more than the limit of " + Number(limit, 1) +
+                       "; the worst is on " + LineOf(worst->pick) + " with " +
+                       Number(worst->residual_px, 1) +
+                       " pixels. Pick again, or pick more points so that a bad one shows.");
   }
-  if (!(result->position_sigma <= trust.max_position_sigma)) {
-    result->reasons.push_back(
-        "The picks leave the camera's position open by " + Number(result->position_sigma, 2) +
-        " m (one standard deviation). Spread them more over the photo and in depth.");
-  }
-  if (result->surface_fit.converged && result->reasons.empty()) {
-    JudgePicksAgainstSurface(limit, result);
+  if (!(start.position_sigma <= trust.max_position_sigma)) {
+    reasons->push_back("The picks leave the camera's position open by " +
+                       Number(start.position_sigma, 2) +
+                       " m (one standard deviation). Spread them more over the photo and in depth.");
   }
 }
 
-void JudgeScale(const TrustOptions& trust, Alignment* result) {
-  const ScaleEstimate& scale = result->scale;
+void JudgeScale(const AlignmentStart& start, const TrustOptions& trust,
+                std::vector<std::string>* reasons) {
+  const ScaleEstimate& scale = start.scale;
   if (scale.num_features < trust.min_scale_features) {
-    result->reasons.push_back("The scale rests on " + std::to_string(scale.num_features) +
-                              " features of " + result->clicked_image + ", fewer than " +
-                              std::to_string(trust.min_scale_features) + ".");
+    reasons->push_back("The scale rests on " + std::to_string(scale.num_features) +
+                       " features of " + start.image_name + ", fewer than " +
+                       std::to_string(trust.min_scale_features) + ".");
   }
   if (!(scale.relative_mad <= trust.max_scale_mad)) {
-    result->reasons.push_back("The scale differs from feature to feature by " +
-                              Number(100 * scale.relative_mad, 0) + " % (limit " +
-                              Number(100 * trust.max_scale_mad, 0) + " %): the pose of " +
-                              result->clicked_image +
-                              " in the scan does not agree with its pose in the sparse model. "
-                              "Check that the picks name the right photo.");
+    reasons->push_back("The scale differs from feature to feature by " +
+                       Number(100 * scale.relative_mad, 0) + " % (limit " +
+                       Number(100 * trust.max_scale_mad, 0) + " %): the pose of " +
+                       start.image_name +
+                       " in the scan does not agree with its pose in the sparse model. "
+                       "Check that the picks name the right photo.");
   }
 }
 
-void JudgePlacement(const TrustOptions& trust, Alignment* result) {
-  const Placement& placement = result->placement;
+void JudgePlacement(const Placement& placement, const TrustOptions& trust,
+                    std::vector<std::string>* reasons) {
   const int judged = placement.num_on_surface + placement.num_floating + placement.num_hidden;
-  if (judged < 20) {
-    result->reasons.push_back("Only " + std::to_string(judged) +
-                              " sparse points lie where the scanner saw something, too few to "
-                              "tell whether the alignment is right.");
+  if (judged < kMinJudged) {
+    reasons->push_back("Only " + std::to_string(judged) +
+                       " sparse points lie where the scanner saw something, too few to "
+                       "tell whether the alignment is right.");
   } else if (!(placement.SurfaceShare() >= trust.min_surface_share)) {
-    result->reasons.push_back(
+    reasons->push_back(
         "Only " + Number(100 * placement.SurfaceShare(), 0) +
         " % of the sparse points that the scanner could see lie within " +
         Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
         Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.");
   } else if (!(placement.ChangedShare() <= trust.max_changed_share)) {
     const double percent = 100.0 / judged;
-    result->reasons.push_back(
+    reasons->push_back(
         Number(percent * placement.num_floating, 0) +
         " % of the sparse points float in space that the scanner saw to be empty, and " +
         Number(percent * placement.num_hidden, 0) + " % lie behind its surface (at most " +
@@ -103,11 +112,42 @@ void JudgePlacement(const TrustOptions& trust, Alignment* result) {
         " % of each): the scan is of another room, or much was moved between scan and photos.");
   }
   if (!(placement.CameraShare() >= trust.min_camera_share)) {
-    result->reasons.push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +
-                              " of " + std::to_string(placement.num_cameras) +
-                              " photos would have been taken from behind the surface that the "
-                              "scanner saw.");
+    reasons->push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +
+                       " of " + std::to_string(placement.num_cameras) +
+                       " photos would have been taken from behind the surface that the "
+                       "scanner saw.");
   }
+}
+
+// What the similarity leaves open, as numbers.
+void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start,
+                  const AlignmentFit& fit, const AlignmentOptions& options, Judgement* judgement) {
+  const SimilarityFit by_picks =
+      fit.refined ? SimilarityFit()
+                  : FitToPicks(input.model, input.picks, start.UsedPicks(), start.pick_sigma_px,
+                               fit.scan_from_sparse, options.fit);
+  std::vector<Eigen::Vector3d> centres;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const auto& [image_id, image] : input.model.images) {
+    centres.push_back(fit.scan_from_sparse * image.cam_from_model.TargetOriginInSource());
+    middle += centres.back() / static_cast<double>(input.model.images.size());
+  }
+  judgement->expected_error =
+      PropagateError(fit.refined ? fit.surface : by_picks, centres, input.surveyed.scans());
+  if (!fit.refined) return;
+  judgement->open = FindOpenDirections(fit.surface, middle);
+  if (!judgement->open.None()) judgement->warnings.push_back(judgement->open.Sentence());
+}
+
+void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const AlignmentFit& fit,
+                const TrustOptions& trust, std::vector<std::string>* reasons) {
+  const double limit = PickRmsLimit(input, start, trust);
+  JudgePicks(start, limit, trust, reasons);
+  if (fit.surface.converged && reasons->empty()) {
+    const std::string reason = ContradictionOnSurface(start, fit, limit);
+    if (!reason.empty()) reasons->push_back(reason);
+  }
+  JudgeScale(start, trust, reasons);
 }
 
 }  // namespace
@@ -124,28 +164,77 @@ std::string LineOf(const Pick& pick) {
   return pick.line > 0 ? "line " + std::to_string(pick.line) : "a pick of " + pick.image_name;
 }
 
-void JudgeAlignment(const AlignmentInput& input, const TrustOptions& trust, Alignment* result) {
-  JudgePicks(input, trust, result);
-  JudgeScale(trust, result);
-  JudgePlacement(trust, result);
+Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
+                   const AlignmentFit& fit, const AlignmentOptions& options) {
+  Judgement judgement;
+  const bool by_picks = start.source == AlignmentStart::Source::kPicks;
+  if (!fit.surface.converged) {
+    judgement.reasons.push_back(
+        "The sparse points do not settle on the scan's surface: too few of the " +
+        std::to_string(fit.points.size()) +
+        " are near it, or they pull the scale away from what the " +
+        (by_picks ? "picks give." : "start gives."));
+  }
+  FindAccuracy(input, start, fit, options, &judgement);
+  TrustOptions trust = options.trust;
+  if (!fit.refined) {
+    // Clicks alone are rough, and say themselves how rough.
+    trust.surface_tolerance =
+        std::max(trust.surface_tolerance, std::min(2 * start.position_sigma, kMaxRoughness));
+  }
+  judgement.placement =
+      CheckPlacement(input.model, fit.points, fit.scan_from_sparse, input.surveyed.patches(),
+                     input.surveyed.free_space(), trust);
+  if (by_picks) JudgeStart(input, start, fit, trust, &judgement.reasons);
+  JudgePlacement(judgement.placement, trust, &judgement.reasons);
+  return judgement;
 }
 
-void JudgePicksLeftOut(double rms_limit_px, Alignment* result) {
-  int num_used = 0;
-  const PickOutcome* worst = nullptr;
-  for (const PickOutcome& outcome : result->picks) {
+std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
+                                            const SparseModel& model) {
+  const PlaneBundle& bundle = adjustment.bundle;
+  if (!bundle.usable) return {bundle.reason + " One similarity for all photos is used."};
+  std::vector<std::string> warnings;
+  if (adjustment.bend) {
+    std::string warning =
+        "The scan is bent by " + Number(1000 * adjustment.bend->bend_rms, 1) +
+        " mm (rms over the sparse points): the photos were fitted to it as it is, so that their "
+        "reprojection errors grow.";
+    if (adjustment.bend->bend_rms > kMaxLaserBend) {
+      warning +=
+          " That is more than a laser scanner does: the sparse model may be bent instead. Look at "
+          "the overlays (--overlays), and compare with --PlaneBA.bend 0.";
+    }
+    warnings.push_back(warning);
+  }
+  for (const uint32_t id : bundle.idle_images) {
+    warnings.push_back(model.images.at(id).name +
+                       " was not adjusted to the scan's surface: too few sparse points "
+                       "hold it. It follows the other photos.");
+  }
+  return warnings;
+}
+
+std::string JudgePicksLeftOut(const AlignmentInput& input, const AlignmentStart& start,
+                              const std::vector<double>& surface_px, const TrustOptions& trust) {
+  if (start.source != AlignmentStart::Source::kPicks) return "";
+  int num_used = 0, worst = -1;
+  const auto weighted = [&](int i) { return Weighted(start.picks[i], surface_px[i]); };
+  for (int i = 0; i < static_cast<int>(start.picks.size()); ++i) {
+    const PickOutcome& outcome = start.picks[i];
     num_used += outcome.used;
     if (outcome.used || !(outcome.pick.weight > 0)) continue;
-    if (worst == nullptr || Weighted(outcome) > Weighted(*worst)) worst = &outcome;
+    if (worst < 0 || weighted(i) > weighted(worst)) worst = i;
   }
-  if (worst == nullptr || num_used >= kMinPicksPerPhoto) return;
-  if (Weighted(*worst) < rms_limit_px) return;
-  result->reasons.push_back(
-      "The pick on " + LineOf(worst->pick) + " (" + worst->pick.image_name + ") is " +
-      Number(worst->leave_one_out_px, 0) + " pixels away from where the other picks put it, and " +
-      "without it only " + std::to_string(num_used) + " are left, fewer than " +
-      std::to_string(kMinPicksPerPhoto) +
-      ". The alignment was made from those. Correct or remove the pick, or add others.");
+  if (worst < 0 || num_used >= kMinPicksPerPhoto) return "";
+  if (weighted(worst) < PickRmsLimit(input, start, trust)) return "";
+  const PickOutcome& outcome = start.picks[worst];
+  return "The pick on " + LineOf(outcome.pick) + " (" + outcome.pick.image_name + ") is " +
+         Number(outcome.leave_one_out_px, 0) +
+         " pixels away from where the other picks put it, and without it only " +
+         std::to_string(num_used) + " are left, fewer than " +
+         std::to_string(kMinPicksPerPhoto) +
+         ". The alignment was made from those. Correct or remove the pick, or add others.";
 }
 
 }  // namespace roomtex

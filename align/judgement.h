@@ -1,21 +1,45 @@
 #pragma once
-// Whether an alignment is to be believed, in sentences (Alignment::reasons); trust.h has what it
-// is measured by.
+// Whether an alignment is to be believed, in sentences; trust.h has what it is measured by.
 
+#include <map>
 #include <string>
+#include <vector>
 
-#include "align/alignment.h"
+#include "align/alignment_fit.h"
+#include "align/alignment_input.h"
+#include "align/start.h"
+#include "align/trust/expected_error.h"
+#include "align/trust/open_directions.h"
 
 namespace roomtex {
 
 std::string Number(double value, int digits);  // fixed, `digits` behind the point
 std::string LineOf(const Pick& pick);          // "line 4"
 
-// Picks, scale and placement of an alignment before its poses are adjusted.
-void JudgeAlignment(const AlignmentInput& input, const TrustOptions& trust, Alignment* result);
+struct Judgement {
+  // Of the similarity: by the surface where it was refined, else by the picks.
+  ExpectedError expected_error;
+  OpenDirections open;  // what the surface leaves to the picks
+  Placement placement;
+  std::vector<std::string> warnings;
+  // Why the answer is not to be trusted; empty = trusted.
+  std::vector<std::string> reasons;
+};
+
+// Picks and scale of the start, similarity and placement of the fit: before the poses are adjusted,
+// which brings points to the surface that do not belong there, too.
+Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
+                   const AlignmentFit& fit, const AlignmentOptions& options);
+
+// What speaks against an adjustment, or should be known of it. All of it warnings: the similarity
+// remains.
+std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
+                                            const SparseModel& model);
 
 // Fewer than six picks that can be used are too few to rely on (kMinPicksPerPhoto), unless those
-// that were left out turn out to be right on the surface. The alignment by the others stands.
-void JudgePicksLeftOut(double rms_limit_px, Alignment* result);
+// that were left out turn out to be right on the surface. The alignment by the others stands. A
+// reason, or "". surface_px: one per pick, distance where the sparse points lie on the surface.
+std::string JudgePicksLeftOut(const AlignmentInput& input, const AlignmentStart& start,
+                              const std::vector<double>& surface_px, const TrustOptions& trust);
 
 }  // namespace roomtex

@@ -10,16 +10,17 @@ namespace roomtex {
 namespace {
 
 Json BendToJson(const Alignment& alignment) {
-  if (!alignment.bend) return nullptr;
+  const ModelAdjustment& adjustment = alignment.adjustment;
+  if (!adjustment.bend) return nullptr;
   double range = 0, azimuth = 0;
-  for (const SurfaceConstraint& c : alignment.bundle.constraints) {
+  for (const SurfaceConstraint& c : adjustment.bundle.constraints) {
     const Eigen::Vector2d at =
-        alignment.bend->bend.At(alignment.bundle.model.points.at(c.point3d_id).x_in_model);
+        adjustment.bend->bend.At(adjustment.bundle.model.points.at(c.point3d_id).x_in_model);
     range = std::max(range, std::abs(at[0]));
     azimuth = std::max(azimuth, std::abs(at[1]));
   }
   Json json;
-  json["rms_m"] = alignment.bend->bend_rms;
+  json["rms_m"] = adjustment.bend->bend_rms;
   json["max_range_share"] = range;
   json["max_azimuth_deg"] = DegFromRad(azimuth);
   return json;
@@ -28,10 +29,10 @@ Json BendToJson(const Alignment& alignment) {
 }  // namespace
 
 Json PlaneBundleToJson(const Alignment& alignment) {
-  const PlaneBundle& bundle = alignment.bundle;
+  const PlaneBundle& bundle = alignment.adjustment.bundle;
   if (bundle.model.images.empty()) return nullptr;
   Json json;
-  json["used"] = alignment.adjusted;
+  json["used"] = alignment.adjusted();
   json["reason"] = bundle.reason;
   json["num_points"] = bundle.constraints.size();
   json["num_on_patches"] = std::count_if(bundle.constraints.begin(), bundle.constraints.end(),
@@ -48,8 +49,8 @@ Json PlaneBundleToJson(const Alignment& alignment) {
 }
 
 void SetNumPointsOfPlanes(const Alignment& alignment, Json* planes) {
-  const std::vector<int>& counts = alignment.bundle.num_points_of_plane;
-  for (size_t i = 0; alignment.adjusted && i < counts.size() && i < planes->size(); ++i) {
+  const std::vector<int>& counts = alignment.adjustment.bundle.num_points_of_plane;
+  for (size_t i = 0; alignment.adjusted() && i < counts.size() && i < planes->size(); ++i) {
     (*planes)[i]["num_points"] = counts[i];
   }
 }

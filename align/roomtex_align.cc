@@ -21,9 +21,6 @@
 namespace roomtex {
 namespace {
 
-// Samples of the coarse mesh for free space and agreement.
-constexpr int kCoarseSamples = 300000;
-
 struct Arguments {
   std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
   std::string geo_origin;
@@ -117,7 +114,9 @@ Json PicksToJson(const Alignment& alignment) {
   Json json;
   int num_used = 0;
   Json per_pick = Json::array();
-  for (const PickOutcome& outcome : alignment.picks) {
+  const AlignmentStart& start = alignment.start;
+  for (size_t i = 0; i < start.picks.size(); ++i) {
+    const PickOutcome& outcome = start.picks[i];
     num_used += outcome.used;
     Json one;
     one["image_name"] = outcome.pick.image_name;
@@ -125,19 +124,19 @@ Json PicksToJson(const Alignment& alignment) {
     one["y"] = outcome.pick.x_in_img.y();
     one["line"] = outcome.pick.line;
     one["residual_px"] = NumberOrNull(outcome.residual_px);
-    one["refined_residual_px"] = NumberOrNull(outcome.refined_residual_px);
+    one["refined_residual_px"] = NumberOrNull(alignment.refined_pick_px[i]);
     one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
     one["used"] = outcome.used;
     one["weight"] = outcome.pick.weight;
     per_pick.push_back(one);
   }
-  json["count"] = alignment.picks.size();
+  json["count"] = start.picks.size();
   json["num_used"] = num_used;
-  json["image_name"] = alignment.clicked_image;
-  json["rms_px"] = NumberOrNull(alignment.pick_rms_px);
-  json["max_px"] = NumberOrNull(alignment.pick_max_px);
+  json["image_name"] = start.image_name;
+  json["rms_px"] = NumberOrNull(start.pick_rms_px);
+  json["max_px"] = NumberOrNull(start.pick_max_px);
   json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
-  json["position_sigma_m"] = NumberOrNull(alignment.position_sigma);
+  json["position_sigma_m"] = NumberOrNull(start.position_sigma);
   json["per_pick"] = per_pick;
   return json;
 }
@@ -198,33 +197,33 @@ Json PlacementToJson(const Placement& placement) {
 }
 
 // The keys of docs/commands.md; `planes` and those of the photos follow in Align().
-void FillReport(const Alignment& alignment, double reprojection_rms_before,
-                double reprojection_rms_after, Report* report) {
+void FillReport(const Alignment& alignment, double reprojection_rms_after, Report* report) {
   Report& r = *report;
   r["scan_from_sparse"] = ToJson(alignment.scan_from_sparse);
-  r["scan_from_sparse_from_picks"] = ToJson(alignment.scan_from_sparse_from_picks);
+  r["scan_from_sparse_from_picks"] = ToJson(alignment.start.scan_from_sparse);
   r["picks"] = PicksToJson(alignment);
-  r["scale"]["value"] = alignment.scale.scale;
-  r["scale"]["num_features"] = alignment.scale.num_features;
-  r["scale"]["relative_mad"] = alignment.scale.relative_mad;
+  r["scale"]["value"] = alignment.start.scale.scale;
+  r["scale"]["num_features"] = alignment.start.scale.num_features;
+  r["scale"]["relative_mad"] = alignment.start.scale.relative_mad;
   r["planes"] = Json::array();
-  const bool refined = alignment.refined;
+  const bool refined = alignment.fit.refined;
+  const SimilarityFit& fit = alignment.fit.surface;
   // Of the similarity by the picks and the refined one; the adjustment has its own below.
-  r["plane_rms_m"]["before"] = refined ? Json(alignment.surface_fit.rms_before) : Json(nullptr);
-  r["plane_rms_m"]["after"] = refined ? Json(alignment.surface_fit.rms_after) : Json(nullptr);
-  r["plane_rms_m"]["num_points"] = refined ? alignment.surface_fit.num_points : 0;
-  const PlaneBundle& bundle = alignment.bundle;
-  if (alignment.adjusted) {
+  r["plane_rms_m"]["before"] = refined ? Json(fit.rms_before) : Json(nullptr);
+  r["plane_rms_m"]["after"] = refined ? Json(fit.rms_after) : Json(nullptr);
+  r["plane_rms_m"]["num_points"] = refined ? fit.num_points : 0;
+  const PlaneBundle& bundle = alignment.adjustment.bundle;
+  if (alignment.adjusted()) {
     r["plane_rms_m"]["before"] = bundle.plane_rms_before;
     r["plane_rms_m"]["after"] = bundle.plane_rms_after;
     r["plane_rms_m"]["num_points"] = bundle.constraints.size();
   }
   r["plane_bundle"] = PlaneBundleToJson(alignment);
-  r["reprojection_rms_px"]["before"] = reprojection_rms_before;
+  r["reprojection_rms_px"]["before"] = alignment.reprojection_rms_px;
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
   r["placement"] = PlacementToJson(alignment.placement);
   r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
-  r["surface_geometry"] = alignment.refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
+  r["surface_geometry"] = refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
   r["agreement"] = nullptr;
 }
 
@@ -245,22 +244,21 @@ void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans&
 
 // What photos and scan say about each other; the report's `agreement` and `overlays`.
 void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
-                       const std::vector<Scan>& scans, const FreeSpace& free_space,
-                       const Command::Context& context) {
+                       const SurveyedScans& surveyed, const Command::Context& context) {
   context.report["overlays"] = Json::array();
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");
   const int num_threads = context.options.num_threads;
   std::vector<std::string> warnings;
   const AgreementOptions options;
-  const Agreement agreement =
-      MeasureAgreement(aligned, a.image_path, scans, free_space, options, num_threads, &warnings);
+  const Agreement agreement = MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options,
+                                               num_threads, &warnings);
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
   if (a.overlays > 0) {
     context.progress.Stage("overlays");
     for (const std::string& path :
-         WriteOverlays(aligned, a.image_path, a.output_path + "/overlays", scans, free_space,
+         WriteOverlays(aligned, a.image_path, a.output_path + "/overlays", surveyed.viewer(),
                        a.overlays, OverlayOptions(), num_threads, &warnings)) {
       context.report["overlays"].push_back(path);
     }
@@ -269,15 +267,29 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
 }
 
 // The planes of the scans (thesis 7.2), where they are asked for.
-std::vector<ScanPlane> DetectPlanes(const Arguments& a, const std::vector<Scan>& scans,
+std::vector<ScanPlane> DetectPlanes(const Arguments& a, const SurveyedScans& surveyed,
                                     const Command::Context& context) {
   if (!a.alignment.plane_constrained && a.planes_path.empty()) return {};
   context.progress.Stage("planes");
-  std::vector<ScanPlane> planes = FindScanPlanes(scans, a.planes, context.options.num_threads);
+  const std::vector<ScanPlane>& planes = surveyed.planes();
   if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, scans, planes, context.options.num_threads);
+    WriteScanPlanes(a.planes_path, surveyed.scans(), planes, context.options.num_threads);
   }
   return planes;
+}
+
+// None if the files contradict each other; the report then says so.
+std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput& input,
+                                       const Command::Context& context) {
+  try {
+    return AlignToScan(input, a.alignment, &context.progress);
+  } catch (const Contradiction& contradiction) {
+    context.report.SetUntrusted(contradiction.what());
+    context.report["scan_from_sparse"] = nullptr;
+    MakeFolder(a.output_path);
+    context.report.AddCopy(a.output_path + "/alignment.json");
+    return std::nullopt;
+  }
 }
 
 void Align(const Arguments& a, const Command::Context& context) {
@@ -286,40 +298,28 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadSparseModel(a.input_path);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
-  const ReprojectionErrors before = UpdateReprojectionErrors(&model);
   context.progress.Stage("read scan");
   const PlacedScans placed = ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
-  const std::vector<Scan>& scans = placed.scans;
   const std::optional<GeoReference> geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
-  const FreeSpace free_space(scans, kCoarseSamples);
-  const std::vector<ScanPlane> planes = DetectPlanes(a, scans, context);
-
-  AlignmentOptions options = a.alignment;
+  SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
   options.num_threads = context.options.num_threads;
-  const double sigma_px = std::max(0.3, before.rms_px / std::sqrt(2.0));
-  std::optional<Alignment> found;
-  try {
-    found = AlignToScan({model, scans, picks, a.picks_path, a.scan_reader.azimuth, planes},
-                        sigma_px, free_space, options, &context.progress);
-  } catch (const Contradiction& contradiction) {
-    context.report.SetUntrusted(contradiction.what());
-    context.report["scan_from_sparse"] = nullptr;
-    MakeFolder(a.output_path);
-    context.report.AddCopy(a.output_path + "/alignment.json");
-    return;
-  }
+  const SurveyedScans surveyed(placed.scans, options);
+  const std::vector<ScanPlane> planes = DetectPlanes(a, surveyed, context);
+  const std::optional<Alignment> found = FindAlignment(
+      a, {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth}, context);
+  if (!found) return;
   const Alignment& alignment = *found;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
 
   context.progress.Stage("write");
-  if (alignment.adjusted) {
-    model = alignment.bundle.model;
+  if (alignment.adjusted()) {
+    model = alignment.adjustment.bundle.model;
   } else {
     TransformModel(alignment.scan_from_sparse, &model);
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
-  FillReport(alignment, before.rms_px, after.rms_px, &context.report);
+  FillReport(alignment, after.rms_px, &context.report);
   context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
@@ -328,7 +328,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);
   WriteGeo(a, model, placed, geo, context);
   context.report.AddCopy(a.output_path + "/alignment.json");
-  CompareWithPhotos(a, model, scans, free_space, context);
+  CompareWithPhotos(a, model, surveyed, context);
 }
 
 }  // namespace

@@ -152,6 +152,9 @@ class BendSolver {
         start_(start) {
     for (const auto& [id, camera] : model.cameras) projections_.emplace(id, camera);
     for (const Pick& pick : picks) pivot_ += pick.x_in_scan / static_cast<double>(picks.size());
+    for (size_t i = 0; picks.empty() && i < points.size(); ++i) {
+      pivot_ += start * points[i].x_in_sparse / static_cast<double>(points.size());
+    }
   }
 
   // The most likely state; false if there is none.

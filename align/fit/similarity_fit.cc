@@ -131,6 +131,15 @@ Eigen::Vector3d Pivot(const std::vector<Pick>& picks) {
   return pivot;
 }
 
+// The pivot where there are no picks.
+Eigen::Vector3d Middle(const std::vector<SurfacePoint>& points, const Similarity& s) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const SurfacePoint& point : points) {
+    middle += s * point.x_in_sparse / static_cast<double>(points.size());
+  }
+  return middle;
+}
+
 // A sparse point and the patch of the surface it belongs to at one step.
 struct Match {
   int point = 0, patch = 0;
@@ -343,7 +352,7 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
                            const Similarity& start, const SimilarityFitOptions& options) {
   SimilarityFit fit;
   fit.scan_from_sparse = start;
-  fit.pivot = Pivot(picks);
+  fit.pivot = picks.empty() ? Middle(points, start) : Pivot(picks);
   fit.covariance.setConstant(kInfinity);
   const PickTerms terms(model, picks);
   gate = std::min(gate, options.max_gate);

@@ -90,7 +90,7 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
                          const SimilarityFitOptions& options);
 
 // The same with point-to-plane distances from the surface; the gate shrinks from `gate` metres. The
-// picks keep what the surface leaves open (one wall, two parallel walls).
+// picks keep what the surface leaves open (one wall, two parallel walls); there may be none.
 SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePoint>& points,
                            const ScanPatches& surface, const std::vector<Pick>& picks,
                            const std::vector<bool>& used, double sigma_px, double gate,

@@ -8,7 +8,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "align/trust/scan_view.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
 #include "core/parallel.h"
@@ -219,10 +218,8 @@ double PatchNcc(const cv::Mat1b& a, const cv::Mat1b& b, const cv::Mat1b& valid, 
 }
 
 Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_path,
-                           const std::vector<Scan>& scans, const FreeSpace& free_space,
-                           const AgreementOptions& options, int num_threads,
-                           std::vector<std::string>* warnings) {
-  const ScanViewer viewer(scans, free_space);
+                           const ScanViewer& viewer, const AgreementOptions& options,
+                           int num_threads, std::vector<std::string>* warnings) {
   // Every num_sets-th of them make a set of its own that is spread over all.
   const std::vector<const SparseImage*> images =
       SpreadImages(aligned, kMaxSets * options.num_photos);

@@ -10,10 +10,9 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "align/trust/free_space.h"
 #include "align/trust/gradient_shift.h"
+#include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
-#include "core/scan.h"
 
 namespace roomtex {
 
@@ -75,8 +74,7 @@ struct Agreement {
 // few side by side); those that cannot be read or have another size than their camera are named in
 // `warnings` and left out.
 Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_path,
-                           const std::vector<Scan>& scans, const FreeSpace& free_space,
-                           const AgreementOptions& options, int num_threads,
-                           std::vector<std::string>* warnings);
+                           const ScanViewer& viewer, const AgreementOptions& options,
+                           int num_threads, std::vector<std::string>* warnings);
 
 }  // namespace roomtex

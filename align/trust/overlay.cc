@@ -284,13 +284,11 @@ cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vecto
 }
 
 std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::string& image_path,
-                                       const std::string& folder, const std::vector<Scan>& scans,
-                                       const FreeSpace& free_space, int count,
-                                       const OverlayOptions& options, int num_threads,
+                                       const std::string& folder, const ScanViewer& viewer,
+                                       int count, const OverlayOptions& options, int num_threads,
                                        std::vector<std::string>* warnings) {
-  const ScanViewer viewer(scans, free_space);
   std::vector<ScanEdge> edges;
-  for (const Scan& scan : scans) {
+  for (const Scan& scan : viewer.scans()) {
     if (!scan.organised) continue;
     for (ScanEdge& edge : FindScanEdges(scan, options.edges)) edges.push_back(std::move(edge));
   }
@@ -332,7 +330,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     if (!photo) return;
     const ScanView view = viewer.Look(setup.lattice, camera, image.cam_from_model, setup.cell_px);
     const cv::Mat sheet = DrawOverlay(
-        *photo, view, SeeEdges(edges, free_space, setup.projection, image.cam_from_model),
+        *photo, view, SeeEdges(edges, viewer.free_space(), setup.projection, image.cam_from_model),
         image.name, options);
     std::vector<uchar> bytes;
     cv::imencode(".jpg", sheet, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});

@@ -48,9 +48,8 @@ cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vecto
 // Writes folder/NAME.jpg for `count` photos evenly taken from all; a slash in a name becomes an
 // underscore. Gives the paths written. Photos that cannot be read are named in `warnings`.
 std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::string& image_path,
-                                       const std::string& folder, const std::vector<Scan>& scans,
-                                       const FreeSpace& free_space, int count,
-                                       const OverlayOptions& options, int num_threads,
+                                       const std::string& folder, const ScanViewer& viewer,
+                                       int count, const OverlayOptions& options, int num_threads,
                                        std::vector<std::string>* warnings);
 
 }  // namespace roomtex

@@ -57,6 +57,9 @@ class ScanViewer {
   // Both must outlive it. Keeps two bytes per sample.
   ScanViewer(const std::vector<Scan>& scans, const FreeSpace& free_space);
 
+  const std::vector<Scan>& scans() const { return scans_; }
+  const FreeSpace& free_space() const { return free_space_; }
+
   // Angle between neighbouring samples seen from the scanner, radians: the larger of the median
   // steps of columns and of rows, of the coarsest scan; for meshes, of their median edge at their
   // median distance from their centre. 0 without samples.

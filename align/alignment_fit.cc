@@ -1,0 +1,36 @@
+#include "align/alignment_fit.h"
+
+#include <algorithm>
+
+namespace roomtex {
+
+AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
+                          const AlignmentOptions& options) {
+  AlignmentFit fit;
+  fit.scan_from_sparse = start.scan_from_sparse;
+  fit.points = FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
+  const double gate = std::clamp(5 * start.position_sigma, 0.1, options.fit.max_gate);
+  fit.surface =
+      FitToSurface(input.model, fit.points, input.surveyed.patches(), input.picks,
+                   start.UsedPicks(), start.pick_sigma_px, gate, start.scan_from_sparse, options.fit);
+  fit.pick_px.assign(input.picks.size(), std::numeric_limits<double>::quiet_NaN());
+  if (!fit.surface.converged) return fit;
+  fit.pick_px = PickDistances(input.model, input.picks, fit.surface.scan_from_sparse);
+  fit.pick_rms_px = PickRms(start.picks, fit.pick_px);
+  fit.refined = options.plane_constrained;
+  if (fit.refined) fit.scan_from_sparse = fit.surface.scan_from_sparse;
+  return fit;
+}
+
+ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
+                                const AlignmentFit& fit, const AlignmentOptions& options) {
+  const SurveyedScans& surveyed = input.surveyed;
+  // The clicked view keeps the pose of its clicks, so that the model starts there, too.
+  const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
+  return AdjustModel({input.model, fit.points, surveyed.scans(), surveyed.planes(),
+                      surveyed.patches(), input.picks, start.UsedPicks(), start.pick_sigma_px,
+                      start.image_name},
+                     fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
+}
+
+}  // namespace roomtex

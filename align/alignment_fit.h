@@ -1,0 +1,34 @@
+#pragma once
+// A start, fitted to the surface of the scan: one similarity for the whole model.
+
+#include <vector>
+
+#include "align/alignment_input.h"
+#include "align/fit/model_adjustment.h"
+#include "align/fit/similarity_fit.h"
+#include "align/start.h"
+
+namespace roomtex {
+
+struct AlignmentFit {
+  std::vector<SurfacePoint> points;  // of the sparse model, those that can be judged
+  // On the surface. It is made in any case, as a check of the start; `refined` says whether it is
+  // the answer.
+  SimilarityFit surface;
+  bool refined = false;
+  Similarity scan_from_sparse;  // the answer: by the surface or the start's
+  // Distances of the picks where the sparse points lie on the surface, pixels; NaN if they could
+  // not be brought there. pick_rms_px: of the used ones, NaN without any pick.
+  std::vector<double> pick_px;
+  double pick_rms_px = std::numeric_limits<double>::quiet_NaN();
+};
+
+// sigma_px: of an observation of the sparse model, per coordinate (KeypointSigma()).
+AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
+                          const AlignmentOptions& options);
+
+// Poses and points of a fit that is trusted, adjusted to the surface.
+ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
+                                const AlignmentFit& fit, const AlignmentOptions& options);
+
+}  // namespace roomtex

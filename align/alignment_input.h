@@ -1,0 +1,44 @@
+#pragma once
+// What an alignment is made from.
+
+#include <string>
+#include <vector>
+
+#include "align/clicks/pick_review.h"
+#include "align/clicks/picks.h"
+#include "align/clicks/scale.h"
+#include "align/fit/plane_bundle.h"
+#include "align/fit/similarity_fit.h"
+#include "align/surface/scan_patches.h"
+#include "align/surveyed_scans.h"
+#include "align/trust/trust.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/scan_mesh.h"
+
+namespace roomtex {
+
+struct AlignmentOptions {
+  // Refine the similarity on the surface of the scan, and adjust poses and points to it.
+  bool plane_constrained = true;
+  PickReviewOptions picks;
+  ScaleOptions scale;
+  SimilarityFitOptions fit;
+  PlaneBundleOptions bundle;
+  TrustOptions trust;
+  // Of the SurveyedScans that the alignment is made on.
+  ScanPatchOptions surface;
+  ScanMeshOptions mesh;
+
+  std::vector<std::string> Problems() const;
+};
+
+struct AlignmentInput {
+  const SparseModel& model;
+  const SurveyedScans& surveyed;
+  const std::vector<Pick>& picks;  // may be empty where a start is given
+  // What was read from where, for the messages.
+  std::string picks_path;
+  std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
+};
+
+}  // namespace roomtex

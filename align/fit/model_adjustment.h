@@ -1,0 +1,42 @@
+#pragma once
+// The aligned model adjusted to the surface of the scan, bent or not (thesis 7.2).
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "align/fit/plane_bundle.h"
+#include "align/fit/pose_covariance.h"
+#include "align/fit/scan_bend.h"
+#include "align/fit/similarity_fit.h"
+
+namespace roomtex {
+
+struct ModelAdjustmentInput {
+  const SparseModel& model;                 // in its own frame
+  const std::vector<SurfacePoint>& points;  // of the model
+  const std::vector<Scan>& scans;
+  const std::vector<ScanPlane>& planes;
+  const ScanPatches& patches;
+  const std::vector<Pick>& picks;  // may be empty
+  std::vector<bool> used;          // one per pick
+  double pick_sigma_px = 1.5;
+  std::string clicked_image;  // for PlaneBundleOptions::fix_clicked_view; may be empty
+};
+
+struct ModelAdjustment {
+  PlaneBundle bundle;           // its model is the answer if it is usable
+  std::optional<BendFit> bend;  // of a bent scan
+  // From the input model to the adjusted one, the best there is (of a bent scan: to where the room
+  // really is). If the bundle is not usable: the start's.
+  Similarity scan_from_sparse;
+  PoseCovariances covariances;
+};
+
+// From a similarity that lies on the surface. With options.bend, and unless the clicked photo is
+// fixed, a bent scan is told from a bent model by the photos: straightening it must lower the cost
+// of their observations.
+ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
+                            const PlaneBundleOptions& options);
+
+}  // namespace roomtex
