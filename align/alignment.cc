@@ -73,8 +73,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
     result.adjustment = AdjustAlignment(input, start, result.fit, options);
     TakeAdjustment(input, &result);
   }
-  const std::string reason =
-      JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
+  const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
   if (!reason.empty()) result.reasons.push_back(reason);
   return result;
 }

@@ -10,9 +10,9 @@ AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& sta
   fit.scan_from_sparse = start.scan_from_sparse;
   fit.points = FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
   const double gate = std::clamp(5 * start.position_sigma, 0.1, options.fit.max_gate);
-  fit.surface =
-      FitToSurface(input.model, fit.points, input.surveyed.patches(), input.picks,
-                   start.UsedPicks(), start.pick_sigma_px, gate, start.scan_from_sparse, options.fit);
+  fit.surface = FitToSurface(input.model, fit.points, input.surveyed.patches(), input.picks,
+                             start.UsedPicks(), start.pick_sigma_px, gate, start.scan_from_sparse,
+                             options.fit);
   fit.pick_px.assign(input.picks.size(), std::numeric_limits<double>::quiet_NaN());
   if (!fit.surface.converged) return fit;
   fit.pick_px = PickDistances(input.model, input.picks, fit.surface.scan_from_sparse);
@@ -27,10 +27,10 @@ ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStar
   const SurveyedScans& surveyed = input.surveyed;
   // The clicked view keeps the pose of its clicks, so that the model starts there, too.
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
-  return AdjustModel({input.model, fit.points, surveyed.scans(), surveyed.planes(),
-                      surveyed.patches(), input.picks, start.UsedPicks(), start.pick_sigma_px,
-                      start.image_name},
-                     fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
+  return AdjustModel(
+      {input.model, fit.points, surveyed.scans(), surveyed.planes(), surveyed.patches(),
+       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name},
+      fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
 }
 
 }  // namespace roomtex

@@ -65,9 +65,9 @@ void JudgePicks(const AlignmentStart& start, double limit, const TrustOptions& t
                        " pixels. Pick again, or pick more points so that a bad one shows.");
   }
   if (!(start.position_sigma <= trust.max_position_sigma)) {
-    reasons->push_back("The picks leave the camera's position open by " +
-                       Number(start.position_sigma, 2) +
-                       " m (one standard deviation). Spread them more over the photo and in depth.");
+    reasons->push_back(
+        "The picks leave the camera's position open by " + Number(start.position_sigma, 2) +
+        " m (one standard deviation). Spread them more over the photo and in depth.");
   }
 }
 
@@ -112,16 +112,16 @@ void JudgePlacement(const Placement& placement, const TrustOptions& trust,
         " % of each): the scan is of another room, or much was moved between scan and photos.");
   }
   if (!(placement.CameraShare() >= trust.min_camera_share)) {
-    reasons->push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) +
-                       " of " + std::to_string(placement.num_cameras) +
+    reasons->push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) + " of " +
+                       std::to_string(placement.num_cameras) +
                        " photos would have been taken from behind the surface that the "
                        "scanner saw.");
   }
 }
 
 // What the similarity leaves open, as numbers.
-void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start,
-                  const AlignmentFit& fit, const AlignmentOptions& options, Judgement* judgement) {
+void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, const AlignmentFit& fit,
+                  const AlignmentOptions& options, Judgement* judgement) {
   const SimilarityFit by_picks =
       fit.refined ? SimilarityFit()
                   : FitToPicks(input.model, input.picks, start.UsedPicks(), start.pick_sigma_px,
@@ -136,7 +136,15 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start,
       PropagateError(fit.refined ? fit.surface : by_picks, centres, input.surveyed.scans());
   if (!fit.refined) return;
   judgement->open = FindOpenDirections(fit.surface, middle);
-  if (!judgement->open.None()) judgement->warnings.push_back(judgement->open.Sentence());
+  const std::vector<bool> used = start.UsedPicks();
+  const bool held = std::count(used.begin(), used.end(), true) > 0;
+  if (held && !judgement->open.None()) judgement->warnings.push_back(judgement->open.Sentence());
+  // What is wholly open has no covariance at all.
+  if (!held && !(judgement->open.None() && fit.surface.covariance.allFinite())) {
+    judgement->reasons.push_back(
+        "The scan's surface leaves open where the model lies, how it is turned or how large it is, "
+        "and there are no picks to hold it there.");
+  }
 }
 
 void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const AlignmentFit& fit,
@@ -232,8 +240,7 @@ std::string JudgePicksLeftOut(const AlignmentInput& input, const AlignmentStart&
   return "The pick on " + LineOf(outcome.pick) + " (" + outcome.pick.image_name + ") is " +
          Number(outcome.leave_one_out_px, 0) +
          " pixels away from where the other picks put it, and without it only " +
-         std::to_string(num_used) + " are left, fewer than " +
-         std::to_string(kMinPicksPerPhoto) +
+         std::to_string(num_used) + " are left, fewer than " + std::to_string(kMinPicksPerPhoto) +
          ". The alignment was made from those. Correct or remove the pick, or add others.";
 }
 

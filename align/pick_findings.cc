@@ -127,14 +127,13 @@ std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input) {
   }
   const std::string of_all = " of " + std::to_string(n) + " picks";
   if (off >= 2 && 3 * on_scan.num_mirrored_off <= off) {
-    throw Contradiction(scan_path, "",
-                        "the scan is a mirror image of the one that the picks were made on: " +
-                            std::to_string(off) + of_all + " lie more than " +
-                            Number(kPickReach, 2) + " m off its surface, up to " +
-                            Number(distance[farthest], 2) + " m, but " +
-                            std::to_string(on_scan.num_mirrored_off) +
-                            " when the scan is reflected",
-                        MirrorRemedy(input));
+    throw Contradiction(
+        scan_path, "",
+        "the scan is a mirror image of the one that the picks were made on: " +
+            std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
+            " m off its surface, up to " + Number(distance[farthest], 2) + " m, but " +
+            std::to_string(on_scan.num_mirrored_off) + " when the scan is reflected",
+        MirrorRemedy(input));
   }
   if (n > 0 && 2 * off >= n) {
     throw Contradiction(
@@ -166,12 +165,11 @@ std::vector<std::string> CheckViews(const AlignmentInput& input,
     for (size_t k = 0; view.HasPose() && k < view.picks.size(); ++k) {
       if (view.review.used[k]) continue;
       const Pick& pick = input.picks[view.picks[k]];
-      warnings.push_back(
-          "The pick on " + LineOf(pick) + " (" + pick.image_name + " at " +
-          Number(pick.x_in_img.x(), 1) + ", " + Number(pick.x_in_img.y(), 1) +
-          ") was left out: it is " +
-          Number(view.review.leave_one_out_px[static_cast<int>(k)], 1) +
-          " pixels away from where the other picks put it.");
+      warnings.push_back("The pick on " + LineOf(pick) + " (" + pick.image_name + " at " +
+                         Number(pick.x_in_img.x(), 1) + ", " + Number(pick.x_in_img.y(), 1) +
+                         ") was left out: it is " +
+                         Number(view.review.leave_one_out_px[static_cast<int>(k)], 1) +
+                         " pixels away from where the other picks put it.");
     }
   }
   return warnings;
@@ -199,9 +197,8 @@ std::vector<std::string> CheckStart(const AlignmentInput& input, const std::vect
   }
   for (size_t i = 0; i < input.picks.size(); ++i) {
     if (std::isnan(found.joint->left_out_px[i])) continue;
-    warnings.push_back("The pick on " + LineOf(input.picks[i]) + " (" +
-                       input.picks[i].image_name + ") was left out: it is " +
-                       Number(found.joint->left_out_px[i], 1) +
+    warnings.push_back("The pick on " + LineOf(input.picks[i]) + " (" + input.picks[i].image_name +
+                       ") was left out: it is " + Number(found.joint->left_out_px[i], 1) +
                        " pixels away from where the other picks put it.");
   }
   return warnings;

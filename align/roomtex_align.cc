@@ -132,7 +132,7 @@ Json PicksToJson(const Alignment& alignment) {
   }
   json["count"] = start.picks.size();
   json["num_used"] = num_used;
-  json["image_name"] = start.image_name;
+  json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
   json["rms_px"] = NumberOrNull(start.pick_rms_px);
   json["max_px"] = NumberOrNull(start.pick_max_px);
   json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
@@ -202,9 +202,11 @@ void FillReport(const Alignment& alignment, double reprojection_rms_after, Repor
   r["scan_from_sparse"] = ToJson(alignment.scan_from_sparse);
   r["scan_from_sparse_from_picks"] = ToJson(alignment.start.scan_from_sparse);
   r["picks"] = PicksToJson(alignment);
-  r["scale"]["value"] = alignment.start.scale.scale;
-  r["scale"]["num_features"] = alignment.start.scale.num_features;
-  r["scale"]["relative_mad"] = alignment.start.scale.relative_mad;
+  const ScaleEstimate& scale = alignment.start.scale;
+  const bool has_scale = scale.num_features > 0;
+  r["scale"]["value"] = has_scale ? Json(scale.scale) : Json(nullptr);
+  r["scale"]["num_features"] = scale.num_features;
+  r["scale"]["relative_mad"] = has_scale ? Json(scale.relative_mad) : Json(nullptr);
   r["planes"] = Json::array();
   const bool refined = alignment.fit.refined;
   const SimilarityFit& fit = alignment.fit.surface;
@@ -251,8 +253,8 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
   const int num_threads = context.options.num_threads;
   std::vector<std::string> warnings;
   const AgreementOptions options;
-  const Agreement agreement = MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options,
-                                               num_threads, &warnings);
+  const Agreement agreement =
+      MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options, num_threads, &warnings);
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
   if (a.overlays > 0) {
@@ -305,8 +307,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   options.num_threads = context.options.num_threads;
   const SurveyedScans surveyed(placed.scans, options);
   const std::vector<ScanPlane> planes = DetectPlanes(a, surveyed, context);
-  const std::optional<Alignment> found = FindAlignment(
-      a, {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth}, context);
+  const std::optional<Alignment> found =
+      FindAlignment(a, {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth}, context);
   if (!found) return;
   const Alignment& alignment = *found;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);

@@ -112,12 +112,12 @@ PickStart StartFromPicks(const SparseModel& model, const std::vector<Pick>& pick
   AlignmentStart start = StartFromView(view, found.choice);
   start.picks = OutcomesOf(picks);
   SetReviewed(views, &start.picks);
-  const auto num_on = std::count_if(picks.begin(), picks.end(),
-                                    [](const Pick& pick) { return pick.weight > 0; });
+  const auto num_on =
+      std::count_if(picks.begin(), picks.end(), [](const Pick& pick) { return pick.weight > 0; });
   if (num_on > static_cast<long>(view.picks.size())) {
-    found.joint = FitPicksJointly(model, picks, start.UsedPicks(), start.pick_sigma_px,
-                                  start.scan_from_sparse, options.fit,
-                                  options.picks.min_bad_pick_px);
+    found.joint =
+        FitPicksJointly(model, picks, start.UsedPicks(), start.pick_sigma_px,
+                        start.scan_from_sparse, options.fit, options.picks.min_bad_pick_px);
     start.scan_from_sparse = found.joint->scan_from_sparse;
     for (size_t i = 0; i < picks.size(); ++i) start.picks[i].used = found.joint->used[i];
   }

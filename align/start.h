@@ -18,7 +18,7 @@ namespace roomtex {
 struct PickOutcome {
   Pick pick;
   bool used = true;
-  double residual_px = 0;  // under the start
+  double residual_px = 0;                                              // under the start
   double leave_one_out_px = std::numeric_limits<double>::quiet_NaN();  // NaN where it was not tried
 };
 

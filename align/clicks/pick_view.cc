@@ -52,9 +52,11 @@ std::vector<PickView> ReviewViews(const SparseModel& model, const std::vector<Pi
 
 std::vector<PickView> ReviewViews(const SparseModel& model, const std::vector<Pick>& picks,
                                   const PickReviewOptions& options) {
-  return ReviewViews(model, picks, kMinPicksPerPhoto, options,
-                     [&](const std::string&, const CameraProjection& projection,
-                         const PointPairs& pairs) { return ReviewPicks(projection, pairs, options); });
+  return ReviewViews(
+      model, picks, kMinPicksPerPhoto, options,
+      [&](const std::string&, const CameraProjection& projection, const PointPairs& pairs) {
+        return ReviewPicks(projection, pairs, options);
+      });
 }
 
 PoseChoice ChoosePoseOf(const PickView& view, const ScaleOptions& options, int min_features,

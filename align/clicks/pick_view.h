@@ -40,8 +40,8 @@ std::vector<PickView> ReviewViews(const SparseModel& model, const std::vector<Pi
 
 // Metres per sparse unit by the features of one photo: EstimateScale() on one form of the scans or
 // another.
-using ScaleOfPhoto = std::function<ScaleEstimate(
-    const SparseImage&, const Rigid& cam_from_scan, const ScaleOptions&)>;
+using ScaleOfPhoto = std::function<ScaleEstimate(const SparseImage&, const Rigid& cam_from_scan,
+                                                 const ScaleOptions&)>;
 
 // Which of the poses of a view is the photo's (ChoosePose). The view must have one.
 PoseChoice ChoosePoseOf(const PickView& view, const ScaleOptions& options, int min_features,

@@ -20,9 +20,8 @@ struct Trial {
   Trial(const ModelAdjustmentInput& adjustment, const Similarity& scan_from_sparse,
         const ScanBend& bend, const PlaneBundleOptions& options)
       : start(adjustment.model),
-        input{start,           adjustment.planes, adjustment.patches,
-              adjustment.picks, adjustment.used,   adjustment.pick_sigma_px,
-              adjustment.clicked_image, bend} {
+        input{start,           adjustment.planes,        adjustment.patches,       adjustment.picks,
+              adjustment.used, adjustment.pick_sigma_px, adjustment.clicked_image, bend} {
     TransformModel(scan_from_sparse, &start);
     bundle = AdjustToSurface(input, options);
   }

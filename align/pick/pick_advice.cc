@@ -53,13 +53,6 @@ std::string AsSentence(std::string text) {
   return text;
 }
 
-std::string LayoutProblemOfThree(const PointPairs& pairs) {
-  const Eigen::Vector3d extents = PrincipalExtents(pairs.x_in_scan);
-  if (extents[1] > PickReviewOptions().min_line_share * extents[0]) return "";
-  return "the three picks lie on one straight line, around which the camera could turn freely; "
-         "pick a point beside it";
-}
-
 std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
                                         const ScanReaderOptions& reader) {
   std::vector<std::string> warnings;

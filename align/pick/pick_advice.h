@@ -11,8 +11,6 @@ namespace roomtex {
 // With a capital letter and a full stop.
 std::string AsSentence(std::string text);
 
-// "" or why three picks fix nothing.
-std::string LayoutProblemOfThree(const PointPairs& pairs);
 // Exchanged, mirrored, bad. `on`: where the reviewed picks stand among all, which is their number
 // (from 1) in the sentences.
 std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,

@@ -14,8 +14,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int kCoarseSamples = 300000;  // of the mesh that decides which edges a photo sees
-constexpr int kRankCells = 8;           // a photo has this many cells across and down
+constexpr int kRankCells = 8;  // a photo has this many cells across and down
 
 // A name of the model must not lead out of the folder of the photos.
 bool StaysInside(const std::string& name) {
@@ -169,8 +168,7 @@ void PickScene::Work() {
   if (!rays_) rays_ = std::make_unique<ScanRays>(scans_);
   publish([&] { rays_ready_ = rays_.get(); });
   if (stopping_) return;
-  auto edges = std::make_unique<Edges>();
-  edges->free_space = std::make_unique<FreeSpace>(scans_, kCoarseSamples);
+  auto edges = std::make_unique<Edges>(Edges{surveyed_.free_space(), {}});
   for (const auto& places : places_) {
     if (stopping_) return;
     for (ScanEdge& edge : FindScanEdges(places->scan(), ScanEdgeOptions())) {

@@ -13,7 +13,7 @@
 
 #include "align/pick/scan_places.h"
 #include "align/pick/scan_rays.h"
-#include "align/trust/free_space.h"
+#include "align/surveyed_scans.h"
 #include "align/trust/overlay.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
@@ -69,7 +69,7 @@ class PickScene {
   // Null until it stands.
   const ScanRays* rays() const { return rays_ready_.load(); }
   struct Edges {
-    std::unique_ptr<FreeSpace> free_space;
+    const FreeSpace& free_space;
     std::vector<ScanEdge> edges;
   };
   // Null until they stand, or when give_up() became true while waiting for them.
@@ -84,6 +84,7 @@ class PickScene {
   const PickSceneInput input_;
   SparseModel model_;
   std::vector<Scan> scans_;
+  const SurveyedScans surveyed_{scans_};
   std::deque<Scan> panoramas_;  // of meshes
   std::vector<std::unique_ptr<ScanPlaces>> places_;
   std::map<uint32_t, CameraProjection> projections_;

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "align/clicks/pose_choice.h"
-#include "align/fit/joint_picks.h"
-#include "align/judgement.h"
 #include "align/pick/few_picks.h"
 #include "align/pick/pick_advice.h"
 
 namespace roomtex {
 namespace {
+
+constexpr int kMinPicks = 3;  // in one photo, that can say something about its pose
 
 double MetresOff(const CameraProjection& projection, const Rigid& cam_from_scan,
                  const SessionPick& pick) {
@@ -40,17 +39,6 @@ PickReview ReviewOfPoses(std::vector<ViewPose> poses, int num_picks) {
 
 }  // namespace
 
-// The picks of one photo that are on, and their own pose.
-struct PickSolver::View {
-  const PickPhoto* photo = nullptr;
-  std::vector<int> picks;  // indices
-  PointPairs pairs;
-  PickReview review;
-  ScaleEstimate scale;
-  Rigid cam_from_scan;
-  bool has_pose = false;
-};
-
 PickReview PickSolver::Review(const std::string& name, const CameraProjection& projection,
                               const PointPairs& pairs) {
   const auto found = reviewed_.find(name);
@@ -73,102 +61,118 @@ PickReview PickSolver::Review(const std::string& name, const CameraProjection& p
   return review;
 }
 
-void PickSolver::SolveView(const ScanRays* rays, View* view, PhotoState* photo) {
+// What the picks of one photo say about it alone.
+std::optional<PoseChoice> PickSolver::SolveView(const ScaleOfPhoto& scale_of_photo, PickView* view,
+                                                PhotoState* photo) const {
   const int n = view->pairs.size();
-  const CameraProjection& projection = *view->photo->projection;
-  if (n < 3) return;
-  const std::string problem =
-      n >= 4 ? FindLayoutProblem(view->pairs, projection.camera(), options_.picks)
-             : LayoutProblemOfThree(view->pairs);
-  if (!problem.empty()) {
-    photo->warnings.push_back(AsSentence(problem));
-    return;
-  }
-  view->review = Review(view->photo->name(), projection, view->pairs);
   const PickReview& review = view->review;
-  for (std::string& warning : ReviewWarnings(review, view->picks, scene_.input().scan_reader)) {
-    photo->warnings.push_back(std::move(warning));
-  }
+  std::optional<PoseChoice> choice;
   if (!review.HasPose()) {
     photo->warnings.push_back(
         "No camera pose has all these picks in front of the camera. Check that they are of this "
         "photo.");
-    return;
+    return choice;
   }
-  int chosen = 0;
-  if (rays != nullptr) {
-    const PoseChoice choice =
-        ChoosePose(review.poses, options_.scale, options_.trust.min_scale_features,
-                   [&](const Rigid& cam_from_scan, const ScaleOptions& options) {
-                     return EstimateScale(scene_.model(), *view->photo->image, cam_from_scan,
-                                          rays->caster(), options, scene_.input().num_threads);
-                   });
-    chosen = choice.index;
-    view->scale = choice.scale;
-    photo->ambiguous = choice.ambiguous;
+  if (scale_of_photo) {
+    choice = ChoosePoseOf(*view, options_.scale, options_.trust.min_scale_features, scale_of_photo);
+    photo->ambiguous = choice->ambiguous;
   } else {
     photo->ambiguous = n < kMinPicksPerPhoto && review.poses.size() > 1;
   }
-  if (n == 3 && view->scale.num_features < options_.trust.min_scale_features) {
-    if (rays != nullptr) {
+  const int num_features = choice ? choice->scale.num_features : 0;
+  if (n == 3 && num_features < options_.trust.min_scale_features) {
+    if (scale_of_photo) {
       photo->warnings.push_back(
           "Three picks fit several poses, and too few sparse points of this photo lie on the scan "
-          "to "
-          "tell which.");
+          "to tell which.");
     }
-    return;
+    view->review.poses.clear();
+    return choice;
   }
-  view->has_pose = true;
-  view->cam_from_scan = review.poses[chosen].cam_from_scan;
-  photo->cam_from_scan = view->cam_from_scan;
+  const ViewPose& pose = review.poses[choice ? choice->index : 0];
+  photo->cam_from_scan = pose.cam_from_scan;
   photo->by = n == 3 ? PhotoState::By::kSparseModel : PhotoState::By::kPicks;
-  const double sigma = review.poses[chosen].PositionSigma();
+  const double sigma = pose.PositionSigma();
   if (n >= 4 && std::isfinite(sigma)) photo->position_sigma = sigma;
+  return choice;
 }
 
-// One similarity for the model (thesis 7.1.3), as AlignToScan() finds it from the picks.
-void PickSolver::FitModel(const std::vector<SessionPick>& picks, const std::vector<View>& views,
-                          PickSolution* solution) const {
-  const View* best = nullptr;
-  for (const View& view : views) {
-    if (!view.has_pose || view.scale.num_features == 0) continue;
-    const auto is_better = [](const View& a, const View& b) {
-      const bool a_is_whole = a.pairs.size() >= kMinPicksPerPhoto;
-      const bool b_is_whole = b.pairs.size() >= kMinPicksPerPhoto;
-      if (a_is_whole != b_is_whole) return a_is_whole;
-      if (!a_is_whole && a.pairs.size() != b.pairs.size()) return a.pairs.size() > b.pairs.size();
-      return a.review.pose().PositionSigma() < b.review.pose().PositionSigma();
-    };
-    if (best == nullptr || is_better(view, *best)) best = &view;
-  }
-  if (best == nullptr) return;
-  solution->scale = best->scale;
-  Similarity scan_from_sparse =
-      ScanFromSparse(best->cam_from_scan, best->photo->image->cam_from_model, best->scale.scale);
-  std::vector<int> on;
-  std::vector<Pick> complete;
-  std::vector<bool> used;
+PickSolver::Complete PickSolver::CompletePicks(const std::vector<SessionPick>& picks,
+                                               PickSolution* solution) const {
+  Complete complete;
+  std::map<std::string, std::vector<int>> on;
   for (size_t i = 0; i < picks.size(); ++i) {
-    if (!picks[i].complete() || !(picks[i].weight > 0)) continue;
-    on.push_back(static_cast<int>(i));
-    complete.push_back(
-        {picks[i].image_name, *picks[i].x_in_img, *picks[i].x_in_scan, 0, picks[i].weight});
-    used.push_back(solution->picks[i].status != PickState::Status::kBad);
+    const SessionPick& pick = picks[i];
+    if (!pick.complete()) continue;
+    const int index = static_cast<int>(i);
+    complete.picks.push_back({pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight});
+    complete.index.push_back(index);
+    ++solution->photos[pick.image_name].num_complete;
+    solution->picks[i].status =
+        pick.weight > 0 ? PickState::Status::kUsed : PickState::Status::kOff;
+    if (pick.weight > 0) on[pick.image_name].push_back(index);
   }
-  if (complete.size() > best->picks.size()) {
-    const double sigma_px = std::max(0.5, best->review.pose().sigma_px);
-    const JointPickFit joint =
-        FitPicksJointly(scene_.model(), complete, used, sigma_px, scan_from_sparse, options_.fit,
-                        options_.picks.min_bad_pick_px);
-    scan_from_sparse = joint.scan_from_sparse;
-    for (size_t k = 0; k < on.size(); ++k) {
-      if (!joint.used[k]) solution->picks[on[k]].status = PickState::Status::kBad;
+  for (const auto& [name, indices] : on) {
+    solution->photos[name].warnings = SurfaceWarnings(picks, indices, scene_);
+  }
+  return complete;
+}
+
+PickSolver::Views PickSolver::SolveViews(const Complete& complete, const ScanRays* rays,
+                                         PickSolution* solution) {
+  ScaleOfPhoto scale_of_photo;  // needs the rays
+  if (rays != nullptr) {
+    scale_of_photo = [&](const SparseImage& image, const Rigid& cam_from_scan,
+                         const ScaleOptions& options) {
+      return EstimateScale(scene_.model(), image, cam_from_scan, rays->caster(), options,
+                           scene_.input().num_threads);
+    };
+  }
+  Views solved;
+  solved.views =
+      ReviewViews(scene_.model(), complete.picks, kMinPicks, options_.picks,
+                  [this](const std::string& name, const CameraProjection& projection,
+                         const PointPairs& pairs) { return Review(name, projection, pairs); });
+  for (PickView& view : solved.views) {
+    PhotoState& photo = solution->photos[view.image_name];
+    solved.choices.emplace_back();
+    if (!view.layout_problem.empty()) {
+      photo.warnings.push_back(AsSentence(view.layout_problem));
+      continue;
+    }
+    std::vector<int> on;
+    for (const int pick : view.picks) on.push_back(complete.index[pick]);
+    for (std::string& warning : ReviewWarnings(view.review, on, scene_.input().scan_reader)) {
+      photo.warnings.push_back(std::move(warning));
+    }
+    solved.choices.back() = SolveView(scale_of_photo, &view, &photo);
+    for (size_t k = 0; view.HasPose() && k < on.size(); ++k) {
+      PickState& state = solution->picks[on[k]];
+      state.leave_one_out_px = view.review.leave_one_out_px[static_cast<int>(k)];
+      if (!view.review.used[k]) state.status = PickState::Status::kBad;
     }
   }
-  solution->scan_from_sparse = scan_from_sparse;
+  return solved;
+}
+
+// One similarity for the model (thesis 7.1.3).
+void PickSolver::FitModel(const Complete& complete, const Views& views,
+                          PickSolution* solution) const {
+  const PickStart found =
+      StartFromPicks(scene_.model(), complete.picks, views.views, views.choices, options_, {});
+  if (!found.start) return;
+  solution->scale = found.start->scale;
+  solution->scan_from_sparse = found.start->scan_from_sparse;
+  for (size_t k = 0; k < complete.index.size(); ++k) {
+    PickState& state = solution->picks[complete.index[k]];
+    const bool is_left_out = !found.start->picks[k].used;
+    if (is_left_out && state.status == PickState::Status::kUsed) {
+      state.status = PickState::Status::kBad;
+    }
+  }
   for (const PickPhoto& photo : scene_.photos()) {
     PhotoState& state = solution->photos[photo.name()];
-    state.cam_from_scan = CamFromScan(photo.image->cam_from_model, scan_from_sparse);
+    state.cam_from_scan = CamFromScan(photo.image->cam_from_model, *solution->scan_from_sparse);
     if (!state.solved()) state.by = PhotoState::By::kSparseModel;
   }
 }
@@ -254,40 +258,15 @@ PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
   solution.with_rays = rays != nullptr;
   solution.picks.resize(picks.size());
   for (const PickPhoto& photo : scene_.photos()) solution.photos[photo.name()];
-  std::map<std::string, View> by_name;
-  for (size_t i = 0; i < picks.size(); ++i) {
-    if (!picks[i].complete()) continue;
-    ++solution.photos[picks[i].image_name].num_complete;
-    const bool on = picks[i].weight > 0;
-    solution.picks[i].status = on ? PickState::Status::kUsed : PickState::Status::kOff;
-    if (on) by_name[picks[i].image_name].picks.push_back(static_cast<int>(i));
-  }
-  std::vector<View> views;
-  for (auto& [name, view] : by_name) {
-    view.photo = scene_.FindPhoto(name);
-    const int n = static_cast<int>(view.picks.size());
-    view.pairs = {Eigen::Matrix2Xd(2, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n)};
-    for (int k = 0; k < n; ++k) {
-      const SessionPick& pick = picks[view.picks[k]];
-      view.pairs.x_in_img.col(k) = *pick.x_in_img;
-      view.pairs.x_in_scan.col(k) = *pick.x_in_scan;
-      view.pairs.weight[k] = pick.weight;
-    }
-    solution.photos[name].warnings = SurfaceWarnings(picks, view.picks, scene_);
-    SolveView(rays, &view, &solution.photos[name]);
-    for (int k = 0; k < n && view.has_pose; ++k) {
-      PickState& state = solution.picks[view.picks[k]];
-      state.leave_one_out_px = view.review.leave_one_out_px[k];
-      if (!view.review.used[k]) state.status = PickState::Status::kBad;
-    }
-    views.push_back(std::move(view));
-  }
-  FitModel(picks, views, &solution);
+  const Complete complete = CompletePicks(picks, &solution);
+  const Views views = SolveViews(complete, rays, &solution);
+  if (rays != nullptr) FitModel(complete, views, &solution);
   Measure(picks, &solution);
-  for (const View& view : views) {
-    if (!view.has_pose) continue;
-    PhotoState& photo = solution.photos[view.photo->name()];
-    for (std::string& warning : SpreadWarnings(view.pairs, view.photo->projection->camera())) {
+  for (const PickView& view : views.views) {
+    if (!view.HasPose()) continue;
+    PhotoState& photo = solution.photos[view.image_name];
+    const CameraProjection& projection = *scene_.FindPhoto(view.image_name)->projection;
+    for (std::string& warning : SpreadWarnings(view.pairs, projection.camera())) {
       photo.warnings.push_back(std::move(warning));
     }
     const std::string warning = ModelWarning(view.review, photo);

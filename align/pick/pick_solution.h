@@ -66,13 +66,24 @@ class PickSolver {
   PickSolution Solve(const std::vector<SessionPick>& picks);
 
  private:
-  struct View;
-  struct Joint;
+  // The picks that have both sides, and where each stands in the list.
+  struct Complete {
+    std::vector<Pick> picks;
+    std::vector<int> index;
+  };
+  // A photo with three picks or more, and which of its poses is its own (if it could be told).
+  struct Views {
+    std::vector<PickView> views;
+    std::vector<std::optional<PoseChoice>> choices;
+  };
+
   PickReview Review(const std::string& name, const CameraProjection& projection,
                     const PointPairs& pairs);
-  void SolveView(const ScanRays* rays, View* view, PhotoState* photo);
-  void FitModel(const std::vector<SessionPick>& picks, const std::vector<View>& views,
-                PickSolution* solution) const;
+  Complete CompletePicks(const std::vector<SessionPick>& picks, PickSolution* solution) const;
+  Views SolveViews(const Complete& complete, const ScanRays* rays, PickSolution* solution);
+  std::optional<PoseChoice> SolveView(const ScaleOfPhoto& scale_of_photo, PickView* view,
+                                      PhotoState* photo) const;
+  void FitModel(const Complete& complete, const Views& views, PickSolution* solution) const;
   void Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const;
   void Predict(const std::vector<SessionPick>& picks, const ScanRays* rays,
                PickSolution* solution) const;

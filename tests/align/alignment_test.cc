@@ -1,5 +1,6 @@
 #include "align/alignment.h"
 
+#include <cmath>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -38,7 +39,7 @@ TEST(Alignment, ExactPicksWithoutRefinementGiveTheTruth) {
   options.plane_constrained = false;
   const Alignment alignment = AlignCase(one, options);
   EXPECT_THAT(alignment.reasons, IsEmpty());
-  EXPECT_LT(alignment.pick_rms_px, 1e-4);
+  EXPECT_LT(alignment.start.pick_rms_px, 1e-4);
   // The pose is exact; the scale rests on hundreds of features with 0.7 pixels of noise.
   EXPECT_NEAR(alignment.scan_from_sparse.scale / one.room->ScanFromSparse().scale, 1, 5e-4);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position, 2e-3);
@@ -50,14 +51,14 @@ TEST(Alignment, SixNoisyPicksAndTheSurfaceGiveMillimetres) {
     const SimulatedCase& one = MakeCase(seed, 6);
     const Alignment alignment = AlignCase(one);
     EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
-    EXPECT_TRUE(alignment.refined);
+    EXPECT_TRUE(alignment.fit.refined);
     const PoseErrors from_picks =
-        WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse_from_picks);
+        WorstPoseErrors(*one.room, one.model, alignment.start.scan_from_sparse);
     const PoseErrors refined = WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse);
     EXPECT_LT(from_picks.position, 0.06) << seed;
     EXPECT_LT(refined.position, 0.002) << seed;
     EXPECT_LT(refined.rotation, RadFromDeg(0.03)) << seed;
-    EXPECT_LT(alignment.surface_fit.rms_after, alignment.surface_fit.rms_before);
+    EXPECT_LT(alignment.fit.surface.rms_after, alignment.fit.surface.rms_before);
   }
 }
 
@@ -111,9 +112,9 @@ TEST(Alignment, LeavesOutOneBadPickAndNamesItsLine) {
   const Alignment alignment = AlignCase(one);
   EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
   EXPECT_THAT(alignment.warnings, ElementsAre(HasSubstr("The pick on line 5")));
-  EXPECT_FALSE(alignment.picks[3].used);
-  EXPECT_GT(alignment.pick_max_px, 40);
-  EXPECT_LT(alignment.pick_rms_px, 4);
+  EXPECT_FALSE(alignment.start.picks[3].used);
+  EXPECT_GT(alignment.start.pick_max_px, 40);
+  EXPECT_LT(alignment.start.pick_rms_px, 4);
 }
 
 // Five picks are fewer than are asked for, so the answer is not trusted; but it is there, and
@@ -126,11 +127,12 @@ TEST(Alignment, OfSixPicksOneFarOffIsNamedAndTheOthersGiveTheAnswer) {
     one.picks[bad].x_in_img += 60 * (middle - one.picks[bad].x_in_img).normalized();
     const Alignment alignment = AlignCase(one);
     EXPECT_NE(Reasons(alignment), "") << bad;
-    if (alignment.picks[bad].used) continue;
+    if (alignment.start.picks[bad].used) continue;
     ++num_named;
     EXPECT_THAT(Reasons(alignment), HasSubstr("line " + std::to_string(bad + 2))) << bad;
-    EXPECT_TRUE(alignment.adjusted) << bad;
-    EXPECT_LT(WorstPoseErrors(*one.room, alignment.bundle.model, Similarity()).position, 0.003)
+    EXPECT_TRUE(alignment.adjusted()) << bad;
+    EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
+              0.003)
         << bad;
   }
   EXPECT_GE(num_named, 5);
@@ -146,9 +148,9 @@ TEST(Alignment, APickThatIsSwitchedOffChangesNothing) {
   more.picks.insert(more.picks.begin() + 1, wrong);
   const Alignment expected = AlignCase(one), found = AlignCase(more);
   EXPECT_THAT(found.reasons, IsEmpty()) << Reasons(found);
-  EXPECT_FALSE(found.picks[1].used);
-  EXPECT_GT(found.picks[1].residual_px, 100);
-  EXPECT_EQ(found.pick_max_px, expected.pick_max_px);
+  EXPECT_FALSE(found.start.picks[1].used);
+  EXPECT_GT(found.start.picks[1].residual_px, 100);
+  EXPECT_EQ(found.start.pick_max_px, expected.start.pick_max_px);
   EXPECT_THAT(found.scan_from_sparse.Matrix(),
               IsNearMatrix(expected.scan_from_sparse.Matrix(), 1e-9));
 }
@@ -284,7 +286,7 @@ TEST(Alignment, PicksInSeveralPhotosAreBetterThanInOne) {
     }
     const Alignment joint = AlignCase(one, options);
     EXPECT_THAT(joint.reasons, IsEmpty()) << Reasons(joint);
-    EXPECT_LT(joint.pick_rms_px, 4);
+    EXPECT_LT(joint.start.pick_rms_px, 4);
     four_photos += WorstPoseErrors(*one.room, one.model, joint.scan_from_sparse).position;
   }
   EXPECT_LT(four_photos, 0.7 * one_photo);
@@ -323,7 +325,7 @@ TEST(Alignment, NamesABadPickInAPhotoWithFewPicks) {
   one.picks.insert(one.picks.end(), more.begin(), more.end());
   one.picks.back().x_in_img += Eigen::Vector2d(80, 0);
   const Alignment alignment = AlignCase(one);
-  EXPECT_FALSE(alignment.picks.back().used);
+  EXPECT_FALSE(alignment.start.picks.back().used);
   EXPECT_THAT(alignment.warnings, ElementsAre(HasSubstr("line 22")));
 }
 
@@ -361,6 +363,95 @@ TEST(Alignment, ChoosesTheRightSolutionOfCoplanarPicks) {
         << photo;
   }
   EXPECT_GE(tried, 2);
+}
+
+// The truth, off by a few centimetres, half a degree and a percent.
+Similarity NearTheTruth(const SimulatedCase& one) {
+  Similarity off;
+  off.scale = 1.01;
+  off.rotation = Eigen::AngleAxisd(RadFromDeg(0.5), Eigen::Vector3d(1, 2, -2).normalized());
+  off.translation = {0.03, -0.02, 0.02};
+  return off * one.room->ScanFromSparse();
+}
+
+TEST(Alignment, ASimilarityIsEnoughToStartFrom) {
+  SimulatedCase one = MakeCase();
+  one.picks.clear();
+  const Alignment alignment = AlignCaseFrom(NearTheTruth(one), 0.05, one);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_THAT(alignment.warnings, IsEmpty());
+  EXPECT_TRUE(alignment.fit.surface.converged);
+  ASSERT_TRUE(alignment.adjusted());
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.fit.scan_from_sparse).position, 0.003);
+  EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
+            0.003);
+  EXPECT_GT(alignment.placement.SurfaceShare(), 0.98);
+  EXPECT_LT(alignment.expected_error.at_cameras, 0.01);
+  EXPECT_EQ(alignment.photo_sigmas.size(), one.model.images.size());
+  // Nothing is said of picks.
+  EXPECT_THAT(alignment.start.picks, IsEmpty());
+  EXPECT_THAT(alignment.refined_pick_px, IsEmpty());
+  EXPECT_TRUE(std::isnan(alignment.start.pick_rms_px));
+  EXPECT_TRUE(std::isnan(alignment.start.pick_max_px));
+  EXPECT_TRUE(std::isnan(alignment.refined_pick_rms_px));
+  EXPECT_EQ(alignment.start.image_name, "");
+  EXPECT_EQ(alignment.start.scale.num_features, 0);
+}
+
+TEST(Alignment, WithoutPicksTheAnswerDoesNotDependOnWhereTheScanLies) {
+  SimulatedCase one = MakeCase();
+  one.picks.clear();
+  AlignmentOptions options;
+  options.plane_constrained = false;  // the fit itself is asked
+  const Similarity start = NearTheTruth(one);
+  const Similarity before = AlignCaseFrom(start, 0.05, one, options).fit.surface.scan_from_sparse;
+  const Similarity moved_from_scan{1, Eigen::Quaterniond::Identity(), {600000, 5000000, 300}};
+  for (Eigen::Vector3d& point : one.scans[0].points) point = moved_from_scan * point;
+  one.scans[0].scan_from_station.translation += moved_from_scan.translation;
+  const Alignment after = AlignCaseFrom(moved_from_scan * start, 0.05, one, options);
+  ASSERT_TRUE(after.fit.surface.converged);
+  const Similarity back = moved_from_scan.Inverse() * after.fit.surface.scan_from_sparse;
+  for (const auto& [id, image] : one.model.images) {
+    EXPECT_THAT(CamFromScan(image.cam_from_model, back),
+                IsNearRigid(CamFromScan(image.cam_from_model, before), RadFromDeg(0.02), 1e-3));
+  }
+}
+
+TEST(Alignment, WithoutPicksAndRefinementTheStartIsTheAnswer) {
+  SimulatedCase one = MakeCase();
+  one.picks.clear();
+  AlignmentOptions options;
+  options.plane_constrained = false;
+  const Similarity start = one.room->ScanFromSparse();
+  const Alignment alignment = AlignCaseFrom(start, 0.01, one, options);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_EQ(alignment.scan_from_sparse.translation, start.translation);
+  EXPECT_FALSE(std::isfinite(alignment.expected_error.at_cameras));  // nobody knows
+}
+
+TEST(Alignment, NeverTrustsAWrongStart) {
+  SimulatedCase one = MakeCase();
+  one.picks.clear();
+  for (int k = 0; k < 4; ++k) {
+    Similarity off;
+    off.rotation = Eigen::AngleAxisd(1 + 0.6 * k, one.scans[0].up.normalized());
+    off.translation = {0.8, -0.3 * k, 0};
+    const Alignment alignment = AlignCaseFrom(off * one.room->ScanFromSparse(), 0.2, one);
+    EXPECT_NE(Reasons(alignment), "") << k;
+    EXPECT_FALSE(alignment.adjusted()) << k;
+  }
+}
+
+// Two picks fix no pose, but they hold what the surface leaves open.
+TEST(Alignment, AStartTakesTheFewPicksThereAre) {
+  SimulatedCase one = MakeCase(0, 6);
+  one.picks.resize(2);
+  one.picks[1].weight = 0;
+  const Alignment alignment = AlignCaseFrom(NearTheTruth(one), 0.05, one);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_THAT(alignment.start.UsedPicks(), ElementsAre(true, false));
+  EXPECT_GT(alignment.start.pick_rms_px, 5);
+  EXPECT_LT(alignment.refined_pick_rms_px, 5);
 }
 
 TEST(Alignment, FewFeaturesAreNotTrusted) {

@@ -56,13 +56,20 @@ inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
   return one;
 }
 
-inline Alignment AlignCase(SimulatedCase one, AlignmentOptions options = {}) {
-  const ReprojectionErrors errors = UpdateReprojectionErrors(&one.model);
-  const FreeSpace free_space(one.scans, 100000);
+inline Alignment AlignCase(const SimulatedCase& one, const AlignmentOptions& options = {}) {
+  const SurveyedScans surveyed(one.scans);
   Progress progress(true);
-  const std::vector<ScanPlane> planes = FindScanPlanes(one.scans, ScanPlaneOptions(), 2);
-  return AlignToScan({one.model, one.scans, one.picks, "picks.csv", one.azimuth, planes},
-                     std::max(0.3, errors.rms_px / std::sqrt(2.0)), free_space, options, &progress);
+  return AlignToScan({one.model, surveyed, one.picks, "picks.csv", one.azimuth}, options,
+                     &progress);
+}
+// From a similarity, with what picks there are.
+inline Alignment AlignCaseFrom(const Similarity& scan_from_sparse, double position_sigma,
+                               const SimulatedCase& one, const AlignmentOptions& options = {}) {
+  const SurveyedScans surveyed(one.scans);
+  Progress progress(true);
+  return AlignToScan({one.model, surveyed, one.picks, "", one.azimuth},
+                     StartFromSimilarity(one.model, one.picks, scan_from_sparse, position_sigma),
+                     options, &progress);
 }
 
 // Largest errors over the photos: position in metres, rotation in radians.

@@ -147,9 +147,9 @@ void Add(const SimulatedCase& one, bool is_right, Counts* counts) {
     return;
   }
   SparseModel model = one.model;
-  TransformModel(alignment.surface_fit.scan_from_sparse, &model);
+  TransformModel(alignment.fit.surface.scan_from_sparse, &model);
   const Errors by_similarity = ErrorsOf(*one.room, model);
-  if (alignment.adjusted) model = alignment.bundle.model;
+  if (alignment.adjusted()) model = alignment.adjustment.bundle.model;
   const Errors errors = ErrorsOf(*one.room, model);
   const double worst = Quantile(errors.position, 1), median = Quantile(errors.position, 0.5);
   const bool trusted = alignment.reasons.empty();

@@ -251,6 +251,7 @@ TEST_F(Kitchen, PhotosContradictWrongAlignments) {
   reader.azimuth = "counterclockwise";
   const std::vector<Scan> scans = {ReadScan(std::string(kKitchen) + "/scan.rtpi", reader)};
   const FreeSpace free_space(scans, 300000);
+  const ScanViewer viewer(scans, free_space);
   int contradictions = 0;
   for (int k = 0; k < 6; ++k) {
     Similarity wrong;
@@ -260,8 +261,8 @@ TEST_F(Kitchen, PhotosContradictWrongAlignments) {
     SparseModel model = ReadSparseModel(*folder_ / "aligned");
     TransformModel(wrong, &model);
     std::vector<std::string> warnings;
-    const Agreement agreement = MeasureAgreement(model, std::string(kKitchen) + "/images", scans,
-                                                 free_space, AgreementOptions(), -1, &warnings);
+    const Agreement agreement = MeasureAgreement(model, std::string(kKitchen) + "/images", viewer,
+                                                 AgreementOptions(), -1, &warnings);
     EXPECT_FALSE(agreement.gradient.supports) << k;
     contradictions += agreement.gradient.contradicts;
   }

@@ -184,8 +184,8 @@ TEST(ScanBend, IsBelievedOnlyWhereAStraightScanContradictsThePhotos) {
     SimulatedCase one = MakeCase(room, 8);
     one.model = Reconstructed(one.room->MakeSparseModel(2000, c.noise_px));
     const Alignment alignment = AlignCase(one);
-    ASSERT_TRUE(alignment.adjusted) << c.seed;
-    EXPECT_EQ(alignment.bend.has_value(), c.bend > 0) << c.seed;
+    ASSERT_TRUE(alignment.adjusted()) << c.seed;
+    EXPECT_EQ(alignment.adjustment.bend.has_value(), c.bend > 0) << c.seed;
   }
 }
 

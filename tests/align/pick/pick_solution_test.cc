@@ -193,30 +193,34 @@ TEST(PickSolution, TheMissingPartnerOfAHalfPairIsPredicted) {
 }
 
 // The same picks through roomtex-align's code.
-Alignment Align(const std::vector<SessionPick>& session_picks) {
-  const PickScene& scene = ThePickRoom().scene();
+std::vector<Pick> AsInAFile(const std::vector<SessionPick>& session_picks) {
   std::vector<Pick> picks;
   for (const SessionPick& pick : session_picks) {
     picks.push_back({pick.image_name, *pick.x_in_img, *pick.x_in_scan,
                      2 + static_cast<long>(picks.size()), pick.weight});
   }
-  SparseModel model = scene.model();
-  UpdateReprojectionErrors(&model);
-  const FreeSpace free_space(scene.scans(), 100000);
+  return picks;
+}
+
+Alignment Align(const std::vector<SessionPick>& session_picks) {
+  const PickScene& scene = ThePickRoom().scene();
+  const std::vector<Pick> picks = AsInAFile(session_picks);
+  const SurveyedScans surveyed(scene.scans());
   AlignmentOptions options;
   options.plane_constrained = false;
   Progress progress(true);
-  return AlignToScan({model, scene.scans(), picks, "picks.csv", "clockwise"}, 0.3, free_space,
-                     options, &progress);
+  return AlignToScan({scene.model(), surveyed, picks, "picks.csv", "clockwise"}, options,
+                     &progress);
 }
 
 void ExpectSameNumbers(const PickSolution& solution, const Alignment& alignment) {
-  EXPECT_NEAR(solution.rms_px, alignment.pick_rms_px, 1e-9);
-  EXPECT_NEAR(solution.scan_from_sparse->scale, alignment.scan_from_sparse_from_picks.scale, 1e-6);
-  EXPECT_EQ(solution.scale.num_features, alignment.scale.num_features);
+  const AlignmentStart& start = alignment.start;
+  EXPECT_NEAR(solution.rms_px, start.pick_rms_px, 1e-9);
+  EXPECT_NEAR(solution.scan_from_sparse->scale, start.scan_from_sparse.scale, 1e-6);
+  EXPECT_EQ(solution.scale.num_features, start.scale.num_features);
   for (size_t i = 0; i < solution.picks.size(); ++i) {
-    EXPECT_NEAR(solution.picks[i].residual_px, alignment.picks[i].residual_px, 1e-9) << i;
-    EXPECT_EQ(solution.picks[i].status == Status::kUsed, alignment.picks[i].used) << i;
+    EXPECT_NEAR(solution.picks[i].residual_px, start.picks[i].residual_px, 1e-9) << i;
+    EXPECT_EQ(solution.picks[i].status == Status::kUsed, start.picks[i].used) << i;
   }
 }
 
@@ -233,9 +237,11 @@ TEST(PickSolution, NumbersAreThoseOfTheAlignment) {
   const Alignment alignment = Align(picks);
   ExpectSameNumbers(solution, alignment);
   for (size_t i = 0; i < picks.size(); ++i) {
-    EXPECT_NEAR(solution.picks[i].leave_one_out_px, alignment.picks[i].leave_one_out_px, 1e-9);
+    EXPECT_NEAR(solution.picks[i].leave_one_out_px, alignment.start.picks[i].leave_one_out_px,
+                1e-9);
   }
-  EXPECT_NEAR(solution.photos.at(ClickedName()).position_sigma, alignment.position_sigma, 1e-12);
+  EXPECT_NEAR(solution.photos.at(ClickedName()).position_sigma, alignment.start.position_sigma,
+              1e-12);
 }
 
 TEST(PickSolution, NumbersOfPicksInTwoPhotosAreThoseOfTheAlignment) {
@@ -248,6 +254,44 @@ TEST(PickSolution, NumbersOfPicksInTwoPhotosAreThoseOfTheAlignment) {
   ExpectSameNumbers(solution, Align(picks));
   EXPECT_EQ(solution.picks.back().status, Status::kBad);
   EXPECT_EQ(solution.num_clicked_photos, 2);
+}
+
+void ExpectSameBits(const Similarity& a, const Similarity& b) {
+  EXPECT_EQ(a.scale, b.scale);
+  EXPECT_EQ(a.rotation.coeffs(), b.rotation.coeffs());
+  EXPECT_EQ(a.translation, b.translation);
+}
+
+// Window and command ask the same function. Only the scale is measured on another form of the same
+// mesh (a caster of all of it, and of what the photo sees): a ray meets it 1e-7 off.
+TEST(PickSolution, SixPicksGiveTheSimilarityOfTheAlignment) {
+  const std::vector<SessionPick> picks = WithNoise(TruePicks(6));
+  const PickScene& scene = ThePickRoom().scene();
+  const Similarity by_window = Solve(picks).scan_from_sparse.value();
+  const Alignment alignment = Align(picks);
+  Similarity by_command = alignment.start.scan_from_sparse;
+  EXPECT_NEAR(by_command.scale / by_window.scale, 1, 1e-6);
+  EXPECT_EQ(by_command.rotation.coeffs(), by_window.rotation.coeffs());
+  // With the command's views and the window's scale, to the last bit.
+  const std::vector<Pick> as_in_file = AsInAFile(picks);
+  const PickStart found = StartFromPicks(
+      scene.model(), as_in_file, ReviewViews(scene.model(), as_in_file, PickReviewOptions()), {},
+      AlignmentOptions(),
+      [&](const SparseImage& image, const Rigid& cam_from_scan, const ScaleOptions& options) {
+        return EstimateScale(scene.model(), image, cam_from_scan, scene.rays()->caster(), options,
+                             1);
+      });
+  ExpectSameBits(found.start.value().scan_from_sparse, by_window);
+  // And with the window's own scale estimate on the command's mesh.
+  const SurveyedScans surveyed(scene.scans());
+  const PickStart on_mesh = StartFromPicks(
+      scene.model(), as_in_file, ReviewViews(scene.model(), as_in_file, PickReviewOptions()), {},
+      AlignmentOptions(),
+      [&](const SparseImage& image, const Rigid& cam_from_scan, const ScaleOptions& options) {
+        return EstimateScale(scene.model(), image, cam_from_scan, scene.scans(), surveyed.meshes(),
+                             options);
+      });
+  ExpectSameBits(on_mesh.start.value().scan_from_sparse, by_command);
 }
 
 TEST(PickSolution, BeforeTheRayCasterStandsThePoseIsThereAlready) {

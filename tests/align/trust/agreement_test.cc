@@ -93,8 +93,9 @@ struct PhotographedRoom {
   Agreement Measure(const SparseModel& aligned, int num_threads = 2) const {
     const FreeSpace free_space(scans, 100000);
     std::vector<std::string> warnings;
-    const Agreement agreement = MeasureAgreement(aligned, folder.path(), scans, free_space,
-                                                 AgreementOptions(), num_threads, &warnings);
+    const Agreement agreement =
+        MeasureAgreement(aligned, folder.path(), ScanViewer(scans, free_space), AgreementOptions(),
+                         num_threads, &warnings);
     EXPECT_TRUE(warnings.empty()) << warnings[0];
     return agreement;
   }
@@ -153,8 +154,9 @@ TEST(Agreement, NamesPhotosThatAreMissing) {
   TransformModel(one.room->ScanFromSparse(), &one.model);
   const FreeSpace free_space(one.scans, 10000);
   std::vector<std::string> warnings;
-  const Agreement agreement = MeasureAgreement(one.model, folder.path(), one.scans, free_space,
-                                               AgreementOptions(), 1, &warnings);
+  const Agreement agreement =
+      MeasureAgreement(one.model, folder.path(), ScanViewer(one.scans, free_space),
+                       AgreementOptions(), 1, &warnings);
   EXPECT_EQ(agreement.num_photos, 0);
   EXPECT_EQ(warnings.size(), 8u);
   EXPECT_FALSE(agreement.gradient.supports);

@@ -10,7 +10,6 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
-using testing::Not;
 
 // The scan of which only samples on these planes of the room are left (axis, coordinate in `room`),
 // with picks on them in the photo that sees the most of them.
@@ -56,7 +55,7 @@ TEST(OpenDirections, AFurnishedRoomLeavesNothingOpen) {
 TEST(OpenDirections, OneWallLeavesSlidingTurningAndScaleToThePicks) {
   const SimulatedCase one = OnlyWalls({{1, 4.0}});
   const Alignment alignment = AlignCase(one);
-  ASSERT_TRUE(alignment.refined);
+  ASSERT_TRUE(alignment.fit.refined);
   EXPECT_EQ(alignment.open.num_facings, 1);
   const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();  // columns
   // Along the wall, and about its normal. The distance to it follows the scale.
@@ -74,7 +73,7 @@ TEST(OpenDirections, OneWallLeavesSlidingTurningAndScaleToThePicks) {
 TEST(OpenDirections, TwoParallelWallsFixTheScaleButNotSliding) {
   const SimulatedCase one = OnlyWalls({{1, 0.0}, {1, 4.0}});
   const Alignment alignment = AlignCase(one);
-  ASSERT_TRUE(alignment.refined);
+  ASSERT_TRUE(alignment.fit.refined);
   EXPECT_EQ(alignment.open.num_facings, 1);
   EXPECT_FALSE(alignment.open.scale);
   const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();
@@ -89,11 +88,26 @@ TEST(OpenDirections, TwoParallelWallsFixTheScaleButNotSliding) {
 TEST(OpenDirections, ACornerOfTwoWallsLeavesOneDirectionOpen) {
   const SimulatedCase one = OnlyWalls({{1, 4.0}, {0, 5.0}});
   const Alignment alignment = AlignCase(one);
-  ASSERT_TRUE(alignment.refined);
+  ASSERT_TRUE(alignment.fit.refined);
   EXPECT_EQ(alignment.open.num_facings, 2);
   const Eigen::Matrix3d axes = one.room->ScanFromRoom().rotation.toRotationMatrix();
   EXPECT_GT(LargestCosine(alignment.open.slides, axes.col(2)), 0.8);
   EXPECT_THAT(alignment.warnings, Contains(HasSubstr("faces two ways only")));
+}
+
+// Without picks the model slides along parallel walls, or finds nothing to settle on.
+TEST(OpenDirections, WhatNoPicksHoldIsNotTrusted) {
+  SimulatedCase parallel = OnlyWalls({{1, 0.0}, {1, 4.0}}),
+                corner = OnlyWalls({{1, 4.0}, {0, 5.0}});
+  parallel.picks.clear();
+  corner.picks.clear();
+  const Alignment slid = AlignCaseFrom(parallel.room->ScanFromSparse(), 0.05, parallel);
+  EXPECT_TRUE(slid.fit.refined);
+  EXPECT_THAT(slid.reasons, Contains(HasSubstr("there are no picks to hold it")));
+  EXPECT_FALSE(slid.adjusted());
+  const Alignment lost = AlignCaseFrom(corner.room->ScanFromSparse(), 0.05, corner);
+  EXPECT_THAT(lost.reasons, Contains(HasSubstr("from what the start gives")));
+  EXPECT_FALSE(lost.adjusted());
 }
 
 TEST(OpenDirections, AFitWithoutSolutionSaysNothing) {
