@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
+
+#include "align/clicks/picks.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -159,18 +162,6 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
 }
 
 }  // namespace
-
-std::string Number(double value, int digits) {
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
-}
-
-std::string LineOf(const Pick& pick) {
-  return pick.line > 0 ? "line " + std::to_string(pick.line) : "a pick of " + pick.image_name;
-}
 
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
                    const AlignmentFit& fit, const AlignmentOptions& options) {

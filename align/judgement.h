@@ -13,9 +13,6 @@
 
 namespace roomtex {
 
-std::string Number(double value, int digits);  // fixed, `digits` behind the point
-std::string LineOf(const Pick& pick);          // "line 4"
-
 struct Judgement {
   // Of the similarity: by the surface where it was refined, else by the picks.
   ExpectedError expected_error;

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "align/judgement.h"
+#include "align/clicks/picks.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {

@@ -5,6 +5,8 @@
 #include <deque>
 #include <limits>
 
+#include <fmt/core.h>
+
 #include "colmap_ext/seed_model.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
@@ -243,10 +245,8 @@ std::optional<Seed> Initializer::Impl::Decide(SolvedPair solved_pair) {
   Seed seed = MakeSeed(solved_pair, views);
   const double angle = seed.trial.analysis.hypotheses[trial.decision.best].median_angle_deg;
   if (!(angle >= options.min_tri_angle_deg)) {
-    char text[120];
-    std::snprintf(text, sizeof(text), "the rays meet at %.2f degrees only, wanted %.2f", angle,
-                  options.min_tri_angle_deg);
-    trial.problem = text;
+    trial.problem = fmt::format("the rays meet at {:.2f} degrees only, wanted {:.2f}", angle,
+                                options.min_tri_angle_deg);
   } else if (static_cast<int>(seed.pair_model.points.size()) < options.min_num_inliers) {
     trial.problem = "only " + std::to_string(seed.pair_model.points.size()) +
                     " points could be triangulated well";

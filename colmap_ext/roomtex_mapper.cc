@@ -7,6 +7,8 @@
 #include <fstream>
 #include <set>
 
+#include <fmt/core.h>
+
 #include "colmap_ext/calibration_check.h"
 #include "colmap_ext/mapper_run.h"
 #include "colmap_ext/model_check.h"
@@ -16,6 +18,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -104,12 +107,6 @@ Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::s
   return json;
 }
 
-std::string Percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.0f %%", 100 * share);
-  return text;
-}
-
 struct Outcome {
   Seed seed;
   MapperResult result;
@@ -191,12 +188,10 @@ std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& image
            "enough of what both see to tell which one is right." +
            cure;
   }
-  char confidence[32];
-  std::snprintf(confidence, sizeof(confidence), "%.2f", trial.decision.confidence);
-  return "planar-ambiguous: two camera motions explain " + name1 + " and " + name2 +
-         " about equally well (ratio " + confidence + ", " +
-         std::to_string(trial.decision.num_views) + " third views), as happens before a wall." +
-         cure;
+  return fmt::format(
+      "planar-ambiguous: two camera motions explain {} and {} about equally well (ratio {:.2f}, {} "
+      "third views), as happens before a wall.{}",
+      name1, name2, trial.decision.confidence, trial.decision.num_views, cure);
 }
 
 void JudgeTrust(const Outcome& outcome, const MatchedImages& images, Report* report) {
@@ -337,16 +332,15 @@ void CheckLens(MapperRun* mapper, const Outcome& outcome, const Options& options
   json["rms_fixed_px"] = check.rms_fixed_px;
   json["rms_free_px"] = check.rms_free_px;
   if (check.Fits()) return;
-  char text[160];
-  std::snprintf(text, sizeof(text),
-                "the camera's calibration does not fit the photos: their error falls from %.2f to "
-                "%.2f px when focal length and distortion may change, so the model is bent. ",
-                check.rms_fixed_px, check.rms_free_px);
   context.report.SetUntrusted(
-      text + std::string(options.mapper.refine_intrinsics
-                             ? "Extract the features with a camera model that can describe the "
-                               "lens (--ImageReader.camera_model OPENCV)."
-                             : "Calibrate the camera, or give --refine_intrinsics 1."));
+      fmt::format("the camera's calibration does not fit the photos: their error falls from {:.2f} "
+                  "to {:.2f} px "
+                  "when focal length and distortion may change, so the model is bent. {}",
+                  check.rms_fixed_px, check.rms_free_px,
+                  options.mapper.refine_intrinsics
+                      ? "Extract the features with a camera model that can describe the lens "
+                        "(--ImageReader.camera_model OPENCV)."
+                      : "Calibrate the camera, or give --refine_intrinsics 1."));
 }
 
 // Seeds one after the other until COLMAP makes something of one.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <set>
 
@@ -11,6 +10,7 @@
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -94,12 +94,6 @@ bool SamePose(const Candidate& a, const Candidate& b) {
   return RotationAngle(a.view.cam_from_model.rotation, b.view.cam_from_model.rotation) <
              RadFromDeg(kEqualRotationDeg) &&
          distance < kEqualCentre * std::max(a.baseline, b.baseline);
-}
-
-std::string Percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.0f %%", 100 * share);
-  return text;
 }
 
 // The unit-baseline motion of EvaluatePose and the essential matrix.

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iomanip>
 #include <vector>
 
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -102,9 +102,9 @@ double RotationAngle(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 void WriteSimilarity(const std::string& path, const Similarity& target_from_source) {
   OutputFile file(path);
   const Eigen::Vector4d wxyz = WxyzFromQuaternion(target_from_source.rotation);
-  file.stream() << std::setprecision(17) << target_from_source.scale;
-  for (int i = 0; i < 4; ++i) file.stream() << ' ' << wxyz[i];
-  for (int i = 0; i < 3; ++i) file.stream() << ' ' << target_from_source.translation[i];
+  file.stream() << Exact(target_from_source.scale);
+  for (const double q : wxyz) file.stream() << ' ' << Exact(q);
+  for (const double t : target_from_source.translation) file.stream() << ' ' << Exact(t);
   file.stream() << '\n';
   file.Commit();
 }
@@ -112,10 +112,9 @@ void WriteSimilarity(const std::string& path, const Similarity& target_from_sour
 void WriteSimilarityMatrix(const std::string& path, const Similarity& target_from_source) {
   OutputFile file(path);
   const Eigen::Matrix4d matrix = target_from_source.Matrix();
-  file.stream() << std::setprecision(17);
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) {
-      file.stream() << matrix(row, column) << (column < 3 ? ' ' : '\n');
+      file.stream() << Exact(matrix(row, column)) << (column < 3 ? ' ' : '\n');
     }
   }
   file.Commit();

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
+#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
 #include "core/output_file.h"
@@ -23,9 +23,7 @@ std::string FileStem(const std::vector<PhotoView>& photos, int photo) {
   std::string name = std::filesystem::path(photos[photo].name).replace_extension().string();
   std::replace_if(
       name.begin(), name.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
-  char number[16];
-  std::snprintf(number, sizeof number, "%03d_", photo);
-  return number + name;
+  return fmt::format("{:03}_{}", photo, name);
 }
 
 // "" for the first scan, "_1" for the second ...
@@ -240,10 +238,9 @@ void WriteLegend(const DebugInput& input, const std::string& folder) {
          "(linear light):\n";
   for (size_t i = 0; i < input.photos.size(); ++i) {
     const cv::Vec3b color = ColorOfPhoto(static_cast<int>(i));
-    char line[128];
-    std::snprintf(line, sizeof line, "  %3d %3d %3d   %.3f %.3f %.3f   ", color[2], color[1],
-                  color[0], input.gains[i][0], input.gains[i][1], input.gains[i][2]);
-    out << line << FileStem(input.photos, static_cast<int>(i)) << "\n";
+    out << fmt::format("  {:3} {:3} {:3}   {:.3f} {:.3f} {:.3f}   {}\n", color[2], color[1],
+                       color[0], input.gains[i][0], input.gains[i][1], input.gains[i][2],
+                       FileStem(input.photos, static_cast<int>(i)));
   }
   file.Commit();
 }

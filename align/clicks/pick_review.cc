@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <sstream>
+
+#include <fmt/core.h>
 
 #include "core/option_fields.h"
 
@@ -180,33 +181,30 @@ std::vector<std::string> PickReviewOptions::Problems() const { return ProblemsOf
 
 std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
                               const PickReviewOptions& options) {
-  std::ostringstream text;
-  text.precision(2);
   const double diagonal = std::hypot(camera.width, camera.height);
   const Eigen::Vector2d centre = pairs.x_in_img.rowwise().mean();
   const double spread = std::sqrt((pairs.x_in_img.colwise() - centre).squaredNorm() / pairs.size());
   if (!(spread > options.min_photo_share * diagonal)) {
-    text << std::fixed << "the picks lie within " << spread << " pixels of one spot of the photo ("
-         << diagonal << " pixels across), which does not fix the camera's pose";
-    return text.str();
+    return fmt::format(
+        "the picks lie within {:.2f} pixels of one spot of the photo ({:.2f} pixels across), which "
+        "does not fix the camera's pose",
+        spread, diagonal);
   }
-  text << std::fixed;
-  text.precision(3);
-  const char* const rest = ", around which the camera could turn freely";
   if (IsCollinear(pairs.x_in_scan, options.min_line_share)) {
     const LineFit line = FitLine(pairs.x_in_scan);
-    text << "the picks lie on one straight line: " << line.length << " m long, none farther than "
-         << line.width << " m beside it" << rest;
-    return text.str();
+    return fmt::format(
+        "the picks lie on one straight line: {:.3f} m long, none farther than {:.3f} m beside it, "
+        "around which the camera could turn freely",
+        line.length, line.width);
   }
   for (int i = 0; i < pairs.size(); ++i) {
     const Eigen::Matrix3Xd others = pairs.Without(i).x_in_scan;
     if (!IsCollinear(others, options.min_line_share)) continue;
     const LineFit line = FitLine(others);
-    text << "all picks but one lie on one straight line: " << line.length
-         << " m long, none farther than " << line.width
-         << " m beside it, so that several camera poses fit equally well";
-    return text.str();
+    return fmt::format(
+        "all picks but one lie on one straight line: {:.3f} m long, none farther than {:.3f} m "
+        "beside it, so that several camera poses fit equally well",
+        line.length, line.width);
   }
   return "";
 }

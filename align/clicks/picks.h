@@ -25,6 +25,9 @@ struct Pick {
   double weight = 1;
 };
 
+// Where it stands, for a message: "line 4", or "a pick of a.jpg".
+std::string LineOf(const Pick& pick);
+
 // The fewest picks in one photo that fix its pose (thesis 7.1.1).
 inline constexpr int kMinPicksPerPhoto = 6;
 // The largest weight that a file or the window may give: a typing error is larger.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <set>
@@ -14,6 +13,7 @@
 #include "core/option_fields.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -38,12 +38,6 @@ constexpr double kMaxReprojectionGrowth = 4, kMaxReprojectionRise_px = 4;
 // ... and the picks may miss by so many standard deviations (rms), or this share of the photo's
 // diagonal if that is more (as TrustOptions::PickRmsLimit).
 constexpr double kMaxPickDeviations = 6, kMaxPickShare = 0.004;
-
-std::string Number(double value, int digits) {
-  char text[64];
-  std::snprintf(text, sizeof(text), "%.*f", digits, value);
-  return text;
-}
 
 // Of every observation, pixels.
 std::vector<double> ReprojectionDistances(const SparseModel& model) {

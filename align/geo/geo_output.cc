@@ -2,16 +2,18 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <iomanip>
 #include <sstream>
 
+#include <fmt/core.h>
+
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -22,15 +24,7 @@ constexpr double kFarFromOrigin = 10e3;
 std::optional<double> NumberFrom(std::string text) {
   const auto is_space = [](unsigned char c) { return std::isspace(c) != 0; };
   text.erase(std::remove_if(text.begin(), text.end(), is_space), text.end());
-  const char* begin = text.data();
-  const char* end = begin + text.size();
-  if (begin != end && *begin == '+') ++begin;
-  double value = 0;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (begin == end || stop != end || error != std::errc() || !std::isfinite(value)) {
-    return std::nullopt;
-  }
-  return value;
+  return ParseNumber(text);
 }
 
 Eigen::Vector3d CameraInEnu(const SparseImage& image, const GeoReference& geo) {
@@ -64,18 +58,11 @@ Json RigidToJson(const Rigid& rigid) {
 std::string ProjPipeline(const GeoFrame& frame) {
   const GeoPosition& origin = frame.origin();
   const GridPosition grid = frame.GridOfOrigin();
-  std::ostringstream text;
-  text << std::setprecision(17)
-       << "+proj=pipeline +step +inv +proj=topocentric +ellps=WGS84 +lat_0=" << origin.latitude_deg
-       << " +lon_0=" << origin.longitude_deg << " +h_0=" << origin.height
-       << " +step +inv +proj=cart +ellps=WGS84 +step ";
-  if (grid.zone == 0) {
-    text << "+proj=ups";
-  } else {
-    text << "+proj=utm +zone=" << grid.zone;
-  }
-  text << (grid.north ? "" : " +south") << " +ellps=WGS84";
-  return text.str();
+  return fmt::format(
+      "+proj=pipeline +step +inv +proj=topocentric +ellps=WGS84 +lat_0={} +lon_0={} +h_0={} +step "
+      "+inv +proj=cart +ellps=WGS84 +step +proj={}{} +ellps=WGS84",
+      Exact(origin.latitude_deg), Exact(origin.longitude_deg), Exact(origin.height),
+      grid.zone == 0 ? "ups" : fmt::format("utm +zone={}", grid.zone), grid.north ? "" : " +south");
 }
 
 Json FrameToJson(const GeoReference& geo) {
@@ -97,33 +84,24 @@ Json FrameToJson(const GeoReference& geo) {
   return json;
 }
 
-std::string CsvField(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
 void WriteCameras(const SparseModel& aligned, const GeoReference& geo, const std::string& path) {
   OutputFile file(path);
-  std::ostream& out = file.stream();
-  out << "image_name,latitude,longitude,height,ecef_x,ecef_y,ecef_z,utm_zone,utm_easting,"
-         "utm_northing\n"
-      << std::fixed;
+  file.stream() << CsvLine({"image_name", "latitude", "longitude", "height", "ecef_x", "ecef_y",
+                            "ecef_z", "utm_zone", "utm_easting", "utm_northing"});
   for (const auto& [id, image] : aligned.images) {
     const Eigen::Vector3d x_in_enu = CameraInEnu(image, geo);
     const GeoPosition position = geo.frame.GeoFromEnu(x_in_enu);
     const Eigen::Vector3d x_in_ecef = geo.frame.EcefFromEnu() * x_in_enu;
-    // A tenth of a micrometre in each.
-    out << CsvField(image.name) << std::setprecision(12) << ',' << position.latitude_deg << ','
-        << position.longitude_deg << std::setprecision(7) << ',' << position.height;
-    for (int i = 0; i < 3; ++i) out << ',' << x_in_ecef[i];
     const std::optional<GridPosition> grid = geo.frame.GridFromEnu(x_in_enu);
-    if (grid) {
-      out << ',' << grid->ZoneName() << ',' << grid->easting << ',' << grid->northing << '\n';
-    } else {
-      out << ",,,\n";
-    }
+    // A tenth of a micrometre in each.
+    constexpr int kMetreDigits = 7, kDegreeDigits = 12;
+    file.stream() << CsvLine(
+        {image.name, Number(position.latitude_deg, kDegreeDigits),
+         Number(position.longitude_deg, kDegreeDigits), Number(position.height, kMetreDigits),
+         Number(x_in_ecef.x(), kMetreDigits), Number(x_in_ecef.y(), kMetreDigits),
+         Number(x_in_ecef.z(), kMetreDigits), grid ? grid->ZoneName() : "",
+         grid ? Number(grid->easting, kMetreDigits) : "",
+         grid ? Number(grid->northing, kMetreDigits) : ""});
   }
   file.Commit();
 }
@@ -155,11 +133,9 @@ Json GpsToJson(const GpsCheck& gps) {
 
 // "12 m", "3.4 km".
 std::string Length(double metres) {
-  std::ostringstream text;
   const bool is_far = metres >= 10000;
-  text << std::setprecision(metres < 10 || is_far ? 2 : 4) << (is_far ? metres / 1000 : metres)
-       << (is_far ? " km" : " m");
-  return text.str();
+  return Significant(is_far ? metres / 1000 : metres, metres < 10 || is_far ? 2 : 4) +
+         (is_far ? " km" : " m");
 }
 
 }  // namespace

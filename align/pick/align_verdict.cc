@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "align/judgement.h"
 #include "align/pick/align_job.h"
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -24,8 +24,6 @@ std::string Millimetres(double mm) {
   if (mm >= 1000) return Number(mm / 1000, 2) + " m";
   return Number(mm, mm < 10 ? 1 : 0) + " mm";
 }
-
-std::string Percent(double share) { return Number(100 * share, 0) + " %"; }
 
 class FactList {
  public:

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "align/judgement.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {

@@ -5,9 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iomanip>
 #include <iterator>
-#include <sstream>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -18,6 +16,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -44,9 +43,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
   if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
   if (reader.units != defaults.units) add("--units", reader.units);
   if (reader.max_range != defaults.max_range) {
-    std::ostringstream text;
-    text << std::setprecision(17) << reader.max_range;
-    add("--max_range", text.str());
+    add("--max_range", Exact(reader.max_range));
   }
   if (input.num_threads > 0) add("--num_threads", std::to_string(input.num_threads));
   add("--overlays", std::to_string(kNumOverlays));

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <sstream>
 
 #include "align/surface/scan_planes.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -92,22 +92,20 @@ void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
                 [&](int row) { rows.back()[row] = RowBytes(scan, row, shift, planes); });
     count += scan.points.size() - scan.NumMissing();
   }
-  std::ostringstream header;
-  header.precision(12);
+  OutputFile file(path);
+  std::ostream& header = file.stream();
   header << "ply\nformat binary_little_endian 1.0\n"
          << "comment planes of the scan by roomtex-align; plane = index in alignment.json, -1 = "
             "none\n";
   if (!shift.isZero()) {
-    header << "comment add " << shift.x() << " " << shift.y() << " " << shift.z()
-           << " for the scan frame\n";
+    header << "comment add " << Significant(shift.x(), 12) << " " << Significant(shift.y(), 12)
+           << " " << Significant(shift.z(), 12) << " for the scan frame\n";
   }
   header << "element vertex " << count << "\n";
   for (const char* name : {"x", "y", "z"}) header << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue"}) header << "property uchar " << name << "\n";
   for (const char* name : {"nx", "ny", "nz"}) header << "property float " << name << "\n";
   header << "property int plane\nend_header\n";
-  OutputFile file(path);
-  file.stream() << header.str();
   for (const auto& of_scan : rows) {
     for (const std::string& bytes : of_scan) file.stream() << bytes;
   }

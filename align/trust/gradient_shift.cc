@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <sstream>
 
+#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
@@ -307,15 +307,12 @@ GradientAgreement JudgeGradientShifts(const GradientShifts& shifts) {
                        SigmasAbove(shifts.clear, by_chance) < kChanceLike &&
                        shifts.clear.High(3) < kLeastShareWhenRight;
   if (result.contradicts) {
-    std::ostringstream text;
-    text.setf(std::ios::fixed);
-    text.precision(1);
-    text << "Photos and scan do not show the same at the same place: of " << shifts.clear.num
-         << " corners of the scan's intensity, " << 100 * shifts.clear.Share() << " % lie within "
-         << shifts.tolerance_deg << " degrees of where the photos have them, and "
-         << 100 * by_chance.Share()
-         << " % do so by chance. Check that scan and photos are of the same room, and the picks.";
-    result.reason = text.str();
+    result.reason = fmt::format(
+        "Photos and scan do not show the same at the same place: of {} corners of the scan's "
+        "intensity, {:.1f} % lie within {:.1f} degrees of where the photos have them, and {:.1f} % "
+        "do so by chance. Check that scan and photos are of the same room, and the picks.",
+        shifts.clear.num, 100 * shifts.clear.Share(), shifts.tolerance_deg,
+        100 * by_chance.Share());
   }
   return result;
 }

@@ -1,12 +1,13 @@
 #include "align/trust/open_directions.h"
 
 #include <cmath>
-#include <sstream>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <fmt/core.h>
 
 #include "core/frames.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -39,15 +40,14 @@ Eigen::Matrix<double, 3, 7> PointJacobian(const Eigen::Vector3d& arm) {
 }
 
 std::string Listed(const std::vector<Eigen::Vector3d>& directions) {
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(2);
-  for (size_t i = 0; i < directions.size(); ++i) {
+  std::string text;
+  for (const Eigen::Vector3d& direction : directions) {
     // No "-0.00": adding zero makes it positive.
-    const Eigen::Vector3d d = (100 * directions[i]).array().round() / 100 + 0.0;
-    text << (i > 0 ? ", " : "") << "(" << d.x() << ", " << d.y() << ", " << d.z() << ")";
+    const Eigen::Vector3d d = (100 * direction).array().round() / 100 + 0.0;
+    text +=
+        fmt::format("{}({:.2f}, {:.2f}, {:.2f})", text.empty() ? "" : ", ", d.x(), d.y(), d.z());
   }
-  return text.str();
+  return text;
 }
 
 }  // namespace
@@ -76,34 +76,22 @@ OpenDirections FindOpenDirections(const SimilarityFit& fit, const Eigen::Vector3
 
 std::string OpenDirections::Sentence() const {
   if (None()) return "";
-  std::ostringstream text;
-  text << "The surface of the scan that the sparse points lie on ";
-  if (num_facings == 1) {
-    text << "faces one way only (one wall, or walls opposite each other)";
-  } else if (num_facings == 2) {
-    text << "faces two ways only";
-  } else {
-    text << "is too small or too round";
-  }
-  text << " and leaves open";
-  const char* separator = " ";
-  if (!slides.empty()) {
-    text << separator << "where the model lies along " << Listed(slides);
-    separator = ", ";
-  }
-  if (!turns.empty()) {
-    text << separator << "how it is turned about " << Listed(turns);
-    separator = ", ";
-  }
-  if (scale) text << separator << "its scale";
-  text << ": there the picks alone hold it";
-  if (!slides.empty()) {
-    text.setf(std::ios::fixed);
-    text.precision(1);
-    text << ", to " << 1000 * slide_sigma << " mm at the photos (one standard deviation)";
-  }
-  text << ". More picks, or a scan of more of the room, would make it safer.";
-  return text.str();
+  std::string open;
+  const auto add = [&](const std::string& what) { open += (open.empty() ? "" : ", ") + what; };
+  if (!slides.empty()) add("where the model lies along " + Listed(slides));
+  if (!turns.empty()) add("how it is turned about " + Listed(turns));
+  if (scale) add("its scale");
+  return fmt::format(
+      "The surface of the scan that the sparse points lie on {} and leaves open {}: there the "
+      "picks "
+      "alone hold it{}. More picks, or a scan of more of the room, would make it safer.",
+      num_facings == 1   ? "faces one way only (one wall, or walls opposite each other)"
+      : num_facings == 2 ? "faces two ways only"
+                         : "is too small or too round",
+      open,
+      slides.empty()
+          ? ""
+          : ", to " + Number(1000 * slide_sigma, 1) + " mm at the photos (one standard deviation)");
 }
 
 }  // namespace roomtex

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,13 +10,17 @@
 #include <tuple>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "capture/association/associated_views_photo.h"
 #include "colmap_ext/database.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -398,16 +401,14 @@ class Finder {
   void WarnOfBrightness() {
     if (not_brighter_.empty()) return;
     const AssociatedPair& first = not_brighter_[0];
-    char ratio[32];
-    std::snprintf(ratio, sizeof ratio, "%.2f", first.brightness_ratio);
-    result_.warnings.push_back(
-        std::to_string(not_brighter_.size()) +
-        " patterned photos are not brighter than their plain twins and were told by their "
-        "detail: " +
-        first.patterned_image + " is " + ratio + " times as bright as " + first.plain_image +
-        (first.exif_brightness ? " (exposures taken into account)"
-                               : " (no exposures in EXIF: automatic exposure hides the light)") +
-        (not_brighter_.size() > 1 ? ", and so on" : ""));
+    result_.warnings.push_back(fmt::format(
+        "{} patterned photos are not brighter than their plain twins and were told by their "
+        "detail: "
+        "{} is {:.2f} times as bright as {} ({}){}",
+        not_brighter_.size(), first.patterned_image, first.brightness_ratio, first.plain_image,
+        first.exif_brightness ? "exposures taken into account"
+                              : "no exposures in EXIF: automatic exposure hides the light",
+        not_brighter_.size() > 1 ? ", and so on" : ""));
   }
 
   std::string WhySingle(int i) const {
@@ -430,16 +431,14 @@ class Finder {
     };
     if (spare != nullptr) return "a further plain photo of the place of " + other(spare);
     if (moved != nullptr) {
-      char offset[32];
-      std::snprintf(offset, sizeof offset, "%.2f", moved->camera.offset_px);
-      return "the camera moved by " + std::string(offset) + " pixels against " + other(moved);
+      return fmt::format("the camera moved by {:.2f} pixels against {}", moved->camera.offset_px,
+                         other(moved));
     }
     if (unclear != nullptr) {
-      char offset[64] = "";
-      if (unclear->camera.found) {
-        std::snprintf(offset, sizeof offset, " (%.2f pixels, give or take %.2f)",
-                      unclear->camera.offset_px, unclear->camera.error_px);
-      }
+      const std::string offset =
+          unclear->camera.found ? fmt::format(" ({:.2f} pixels, give or take {:.2f})",
+                                              unclear->camera.offset_px, unclear->camera.error_px)
+                                : "";
       return "it shows the place of " + other(unclear) +
              ", but too few edges that both show tell whether the camera moved" + offset;
     }
@@ -469,16 +468,6 @@ class Finder {
   Associations result_;
 };
 
-std::string CsvField(const std::string& text) {
-  if (text.find_first_of(",\"\n#") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted += c;
-    if (c == '"') quoted += '"';
-  }
-  return quoted + '"';
-}
-
 }  // namespace
 
 void AssociateOptions::Declare(OptionFields* fields) {
@@ -500,11 +489,10 @@ Associations FindAssociations(const AssociateOptions& options, Progress* progres
 
 void WriteAssociations(const std::string& path, const std::vector<AssociatedPair>& pairs) {
   OutputFile file(path);
-  file.stream() << "patterned_image,plain_image,offset_px,brightness_ratio\n";
+  file.stream() << CsvLine({"patterned_image", "plain_image", "offset_px", "brightness_ratio"});
   for (const AssociatedPair& pair : pairs) {
-    char numbers[64];
-    std::snprintf(numbers, sizeof numbers, ",%.3f,%.3f\n", pair.offset_px, pair.brightness_ratio);
-    file.stream() << CsvField(pair.patterned_image) << ',' << CsvField(pair.plain_image) << numbers;
+    file.stream() << CsvLine({pair.patterned_image, pair.plain_image, Number(pair.offset_px, 3),
+                              Number(pair.brightness_ratio, 3)});
   }
   file.Commit();
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numeric>
 
@@ -14,6 +13,7 @@
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -22,12 +22,6 @@ constexpr int kMinPhotos = 3;   // fewer leave the camera open whatever they sho
 constexpr int kMinCorners = 8;  // of a photo
 constexpr double kHuberSigmas = 3;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-std::string Number(double value, const char* format = "%.2f") {
-  char text[40];
-  std::snprintf(text, sizeof(text), format, value);
-  return text;
-}
 
 // Standard deviation of one coordinate from the median length of the residuals: for two Gaussian
 // coordinates the median of the squared length is 2 ln 2 sigma^2. unknowns: that the photo's
@@ -204,15 +198,15 @@ std::string ReasonOf(const PhotoSelection::Dropped& dropped, double sigma, doubl
                      double median_edge_width) {
   const auto num_bad = std::count(dropped.view.used.begin(), dropped.view.used.end(), false);
   const auto num_corners = static_cast<long>(dropped.view.used.size());
-  const std::string reason = 4 * num_bad > num_corners
-                                 ? std::to_string(num_bad) + " of its " +
-                                       std::to_string(num_corners) +
-                                       " corners contradict the other photos"
-                                 : "its corners miss by " + Number(dropped.sigma) +
-                                       " px, those of the median photo by " + Number(sigma) + " px";
+  const std::string reason =
+      4 * num_bad > num_corners
+          ? std::to_string(num_bad) + " of its " + std::to_string(num_corners) +
+                " corners contradict the other photos"
+          : "its corners miss by " + Number(dropped.sigma, 2) +
+                " px, those of the median photo by " + Number(sigma, 2) + " px";
   if (edge_width > 1.5 * median_edge_width && median_edge_width > 0) {
-    return reason + ": blurred (edges " + Number(edge_width, "%.1f") +
-           " px wide, in the median photo " + Number(median_edge_width, "%.1f") + " px)";
+    return reason + ": blurred (edges " + Number(edge_width, 1) + " px wide, in the median photo " +
+           Number(median_edge_width, 1) + " px)";
   }
   return reason + ": another board, a bent one, or corners found wrongly";
 }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "capture/calibration/calibration_trust.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -50,11 +50,7 @@ double Bic(const std::vector<BoardView>& views, const CameraFit& fit) {
          num_unknowns * std::log(num_coordinates);
 }
 
-std::string Pixels(double value) {
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.4f px", value);
-  return text;
-}
+std::string Pixels(double value) { return Number(value, 4) + " px"; }
 
 std::string WhyChosen(const std::vector<ModelComparison>& models, size_t chosen, size_t before) {
   std::string why = models[chosen].lens.Name() + " foretells photos left out to " +

@@ -1,20 +1,16 @@
 #include "capture/calibration/calibration_output.h"
 
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
 
 // Ten digits: 1e-6 of a pixel of a focal length, 1e-9 of a distortion.
-std::string Digits(double value) {
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.10g", value);
-  return text;
-}
+std::string Digits(double value) { return Significant(value, 10); }
 
 Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 

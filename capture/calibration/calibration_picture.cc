@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
+#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
+
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -138,10 +140,8 @@ class Drawing {
     }
     // A bar for comparison.
     const double pixels = 50 / enlargement;
-    char text[120];
-    std::snprintf(text, sizeof(text),
-                  "arrows: mean residual per cell; bar = %.2g px; red rings: corners left out",
-                  pixels);
+    const std::string text = fmt::format(
+        "arrows: mean residual per cell; bar = {:.2g} px; red rings: corners left out", pixels);
     const int y = kMargin + height_ + 22;
     cv::line(picture_, {kMargin, y}, {kMargin + 50, y}, kInk, 2, cv::LINE_AA);
     Write(text, {kMargin + 62, y + 5}, kInk);
@@ -149,18 +149,15 @@ class Drawing {
 
   void WriteLines() {
     const Calibration& c = calibration_;
-    char text[400];
-    std::snprintf(text, sizeof(text), "%s, %d of %d photos, residual %.3f px rms, held out %.3f px",
-                  c.lens.Name().c_str(), c.NumUsed(), static_cast<int>(c.photos.size()), c.rms_px,
-                  c.held_out_rms_px);
-    lines_.push_back({text, kInk});
-    std::snprintf(text, sizeof(text),
-                  "one standard deviation: focal length %.3f %%, picture corners %.3f px, whole "
-                  "picture %.3f px; "
-                  "boards in %.0f %% of the cells",
-                  c.focal_sigma_percent, c.corner_sigma_px, c.mean_sigma_px,
-                  100 * c.coverage.share);
-    lines_.push_back({text, kInk});
+    lines_.push_back(
+        {fmt::format("{}, {} of {} photos, residual {:.3f} px rms, held out {:.3f} px",
+                     c.lens.Name(), c.NumUsed(), c.photos.size(), c.rms_px, c.held_out_rms_px),
+         kInk});
+    lines_.push_back({fmt::format("one standard deviation: focal length {:.3f} %, picture corners "
+                                  "{:.3f} px, whole picture {:.3f} px; boards in {} of the cells",
+                                  c.focal_sigma_percent, c.corner_sigma_px, c.mean_sigma_px,
+                                  Percent(c.coverage.share)),
+                      kInk});
     size_t num_left_out = 0;
     for (const CalibratedPhoto& photo : c.photos) {
       if (photo.used || ++num_left_out > kMaxLines) continue;
@@ -180,10 +177,8 @@ class Drawing {
       Write(text, {kMargin, y}, color);
       y += kLine;
     }
-    char size[60];
-    std::snprintf(size, sizeof(size), "%d x %d", calibration_.camera.width,
-                  calibration_.camera.height);
-    Write(size, {kMargin, kMargin - 12}, kGrey);
+    const Camera& camera = calibration_.camera;
+    Write(fmt::format("{} x {}", camera.width, camera.height), {kMargin, kMargin - 12}, kGrey);
   }
 
   // What does not fit into the width is cut off, with dots.

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numeric>
 
 #include "capture/calibration/calibration_uncertainty.h"
 #include "core/camera_formulas.h"
 #include "core/frames.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -20,12 +20,6 @@ constexpr int kWantedCorners = 3;     // of the picture
 constexpr double kWantedCornerSigma = 0.5;  // pixels
 constexpr int kMaxPlaces = 150;             // where cameras are compared
 constexpr double kManyDropped = 1.0 / 3;
-
-std::string Number(double value, const char* format = "%.2f") {
-  char text[60];
-  std::snprintf(text, sizeof(text), format, value);
-  return text;
-}
 
 double Rms(const std::vector<double>& values) {
   double sum = 0;
@@ -71,11 +65,11 @@ void WarnOfCoverage(const CalibrationOptions& options, Calibration* result) {
   if (coverage.radius < options.min_radius) {
     result->reasons.push_back(
         "the boards lie in the middle of the picture only (they reach " +
-        Number(100 * coverage.radius, "%.0f") +
+        Number(100 * coverage.radius, 0) +
         " % of the way to its corners): what the lens does outside is not known; photograph the "
         "board near all borders and corners too");
   } else if (reached < kWantedCorners || coverage.share < kWantedShare) {
-    result->warnings.push_back("boards cover " + Number(100 * coverage.share, "%.0f") +
+    result->warnings.push_back("boards cover " + Number(100 * coverage.share, 0) +
                                " % of the picture and reach " + std::to_string(reached) +
                                " of its corners: add photos with the board near the others");
   }
@@ -85,18 +79,18 @@ void JudgeUncertainty(const CalibrationOptions& options, Calibration* result) {
   if (!(result->focal_sigma_percent <= options.max_focal_sigma_percent)) {
     result->reasons.push_back("the focal length is not determined: its standard deviation is " +
                               (std::isfinite(result->focal_sigma_percent)
-                                   ? Number(result->focal_sigma_percent) + " %"
+                                   ? Number(result->focal_sigma_percent, 2) + " %"
                                    : std::string("unlimited")));
   }
   if (!(result->mean_sigma_px <= options.max_sigma_px)) {
     result->reasons.push_back("the camera is uncertain by " +
                               (std::isfinite(result->mean_sigma_px)
-                                   ? Number(result->mean_sigma_px) + " px"
+                                   ? Number(result->mean_sigma_px, 2) + " px"
                                    : std::string("more than can be told")) +
                               " over the picture");
   } else if (result->corner_sigma_px > kWantedCornerSigma) {
     result->warnings.push_back("at the corners of the picture the camera is uncertain by " +
-                               Number(result->corner_sigma_px) +
+                               Number(result->corner_sigma_px, 2) +
                                " px (one standard deviation): more photos there would help");
   }
   const CameraProjection projection(result->camera);
@@ -219,7 +213,7 @@ void JudgeCalibration(const CalibrationOptions& options, Calibration* result) {
   const double angle = result->max_angle_between_boards_deg;
   if (angle < options.min_tilt_deg) {
     result->reasons.push_back(
-        "all boards are held alike (within " + Number(angle, "%.0f") +
+        "all boards are held alike (within " + Number(angle, 0) +
         " degrees): focal length and distance cannot be told apart; tilt the board by 20 to 45 "
         "degrees, in different directions");
   }
@@ -227,7 +221,7 @@ void JudgeCalibration(const CalibrationOptions& options, Calibration* result) {
   JudgeUncertainty(options, result);
   if (result->photo_scatter > 2) {
     result->warnings.push_back(
-        "photos disagree " + Number(result->photo_scatter, "%.1f") +
+        "photos disagree " + Number(result->photo_scatter, 1) +
         " times as much as the noise of their corners lets expect (a bent board, motion, a touched "
         "focus?); the standard deviations are enlarged by that");
   }

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -164,17 +164,6 @@ void MeasureExposure(const cv::Mat1b& photo, const cv::Mat1b& region, PatternPho
   check->mean_grey = count > 0 ? sum / count : 0;
 }
 
-std::string Percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
-  return text;
-}
-std::string Decimal(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
-}
-
 void Judge(PatternPhotoCheck* check) {
   check->usable = check->on_planes >= kLeastFeatures;
   auto& verdict = check->verdict;
@@ -193,13 +182,13 @@ void Judge(PatternPhotoCheck* check) {
                       " of the pattern is over-exposed: shorten the exposure.");
   }
   if (check->mean_grey < 35) {
-    verdict.push_back("The photo is dark (mean grey value " + Decimal(check->mean_grey) +
+    verdict.push_back("The photo is dark (mean grey value " + Number(check->mean_grey, 1) +
                       " of 255): expose longer.");
   }
   if (check->planes.empty()) return;
   if (check->blur_px > 1.7 && check->blur_pattern_px > 1.7) {
-    verdict.push_back("The pattern is blurred by " + Decimal(check->blur_px) + " photo pixels (" +
-                      Decimal(check->blur_pattern_px) +
+    verdict.push_back("The pattern is blurred by " + Number(check->blur_px, 1) + " photo pixels (" +
+                      Number(check->blur_pattern_px, 1) +
                       " projector pixels): focus the projector, then the camera.");
   }
   if (check->contrast < 0.25) {

@@ -1,21 +1,23 @@
 #include "capture/simulation/capture_writer.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <set>
 #include <sstream>
 
+#include <fmt/core.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "capture/simulation/simulated_projector.h"
 #include "capture/simulation/true_colors.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/text.h"
 #include "importers/rtpi.h"
 
 namespace roomtex {
@@ -30,13 +32,6 @@ void WriteText(const std::string& path, const std::string& text) {
   OutputFile file(path);
   file.stream() << text;
   file.Commit();
-}
-
-// A stream that prints doubles so that they read back exactly.
-std::ostringstream ExactStream() {
-  std::ostringstream stream;
-  stream.precision(std::numeric_limits<double>::max_digits10);
-  return stream;
 }
 
 std::string ScanName(int station) {
@@ -61,10 +56,8 @@ std::string DateTime(const SimulatedRoom& room, int photo) {
   const bool paired = !room.Projectors().empty();
   const int place = room.PlaceOf(photo);
   const int seconds = paired ? 60 * place + (room.IsPatterned(photo) ? 0 : 7) : 20 * place;
-  char date_time[40];
-  std::snprintf(date_time, sizeof(date_time), "2008:05:01 %02d:%02d:%02d", 12 + seconds / 3600,
-                seconds / 60 % 60, seconds % 60);
-  return date_time;
+  return fmt::format("2008:05:01 {:02}:{:02}:{:02}", 12 + seconds / 3600, seconds / 60 % 60,
+                     seconds % 60);
 }
 
 void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
@@ -88,11 +81,10 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
 }
 
 std::string PoseLine(const Rigid& pose) {
-  std::ostringstream line = ExactStream();
   const Eigen::Vector4d q = WxyzFromQuaternion(pose.rotation);
-  line << q[0] << " " << q[1] << " " << q[2] << " " << q[3] << " " << pose.translation.x() << " "
-       << pose.translation.y() << " " << pose.translation.z();
-  return line.str();
+  const Eigen::Vector3d& t = pose.translation;
+  return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}", q[0], q[1], q[2],
+                     q[3], t.x(), t.y(), t.z());
 }
 
 // As the scanner itself measured it: RTPI knows no pose.
@@ -106,55 +98,53 @@ Scan InItsStation(Scan scan) {
 void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
                 Progress* progress) {
   progress->Stage("scans", room.options().num_stations);
-  std::ostringstream poses = ExactStream();
-  poses << "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
+  std::string poses = "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
   for (int station = 0; station < room.options().num_stations; ++station) {
     const Scan scan = room.MakeScan(station);
     WriteRtpi(RtpiFromScan(InItsStation(scan)), folder + "/" + ScanName(station));
-    poses << ScanName(station) << " " << PoseLine(scan.scan_from_station) << "\n";
+    poses += ScanName(station) + " " + PoseLine(scan.scan_from_station) + "\n";
     summary->num_samples += scan.points.size();
     summary->num_missing += scan.NumMissing();
     progress->Tick();
   }
-  if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses.str());
+  if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses);
 }
 
 void WritePicks(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary) {
-  std::ostringstream text = ExactStream();
-  text << "# pixel in the photo (centre of the upper-left pixel = 0.5, 0.5), point in the scan "
-          "frame in metres\n"
-       << "image_name,x,y,scan_x,scan_y,scan_z\n";
+  std::string text =
+      "# pixel in the photo (centre of the upper-left pixel = 0.5, 0.5), point in the scan frame "
+      "in "
+      "metres\n" +
+      CsvLine({"image_name", "x", "y", "scan_x", "scan_y", "scan_z"});
   if (room.options().num_picks > 0) {
     const int photo = room.BestPhotoForPicks();
     for (const SimulatedPick& pick : room.MakePicks(photo, room.options().num_picks)) {
       summary->picked_photo = pick.image_name;
       ++summary->num_picks;
-      char line[200];
-      std::snprintf(line, sizeof(line), "%s,%.2f,%.2f,%.4f,%.4f,%.4f\n", pick.image_name.c_str(),
-                    pick.x_in_img.x(), pick.x_in_img.y(), pick.x_in_scan.x(), pick.x_in_scan.y(),
-                    pick.x_in_scan.z());
-      text << line;
+      std::vector<std::string> fields = {pick.image_name};
+      for (const double x : pick.x_in_img) fields.push_back(Number(x, 2));
+      for (const double x : pick.x_in_scan) fields.push_back(Number(x, 4));
+      text += CsvLine(fields);
     }
   }
-  WriteText(folder + "/picks.csv", text.str());
+  WriteText(folder + "/picks.csv", text);
 }
 
 std::string CameraParams(const Camera& camera) {
-  std::ostringstream params = ExactStream();
-  for (size_t i = 0; i < camera.params.size(); ++i)
-    params << (i > 0 ? "," : "") << camera.params[i];
-  return params.str();
+  std::string params;
+  for (const double param : camera.params) params += (params.empty() ? "" : ",") + Exact(param);
+  return params;
 }
 
 void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
   const Camera& camera = room.camera();
   const std::string params = CameraParams(camera);
-  std::ostringstream cameras;
-  cameras << "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
-          << camera.camera_id << " " << CameraModelName(camera.model) << " " << camera.width << " "
-          << camera.height;
-  for (const char c : "," + params) cameras << (c == ',' ? ' ' : c);
-  WriteText(folder + "/cameras.txt", cameras.str() + "\n");
+  std::string spaced = params;
+  std::replace(spaced.begin(), spaced.end(), ',', ' ');
+  WriteText(
+      folder + "/cameras.txt",
+      fmt::format("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{} {} {} {} {}\n", camera.camera_id,
+                  CameraModelName(camera.model), camera.width, camera.height, spaced));
   WriteText(folder + "/camera_options.txt",
             std::string("--ImageReader.single_camera 1 --ImageReader.camera_model ") +
                 CameraModelName(camera.model) + " --ImageReader.camera_params " + params + "\n");
@@ -163,43 +153,43 @@ void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
 // What roomtex-associate has to find, and what the projectors throw from where.
 void WriteProjectors(const SimulatedRoom& room, const std::string& folder) {
   if (room.Projectors().empty()) return;
-  std::string pairs = "patterned_image,plain_image\n";
+  std::string pairs = CsvLine({"patterned_image", "plain_image"});
   for (int photo = 0; photo < room.NumPhotos(); photo += 2) {
-    pairs += room.PhotoName(photo) + "," + room.PhotoName(photo + 1) + "\n";
+    pairs += CsvLine({room.PhotoName(photo), room.PhotoName(photo + 1)});
   }
   WriteText(folder + "/associations.csv", pairs);
   const Rigid room_from_scan = room.ScanFromRoom().Inverse();
-  std::ostringstream text = ExactStream();
-  text << "# proj_from_scan: PATTERN WIDTH HEIGHT fx fy cx cy qw qx qy qz tx ty tz\n";
+  std::string text = "# proj_from_scan: PATTERN WIDTH HEIGHT fx fy cx cy qw qx qy qz tx ty tz\n";
   for (const Projector& projector : room.Projectors()) {
     const Camera& camera = projector.camera();
     const std::string name = "pattern_" + std::to_string(camera.camera_id) + ".png";
-    text << name << " " << camera.width << " " << camera.height;
-    for (const double param : camera.params) text << " " << param;
-    text << " " << PoseLine(projector.proj_from_room() * room_from_scan) << "\n";
+    text += fmt::format("{} {} {}", name, camera.width, camera.height);
+    for (const double param : camera.params) text += " " + Exact(param);
+    text += " " + PoseLine(projector.proj_from_room() * room_from_scan) + "\n";
     std::vector<uchar> bytes;
     cv::imencode(".png", projector.pattern(), bytes);
     WriteText(folder + "/" + name, std::string(bytes.begin(), bytes.end()));
   }
-  WriteText(folder + "/projectors.txt", text.str());
+  WriteText(folder + "/projectors.txt", text);
 }
 
 void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   SparseModel model;
   model.cameras[1] = room.camera();
-  std::ostringstream exposures = ExactStream();
-  exposures << "image_name,exposure_ev,exposure_time,red_gain,blue_gain\n";
+  std::string exposures =
+      CsvLine({"image_name", "exposure_ev", "exposure_time", "red_gain", "blue_gain"});
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
     SparseImage& image = model.images[photo + 1];
     image.image_id = photo + 1;
     image.camera_id = 1;
     image.name = room.PhotoName(photo);
     image.cam_from_model = room.CamFromScan(photo);
-    exposures << image.name << "," << room.ExposureEv(photo) << "," << room.ExposureTime(photo)
-              << "," << room.WhiteBalance(photo)[0] << "," << room.WhiteBalance(photo)[2] << "\n";
+    exposures +=
+        CsvLine({image.name, Exact(room.ExposureEv(photo)), Exact(room.ExposureTime(photo)),
+                 Exact(room.WhiteBalance(photo)[0]), Exact(room.WhiteBalance(photo)[2])});
   }
   WriteSparseModelText(model, folder);
-  WriteText(folder + "/exposures.csv", exposures.str());
+  WriteText(folder + "/exposures.csv", exposures);
   WriteProjectors(room, folder);
   const Rigid scan_from_room = room.ScanFromRoom();
   WriteSimilarity(folder + "/scan_from_room.txt",

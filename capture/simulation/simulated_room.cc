@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <mutex>
+
+#include <fmt/core.h>
 
 #include "capture/simulation/camera_faults.h"
 #include "capture/simulation/photo_renderer.h"
@@ -98,13 +99,8 @@ int SimulatedRoom::PlaceOf(int photo) const { return impl_->projected ? photo / 
 const std::vector<Projector>& SimulatedRoom::Projectors() const { return impl_->projectors; }
 
 std::string SimulatedRoom::PhotoName(int photo) const {
-  char name[32];
-  if (impl_->projected) {
-    std::snprintf(name, sizeof(name), "IMG_%04d.jpg", photo + 1);
-  } else {
-    std::snprintf(name, sizeof(name), "photo_%03d.jpg", photo);
-  }
-  return name;
+  return impl_->projected ? fmt::format("IMG_{:04}.jpg", photo + 1)
+                          : fmt::format("photo_{:03}.jpg", photo);
 }
 
 Rigid SimulatedRoom::CamFromRoom(int photo) const {

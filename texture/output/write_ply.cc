@@ -1,8 +1,9 @@
 #include "texture/output/write_ply.h"
 
 #include <cstring>
-#include <sstream>
 #include <utility>
+
+#include <fmt/core.h>
 
 #include "core/output_file.h"
 
@@ -39,13 +40,12 @@ class ByteSink {
 // What the importers' reader wants to know of a mesh (importers/ply.h).
 std::string CommentsOf(const std::vector<Scan>& scans) {
   if (scans.empty()) return "";
-  std::ostringstream comments;
-  comments.precision(17);
+  std::string comments;
   for (const auto& [name, v] :
        {std::pair{"up", scans[0].up}, std::pair{"station", scans[0].Station()}}) {
-    comments << "comment roomtex " << name << ' ' << v[0] << ' ' << v[1] << ' ' << v[2] << '\n';
+    comments += fmt::format("comment roomtex {} {:.17g} {:.17g} {:.17g}\n", name, v[0], v[1], v[2]);
   }
-  return comments.str();
+  return comments;
 }
 
 }  // namespace

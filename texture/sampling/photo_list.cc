@@ -3,43 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
 
+#include <fmt/core.h>
+
 #include "colmap_ext/database.h"
 #include "core/camera_formulas.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 
 namespace roomtex {
 namespace {
-
-std::vector<std::string> SplitCsvLine(std::string line) {
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  std::vector<std::string> fields(1);
-  bool quoted = false;
-  for (size_t i = 0; i < line.size(); ++i) {
-    if (line[i] == '"') {
-      if (quoted && i + 1 < line.size() && line[i + 1] == '"') {
-        fields.back() += line[++i];
-      } else {
-        quoted = !quoted;
-      }
-    } else if (line[i] == ',' && !quoted) {
-      fields.emplace_back();
-    } else {
-      fields.back() += line[i];
-    }
-  }
-  for (std::string& field : fields) {
-    const size_t first = field.find_first_not_of(" \t");
-    const size_t last = field.find_last_not_of(" \t");
-    field = first == std::string::npos ? "" : field.substr(first, last - first + 1);
-  }
-  return fields;
-}
 
 // "a.jpg, b.jpg, c.jpg and 4 more".
 std::string Enumerate(const std::vector<std::string>& names) {
@@ -178,37 +155,34 @@ Camera FitCamera(const Camera& camera, const std::string& path, const std::strin
 }  // namespace
 
 std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
-  RequireFile(path, "Check --associations_path");
-  std::ifstream stream(path);
-  std::string line;
-  long number = 0;
+  const char* const expected = "Expected a CSV with the header patterned_image,plain_image";
+  CsvReader table(path, "Check --associations_path", expected);
   int patterned = -1, plain = -1;
   std::vector<AssociatedPhotos> pairs;
-  while (std::getline(stream, line)) {
-    ++number;
-    if (number == 1 && line.rfind("\xef\xbb\xbf", 0) == 0) line.erase(0, 3);
-    if (line.empty() || line == "\r" || line[0] == '#') continue;
-    const std::vector<std::string> fields = SplitCsvLine(line);
+  while (table.Next()) {
+    const auto fields = table.Fields();
+    if (!fields) {
+      throw table.Error("a quoted name is not closed by a quote",
+                        "A quote inside a quoted name is written twice");
+    }
     if (patterned < 0) {
-      for (int i = 0; i < static_cast<int>(fields.size()); ++i) {
-        if (fields[i] == "patterned_image") patterned = i;
-        if (fields[i] == "plain_image") plain = i;
+      for (int i = 0; i < static_cast<int>(fields->size()); ++i) {
+        if ((*fields)[i] == "patterned_image") patterned = i;
+        if ((*fields)[i] == "plain_image") plain = i;
       }
       if (patterned < 0 || plain < 0) {
-        throw InputError(path, LinePosition(number),
-                         "is no header with the columns patterned_image and plain_image",
-                         "Expected a CSV with the header patterned_image,plain_image");
+        throw table.Error("is no header with the columns patterned_image and plain_image",
+                          expected);
       }
       continue;
     }
-    if (static_cast<int>(fields.size()) <= std::max(patterned, plain) ||
-        fields[patterned].empty()) {
-      throw InputError(path, LinePosition(number),
-                       "has " + std::to_string(fields.size()) +
-                           " fields, expected a patterned_image and a plain_image",
-                       "Correct the line or start it with #");
+    if (static_cast<int>(fields->size()) <= std::max(patterned, plain) ||
+        (*fields)[patterned].empty()) {
+      throw table.Error(fmt::format("has {} fields, expected a patterned_image and a plain_image",
+                                    fields->size()),
+                        "Correct the line or start it with #");
     }
-    pairs.push_back({fields[patterned], fields[plain]});
+    pairs.push_back({(*fields)[patterned], (*fields)[plain]});
   }
   if (patterned < 0) {
     throw InputError(path, "", "is empty, expected a header and pairs of photos",

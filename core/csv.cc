@@ -1,0 +1,83 @@
+#include "core/csv.h"
+
+#include <algorithm>
+
+#include "core/output_file.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+constexpr size_t kMaxLineLength = 64 * 1024;  // bytes; a longer line is none of a table
+constexpr char kByteOrderMark[] = "\xef\xbb\xbf";
+
+std::string Field(const std::string& text) {
+  if (text.find_first_of(",\"#\r\n") == std::string::npos && text == Trimmed(text)) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+}  // namespace
+
+CsvReader::CsvReader(const std::string& path, const std::string& remedy,
+                     const std::string& expected)
+    : path_(path), expected_(expected) {
+  RequireFile(path, remedy);
+  stream_.open(path, std::ios::binary);
+  if (!stream_) throw InputError(path, "", "cannot be opened", "Check that you may read it");
+}
+
+bool CsvReader::Next() {
+  while (std::getline(stream_, line_)) {
+    ++line_number_;
+    if (line_number_ == 1 && line_.rfind(kByteOrderMark, 0) == 0) line_.erase(0, 3);
+    if (line_.size() > kMaxLineLength || line_.find('\0') != std::string::npos) {
+      throw Error("is not a line of a text file", expected_);
+    }
+    line_ = Trimmed(line_);
+    if (!line_.empty() && line_[0] != '#') return true;
+  }
+  if (stream_.bad()) {
+    throw InputError(path_, "", "could not be read to its end", "Check the disk");
+  }
+  return false;
+}
+
+std::optional<std::vector<std::string>> CsvReader::Fields() const {
+  std::vector<std::string> fields;
+  for (size_t at = 0;; ++at) {
+    while (at < line_.size() && (line_[at] == ' ' || line_[at] == '\t')) ++at;
+    std::string field;
+    const bool quoted = at < line_.size() && line_[at] == '"';
+    if (quoted) {
+      for (++at;; ++at) {
+        if (at >= line_.size()) return std::nullopt;
+        if (line_[at] == '"') {
+          if (at + 1 >= line_.size() || line_[at + 1] != '"') break;
+          ++at;
+        }
+        field += line_[at];
+      }
+      ++at;
+    }
+    const size_t comma = std::min(line_.find(',', at), line_.size());
+    const std::string rest = Trimmed(line_.substr(at, comma - at));
+    if (quoted && !rest.empty()) return std::nullopt;
+    fields.push_back(quoted ? field : rest);
+    if (comma == line_.size()) return fields;
+    at = comma;
+  }
+}
+
+InputError CsvReader::Error(const std::string& finding, const std::string& remedy) const {
+  return InputError(path_, LinePosition(line_number_), finding, remedy);
+}
+
+std::string CsvLine(const std::vector<std::string>& fields) {
+  std::string line;
+  for (size_t i = 0; i < fields.size(); ++i) line += (i > 0 ? "," : "") + Field(fields[i]);
+  return line + "\n";
+}
+
+}  // namespace roomtex

@@ -1,0 +1,44 @@
+#pragma once
+// Tables with commas between their fields (CSV): RFC 4180 with a record per line, so that every
+// error has its line. A field that holds a comma stands in double quotes, a quote in it is written
+// twice; blanks around fields mean nothing. Blank lines and those that start with `#` are comments.
+// UTF-8, with or without a byte order mark; lines end with LF or CR LF.
+
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace roomtex {
+
+class CsvReader {
+ public:
+  // Throws InputError if the file cannot be opened; remedy: what to do if there is none. expected:
+  // the remedy for a file that is no text, "Expected a CSV file with ...".
+  CsvReader(const std::string& path, const std::string& remedy, const std::string& expected);
+
+  // Goes to the next line that is no comment; false behind the last one. Throws InputError for what
+  // is not a line of text, and when the file cannot be read on.
+  bool Next();
+
+  long line_number() const { return line_number_; }        // from 1
+  const std::string& line() const { return line_; }        // without blanks at its ends
+  std::optional<std::vector<std::string>> Fields() const;  // none if a quote is not closed
+
+  // An error in this line.
+  InputError Error(const std::string& finding, const std::string& remedy) const;
+
+ private:
+  std::string path_, expected_;
+  std::ifstream stream_;
+  std::string line_;
+  long line_number_ = 0;
+};
+
+// A line of a table: fields between commas, in quotes where a reader needs them, and a line feed.
+// Read back, the fields are the same as long as none holds a line end.
+std::string CsvLine(const std::vector<std::string>& fields);
+
+}  // namespace roomtex

@@ -1,0 +1,30 @@
+#pragma once
+// Numbers as text, and text as numbers: in messages, tables and files. The decimal point is a
+// point, whatever the locale.
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace roomtex {
+
+// `digits` behind the point: Number(2.5, 2) is "2.50".
+std::string Number(double value, int digits);
+// At most `digits` significant ones, no zeros at the end (C's %g): Significant(0.25, 3) is "0.25".
+std::string Significant(double value, int digits);
+// Reads back to the same number, to the last bit: Significant() with 17 digits.
+std::string Exact(double value);
+// In whole per cent: Percent(0.254) is "25 %".
+std::string Percent(double share);
+
+// A finite number in C notation ("-1.5e3", also "+2"); none if anything else stands there, be it a
+// blank.
+std::optional<double> ParseNumber(std::string_view text);
+
+// Without blanks and control characters for spacing at both ends.
+std::string Trimmed(const std::string& text);
+// Text of a file as it may stand in a message: in double quotes, at most 40 bytes of it, `?` for
+// control characters.
+std::string Quoted(const std::string& text);
+
+}  // namespace roomtex

@@ -1,0 +1,74 @@
+#include "core/csv.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+using testing::ElementsAre;
+
+struct Row {
+  long line;
+  std::vector<std::string> fields;
+};
+
+std::vector<Row> ReadTable(const std::string& bytes) {
+  const TempFolder folder;
+  WriteBytes(folder / "table.csv", bytes);
+  CsvReader table(folder / "table.csv", "Make it", "Expected a table");
+  std::vector<Row> rows;
+  while (table.Next()) {
+    const auto fields = table.Fields();
+    if (!fields) throw table.Error("a quote is open", "Close it");
+    rows.push_back({table.line_number(), *fields});
+  }
+  return rows;
+}
+
+TEST(Csv, CountsLinesAndPassesByComments) {
+  const auto rows =
+      ReadTable("\xef\xbb\xbf# by hand\r\n a, b ,c\r\n\r\n \t\r\n  # between\r\n1,,\"\"");
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].line, 2);
+  EXPECT_THAT(rows[0].fields, ElementsAre("a", "b", "c"));
+  EXPECT_EQ(rows[1].line, 6);
+  EXPECT_THAT(rows[1].fields, ElementsAre("1", "", ""));
+}
+
+TEST(Csv, QuotesHoldCommasBlanksAndQuotes) {
+  const auto rows = ReadTable("\"a, b\" , \" c \",\"\"\"d\"\"\",e\"f\n\"#g\",,\n");
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_THAT(rows[0].fields, ElementsAre("a, b", " c ", "\"d\"", "e\"f"));
+  EXPECT_THAT(rows[1].fields, ElementsAre("#g", "", ""));
+}
+
+TEST(Csv, WhatIsWrittenIsReadBack) {
+  const std::vector<std::string> fields = {"a.jpg", "b, c", "#d", "e\"f", " g ", "", "h#"};
+  const auto rows = ReadTable(CsvLine(fields) + CsvLine({"", ""}));
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].fields, fields);
+  EXPECT_THAT(rows[1].fields, ElementsAre("", ""));
+}
+
+TEST(Csv, PlainFieldsStandWithoutQuotes) {
+  EXPECT_EQ(CsvLine({"a b.jpg", "1.5", "", "-2e-05"}), "a b.jpg,1.5,,-2e-05\n");
+}
+
+TEST(Csv, RefusesOpenQuotesWithTheirLine) {
+  EXPECT_INPUT_ERROR(ReadTable("a\n\"b,c\n"), "line 2: a quote is open");
+  EXPECT_INPUT_ERROR(ReadTable("\"b\" c,d\n"), "line 1: a quote is open");
+}
+
+TEST(Csv, RefusesWhatIsNoText) {
+  EXPECT_INPUT_ERROR(ReadTable(std::string("a\nb\0c\n", 6)), "line 2: is not a line of a text");
+  EXPECT_INPUT_ERROR(ReadTable(std::string(70000, 'a')), "line 1: is not a line of a text");
+  EXPECT_INPUT_ERROR(CsvReader("/nonexistent/table.csv", "Make it", ""), "Make it");
+}
+
+TEST(Csv, AnEmptyFileHasNoRows) { EXPECT_TRUE(ReadTable("").empty()); }
+
+}  // namespace
+}  // namespace roomtex

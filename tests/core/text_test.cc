@@ -1,0 +1,78 @@
+#include "core/text.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "core/random_stream.h"
+
+namespace roomtex {
+namespace {
+
+std::string Printed(const char* format, int digits, double value) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, digits, value);
+  return text;
+}
+
+TEST(Text, PrintsNumbersAsCDoes) {
+  RandomStream random(3);
+  std::vector<double> values = {0,     -0.0, 0.5, 1.5,  2.5,     1e-320, 1e300, -1234567.875,
+                                0.125, 1e5,  1e6, 1e17, 999999.5};
+  values.push_back(std::numeric_limits<double>::infinity());
+  values.push_back(-std::numeric_limits<double>::infinity());
+  values.push_back(std::numeric_limits<double>::quiet_NaN());
+  for (int i = 0; i < 2000; ++i) {
+    values.push_back(random.Gaussian() * std::pow(10, random.Uniform(-12, 12)));
+  }
+  for (const double value : values) {
+    for (const int digits : {0, 1, 2, 3, 4, 7, 12}) {
+      ASSERT_EQ(Number(value, digits), Printed("%.*f", digits, value));
+    }
+    for (const int digits : {2, 4, 6, 10, 12, 17}) {
+      ASSERT_EQ(Significant(value, digits), Printed("%.*g", digits, value));
+    }
+  }
+}
+
+TEST(Text, ExactNumbersReadBackToTheLastBit) {
+  RandomStream random(4);
+  for (int i = 0; i < 2000; ++i) {
+    const double value = random.Gaussian() * std::pow(10, random.Uniform(-300, 300));
+    const std::optional<double> again = ParseNumber(Exact(value));
+    ASSERT_TRUE(again);
+    ASSERT_EQ(*again, value);
+  }
+}
+
+TEST(Text, SharesArePerCents) {
+  EXPECT_EQ(Percent(0.254), "25 %");
+  EXPECT_EQ(Percent(1), "100 %");
+}
+
+TEST(Text, ParsesFiniteNumbersOnly) {
+  EXPECT_EQ(ParseNumber("-1.5e3"), -1500);
+  EXPECT_EQ(ParseNumber("+2"), 2);
+  EXPECT_EQ(ParseNumber(".5"), 0.5);
+  for (const char* bad :
+       {"", "+", "nan", "inf", "1e999", "0x10", " 1", "1 ", "1,5", "1.5px", "++1"}) {
+    EXPECT_FALSE(ParseNumber(bad)) << bad;
+  }
+}
+
+TEST(Text, QuotesWhatMayStandInAMessage) {
+  EXPECT_EQ(Quoted("a.jpg"), "\"a.jpg\"");
+  EXPECT_EQ(Quoted("a\tb\x7f"), "\"a?b?\"");
+  EXPECT_EQ(Quoted(std::string(50, 'x')), "\"" + std::string(40, 'x') + "...\"");
+}
+
+TEST(Text, TrimsBothEnds) {
+  EXPECT_EQ(Trimmed(" \ta b\r\n"), "a b");
+  EXPECT_EQ(Trimmed(" \t"), "");
+}
+
+}  // namespace
+}  // namespace roomtex
