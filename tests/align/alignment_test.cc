@@ -49,7 +49,7 @@ TEST(Alignment, ExactPicksWithoutRefinementGiveTheTruth) {
 TEST(Alignment, SixNoisyPicksAndTheSurfaceGiveMillimetres) {
   for (int seed = 0; seed < 4; ++seed) {
     const SimulatedCase& one = MakeCase(seed, 6);
-    const Alignment alignment = AlignCase(one);
+    const Alignment& alignment = AlignedCase(seed, 6);
     EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
     EXPECT_TRUE(alignment.fit.refined);
     const PoseErrors from_picks =
@@ -64,7 +64,7 @@ TEST(Alignment, SixNoisyPicksAndTheSurfaceGiveMillimetres) {
 
 TEST(Alignment, DoesNotDependOnTheFrameOfTheSparseModel) {
   const SimulatedCase& one = MakeCase();
-  const Alignment before = AlignCase(one);
+  const Alignment& before = AlignedCase();
   SimulatedCase moved = one;
   TransformModel(SomeSimilarity(), &moved.model);
   const Alignment after = AlignCase(moved);
@@ -79,7 +79,7 @@ TEST(Alignment, DoesNotDependOnTheFrameOfTheSparseModel) {
 
 TEST(Alignment, MovesWithTheScan) {
   const SimulatedCase& one = MakeCase();
-  const Alignment before = AlignCase(one);
+  const Alignment& before = AlignedCase();
   const Rigid moved_from_scan{Eigen::Quaterniond(0.9, 0.1, -0.4, 0.2).normalized(), {4, -2, 1}};
   SimulatedCase moved = one;
   for (Eigen::Vector3d& point : moved.scans[0].points) point = moved_from_scan * point;
@@ -99,7 +99,7 @@ TEST(Alignment, MovesWithTheScan) {
 
 TEST(Alignment, DoesNotDependOnTheOrderOfThePicks) {
   SimulatedCase one = MakeCase();
-  const Similarity before = AlignCase(one).scan_from_sparse;
+  const Similarity before = AlignedCase().scan_from_sparse;
   std::reverse(one.picks.begin(), one.picks.end());
   const Similarity after = AlignCase(one).scan_from_sparse;
   EXPECT_THAT(after.Matrix(), IsNearMatrix(before.Matrix(), 1e-6));
@@ -146,7 +146,7 @@ TEST(Alignment, APickThatIsSwitchedOffChangesNothing) {
   wrong.x_in_scan += Eigen::Vector3d(3, 3, 3);
   wrong.weight = 0;
   more.picks.insert(more.picks.begin() + 1, wrong);
-  const Alignment expected = AlignCase(one), found = AlignCase(more);
+  const Alignment &expected = AlignedCase(0, 6), found = AlignCase(more);
   EXPECT_THAT(found.reasons, IsEmpty()) << Reasons(found);
   EXPECT_FALSE(found.start.picks[1].used);
   EXPECT_GT(found.start.picks[1].residual_px, 100);
@@ -228,7 +228,7 @@ TEST(Alignment, NeverTrustsTheScanOfAnotherRoom) {
 // room tells that the scan is of another one.
 TEST(Alignment, NeverTrustsTheScanOfARoomOfTheSameShape) {
   int num_tried = 0;
-  for (const int seed : {0, 3, 8}) {
+  for (const int seed : {0, 1, 2}) {
     SimulatedCase one = MakeCase(seed);
     one.scans = MakeCase(seed + 1).scans;
     const ScanPatches surface(one.scans, ScanPatchOptions());

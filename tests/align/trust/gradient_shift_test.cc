@@ -1,12 +1,10 @@
 #include "align/trust/gradient_shift.h"
 
-#include <memory>
-
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "capture/simulation/simulated_room.h"
 #include "core/frames.h"
+#include "tests/align/trust/exposed_room.h"
 
 namespace roomtex {
 namespace {
@@ -23,69 +21,6 @@ TEST(Tally, GivesTheWilsonInterval) {
   EXPECT_GT(tally.High(1.96), 0.1);
   EXPECT_EQ(Tally().Low(2), 0);
   EXPECT_EQ(Tally().High(2), 1);
-}
-
-// Photos and scan of a simulated room.
-struct Exposed {
-  explicit Exposed(SimulatedRoomOptions options) {
-    options.num_photos = kNumPhotos;
-    options.photo_width = 720;
-    options.photo_height = 480;
-    options.scan_columns = 1400;
-    options.scan_rows = 700;
-    room = std::make_unique<SimulatedRoom>(options);
-    scans = {room->MakeScan(0)};
-    free_space = std::make_unique<FreeSpace>(scans, 300000);
-    viewer = std::make_unique<ScanViewer>(scans, *free_space);
-    projection = std::make_unique<CameraProjection>(room->camera());
-    lattice = std::make_unique<RayLattice>(*projection, 3.0 * kCell);
-    for (int photo = 0; photo < room->NumPhotos(); ++photo) {
-      photos.push_back(room->RenderPhoto(photo));
-    }
-  }
-
-  // At the true poses after the scan frame was moved by `wrong`; the photos may be another room's.
-  GradientAgreement Judge(const Similarity& wrong, const std::vector<cv::Mat>& pictures) const {
-    GradientShifts shifts;
-    for (int photo = 0; photo < room->NumPhotos(); ++photo) {
-      const ScanView view = viewer->Look(*lattice, room->camera(),
-                                         CamFromScan(room->CamFromScan(photo), wrong), kCell);
-      shifts.Add(MeasureGradientShifts(view, pictures[photo], *projection, viewer->sample_angle(),
-                                       GradientShiftOptions()));
-    }
-    return JudgeGradientShifts(shifts);
-  }
-
-  static constexpr int kNumPhotos = 4, kCell = 1;
-  std::unique_ptr<SimulatedRoom> room;
-  std::vector<Scan> scans;
-  std::unique_ptr<FreeSpace> free_space;
-  std::unique_ptr<ScanViewer> viewer;
-  std::unique_ptr<CameraProjection> projection;
-  std::unique_ptr<RayLattice> lattice;
-  std::vector<cv::Mat> photos;
-};
-
-const Exposed& Room(int seed) {
-  static std::map<int, std::unique_ptr<Exposed>> rooms;
-  auto& room = rooms[seed];
-  if (room == nullptr) {
-    SimulatedRoomOptions options;
-    options.random_seed = seed;
-    room = std::make_unique<Exposed>(options);
-  }
-  return *room;
-}
-
-Similarity Turned(double degrees, const Eigen::Vector3d& axis) {
-  Similarity turned;
-  turned.rotation = Eigen::AngleAxisd(RadFromDeg(degrees), axis.normalized());
-  return turned;
-}
-Similarity Moved(const Eigen::Vector3d& by) {
-  Similarity moved;
-  moved.translation = by;
-  return moved;
 }
 
 TEST(GradientShift, SupportsTheTruePosesWithAMedianShiftBelowAPixel) {
@@ -133,46 +68,13 @@ TEST(GradientShift, TheShiftIsTheTurnOfTheCamera) {
   EXPECT_NEAR(JudgeGradientShifts(shifts).median_shift_deg, 0.6, 0.1);
 }
 
-// Over ten rooms of different kinds: a right alignment never contradicts and a wrong one never
-// supports.
-TEST(GradientShift, IsNeverFalseOverTenRooms) {
-  int false_contradictions = 0, false_supports = 0, supports = 0, contradictions = 0;
-  for (int seed = 0; seed < 10; ++seed) {
-    SimulatedRoomOptions options;
-    options.random_seed = 100 + seed;
-    options.shading = seed % 2 == 1;
-    if (seed == 2) options.blur_px = 3;
-    if (seed == 3) options.photo_noise = 8;
-    if (seed == 4) options.furnished = false;
-    if (seed == 5) options.bare_walls = true;
-    if (seed == 6) options.camera_model = "OPENCV_FISHEYE";
-    if (seed == 7) options.range_noise = 0.006;
-    if (seed == 8) options.bend = 0.005;
-    if (seed == 9) options.exposure_range_ev = 3;
-    const Exposed one(options);
-    const GradientAgreement right = one.Judge(Similarity(), one.photos);
-    false_contradictions += right.contradicts;
-    supports += right.supports;
-    const Similarity wrongs[] = {Turned(3, {1, 2, 3}), Moved({0.15, -0.1, 0.09}),
-                                 Turned(180, {0, 1, 0})};
-    for (const Similarity& wrong : wrongs) {
-      const GradientAgreement judged = one.Judge(wrong, one.photos);
-      EXPECT_FALSE(judged.supports) << seed;
-      false_supports += judged.supports;
-      contradictions += judged.contradicts;
-    }
-    // A similar room: same size, same cameras' range, other walls and furniture.
-    const GradientAgreement other = one.Judge(Similarity(), Room(0).photos);
-    EXPECT_FALSE(other.supports) << seed;
-    false_supports += other.supports;
-    contradictions += other.contradicts;
-  }
-  EXPECT_EQ(false_contradictions, 0);
-  EXPECT_EQ(false_supports, 0);
-  EXPECT_GE(supports, 9);
-  EXPECT_GE(contradictions, 25);  // of 40, with four small photos
-  RecordProperty("supports_of_10", supports);
-  RecordProperty("contradictions_of_40", contradictions);
+// The ten rooms are gradient_shift_rooms_test.cc, labelled slow.
+TEST(GradientShift, IsNeverFalseOverThreeRooms) {
+  const RoomVerdicts verdicts = JudgeRooms({1, 4, 6});
+  EXPECT_EQ(verdicts.false_contradictions, 0);
+  EXPECT_EQ(verdicts.false_supports, 0);
+  EXPECT_EQ(verdicts.supports, 3);
+  EXPECT_GE(verdicts.contradictions, 8);  // of 12
 }
 
 TEST(GradientShift, FindsNoCornersInNoise) {

@@ -46,7 +46,7 @@ double LargestCosine(const std::vector<Eigen::Vector3d>& directions, const Eigen
 }
 
 TEST(OpenDirections, AFurnishedRoomLeavesNothingOpen) {
-  const Alignment alignment = AlignCase(MakeCase(0));
+  const Alignment& alignment = AlignedCase();
   EXPECT_TRUE(alignment.open.None());
   EXPECT_EQ(alignment.open.num_facings, 3);
   EXPECT_EQ(alignment.open.Sentence(), "");

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
@@ -33,7 +35,7 @@ class AssociateScene {
   static constexpr int kWidth = 720, kHeight = 480;
 
   // furnished = false: only edges of walls and floor.
-  explicit AssociateScene(int num_places, bool furnished = true) : pattern_(MakeOne()) {
+  explicit AssociateScene(int num_places, bool furnished = true) {
     SimulatedRoomOptions options;
     options.random_seed = 4;
     options.bare_walls = true;
@@ -49,19 +51,22 @@ class AssociateScene {
     options.scan_rows = 30;
     const SimulatedRoom room(options);
     for (int place = 0; place < num_places; ++place) {
-      fine_.push_back(Linear(room.RenderPhoto(place)));
+      const cv::Mat3f room_light = Linear(room.RenderPhoto(place));
+      plain_.push_back(0.45 * room_light);
+      patterned_.push_back(plain_.back() + 1.6 * room_light.mul(ProjectedAt(place)));
     }
   }
 
   cv::Mat TakePhoto(int place, const Take& take) const {
-    cv::Mat3f light = 0.45 * fine_[place];
-    if (take.patterned) light += 1.6 * fine_[place].mul(ProjectedAt(place));
-    const double c = std::cos(RadFromDeg(take.roll_deg)), s = std::sin(RadFromDeg(take.roll_deg));
-    const double mx = kWidth - 0.5, my = kHeight - 0.5;
-    const cv::Matx23d move(c, -s, mx - c * mx + s * my + 2 * take.shift_x,  //
-                           s, c, my - s * mx - c * my + 2 * take.shift_y);
-    cv::Mat3f moved, small;
-    cv::warpAffine(light, moved, move, light.size(), cv::INTER_LANCZOS4, cv::BORDER_REPLICATE);
+    const cv::Mat3f& light = (take.patterned ? patterned_ : plain_)[place];
+    cv::Mat3f moved = light, small;
+    if (take.shift_x != 0 || take.shift_y != 0 || take.roll_deg != 0) {
+      const double c = std::cos(RadFromDeg(take.roll_deg)), s = std::sin(RadFromDeg(take.roll_deg));
+      const double mx = kWidth - 0.5, my = kHeight - 0.5;
+      const cv::Matx23d move(c, -s, mx - c * mx + s * my + 2 * take.shift_x,  //
+                             s, c, my - s * mx - c * my + 2 * take.shift_y);
+      cv::warpAffine(light, moved, move, light.size(), cv::INTER_LANCZOS4, cv::BORDER_REPLICATE);
+    }
     cv::resize(moved, small, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
     cv::Mat3b photo(small.size());
     RandomStream random(MixBits(take.seed, static_cast<uint64_t>(place)));
@@ -77,7 +82,8 @@ class AssociateScene {
 
   void Save(const std::string& path, int place, const Take& take,
             const std::string& date_time = "") const {
-    cv::imwrite(path, TakePhoto(place, take), {cv::IMWRITE_JPEG_QUALITY, 93});
+    const std::string bytes = Encoded(path.substr(path.rfind('.')), place, take);
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<long>(bytes.size()));
     if (date_time.empty()) return;
     ExposureData exposure;
     exposure.date_time = date_time;
@@ -88,6 +94,18 @@ class AssociateScene {
   }
 
  private:
+  // The photo's file. Most tests want the same photos.
+  const std::string& Encoded(const std::string& extension, int place, const Take& take) const {
+    std::string& bytes = encoded_[{extension, place, take.patterned, take.shift_x, take.shift_y,
+                                   take.roll_deg, take.ev, take.noise, take.seed}];
+    if (bytes.empty()) {
+      std::vector<uchar> buffer;
+      cv::imencode(extension, TakePhoto(place, take), buffer, {cv::IMWRITE_JPEG_QUALITY, 93});
+      bytes.assign(buffer.begin(), buffer.end());
+    }
+    return bytes;
+  }
+
   static cv::Mat3f Linear(const cv::Mat3b& photo) {
     cv::Mat3f linear(photo.size());
     for (int i = 0; i < static_cast<int>(photo.total()); ++i) {
@@ -95,16 +113,19 @@ class AssociateScene {
     }
     return linear;
   }
-  static cv::Mat3f MakeOne() {
-    PatternOptions options;
-    options.width = 1280;
-    options.height = 720;
-    cv::Mat3b pattern;
-    cv::cvtColor(MakePattern(options), pattern, cv::COLOR_GRAY2BGR);
-    return Linear(pattern);
+  static const cv::Mat3f& Pattern() {
+    static const cv::Mat3f light = [] {
+      PatternOptions options;
+      options.width = 1280;
+      options.height = 720;
+      cv::Mat3b pattern;
+      cv::cvtColor(MakePattern(options), pattern, cv::COLOR_GRAY2BGR);
+      return Linear(pattern);
+    }();
+    return light;
   }
   // The pattern lies differently in the photo of each place.
-  cv::Mat3f ProjectedAt(int place) const {
+  static cv::Mat3f ProjectedAt(int place) {
     RandomStream random(MixBits(77, static_cast<uint64_t>(place)));
     const auto width = static_cast<float>(2 * kWidth), height = static_cast<float>(2 * kHeight);
     const auto any = [&](double low, double high) {
@@ -116,13 +137,22 @@ class AssociateScene {
                                          {width * any(0.8, 1.1), height * any(0.8, 1.1)},
                                          {width * any(-0.1, 0.2), height * any(0.8, 1.1)}};
     cv::Mat3f light;
-    cv::warpPerspective(pattern_, light, cv::getPerspectiveTransform(from, to),
+    cv::warpPerspective(Pattern(), light, cv::getPerspectiveTransform(from, to),
                         {2 * kWidth, 2 * kHeight});
     return light;
   }
 
-  cv::Mat3f pattern_;
-  std::vector<cv::Mat3f> fine_;
+  // Light of the room, and with the pattern, per place; twice as fine as the photos.
+  std::vector<cv::Mat3f> plain_, patterned_;
+  using TakeKey =
+      std::tuple<std::string, int, bool, double, double, double, double, double, uint64_t>;
+  mutable std::map<TakeKey, std::string> encoded_;
 };
+
+// Five places, rendered once per process.
+inline const AssociateScene& FurnishedScene() {
+  static const AssociateScene scene(5);
+  return scene;
+}
 
 }  // namespace roomtex

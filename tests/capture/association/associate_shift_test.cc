@@ -23,10 +23,15 @@ struct Motion {
 constexpr Motion kMotions[] = {{0, 0},        {0.1, 0},   {0.3, 0},    {0.35, -0.35},
                                {-0.55, 0.58}, {0.8, 0.0}, {2.4, -1.7}, {14.3, 9.6}};
 
-// Largest error of the offset over the motions.
-double WorstError(const AssociateScene& scene, int place, const cv::Mat1b& plain) {
+// Largest error of the offset over the motions, each at one of two places.
+double WorstError(const AssociateScene& scene) {
+  const cv::Mat1b plain_photos[] = {Grey(scene.TakePhoto(0, Take())),
+                                    Grey(scene.TakePhoto(1, Take()))};
   double worst = 0;
+  int place = 0;
   for (const Motion& motion : kMotions) {
+    place = 1 - place;
+    const cv::Mat1b& plain = plain_photos[place];
     Take take;
     take.patterned = true;
     take.shift_x = motion.x;
@@ -49,23 +54,18 @@ double WorstError(const AssociateScene& scene, int place, const cv::Mat1b& plain
 }
 
 TEST(CameraShift, IsMeasuredToATwentiethOfAPixelInAFurnishedRoom) {
-  const AssociateScene scene(2);
-  for (int place = 0; place < 2; ++place) {
-    EXPECT_LT(WorstError(scene, place, Grey(scene.TakePhoto(place, Take()))), 0.05);
-  }
+  EXPECT_LT(WorstError(FurnishedScene()), 0.05);
 }
 
 TEST(CameraShift, IsMeasuredInAnEmptyRoomWithItsError) {
   const AssociateScene scene(2, false);
-  for (int place = 0; place < 2; ++place) {
-    // A floor line and a corner in a photo of a third of a megapixel: what is known is little, and
-    // known to be little (the check in WorstError).
-    EXPECT_LT(WorstError(scene, place, Grey(scene.TakePhoto(place, Take()))), 0.5);
-  }
+  // A floor line and a corner in a photo of a third of a megapixel: what is known is little, and
+  // known to be little (the check in WorstError).
+  EXPECT_LT(WorstError(scene), 0.5);
 }
 
 TEST(CameraShift, SeesARollOfTheCamera) {
-  const AssociateScene scene(2);
+  const AssociateScene& scene = FurnishedScene();
   // At the corners, half a diagonal of 432.7 pixels away.
   const double roll_px = RadFromDeg(0.25) * 432.7, offset_px = roll_px / std::sqrt(3);
   for (int place = 0; place < 2; ++place) {
