@@ -25,7 +25,8 @@ namespace roomtex {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr char kRemedy[] = "Install COLMAP (apt install colmap), or name the program with --colmap";
+constexpr char kInstallRemedy[] =
+    "Install COLMAP (apt install colmap), or name the program with --colmap";
 constexpr size_t kNumLastLines = 12;
 
 std::atomic<int> received_signal{0};
@@ -54,8 +55,9 @@ std::string FindProgram(const std::string& program) {
   };
   if (program.find('/') != std::string::npos) {
     std::error_code error;
-    if (!fs::exists(program, error)) throw InputError(program, "", "does not exist", kRemedy);
-    if (!runnable(program)) throw InputError(program, "", "is not a program", kRemedy);
+    if (!fs::exists(program, error))
+      throw InputError(program, "", "does not exist", kInstallRemedy);
+    if (!runnable(program)) throw InputError(program, "", "is not a program", kInstallRemedy);
     return program;
   }
   const char* path = std::getenv("PATH");
@@ -66,7 +68,7 @@ std::string FindProgram(const std::string& program) {
     if (runnable(candidate)) return candidate.string();
     begin = end + 1;
   }
-  throw InputError(program, "", "is not on the PATH", kRemedy);
+  throw InputError(program, "", "is not on the PATH", kInstallRemedy);
 }
 
 std::vector<std::string> ChildEnvironment() {
@@ -160,7 +162,7 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
   });
   if (!help.success || version_.empty()) {
     throw InputError(path_, "", "does not answer `help` as COLMAP does (" + help.LastLines() + ")",
-                     kRemedy);
+                     kInstallRemedy);
   }
 }
 

@@ -23,7 +23,7 @@ namespace {
 
 constexpr int kBusyMilliseconds = 3000;
 constexpr uint64_t kMaxNumImages = 2147483647;  // COLMAP's Database::kMaxNumImages
-constexpr char kRemedy[] =
+constexpr char kDatabaseRemedy[] =
     "Give the database.db that COLMAP wrote, or make it again with colmap feature_extractor";
 
 // What the first 100 bytes of an SQLite file say (sqlite.org/fileformat.html, section 1.3).
@@ -36,10 +36,11 @@ SqliteHeader ReadHeader(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   unsigned char header[100] = {};
   stream.read(reinterpret_cast<char*>(header), sizeof(header));
-  if (stream.gcount() == 0) throw InputError(path, "", "is empty, expected a database", kRemedy);
+  if (stream.gcount() == 0)
+    throw InputError(path, "", "is empty, expected a database", kDatabaseRemedy);
   if (stream.gcount() < static_cast<std::streamsize>(sizeof(header)) ||
       std::memcmp(header, "SQLite format 3", 16) != 0) {
-    throw InputError(path, "byte 0", "is not an SQLite database", kRemedy);
+    throw InputError(path, "byte 0", "is not an SQLite database", kDatabaseRemedy);
   }
   const auto big_endian = [&header](int first, int count) {
     uint64_t value = 0;
@@ -109,9 +110,9 @@ InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& err
       return InputError(path, "", "is being written by another program",
                         "Wait until COLMAP has finished");
     case SQLITE_NOTADB:
-      return InputError(path, "", "is not an SQLite database", kRemedy);
+      return InputError(path, "", "is not an SQLite database", kDatabaseRemedy);
     case SQLITE_CORRUPT:
-      return InputError(path, "", "is damaged or cut off" + said, kRemedy);
+      return InputError(path, "", "is damaged or cut off" + said, kDatabaseRemedy);
     case SQLITE_READONLY:
       return InputError(path, "", "was left half written by a program that was stopped" + said,
                         "Open it once with colmap or sqlite3, which restores it");
@@ -124,7 +125,7 @@ InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& err
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     default:
-      return InputError(path, "", "cannot be read as COLMAP's database" + said, kRemedy);
+      return InputError(path, "", "cannot be read as COLMAP's database" + said, kDatabaseRemedy);
   }
 }
 
@@ -141,7 +142,7 @@ class Row {
            statement_.getColumn(0).getString();
   }
   [[noreturn]] void Fail(const std::string& finding) const {
-    throw InputError(path_, Position(), finding, kRemedy);
+    throw InputError(path_, Position(), finding, kDatabaseRemedy);
   }
 
   int64_t Integer(int column, int64_t least, int64_t largest) const {
@@ -243,7 +244,8 @@ void Database::Impl::Open() {
   if (!has_wal && num_bytes < header.num_bytes) {
     throw InputError(
         path, BytePosition(static_cast<long long>(num_bytes)),
-        "is cut off: its header promises " + std::to_string(header.num_bytes) + " bytes", kRemedy);
+        "is cut off: its header promises " + std::to_string(header.num_bytes) + " bytes",
+        kDatabaseRemedy);
   }
   if (has_wal && !fs::exists(path + "-shm", error)) copy = std::make_unique<TemporaryCopy>(path);
   const bool immutable = header.uses_wal && !has_wal;
@@ -276,7 +278,7 @@ void Database::Impl::RequireColumns(const char* table,
       throw InputError(
           path, "",
           std::string("is an SQLite database, but not COLMAP's: it has no table ") + table,
-          kRemedy);
+          kDatabaseRemedy);
     }
     SQLite::Statement statement(*sqlite, "SELECT name FROM pragma_table_info(" + quoted + ")");
     while (statement.executeStep()) present.insert(statement.getColumn(0).getString());
@@ -284,7 +286,7 @@ void Database::Impl::RequireColumns(const char* table,
   for (const std::string& column : columns) {
     if (present.count(column) > 0) continue;
     throw InputError(path, std::string("table ") + table,
-                     "is not COLMAP's: it has no column " + column, kRemedy);
+                     "is not COLMAP's: it has no column " + column, kDatabaseRemedy);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace roomtex {
 namespace {
 
-constexpr char kRemedy[] = "The file is cut off or damaged: write it again with COLMAP";
+constexpr char kDamagedRemedy[] = "The file is cut off or damaged: write it again with COLMAP";
 
 // Takes numbers from the front of the bytes; an InputError where they end.
 class ByteReader {
@@ -61,7 +61,7 @@ class ByteReader {
   }
 
   [[noreturn]] void Fail(long long byte, const std::string& finding) const {
-    throw InputError(path_, BytePosition(byte), finding, kRemedy);
+    throw InputError(path_, BytePosition(byte), finding, kDamagedRemedy);
   }
 
  private:

@@ -142,7 +142,7 @@ class Words {
   const char* expected_;
 };
 
-PlacedList<Camera> ParseCameras(const std::string& bytes, const std::string& path) {
+PlacedList<Camera> ParseTextCameras(const std::string& bytes, const std::string& path) {
   constexpr char kExpected[] = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]";
   PlacedList<Camera> cameras;
   LineReader reader(bytes, path);
@@ -187,7 +187,7 @@ void ParsePoints2d(std::string_view line, const LineReader& reader, SparseImage*
   }
 }
 
-PlacedList<SparseImage> ParseImages(const std::string& bytes, const std::string& path) {
+PlacedList<SparseImage> ParseTextImages(const std::string& bytes, const std::string& path) {
   constexpr char kExpected[] = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
   PlacedList<SparseImage> images;
   LineReader reader(bytes, path);
@@ -211,7 +211,7 @@ PlacedList<SparseImage> ParseImages(const std::string& bytes, const std::string&
   return images;
 }
 
-PlacedList<SparsePoint> ParsePoints(const std::string& bytes, const std::string& path) {
+PlacedList<SparsePoint> ParseTextPoints(const std::string& bytes, const std::string& path) {
   constexpr char kExpected[] = "POINT3D_ID X Y Z R G B ERROR and pairs IMAGE_ID POINT2D_IDX";
   PlacedList<SparsePoint> points;
   LineReader reader(bytes, path);
@@ -271,7 +271,7 @@ class TextWriter {
   bool at_line_start_ = true;
 };
 
-void WriteCameras(const SparseModel& model, const SparseModelFormat::Write& write) {
+void WriteTextCameras(const SparseModel& model, const SparseModelFormat::Write& write) {
   TextWriter writer(write);
   writer.Comment("CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]");
   for (const auto& [id, camera] : model.cameras) {
@@ -285,7 +285,7 @@ void WriteCameras(const SparseModel& model, const SparseModelFormat::Write& writ
   writer.Flush();
 }
 
-void WriteImages(const SparseModel& model, const SparseModelFormat::Write& write) {
+void WriteTextImages(const SparseModel& model, const SparseModelFormat::Write& write) {
   TextWriter writer(write);
   writer.Comment("IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME");
   writer.Comment("POINTS2D[] as (X, Y, POINT3D_ID)");
@@ -314,7 +314,7 @@ void WriteImages(const SparseModel& model, const SparseModelFormat::Write& write
   writer.Flush();
 }
 
-void WritePoints(const SparseModel& model, const SparseModelFormat::Write& write) {
+void WriteTextPoints(const SparseModel& model, const SparseModelFormat::Write& write) {
   TextWriter writer(write);
   writer.Comment("POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)");
   for (const auto& [id, point] : model.points) {
@@ -331,13 +331,14 @@ void WritePoints(const SparseModel& model, const SparseModelFormat::Write& write
   writer.Flush();
 }
 
-std::string Position(long long line) { return LinePosition(static_cast<long>(line)); }
+std::string PositionOfLine(long long line) { return LinePosition(static_cast<long>(line)); }
 
 }  // namespace
 
 const SparseModelFormat& SparseModelText() {
-  static const SparseModelFormat format = {".txt",      Position,     ParseCameras, ParseImages,
-                                           ParsePoints, WriteCameras, WriteImages,  WritePoints};
+  static const SparseModelFormat format = {".txt",          PositionOfLine,  ParseTextCameras,
+                                           ParseTextImages, ParseTextPoints, WriteTextCameras,
+                                           WriteTextImages, WriteTextPoints};
   return format;
 }
 

@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
+
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
 
-std::string NumberText(double number) {
-  std::ostringstream text;
-  text << std::setprecision(15) << number;
-  return text.str();
-}
+std::string LimitText(double limit) { return Significant(limit, 15); }
 
 bool Contains(const std::vector<std::string>& all, const std::string& one) {
   return std::find(all.begin(), all.end(), one) != all.end();
@@ -60,7 +56,7 @@ OptionField& OptionField::Finite() {
 
 OptionField& OptionField::Within(double low, double high, const std::string& unit) {
   AtLeast(low).AtMost(high);
-  return Says("must be " + NumberText(low) + " to " + NumberText(high) +
+  return Says("must be " + LimitText(low) + " to " + LimitText(high) +
               (unit.empty() ? "" : " " + unit));
 }
 
@@ -125,12 +121,12 @@ std::string OptionField::Phrase() const {
   }
   const bool has_low = std::isfinite(low_), has_high = std::isfinite(high_);
   if (has_low && has_high) {
-    return "must lie between " + NumberText(low_) + " and " + NumberText(high_);
+    return "must lie between " + LimitText(low_) + " and " + LimitText(high_);
   }
-  if (has_high) return (high_is_open_ ? "must be below " : "must be at most ") + NumberText(high_);
+  if (has_high) return (high_is_open_ ? "must be below " : "must be at most ") + LimitText(high_);
   if (!has_low) return "must be a finite number";
   if (low_ == 0) return low_is_open_ ? "must be positive" : "must not be negative";
-  return (low_is_open_ ? "must be greater than " : "must be at least ") + NumberText(low_);
+  return (low_is_open_ ? "must be greater than " : "must be at least ") + LimitText(low_);
 }
 
 std::string OptionField::Sentence() const {

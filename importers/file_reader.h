@@ -8,6 +8,9 @@
 
 namespace roomtex {
 
+// The remedy for a file that contradicts itself.
+inline constexpr char kDamaged[] = "The file is damaged: write it again";
+
 // A file opened for reading at any position. All errors are InputErrors that name the file.
 class FileReader {
  public:

@@ -14,8 +14,6 @@
 namespace roomtex {
 namespace {
 
-const char kDamaged[] = "The file is damaged: write it again";
-
 // What OBJ knows beside v and f: attributes, elements, groups, free-form curves and surfaces.
 constexpr std::string_view kSkipped[] = {
     "vt",       "vn",         "vp",        "g",      "o",    "s",    "mg",    "usemtl",

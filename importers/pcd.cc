@@ -26,9 +26,8 @@
 namespace roomtex {
 namespace {
 
-constexpr int64_t kLongestHeader = 1 << 16;  // bytes
-constexpr int64_t kLargestPoint = 1 << 16;   // bytes of one point, all fields
-const char kDamaged[] = "The file is damaged: write it again";
+constexpr int64_t kLongestPcdHeader = 1 << 16;  // bytes
+constexpr int64_t kLargestPoint = 1 << 16;      // bytes of one point, all fields
 
 struct PcdField {
   std::string name;
@@ -84,7 +83,7 @@ class PcdHeaderParser {
   PcdHeader Parse() {
     std::string_view line;
     while (header_.data.empty()) {
-      if (lines_.offset() > kLongestHeader || !lines_.Next(&line)) {
+      if (lines_.offset() > kLongestPcdHeader || !lines_.Next(&line)) {
         throw InputError(file_.path(), BytePosition(lines_.offset()),
                          "the header does not end: no DATA line up to here", kDamaged);
       }

@@ -24,8 +24,6 @@
 namespace roomtex {
 namespace {
 
-const char kDamaged[] = "The file is damaged: write it again";
-
 // The values of the body one after the other.
 class ValueSource {
  public:

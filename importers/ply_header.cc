@@ -10,7 +10,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int64_t kLongestHeader = 1 << 20;  // bytes
+constexpr int64_t kLongestPlyHeader = 1 << 20;  // bytes
 
 std::optional<PlyType> TypeFromName(const std::string& name) {
   static const std::pair<const char*, PlyType> kTypes[] = {
@@ -129,7 +129,7 @@ PlyHeader ReadPlyHeader(const FileReader& file) {
                      "Give a PLY file");
   }
   while (true) {
-    if (lines.offset() > kLongestHeader || !lines.Next(&line)) {
+    if (lines.offset() > kLongestPlyHeader || !lines.Next(&line)) {
       throw InputError(file.path(), BytePosition(lines.offset()),
                        "the header does not end: no line \"end_header\" up to here",
                        "The file is cut off or damaged: copy it again");

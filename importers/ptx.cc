@@ -18,9 +18,9 @@ namespace roomtex {
 namespace {
 
 constexpr int64_t kShortestSample = 8;  // bytes: "0 0 0 0\n"
-const char kDamaged[] = "The file is damaged or not PTX";
+const char kNotPtx[] = "The file is damaged or not PTX";
 
-bool IsBlank(char c) { return c == ' ' || c == '\t' || c == ',' || c == ';'; }
+bool IsSeparator(char c) { return c == ' ' || c == '\t' || c == ',' || c == ';'; }
 
 // The numbers of a line; -1 if something in it is no number or there are more than `max_count`.
 int ParseNumbers(std::string_view line, double* numbers, int max_count) {
@@ -28,7 +28,7 @@ int ParseNumbers(std::string_view line, double* numbers, int max_count) {
   const char* const end = at + line.size();
   int count = 0;
   while (true) {
-    while (at < end && IsBlank(*at)) ++at;
+    while (at < end && IsSeparator(*at)) ++at;
     if (at == end) return count;
     if (count == max_count) return -1;
     if (*at == '+') ++at;
@@ -39,7 +39,7 @@ int ParseNumbers(std::string_view line, double* numbers, int max_count) {
     } else if (error != std::errc()) {
       return -1;
     }
-    if (next < end && !IsBlank(*next)) return -1;
+    if (next < end && !IsSeparator(*next)) return -1;
     at = next;
     ++count;
   }
@@ -72,7 +72,7 @@ class PtxParser {
 
  private:
   InputError Error(const std::string& finding) const {
-    return InputError(file_.path(), LinePosition(lines_.line_number()), finding, kDamaged);
+    return InputError(file_.path(), LinePosition(lines_.line_number()), finding, kNotPtx);
   }
   InputError CutOff(const std::string& finding) const {
     return InputError(file_.path(), LinePosition(lines_.line_number() + 1), finding,

@@ -11,7 +11,7 @@ namespace {
 
 constexpr char kMagic[] = "RTPI_version_";
 constexpr char kMagic2[] = "RTPIv2";
-constexpr int64_t kLongestHeader = 1 << 20;  // bytes; the manual's has below one thousand
+constexpr int64_t kLongestRtpiHeader = 1 << 20;  // bytes; the manual's has below one thousand
 
 std::string_view Trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(" \t\r");
@@ -137,7 +137,7 @@ class HeaderParser {
   }
 
   bool NextLine(std::string_view* line) {
-    return lines_.offset() < kLongestHeader && lines_.Next(line);
+    return lines_.offset() < kLongestRtpiHeader && lines_.Next(line);
   }
 
   void ParseVersion2(std::string_view line) {

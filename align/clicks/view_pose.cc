@@ -153,7 +153,7 @@ Rigid ReflectedAlongSight(const NormalisedPairs& pairs, const Frame& frame, cons
 }
 
 // Reprojection error in pixels; parameters (w, t) with x_in_cam = exp(w) R x_in_scan + t.
-struct ReprojectionCost {
+struct PickCost {
   template <typename T>
   bool operator()(const T* const pose, T* residual) const {
     const T rotated[3] = {T(rotated_point.x()), T(rotated_point.y()), T(rotated_point.z())};
@@ -181,8 +181,8 @@ class PoseProblem {
     Eigen::Map<Eigen::Vector3d>(parameters_ + 3) = start.translation;
     for (int i = 0; i < pairs.size(); ++i) {
       problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6>(
-              new ReprojectionCost{&projection.camera(), pairs.x_in_img.col(i),
+          new ceres::AutoDiffCostFunction<PickCost, 2, 6>(
+              new PickCost{&projection.camera(), pairs.x_in_img.col(i),
                                    start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
           nullptr, parameters_);
     }

@@ -29,7 +29,7 @@ constexpr double kHysteresis = 1.3;   // a cell leaves its region beyond this ma
 constexpr uint8_t kMostTries = 6;
 constexpr double kLeastAmid = 0.2;  // share of a region's cells
 constexpr int kFewestCells = 12;
-constexpr double kMostCells = 1500;
+constexpr double kMostPieces = 1500;
 
 // Grows one region after the other.
 class RegionGrower {
@@ -216,11 +216,11 @@ class RegionGrower {
   double limit_ = 0;               // of the distance from its plane
 };
 
-// A large region in about kMostCells pieces: it is summed up again whenever another one joins it.
+// A large region in about kMostPieces pieces: it is summed up again whenever another one joins it.
 PlaneRegion MakeRegion(const ScanSurface& surface, const std::vector<int>& members) {
   double area = 0;
   for (int index : members) area += surface.cells()[index].area;
-  const double size = std::sqrt(area / kMostCells);
+  const double size = std::sqrt(area / kMostPieces);
   struct Piece {
     Moments moments;
     double inverse_variance = 0, noise = 0;

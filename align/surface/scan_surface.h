@@ -49,6 +49,8 @@ class RangeNoise {
 // Fewer samples make no cell, and a cell whose normal is less certain (radians) belongs to no
 // plane.
 inline constexpr int kFewestSamples = 6;
+// A cell whose samples scatter more than this many times the noise expected there is not flat.
+inline constexpr double kNotFlat = 3;
 inline constexpr double kWorstNormalSigma = RadFromDeg(4.0);
 
 struct SurfaceCell {

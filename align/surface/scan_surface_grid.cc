@@ -20,7 +20,7 @@ constexpr double kNormalSigma = RadFromDeg(1.0);  // windows grow until normals 
 constexpr double kLargestWindow = 0.4;            // metres
 // RMS of a window over the expected noise: a larger one makes windows beside the cell be tried, a
 // much larger one is no plane (surfaces differ in noise: dark ones have more).
-constexpr double kSuspicious = 1.1, kNotFlat = 3;
+constexpr double kSuspicious = 1.1;
 
 using Sums = Eigen::Array<double, 10, 1>;
 

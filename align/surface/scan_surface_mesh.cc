@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kMostCubes = 1500;         // along the longest side of the scan's box
 constexpr double kLeastMeshNoise = 0.0005;  // metres; flat triangles show none of theirs
-constexpr double kNotFlat = 3;
 constexpr int kNumNeighbours = 26;
 
 using Cube = Eigen::Vector3i;

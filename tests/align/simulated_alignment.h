@@ -68,51 +68,51 @@ inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
   return one;
 }
 
-// Scans with the forms that were asked of them: half the time of an alignment that is refused.
-struct PreparedScans {
-  explicit PreparedScans(const std::vector<Scan>& of_scans) : scans(of_scans), surveyed(scans) {}
-  bool AreOf(const std::vector<Scan>& others) const {
-    return std::equal(scans.begin(), scans.end(), others.begin(), others.end(),
-                      [](const Scan& a, const Scan& b) {
-                        return a.path == b.path && a.is_rtpi == b.is_rtpi &&
-                               a.organised == b.organised && a.num_columns == b.num_columns &&
-                               a.num_rows == b.num_rows && a.points.size() == b.points.size() &&
-                               a.triangles == b.triangles &&
-                               a.scan_from_station.Matrix() == b.scan_from_station.Matrix() &&
-                               // By bytes: missing points are not equal to themselves.
-                               std::memcmp(a.points.data(), b.points.data(),
-                                           a.points.size() * sizeof(Eigen::Vector3d)) == 0;
-                      });
+// Nothing in which an alignment could tell them apart. By bytes: missing points are not equal to
+// themselves.
+inline bool AreSame(const Scan& a, const Scan& b) {
+  return a.path == b.path && a.is_rtpi == b.is_rtpi && a.organised == b.organised &&
+         a.num_columns == b.num_columns && a.num_rows == b.num_rows && a.up == b.up &&
+         a.scan_from_station.Matrix() == b.scan_from_station.Matrix() &&
+         a.intensity == b.intensity && a.triangles == b.triangles &&
+         a.points.size() == b.points.size() &&
+         std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(Eigen::Vector3d)) ==
+             0;
+}
+
+// The survey takes half the time of an alignment that is refused: the latest ones are kept.
+inline const SurveyedScans& Survey(const std::vector<Scan>& scans) {
+  struct Kept {
+    explicit Kept(const std::vector<Scan>& of) : scans(of), surveyed(scans) {}
+    const std::vector<Scan> scans;
+    const SurveyedScans surveyed;
+  };
+  constexpr size_t kMost = 6;
+  static std::list<Kept> latest;
+  for (const Kept& kept : latest) {
+    if (std::equal(scans.begin(), scans.end(), kept.scans.begin(), kept.scans.end(), AreSame)) {
+      return kept.surveyed;
+    }
   }
-  std::vector<Scan> scans;
-  SurveyedScans surveyed;
-};
-inline const SurveyedScans& Prepare(const std::vector<Scan>& scans) {
-  static std::list<PreparedScans> latest;
-  const auto known = std::find_if(latest.begin(), latest.end(), [&](const PreparedScans& prepared) {
-    return prepared.AreOf(scans);
-  });
-  if (known != latest.end()) return known->surveyed;
-  if (latest.size() == 6) latest.pop_back();
+  if (latest.size() == kMost) latest.pop_back();
   return latest.emplace_front(scans).surveyed;
 }
 
 inline Alignment AlignCase(const SimulatedCase& one, const AlignmentOptions& options = {}) {
   Progress progress(true);
-  return AlignToScan({one.model, Prepare(one.scans), one.picks, "picks.csv", one.azimuth}, options,
+  return AlignToScan({one.model, Survey(one.scans), one.picks, "picks.csv", one.azimuth}, options,
                      &progress);
 }
-
 // From a similarity, with what picks there are.
 inline Alignment AlignCaseFrom(const Similarity& scan_from_sparse, double position_sigma,
                                const SimulatedCase& one, const AlignmentOptions& options = {}) {
   Progress progress(true);
-  return AlignToScan({one.model, Prepare(one.scans), one.picks, "", one.azimuth},
+  return AlignToScan({one.model, Survey(one.scans), one.picks, "", one.azimuth},
                      StartFromSimilarity(one.model, one.picks, scan_from_sparse, position_sigma),
                      options, &progress);
 }
 
-// MakeCase(seed, num_picks) as it is, aligned; what tests compare with.
+// MakeCase(seed, num_picks) as it is, aligned: what tests compare with.
 inline const Alignment& AlignedCase(int seed = 0, int num_picks = 8) {
   static std::map<std::pair<int, int>, std::unique_ptr<Alignment>> alignments;
   std::unique_ptr<Alignment>& alignment = alignments[{seed, num_picks}];

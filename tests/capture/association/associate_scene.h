@@ -59,7 +59,7 @@ class AssociateScene {
 
   cv::Mat TakePhoto(int place, const Take& take) const {
     const cv::Mat3f& light = (take.patterned ? patterned_ : plain_)[place];
-    cv::Mat3f moved = light, small;
+    cv::Mat3f moved, small;
     if (take.shift_x != 0 || take.shift_y != 0 || take.roll_deg != 0) {
       const double c = std::cos(RadFromDeg(take.roll_deg)), s = std::sin(RadFromDeg(take.roll_deg));
       const double mx = kWidth - 0.5, my = kHeight - 0.5;
@@ -67,7 +67,7 @@ class AssociateScene {
                              s, c, my - s * mx - c * my + 2 * take.shift_y);
       cv::warpAffine(light, moved, move, light.size(), cv::INTER_LANCZOS4, cv::BORDER_REPLICATE);
     }
-    cv::resize(moved, small, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
+    cv::resize(moved.empty() ? light : moved, small, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
     cv::Mat3b photo(small.size());
     RandomStream random(MixBits(take.seed, static_cast<uint64_t>(place)));
     for (int i = 0; i < kWidth * kHeight; ++i) {
