@@ -91,7 +91,9 @@ void ExpectChecksItsOptions(const std::string& command, const std::string& argum
   ExpectRefusesBeyond(line, fields, 1);
   for (const auto& [name, type] : listed) {
     if (type.empty() || type == "TEXT" || type == "PATH") continue;
-    const CommandResult result = RunCommandLine(line + " --" + name + " nonsense");
+    std::string wrong = line;
+    wrong.append(" --").append(name).append(" nonsense");
+    const CommandResult result = RunCommandLine(wrong);
     EXPECT_EQ(result.exit_code, kExitUsage) << name;
     EXPECT_NE(result.err.find("--" + name + " is \"nonsense\", expected"), std::string::npos)
         << result.err;
