@@ -7,7 +7,7 @@
 namespace roomtex {
 namespace {
 
-TEST(AlignCommand, ChecksItsOptions) {
+TEST(AlignCommandOptions, AreListedAndChecked) {
   AlignmentOptions o;
   ScanPlaneOptions planes;
   ScanReaderOptions reader;

@@ -9,23 +9,23 @@
 namespace roomtex {
 namespace {
 
-TEST(SimulateCommand, ChecksItsOptions) {
+TEST(SimulateCommandOptions, AreListedAndChecked) {
   SimulatedRoomOptions room;
   ExpectChecksItsOptions("roomtex-simulate", "--output_path none", {FieldsOf(&room)});
 }
 
-TEST(PatternCommand, ChecksItsOptions) {
+TEST(PatternCommandOptions, AreListedAndChecked) {
   PatternOptions pattern;
   ExpectChecksItsOptions("roomtex-pattern", "--output_path none.png", {FieldsOf(&pattern)});
 }
 
-TEST(AssociateCommand, ChecksItsOptions) {
+TEST(AssociateCommandOptions, AreListedAndChecked) {
   AssociateOptions options;
   ExpectChecksItsOptions("roomtex-associate", "--image_path none --output_path none",
                          {FieldsOf(&options)});
 }
 
-TEST(CalibrateCommand, ChecksItsOptions) {
+TEST(CalibrateCommandOptions, AreListedAndChecked) {
   BoardOptions board;
   board.size = "9x6";
   CalibrationOptions calibration;

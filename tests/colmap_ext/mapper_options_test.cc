@@ -7,7 +7,7 @@
 namespace roomtex {
 namespace {
 
-TEST(MapperCommand, ChecksItsOptions) {
+TEST(MapperCommandOptions, AreListedAndChecked) {
   InitOptions init;
   ChainOptions chain;
   ExpectChecksItsOptions("roomtex-mapper",

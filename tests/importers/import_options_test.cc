@@ -7,7 +7,7 @@
 namespace roomtex {
 namespace {
 
-TEST(ImportCommand, ChecksItsOptions) {
+TEST(ImportCommandOptions, AreListedAndChecked) {
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
   ExpectChecksItsOptions("roomtex-import", "--input_path none --output_path none.ply",

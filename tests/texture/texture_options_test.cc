@@ -13,7 +13,7 @@ namespace {
 constexpr char kArguments[] =
     "--input_path none --image_path none --scan_path none --output_path none";
 
-TEST(TextureCommand, ChecksItsOptions) {
+TEST(TextureCommandOptions, AreListedAndChecked) {
   ColorizeOptions o;
   GlbOptions glb;
   ScanReaderOptions reader;
@@ -23,7 +23,7 @@ TEST(TextureCommand, ChecksItsOptions) {
                           FieldsOf(&o.detail), FieldsOf(&o.surface), FieldsOf(&o.mesh)});
 }
 
-TEST(TextureCommand, ScaleIsANumberOrAuto) {
+TEST(TextureCommandOptions, ScaleIsANumberOrAuto) {
   const std::string line = std::string("roomtex-texture ") + kArguments + " --Texture.scale ";
   for (const char* text : {"nonsense", "1.5", "\"\""}) {
     EXPECT_EQ(RunCommandLine(line + text).exit_code, kExitUsage) << text;

@@ -7,7 +7,7 @@
 namespace roomtex {
 namespace {
 
-TEST(PickCommand, ChecksItsOptions) {
+TEST(PickCommandOptions, AreListedAndChecked) {
   ScanReaderOptions reader;
   LocalServerOptions server;
   ExpectChecksItsOptions(

@@ -6,7 +6,7 @@
 namespace roomtex {
 namespace {
 
-TEST(ViewCommand, ChecksItsOptions) {
+TEST(ViewCommandOptions, AreListedAndChecked) {
   LocalServerOptions server;
   ExpectChecksItsOptions("roomtex-view", "--input_path none", {FieldsOf(&server)});
 }
