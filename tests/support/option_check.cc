@@ -1,6 +1,7 @@
 #include "tests/support/option_check.h"
 
 #include <cmath>
+#include <iomanip>
 #include <map>
 #include <optional>
 #include <regex>
@@ -18,10 +19,10 @@ namespace {
 std::map<std::string, std::string> ListOptions(const std::string& help) {
   std::map<std::string, std::string> types;
   std::istringstream lines(help);
-  const std::regex heading("  --([A-Za-z0-9_.]+) ?(\\S*).*");
+  const std::regex heading("  --([A-Za-z0-9_.]+)( (\\S+).*)?");
   std::smatch match;
   for (std::string line; std::getline(lines, line);) {
-    if (std::regex_match(line, match, heading)) types[match[1]] = match[2];
+    if (std::regex_match(line, match, heading)) types[match[1]] = match[3];
   }
   return types;
 }
@@ -48,6 +49,7 @@ std::optional<double> Beyond(const OptionField& field, double bound, double dire
 void ExpectRefusesBeyond(const std::string& line, const std::vector<OptionFields>& fields,
                          double direction) {
   std::ostringstream options;
+  options << std::setprecision(15);
   std::vector<std::string> sentences;
   for (const OptionFields& some : fields) {
     for (const OptionField& field : some.fields()) {
