@@ -18,7 +18,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxFields = 100;         // header lines of a request
 constexpr double kFarewellSeconds = 2;  // for the last bytes when stopping or refusing
-constexpr size_t kBlockBytes = size_t{1} << 16;
+constexpr size_t kReadBytes = size_t{1} << 16;
 const char kHeadEnd[] = "\r\n\r\n";
 const std::array<const char*, 5> kUsedFields = {"host", "origin", "content-type", "if-none-match",
                                                 "accept-encoding"};
@@ -69,7 +69,7 @@ size_t BodyBytes(const std::string& head, const LocalRequest& request) {
 
 // False at the end.
 bool AppendFrom(int http, std::string* answer) {
-  char block[kBlockBytes];
+  char block[kReadBytes];
   ssize_t size = -1;
   do {
     size = recv(http, block, sizeof block, 0);
@@ -109,7 +109,7 @@ bool LocalConnection::Receive(Clock::time_point deadline) {
     const int ready = poll(fds, 2, MillisecondsTo(deadline));
     if (ready < 0 && errno == EINTR) continue;
     if (ready <= 0 || fds[1].revents != 0) return false;
-    char block[kBlockBytes];
+    char block[kReadBytes];
     const ssize_t size = recv(browser_.get(), block, sizeof block, MSG_DONTWAIT);
     if (size < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (size <= 0) return false;

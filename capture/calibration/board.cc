@@ -11,7 +11,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int kMinCorners = 3, kMaxCorners = 100;
+constexpr int kFewestSquares = 3, kMostSquares = 100;
 
 struct Dictionary {
   const char* name;
@@ -61,7 +61,7 @@ void BoardOptions::Declare(OptionFields* fields) {
   const bool charuco = type == "charuco";
   const std::string what = charuco ? "squares" : "inner corners";
   const auto counts = ParseSize(size);
-  const int least = charuco ? kMinCorners + 1 : kMinCorners;
+  const int least = charuco ? kFewestSquares + 1 : kFewestSquares;
   fields
       ->Text("board", &size,
              "COLUMNSxROWS: inner corners of a checkerboard (where four squares meet; 9x6 "
@@ -71,9 +71,9 @@ void BoardOptions::Declare(OptionFields* fields) {
                                           what + ", such as 9x6" +
                                           (charuco ? "" : " for a board of 10x7 squares"));
   fields->Require(!counts || (std::min(counts->first, counts->second) >= least &&
-                              std::max(counts->first, counts->second) <= kMaxCorners),
+                              std::max(counts->first, counts->second) <= kMostSquares),
                   "--board is \"" + size + "\", expected " + std::to_string(least) + " to " +
-                      std::to_string(kMaxCorners) + " " + what + " each way");
+                      std::to_string(kMostSquares) + " " + what + " each way");
   fields
       ->Number("square", &square,
                "Side of a square, metres. The intrinsics do not depend on it, only the "

@@ -106,12 +106,12 @@ Matrix Damped(Matrix matrix, double damping) {
 }
 
 // The camera's normal equations with the poses eliminated (Schur complement).
-struct Reduced {
+struct ReducedBlock {
   Eigen::MatrixXd S;
   Eigen::VectorXd g;
 };
 
-Reduced Reduce(const Block& block, int num_free, double damping) {
+ReducedBlock Reduce(const Block& block, int num_free, double damping) {
   const Eigen::LDLT<Matrix6> C(Damped(block.C, damping));
   const Eigen::MatrixXd A = block.A.topLeftCorner(num_free, num_free);
   const Eigen::MatrixXd B = block.B.topRows(num_free);
@@ -165,9 +165,9 @@ double SumOfCosts(const std::vector<Block>& blocks) {
 // One damped step of all unknowns; unchanged if the equations cannot be solved.
 CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double damping) {
   const int n = fit.lens.num_free;
-  Reduced sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+  ReducedBlock sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   for (const Block& block : blocks) {
-    const Reduced reduced = Reduce(block, n, damping);
+    const ReducedBlock reduced = Reduce(block, n, damping);
     sum.S += reduced.S;
     sum.g += reduced.g;
   }
@@ -225,8 +225,8 @@ Rigid RoughPose(const BoardView& view, const Camera& camera) {
 void HoldOut(const std::vector<BoardView>& views, const std::vector<Block>& blocks,
              CameraFit* fit) {
   const int n = fit->lens.num_free;
-  Reduced sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  std::vector<Reduced> parts;
+  ReducedBlock sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+  std::vector<ReducedBlock> parts;
   for (const Block& block : blocks) {
     parts.push_back(Reduce(block, n, 0));
     sum.S += parts.back().S;

@@ -12,7 +12,7 @@ namespace roomtex {
 namespace {
 
 constexpr double kBlackLevel = 1.0 / 800;  // light of a black pixel, white = 1
-constexpr double kAperture = 0.008;        // metres
+constexpr double kLensOpening = 0.008;        // metres
 constexpr double kFromWall = 0.34;         // metres from the lens to both walls of a corner
 constexpr double kLensHeight = 1.95;
 
@@ -157,7 +157,7 @@ Projector MakeProjector(const SimulatedRoomOptions& options, int k, const Rigid&
       0.5 * camera.width / std::tan(RadFromDeg(options.projector_field_of_view_deg) / 2);
   camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
   return Projector(camera, room_from_proj.Inverse(), pattern, options.projector_light,
-                   options.projector_focus, kAperture);
+                   options.projector_focus, kLensOpening);
 }
 
 double RoomArea(const SimulatedRoomOptions& options) {

@@ -28,7 +28,7 @@ std::vector<BoardPhoto> Find(const std::string& folder, const Board& board, int 
 }
 
 // Root mean square over the corners seen, of what the two cameras make of them; the turn taken out.
-double CoveredRms(const Camera& truth, const Calibration& calibration) {
+double RmsWhereCovered(const Camera& truth, const Calibration& calibration) {
   double sum = 0;
   int count = 0;
   Eigen::Matrix2Xd all(2, 0);
@@ -73,7 +73,7 @@ TEST_P(PhotosOfLens, GiveItsModelAndItsMapping) {
   EXPECT_EQ(found.camera.model, truth.model) << found.why_model;
   EXPECT_TRUE(found.reasons.empty());
   EXPECT_EQ(found.NumUsed(), set.num_photos);
-  EXPECT_LT(CoveredRms(truth, found), 0.1);
+  EXPECT_LT(RmsWhereCovered(truth, found), 0.1);
   for (int i = 0; i < found.lens.num_free; ++i) {
     EXPECT_NEAR(found.camera.params[i], truth.params[i], 4 * found.params_sigma[i]) << i;
   }
@@ -196,7 +196,7 @@ TEST_F(BoardFolder, LeavesOutAndNamesWhatCannotBeUsed) {
       << found.photos[5].reason;
   EXPECT_NE(found.photos[6].reason.find("cannot be read"), std::string::npos)
       << found.photos[6].reason;
-  EXPECT_LT(CoveredRms(truth_, found), 0.1);
+  EXPECT_LT(RmsWhereCovered(truth_, found), 0.1);
 
   const cv::Mat picture = DrawCalibration(found);
   EXPECT_EQ(picture.type(), CV_8UC3);
@@ -260,7 +260,7 @@ TEST(Charuco, CalibratesFromPartsOfTheBoard) {
     EXPECT_EQ(found.camera.model, CameraModel::kOpenCv) << found.why_model;
     EXPECT_TRUE(found.reasons.empty());
     // Half as many corners as of whole boards.
-    EXPECT_LT(CoveredRms(truth, found), 0.15);
+    EXPECT_LT(RmsWhereCovered(truth, found), 0.15);
   }
 }
 
