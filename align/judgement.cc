@@ -7,6 +7,8 @@
 #include "align/clicks/picks.h"
 #include "core/text.h"
 
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -32,8 +34,7 @@ std::string ContradictionOnSurface(const AlignmentStart& start, const AlignmentF
     if (farthest < 0 || weighted(i) > weighted(farthest)) farthest = i;
   }
   if (farthest < 0) return "";
-  std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
-  const double median = residuals[residuals.size() / 2];
+  const double median = Median(&residuals);
   const Pick& pick = start.picks[farthest].pick;
   const std::string place = "where the sparse points lie on the scan's surface, ";
   if (weighted(farthest) > std::max(1.5 * rms_limit, 5 * median)) {

@@ -2,7 +2,6 @@
 // colours.
 //   color_scan SCAN MODEL PICKS PHOTOS OUTPUT.ply
 
-#include <cmath>
 #include <cstdio>
 
 #include "align/alignment.h"
@@ -18,13 +17,11 @@ int main(int argc, char** argv) try {
   const std::vector<Scan> scans = {ReadScan(argv[1], ScanReaderOptions())};
   SparseModel model = ReadSparseModel(argv[2]);
   const std::vector<Pick> picks = ReadPicks(argv[3]);
-  CheckPicksAgainstModel(argv[3], picks, model);
 
   Progress progress(/*quiet=*/false);
-  const double sigma_px = UpdateReprojectionErrors(&model).rms_px / std::sqrt(2.0);
-  const FreeSpace free_space(scans, /*max_samples=*/300000);
-  const Alignment alignment = AlignToScan({model, scans, picks, argv[3], "clockwise"}, sigma_px,
-                                          free_space, AlignmentOptions(), &progress);
+  const SurveyedScans surveyed(scans);
+  const Alignment alignment =
+      AlignToScan({model, surveyed, picks, argv[3], "clockwise"}, AlignmentOptions(), &progress);
   for (const std::string& reason : alignment.reasons) std::fprintf(stderr, "%s\n", reason.c_str());
   if (!alignment.reasons.empty()) return 4;
   TransformModel(alignment.scan_from_sparse, &model);
