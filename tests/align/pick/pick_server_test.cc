@@ -8,6 +8,7 @@
 
 #include "align/pick/back_projection.h"
 #include "align/pick/scan_picture.h"
+#include "core/command_line.h"
 #include "core/photo.h"
 #include "tests/align/pick/pick_page.h"
 #include "tests/support/matchers.h"
