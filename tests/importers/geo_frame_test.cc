@@ -60,7 +60,7 @@ class EveryPlace : public testing::TestWithParam<Place> {
   const GeoFrame frame_{GetParam().position};
 };
 INSTANTIATE_TEST_SUITE_P(All, EveryPlace, testing::ValuesIn(kPlaces),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& place) { return std::string(place.param.name); });
 
 // Points of a site half a kilometre around, one of them deep below.
 std::vector<Eigen::Vector3d> SitePoints() {

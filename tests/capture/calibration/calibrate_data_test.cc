@@ -14,11 +14,11 @@
 namespace roomtex {
 namespace {
 
-const char kSamples[] = "/usr/share/doc/opencv-doc/examples/data";
+const char kSamplePhotos[] = "/usr/share/doc/opencv-doc/examples/data";
 
 TEST(SampleBoards, GiveThePublishedCamera) {
-  if (!std::filesystem::exists(std::string(kSamples) + "/left01.jpg")) {
-    GTEST_SKIP() << "Debian's package opencv-doc is not installed (" << kSamples << ")";
+  if (!std::filesystem::exists(std::string(kSamplePhotos) + "/left01.jpg")) {
+    GTEST_SKIP() << "Debian's package opencv-doc is not installed (" << kSamplePhotos << ")";
   }
   std::vector<std::string> names;
   for (int i = 1; i <= 14; ++i) {
@@ -28,7 +28,7 @@ TEST(SampleBoards, GiveThePublishedCamera) {
   Progress progress(true);
   const Board board = Checkerboard(9, 6);
   const Calibration found =
-      Calibrate(FindBoards(kSamples, names, board, -1, &progress), board, {}, kSamples);
+      Calibrate(FindBoards(kSamplePhotos, names, board, -1, &progress), board, {}, kSamplePhotos);
   EXPECT_EQ(found.camera.model, CameraModel::kOpenCv) << found.why_model;
   EXPECT_EQ(found.NumUsed(), 13);
   EXPECT_TRUE(found.reasons.empty());
@@ -38,7 +38,7 @@ TEST(SampleBoards, GiveThePublishedCamera) {
   // from the middle of the first pixel, and its second photo misses by 1.2 px, which bends it: its
   // own error is more than ours.
   cv::Mat K, distortion, per_view;
-  cv::FileStorage file(std::string(kSamples) + "/left_intrinsics.yml", cv::FileStorage::READ);
+  cv::FileStorage file(std::string(kSamplePhotos) + "/left_intrinsics.yml", cv::FileStorage::READ);
   file["camera_matrix"] >> K;
   file["distortion_coefficients"] >> distortion;
   file["per_view_reprojection_errors"] >> per_view;

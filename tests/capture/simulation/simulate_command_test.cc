@@ -10,6 +10,7 @@
 #include "capture/simulation/capture_writer.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/photo.h"
+#include "core/report.h"
 #include "importers/scan_reader.h"
 #include "tests/capture/simulation/small_room.h"
 #include "tests/support/matchers.h"
