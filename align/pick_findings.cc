@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "align/clicks/picks.h"
 #include "core/text.h"
 
 namespace roomtex {
