@@ -102,9 +102,10 @@ class RoundProblem {
       poses_.emplace_back(image.cam_from_model);
     }
     for (const auto& [id, point] : model_.points) {
+      const Eigen::Vector3d& x_in_model = point.x_in_model;
       const auto num_seen = std::count_if(
           point.track.begin(), point.track.end(),
-          [&](const TrackElement& element) { return Sees(element.image_id, point.x_in_model); });
+          [&](const TrackElement& element) { return Sees(element.image_id, x_in_model); });
       if (num_seen < 2) continue;
       point_index_[id] = points_.size();
       points_.push_back(point.x_in_model);

@@ -108,7 +108,7 @@ void WriteCameras(const SparseModel& aligned, const GeoReference& geo, const std
 
 // "WGS-84", "WGS84", "WGS 84" ...; cameras that name no datum mean it (EXIF 2.3, GPSMapDatum).
 bool IsWgs84(const std::string& datum) {
-  return datum.find_first_not_of(" ") == std::string::npos || datum.find("84") != std::string::npos;
+  return datum.find_first_not_of(' ') == std::string::npos || datum.find("84") != std::string::npos;
 }
 
 Json GpsToJson(const GpsCheck& gps) {
