@@ -5,9 +5,8 @@
 #include <string>
 
 #include "align/clicks/picks.h"
-#include "core/text.h"
-
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {

@@ -180,11 +180,10 @@ class PoseProblem {
       : start_(start) {
     Eigen::Map<Eigen::Vector3d>(parameters_ + 3) = start.translation;
     for (int i = 0; i < pairs.size(); ++i) {
-      problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<PickCost, 2, 6>(
-              new PickCost{&projection.camera(), pairs.x_in_img.col(i),
-                                   start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
-          nullptr, parameters_);
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PickCost, 2, 6>(new PickCost{
+                                    &projection.camera(), pairs.x_in_img.col(i),
+                                    start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
+                                nullptr, parameters_);
     }
   }
 

@@ -12,7 +12,7 @@ namespace roomtex {
 namespace {
 
 constexpr double kBlackLevel = 1.0 / 800;  // light of a black pixel, white = 1
-constexpr double kLensOpening = 0.008;        // metres
+constexpr double kLensOpening = 0.008;     // metres
 constexpr double kFromWall = 0.34;         // metres from the lens to both walls of a corner
 constexpr double kLensHeight = 1.95;
 

@@ -225,12 +225,12 @@ async function waitUntilReady() {
     await new Promise((done) => setTimeout(done, kReadyPoll));
     try {
       const now = await api.state();
-      server.ready = now.ready;
       for (const photo of server.photos) {
         const same = now.photos.find((one) => one.id === photo.id);
         photo.scan_share = same?.scan_share ?? photo.scan_share;
       }
-      if (now.ready) app.picks.refresh(now.session);
+      // Picks on their way were solved without the ray caster, perhaps: their answer comes first.
+      server.ready = now.ready && app.picks.refresh(now.session);
       refresh();
     } catch {
       // The heartbeat says that the server is gone.

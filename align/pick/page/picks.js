@@ -57,7 +57,9 @@ export class Picks extends EventTarget {
 
   // The same picks with more numbers.
   refresh(session) {
-    if (session.revision === this.session.revision && !this.pending) this.#take(session, this.list);
+    if (session.revision !== this.session.revision || this.pending) return false;
+    this.#take(session, this.list);
+    return true;
   }
 
   find(uid) {
