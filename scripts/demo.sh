@@ -8,7 +8,7 @@ out=${1:-demo}
 
 scripts/setup.sh
 cmake --preset release >/dev/null
-cmake --build --preset release
+cmake --build --preset release --target roomtex-simulate roomtex-mapper roomtex-align roomtex-texture roomtex-evaluate
 export PATH="$PWD/build/bin:$PATH" QT_QPA_PLATFORM=offscreen
 
 if [ -e "$out" ] && [ ! -e "$out/.roomtex-demo" ]; then
@@ -52,6 +52,7 @@ Done. Look at
   $out/aligned/              the sparse model in the scan: colmap gui --import_path $out/aligned \\
                              --database_path $out/database.db --image_path $out/capture/photos
 or walk through it, and see where the picks lie, in a browser:
+  cmake --build --preset release --target roomtex-view roomtex-pick
   build/bin/roomtex-view --input_path $out/textured --aligned $out/aligned --image_path $out/capture/photos
   build/bin/roomtex-pick --input_path $out/sparse/0 --image_path $out/capture/photos \
       --scan_path $out/capture/scan.rtpi --output_path $out/capture/picks.csv
