@@ -37,12 +37,19 @@ AlignmentStart FindStart(const AlignmentInput& input, const AlignmentOptions& op
 // Takes over what the adjustment says better than the fit.
 void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
   const ModelAdjustment& adjustment = result->adjustment;
-  Append(AdjustmentWarnings(adjustment, input.model), &result->warnings);
+  Append(AdjustmentWarnings(adjustment, result->disagreement, input.model), &result->warnings);
   if (!result->adjusted()) return;
   result->scan_from_sparse = adjustment.scan_from_sparse;
+  const CameraCentres centres = FindCameraCentres(adjustment.bundle.model, Similarity());
+  if (adjustment.bend && adjustment.bend->bend_rms <= kMaxScannerBend) {
+    result->disagreement =
+        FindDisagreement(input.model, result->fit.points, input.surveyed.patches(),
+                         adjustment.bend->scan_from_sparse, adjustment.bend->bend);
+  }
+  result->expected_error = PropagateError(result->fit.surface, centres, input.surveyed.scans());
   result->photo_sigmas =
-      FindPhotoSigmas(adjustment.covariances, adjustment.bundle.model, result->fit.surface);
-  SetExpectedErrorAtCameras(result->photo_sigmas, &result->expected_error);
+      FindPhotoSigmas(adjustment.covariances, centres, result->fit.surface, result->disagreement);
+  SetExpectedErrorAtCameras(result->photo_sigmas, result->disagreement, &result->expected_error);
   result->refined_pick_px = PickDistances(adjustment.bundle.model, input.picks, Similarity());
   result->refined_pick_rms_px = PickRms(result->start.picks, result->refined_pick_px);
 }
@@ -63,6 +70,8 @@ Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
   progress->Stage("trust");
   Judgement judgement = JudgeFit(input, start, result.fit, options);
   result.expected_error = judgement.expected_error;
+  result.photo_sigmas = std::move(judgement.photo_sigmas);
+  result.disagreement = std::move(judgement.disagreement);
   result.open = std::move(judgement.open);
   result.placement = judgement.placement;
   result.warnings = std::move(judgement.warnings);

@@ -30,9 +30,9 @@ struct Alignment {
   // one), pixels; see AlignmentFit.
   std::vector<double> refined_pick_px;
   double refined_pick_rms_px = std::numeric_limits<double>::quiet_NaN();
-  // Of an adjusted model at_cameras and rotation are those of photo_sigmas, else as in Judgement.
-  ExpectedError expected_error;
-  std::map<uint32_t, PhotoSigma> photo_sigmas;  // of an adjusted model
+  ExpectedError expected_error;                 // at_cameras and rotation: medians of photo_sigmas
+  std::map<uint32_t, PhotoSigma> photo_sigmas;  // by image_id
+  Disagreement disagreement;                    // what no similarity and no bend takes away
   OpenDirections open;
   Placement placement;
   double reprojection_rms_px = 0;  // of the input model

@@ -3,6 +3,23 @@
 #include <algorithm>
 
 namespace roomtex {
+namespace {
+
+// Pixels per photo with picks, the largest.
+double PickBend(const AlignmentInput& input, const Disagreement& disagreement) {
+  double bend_px = 0;
+  for (const Pick& pick : input.picks) {
+    const SparseImage* const image = input.model.FindImage(pick.image_name);
+    if (image == nullptr) continue;
+    const auto seen = disagreement.photos.find(image->image_id);
+    if (seen == disagreement.photos.end()) continue;
+    const Camera& camera = input.model.cameras.at(image->camera_id);
+    bend_px = std::max(bend_px, seen->second.rotation * camera.MeanFocalLength());
+  }
+  return bend_px;
+}
+
+}  // namespace
 
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
                           const AlignmentOptions& options) {
@@ -19,6 +36,9 @@ AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& sta
   fit.pick_rms_px = PickRms(start.picks, fit.pick_px);
   fit.refined = options.plane_constrained;
   if (fit.refined) fit.scan_from_sparse = fit.surface.scan_from_sparse;
+  fit.disagreement = FindDisagreement(input.model, fit.points, input.surveyed.patches(),
+                                      fit.surface.scan_from_sparse, ScanBend());
+  fit.pick_bend_px = PickBend(input, fit.disagreement);
   return fit;
 }
 
@@ -29,7 +49,7 @@ ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStar
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
   return AdjustModel(
       {input.model, fit.points, surveyed.scans(), surveyed.planes(), surveyed.patches(),
-       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name},
+       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name, fit.pick_bend_px},
       fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
 }
 

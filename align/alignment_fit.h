@@ -7,6 +7,7 @@
 #include "align/fit/model_adjustment.h"
 #include "align/fit/similarity_fit.h"
 #include "align/start.h"
+#include "align/trust/disagreement.h"
 
 namespace roomtex {
 
@@ -21,6 +22,10 @@ struct AlignmentFit {
   // not be brought there. pick_rms_px: of the used ones, NaN without any pick.
   std::vector<double> pick_px;
   double pick_rms_px = std::numeric_limits<double>::quiet_NaN();
+  // What the similarity leaves between sparse model and scan, and how far picks are off by it,
+  // however well they are made: pixels, the largest over the photos with picks.
+  Disagreement disagreement;
+  double pick_bend_px = 0;
 };
 
 // sigma_px: of an observation of the sparse model, per coordinate (KeypointSigma()).

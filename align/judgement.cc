@@ -11,10 +11,10 @@
 namespace roomtex {
 namespace {
 
-// Metres, rms; a scanner that measures 1 % wrong (the worst that the thesis speaks of) at 2 to 3 m.
-constexpr double kMaxLaserBend = 0.025;
 constexpr double kMaxRoughness = 0.2;  // metres; what the uncertainty of clicks may excuse
 constexpr int kMinJudged = 20;         // sparse points
+// Picks may be off by this many times what model and scan disagree in anyway.
+constexpr double kBendDeviations = 2;
 
 double Weighted(const PickOutcome& outcome, double residual_px) {
   return outcome.pick.weight * residual_px;
@@ -129,14 +129,20 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
       fit.refined ? SimilarityFit()
                   : FitToPicks(input.model, input.picks, start.UsedPicks(), start.pick_sigma_px,
                                fit.scan_from_sparse, options.fit);
-  std::vector<Eigen::Vector3d> centres;
+  const SimilarityFit& placed = fit.refined ? fit.surface : by_picks;
+  const CameraCentres centres = FindCameraCentres(input.model, fit.scan_from_sparse);
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const auto& [image_id, image] : input.model.images) {
-    centres.push_back(fit.scan_from_sparse * image.cam_from_model.TargetOriginInSource());
-    middle += centres.back() / static_cast<double>(input.model.images.size());
+  for (const auto& [image_id, centre] : centres) {
+    middle += centre / static_cast<double>(centres.size());
   }
-  judgement->expected_error =
-      PropagateError(fit.refined ? fit.surface : by_picks, centres, input.surveyed.scans());
+  judgement->expected_error = PropagateError(placed, centres, input.surveyed.scans());
+  judgement->disagreement =
+      fit.refined ? fit.disagreement
+                  : FindDisagreement(input.model, fit.points, input.surveyed.patches(),
+                                     fit.scan_from_sparse, ScanBend());
+  judgement->photo_sigmas = FindPhotoSigmas({}, centres, placed, judgement->disagreement);
+  SetExpectedErrorAtCameras(judgement->photo_sigmas, judgement->disagreement,
+                            &judgement->expected_error);
   if (!fit.refined) return;
   judgement->open = FindOpenDirections(fit.surface, middle);
   const std::vector<bool> used = start.UsedPicks();
@@ -155,7 +161,8 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
   const double limit = PickRmsLimit(input, start, trust);
   JudgePicks(start, limit, trust, reasons);
   if (fit.surface.converged && reasons->empty()) {
-    const std::string reason = ContradictionOnSurface(start, fit, limit);
+    const std::string reason =
+        ContradictionOnSurface(start, fit, std::max(limit, kBendDeviations * fit.pick_bend_px));
     if (!reason.empty()) reasons->push_back(reason);
   }
   JudgeScale(start, trust, reasons);
@@ -190,21 +197,23 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
 }
 
 std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
+                                            const Disagreement& disagreement,
                                             const SparseModel& model) {
   const PlaneBundle& bundle = adjustment.bundle;
   if (!bundle.usable) return {bundle.reason + " One similarity for all photos is used."};
   std::vector<std::string> warnings;
-  if (adjustment.bend) {
-    std::string warning =
+  if (adjustment.bend && adjustment.bend->bend_rms <= kMaxScannerBend) {
+    warnings.push_back(
         "The scan is bent by " + Number(1000 * adjustment.bend->bend_rms, 1) +
         " mm (rms over the sparse points): the photos were fitted to it as it is, so that their "
-        "reprojection errors grow.";
-    if (adjustment.bend->bend_rms > kMaxLaserBend) {
-      warning +=
-          " That is more than a laser scanner does: the sparse model may be bent instead. Look at "
-          "the overlays (--overlays), and compare with --PlaneBA.bend 0.";
-    }
-    warnings.push_back(warning);
+        "reprojection errors grow.");
+  } else if (adjustment.bend) {
+    warnings.push_back(
+        "Sparse model and scan differ in shape by more than a scanner's errors explain (" +
+        Number(1000 * disagreement.rms, 0) +
+        " mm over the room): a scan put together of drifting parts, or a sparse model bent by few "
+        "photos or a wrong lens. The scan was followed, and the expected error holds the "
+        "difference. Look at the overlays (--overlays).");
   }
   for (const uint32_t id : bundle.idle_images) {
     warnings.push_back(model.images.at(id).name +

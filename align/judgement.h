@@ -8,14 +8,18 @@
 #include "align/alignment_fit.h"
 #include "align/alignment_input.h"
 #include "align/start.h"
+#include "align/trust/disagreement.h"
 #include "align/trust/expected_error.h"
 #include "align/trust/open_directions.h"
 
 namespace roomtex {
 
 struct Judgement {
-  // Of the similarity: by the surface where it was refined, else by the picks.
+  // Of the similarity: by the surface where it was refined, else by the picks; with what sparse
+  // model and scan disagree in.
   ExpectedError expected_error;
+  std::map<uint32_t, PhotoSigma> photo_sigmas;  // by image_id
+  Disagreement disagreement;
   OpenDirections open;  // what the surface leaves to the picks
   Placement placement;
   std::vector<std::string> warnings;
@@ -31,6 +35,7 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
 // What speaks against an adjustment, or should be known of it. All of it warnings: the similarity
 // remains.
 std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
+                                            const Disagreement& disagreement,
                                             const SparseModel& model);
 
 // Fewer than six picks that can be used are too few to rely on (kMinPicksPerPhoto), unless those

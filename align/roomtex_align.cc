@@ -225,6 +225,7 @@ void FillReport(const Alignment& alignment, double reprojection_rms_after, Repor
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
   r["placement"] = PlacementToJson(alignment.placement);
   r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
+  r["expected_error"]["disagreement_mm"] = NumberOrNull(1000 * alignment.disagreement.rms);
   r["surface_geometry"] = refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
   r["agreement"] = nullptr;
 }

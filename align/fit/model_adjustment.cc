@@ -22,6 +22,7 @@ struct Trial {
       : start(adjustment.model),
         input{start,           adjustment.planes,        adjustment.patches,       adjustment.picks,
               adjustment.used, adjustment.pick_sigma_px, adjustment.clicked_image, bend} {
+    input.pick_bend_px = adjustment.pick_bend_px;
     TransformModel(scan_from_sparse, &start);
     bundle = AdjustToSurface(input, options);
   }
@@ -33,6 +34,19 @@ bool IsScanBent(const PlaneBundle& straight, const PlaneBundle& bent) {
   if (!bent.usable) return false;
   return !straight.usable || straight.image_cost - bent.image_cost >
                                  std::max(kMinBendGain, kMinBendShare * straight.image_cost);
+}
+
+// The straight scan again, from where the bent one has brought the model: what looks like a bend
+// may only have been the better start (a large room, blurred photos, few of them), and then there
+// is no cost left between the two.
+bool IsStraightAfterAll(const ModelAdjustmentInput& adjustment, const PlaneBundle& bent,
+                        const PlaneBundleOptions& options) {
+  PlaneBundleInput input{
+      bent.model,      adjustment.planes,        adjustment.patches,      adjustment.picks,
+      adjustment.used, adjustment.pick_sigma_px, adjustment.clicked_image};
+  input.sigma_px = bent.sigma_px;
+  input.pick_bend_px = adjustment.pick_bend_px;
+  return !IsScanBent(AdjustToSurface(input, options), bent);
 }
 
 }  // namespace
@@ -50,7 +64,8 @@ ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity&
   if (result.bend) {
     const Similarity& scan_from_sparse = result.bend->scan_from_sparse;
     auto bent = std::make_unique<Trial>(input, scan_from_sparse, result.bend->bend, options);
-    if (IsScanBent(trial->bundle, bent->bundle)) {
+    if (IsScanBent(trial->bundle, bent->bundle) &&
+        !IsStraightAfterAll(input, bent->bundle, options)) {
       result.scan_from_sparse = scan_from_sparse;
       trial = std::move(bent);
     } else {

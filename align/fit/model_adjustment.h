@@ -22,6 +22,7 @@ struct ModelAdjustmentInput {
   std::vector<bool> used;          // one per pick
   double pick_sigma_px = 1.5;
   std::string clicked_image;  // for PlaneBundleOptions::fix_clicked_view; may be empty
+  double pick_bend_px = 0;    // PlaneBundleInput
 };
 
 struct ModelAdjustment {

@@ -38,6 +38,8 @@ constexpr double kMaxReprojectionGrowth = 4, kMaxReprojectionRise_px = 4;
 // ... and the picks may miss by so many standard deviations (rms), or this share of the photo's
 // diagonal if that is more (as TrustOptions::PickRmsLimit).
 constexpr double kMaxPickDeviations = 6, kMaxPickShare = 0.004;
+// ... or this many times what model and scan disagree in anyway.
+constexpr double kMaxBendDeviations = 3;
 
 // Of every observation, pixels.
 std::vector<double> ReprojectionDistances(const SparseModel& model) {
@@ -217,7 +219,8 @@ double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
     sum += x ? (*x - input.picks[i].x_in_img).squaredNorm() : diagonal * diagonal;
     ++count;
   }
-  const double limit = std::max(kMaxPickDeviations * input.pick_sigma_px, kMaxPickShare * diagonal);
+  const double limit = std::max({kMaxPickDeviations * input.pick_sigma_px, kMaxPickShare * diagonal,
+                                 kMaxBendDeviations * input.pick_bend_px});
   return count > 0 ? std::sqrt(sum / count) / limit : 0;
 }
 
@@ -370,7 +373,7 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
   PlaneBundle result;
   result.model = input.model;
   result.reprojection_rms_before = UpdateReprojectionErrors(&result.model).rms_px;
-  result.sigma_px = ImageNoise(result.model);
+  result.sigma_px = input.sigma_px > 0 ? input.sigma_px : ImageNoise(result.model);
   result.reason = RunRounds(input, options, &result);
   if (result.reason.empty()) {
     MoveIdle(input, &result);

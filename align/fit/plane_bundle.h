@@ -55,6 +55,10 @@ struct PlaneBundleInput {
   double pick_sigma_px = 1.5;      // click noise, per coordinate
   std::string clicked_image;       // for fix_clicked_view
   ScanBend bend = ScanBend();      // where the scan has what the photos see
+  // Image noise per coordinate, pixels; 0 = from the residuals of `model`.
+  double sigma_px = 0;
+  // Pixels; how far picks are off, however well they are made, because model and scan disagree.
+  double pick_bend_px = 0;
 };
 
 struct PlaneBundle {

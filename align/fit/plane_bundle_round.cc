@@ -154,7 +154,8 @@ class RoundProblem {
       if (!round_.input.used[i] || image == nullptr || !Sees(image->image_id, x_in_scan)) continue;
       pick_points_.push_back(x_in_scan);
       AddReprojection(image->image_id, pick_points_.back().data(), pick.x_in_img,
-                      pick.weight * round_.sigma_px / round_.input.pick_sigma_px);
+                      round_.sigma_px / std::hypot(round_.input.pick_sigma_px / pick.weight,
+                                                   round_.input.pick_bend_px));
       problem_->SetParameterBlockConstant(pick_points_.back().data());
     }
   }

@@ -137,8 +137,9 @@ class ReducedSystem {
       if (!input_.used[i] || image == nullptr) continue;
       const auto at = index_.find(image->image_id);
       Terms terms;
-      if (at == index_.end() || !Evaluate(image->image_id, pick.x_in_scan, pick.x_in_img,
-                                          input_.pick_sigma_px / pick.weight, &terms)) {
+      if (at == index_.end() ||
+          !Evaluate(image->image_id, pick.x_in_scan, pick.x_in_img,
+                    std::hypot(input_.pick_sigma_px / pick.weight, input_.pick_bend_px), &terms)) {
         continue;
       }
       matrix_.block<6, 6>(6 * at->second, 6 * at->second) +=

@@ -57,6 +57,10 @@ class ScanBend {
   double turn_ = 1;                                     // +1: columns run counter-clockwise
 };
 
+// Metres, rms; a scanner that measures 1 % wrong (the worst that the thesis speaks of) at 2 to 3 m.
+// What is bent by more was not bent by a scanner.
+inline constexpr double kMaxScannerBend = 0.025;
+
 struct BendFit {
   Similarity scan_from_sparse;  // of the room as it is
   ScanBend bend;

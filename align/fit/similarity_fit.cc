@@ -8,7 +8,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "align/surface/surface_cells.h"
+#include "align/fit/similarity_accuracy.h"
+#include "align/fit/similarity_normal.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/robust_kernel.h"
@@ -18,107 +19,10 @@
 namespace roomtex {
 namespace {
 
-using Vector7d = Eigen::Matrix<double, 7, 1>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The gate shrinks by this factor per step.
 constexpr double kGateShrink = 0.8;
-// Cells of the surface with fewer points say nothing about the accuracy of the fit.
-constexpr int kMinPointsOfCell = 5;
-constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
-
-// Picks with what their projection needs.
-class PickTerms {
- public:
-  PickTerms(const SparseModel& model, const std::vector<Pick>& picks) {
-    for (const Pick& pick : picks) {
-      const SparseImage* image = model.FindImage(pick.image_name);
-      const auto [at, is_new] =
-          projections_.try_emplace(image->camera_id, model.cameras.at(image->camera_id));
-      terms_.push_back({&at->second, image->cam_from_model, &pick});
-    }
-  }
-
-  Eigen::Vector2d Error(int i, const Similarity& scan_from_sparse) const {
-    const Term& term = terms_[i];
-    const Rigid cam_from_scan = CamFromScan(term.cam_from_sparse, scan_from_sparse);
-    const auto x = term.projection->ImgFromCam(cam_from_scan * term.pick->x_in_scan);
-    if (!x) return Eigen::Vector2d::Constant(kInfinity);
-    return *x - term.pick->x_in_img;
-  }
-  double Weight(int i) const { return terms_[i].pick->weight; }
-
-  // By central differences: six to a hundred picks, so exactness of the step is all that matters.
-  Eigen::Matrix<double, 2, 7> Jacobian(int i, const Similarity& s,
-                                       const Eigen::Vector3d& pivot) const {
-    constexpr double kStep = 1e-6;
-    Eigen::Matrix<double, 2, 7> jacobian;
-    for (int k = 0; k < 7; ++k) {
-      const Vector7d step = kStep * Vector7d::Unit(k);
-      jacobian.col(k) =
-          (Error(i, Moved(s, pivot, step)) - Error(i, Moved(s, pivot, -step))) / (2 * kStep);
-    }
-    return jacobian;
-  }
-
-  int size() const { return static_cast<int>(terms_.size()); }
-
- private:
-  struct Term {
-    const CameraProjection* projection;
-    Rigid cam_from_sparse;
-    const Pick* pick;
-  };
-  std::map<uint32_t, CameraProjection> projections_;
-  std::vector<Term> terms_;
-};
-
-struct Normal {
-  Matrix7d matrix = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-
-  template <int N>
-  void Add(const Eigen::Matrix<double, N, 7>& jacobian, const Eigen::Matrix<double, N, 1>& residual,
-           double weight) {
-    matrix += weight * jacobian.transpose() * jacobian;
-    gradient += weight * jacobian.transpose() * residual;
-  }
-};
-
-void AddPicks(const PickTerms& terms, const std::vector<bool>& used, double sigma_px,
-              const Similarity& s, const Eigen::Vector3d& pivot, Normal* normal) {
-  for (int i = 0; i < terms.size(); ++i) {
-    if (!used[i]) continue;
-    const Eigen::Vector2d error = terms.Error(i, s);
-    const Eigen::Matrix<double, 2, 7> jacobian = terms.Jacobian(i, s, pivot);
-    if (!error.allFinite() || !jacobian.allFinite()) continue;
-    const double own_sigma_px = sigma_px / terms.Weight(i);
-    const double deviations = error.norm() / own_sigma_px;
-    const double weight = HuberWeight(deviations, kClickHuber);
-    normal->Add<2>(jacobian, error, weight / (own_sigma_px * own_sigma_px));
-  }
-}
-
-void AddScalePrior(const Similarity& s, const Similarity& start, Normal* normal) {
-  const double off = std::log(s.scale / start.scale);
-  normal->matrix(6, 6) += 1 / (kScalePrior * kScalePrior);
-  normal->gradient[6] += off / (kScalePrior * kScalePrior);
-}
-
-// The step to the minimum; none if the normal matrix has no inverse.
-bool SolveStep(const Normal& normal, Vector7d* step, Matrix7d* inverse) {
-  const Vector7d size = normal.matrix.diagonal().cwiseSqrt();
-  if (!normal.matrix.allFinite() || !(size.minCoeff() > 0)) return false;
-  const Matrix7d balanced =
-      size.cwiseInverse().asDiagonal() * normal.matrix * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix7d> solver(balanced);
-  if (!(solver.eigenvalues()[0] > 1e-12)) return false;
-  const Matrix7d balanced_inverse = solver.eigenvectors() *
-                                    solver.eigenvalues().cwiseInverse().asDiagonal() *
-                                    solver.eigenvectors().transpose();
-  *inverse = size.cwiseInverse().asDiagonal() * balanced_inverse * size.cwiseInverse().asDiagonal();
-  *step = -*inverse * normal.gradient;
-  return step->allFinite();
-}
+constexpr int kNumCellSteps = 20;
 
 bool IsTiny(const Vector7d& step) {
   return step.head<3>().norm() < 1e-7 && step.segment<3>(3).norm() < 1e-8 &&
@@ -140,103 +44,41 @@ Eigen::Vector3d Middle(const std::vector<SurfacePoint>& points, const Similarity
   return middle;
 }
 
-// A sparse point and the patch of the surface it belongs to at one step.
-struct Match {
-  int point = 0, patch = 0;
-  double distance = 0;  // metres, along the normal
-  double sigma = 0;     // metres, of that distance
-};
-
-std::vector<Match> FindMatches(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
-                               const Similarity& s, double gate, double max_gate) {
-  const Eigen::Matrix3d linear = s.scale * s.rotation.toRotationMatrix();
-  std::vector<Match> matches;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const double reach = std::hypot(gate, surface.cell_size());
-    const auto nearest = surface.FindNearest(s * points[i].x_in_sparse, reach);
-    if (!nearest) continue;
-    const ScanPatch& patch = surface.patches()[nearest->patch];
-    const Eigen::Vector3d normal_in_sparse = linear.transpose() * patch.normal;
-    // The scanner and the photos look at the same side of the surface.
-    if (!(normal_in_sparse.dot(points[i].to_cameras) > 0)) continue;
-    const double point_variance = normal_in_sparse.dot(points[i].covariance * normal_in_sparse);
-    const double patch_variance = patch.thickness * patch.thickness / patch.num_samples;
-    Match match{static_cast<int>(i), nearest->patch, nearest->distance,
-                std::sqrt(point_variance + patch_variance + kSurfaceNoise * kSurfaceNoise)};
-    if (std::abs(match.distance) < std::min(max_gate, std::max(gate, 3 * match.sigma))) {
-      matches.push_back(match);
-    }
-  }
-  return matches;
-}
-
-void AddDistance(const Match& match, const Eigen::Vector3d& x_in_scan,
-                 const Eigen::Vector3d& surface_normal, const Eigen::Vector3d& pivot, double weight,
-                 Normal* normal) {
-  const Eigen::Vector3d arm = x_in_scan - pivot;
-  Eigen::Matrix<double, 1, 7> jacobian;
-  jacobian << surface_normal.transpose(), arm.cross(surface_normal).transpose(),
-      surface_normal.dot(arm);
-  normal->Add<1>(jacobian, Eigen::Matrix<double, 1, 1>(match.distance), weight);
-}
-
 // Tukey's biweight: what lies beyond the gate does not pull.
 double TukeyWeight(double distance, double gate) {
   const double root = TukeyRootWeight(distance, gate);
   return root * root;
 }
 
-// How far the surface is off as a whole within a cell, metres^2: the spread of the cells' median
-// distances beyond what their points' own noise explains. Bends of model and scan show there.
-double CommonVariance(const std::vector<Match>& matches, const SurfaceCells& cells) {
-  std::map<int, std::vector<double>> distances, variances;
-  for (size_t i = 0; i < matches.size(); ++i) {
-    const int cell = cells.Cell(i);
-    if (cells.NumPoints(cell) < kMinPointsOfCell) continue;
-    distances[cell].push_back(matches[i].distance);
-    variances[cell].push_back(std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2));
+// The last steps, with the weights that are true to how surfaces are off (SurfaceWeights): where
+// the surface leaves a direction open, the scatter of its normals does not hold the model there,
+// and picks do. Keeps the fit as it is where that has no solution.
+void WeighByCells(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                  const PickTerms& terms, const std::vector<bool>& used, double sigma_px,
+                  double gate, const Similarity& start, const SimilarityFitOptions& options,
+                  SimilarityFit* fit) {
+  Similarity s = fit->scan_from_sparse;
+  for (int i = 0; i < kNumCellSteps; ++i) {
+    const auto matches = FindMatches(points, surface, s, gate, options.max_gate);
+    const SurfaceWeights weights(matches, surface);
+    SimilarityNormal normal;
+    for (size_t k = 0; k < matches.size(); ++k) {
+      if (!weights.Counts(k)) continue;
+      const SurfaceMatch& match = matches[k];
+      const double own_gate = std::min(options.max_gate, std::max(gate, 3 * match.sigma));
+      normal.AddDistance(match.distance, s * points[match.point].x_in_sparse, weights.Normal(k),
+                         fit->pivot, TukeyWeight(match.distance, own_gate) / weights.Variance(k));
+    }
+    normal.AddPicks(terms, used, sigma_px, weights.CommonSigma(), s, fit->pivot);
+    normal.AddScalePrior(s, start);
+    Vector7d step;
+    Matrix7d inverse;
+    if (!normal.SolveStep(&step, &inverse)) return;
+    s = Moved(s, fit->pivot, step);
+    if (!(std::abs(s.scale / start.scale - 1) < options.max_scale_change)) return;
+    if (IsTiny(step)) break;
   }
-  std::vector<double> excess;
-  for (auto& [cell, values] : distances) {
-    const auto n = static_cast<double>(values.size());
-    // The variance of a median is pi / 2 times that of a mean.
-    excess.push_back(std::pow(Median(values), 2) - kPi / 2 * Median(variances[cell]) / n);
-  }
-  return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / kMedianSquarePerVariance);
-}
-
-// Fills what the fit knows about its own accuracy, at its solution.
-void JudgeAccuracy(const std::vector<Match>& matches, const std::vector<SurfacePoint>& points,
-                   const ScanPatches& surface, const PickTerms& terms,
-                   const std::vector<bool>& used, double sigma_px, const Similarity& start,
-                   SimilarityFit* fit) {
-  std::vector<Eigen::Vector3d> places, normals;
-  for (const Match& match : matches) {
-    places.push_back(surface.patches()[match.patch].point);
-    normals.push_back(surface.patches()[match.patch].normal);
-  }
-  const SurfaceCells cells(places, normals);
-  const double common = CommonVariance(matches, cells);
-  Normal normal;
-  int num_counted = 0;
-  for (size_t i = 0; i < matches.size(); ++i) {
-    const int count = cells.NumPoints(cells.Cell(i));
-    // A few points, where patches may straddle an edge, fix nothing on their own.
-    const double share = cells.NumPointsAlike(i) / static_cast<double>(matches.size());
-    if (count < kMinPointsOfCell || share < kMinFacingShare) continue;
-    ++num_counted;
-    const double own = std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2);
-    const Eigen::Vector3d n = cells.SharedNormal(i);
-    AddDistance(matches[i], fit->scan_from_sparse * points[matches[i].point].x_in_sparse, n,
-                fit->pivot, 1 / (own + count * common), &normal);
-    fit->facing += n * n.transpose();
-  }
-  fit->facing /= std::max(1, num_counted);
-  fit->surface_information = normal.matrix;
-  AddPicks(terms, used, sigma_px, fit->scan_from_sparse, fit->pivot, &normal);
-  AddScalePrior(fit->scan_from_sparse, start, &normal);
-  Vector7d step;
-  if (!SolveStep(normal, &step, &fit->covariance)) fit->covariance.setConstant(kInfinity);
+  fit->scan_from_sparse = s;
 }
 
 }  // namespace
@@ -335,11 +177,11 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
   fit.covariance.setConstant(kInfinity);
   const PickTerms terms(model, picks);
   for (int i = 0; i < options.num_steps && !fit.converged; ++i) {
-    Normal normal;
-    AddPicks(terms, used, sigma_px, fit.scan_from_sparse, fit.pivot, &normal);
-    AddScalePrior(fit.scan_from_sparse, start, &normal);
+    SimilarityNormal normal;
+    normal.AddPicks(terms, used, sigma_px, 0, fit.scan_from_sparse, fit.pivot);
+    normal.AddScalePrior(fit.scan_from_sparse, start);
     Vector7d step;
-    if (!SolveStep(normal, &step, &fit.covariance)) return fit;
+    if (!normal.SolveStep(&step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(fit.scan_from_sparse, fit.pivot, step);
     fit.converged = IsTiny(step);
   }
@@ -356,30 +198,31 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
   fit.covariance.setConstant(kInfinity);
   const PickTerms terms(model, picks);
   gate = std::min(gate, options.max_gate);
-  std::vector<Match> matches;
+  std::vector<SurfaceMatch> matches;
   for (int i = 0; i < options.num_steps && !fit.converged; ++i) {
     const Similarity s = fit.scan_from_sparse;
     matches = FindMatches(points, surface, s, gate, options.max_gate);
     if (matches.size() < 30) return fit;
     std::vector<double> deviations, distances;
-    for (const Match& match : matches) {
+    for (const SurfaceMatch& match : matches) {
       deviations.push_back(std::abs(match.distance) / match.sigma);
       distances.push_back(std::abs(match.distance));
     }
     // What the distances say about themselves: a model that is bent, or a scan with more noise than
     // assumed, must not outvote the picks.
     const double inflation = std::max(1.0, kSigmaPerMad * Median(deviations));
-    Normal normal;
-    for (const Match& match : matches) {
+    SimilarityNormal normal;
+    for (const SurfaceMatch& match : matches) {
       const double own_gate = std::min(options.max_gate, std::max(gate, 3 * match.sigma));
       const double sigma = match.sigma * inflation;
-      AddDistance(match, s * points[match.point].x_in_sparse, surface.patches()[match.patch].normal,
-                  fit.pivot, TukeyWeight(match.distance, own_gate) / (sigma * sigma), &normal);
+      normal.AddDistance(match.distance, s * points[match.point].x_in_sparse,
+                         surface.patches()[match.patch].normal, fit.pivot,
+                         TukeyWeight(match.distance, own_gate) / (sigma * sigma));
     }
-    AddPicks(terms, used, sigma_px, s, fit.pivot, &normal);
-    AddScalePrior(s, start, &normal);
+    normal.AddPicks(terms, used, sigma_px, 0, s, fit.pivot);
+    normal.AddScalePrior(s, start);
     Vector7d step;
-    if (!SolveStep(normal, &step, &fit.covariance)) return fit;
+    if (!normal.SolveStep(&step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(s, fit.pivot, step);
     if (!(std::abs(fit.scan_from_sparse.scale / start.scale - 1) < options.max_scale_change)) {
       return fit;
@@ -388,9 +231,10 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
     fit.converged = IsTiny(step) && gate <= last_gate;
     gate = std::max(kGateShrink * gate, std::min(gate, last_gate));
   }
+  WeighByCells(points, surface, terms, used, sigma_px, gate, start, options, &fit);
   matches = FindMatches(points, surface, fit.scan_from_sparse, gate, options.max_gate);
   double sum_before = 0, sum_after = 0;
-  for (const Match& match : matches) {
+  for (const SurfaceMatch& match : matches) {
     const ScanPatch& patch = surface.patches()[match.patch];
     const Eigen::Vector3d before = start * points[match.point].x_in_sparse - patch.point;
     sum_before += std::pow(patch.normal.dot(before), 2);

@@ -18,22 +18,38 @@ double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_sca
   return variance >= 0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity();
 }
 
+CameraCentres FindCameraCentres(const SparseModel& model, const Similarity& scan_from_model) {
+  CameraCentres centres;
+  for (const auto& [image_id, image] : model.images) {
+    centres[image_id] = scan_from_model * image.cam_from_model.TargetOriginInSource();
+  }
+  return centres;
+}
+
 std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
-                                               const SparseModel& adjusted,
-                                               const SimilarityFit& fit) {
+                                               const CameraCentres& centres,
+                                               const SimilarityFit& fit,
+                                               const Disagreement& disagreement) {
   const double rotation = std::sqrt(fit.covariance.block<3, 3>(3, 3).trace());
   std::map<uint32_t, PhotoSigma> sigmas;
-  for (const auto& [image_id, covariance] : covariances) {
-    const Eigen::Vector3d centre =
-        adjusted.images.at(image_id).cam_from_model.TargetOriginInSource();
-    sigmas[image_id] = {
-        std::max(std::sqrt(covariance.block<3, 3>(3, 3).trace()), PositionSigmaAt(fit, centre)),
-        std::max(std::sqrt(covariance.block<3, 3>(0, 0).trace()), rotation)};
+  for (const auto& [image_id, centre] : centres) {
+    PhotoSigma sigma{PositionSigmaAt(fit, centre), rotation};
+    const auto own = covariances.find(image_id);
+    if (own != covariances.end()) {
+      sigma.position = std::max(sigma.position, std::sqrt(own->second.block<3, 3>(3, 3).trace()));
+      sigma.rotation = std::max(sigma.rotation, std::sqrt(own->second.block<3, 3>(0, 0).trace()));
+    }
+    const auto seen = disagreement.photos.find(image_id);
+    const bool known = seen != disagreement.photos.end();
+    sigma.position = std::hypot(sigma.position, known ? seen->second.shift : disagreement.rms);
+    if (known) sigma.rotation = std::hypot(sigma.rotation, seen->second.rotation);
+    sigmas[image_id] = sigma;
   }
   return sigmas;
 }
 
-void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, ExpectedError* error) {
+void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas,
+                               const Disagreement& disagreement, ExpectedError* error) {
   if (sigmas.empty()) return;
   std::vector<double> positions, rotations;
   for (const auto& [image_id, sigma] : sigmas) {
@@ -42,10 +58,10 @@ void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, Exp
   }
   error->at_cameras = Median(&positions);
   error->rotation = Median(&rotations);
+  error->at_far_corner = std::hypot(error->at_far_corner, disagreement.rms);
 }
 
-ExpectedError PropagateError(const SimilarityFit& fit,
-                             const std::vector<Eigen::Vector3d>& camera_centres,
+ExpectedError PropagateError(const SimilarityFit& fit, const CameraCentres& centres,
                              const std::vector<Scan>& scans) {
   ExpectedError error;
   Bounds bounds;
@@ -63,8 +79,7 @@ ExpectedError PropagateError(const SimilarityFit& fit,
     error.far_corner = x;
   }
   std::vector<double> sigmas;
-  for (const Eigen::Vector3d& centre : camera_centres)
-    sigmas.push_back(PositionSigmaAt(fit, centre));
+  for (const auto& [image_id, centre] : centres) sigmas.push_back(PositionSigmaAt(fit, centre));
   error.at_cameras = Median(&sigmas, error.at_cameras);
   const double rotation2 = fit.covariance.block<3, 3>(3, 3).trace();
   error.rotation = rotation2 >= 0 ? std::sqrt(rotation2) : std::numeric_limits<double>::infinity();

@@ -10,6 +10,7 @@
 
 #include "align/fit/pose_covariance.h"
 #include "align/fit/similarity_fit.h"
+#include "align/trust/disagreement.h"
 #include "core/scan.h"
 
 namespace roomtex {
@@ -31,19 +32,23 @@ struct PhotoSigma {
   double rotation = 0;  // radians, root of the trace
 };
 
-// Of the photos of an adjusted model, by image_id; empty if `covariances` is. The larger of two:
-// the photo's own covariance, and that of the similarity at its place, which knows how far sparse
-// model and scan disagree beyond their noise (a bent scan, a bent model).
+using CameraCentres = std::map<uint32_t, Eigen::Vector3d>;  // `scan`, by image_id
+CameraCentres FindCameraCentres(const SparseModel& model, const Similarity& scan_from_model);
+
+// Of the photos, by image_id. The larger of two: the photo's own
+// covariance where there is one (of an adjusted model), and that of the similarity at its place;
+// and beside it how far sparse model and scan disagree in what the photo sees.
 std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
-                                               const SparseModel& adjusted,
-                                               const SimilarityFit& fit);
+                                               const CameraCentres& centres,
+                                               const SimilarityFit& fit,
+                                               const Disagreement& disagreement);
 
-// Sets at_cameras and rotation to the medians over the photos; leaves them if there are none.
-void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas, ExpectedError* error);
+// Sets at_cameras and rotation to the medians over the photos, and adds the disagreement of the
+// room to what is expected at the far corner; leaves them if there are no photos.
+void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas,
+                               const Disagreement& disagreement, ExpectedError* error);
 
-// camera_centres: `scan`.
-ExpectedError PropagateError(const SimilarityFit& fit,
-                             const std::vector<Eigen::Vector3d>& camera_centres,
+ExpectedError PropagateError(const SimilarityFit& fit, const CameraCentres& centres,
                              const std::vector<Scan>& scans);
 
 }  // namespace roomtex

@@ -46,7 +46,7 @@ TEST(ExpectedError, IsLargestAtTheCornerFarFromThePivot) {
   Scan scan;
   scan.points = {{0, 0, 0}, Scan::MissingPoint(), {5, 4, 3}};
   const ExpectedError error =
-      PropagateError(fit, {{1, -2, 0.5}, {2, -2, 0.5}, {1, 0, 0.5}}, {scan});
+      PropagateError(fit, {{1, {1, -2, 0.5}}, {2, {2, -2, 0.5}}, {3, {1, 0, 0.5}}}, {scan});
   EXPECT_EQ(error.far_corner, Eigen::Vector3d(5, 4, 3));
   EXPECT_NEAR(error.at_far_corner, PositionSigmaAt(fit, {5, 4, 3}), 1e-15);
   EXPECT_GT(error.at_far_corner, error.at_cameras);
@@ -56,21 +56,39 @@ TEST(ExpectedError, IsLargestAtTheCornerFarFromThePivot) {
 // What the model itself says of a photo counts where it is more than the similarity leaves open.
 TEST(ExpectedError, OfAPhotoIsTheLargerOfItsOwnAndOfTheSimilarity) {
   const SimilarityFit fit = FitWithCovariance();
-  SparseModel model;
+  CameraCentres centres;
   PoseCovariances covariances;
-  for (uint32_t id = 1; id <= 3; ++id) {
-    model.images[id].cam_from_model.translation = {1.0 * id, 2, 3};
-    covariances[id] = (id == 2 ? 1e-2 : 1e-12) * Eigen::Matrix<double, 6, 6>::Identity();
+  for (uint32_t id = 1; id <= 4; ++id) {
+    centres[id] = {-1.0 * id, -2, -3};
+    if (id < 4)
+      covariances[id] = (id == 2 ? 1e-2 : 1e-12) * Eigen::Matrix<double, 6, 6>::Identity();
   }
-  const auto sigmas = FindPhotoSigmas(covariances, model, fit);
-  ASSERT_EQ(sigmas.size(), 3u);
+  const auto sigmas = FindPhotoSigmas(covariances, centres, fit, Disagreement());
+  ASSERT_EQ(sigmas.size(), 4u);
   EXPECT_NEAR(sigmas.at(1).position, PositionSigmaAt(fit, {-1, -2, -3}), 1e-12);
   EXPECT_NEAR(sigmas.at(2).position, std::sqrt(3e-2), 1e-12);
   EXPECT_NEAR(sigmas.at(2).rotation, std::sqrt(3e-2), 1e-12);
+  EXPECT_NEAR(sigmas.at(4).position, PositionSigmaAt(fit, {-4, -2, -3}), 1e-12);
+}
+
+TEST(ExpectedError, HoldsWhatModelAndScanDisagreeIn) {
+  const SimilarityFit fit = FitWithCovariance();
+  const CameraCentres centres = {{1, {-1, -2, -3}}, {2, {-2, -2, -3}}, {3, {-3, -2, -3}}};
+  Disagreement disagreement;
+  disagreement.rms = 0.03;
+  disagreement.photos[1] = {0.04, 0.02};
+  const auto sigmas = FindPhotoSigmas({}, centres, fit, disagreement);
+  const double alone = PositionSigmaAt(fit, {-1, -2, -3});
+  EXPECT_NEAR(sigmas.at(1).position, std::hypot(alone, 0.04), 1e-12);
+  EXPECT_GT(sigmas.at(1).rotation, 0.02);
+  // A photo that sees nothing of the surface may be off like the room.
+  EXPECT_NEAR(sigmas.at(2).position, std::hypot(PositionSigmaAt(fit, {-2, -2, -3}), 0.03), 1e-12);
   ExpectedError error;
-  SetExpectedErrorAtCameras(sigmas, &error);
+  error.at_far_corner = 0.04;
+  SetExpectedErrorAtCameras(sigmas, disagreement, &error);
   EXPECT_EQ(error.at_cameras, sigmas.at(3).position);
-  SetExpectedErrorAtCameras({}, &error);
+  EXPECT_NEAR(error.at_far_corner, 0.05, 1e-12);
+  SetExpectedErrorAtCameras({}, disagreement, &error);
   EXPECT_EQ(error.at_cameras, sigmas.at(3).position);
 }
 

@@ -1,0 +1,139 @@
+#include "align/fit/similarity_accuracy.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <Eigen/Eigenvalues>
+
+#include "align/surface/surface_cells.h"
+#include "core/frames.h"
+#include "core/statistics.h"
+
+namespace roomtex {
+namespace {
+
+// Cells of the surface with fewer points say nothing about the accuracy of the fit.
+constexpr int kMinPointsOfCell = 5;
+constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
+constexpr double kPartSize = 1.5;         // metres; edge of the parts of the jackknife
+constexpr int kMinParts = 5;              // fewer leave the jackknife nothing to compare
+
+// How far the surface is off as a whole within a cell, metres^2: the spread of the cells' median
+// distances beyond what their points' own noise explains. Bends of model and scan show there.
+double CommonVariance(const std::vector<SurfaceMatch>& matches, const SurfaceCells& cells) {
+  std::map<int, std::vector<double>> distances, variances;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const int cell = cells.Cell(i);
+    if (cells.NumPoints(cell) < kMinPointsOfCell) continue;
+    distances[cell].push_back(matches[i].distance);
+    variances[cell].push_back(std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2));
+  }
+  std::vector<double> excess;
+  for (auto& [cell, values] : distances) {
+    const auto n = static_cast<double>(values.size());
+    // The variance of a median is pi / 2 times that of a mean.
+    excess.push_back(std::pow(Median(values), 2) - kPi / 2 * Median(variances[cell]) / n);
+  }
+  return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / kMedianSquarePerVariance);
+}
+
+// Covariance by leaving out the parts one by one; zero with too few of them. One step from the
+// solution, where all parts together have their minimum.
+Matrix7d JackknifeCovariance(const SimilarityNormal& all,
+                             const std::vector<SimilarityNormal>& parts) {
+  std::vector<Vector7d> steps;
+  Vector7d mean = Vector7d::Zero();
+  for (const SimilarityNormal& part : parts) {
+    if (part.matrix.isZero(0)) continue;
+    SimilarityNormal rest = all;
+    rest.matrix -= part.matrix;
+    rest.gradient -= part.gradient;
+    Vector7d step;
+    Matrix7d inverse;
+    if (!rest.SolveStep(&step, &inverse)) continue;
+    steps.push_back(step);
+    mean += step;
+  }
+  Matrix7d covariance = Matrix7d::Zero();
+  if (static_cast<int>(steps.size()) < kMinParts) return covariance;
+  const auto n = static_cast<double>(steps.size());
+  mean /= n;
+  for (const Vector7d& step : steps) {
+    covariance += (n - 1) / n * (step - mean) * (step - mean).transpose();
+  }
+  return covariance;
+}
+
+// The smallest covariance that is not below either, direction by direction of a.
+Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
+  const Eigen::SelfAdjointEigenSolver<Matrix7d> of_a(a);
+  const Matrix7d root = of_a.operatorSqrt(), inverse_root = of_a.operatorInverseSqrt();
+  if (!inverse_root.allFinite()) return a;
+  const Eigen::SelfAdjointEigenSolver<Matrix7d> relative(inverse_root * b * inverse_root);
+  const Vector7d larger = relative.eigenvalues().cwiseMax(1);
+  return root * relative.eigenvectors() * larger.asDiagonal() *
+         relative.eigenvectors().transpose() * root;
+}
+
+}  // namespace
+
+SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches,
+                               const ScanPatches& surface) {
+  std::vector<Eigen::Vector3d> places, normals;
+  for (const SurfaceMatch& match : matches) {
+    places.push_back(surface.patches()[match.patch].point);
+    normals.push_back(surface.patches()[match.patch].normal);
+  }
+  const SurfaceCells cells(places, normals);
+  const double common = CommonVariance(matches, cells);
+  common_sigma_ = std::sqrt(common);
+  std::map<std::array<long, 3>, int> parts;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const int count = cells.NumPoints(cells.Cell(i));
+    const double share = cells.NumPointsAlike(i) / static_cast<double>(matches.size());
+    counts_.push_back(count >= kMinPointsOfCell && share >= kMinFacingShare);
+    const double own = std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2);
+    variances_.push_back(own + count * common);
+    normals_.push_back(cells.SharedNormal(i));
+    std::array<long, 3> key;
+    for (int k = 0; k < 3; ++k) key[k] = std::lround(std::floor(places[i][k] / kPartSize));
+    parts_.push_back(parts.emplace(key, static_cast<int>(parts.size())).first->second);
+  }
+  num_parts_ = static_cast<int>(parts.size());
+}
+
+void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,
+                   const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                   const PickTerms& terms, const std::vector<bool>& used, double sigma_px,
+                   const Similarity& start, SimilarityFit* fit) {
+  const SurfaceWeights weights(matches, surface);
+  SimilarityNormal normal;
+  std::vector<SimilarityNormal> parts(weights.num_parts());
+  int num_counted = 0;
+  fit->facing.setZero();
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (!weights.Counts(i)) continue;
+    ++num_counted;
+    const Eigen::Vector3d& n = weights.Normal(i);
+    const Eigen::Vector3d x_in_scan = fit->scan_from_sparse * points[matches[i].point].x_in_sparse;
+    for (SimilarityNormal* one : {&normal, &parts[weights.Part(i)]}) {
+      one->AddDistance(matches[i].distance, x_in_scan, n, fit->pivot, 1 / weights.Variance(i));
+    }
+    fit->facing += n * n.transpose();
+  }
+  fit->facing /= std::max(1, num_counted);
+  fit->surface_information = normal.matrix;
+  normal.AddPicks(terms, used, sigma_px, weights.CommonSigma(), fit->scan_from_sparse, fit->pivot);
+  normal.AddScalePrior(fit->scan_from_sparse, start);
+  Vector7d step;
+  if (!normal.SolveStep(&step, &fit->covariance)) {
+    fit->covariance.setConstant(std::numeric_limits<double>::infinity());
+    return;
+  }
+  fit->covariance = Larger(fit->covariance, JackknifeCovariance(normal, parts));
+}
+
+}  // namespace roomtex
