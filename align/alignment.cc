@@ -69,6 +69,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
 
   progress->Stage("trust");
   Judgement judgement = JudgeFit(input, start, result.fit, options);
+  AskPhotos(input, result.fit, &judgement);
   result.expected_error = judgement.expected_error;
   result.photo_sigmas = std::move(judgement.photo_sigmas);
   result.disagreement = std::move(judgement.disagreement);

@@ -32,7 +32,7 @@ struct Alignment {
   double refined_pick_rms_px = std::numeric_limits<double>::quiet_NaN();
   ExpectedError expected_error;                 // at_cameras and rotation: medians of photo_sigmas
   std::map<uint32_t, PhotoSigma> photo_sigmas;  // by image_id
-  Disagreement disagreement;                    // what no similarity and no bend takes away
+  ShapeDisagreement disagreement;               // what no similarity and no bend takes away
   OpenDirections open;
   Placement placement;
   double reprojection_rms_px = 0;  // of the input model

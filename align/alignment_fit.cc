@@ -6,7 +6,7 @@ namespace roomtex {
 namespace {
 
 // Pixels per photo with picks, the largest.
-double PickBend(const AlignmentInput& input, const Disagreement& disagreement) {
+double PickBend(const AlignmentInput& input, const ShapeDisagreement& disagreement) {
   double bend_px = 0;
   for (const Pick& pick : input.picks) {
     const SparseImage* const image = input.model.FindImage(pick.image_name);

@@ -24,7 +24,7 @@ struct AlignmentFit {
   double pick_rms_px = std::numeric_limits<double>::quiet_NaN();
   // What the similarity leaves between sparse model and scan, and how far picks are off by it,
   // however well they are made: pixels, the largest over the photos with picks.
-  Disagreement disagreement;
+  ShapeDisagreement disagreement;
   double pick_bend_px = 0;
 };
 

@@ -39,6 +39,10 @@ struct AlignmentInput {
   // What was read from where, for the messages.
   std::string picks_path;
   std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
+  // Folder of the photos, for a second opinion where few points lie on a rough surface; may be
+  // empty.
+  std::string image_path = "";
+  int num_threads = -1;  // for that; changes nothing
 };
 
 }  // namespace roomtex

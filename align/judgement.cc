@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "align/clicks/picks.h"
+#include "align/trust/agreement.h"
 #include "core/statistics.h"
 #include "core/text.h"
 
@@ -13,6 +15,8 @@ namespace {
 
 constexpr double kMaxRoughness = 0.2;  // metres; what the uncertainty of clicks may excuse
 constexpr int kMinJudged = 20;         // sparse points
+// A point is on the surface within this many times the scan's noise.
+constexpr double kNoiseReach = 4;
 // Picks may be off by this many times what model and scan disagree in anyway.
 constexpr double kBendDeviations = 2;
 
@@ -92,19 +96,27 @@ void JudgeScale(const AlignmentStart& start, const TrustOptions& trust,
   }
 }
 
+// Fewer points on the surface cannot be excused by a rough scan.
+constexpr double kLeastSurfaceShare = 0.3;
+
 void JudgePlacement(const Placement& placement, const TrustOptions& trust,
-                    std::vector<std::string>* reasons) {
+                    std::vector<std::string>* reasons, std::string* sparse_on_surface) {
   const int judged = placement.num_on_surface + placement.num_floating + placement.num_hidden;
   if (judged < kMinJudged) {
     reasons->push_back("Only " + std::to_string(judged) +
                        " sparse points lie where the scanner saw something, too few to "
                        "tell whether the alignment is right.");
   } else if (!(placement.SurfaceShare() >= trust.min_surface_share)) {
-    reasons->push_back(
+    const std::string reason =
         "Only " + Number(100 * placement.SurfaceShare(), 0) +
         " % of the sparse points that the scanner could see lie within " +
         Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
-        Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.");
+        Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.";
+    if (placement.SurfaceShare() >= kLeastSurfaceShare) {
+      *sparse_on_surface = reason;
+    } else {
+      reasons->push_back(reason);
+    }
   } else if (!(placement.ChangedShare() <= trust.max_changed_share)) {
     const double percent = 100.0 / judged;
     reasons->push_back(
@@ -183,6 +195,9 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
   }
   FindAccuracy(input, start, fit, options, &judgement);
   TrustOptions trust = options.trust;
+  // A coarse scan is not a laser's.
+  trust.surface_tolerance =
+      std::max(trust.surface_tolerance, kNoiseReach * input.surveyed.patches().TypicalThickness());
   if (!fit.refined) {
     // Clicks alone are rough, and say themselves how rough.
     trust.surface_tolerance =
@@ -192,12 +207,36 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
       CheckPlacement(input.model, fit.points, fit.scan_from_sparse, input.surveyed.patches(),
                      input.surveyed.free_space(), trust);
   if (by_picks) JudgeStart(input, start, fit, trust, &judgement.reasons);
-  JudgePlacement(judgement.placement, trust, &judgement.reasons);
+  JudgePlacement(judgement.placement, trust, &judgement.reasons, &judgement.sparse_on_surface);
   return judgement;
 }
 
+void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement) {
+  if (judgement->sparse_on_surface.empty()) return;
+  const std::string reason = std::exchange(judgement->sparse_on_surface, "");
+  if (!input.image_path.empty() && judgement->reasons.empty()) {
+    SparseModel aligned = input.model;
+    TransformModel(fit.scan_from_sparse, &aligned);
+    std::vector<std::string> ignored;  // comes again when the result is compared
+    const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
+                                                 AgreementOptions(), input.num_threads, &ignored);
+    if (agreement.gradient.supports) {
+      judgement->warnings.push_back(
+          reason +
+          " It is believed all the same: the photos show the scan's intensity where it "
+          "is. A coarse scan, or things that it does not show.");
+      return;
+    }
+  }
+  judgement->reasons.push_back(
+      reason + " If the scan is coarse, say how coarse (--Trust.surface_tolerance)" +
+      (input.image_path.empty() ? ", or give --image_path: photos that show the scan's intensity "
+                                  "where it is speak for the alignment."
+                                : "."));
+}
+
 std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
-                                            const Disagreement& disagreement,
+                                            const ShapeDisagreement& disagreement,
                                             const SparseModel& model) {
   const PlaneBundle& bundle = adjustment.bundle;
   if (!bundle.usable) return {bundle.reason + " One similarity for all photos is used."};

@@ -19,12 +19,15 @@ struct Judgement {
   // model and scan disagree in.
   ExpectedError expected_error;
   std::map<uint32_t, PhotoSigma> photo_sigmas;  // by image_id
-  Disagreement disagreement;
+  ShapeDisagreement disagreement;
   OpenDirections open;  // what the surface leaves to the picks
   Placement placement;
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted; empty = trusted.
   std::vector<std::string> reasons;
+  // One more reason, or "": too few points on the surface for a laser scan. Photos that show the
+  // scan's intensity where it is overrule it (AskPhotos).
+  std::string sparse_on_surface;
 };
 
 // Picks and scale of the start, similarity and placement of the fit: before the poses are adjusted,
@@ -32,10 +35,14 @@ struct Judgement {
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
                    const AlignmentFit& fit, const AlignmentOptions& options);
 
+// Decides on Judgement::sparse_on_surface: by photos and intensity (agreement.h), where there are
+// both; else it is a reason like the others.
+void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement);
+
 // What speaks against an adjustment, or should be known of it. All of it warnings: the similarity
 // remains.
 std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
-                                            const Disagreement& disagreement,
+                                            const ShapeDisagreement& disagreement,
                                             const SparseModel& model);
 
 // Fewer than six picks that can be used are too few to rely on (kMinPicksPerPhoto), unless those

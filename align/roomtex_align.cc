@@ -11,6 +11,7 @@
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
+#include "align/trust/station_check.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -30,6 +31,7 @@ struct Arguments {
   ScanPlaneOptions planes;
   std::string planes_path;
   int overlays = 0;
+  bool register_stations = false;
 };
 
 void AddOptions(Arguments* a, Command* command) {
@@ -62,6 +64,9 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's database; not needed for an alignment by picks.",
                         Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
+  command->AddBool("register_stations", &a->register_stations,
+                   "Move scans that do not fit the others where both show the same surface; 0 = "
+                   "say so, and trust nothing that rests on them.");
   command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
   command->Add(FieldsOf(&a->scan_reader));
   AlignmentOptions& o = a->alignment;
@@ -281,6 +286,32 @@ std::vector<ScanPlane> DetectPlanes(const Arguments& a, const SurveyedScans& sur
   return planes;
 }
 
+// Scans of several stations against each other; the report's `stations`.
+void CompareStations(const Arguments& a, std::vector<Scan>* scans,
+                     const Command::Context& context) {
+  context.report["stations"] = Json::array();
+  if (scans->size() < 2) return;
+  context.progress.Stage("stations");
+  if (a.register_stations) {
+    for (const int moved : RegisterStations(scans)) {
+      context.Warn((*scans)[moved].path + " was moved onto the other scans");
+    }
+  }
+  const StationCheck check = CheckStations(*scans);
+  for (const StationPair& pair : check.pairs) {
+    Json one;
+    one["first"] = (*scans)[pair.first].path;
+    one["second"] = (*scans)[pair.second].path;
+    one["num_patches"] = pair.num_patches;
+    one["offset_mm"] = 1000 * pair.offset;
+    one["offset_sigma_mm"] = 1000 * pair.sigma;
+    one["turn_deg"] = DegFromRad(pair.turn);
+    one["agree"] = !pair.Disagrees();
+    context.report["stations"].push_back(one);
+  }
+  if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
+}
+
 // None if the files contradict each other; the report then says so.
 std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput& input,
                                        const Command::Context& context) {
@@ -302,14 +333,18 @@ void Align(const Arguments& a, const Command::Context& context) {
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
   context.progress.Stage("read scan");
-  const PlacedScans placed = ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  PlacedScans placed = ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  CompareStations(a, &placed.scans, context);
   const std::optional<GeoReference> geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
   SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
   options.num_threads = context.options.num_threads;
   const SurveyedScans surveyed(placed.scans, options);
   const std::vector<ScanPlane> planes = DetectPlanes(a, surveyed, context);
   const std::optional<Alignment> found =
-      FindAlignment(a, {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth}, context);
+      FindAlignment(a,
+                    {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth, a.image_path,
+                     context.options.num_threads},
+                    context);
   if (!found) return;
   const Alignment& alignment = *found;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);

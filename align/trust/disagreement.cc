@@ -45,9 +45,10 @@ std::vector<OnSurface> PointsNear(const std::vector<SurfacePoint>& points,
 
 }  // namespace
 
-Disagreement FindDisagreement(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                              const ScanPatches& surface, const Similarity& scan_from_sparse,
-                              const ScanBend& bend) {
+ShapeDisagreement FindDisagreement(const SparseModel& model,
+                                   const std::vector<SurfacePoint>& points,
+                                   const ScanPatches& surface, const Similarity& scan_from_sparse,
+                                   const ScanBend& bend) {
   std::vector<OnSurface> near = PointsNear(points, surface, scan_from_sparse, bend, kMostReach);
   std::vector<double> distances;
   for (const OnSurface& one : near) distances.push_back(std::abs(one.distance));
@@ -68,7 +69,7 @@ Disagreement FindDisagreement(const SparseModel& model, const std::vector<Surfac
     variances[cells.Cell(i)].push_back(near[i].variance);
   }
   std::vector<double> excess(cells.NumCells(), 0);  // metres^2
-  Disagreement result;
+  ShapeDisagreement result;
   double sum = 0;
   for (int cell = 0; cell < cells.NumCells(); ++cell) {
     const auto n = static_cast<double>(of_cell[cell].size());

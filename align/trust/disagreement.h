@@ -19,7 +19,7 @@ struct PhotoDisagreement {
   double rotation = 0;  // radians: the same seen from the photo
 };
 
-struct Disagreement {
+struct ShapeDisagreement {
   double rms = 0;  // metres, over the surface that the sparse points lie on
   int num_cells = 0;
   std::map<uint32_t, PhotoDisagreement> photos;  // by image_id; none for one that sees no surface
@@ -29,8 +29,9 @@ struct Disagreement {
 // less what their noise explains. Only what is across the surface shows; the same is assumed along
 // it, twice, so that lengths are sqrt(3) times the distances. bend: of the scan (scan_bend.h), as
 // far as it is believed; scan_from_sparse then leads to the room as it is.
-Disagreement FindDisagreement(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                              const ScanPatches& surface, const Similarity& scan_from_sparse,
-                              const ScanBend& bend);
+ShapeDisagreement FindDisagreement(const SparseModel& model,
+                                   const std::vector<SurfacePoint>& points,
+                                   const ScanPatches& surface, const Similarity& scan_from_sparse,
+                                   const ScanBend& bend);
 
 }  // namespace roomtex

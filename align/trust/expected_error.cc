@@ -29,7 +29,7 @@ CameraCentres FindCameraCentres(const SparseModel& model, const Similarity& scan
 std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
                                                const CameraCentres& centres,
                                                const SimilarityFit& fit,
-                                               const Disagreement& disagreement) {
+                                               const ShapeDisagreement& disagreement) {
   const double rotation = std::sqrt(fit.covariance.block<3, 3>(3, 3).trace());
   std::map<uint32_t, PhotoSigma> sigmas;
   for (const auto& [image_id, centre] : centres) {
@@ -49,7 +49,7 @@ std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariance
 }
 
 void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas,
-                               const Disagreement& disagreement, ExpectedError* error) {
+                               const ShapeDisagreement& disagreement, ExpectedError* error) {
   if (sigmas.empty()) return;
   std::vector<double> positions, rotations;
   for (const auto& [image_id, sigma] : sigmas) {

@@ -41,12 +41,12 @@ CameraCentres FindCameraCentres(const SparseModel& model, const Similarity& scan
 std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
                                                const CameraCentres& centres,
                                                const SimilarityFit& fit,
-                                               const Disagreement& disagreement);
+                                               const ShapeDisagreement& disagreement);
 
 // Sets at_cameras and rotation to the medians over the photos, and adds the disagreement of the
 // room to what is expected at the far corner; leaves them if there are no photos.
 void SetExpectedErrorAtCameras(const std::map<uint32_t, PhotoSigma>& sigmas,
-                               const Disagreement& disagreement, ExpectedError* error);
+                               const ShapeDisagreement& disagreement, ExpectedError* error);
 
 ExpectedError PropagateError(const SimilarityFit& fit, const CameraCentres& centres,
                              const std::vector<Scan>& scans);

@@ -27,14 +27,14 @@ SparseModel Waved(const SimulatedCase& one, double amplitude) {
   return waved;
 }
 
-Disagreement Between(const SimulatedCase& one, const SparseModel& model) {
+ShapeDisagreement Between(const SimulatedCase& one, const SparseModel& model) {
   const ScanPatches surface(one.scans, ScanPatchOptions());
   return FindDisagreement(model, FindSurfacePoints(model, 3, 0.7), surface,
                           one.room->ScanFromSparse(), ScanBend());
 }
 
 TEST(Disagreement, IsSmallWhereModelAndScanAreRight) {
-  const Disagreement found = Between(MakeCase(), MakeCase().model);
+  const ShapeDisagreement found = Between(MakeCase(), MakeCase().model);
   EXPECT_GT(found.num_cells, 50);
   EXPECT_LT(found.rms, 0.004);
   EXPECT_EQ(found.photos.size(), MakeCase().model.images.size());
@@ -44,7 +44,7 @@ TEST(Disagreement, IsSmallWhereModelAndScanAreRight) {
 // A wave of this amplitude has a root mean square length of sqrt(3 / 2) times it.
 TEST(Disagreement, IsTheSizeOfAWaveThroughTheRoom) {
   for (const double amplitude : {0.02, 0.04}) {
-    const Disagreement found = Between(MakeCase(), Waved(MakeCase(), amplitude));
+    const ShapeDisagreement found = Between(MakeCase(), Waved(MakeCase(), amplitude));
     const double truth = std::sqrt(1.5) * amplitude;
     EXPECT_GT(found.rms, 0.6 * truth);
     EXPECT_LT(found.rms, 1.3 * truth);
@@ -61,7 +61,7 @@ TEST(Disagreement, IsTheSizeOfAWaveThroughTheRoom) {
 TEST(Disagreement, OfAModelThatIsNowhereNearIsNone) {
   SparseModel far = MakeCase().model;
   TransformModel({1, Eigen::Quaterniond::Identity(), {1000, 0, 0}}, &far);
-  const Disagreement found = Between(MakeCase(), far);
+  const ShapeDisagreement found = Between(MakeCase(), far);
   EXPECT_EQ(found.num_cells, 0);
   EXPECT_EQ(found.rms, 0);
   EXPECT_TRUE(found.photos.empty());

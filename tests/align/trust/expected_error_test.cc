@@ -63,7 +63,7 @@ TEST(ExpectedError, OfAPhotoIsTheLargerOfItsOwnAndOfTheSimilarity) {
     if (id < 4)
       covariances[id] = (id == 2 ? 1e-2 : 1e-12) * Eigen::Matrix<double, 6, 6>::Identity();
   }
-  const auto sigmas = FindPhotoSigmas(covariances, centres, fit, Disagreement());
+  const auto sigmas = FindPhotoSigmas(covariances, centres, fit, ShapeDisagreement());
   ASSERT_EQ(sigmas.size(), 4u);
   EXPECT_NEAR(sigmas.at(1).position, PositionSigmaAt(fit, {-1, -2, -3}), 1e-12);
   EXPECT_NEAR(sigmas.at(2).position, std::sqrt(3e-2), 1e-12);
@@ -74,7 +74,7 @@ TEST(ExpectedError, OfAPhotoIsTheLargerOfItsOwnAndOfTheSimilarity) {
 TEST(ExpectedError, HoldsWhatModelAndScanDisagreeIn) {
   const SimilarityFit fit = FitWithCovariance();
   const CameraCentres centres = {{1, {-1, -2, -3}}, {2, {-2, -2, -3}}, {3, {-3, -2, -3}}};
-  Disagreement disagreement;
+  ShapeDisagreement disagreement;
   disagreement.rms = 0.03;
   disagreement.photos[1] = {0.04, 0.02};
   const auto sigmas = FindPhotoSigmas({}, centres, fit, disagreement);

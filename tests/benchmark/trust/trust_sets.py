@@ -21,20 +21,21 @@ from trust_table import multiply, read_truth  # noqa: E402
 
 MODELS = {"SIMPLE_RADIAL": 2, "PINHOLE": 1, "OPENCV": 4}
 SIFT = ["--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features", "4096"]
-SMALL = "--num_photos 16 --photo_width 1200 --photo_height 800 --scan_columns 1600 --scan_rows 600".split()
+SMALL = {"--num_photos": "16", "--photo_width": "1200", "--photo_height": "800", "--scan_columns": "1600",
+         "--scan_rows": "600"}
 
 # Captures, each with a database of its own. Tuned on: those of seed 1. Never tuned on: the others.
 ROOMS = {
-    "s1": ["--random_seed", "1"],
-    "s2": ["--random_seed", "2"],
-    "s3": ["--random_seed", "3"],
-    "few": ["--random_seed", "4", "--num_photos", "8"],
-    "big": ["--random_seed", "5", "--room_width", "14", "--room_depth", "12", "--num_photos", "24"],
-    "blur": ["--random_seed", "6", "--blur_px", "4"],
-    "strangers": ["--random_seed", "7", "--strangers", "0.5"],
-    "bare": ["--random_seed", "8", "--bare", "1"],
-    "bent": ["--random_seed", "9", "--bend", "0.005"],
-    "two": ["--random_seed", "10", "--num_stations", "2"],
+    "s1": {"--random_seed": "1"},
+    "s2": {"--random_seed": "2"},
+    "s3": {"--random_seed": "3"},
+    "few": {"--random_seed": "4", "--num_photos": "8"},
+    "big": {"--random_seed": "5", "--room_width": "14", "--room_depth": "12", "--num_photos": "24"},
+    "blur": {"--random_seed": "6", "--blur_px": "4"},
+    "strangers": {"--random_seed": "7", "--strangers": "0.5"},
+    "bare": {"--random_seed": "8", "--bare": "1"},
+    "bent": {"--random_seed": "9", "--bend": "0.005"},
+    "two": {"--random_seed": "10", "--num_stations": "2"},
 }
 
 
@@ -114,7 +115,8 @@ def make_room(sets, tools, name):
     os.makedirs(folder, exist_ok=True)
     os.chdir(folder)
     if not os.path.exists("capture/picks.csv"):
-        run(os.path.join(tools, "roomtex-simulate"), "--output_path", "capture", "--quiet", "1", *SMALL, *ROOMS[name])
+        run(os.path.join(tools, "roomtex-simulate"), "--output_path", "capture", "--quiet", "1",
+            *[word for option in {**SMALL, **ROOMS[name]}.items() for word in option])
     words = open("capture/camera_options.txt").read().split()
     params = words[words.index("--ImageReader.camera_params") + 1]
     model = words[words.index("--ImageReader.camera_model") + 1]

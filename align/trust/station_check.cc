@@ -1,0 +1,223 @@
+#include "align/trust/station_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <Eigen/Cholesky>
+
+#include "align/fit/similarity_accuracy.h"
+#include "align/fit/similarity_normal.h"
+#include "align/surface/scan_patches.h"
+#include "core/frames.h"
+#include "core/robust_kernel.h"
+#include "core/statistics.h"
+#include "core/text.h"
+#include "core/twist.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kMaxPatches = 20000;  // of one scan that are tried
+constexpr int kMinCommon = 200;     // fewer patches on the other's surface are no overlap
+constexpr double kMinCommonShare = 0.1;
+// Metres: how far off a station is looked for, and the gate of the last steps.
+constexpr double kFirstGate = 0.2, kLastGate = 0.02;
+constexpr double kGateShrink = 0.8;
+constexpr int kNumSteps = 40, kNumRegisterings = 3;
+// What is known without any surface: keeps open directions where they are (metres, radians).
+constexpr double kPriorMove = 0.05, kPriorTurn = 0.02;
+// An offset counts from here on (metres), and when it is this many standard deviations.
+constexpr double kLeastOffset = 0.006, kDeviations = 4;
+
+// The patches of a scan as points that are to lie on another one.
+std::vector<SurfacePoint> PatchesAsPoints(const ScanPatches& patches) {
+  const size_t stride = patches.patches().size() / kMaxPatches + 1;
+  std::vector<SurfacePoint> points;
+  for (size_t i = 0; i < patches.patches().size(); i += stride) {
+    const ScanPatch& patch = patches.patches()[i];
+    SurfacePoint point;
+    point.x_in_sparse = patch.point;
+    point.to_cameras = patch.normal;
+    point.covariance = patch.thickness * patch.thickness / patch.num_samples *
+                       (patch.normal * patch.normal.transpose());
+    points.push_back(point);
+  }
+  return points;
+}
+
+struct Solution {
+  Similarity moved;  // scale 1
+  Matrix7d covariance = Matrix7d::Zero();
+  std::vector<SurfaceMatch> matches;
+};
+
+bool Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface, double gate,
+          const Eigen::Vector3d& pivot, Solution* solution) {
+  solution->matches = FindMatches(points, surface, solution->moved, gate, gate);
+  if (static_cast<int>(solution->matches.size()) < kMinCommon) return false;
+  const SurfaceWeights weights(solution->matches, surface);
+  SimilarityNormal normal;
+  for (size_t k = 0; k < solution->matches.size(); ++k) {
+    if (!weights.Counts(k)) continue;
+    const SurfaceMatch& match = solution->matches[k];
+    const double root = TukeyRootWeight(match.distance, gate);
+    normal.AddDistance(match.distance, solution->moved * points[match.point].x_in_sparse,
+                       weights.Normal(k), pivot, root * root / weights.Variance(k));
+  }
+  for (int k = 0; k < 6; ++k) {
+    const double prior = k < 3 ? kPriorMove : kPriorTurn;
+    normal.matrix(k, k) += 1 / (prior * prior);
+  }
+  normal.matrix.row(6).setZero();
+  normal.matrix.col(6).setZero();
+  normal.matrix(6, 6) = 1;
+  normal.gradient[6] = 0;
+  Vector7d step;
+  if (!normal.SolveStep(&step, &solution->covariance)) return false;
+  solution->covariance(6, 6) = 0;
+  step[6] = 0;
+  solution->moved = Moved(solution->moved, pivot, step);
+  return true;
+}
+
+// How far the common surface moves across itself, and how well that is known.
+void MeasureOffset(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                   const Eigen::Vector3d& pivot, const Solution& solution, StationPair* pair) {
+  double sum = 0, variance = 0;
+  for (const SurfaceMatch& match : solution.matches) {
+    const Eigen::Vector3d& n = surface.patches()[match.patch].normal;
+    const Eigen::Vector3d& x = points[match.point].x_in_sparse;
+    const Eigen::Vector3d arm = x - pivot;
+    sum += std::pow(n.dot(solution.moved * x - x), 2);
+    Vector7d jacobian;
+    jacobian << n, arm.cross(n), 0;
+    variance += jacobian.dot(solution.covariance * jacobian);
+  }
+  const auto count = static_cast<double>(solution.matches.size());
+  pair->offset = std::sqrt(sum / count);
+  pair->sigma = std::sqrt(variance / count);
+}
+
+StationPair ComparePair(const ScanPatches& first, const ScanPatches& second) {
+  StationPair pair;
+  const std::vector<SurfacePoint> points = PatchesAsPoints(second);
+  Solution solution;
+  solution.matches = FindMatches(points, first, Similarity(), kFirstGate, kFirstGate);
+  if (static_cast<double>(solution.matches.size()) <
+      kMinCommonShare * static_cast<double>(points.size())) {
+    return pair;
+  }
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+  for (const SurfaceMatch& match : solution.matches) {
+    pivot += points[match.point].x_in_sparse / static_cast<double>(solution.matches.size());
+  }
+  double gate = kFirstGate;
+  for (int i = 0; i < kNumSteps; ++i) {
+    if (!Step(points, first, gate, pivot, &solution)) return pair;
+    gate = std::max(kLastGate, kGateShrink * gate);
+  }
+  pair.num_patches = static_cast<int>(solution.matches.size());
+  pair.first_from_second = {solution.moved.rotation, solution.moved.translation};
+  pair.turn = RotationAngle(solution.moved.rotation, Eigen::Quaterniond::Identity());
+  MeasureOffset(points, first, pivot, solution, &pair);
+  return pair;
+}
+
+// Stations by how many of their neighbours contradict them: of a pair, the one with more.
+std::vector<int> FindWrong(const std::vector<StationPair>& pairs, size_t num_scans) {
+  std::vector<int> neighbours(num_scans, 0), against(num_scans, 0), wrong;
+  for (const StationPair& pair : pairs) {
+    for (const int scan : {pair.first, pair.second}) {
+      ++neighbours[scan];
+      against[scan] += pair.Disagrees();
+    }
+  }
+  for (int scan = 0; scan < static_cast<int>(num_scans); ++scan) {
+    if (against[scan] > 0 && 2 * against[scan] > neighbours[scan]) wrong.push_back(scan);
+  }
+  if (wrong.empty()) {
+    for (int scan = 0; scan < static_cast<int>(num_scans); ++scan) {
+      if (against[scan] > 0) wrong.push_back(scan);
+    }
+  }
+  std::stable_sort(wrong.begin(), wrong.end(),
+                   [&](int a, int b) { return against[a] > against[b]; });
+  return wrong;
+}
+
+std::vector<ScanPatches> PatchesOf(const std::vector<Scan>& scans) {
+  std::vector<ScanPatches> patches;
+  for (const Scan& scan : scans) patches.emplace_back(std::vector<Scan>{scan}, ScanPatchOptions());
+  return patches;
+}
+
+void Move(const Rigid& motion, Scan* scan) {
+  for (Eigen::Vector3d& point : scan->points) point = motion * point;
+  scan->scan_from_station = motion * scan->scan_from_station;
+  scan->up = motion.rotation * scan->up;
+}
+
+}  // namespace
+
+bool StationPair::Disagrees() const {
+  return num_patches > 0 && offset > std::max(kLeastOffset, kDeviations * sigma);
+}
+
+std::string StationCheck::Sentence(const std::vector<Scan>& scans) const {
+  if (wrong.empty()) return "";
+  const StationPair* worst = nullptr;
+  for (const StationPair& pair : pairs) {
+    if (pair.Disagrees() && (worst == nullptr || pair.offset > worst->offset)) worst = &pair;
+  }
+  std::string names;
+  for (const int scan : wrong) names += (names.empty() ? "" : ", ") + scans[scan].path;
+  return "The scans do not fit together: " + scans[worst->first].path + " and " +
+         scans[worst->second].path + " are " + Number(1000 * worst->offset, 0) + " mm and " +
+         Number(DegFromRad(worst->turn), 2) +
+         " degrees off where they show the same surface; contradicted by most of its neighbours: " +
+         names +
+         ". Correct the poses of the scans (--scan_poses), or let them be registered anew "
+         "(--register_stations 1).";
+}
+
+StationCheck CheckStations(const std::vector<Scan>& scans) {
+  StationCheck check;
+  if (scans.size() < 2) return check;
+  const std::vector<ScanPatches> patches = PatchesOf(scans);
+  for (int i = 0; i < static_cast<int>(scans.size()); ++i) {
+    for (int j = i + 1; j < static_cast<int>(scans.size()); ++j) {
+      StationPair pair = ComparePair(patches[i], patches[j]);
+      pair.first = i;
+      pair.second = j;
+      if (pair.num_patches > 0) check.pairs.push_back(pair);
+    }
+  }
+  check.wrong = FindWrong(check.pairs, scans.size());
+  return check;
+}
+
+std::vector<int> RegisterStations(std::vector<Scan>* scans) {
+  std::set<int> moved;
+  for (int round = 0; round < kNumRegisterings; ++round) {
+    const StationCheck check = CheckStations(*scans);
+    // The worst that is not the first: onto all that are not contradicted, together.
+    const auto worst =
+        std::find_if(check.wrong.begin(), check.wrong.end(), [](int scan) { return scan != 0; });
+    if (worst == check.wrong.end()) break;
+    std::vector<Scan> others;
+    for (int scan = 0; scan < static_cast<int>(scans->size()); ++scan) {
+      const bool doubted =
+          scan != 0 && std::count(check.wrong.begin(), check.wrong.end(), scan) > 0;
+      if (scan != *worst && !doubted) others.push_back((*scans)[scan]);
+    }
+    const StationPair pair = ComparePair(ScanPatches(others, ScanPatchOptions()),
+                                         ScanPatches({(*scans)[*worst]}, ScanPatchOptions()));
+    if (pair.num_patches == 0) break;
+    Move(pair.first_from_second, &(*scans)[*worst]);
+    moved.insert(*worst);
+  }
+  return {moved.begin(), moved.end()};
+}
+
+}  // namespace roomtex

@@ -1,0 +1,88 @@
+#include "align/trust/station_check.h"
+
+#include <gmock/gmock.h>
+
+#include "core/frames.h"
+#include "tests/align/simulated_alignment.h"
+
+namespace roomtex {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// Scans of one room from three stations, all in one frame; the first `count` of them.
+std::vector<Scan> Stations(int count) {
+  static const std::vector<Scan> all = [] {
+    SimulatedRoomOptions options = CaseOptions(3);
+    options.num_stations = 3;
+    options.scan_columns = 500;
+    options.scan_rows = 250;
+    const SimulatedRoom room(options);
+    std::vector<Scan> scans;
+    for (int station = 0; station < 3; ++station) {
+      scans.push_back(room.MakeScan(station));
+      scans.back().path = "station_" + std::to_string(station) + ".rtpi";
+    }
+    return scans;
+  }();
+  return {all.begin(), all.begin() + count};
+}
+
+void Displace(const Eigen::Vector3d& metres, double deg, Scan* scan) {
+  const Eigen::AngleAxisd turn(RadFromDeg(deg), Eigen::Vector3d(1, 2, 3).normalized());
+  for (Eigen::Vector3d& point : scan->points) point = turn * point + metres;
+  scan->scan_from_station = Rigid{Eigen::Quaterniond(turn), metres} * scan->scan_from_station;
+}
+
+TEST(StationCheck, StationsThatStandRightAgree) {
+  const StationCheck check = CheckStations(Stations(2));
+  ASSERT_EQ(check.pairs.size(), 1u);
+  EXPECT_GT(check.pairs[0].num_patches, 1000);
+  EXPECT_LT(check.pairs[0].offset, 0.004);
+  EXPECT_THAT(check.wrong, IsEmpty());
+}
+
+TEST(StationCheck, AStationThirtyMillimetresOffIsSaid) {
+  std::vector<Scan> scans = Stations(2);
+  Displace({0.02, -0.02, 0.01}, 0, &scans[1]);
+  const StationCheck check = CheckStations(scans);
+  EXPECT_THAT(check.wrong, ElementsAre(0, 1));  // two scans cannot tell which
+  EXPECT_THAT(check.Sentence(scans), HasSubstr("station_1.rtpi"));
+  EXPECT_NEAR(check.pairs[0].first_from_second.translation.norm(), 0.03, 0.006);
+}
+
+TEST(StationCheck, AStationTurnedByADegreeIsSaid) {
+  std::vector<Scan> scans = Stations(2);
+  Displace({0, 0, 0}, 1, &scans[1]);
+  const StationCheck check = CheckStations(scans);
+  EXPECT_THAT(check.wrong, Contains(1));
+  EXPECT_NEAR(DegFromRad(check.pairs[0].turn), 1, 0.1);
+}
+
+TEST(StationCheck, OfThreeTheWrongOneIsNamedAndRegisteredAnew) {
+  std::vector<Scan> scans = Stations(3);
+  const std::vector<Scan> right = scans;
+  Displace({-0.02, 0.03, 0.01}, 0.5, &scans[2]);
+  EXPECT_THAT(CheckStations(scans).wrong, ElementsAre(2));
+  EXPECT_THAT(RegisterStations(&scans), ElementsAre(2));
+  EXPECT_THAT(CheckStations(scans).wrong, IsEmpty());
+  for (size_t i = 0; i < scans[2].points.size(); i += 97) {
+    if (!right[2].points[i].allFinite()) continue;
+    EXPECT_LT((scans[2].points[i] - right[2].points[i]).norm(), 0.005);
+  }
+  EXPECT_EQ(scans[0].points[1000], right[0].points[1000]);
+}
+
+TEST(StationCheck, ScansOfDifferentRoomsSayNothing) {
+  std::vector<Scan> scans = Stations(2);
+  Displace({100, 0, 0}, 0, &scans[1]);
+  const StationCheck check = CheckStations(scans);
+  EXPECT_THAT(check.pairs, IsEmpty());
+  EXPECT_EQ(check.Sentence(scans), "");
+}
+
+}  // namespace
+}  // namespace roomtex
