@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace {
@@ -74,12 +75,30 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
   for (const auto& [id, camera] : model_.cameras) projections_.emplace(id, camera);
   AddPhotos();
   progress->Stage("read scan");
-  scans_ = ReadScans(input.scan_paths, input.scan_poses, input.scan_reader);
+  ReadScans();
   for (const Scan& scan : scans_) {
     if (!scan.organised) AddPanorama(scan);
     places_.push_back(std::make_unique<ScanPlaces>(scan.organised ? scan : panoramas_.back()));
   }
   progress->Finish();
+}
+
+void PickScene::ReadScans() {
+  const AlignmentRecord record = ReadAlignmentRecord(input_.input_path);
+  PlacedScans placed =
+      ReadScansOfModel(record, {input_.scan_paths, input_.scan_poses, input_.scan_reader});
+  scans_ = std::move(placed.scans);
+  notes_ = std::move(placed.notes);
+  input_.scan_paths.clear();
+  for (const PlacedScans::File& file : placed.files) {
+    input_.scan_paths.push_back(file.path);
+    if (azimuth_.empty()) azimuth_ = file.azimuth;
+  }
+  if (record.scans.empty()) return;
+  // What roomtex-align is to be told.
+  if (!azimuth_.empty()) input_.scan_reader.azimuth = azimuth_;
+  input_.scan_reader.units = record.scans[0].units;
+  input_.scan_reader.max_range = record.scans[0].max_range;
 }
 
 void PickScene::AddPanorama(const Scan& mesh) {

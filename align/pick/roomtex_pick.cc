@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/open_browser.h"
 #include "core/option_fields.h"
+#include "importers/scan_record.h"
 #include "pick_page.h"
 
 namespace roomtex {
@@ -30,7 +31,10 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's sparse model: a folder, .bin or .txt.");
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
   command->AddInputPaths("scan_path", &a->scene.scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
+                         "a model of roomtex-align, which remembers its scans and how they were "
+                         "read.",
+                         Command::Kind::kOptional);
   command->AddOutputPath("output_path", &a->output_path,
                          "Picks, a CSV file for roomtex-align. Saved after every change; one that "
                          "is there is continued, and kept as it was with .bak behind its name.");
@@ -51,6 +55,7 @@ void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->scene.scan_reader.Problems();
   AppendProblems(a->server.Problems(), &problems);
   ThrowIfProblems(problems);
+  RequireScans(a->scene.scan_paths, a->scene.input_path);
   const std::filesystem::path picks(a->output_path);
   if (a->aligned_path.empty()) a->aligned_path = (picks.parent_path() / "aligned").string();
   if (std::filesystem::is_directory(picks)) {
@@ -81,6 +86,7 @@ void ServePicking(Arguments a, const Command::Context& context) {
   if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
     throw UsageError("--image_name " + a.image_name + " is not in the sparse model");
   }
+  for (const std::string& note : scene.notes()) context.Warn(note);
   WarnOfMissingPhotos(scene, context);
   PickSession session(scene, a.output_path);
   scene.Prepare();
