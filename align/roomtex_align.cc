@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "align/alignment.h"
@@ -20,6 +21,7 @@
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/photo_fit.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 
@@ -35,6 +37,7 @@ struct Arguments {
   ScanPlaneOptions planes;
   std::string planes_path;
   int overlays = 0;
+  bool strict = false;
 };
 
 void AddOptions(Arguments* a, Command* command) {
@@ -63,6 +66,7 @@ void AddOptions(Arguments* a, Command* command) {
                         "it the report says how well photos and scan intensity agree, and an "
                         "alignment that they contradict is not trusted.",
                         Command::Kind::kOptional);
+  command->AddBool("strict", &a->strict, kStrictHelp);
   command->AddInt("overlays", &a->overlays,
                   "Number of photos for which overlays/NAME.jpg is written into --output_path: "
                   "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
@@ -255,9 +259,46 @@ void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans&
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
 }
 
+// The photos that can be compared with the scan; what there is to say about the others. Returns the
+// reasons that were told.
+std::set<std::string> LookForPhotos(const Arguments& a, const SparseModel& model,
+                                    const Command::Context& context) {
+  std::set<std::string> told;
+  if (a.image_path.empty()) return told;
+  std::vector<PhotoLeftOut> left_out;
+  std::vector<std::string> notes;
+  for (const SparseImage* image : SpreadImages(model, static_cast<int>(model.images.size()))) {
+    const Camera& camera = model.cameras.at(image->camera_id);
+    const PhotoFit fit = FitPhotoToCamera(a.image_path + "/" + image->name, image->name,
+                                          camera.width, camera.height);
+    if (!fit.note.empty()) notes.push_back(fit.note);
+    if (fit.usable()) continue;
+    left_out.push_back({image->name, fit.problem});
+    told.insert(fit.problem);
+  }
+  if (a.strict) ThrowIfAnyLeftOut(left_out, a.image_path);
+  ReportPhotosLeftOut(left_out, context);
+  for (const std::string& note : FirstNotes(notes)) context.Warn(note);
+  return told;
+}
+
+// Warnings "START: REASON" of photos whose reason was not told before.
+void WarnOfPhotos(const Arguments& a, const std::vector<std::string>& warnings,
+                  const std::string& start, const std::set<std::string>& told,
+                  const Command::Context& context) {
+  for (const std::string& warning : warnings) {
+    const std::string reason =
+        warning.compare(0, start.size(), start) == 0 ? warning.substr(start.size()) : warning;
+    if (told.count(reason) > 0) continue;
+    if (a.strict) ThrowIfAnyLeftOut({{"", reason}}, a.image_path);
+    context.Warn(warning);
+  }
+}
+
 // What photos and scan say about each other; the report's `agreement`.
 void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
-                       const SurveyedScans& surveyed, const Command::Context& context) {
+                       const SurveyedScans& surveyed, const std::set<std::string>& told,
+                       const Command::Context& context) {
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");
   std::vector<std::string> warnings;
@@ -266,13 +307,13 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
                                                context.options.num_threads, &warnings);
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
-  for (const std::string& warning : warnings) context.Warn(warning);
+  WarnOfPhotos(a, warnings, "Agreement: ", told, context);
 }
 
 // The report's `overlays`.
 void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
-                          const SurveyedScans& surveyed, const std::string& output_path,
-                          const Command::Context& context) {
+                          const SurveyedScans& surveyed, const std::set<std::string>& told,
+                          const std::string& output_path, const Command::Context& context) {
   context.report["overlays"] = Json::array();
   if (a.overlays == 0) return;
   context.progress.Stage("overlays");
@@ -282,7 +323,7 @@ void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
                      a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
     context.report["overlays"].push_back(path);
   }
-  for (const std::string& warning : warnings) context.Warn(warning);
+  WarnOfPhotos(a, warnings, "Overlay: ", told, context);
 }
 
 // Another scan than the one that a model was aligned to before is no mistake here.
@@ -388,7 +429,8 @@ void WriteRefusal(const Arguments& a, const std::string& refusal, const Command:
 }
 
 void WriteAligned(const Arguments& a, const SparseModel& model, const Reading& reading,
-                  const std::optional<GeoReference>& geo, const Command::Context& context) {
+                  const std::optional<GeoReference>& geo, const std::set<std::string>& told,
+                  const Command::Context& context) {
   const std::string output_path = ChooseOutput(a, context);
   const Similarity& scan_from_sparse = reading.attempt.alignment->scan_from_sparse;
   context.progress.Stage("write");
@@ -398,7 +440,7 @@ void WriteAligned(const Arguments& a, const SparseModel& model, const Reading& r
   WriteGeo(a, model, reading.placed, geo, output_path, context);
   context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
   context.report.AddCopy(output_path + "/alignment.json");
-  WriteOverlayPictures(a, model, *reading.surveyed, output_path, context);
+  WriteOverlayPictures(a, model, *reading.surveyed, told, output_path, context);
 }
 
 void Align(const Arguments& a, const Command::Context& context) {
@@ -407,6 +449,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadSparseModel(a.input_path);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
+  const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
   SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
   options.num_threads = context.options.num_threads;
@@ -437,8 +480,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  CompareWithPhotos(a, model, *reading.surveyed, context);
-  WriteAligned(a, model, reading, geo, context);
+  CompareWithPhotos(a, model, *reading.surveyed, told, context);
+  WriteAligned(a, model, reading, geo, told, context);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
@@ -20,6 +21,7 @@
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
 #include "texture/sampling/photo_list.h"
+#include "texture/sampling/photo_pass.h"
 #include "texture/texels/grid_image.h"
 #include "texture/texels/texture_scale.h"
 
@@ -31,7 +33,7 @@ struct TextureOptions {
   std::vector<std::string> scan_paths;
   PhotoSources sources;
   ScanReaderOptions scan_reader;
-  bool accept_untrusted = false;
+  bool accept_untrusted = false, strict = false;
   ColorizeOptions colorize;
   GlbOptions glb;
   std::string image_format = "png";
@@ -51,6 +53,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                          "they were read.",
                          Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write model.ply, model.glb, texture.png, report.json (and "
                          "model.rtpi) into.");
@@ -321,6 +324,28 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   set.Commit();
 }
 
+// A file may look like a photo and be broken further down: then all is done again without it.
+ColorizeResult ColorizeWithReadable(const std::vector<Scan>& scans, const ColorizeOptions& colorize,
+                                    const TextureOptions& options, PhotoList* list,
+                                    const Command::Context& context) {
+  while (true) {
+    try {
+      return ColorizeScans(scans, list->photos, colorize, context.options.num_threads,
+                           &context.progress);
+    } catch (const UnreadablePhotos& unreadable) {
+      if (options.strict) throw;
+      std::set<std::string> names;
+      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
+      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
+      std::vector<PhotoView>& photos = list->photos;
+      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
+      if (photos.empty()) throw;
+      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
+                            unreadable.photos().end());
+    }
+  }
+}
+
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
@@ -333,7 +358,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
 
   context.progress.Stage("read model");
   const SparseModel model = ReadSparseModel(options.input_path);
-  const PhotoList list = ListPhotos(model, options.sources);
+  PhotoList list = ListPhotos(model, options.sources);
+  if (options.strict) ThrowIfAnyLeftOut(list.left_out, options.sources.image_path);
   for (const std::string& warning : list.warnings) context.Warn(warning);
   if (list.photos.empty()) {
     throw InputError(options.input_path, "", "holds no registered photo",
@@ -356,8 +382,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   context.report.AddCopy(options.output_path + "/report.json");
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result =
-      ColorizeScans(scans, list.photos, colorize, context.options.num_threads, &context.progress);
+  const ColorizeResult result = ColorizeWithReadable(scans, colorize, options, &list, context);
+  ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {

@@ -17,6 +17,7 @@
 #include "align/trust/overlay.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
+#include "core/photo_fit.h"
 #include "core/progress.h"
 #include "core/scan.h"
 #include "importers/scan_reader.h"
@@ -35,8 +36,9 @@ struct PickPhoto {
   const SparseImage* image = nullptr;
   const CameraProjection* projection = nullptr;
   std::string path;
+  PhotoFit fit;
   // It cannot be shown, and why, in a sentence: no file there, one outside the folder of the
-  // photos, or one of another size than its camera's.
+  // photos, or one of another shape than its camera's.
   bool missing = false;
   std::string problem;
   int num_points = 0;  // sparse points it sees
@@ -56,7 +58,9 @@ class PickScene {
   const PickSceneInput& input() const { return input_; }
   // How RTPI scans were read; "" = there are none.
   const std::string& azimuth() const { return azimuth_; }
-  const std::vector<std::string>& notes() const { return notes_; }  // on the scans; sentences
+  const std::vector<std::string>& notes() const {
+    return notes_;
+  }  // on scans and photos; sentences
   const SparseModel& model() const { return model_; }
   const std::vector<Scan>& scans() const { return scans_; }
   int num_scans() const { return static_cast<int>(scans_.size()); }

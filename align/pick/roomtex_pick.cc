@@ -69,14 +69,20 @@ void CheckArguments(Arguments* a) {
 }
 
 void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context) {
-  int num_missing = 0;
-  std::string problem;
+  constexpr size_t kNamed = 5;
+  Json left_out = Json::array();
+  std::string names;
   for (const PickPhoto& photo : scene.photos()) {
-    if (photo.missing && num_missing++ == 0) problem = photo.problem;
+    if (!photo.missing) continue;
+    if (left_out.size() < kNamed) names += (names.empty() ? "" : ", ") + photo.name();
+    left_out.push_back({{"name", photo.name()}, {"reason", photo.problem}});
   }
-  if (num_missing == 0) return;
-  context.Warn(std::to_string(num_missing) + " of " + std::to_string(scene.photos().size()) +
-               " photos cannot be shown. The first: " + problem);
+  context.report["photos_left_out"] = left_out;
+  if (left_out.empty()) return;
+  if (left_out.size() > kNamed) names += " ...";
+  context.Warn(std::to_string(left_out.size()) + " of " + std::to_string(scene.photos().size()) +
+               " photos cannot be shown. The first: " + left_out[0]["reason"].get<std::string>() +
+               " All: " + names);
 }
 
 void ServePicking(Arguments a, const Command::Context& context) {

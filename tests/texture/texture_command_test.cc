@@ -612,5 +612,36 @@ TEST_F(TextureCommand, DoubtsOfTheAlignmentAreThoseOfTheColours) {
   EXPECT_EQ(ReadJson(Path("textured_aligned/report.json"))["warnings"].size(), 1u);
 }
 
+// One photo is gone, one ends before its picture does; the others colour.
+TEST_F(TextureCommand, LeavesOutPhotosThatCannotBeUsed) {
+  const std::string photos = Path("some_photos");
+  fs::copy(Capture() + "/photos", photos);
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(photos)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  fs::remove(photos + "/" + names[2]);
+  const std::string bytes = ReadBytes(photos + "/" + names[5]);
+  WriteBytes(photos + "/" + names[5], bytes.substr(0, bytes.size() / 2));
+  const auto run = [&](const std::string& more) {
+    return RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
+                          "/truth --image_path " + photos + " --scan_path " + Capture() +
+                          "/scan.rtpi --output_path " + Path("some") + more);
+  };
+  const CommandResult strict = run(" --strict 1");
+  EXPECT_EQ(strict.exit_code, 3);
+  EXPECT_NE(strict.err.find(names[2]), std::string::npos) << strict.err;
+  EXPECT_FALSE(fs::exists(Path("some/model.ply")));
+  const CommandResult result = run("");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ReadJson(Path("some/report.json"));
+  ASSERT_EQ(report["photos_left_out"].size(), 2u);
+  EXPECT_EQ(report["photos_left_out"][0]["name"], names[2]);
+  EXPECT_EQ(report["photos_left_out"][1]["name"], names[5]);
+  EXPECT_EQ(report["num_photos"], 10);
+  EXPECT_EQ(ReadJson(Path("textured/report.json"))["photos_left_out"].size(), 0u);
+}
+
 }  // namespace
 }  // namespace roomtex
