@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 
 constexpr double kSamePosition = 1e-6;  // metres
 constexpr double kSameRotation = 1e-6;  // radians
-constexpr char kAlignAnew[] =
-    "Align anew, or give a copy of the model's folder without alignment.json";
+constexpr char kToUseAnother[] =
+    ". To use another: align anew, or copy the model's folder without alignment.json";
 
 std::string FolderOf(const std::string& path) {
   const fs::path parent = fs::path(path).parent_path();
@@ -66,7 +66,7 @@ std::string FindFile(const ScanRecord& record, const AlignmentRecord& alignment)
     throw InputError(changed, "",
                      "is no longer the scan that the model in " + alignment.folder +
                          " was aligned to: its content has changed",
-                     std::string("Give that scan with --scan_path. Or: ") + kAlignAnew);
+                     std::string("Give that scan with --scan_path") + kToUseAnother);
   }
   throw InputError(
       record.path, "",
@@ -107,7 +107,7 @@ std::vector<Found> FindScans(const AlignmentRecord& alignment,
                        "is another scan than the model in " + alignment.folder +
                            " was aligned to, " + alignment.scans[0].path +
                            (alignment.scans.size() > 1 ? " and others" : ""),
-                       std::string("Give that one, or no --scan_path. Or: ") + kAlignAnew);
+                       std::string("Give that one, or none: it is remembered") + kToUseAnother);
     }
     taken.insert(match);
     found.push_back({match, path});
