@@ -13,16 +13,6 @@ constexpr double kPickReach = 0.06;
 // More are not needed to tell whether picks and scan belong together.
 constexpr size_t kMaxPicksOnScan = 100;
 
-std::string MirrorRemedy(const AlignmentInput& input) {
-  const std::vector<Scan>& scans = input.surveyed.scans();
-  const bool is_rtpi =
-      std::any_of(scans.begin(), scans.end(), [](const Scan& scan) { return scan.is_rtpi; });
-  if (!is_rtpi) return "Check the axes of the scan file: its coordinates seem to be left-handed";
-  const std::string other = input.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
-  return "Read it with --azimuth " + other +
-         " (in every command, and for picking: picks made on the mirrored scan have the wrong x)";
-}
-
 // Where the picks would be on the scan if its x were mirrored.
 std::vector<Eigen::Vector3d> Mirrored(const std::vector<Eigen::Vector3d>& points,
                                       const Rigid& scan_from_station) {
@@ -73,11 +63,11 @@ std::string Miss(double rms_px) {
 void RefuseMirroredOrExchanged(const AlignmentInput& input, const PickView& view) {
   const PickReview& review = view.review;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
-    throw Contradiction(input.surveyed.scans()[0].path, "",
-                        "the scan is a mirror image of the room: the picks in " + view.image_name +
-                            " " + Miss(review.RmsPx()) + ", but " + Miss(review.mirrored_rms_px) +
-                            " when the scan is reflected",
-                        MirrorRemedy(input));
+    throw MirroredScan(input.surveyed.scans()[0].path,
+                       "the scan is a mirror image of the room: the picks in " + view.image_name +
+                           " " + Miss(review.RmsPx()) + ", but " + Miss(review.mirrored_rms_px) +
+                           " when the scan is reflected",
+                       MirrorRemedy(input), false);
   }
   if (!review.exchanged) return;
   const Pick& a = input.picks[view.picks[review.exchanged->first]];
@@ -116,6 +106,16 @@ void RefuseWithoutPose(const AlignmentInput& input, const std::vector<PickView>&
 
 }  // namespace
 
+std::string MirrorRemedy(const AlignmentInput& input) {
+  const std::vector<Scan>& scans = input.surveyed.scans();
+  const bool is_rtpi =
+      std::any_of(scans.begin(), scans.end(), [](const Scan& scan) { return scan.is_rtpi; });
+  if (!is_rtpi) return "Check the axes of the scan file: its coordinates seem to be left-handed";
+  const std::string other = input.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+  return "Read it with --azimuth " + other +
+         " (in every command, and for picking: picks made on the mirrored scan have the wrong x)";
+}
+
 std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input) {
   const std::string& scan_path = input.surveyed.scans()[0].path;
   const PicksOnScan on_scan = MeasurePicksOnScan(input);
@@ -127,13 +127,13 @@ std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input) {
   }
   const std::string of_all = " of " + std::to_string(n) + " picks";
   if (off >= 2 && 3 * on_scan.num_mirrored_off <= off) {
-    throw Contradiction(
-        scan_path, "",
-        "the scan is a mirror image of the one that the picks were made on: " +
-            std::to_string(off) + of_all + " lie more than " + Number(kPickReach, 2) +
-            " m off its surface, up to " + Number(distance[farthest], 2) + " m, but " +
-            std::to_string(on_scan.num_mirrored_off) + " when the scan is reflected",
-        MirrorRemedy(input));
+    throw MirroredScan(scan_path,
+                       "the scan is a mirror image of the one that the picks were made on: " +
+                           std::to_string(off) + of_all + " lie more than " +
+                           Number(kPickReach, 2) + " m off its surface, up to " +
+                           Number(distance[farthest], 2) + " m, but " +
+                           std::to_string(on_scan.num_mirrored_off) + " when the scan is reflected",
+                       MirrorRemedy(input), true);
   }
   if (n > 0 && 2 * off >= n) {
     throw Contradiction(
@@ -149,6 +149,11 @@ std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input) {
                        Number(distance[i], 2) + " m off every surface of the scan.");
   }
   return warnings;
+}
+
+bool MirroredPicksLieOnScan(const AlignmentInput& input) {
+  const PicksOnScan on_scan = MeasurePicksOnScan(input);
+  return 3 * on_scan.num_mirrored_off <= on_scan.picks.size();
 }
 
 std::vector<std::string> CheckViews(const AlignmentInput& input,

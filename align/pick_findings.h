@@ -19,15 +19,36 @@ class Contradiction : public InputError {
   using InputError::InputError;
 };
 
+// A Contradiction that is solved by reading the scan as its mirror image.
+class MirroredScan : public Contradiction {
+ public:
+  MirroredScan(const std::string& path, const std::string& finding, const std::string& remedy,
+               bool picks_on_mirror_image)
+      : Contradiction(path, "", finding, remedy), picks_on_mirror_image_(picks_on_mirror_image) {}
+  // The picks lie on the mirror image; else on the scan as it was read, so that they are mirrored,
+  // too.
+  bool picks_on_mirror_image() const { return picks_on_mirror_image_; }
+
+ private:
+  bool picks_on_mirror_image_;
+};
+
+// What to do about a mirrored scan.
+std::string MirrorRemedy(const AlignmentInput& input);
+
 // The picks lie on the surface of the scan that was read; if they lie on its mirror image instead,
 // the file was read with the other azimuth sense than the one they were made with. Gives warnings;
-// throws Contradiction for a mirrored scan and when half of the picks are off, InputError for a
-// scan without a sample.
+// throws MirroredScan, Contradiction when half of the picks are off, and InputError for a scan
+// without a sample.
 std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input);
 
+// All picks but a third lie on the mirror image of the scan, too: a room may be symmetric where it
+// was picked.
+bool MirroredPicksLieOnScan(const AlignmentInput& input);
+
 // Picks that say what is wrong with them are refused, as nothing that follows from them means
-// anything: throws Contradiction for exchanged picks and a mirrored scan, and InputError or
-// Contradiction if no photo's picks fix a pose. Warns of photos whose picks do not, and of picks
+// anything: throws Contradiction for exchanged picks, MirroredScan, and InputError or Contradiction
+// if no photo's picks fix a pose. Warns of photos whose picks do not, and of picks
 // that were left out.
 std::vector<std::string> CheckViews(const AlignmentInput& input,
                                     const std::vector<PickView>& views);

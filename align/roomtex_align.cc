@@ -1,11 +1,16 @@
 // roomtex-align: the sparse model into the scan, by picks.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <set>
+#include <utility>
 
 #include "align/alignment.h"
 #include "align/geo/geo_output.h"
+#include "align/mirrored_reading.h"
 #include "align/plane_bundle_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
@@ -17,7 +22,9 @@
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/photo_fit.h"
 #include "importers/scan_reader.h"
+#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace {
@@ -32,13 +39,16 @@ struct Arguments {
   std::string planes_path;
   int overlays = 0;
   bool register_stations = false;
+  bool strict = false;
 };
 
 void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("input_path", &a->input_path,
                         "COLMAP's sparse model: a folder, .bin or .txt.");
   command->AddInputPaths("scan_path", &a->scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
+                         "an --input_path that was aligned before: it remembers its scans.",
+                         Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
                         "weight: 1 = ordinary, "
@@ -50,12 +60,15 @@ void AddOptions(Arguments* a, Command* command) {
       "output_path", &a->output_path,
       "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
       "quaternion w x y z, translation: --transform_path of colmap model_transformer) and "
-      "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8).");
+      "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8). A trusted "
+      "result "
+      "that is there is not replaced by an untrusted one, which goes to OUTPUT.untrusted.");
   command->AddInputPath("image_path", &a->image_path,
                         "Folder of the photos (the plain ones where a pattern was projected); with "
                         "it the report says how well photos and scan intensity agree, and an "
                         "alignment that they contradict is not trusted.",
                         Command::Kind::kOptional);
+  command->AddBool("strict", &a->strict, kStrictHelp);
   command->AddInt("overlays", &a->overlays,
                   "Number of photos for which overlays/NAME.jpg is written into --output_path: "
                   "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
@@ -102,6 +115,7 @@ void CheckArguments(const Arguments& a) {
     problems.push_back("--overlays needs the photos: give --image_path");
   }
   ThrowIfProblems(problems);
+  RequireScans(a.scan_paths, a.input_path);
   ParseGeoOrigin(a.geo_origin);
   std::error_code ignored;
   if (std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
@@ -237,8 +251,9 @@ void FillReport(const Alignment& alignment, double reprojection_rms_after, Repor
 
 // The model on the Earth, with --geo_origin; the report's `geo`.
 void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans& placed,
-              const std::optional<GeoReference>& geo, const Command::Context& context) {
-  const std::string folder = a.output_path + "/geo";
+              const std::optional<GeoReference>& geo, const std::string& output_path,
+              const Command::Context& context) {
+  const std::string folder = output_path + "/geo";
   context.report["geo"] = nullptr;
   if (a.geo_origin.empty() && std::filesystem::exists(folder + "/geo.json")) {
     context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
@@ -250,51 +265,205 @@ void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans&
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
 }
 
-// What photos and scan say about each other; the report's `agreement` and `overlays`.
+// The photos that can be compared with the scan; what there is to say about the others. Returns the
+// reasons that were told.
+std::set<std::string> LookForPhotos(const Arguments& a, const SparseModel& model,
+                                    const Command::Context& context) {
+  std::set<std::string> told;
+  if (a.image_path.empty()) return told;
+  std::vector<PhotoLeftOut> left_out;
+  std::vector<std::string> notes;
+  for (const SparseImage* image : SpreadImages(model, static_cast<int>(model.images.size()))) {
+    const Camera& camera = model.cameras.at(image->camera_id);
+    const PhotoFit fit = FitPhotoToCamera(a.image_path + "/" + image->name, image->name,
+                                          camera.width, camera.height);
+    if (!fit.note.empty()) notes.push_back(fit.note);
+    if (fit.usable()) continue;
+    left_out.push_back({image->name, fit.problem});
+    told.insert(fit.problem);
+  }
+  if (a.strict) ThrowIfAnyLeftOut(left_out, a.image_path);
+  ReportPhotosLeftOut(left_out, context);
+  for (const std::string& note : FirstNotes(notes)) context.Warn(note);
+  return told;
+}
+
+// Warnings "START: REASON" of photos whose reason was not told before.
+void WarnOfPhotos(const Arguments& a, const std::vector<std::string>& warnings,
+                  const std::string& start, const std::set<std::string>& told,
+                  const Command::Context& context) {
+  for (const std::string& warning : warnings) {
+    const std::string reason =
+        warning.compare(0, start.size(), start) == 0 ? warning.substr(start.size()) : warning;
+    if (told.count(reason) > 0) continue;
+    if (a.strict) ThrowIfAnyLeftOut({{"", reason}}, a.image_path);
+    context.Warn(warning);
+  }
+}
+
+// What photos and scan say about each other; the report's `agreement`.
 void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
-                       const SurveyedScans& surveyed, const Command::Context& context) {
-  context.report["overlays"] = Json::array();
+                       const SurveyedScans& surveyed, const std::set<std::string>& told,
+                       const Command::Context& context) {
   if (a.image_path.empty()) return;
   context.progress.Stage("agreement");
-  const int num_threads = context.options.num_threads;
   std::vector<std::string> warnings;
   const AgreementOptions options;
-  const Agreement agreement =
-      MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options, num_threads, &warnings);
+  const Agreement agreement = MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options,
+                                               context.options.num_threads, &warnings);
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
-  if (a.overlays > 0) {
-    context.progress.Stage("overlays");
-    for (const std::string& path :
-         WriteOverlays(aligned, a.image_path, a.output_path + "/overlays", surveyed.viewer(),
-                       a.overlays, OverlayOptions(), num_threads, &warnings)) {
-      context.report["overlays"].push_back(path);
-    }
+  WarnOfPhotos(a, warnings, "Agreement: ", told, context);
+}
+
+// The report's `overlays`.
+void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
+                          const SurveyedScans& surveyed, const std::set<std::string>& told,
+                          const std::string& output_path, const Command::Context& context) {
+  context.report["overlays"] = Json::array();
+  if (a.overlays == 0) return;
+  context.progress.Stage("overlays");
+  std::vector<std::string> warnings;
+  for (const std::string& path :
+       WriteOverlays(aligned, a.image_path, output_path + "/overlays", surveyed.viewer(),
+                     a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
+    context.report["overlays"].push_back(path);
   }
-  for (const std::string& warning : warnings) context.Warn(warning);
+  WarnOfPhotos(a, warnings, "Overlay: ", told, context);
+}
+
+// Another scan than the one that a model was aligned to before is no mistake here.
+PlacedScans ReadScansToAlign(const Arguments& a) {
+  if (!a.scan_paths.empty()) return ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  return ReadScansOfModel(ReadAlignmentRecord(a.input_path),
+                          {a.scan_paths, a.scan_poses, a.scan_reader});
+}
+
+// The scans as they are read, and the alignment to them. The reading may turn out to be the other
+// one (--azimuth auto).
+struct Reading {
+  Reading(const Arguments& a, const SurveyOptions& options)
+      : placed(ReadScansToAlign(a)),
+        surveyed(std::make_unique<const SurveyedScans>(placed.scans, options)) {}
+  Reading(const Reading&) = delete;  // the survey is one of these scans
+  Reading& operator=(const Reading&) = delete;
+
+  PlacedScans placed;
+  std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
+  std::unique_ptr<const SurveyedScans> surveyed;
+  AlignmentAttempt attempt;
+
+  // Of the first RTPI scan; "" = there is none.
+  std::string azimuth() const {
+    for (const PlacedScans::File& file : placed.files) {
+      if (!file.azimuth.empty()) return file.azimuth;
+    }
+    return "";
+  }
+};
+
+std::string OtherAzimuth(const std::string& azimuth) {
+  return azimuth == "clockwise" ? "counterclockwise" : "clockwise";
 }
 
 // The planes of the scans (thesis 7.2), where they are asked for.
-std::vector<ScanPlane> DetectPlanes(const Arguments& a, const SurveyedScans& surveyed,
-                                    const Command::Context& context) {
+std::vector<ScanPlane> PlanesOf(const Arguments& a, const SurveyedScans& surveyed) {
   if (!a.alignment.plane_constrained && a.planes_path.empty()) return {};
-  context.progress.Stage("planes");
-  const std::vector<ScanPlane>& planes = surveyed.planes();
-  if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, surveyed.scans(), planes, context.options.num_threads);
+  return surveyed.planes();
+}
+
+// The other reading of RTPI scans, which the picks have shown.
+void TakeMirroredReading(MirroredReading found, Reading* reading, const Command::Context& context) {
+  for (PlacedScans::File& file : reading->placed.files) {
+    if (file.azimuth.empty()) continue;
+    context.Warn(file.path + " is read " + OtherAzimuth(file.azimuth) + " (--azimuth auto): read " +
+                 file.azimuth + " it is a mirror image of the room; " + found.evidence + ".");
+    file.azimuth = OtherAzimuth(file.azimuth);
   }
-  return planes;
+  reading->mirrored = std::move(found.scans);
+  reading->surveyed = std::move(found.surveyed);
+  reading->attempt = std::move(found.attempt);
+}
+
+// Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
+// how and there is no other format among the scans, or says so.
+void AlignScans(const Arguments& a, const AlignmentInput& input, Reading* reading,
+                const Command::Context& context) {
+  const std::vector<PlacedScans::File>& files = reading->placed.files;
+  const bool may_turn = a.scan_reader.azimuth == "auto" &&
+                        std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
+                          return !file.azimuth.empty();
+                        });
+  AlignmentAttempt& attempt = reading->attempt;
+  attempt = AttemptAlignment(input, a.alignment, &context.progress);
+  if (attempt.says_mirrored && !may_turn) return;
+  MirroredReading found = FindMirroredReading(input, attempt, a.alignment, &context.progress);
+  if (found.kind == MirroredReading::Kind::kNone) return;
+  if (found.kind == MirroredReading::Kind::kScan && may_turn) {
+    TakeMirroredReading(std::move(found), reading, context);
+  } else if (!attempt.says_mirrored) {
+    const bool both = found.kind == MirroredReading::Kind::kScanAndPicks;
+    attempt.alignment.reset();
+    attempt.refusal = MirroredScan(files[0].path,
+                                   std::string("the scan is a mirror image of the room") +
+                                       (both ? ", and so are the picks: " : ": ") + found.evidence,
+                                   MirrorRemedy(input), !both)
+                          .what();
+  }
+}
+
+// Where the result goes: a trusted one that is there is kept.
+std::string ChooseOutput(const Arguments& a, const Command::Context& context) {
+  if (context.report.trusted()) return a.output_path;
+  const AlignmentRecord there = ReadAlignmentRecord(a.output_path);
+  if (!there.found || !there.trusted) return a.output_path;
+  std::string output_path = a.output_path;
+  while (output_path.size() > 1 && output_path.back() == '/') output_path.pop_back();
+  output_path += ".untrusted";
+  context.Warn("The trusted result in " + a.output_path + " is kept; this one is in " +
+               output_path + ".");
+  return output_path;
+}
+
+// Nothing but the report, which says why.
+void WriteRefusal(const Arguments& a, const std::string& refusal, const Command::Context& context) {
+  context.report.SetUntrusted(refusal);
+  context.report["scan_from_sparse"] = nullptr;
+  const std::string output_path = ChooseOutput(a, context);
+  MakeFolder(output_path);
+  context.report.AddCopy(output_path + "/alignment.json");
+}
+
+void WriteAligned(const Arguments& a, const SparseModel& model, const Reading& reading,
+                  const std::optional<GeoReference>& geo, const std::set<std::string>& told,
+                  const Command::Context& context) {
+  const std::string output_path = ChooseOutput(a, context);
+  const Similarity& scan_from_sparse = reading.attempt.alignment->scan_from_sparse;
+  context.progress.Stage("write");
+  WriteSparseModel(model, output_path);
+  WriteSimilarity(output_path + "/scan_from_sparse.txt", scan_from_sparse);
+  WriteSimilarityMatrix(output_path + "/scan_from_sparse_matrix.txt", scan_from_sparse);
+  WriteGeo(a, model, reading.placed, geo, output_path, context);
+  context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
+  context.report.AddCopy(output_path + "/alignment.json");
+  WriteOverlayPictures(a, model, *reading.surveyed, told, output_path, context);
 }
 
 // Scans of several stations against each other; the report's `stations`.
-void CompareStations(const Arguments& a, std::vector<Scan>* scans,
-                     const Command::Context& context) {
+void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Context& context) {
+  std::vector<Scan>* const scans = &placed->scans;
   context.report["stations"] = Json::array();
   if (scans->size() < 2) return;
   context.progress.Stage("stations");
   if (a.register_stations) {
     for (const int moved : RegisterStations(scans)) {
       context.Warn((*scans)[moved].path + " was moved onto the other scans");
+      int scan = 0;
+      for (PlacedScans::File& file : placed->files) {
+        for (size_t k = 0; k < file.placed.size(); ++k, ++scan) {
+          if (scan == moved) file.placed[k] = true;  // the aligned model remembers where it is now
+        }
+      }
     }
   }
   const StationCheck check = CheckStations(*scans);
@@ -312,45 +481,36 @@ void CompareStations(const Arguments& a, std::vector<Scan>* scans,
   if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
 }
 
-// None if the files contradict each other; the report then says so.
-std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput& input,
-                                       const Command::Context& context) {
-  try {
-    return AlignToScan(input, a.alignment, &context.progress);
-  } catch (const Contradiction& contradiction) {
-    context.report.SetUntrusted(contradiction.what());
-    context.report["scan_from_sparse"] = nullptr;
-    MakeFolder(a.output_path);
-    context.report.AddCopy(a.output_path + "/alignment.json");
-    return std::nullopt;
-  }
-}
-
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
   SparseModel model = ReadSparseModel(a.input_path);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
+  const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
-  PlacedScans placed = ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
-  CompareStations(a, &placed.scans, context);
-  const std::optional<GeoReference> geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
   SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
   options.num_threads = context.options.num_threads;
-  const SurveyedScans surveyed(placed.scans, options);
-  const std::vector<ScanPlane> planes = DetectPlanes(a, surveyed, context);
-  const std::optional<Alignment> found =
-      FindAlignment(a,
-                    {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth, a.image_path,
-                     context.options.num_threads},
-                    context);
-  if (!found) return;
-  const Alignment& alignment = *found;
+  Reading reading(a, options);
+  for (const std::string& note : reading.placed.notes) context.Warn(note);
+  CompareStations(a, &reading.placed, context);
+  const std::optional<GeoReference> geo =
+      FindGeoReference(reading.placed, ParseGeoOrigin(a.geo_origin));
+  context.progress.Stage("planes");
+  PlanesOf(a, *reading.surveyed);
+  AlignScans(a,
+             {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(), a.image_path,
+              context.options.num_threads},
+             &reading, context);
+  const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
+  if (!a.planes_path.empty()) {
+    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads);
+  }
+  if (!reading.attempt.alignment) return WriteRefusal(a, reading.attempt.refusal, context);
+  const Alignment& alignment = *reading.attempt.alignment;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
 
-  context.progress.Stage("write");
   if (alignment.adjusted()) {
     model = alignment.adjustment.bundle.model;
   } else {
@@ -361,12 +521,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  WriteSparseModel(model, a.output_path);
-  WriteSimilarity(a.output_path + "/scan_from_sparse.txt", alignment.scan_from_sparse);
-  WriteSimilarityMatrix(a.output_path + "/scan_from_sparse_matrix.txt", alignment.scan_from_sparse);
-  WriteGeo(a, model, placed, geo, context);
-  context.report.AddCopy(a.output_path + "/alignment.json");
-  CompareWithPhotos(a, model, surveyed, context);
+  CompareWithPhotos(a, model, *reading.surveyed, told, context);
+  WriteAligned(a, model, reading, geo, told, context);
 }
 
 }  // namespace

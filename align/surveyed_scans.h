@@ -35,6 +35,7 @@ class SurveyedScans {
                          const SurveyOptions& options = SurveyOptions());
 
   const std::vector<Scan>& scans() const { return scans_; }
+  const SurveyOptions& options() const { return options_; }
 
   // Small flat patches: distances of points from the surface.
   const ScanPatches& patches() const;

@@ -100,6 +100,28 @@ std::optional<double> Angle(const Exiv2::ExifData& exif, const std::string& key,
   return is_negative ? -degrees : degrees;
 }
 
+// The orientation of EXIF 2.3 (4.6.4 A): what has to be done to the stored pixels; 1 = nothing,
+// also where nothing is said.
+int ReadOrientation(const std::string& path) {
+  SilenceExiv2();
+  try {
+    auto image = Exiv2::ImageFactory::open(path);
+    image->readMetadata();
+    const auto number = PositiveNumber(image->exifData(), "Exif.Image.Orientation");
+    return number && *number <= 8 ? static_cast<int>(*number) : 1;
+  } catch (const std::exception&) {
+    return 1;
+  }
+}
+
+void Turn(int orientation, cv::Mat* photo) {
+  if (orientation >= 5) cv::transpose(*photo, *photo);
+  // Then 5 to 8 are as 1 to 4: nothing, mirrored, turned by 180 degrees, upside down.
+  static constexpr int kFlips[] = {0, 1, -1, 0};
+  const int then = (orientation - 1) % 4;
+  if (then > 0) cv::flip(*photo, *photo, kFlips[then]);
+}
+
 // flags: cv::IMREAD_*.
 cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
@@ -130,7 +152,13 @@ std::optional<double> ExposureData::RelativeExposure() const {
   return *exposure_time * iso.value_or(1.0) / (n * n);
 }
 
-cv::Mat ReadPhoto(const std::string& path) { return DecodePhoto(path, cv::IMREAD_COLOR); }
+cv::Mat ReadPhoto(const std::string& path, PhotoPixels pixels) {
+  cv::Mat photo = DecodePhoto(path, cv::IMREAD_COLOR);
+  if (pixels == PhotoPixels::kTurnedByExif) Turn(ReadOrientation(path), &photo);
+  return photo;
+}
+
+bool ExifExchangesSides(const std::string& path) { return ReadOrientation(path) >= 5; }
 
 cv::Mat1b ReadGreyPhoto(const std::string& path, int shrink) {
   switch (shrink) {

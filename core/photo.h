@@ -23,9 +23,15 @@ struct ExposureData {
   std::optional<double> RelativeExposure() const;
 };
 
-// 8-bit BGR, as stored: an EXIF orientation is NOT applied, because COLMAP's keypoints are not
-// turned either. Throws InputError if the file is missing, not an image or broken.
-cv::Mat ReadPhoto(const std::string& path);
+// Which way up. COLMAP's keypoints are those of the pixels as stored.
+enum class PhotoPixels { kAsStored, kTurnedByExif };
+
+// 8-bit BGR, by default as stored: an EXIF orientation is NOT applied, because COLMAP's keypoints
+// are not turned either. Throws InputError if the file is missing, not an image or broken.
+cv::Mat ReadPhoto(const std::string& path, PhotoPixels pixels = PhotoPixels::kAsStored);
+
+// The file's EXIF orientation exchanges width and height.
+bool ExifExchangesSides(const std::string& path);
 
 // The same in grey, made smaller while it is decoded: shrink is 1, 2, 4 or 8. For a JPEG this takes
 // a part of the time and memory.

@@ -202,6 +202,7 @@ class Importer {
 int main(int argc, char** argv) {
   using roomtex::Command;
   roomtex::ImportOptions options;
+  options.reader.azimuth = "clockwise";  // conversions do not depend on what a header says
   Command command(
       "roomtex-import",
       "Reads a range scan (RTPI, PTX, organised PCD; PLY meshes) and writes it as mesh, "

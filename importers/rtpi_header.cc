@@ -1,5 +1,7 @@
 #include "importers/rtpi_header.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -19,14 +21,14 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-bool StartsWith(std::string_view text, std::string_view start) {
+bool LineBegins(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
 }
 
 // The line without its "#" and the blanks around.
 std::string_view Content(std::string_view line) {
   line = Trimmed(line);
-  if (StartsWith(line, "#")) line = Trimmed(line.substr(1));
+  if (LineBegins(line, "#")) line = Trimmed(line.substr(1));
   return line;
 }
 
@@ -35,14 +37,14 @@ void SplitItem(std::string_view content, std::string_view* key, std::string_view
   const size_t end = content.find_first_of(": \t");
   *key = content.substr(0, end);
   *value = end == std::string_view::npos ? std::string_view() : Trimmed(content.substr(end));
-  if (StartsWith(*value, ":")) *value = Trimmed(value->substr(1));
+  if (LineBegins(*value, ":")) *value = Trimmed(value->substr(1));
 }
 
 // En dash (UTF-8 and Windows-1252) and the typographic minus as '-'.
 std::string WithPlainMinus(std::string_view text) {
   std::string plain;
   for (size_t i = 0; i < text.size(); ++i) {
-    if (StartsWith(text.substr(i), "\xE2\x80\x93") || StartsWith(text.substr(i), "\xE2\x88\x92")) {
+    if (LineBegins(text.substr(i), "\xE2\x80\x93") || LineBegins(text.substr(i), "\xE2\x88\x92")) {
       plain += '-';
       i += 2;
     } else {
@@ -104,18 +106,18 @@ class HeaderParser {
   RtpiLayout Parse() {
     std::string_view line;
     if (!NextLine(&line)) throw NotRtpi();
-    while (StartsWith(Trimmed(line), "#")) {
+    while (LineBegins(Trimmed(line), "#")) {
       layout_.header.comments.emplace_back(line);  // version 2 begins with free lines
       if (!NextLine(&line)) throw NotRtpi();
     }
-    if (StartsWith(line, "P9 ")) {
+    if (LineBegins(line, "P9 ")) {
       throw InputError(path_, LinePosition(lines_.line_number()), "is RTPI version 1 (\"P9\")",
                        "Version 1 is not supported: convert the file to version 3.0 with the "
                        "scanner's software");
     }
-    if (StartsWith(line, kMagic2)) {
+    if (LineBegins(line, kMagic2)) {
       ParseVersion2(line);
-    } else if (StartsWith(line, kMagic)) {
+    } else if (LineBegins(line, kMagic)) {
       ParseVersion3(line);
     } else {
       throw NotRtpi();
@@ -152,7 +154,7 @@ class HeaderParser {
   }
 
   void ParseVersion3(std::string_view magic) {
-    if (!StartsWith(magic.substr(std::string_view(kMagic).size()), "3")) {
+    if (!LineBegins(magic.substr(std::string_view(kMagic).size()), "3")) {
       throw InputError(path_, LinePosition(lines_.line_number()),
                        "is " + Quoted(magic) + ", expected \"RTPI_version_3.0\"",
                        "Only the versions 2 and 3.0 are supported");
@@ -162,14 +164,14 @@ class HeaderParser {
     for (bool have_line = Take(&line);; have_line = Take(&line)) {
       if (!have_line) throw NoEnd();
       const std::string_view content = Content(line);
-      if (StartsWith(content, "--end_header--")) break;
+      if (LineBegins(content, "--end_header--")) break;
       if (in_comments) {
         layout_.header.comments.push_back(line);
-      } else if (StartsWith(content, "--begin_comments--")) {
+      } else if (LineBegins(content, "--begin_comments--")) {
         in_comments = true;
-      } else if (StartsWith(content, "--begin_scan_parameters--")) {
+      } else if (LineBegins(content, "--begin_scan_parameters--")) {
         in_parameters = true;
-      } else if (!StartsWith(content, "--begin_header--")) {
+      } else if (!LineBegins(content, "--begin_header--")) {
         if (!ParseItem(line, &has_num_columns)) {
           (in_parameters ? layout_.header.parameters : layout_.header.device).push_back(line);
         }
@@ -266,15 +268,31 @@ std::string NumberText(double number) {
 
 bool LooksLikeRtpi(const std::string& first_bytes) {
   std::string_view rest = first_bytes;
-  while (StartsWith(rest, "#")) {
+  while (LineBegins(rest, "#")) {
     const size_t newline = rest.find('\n');
     if (newline == std::string_view::npos) return false;
     rest = rest.substr(newline + 1);
   }
-  return StartsWith(rest, kMagic) || StartsWith(rest, kMagic2) || StartsWith(rest, "P9 ");
+  return LineBegins(rest, kMagic) || LineBegins(rest, kMagic2) || LineBegins(rest, "P9 ");
 }
 
 RtpiLayout ReadRtpiHeader(const FileReader& file) { return HeaderParser(file).Parse(); }
+
+std::string AzimuthOfScanner(const RtpiHeader& header) {
+  const auto has = [&](const std::string& start) {
+    return std::any_of(header.device.begin(), header.device.end(), [&](const std::string& line) {
+      if (line.size() <= start.size()) return false;
+      const bool begins = std::equal(start.begin(), start.end(), line.begin(), [](char a, char b) {
+        return std::tolower(static_cast<unsigned char>(a)) ==
+               std::tolower(static_cast<unsigned char>(b));
+      });
+      return begins && line.find_first_not_of(" \t", start.size()) != std::string::npos;
+    });
+  };
+  const bool is_scanners = has("# model: deltaSphere") && has("# serial_number:") &&
+                           has("# laser:") && has("# scan_start_time:");
+  return is_scanners ? "counterclockwise" : "";
+}
 
 std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns) {
   const int64_t max_samples_per_column = header.max_samples_per_column.value_or(0);

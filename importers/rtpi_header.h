@@ -38,6 +38,11 @@ struct RtpiLayout {
 // Whether these first bytes of a file are those of an RTPI file of any version.
 bool LooksLikeRtpi(const std::string& first_bytes);
 
+// The sense of the azimuth seen from above that the header lets one know: "counterclockwise" for
+// one that the scanner's own software wrote (model deltaSphere, serial number, laser and times of
+// the scan: manual 15.2, which counts so), else "".
+std::string AzimuthOfScanner(const RtpiHeader& header);
+
 // Tolerates CR LF, unknown and missing lines, values on the next line, en dashes as minus signs.
 // Throws InputError (not RTPI, version 1, no end of the header, a number that is none).
 RtpiLayout ReadRtpiHeader(const FileReader& file);

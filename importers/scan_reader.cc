@@ -95,9 +95,24 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file;
   file.format = "RTPI";
   file.byte_order = rtpi.byte_order == ByteOrder::kBig ? "big" : "little";
+  const std::string of_scanner = AzimuthOfScanner(rtpi.header);
+  const std::string by_default = of_scanner.empty() ? "clockwise" : of_scanner;
+  file.azimuth = options.azimuth == "auto" ? by_default : options.azimuth;
+  if (!of_scanner.empty()) {
+    const std::string whose =
+        path + " has the header of a DeltaSphere, whose azimuths are " + of_scanner + ": ";
+    if (options.azimuth == "auto") {
+      file.azimuth_note = whose + "it is read so (--azimuth says another).";
+    } else if (options.azimuth != of_scanner) {
+      file.azimuth_note = whose + "read " + options.azimuth + " the room is a mirror image.";
+    }
+  }
+  if (!file.azimuth_note.empty()) file.notes.push_back(file.azimuth_note);
   RtpiScanOptions scan_options;
-  scan_options.counterclockwise = options.azimuth == "counterclockwise";
+  scan_options.counterclockwise = file.azimuth == "counterclockwise";
   scan_options.meters_per_unit = MetersPerUnitOr(options.units, 0);
+  file.meters_per_unit = scan_options.meters_per_unit > 0 ? scan_options.meters_per_unit
+                                                          : MetersPerUnitOr(rtpi.header.units, 1);
   scan_options.max_range = options.max_range;
   file.scans.push_back(ScanFromRtpi(rtpi, scan_options, &file.notes));
   return file;
@@ -106,10 +121,11 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
 }  // namespace
 
 void ScanReaderOptions::Declare(OptionFields* fields) {
-  fields->Choice("azimuth", &azimuth, {"clockwise", "counterclockwise"},
+  fields->Choice("azimuth", &azimuth, {"auto", "clockwise", "counterclockwise"},
                  "RTPI: sense in which the azimuth grows, seen from above. clockwise is the "
                  "thesis' formula; files of real scanners are counterclockwise. The wrong one "
-                 "mirrors the room.");
+                 "mirrors the room. auto: as it is known (an aligned model remembers it, picks "
+                 "show it, or the header is a DeltaSphere's own), else clockwise.");
   fields
       ->Choice("units", &units, LengthUnitNames(),
                "Unit of the lengths in the scan file; not given = what the file says, metres "
@@ -137,6 +153,7 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
   if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
   const double meters_per_unit = MetersPerUnitOr(options.units, 1);
   ScanFile file;
+  file.meters_per_unit = meters_per_unit;
   if (StartsWith(start, "ply\n") || StartsWith(start, "ply\r")) {
     file.format = "PLY";
     file.scans.push_back(ReadPly(path, {meters_per_unit, options.max_range}, &file.byte_order));
@@ -193,10 +210,13 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   for (const std::string& path : paths) {
     ScanFile file = ReadScanFile(path, options);
     const int count = static_cast<int>(file.scans.size());
+    PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
+    if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
     for (int k = 0; k < count; ++k) {
       Scan& scan = file.scans[k];
       const Eigen::Vector3d up_in_station = scan.scan_from_station.rotation.conjugate() * scan.up;
       const std::optional<ScanPoses::Placement> pose = poses.Take(path, k, count, up_in_station);
+      read.placed.push_back(pose.has_value());
       if (pose) {
         PlaceScan(pose->scan_from_station, &scan);
         if (pose->station) placed.stations.push_back(*pose->station);
@@ -205,6 +225,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
       }
       placed.scans.push_back(std::move(scan));
     }
+    placed.files.push_back(std::move(read));
   }
   poses.RequireAllTaken();
   if (!missing.empty() && (placed.scans.size() > 1 || poses.surveyed())) {

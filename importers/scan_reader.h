@@ -14,8 +14,9 @@ class OptionFields;
 
 struct ScanReaderOptions {
   // RTPI: sense of the azimuth seen from above. "clockwise" is the thesis' formula (5.1.1), files
-  // of real scanners are "counterclockwise"; the wrong one mirrors the room.
-  std::string azimuth = "clockwise";
+  // of real scanners are "counterclockwise"; the wrong one mirrors the room. "auto": by the header
+  // where it is one of the scanner's own (AzimuthOfScanner), else clockwise.
+  std::string azimuth = "auto";
   // RTPI, PTX, PCD, PLY, OBJ: unit of the coordinates in the file; "" = what the file says, metres
   // if it does not. One of "", "meters", "millimeters", "centimeters", "feet", "inches".
   std::string units;
@@ -32,6 +33,10 @@ struct ScanFile {
   std::string format;              // "RTPI", "PTX", "PCD", "PLY" or "OBJ"
   std::string byte_order;          // "little", "big" or "text"
   std::vector<std::string> notes;  // assumptions about the file that a user should know
+  // RTPI: as it was read, "clockwise" or "counterclockwise"; and what there is to say about it, a
+  // sentence or "". Other formats: "".
+  std::string azimuth, azimuth_note;
+  double meters_per_unit = 1;
 };
 // Throws InputError (missing, not a scan, broken ...).
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options);
@@ -52,6 +57,14 @@ Scan ReadScan(const std::string& path, const ScanReaderOptions& options);
 // InputError.
 struct PlacedScans {
   std::vector<Scan> scans;
+  // The files that they came from, in the order of the paths.
+  struct File {
+    std::string path, azimuth;  // azimuth as in ScanFile
+    double meters_per_unit = 1;
+    std::vector<bool> placed;  // one per scan of the file: its pose is one of poses_path
+  };
+  std::vector<File> files;
+  std::vector<std::string> notes;  // on azimuths; sentences
   // With surveyed stations: the scan frame, and one station per scan.
   std::optional<GeoFrame> enu;
   std::vector<SurveyedStation> stations;

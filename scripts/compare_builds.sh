@@ -90,7 +90,8 @@ run_all() {
     --output_path textured
   run texture_thesis roomtex-texture --input_path aligned --image_path in/room/photos \
     --scan_path in/room/scan.rtpi --output_path textured_thesis --Texture.scale 1 --Exposure.mode exif
-  run texture_mesh roomtex-texture --input_path aligned --image_path in/room/photos --scan_path import/room.ply \
+  mkdir -p aligned_anywhere && cp aligned/*.bin aligned_anywhere  # remembers no scan
+  run texture_mesh roomtex-texture --input_path aligned_anywhere --image_path in/room/photos --scan_path import/room.ply \
     --output_path textured_mesh
   run texture_stations roomtex-texture --input_path in/stations/truth --image_path in/stations/photos \
     --scan_path in/stations/scan.rtpi --scan_path in/stations/scan_1.rtpi \

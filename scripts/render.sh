@@ -6,7 +6,7 @@
 #   FOLDER   textured/  (has model.ply; give --model and --images, unless they lie beside it as aligned/ and
 #                       capture/photos, photos or images), or
 #            a capture of roomtex-simulate (coloured first, with aligned/ in or beside it, else with true poses), or
-#            aligned/   (coloured first; give --images and --scan)
+#            aligned/   (coloured first; give --images, and --scan unless it remembers it)
 #   OUTPUT   folder for the pictures; FOLDER/pictures if left out
 #   OPTIONS  for roomtex-render (--width 1600, --num_photos 6, --num_ring 8), or with --color before them for
 #            roomtex-texture (--color --azimuth counterclockwise)
@@ -64,12 +64,17 @@ else
     scan=${scan:-$(first "$folder/scan.rtpi")}
     model=${model:-$(first "$folder/aligned" "$parent/aligned" "$folder/truth")}
   fi
-  for need in "model:$model" "images:$images" "scan:$scan"; do
+  remembers=$model/alignment.json  # the scan
+  needs=("model:$model" "images:$images")
+  [ -e "$remembers" ] || needs+=("scan:$scan")
+  for need in "${needs[@]}"; do
     [ -n "${need#*:}" ] || { echo "render: give --${need%%:*}" >&2; exit 2; }
   done
   textured=$out/textured
   mkdir -p "$out"
-  "$bin/roomtex-texture" --input_path "$model" --image_path "$images" --scan_path "$scan" \
+  scan_option=()
+  [ -n "$scan" ] && scan_option=(--scan_path "$scan")
+  "$bin/roomtex-texture" --input_path "$model" --image_path "$images" "${scan_option[@]}" \
     --output_path "$textured" "${color_options[@]}" >/dev/null
 fi
 [ -n "$model" ] || { echo "render: give --model, the aligned COLMAP model" >&2; exit 2; }

@@ -57,7 +57,7 @@ struct ColorizeResult {
 };
 
 // Photos are decoded once each, num_threads of them at a time. The result does not depend on
-// num_threads. Throws InputError for a photo that cannot be read.
+// num_threads. Throws UnreadablePhotos (photo_pass.h).
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress);
 

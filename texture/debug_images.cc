@@ -189,7 +189,7 @@ void WritePhotoImages(const DebugInput& input, const Shares& shares, int photo,
   near.setTo(-1.0f, inverse_depth <= 0);
   WriteJpeg(ColorScale(near, std::max(nearest, 1e-6)), stem + "_depth.jpg");
 
-  cv::Mat picture = ReadPhoto(view.path);
+  cv::Mat picture = ReadPhoto(view.path, view.pixels);
   cv::resize(picture, picture, inverse_depth.size(), 0, 0, cv::INTER_AREA);
   const auto tint = [&picture](const cv::Mat& mask, const cv::Scalar& color) {
     cv::Mat tinted = 0.4 * picture + 0.6 * color;

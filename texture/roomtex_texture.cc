@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
@@ -11,6 +12,7 @@
 #include "core/output_file.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
+#include "importers/scan_record.h"
 #include "texture/colorize.h"
 #include "texture/output/evidence.h"
 #include "texture/output/output_set.h"
@@ -19,6 +21,7 @@
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
 #include "texture/sampling/photo_list.h"
+#include "texture/sampling/photo_pass.h"
 #include "texture/texels/grid_image.h"
 #include "texture/texels/texture_scale.h"
 
@@ -30,6 +33,7 @@ struct TextureOptions {
   std::vector<std::string> scan_paths;
   PhotoSources sources;
   ScanReaderOptions scan_reader;
+  bool accept_untrusted = false, strict = false;
   ColorizeOptions colorize;
   GlbOptions glb;
   std::string image_format = "png";
@@ -44,7 +48,12 @@ void AddPathOptions(TextureOptions* o, Command* command) {
   command->AddInputPath("image_path", &o->sources.image_path,
                         "Folder of the photos, as COLMAP was given it.");
   command->AddInputPaths("scan_path", &o->scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a mesh, .ply or .obj.");
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a mesh, .ply or .obj. Not "
+                         "needed for a model of roomtex-align, which remembers its scans and how "
+                         "they were read.",
+                         Command::Kind::kOptional);
+  command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write model.ply, model.glb, texture.png, report.json (and "
                          "model.rtpi) into.");
@@ -241,9 +250,10 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
 }
 
 // Inputs are never written over: a scan must not be one of the files that are to be written.
-void ProtectInputs(const TextureOptions& options) {
+void ProtectInputs(const TextureOptions& options, const PlacedScans& placed) {
   namespace fs = std::filesystem;
-  for (const std::string& scan : options.scan_paths) {
+  for (const PlacedScans::File& file : placed.files) {
+    const std::string& scan = file.path;
     const fs::path path(scan);
     std::error_code error;
     const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -271,6 +281,17 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
   if (!older.empty()) {
     context.Warn(folder + " also holds what this run did not write: " + older);
   }
+}
+
+// Which scans were read how; they may be those that the aligned model remembers.
+void FillScansReport(const PlacedScans& placed, Report* report) {
+  Json scans = Json::array();
+  for (const PlacedScans::File& file : placed.files) {
+    scans.push_back({{"path", file.path},
+                     {"azimuth", file.azimuth.empty() ? Json(nullptr) : Json(file.azimuth)},
+                     {"meters_per_unit", file.meters_per_unit}});
+  }
+  (*report)["scans"] = scans;
 }
 
 // The files appear together, or none of them.
@@ -303,6 +324,28 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   set.Commit();
 }
 
+// A file may look like a photo and be broken further down: then all is done again without it.
+ColorizeResult ColorizeWithReadable(const std::vector<Scan>& scans, const ColorizeOptions& colorize,
+                                    const TextureOptions& options, PhotoList* list,
+                                    const Command::Context& context) {
+  while (true) {
+    try {
+      return ColorizeScans(scans, list->photos, colorize, context.options.num_threads,
+                           &context.progress);
+    } catch (const UnreadablePhotos& unreadable) {
+      if (options.strict) throw;
+      std::set<std::string> names;
+      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
+      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
+      std::vector<PhotoView>& photos = list->photos;
+      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
+      if (photos.empty()) throw;
+      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
+                            unreadable.photos().end());
+    }
+  }
+}
+
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
@@ -311,10 +354,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   AppendProblems(colorize.Problems(), &problems);
   AppendProblems(options.glb.Problems(), &problems);
   ThrowIfProblems(problems);
+  RequireScans(options.scan_paths, options.input_path);
 
   context.progress.Stage("read model");
   const SparseModel model = ReadSparseModel(options.input_path);
-  const PhotoList list = ListPhotos(model, options.sources);
+  PhotoList list = ListPhotos(model, options.sources);
+  if (options.strict) ThrowIfAnyLeftOut(list.left_out, options.sources.image_path);
   for (const std::string& warning : list.warnings) context.Warn(warning);
   if (list.photos.empty()) {
     throw InputError(options.input_path, "", "holds no registered photo",
@@ -323,17 +368,22 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   if (list.photos.size() >= kMaxPhotos) {
     throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
   }
-  ProtectInputs(options);
-  MakeFolder(options.output_path);
-  context.report.AddCopy(options.output_path + "/report.json");
+  const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  const std::vector<Scan> scans =
-      ReadScans(options.scan_paths, options.scan_poses, options.scan_reader);
+  const PlacedScans placed =
+      ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
+  for (const std::string& note : placed.notes) context.Warn(note);
+  const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans);
+  ProtectInputs(options, placed);
+  MakeFolder(options.output_path);
+  context.report.AddCopy(options.output_path + "/report.json");
+  FillScansReport(placed, &context.report);
 
-  const ColorizeResult result =
-      ColorizeScans(scans, list.photos, colorize, context.options.num_threads, &context.progress);
+  const ColorizeResult result = ColorizeWithReadable(scans, colorize, options, &list, context);
+  ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {

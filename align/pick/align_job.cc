@@ -40,8 +40,8 @@ constexpr Stage kStages[] = {
     {"surface refinement", 0.1},
     {"trust", 0.05},
     {"bundle adjustment", 6},
-    {"write", 0.1},
     {"agreement", 0.9},
+    {"write", 0.1},
     {"overlays", 0.9},
 };
 constexpr int kNumStages = sizeof kStages / sizeof kStages[0];
@@ -71,6 +71,16 @@ Json ReadReport(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   Json json = Json::parse(stream, nullptr, false);
   return json.is_discarded() ? Json() : json;
+}
+
+// An untrusted result does not replace a trusted one: of both folders the one written last.
+std::string FolderOfRun(const std::string& aligned_path) {
+  std::error_code error, other_error;
+  const std::string aside = aligned_path + ".untrusted";
+  const auto time = std::filesystem::last_write_time(aligned_path + "/alignment.json", error);
+  const auto aside_time = std::filesystem::last_write_time(aside + "/alignment.json", other_error);
+  if (other_error) return aligned_path;
+  return error || aside_time > time ? aside : aligned_path;
 }
 
 }  // namespace
@@ -175,8 +185,10 @@ void AlignJob::TakeLine(const std::string& line) {
 void AlignJob::Finish(int exit_code) {
   // Only these two write a report: another one is of an earlier run.
   const bool has_report = exit_code == kExitDone || exit_code == kExitUntrusted;
-  const Json report = has_report ? ReadReport(aligned_path_ + "/alignment.json") : Json();
+  const std::string written = has_report ? FolderOfRun(aligned_path_) : aligned_path_;
+  const Json report = has_report ? ReadReport(written + "/alignment.json") : Json();
   const std::lock_guard<std::mutex> lock(mutex_);
+  written_path_ = written;
   if (cancelled_) {
     verdict_ = {"failed", "Ended before it was done.", {}, {}};
   } else {
@@ -239,7 +251,7 @@ Json AlignJob::State() {
 std::string AlignJob::OverlayPath(const std::string& name) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool known = std::find(overlays_.begin(), overlays_.end(), name) != overlays_.end();
-  return known ? aligned_path_ + "/overlays/" + name : "";
+  return known ? written_path_ + "/overlays/" + name : "";
 }
 
 std::string FindAlignProgram() {

@@ -61,6 +61,7 @@ class AlignJob {
   int exit_code_ = 0;
   AlignVerdict verdict_;
   std::vector<std::string> overlays_;
+  std::string written_path_;  // of the last run: the folder asked for, or the one beside it
 };
 
 // roomtex-align of the folder that this program lies in; its bare name (found by PATH) if there is

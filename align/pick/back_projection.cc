@@ -60,7 +60,7 @@ cv::Mat DrawBackProjection(const PickScene& scene, const ScanRays& rays, const P
   const double pixels = 1 / (camera.MeanFocalLength() * std::max(places.step(), 1e-9));
   const int min_width =
       static_cast<int>(std::ceil(camera.width * std::min(1.0, kPixelsPerSample * pixels)));
-  const cv::Mat3b reduced = ReadReducedPhoto(photo.path, camera.width, min_width);
+  const cv::Mat3b reduced = ReadReducedPhoto(photo.path, photo.fit, min_width);
   const Eigen::Vector2d shrink(1.0 * reduced.cols / camera.width,
                                1.0 * reduced.rows / camera.height);
   const double max_radius2 = std::pow(FieldRadius(projection), 2);

@@ -18,8 +18,8 @@ constexpr double kModelFactor = 3, kModelPx = 4;
 // Metres from the surface to which a pick counts as on it; as roomtex-align has it.
 constexpr double kPickReach = 0.06;
 
-std::string OtherAzimuth(const ScanReaderOptions& reader) {
-  return reader.azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+std::string OtherAzimuth(const std::string& azimuth) {
+  return azimuth == "counterclockwise" ? "clockwise" : "counterclockwise";
 }
 
 // Metres along the ray of the nearest scan; 0 where nothing can be said, infinite where no scanner
@@ -54,7 +54,7 @@ std::string AsSentence(std::string text) {
 }
 
 std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
-                                        const ScanReaderOptions& reader) {
+                                        const std::string& azimuth) {
   std::vector<std::string> warnings;
   if (static_cast<int>(on.size()) < kMinPicksPerPhoto) return warnings;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
@@ -63,7 +63,7 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vec
                        Number(review.mirrored_rms_px, 1) +
                        " when the scan is reflected. End this session and read an RTPI scan with "
                        "--azimuth " +
-                       OtherAzimuth(reader) + ".");
+                       OtherAzimuth(azimuth) + ".");
   } else if (review.exchanged) {
     warnings.push_back("Picks " + NumberOf(on[review.exchanged->first]) + " and " +
                        NumberOf(on[review.exchanged->second]) +
@@ -133,7 +133,7 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
     warnings = {
         "These picks were made on a mirror image of this scan. End this session and read an "
         "RTPI scan with --azimuth " +
-        OtherAzimuth(scene.input().scan_reader) + "."};
+        OtherAzimuth(scene.azimuth()) + "."};
   }
   return warnings;
 }

@@ -14,7 +14,7 @@ std::string AsSentence(std::string text);
 // Exchanged, mirrored, bad. `on`: where the reviewed picks stand among all, which is their number
 // (from 1) in the sentences.
 std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
-                                        const ScanReaderOptions& reader);
+                                        const std::string& azimuth);
 // Nearly on one line, on one plane, crowded in a part of the photo.
 std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera);
 // The picks of the photo agree with each other, but not with where the other photos have it.

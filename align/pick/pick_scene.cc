@@ -9,7 +9,7 @@
 #include "align/pick/mesh_panorama.h"
 #include "core/error.h"
 #include "core/output_file.h"
-#include "core/photo.h"
+#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace {
@@ -23,18 +23,9 @@ bool StaysInside(const std::string& name) {
   return std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
 }
 
-std::string ProblemOf(const PickPhoto& photo, const Camera& camera) {
+std::string ProblemOf(const PickPhoto& photo) {
   if (!StaysInside(photo.name())) return "The name of this photo leads out of --image_path.";
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(photo.path, ignored)) {
-    return "There is no photo " + photo.path + ".";
-  }
-  const auto [width, height] = ReadPhotoSize(photo.path);
-  if (width == 0) return photo.path + " is no photo that can be read.";
-  if (width == camera.width && height == camera.height) return "";
-  return photo.name() + " has " + std::to_string(width) + " x " + std::to_string(height) +
-         " pixels, its camera in the model " + std::to_string(camera.width) + " x " +
-         std::to_string(camera.height) + ".";
+  return photo.fit.problem;
 }
 
 // Share of the cells of a photo in which it has sparse points.
@@ -74,12 +65,30 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
   for (const auto& [id, camera] : model_.cameras) projections_.emplace(id, camera);
   AddPhotos();
   progress->Stage("read scan");
-  scans_ = ReadScans(input.scan_paths, input.scan_poses, input.scan_reader);
+  ReadScans();
   for (const Scan& scan : scans_) {
     if (!scan.organised) AddPanorama(scan);
     places_.push_back(std::make_unique<ScanPlaces>(scan.organised ? scan : panoramas_.back()));
   }
   progress->Finish();
+}
+
+void PickScene::ReadScans() {
+  const AlignmentRecord record = ReadAlignmentRecord(input_.input_path);
+  PlacedScans placed =
+      ReadScansOfModel(record, {input_.scan_paths, input_.scan_poses, input_.scan_reader});
+  scans_ = std::move(placed.scans);
+  notes_.insert(notes_.end(), placed.notes.begin(), placed.notes.end());
+  input_.scan_paths.clear();
+  for (const PlacedScans::File& file : placed.files) {
+    input_.scan_paths.push_back(file.path);
+    if (azimuth_.empty()) azimuth_ = file.azimuth;
+  }
+  if (record.scans.empty()) return;
+  // What roomtex-align is to be told.
+  if (!azimuth_.empty()) input_.scan_reader.azimuth = azimuth_;
+  input_.scan_reader.units = record.scans[0].units;
+  input_.scan_reader.max_range = record.scans[0].max_range;
 }
 
 void PickScene::AddPanorama(const Scan& mesh) {
@@ -99,12 +108,16 @@ PickScene::~PickScene() {
 }
 
 void PickScene::AddPhotos() {
+  std::vector<std::string> notes;
   for (const auto& [id, image] : model_.images) {
     PickPhoto photo;
     photo.image = &image;
     photo.projection = &projections_.at(image.camera_id);
     photo.path = input_.image_path + "/" + image.name;
-    photo.problem = ProblemOf(photo, photo.projection->camera());
+    const Camera& camera = photo.projection->camera();
+    photo.fit = FitPhotoToCamera(photo.path, image.name, camera.width, camera.height);
+    photo.problem = ProblemOf(photo);
+    if (photo.problem.empty() && !photo.fit.note.empty()) notes.push_back(photo.fit.note);
     photo.missing = !photo.problem.empty();
     photo.num_points = static_cast<int>(
         std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
@@ -112,6 +125,7 @@ void PickScene::AddPhotos() {
     photo.score = ScoreOf(image, photo.projection->camera(), model_);
     photos_.push_back(photo);
   }
+  for (const std::string& note : FirstNotes(notes)) notes_.push_back(note);
   std::sort(photos_.begin(), photos_.end(),
             [](const PickPhoto& a, const PickPhoto& b) { return a.name() < b.name(); });
   for (size_t i = 0; i < photos_.size(); ++i) photos_[i].id = static_cast<int>(i);

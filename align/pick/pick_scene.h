@@ -17,6 +17,7 @@
 #include "align/trust/overlay.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
+#include "core/photo_fit.h"
 #include "core/progress.h"
 #include "core/scan.h"
 #include "importers/scan_reader.h"
@@ -25,7 +26,7 @@ namespace roomtex {
 
 struct PickSceneInput {
   std::string input_path, image_path, scan_poses;
-  std::vector<std::string> scan_paths;
+  std::vector<std::string> scan_paths;  // empty: those that the model remembers
   ScanReaderOptions scan_reader;
   int num_threads = -1;
 };
@@ -35,8 +36,9 @@ struct PickPhoto {
   const SparseImage* image = nullptr;
   const CameraProjection* projection = nullptr;
   std::string path;
+  PhotoFit fit;
   // It cannot be shown, and why, in a sentence: no file there, one outside the folder of the
-  // photos, or one of another size than its camera's.
+  // photos, or one of another shape than its camera's.
   bool missing = false;
   std::string problem;
   int num_points = 0;  // sparse points it sees
@@ -52,7 +54,13 @@ class PickScene {
   PickScene(const PickSceneInput& input, Progress* progress);
   ~PickScene();  // ends what runs in the background
 
+  // The scans as they were found and read, where an aligned model remembers them.
   const PickSceneInput& input() const { return input_; }
+  // How RTPI scans were read; "" = there are none.
+  const std::string& azimuth() const { return azimuth_; }
+  const std::vector<std::string>& notes() const {
+    return notes_;
+  }  // on scans and photos; sentences
   const SparseModel& model() const { return model_; }
   const std::vector<Scan>& scans() const { return scans_; }
   int num_scans() const { return static_cast<int>(scans_.size()); }
@@ -78,10 +86,13 @@ class PickScene {
 
  private:
   void AddPhotos();
+  void ReadScans();
   void AddPanorama(const Scan& mesh);
   void Work();
 
-  const PickSceneInput input_;
+  PickSceneInput input_;
+  std::string azimuth_;
+  std::vector<std::string> notes_;
   SparseModel model_;
   std::vector<Scan> scans_;
   const SurveyedScans surveyed_{scans_};

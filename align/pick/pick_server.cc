@@ -135,7 +135,9 @@ void PickServer::AddPictures() {
     if (photo.missing) continue;
     const Camera& camera = photo.projection->camera();
     tiles_.Add(PhotoPicture(photo.id), camera.width, camera.height, ImageTiles::Format::kJpeg,
-               [path = photo.path] { return ReadPhoto(path); });
+               [&photo, &camera] {
+                 return ReadFittedPhoto(photo.path, photo.fit, camera.width, camera.height);
+               });
   }
   for (int scan = 0; scan < scene_.num_scans(); ++scan) {
     const ScanPlaces& places = scene_.places(scan);
@@ -296,8 +298,7 @@ std::optional<LocalServer::Content> PickServer::Thumbnail(const Query& query) {
   const std::lock_guard<std::mutex> lock(thumbnails_mutex_);
   std::shared_ptr<const std::string>& kept = thumbnails_[*id];
   if (!kept && !server_.stopping()) {
-    const Camera& camera = photo.projection->camera();
-    cv::Mat picture = ReadReducedPhoto(photo.path, camera.width, kThumbnailWidth);
+    cv::Mat picture = ReadReducedPhoto(photo.path, photo.fit, kThumbnailWidth);
     if (picture.cols > kThumbnailWidth) {
       const int height = std::max(
           1, static_cast<int>(std::lround(1.0 * kThumbnailWidth * picture.rows / picture.cols)));

@@ -142,7 +142,7 @@ PickSolver::Views PickSolver::SolveViews(const Complete& complete, const ScanRay
     }
     std::vector<int> on;
     for (const int pick : view.picks) on.push_back(complete.index[pick]);
-    for (std::string& warning : ReviewWarnings(view.review, on, scene_.input().scan_reader)) {
+    for (std::string& warning : ReviewWarnings(view.review, on, scene_.azimuth())) {
       photo.warnings.push_back(std::move(warning));
     }
     solved.choices.back() = SolveView(scale_of_photo, &view, &photo);

@@ -7,7 +7,9 @@
 
 namespace roomtex {
 
-cv::Mat ReadReducedPhoto(const std::string& path, int width, int min_width) {
+cv::Mat ReadReducedPhoto(const std::string& path, const PhotoFit& fit, int min_width) {
+  if (fit.pixels != PhotoPixels::kAsStored) return ReadPhoto(path, fit.pixels);
+  const int width = fit.width;
   int flags = cv::IMREAD_COLOR;
   if (width / 8 >= min_width) {
     flags = cv::IMREAD_REDUCED_COLOR_8;

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/open_browser.h"
 #include "core/option_fields.h"
+#include "importers/scan_record.h"
 #include "pick_page.h"
 
 namespace roomtex {
@@ -30,7 +31,10 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's sparse model: a folder, .bin or .txt.");
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
   command->AddInputPaths("scan_path", &a->scene.scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh.");
+                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
+                         "a model of roomtex-align, which remembers its scans and how they were "
+                         "read.",
+                         Command::Kind::kOptional);
   command->AddOutputPath("output_path", &a->output_path,
                          "Picks, a CSV file for roomtex-align. Saved after every change; one that "
                          "is there is continued, and kept as it was with .bak behind its name.");
@@ -51,6 +55,7 @@ void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->scene.scan_reader.Problems();
   AppendProblems(a->server.Problems(), &problems);
   ThrowIfProblems(problems);
+  RequireScans(a->scene.scan_paths, a->scene.input_path);
   const std::filesystem::path picks(a->output_path);
   if (a->aligned_path.empty()) a->aligned_path = (picks.parent_path() / "aligned").string();
   if (std::filesystem::is_directory(picks)) {
@@ -64,14 +69,20 @@ void CheckArguments(Arguments* a) {
 }
 
 void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context) {
-  int num_missing = 0;
-  std::string problem;
+  constexpr size_t kNamed = 5;
+  Json left_out = Json::array();
+  std::string names;
   for (const PickPhoto& photo : scene.photos()) {
-    if (photo.missing && num_missing++ == 0) problem = photo.problem;
+    if (!photo.missing) continue;
+    if (left_out.size() < kNamed) names += (names.empty() ? "" : ", ") + photo.name();
+    left_out.push_back({{"name", photo.name()}, {"reason", photo.problem}});
   }
-  if (num_missing == 0) return;
-  context.Warn(std::to_string(num_missing) + " of " + std::to_string(scene.photos().size()) +
-               " photos cannot be shown. The first: " + problem);
+  context.report["photos_left_out"] = left_out;
+  if (left_out.empty()) return;
+  if (left_out.size() > kNamed) names += " ...";
+  context.Warn(std::to_string(left_out.size()) + " of " + std::to_string(scene.photos().size()) +
+               " photos cannot be shown. The first: " + left_out[0]["reason"].get<std::string>() +
+               " All: " + names);
 }
 
 void ServePicking(Arguments a, const Command::Context& context) {
@@ -81,6 +92,7 @@ void ServePicking(Arguments a, const Command::Context& context) {
   if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
     throw UsageError("--image_name " + a.image_name + " is not in the sparse model");
   }
+  for (const std::string& note : scene.notes()) context.Warn(note);
   WarnOfMissingPhotos(scene, context);
   PickSession session(scene, a.output_path);
   scene.Prepare();

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
-#include "core/photo.h"
+#include "core/photo_fit.h"
 #include "core/similarity.h"
 #include "core/statistics.h"
 
@@ -257,20 +257,18 @@ std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count
 
 std::optional<cv::Mat> ReadPhotoOf(const SparseImage& image, const Camera& camera,
                                    const std::string& image_path, std::string* warning) {
-  cv::Mat photo;
+  const std::string path = image_path + "/" + image.name;
+  const PhotoFit fit = FitPhotoToCamera(path, image.name, camera.width, camera.height);
+  if (!fit.usable()) {
+    *warning = fit.problem;
+    return std::nullopt;
+  }
   try {
-    photo = ReadPhoto(image_path + "/" + image.name);
+    return ReadFittedPhoto(path, fit, camera.width, camera.height);
   } catch (const InputError& error) {
     *warning = error.what();
     return std::nullopt;
   }
-  if (photo.cols != camera.width || photo.rows != camera.height) {
-    *warning = image.name + " has " + std::to_string(photo.cols) + " x " +
-               std::to_string(photo.rows) + " pixels, its camera in the model " +
-               std::to_string(camera.width) + " x " + std::to_string(camera.height) + ".";
-    return std::nullopt;
-  }
-  return photo;
 }
 
 }  // namespace roomtex

@@ -98,8 +98,8 @@ std::vector<uint8_t> FindSmoothSamples(const Scan& scan);
 // `count` images evenly taken from all, in the order of their names.
 std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count);
 
-// The photo of an image as 8-bit BGR; none, and a warning, if it cannot be read or has another size
-// than its camera.
+// The photo of an image as 8-bit BGR in its camera's pixels; none, and a warning, if it cannot be
+// used (FitPhotoToCamera).
 std::optional<cv::Mat> ReadPhotoOf(const SparseImage& image, const Camera& camera,
                                    const std::string& image_path, std::string* warning);
 

@@ -14,6 +14,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/twist.h"
+#include "importers/scan_poses.h"
 
 namespace roomtex {
 namespace {
@@ -152,12 +153,6 @@ std::vector<ScanPatches> PatchesOf(const std::vector<Scan>& scans) {
   return patches;
 }
 
-void Move(const Rigid& motion, Scan* scan) {
-  for (Eigen::Vector3d& point : scan->points) point = motion * point;
-  scan->scan_from_station = motion * scan->scan_from_station;
-  scan->up = motion.rotation * scan->up;
-}
-
 }  // namespace
 
 bool StationPair::Disagrees() const {
@@ -214,7 +209,8 @@ std::vector<int> RegisterStations(std::vector<Scan>* scans) {
     const StationPair pair = ComparePair(ScanPatches(others, ScanPatchOptions()),
                                          ScanPatches({(*scans)[*worst]}, ScanPatchOptions()));
     if (pair.num_patches == 0) break;
-    Move(pair.first_from_second, &(*scans)[*worst]);
+    Scan& scan = (*scans)[*worst];
+    PlaceScan(pair.first_from_second * scan.scan_from_station, &scan);
     moved.insert(*worst);
   }
   return {moved.begin(), moved.end()};

@@ -4,6 +4,7 @@
 
 #include "core/frames.h"
 #include "core/report.h"
+#include "importers/content_hash.h"
 #include "tests/align/case_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -228,6 +229,56 @@ TEST(AlignCommand, RefusesAMirroredScanAndNamesTheOption) {
   // The picks were made on the scan read clockwise. (Picks on the mirrored scan:
   // alignment_test.cc.)
   ExpectContradiction(files, files.Align("--azimuth counterclockwise"), "--azimuth clockwise");
+}
+
+TEST(AlignCommand, FindsTheReadingOfAScanByThePicks) {
+  const CaseFolder files(MakeCase());
+  WriteScan(MakeCase().scans[0], {}, files.scan_path, {true});  // azimuths counter-clockwise
+  const CommandResult result = files.Align();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_THAT(report["warnings"].dump(), HasSubstr("is read counterclockwise (--azimuth auto)"));
+  EXPECT_EQ(report["scans"][0]["azimuth"], "counterclockwise");
+  EXPECT_LT(
+      WorstPoseErrors(*MakeCase().room, ReadSparseModel(files.folder / "aligned"), Similarity())
+          .position,
+      0.003);
+  // What is said wins.
+  EXPECT_EQ(files.Align("--azimuth counterclockwise").exit_code, 0);
+}
+
+TEST(AlignCommand, RemembersItsScans) {
+  const CaseFolder files(MakeCase());
+  ASSERT_EQ(files.Align("--max_range 30").exit_code, 0);
+  const Json scans = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"))["scans"];
+  ASSERT_EQ(scans.size(), 1u);
+  EXPECT_EQ(scans[0]["path"], files.scan_path);
+  EXPECT_EQ(scans[0]["relative_path"], "../room.rtpi");
+  EXPECT_EQ(scans[0]["content_hash"], HashOfFile(files.scan_path));
+  EXPECT_EQ(scans[0]["azimuth"], "clockwise");
+  EXPECT_EQ(scans[0]["max_range"], 30);
+}
+
+TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
+  SimulatedCase one = MakeCase();
+  const CaseFolder files(one);
+  ASSERT_EQ(files.Align().exit_code, 0);
+  const std::string trusted = ReadBytes(files.folder / "aligned/alignment.json");
+  const std::string images = ReadBytes(files.folder / "aligned/images.bin");
+  one.picks[2].x_in_img.swap(one.picks[5].x_in_img);  // refused: no model
+  WritePicks(files.picks_path, one.picks);
+  const CommandResult refused = files.Align();
+  EXPECT_EQ(refused.exit_code, 4);
+  EXPECT_THAT(ReadBytes(files.folder / "aligned.untrusted/alignment.json"),
+              HasSubstr("is kept; this one is in"));
+  EXPECT_FALSE(std::filesystem::exists(files.folder / "aligned.untrusted/images.bin"));
+  one.picks = MakeCase().picks;
+  for (Pick& pick : one.picks) pick.x_in_img.x() += pick.x_in_img.x() < 900 ? 40 : -40;
+  WritePicks(files.picks_path, one.picks);
+  EXPECT_EQ(files.Align("--plane_constrained 0").exit_code, 4);
+  EXPECT_TRUE(std::filesystem::exists(files.folder / "aligned.untrusted/images.bin"));
+  EXPECT_EQ(ReadBytes(files.folder / "aligned/alignment.json"), trusted);
+  EXPECT_EQ(ReadBytes(files.folder / "aligned/images.bin"), images);
 }
 
 TEST(AlignCommand, RefusesExchangedPicks) {

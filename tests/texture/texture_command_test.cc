@@ -14,6 +14,7 @@
 #include "capture/simulation/simulated_room.h"
 #include "core/photo.h"
 #include "importers/scan_reader.h"
+#include "importers/scan_record.h"
 #include "importers/scan_writer.h"
 #include "tests/support/ply_vertices.h"
 #include "tests/support/run_command.h"
@@ -90,6 +91,23 @@ class TextureCommand : public testing::Test {
                           (*folder_ / output) + (scale_given ? " " : " --Texture.scale 1 ") + more);
   }
   static std::string Path(const std::string& name) { return *folder_ / name; }
+  // The true model with what roomtex-align would leave beside it.
+  static std::string Aligned(const std::string& name, bool trusted,
+                             const ScanReaderOptions& options = {}) {
+    fs::copy(Capture() + "/truth", Path(name));
+    const PlacedScans placed = ReadPlacedScans({Capture() + "/scan.rtpi"}, "", options);
+    Json report;
+    report["trusted"] = trusted;
+    report["reason"] = trusted ? "" : "Too few points lie on the surface.";
+    report["scans"] = ToJson(RecordScans(placed, options, Path(name)));
+    WriteJson(Path(name + "/alignment.json"), report);
+    return Path(name);
+  }
+  static CommandResult TextureAligned(const std::string& model, const std::string& more) {
+    return RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + model +
+                          " --image_path " + Capture() + "/photos --output_path " +
+                          (*folder_ / "textured_aligned") + " " + more);
+  }
   static Scan ReadCaptureScan() { return ReadScan(Capture() + "/scan.rtpi", {}); }
 
   static TempFolder* folder_;
@@ -564,6 +582,65 @@ TEST_F(TextureCommand, BadInputGetsASentence) {
   expect(all + rest + " --Exposure.mode guess", 2, "exif, match or none");
   expect(all + rest + " --associations_path " + Path("none.csv"), 3, "does not exist");
   expect(all + rest + " --database_path " + scan, 3, "SQLite");
+}
+
+TEST_F(TextureCommand, AnAlignedModelNeedsNoScanAndReadsItAsItWasAligned) {
+  const std::string model = Aligned("aligned", true);
+  const CommandResult result = TextureAligned(model, "");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadBytes(Path("textured_aligned/model.ply")), ReadBytes(Path("textured/model.ply")));
+  const CommandResult other = TextureAligned(model, "--azimuth counterclockwise");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_NE(other.err.find("--azimuth counterclockwise contradicts the alignment"),
+            std::string::npos)
+      << other.err;
+  const CommandResult mesh =
+      TextureAligned(model, "--scan_path " + Capture() + "/truth/true_colors.ply");
+  EXPECT_EQ(mesh.exit_code, 3);
+  EXPECT_NE(mesh.err.find("is another scan"), std::string::npos) << mesh.err;
+}
+
+TEST_F(TextureCommand, DoubtsOfTheAlignmentAreThoseOfTheColours) {
+  const std::string model = Aligned("doubtful", false);
+  const CommandResult result = TextureAligned(model, "");
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const json report = ReadJson(Path("textured_aligned/report.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_NE(report["reason"].get<std::string>().find("Too few points lie on the surface"),
+            std::string::npos);
+  EXPECT_EQ(TextureAligned(model, "--accept_untrusted 1").exit_code, 0);
+  EXPECT_EQ(ReadJson(Path("textured_aligned/report.json"))["warnings"].size(), 1u);
+}
+
+// One photo is gone, one ends before its picture does; the others colour.
+TEST_F(TextureCommand, LeavesOutPhotosThatCannotBeUsed) {
+  const std::string photos = Path("some_photos");
+  fs::copy(Capture() + "/photos", photos);
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(photos)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  fs::remove(photos + "/" + names[2]);
+  const std::string bytes = ReadBytes(photos + "/" + names[5]);
+  WriteBytes(photos + "/" + names[5], bytes.substr(0, bytes.size() / 2));
+  const auto run = [&](const std::string& more) {
+    return RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
+                          "/truth --image_path " + photos + " --scan_path " + Capture() +
+                          "/scan.rtpi --output_path " + Path("some") + more);
+  };
+  const CommandResult strict = run(" --strict 1");
+  EXPECT_EQ(strict.exit_code, 3);
+  EXPECT_NE(strict.err.find(names[2]), std::string::npos) << strict.err;
+  EXPECT_FALSE(fs::exists(Path("some/model.ply")));
+  const CommandResult result = run("");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ReadJson(Path("some/report.json"));
+  ASSERT_EQ(report["photos_left_out"].size(), 2u);
+  EXPECT_EQ(report["photos_left_out"][0]["name"], names[2]);
+  EXPECT_EQ(report["photos_left_out"][1]["name"], names[5]);
+  EXPECT_EQ(report["num_photos"], 10);
+  EXPECT_EQ(ReadJson(Path("textured/report.json"))["photos_left_out"].size(), 0u);
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
-#include "core/photo.h"
 
 namespace roomtex {
 namespace {
@@ -129,29 +128,6 @@ class CameraSource {
   std::map<std::string, uint32_t> camera_of_;
 };
 
-// The camera for the file as it is.
-Camera FitCamera(const Camera& camera, const std::string& path, const std::string& name,
-                 std::vector<std::string>* warnings) {
-  auto [width, height] = ReadPhotoSize(path);
-  if (width <= 0 || height <= 0) {
-    const cv::Mat photo = ReadPhoto(path);  // throws for what is no image
-    width = photo.cols;
-    height = photo.rows;
-  }
-  if (width == camera.width && height == camera.height) return camera;
-  const std::string sizes = std::to_string(width) + " x " + std::to_string(height) +
-                            " pixels, its camera " + std::to_string(camera.width) + " x " +
-                            std::to_string(camera.height);
-  const double shape = static_cast<double>(width) / height;
-  const double camera_shape = static_cast<double>(camera.width) / camera.height;
-  if (std::abs(shape / camera_shape - 1) > 0.01) {
-    throw InputError(path, "", "has " + sizes,
-                     "Give the photos that COLMAP was given, or resized ones of the same shape");
-  }
-  warnings->push_back(name + " has " + sizes + "; the camera is scaled");
-  return ScaleCamera(camera, width, height);
-}
-
 }  // namespace
 
 std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
@@ -215,19 +191,36 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
   PhotoList list;
   const auto file_of = ChooseFiles(model_in_scan, sources, &list.warnings);
   const CameraSource cameras(model_in_scan, sources.database_path);
+  std::vector<std::string> notes;
   for (const auto& [id, image] : model_in_scan.images) {
     const auto file = file_of.find(image.name);
     if (file == file_of.end()) continue;
+    const std::string path = sources.image_path + "/" + file->second;
+    const Camera& camera = cameras.Find(image);
+    const PhotoFit fit = FitPhotoToCamera(path, file->second, camera.width, camera.height);
+    if (!fit.usable()) {
+      list.left_out.push_back({file->second, fit.problem});
+      continue;
+    }
     PhotoView view;
     view.name = file->second;
-    view.path = sources.image_path + "/" + file->second;
-    RequireFile(view.path, "Check --image_path: the model names this photo");
-    view.camera = FitCamera(cameras.Find(image), view.path, view.name, &list.warnings);
+    view.path = path;
+    view.pixels = fit.pixels;
+    view.camera = fit.scaled ? ScaleCamera(camera, fit.width, fit.height) : camera;
     view.cam_from_scan = image.cam_from_model;
     list.photos.push_back(std::move(view));
+    if (!fit.note.empty()) notes.push_back(fit.note);
   }
+  for (const std::string& note : FirstNotes(notes)) list.warnings.push_back(note);
   std::sort(list.photos.begin(), list.photos.end(),
             [](const PhotoView& a, const PhotoView& b) { return a.name < b.name; });
+  std::sort(list.left_out.begin(), list.left_out.end(),
+            [](const PhotoLeftOut& a, const PhotoLeftOut& b) { return a.name < b.name; });
+  if (list.photos.empty() && !list.left_out.empty()) {
+    throw InputError(
+        sources.image_path, "",
+        "holds no photo of the model that can be used. " + AsClause(list.left_out[0].reason), "");
+  }
   return list;
 }
 

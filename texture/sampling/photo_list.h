@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/photo_fit.h"
 #include "texture/sampling/photo_view.h"
 
 namespace roomtex {
@@ -18,14 +19,16 @@ struct PhotoSources {
 struct PhotoList {
   std::vector<PhotoView> photos;      // ordered by name
   std::vector<std::string> warnings;  // plain sentences
+  // Missing, no image, or of another shape than the camera's; ordered by name.
+  std::vector<PhotoLeftOut> left_out;
 };
 
 // The registered photos of a model in the scan frame. With associations the plain twin of every
 // registered patterned photo takes its place; registered photos that the table knows only as plain
 // ones stay, those that it does not know are left out, because the pattern may be on them, and so
-// are those whose plain twin is not in the folder. Every file is looked at: other missing files, no
-// image, another shape than the camera's make an InputError; a photo of the same shape but another
-// size gets a scaled camera.
+// are those whose plain twin is not in the folder. Every file is looked at (FitPhotoToCamera): one
+// that cannot be used is left out, a photo of the same shape but another size gets a scaled camera.
+// Throws InputError if none is left.
 PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sources);
 
 // CSV with a header that names patterned_image and plain_image among its columns. Pairs in file

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/cpu_stages.h"
 #include "core/parallel.h"
@@ -22,15 +23,22 @@ struct PhotoObservations {
   std::vector<size_t> tile_end;
 };
 
+cv::Mat Decode(const PhotoView& view) {
+  const CpuTimer timer(CpuStage::kDecode);
+  cv::Mat photo = ReadPhoto(view.path, view.pixels);
+  if (view.tone) view.tone->response.ToSrgb(&photo);
+  return photo;
+}
+
 class PhotoObserver {
  public:
-  PhotoObserver(const PhotoPassInput& input, const PhotoView& view,
+  PhotoObserver(const PhotoPassInput& input, const PhotoView& view, cv::Mat picture,
                 const OcclusionOptions& occlusion, const BlendOptions& blend)
       : input_(input),
         blend_(blend),
         projector_(view),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
-        image_(Decode(view)) {
+        image_(std::move(picture)) {
     if (view.tone && !view.tone->vignetting.is_none()) {
       vignetting_.emplace(view.tone->vignetting, projector_.camera());
     }
@@ -48,13 +56,6 @@ class PhotoObserver {
   }
 
  private:
-  static cv::Mat Decode(const PhotoView& view) {
-    const CpuTimer timer(CpuStage::kDecode);
-    cv::Mat photo = ReadPhoto(view.path);
-    if (view.tone) view.tone->response.ToSrgb(&photo);
-    return photo;
-  }
-
   void ObserveTile(const SampleTile& tile, int photo, PhotoObservations* seen) {
     projector_.Project(tile.points, &projected_);
     const Eigen::Vector3f camera = projector_.CentreFrom(tile.points.origin);
@@ -119,11 +120,21 @@ std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector
   const int batch_size = EffectiveThreads(num_threads);
   std::vector<size_t> num_seen(num_photos, 0);
   std::vector<PhotoObservations> batch(batch_size);
+  std::vector<std::string> problems(num_photos);
   for (int first = 0; first < num_photos; first += batch_size) {
     const int count = std::min(batch_size, num_photos - first);
     ParallelFor(num_threads, 0, count, [&](int i) {
       const int photo = first + i;
-      batch[i] = PhotoObserver(input, photos[photo], occlusion, blend).Observe(photo);
+      cv::Mat picture;
+      try {
+        picture = Decode(photos[photo]);
+      } catch (const InputError& error) {
+        problems[photo] = error.what();
+        batch[i] = {{}, std::vector<size_t>(num_tiles, 0)};
+        return;
+      }
+      batch[i] =
+          PhotoObserver(input, photos[photo], std::move(picture), occlusion, blend).Observe(photo);
       num_seen[photo] = batch[i].all.size();
       progress->Tick();
     });
@@ -141,6 +152,11 @@ std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector
       }
     });
   }
+  std::vector<PhotoLeftOut> unreadable;
+  for (int i = 0; i < num_photos; ++i) {
+    if (!problems[i].empty()) unreadable.push_back({photos[i].name, problems[i]});
+  }
+  if (!unreadable.empty()) throw UnreadablePhotos(std::move(unreadable));
   return num_seen;
 }
 

@@ -1,8 +1,11 @@
 #pragma once
 // The one pass over the photos: every photo is decoded once and says what it sees of the samples.
 
+#include <utility>
 #include <vector>
 
+#include "core/error.h"
+#include "core/photo_fit.h"
 #include "core/progress.h"
 #include "texture/sampling/blend.h"
 #include "texture/sampling/mesh_tiles.h"
@@ -18,7 +21,20 @@ struct PhotoPassInput {
   double angular_spacing = 0;            // of the finest scan, radians; 0 = not known
 };
 
-// Adds every photo's observations to the store. Returns how many samples each photo sees.
+// Photos that turned out to be unreadable when they were decoded. All photos were tried.
+class UnreadablePhotos : public InputError {
+ public:
+  explicit UnreadablePhotos(std::vector<PhotoLeftOut> photos)
+      : InputError(photos[0].name, "", "cannot be read: " + photos[0].reason, ""),
+        photos_(std::move(photos)) {}
+  const std::vector<PhotoLeftOut>& photos() const { return photos_; }
+
+ private:
+  std::vector<PhotoLeftOut> photos_;
+};
+
+// Adds every photo's observations to the store. Returns how many samples each photo sees. Throws
+// UnreadablePhotos; the store is then of no use.
 std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector<PhotoView>& photos,
                                   const OcclusionOptions& occlusion, const BlendOptions& blend,
                                   int num_threads, Progress* progress, ObservationStore* store);

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/camera_model.h"
+#include "core/photo.h"
 #include "core/similarity.h"
 #include "texture/sampling/photo_tone.h"
 
@@ -17,7 +18,9 @@ namespace roomtex {
 struct PhotoView {
   std::string name;  // as in the model
   std::string path;  // the file that gives the colour
-  Camera camera;     // of the size of that file
+  // Which way up; the file is used as stored but for a reason, see FitPhotoToCamera().
+  PhotoPixels pixels = PhotoPixels::kAsStored;
+  Camera camera;  // of the size of that picture
   Rigid cam_from_scan;
   std::shared_ptr<const PhotoTone> tone;  // how its bytes become light; none = sRGB
 

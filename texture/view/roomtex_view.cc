@@ -93,10 +93,25 @@ std::optional<std::string> FrameProblem(const ViewModel& model, const ViewCamera
          "roomtex-align.";
 }
 
+// A look does not end with exit 4, but says what the model and its colours are built on.
+void WarnOfDoubts(const ViewOptions& options, const Command::Context& context,
+                  std::vector<std::string>* warnings) {
+  for (const fs::path& path : {fs::path(options.aligned) / "alignment.json",
+                               fs::path(options.input_path) / "report.json"}) {
+    std::ifstream stream(path);
+    const Json json = Json::parse(stream, nullptr, false);
+    if (!json.is_object() || !json.contains("trusted") || json["trusted"] != false) continue;
+    const std::string reason = FromReport(path, {"reason"});
+    warnings->push_back(path.parent_path().string() + " is not to be trusted. " + reason);
+    context.Warn(warnings->back());
+  }
+}
+
 void View(const ViewOptions& options, const Command::Context& context) {
   ThrowIfProblems(options.server.Problems());
   context.progress.Stage("read model");
   ViewContent content;
+  WarnOfDoubts(options, context, &content.warnings);
   content.model = ReadViewModel(options.input_path);
   content.cameras = ReadCameras(options, context);
   if (const auto problem = FrameProblem(content.model, content.cameras)) {
@@ -107,8 +122,11 @@ void View(const ViewOptions& options, const Command::Context& context) {
     content.warnings.push_back(
         std::to_string(content.cameras.size() - content.cameras.num_photos()) + " of " +
         std::to_string(content.cameras.size()) +
-        " photos are not there; give --image_path to see them.");
+        (content.cameras.left_out().empty()
+             ? " photos are not there; give --image_path to see them."
+             : " photos cannot be shown. " + content.cameras.left_out()[0].reason));
   }
+  ReportPhotosLeftOut(content.cameras.left_out(), context);
   const fs::path evidence = fs::path(content.model.path).parent_path() / "evidence.ply";
   std::error_code error;
   if (fs::is_regular_file(evidence, error)) {

@@ -9,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
-#include "core/photo.h"
 
 namespace roomtex {
 namespace {
@@ -81,9 +80,15 @@ ViewCameras::ViewCameras(SparseModel model_in_scan, const std::string& image_pat
             [](const SparseImage* a, const SparseImage* b) { return a->name < b->name; });
   for (const SparseImage* image : images_) {
     const std::filesystem::path path = std::filesystem::path(image_path) / image->name;
-    std::error_code error;
-    const bool there = !image_path.empty() && std::filesystem::is_regular_file(path, error);
+    const Camera& camera = model_.cameras.at(image->camera_id);
+    PhotoFit fit;
+    if (!image_path.empty()) {
+      fit = FitPhotoToCamera(path.string(), image->name, camera.width, camera.height);
+      if (!fit.usable()) left_out_.push_back({image->name, fit.problem});
+    }
+    const bool there = !image_path.empty() && fit.usable();
     paths_.push_back(there ? path.string() : "");
+    pixels_.push_back(fit.pixels);
   }
 }
 
@@ -144,7 +149,7 @@ std::shared_ptr<const std::string> ViewCameras::Photo(int id, int max_size) cons
   if (paths_[id].empty()) return nullptr;
   const int size = std::clamp(max_size, 16, 8192);
   if (auto found = cache_->Find({id, size})) return found;
-  cv::Mat photo = ReadPhoto(paths_[id]);
+  cv::Mat photo = ReadPhoto(paths_[id], pixels_[id]);
   const Camera& camera = model_.cameras.at(image.camera_id);
   const double shape = static_cast<double>(photo.cols) / photo.rows;
   if (std::abs(shape * camera.height / camera.width - 1) > 0.02) {

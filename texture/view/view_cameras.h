@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/photo_fit.h"
 #include "core/report.h"
 
 namespace roomtex {
@@ -33,7 +34,9 @@ class ViewCameras {
   ViewCameras(SparseModel model_in_scan, const std::string& image_path);
 
   size_t size() const { return images_.size(); }
-  size_t num_photos() const;  // whose file is there
+  size_t num_photos() const;  // whose file can be shown
+  // Those whose file cannot be, if there is a folder of photos.
+  const std::vector<PhotoLeftOut>& left_out() const { return left_out_; }
   const SparseModel& model() const { return model_; }
 
   // [{id, name, width, height, focal, center [3] (`scan`), rotation_wxyz (cam_from_scan), corners
@@ -56,6 +59,8 @@ class ViewCameras {
   SparseModel model_;
   std::vector<const SparseImage*> images_;  // by name
   std::vector<std::string> paths_;          // "" = no such file
+  std::vector<PhotoPixels> pixels_;
+  std::vector<PhotoLeftOut> left_out_;
   // The pictures asked for last; behind a pointer, so that this can be moved.
   struct Cache;
   std::shared_ptr<Cache> cache_;

@@ -183,7 +183,8 @@ TEST(AlignCommand, IsNotTrustedWithThePhotosOfAnotherRoom) {
   const CommandResult wrong = files.Align("--image_path " + SmallRoom(1).folder.path());
   EXPECT_EQ(wrong.exit_code, 4);
   EXPECT_NE(wrong.err.find("Photos and scan do not show the same"), std::string::npos) << wrong.err;
-  report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  // The trusted one is kept.
+  report = Json::parse(ReadBytes(files.folder / "aligned.untrusted/alignment.json"));
   EXPECT_EQ(report["trusted"], false);
   EXPECT_EQ(report["agreement"]["gradient_shift"]["contradicts"], true);
 }

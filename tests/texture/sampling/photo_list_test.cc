@@ -61,13 +61,23 @@ TEST_F(PhotoListTest, ScalesTheCameraForResizedPhotos) {
   EXPECT_EQ(list.warnings.size(), 1u);
 }
 
-TEST_F(PhotoListTest, RefusesPhotosOfAnotherShapeAndMissingOnes) {
+TEST_F(PhotoListTest, LeavesOutPhotosOfAnotherShapeAndMissingOnes) {
+  const auto expect_left_out = [this](const std::string& reason) {
+    const PhotoList list = ListPhotos(model_, sources_);
+    EXPECT_EQ(list.photos.size(), 2u);
+    ASSERT_EQ(list.left_out.size(), 1u);
+    EXPECT_EQ(list.left_out[0].name, "b.png");
+    EXPECT_NE(list.left_out[0].reason.find(reason), std::string::npos) << list.left_out[0].reason;
+  };
   Photo("b.png", 40, 60);
-  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "40 x 60 pixels, its camera 60 x 40");
+  expect_left_out("40 x 60 pixels, its camera 60 x 40");
   std::filesystem::remove(folder_ / "b.png");
-  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "the model names this photo");
+  expect_left_out("There is no photo");
   WriteBytes(folder_ / "b.png", "no picture");
-  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "b.png");
+  expect_left_out("b.png");
+  std::filesystem::remove(folder_ / "a.png");
+  std::filesystem::remove(folder_ / "c.png");
+  EXPECT_INPUT_ERROR(ListPhotos(model_, sources_), "no photo of the model that can be used");
 }
 
 TEST_F(PhotoListTest, TakesThePlainTwin) {

@@ -1,0 +1,331 @@
+#include "importers/scan_record.h"
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/text.h"
+#include "importers/content_hash.h"
+#include "importers/length_unit.h"
+#include "importers/scan_poses.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSamePosition = 1e-6;  // metres
+constexpr double kSameRotation = 1e-6;  // radians
+constexpr char kToUseAnother[] =
+    ". To use another: align anew, or copy the model's folder without alignment.json";
+
+std::string FolderOf(const std::string& path) {
+  const fs::path parent = fs::path(path).parent_path();
+  return parent.empty() ? "." : parent.string();
+}
+
+int64_t SizeOf(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return -1;
+  const auto size = fs::file_size(path, error);
+  return error ? -1 : static_cast<int64_t>(size);
+}
+
+bool HasContentOf(const ScanRecord& record, const std::string& path) {
+  return SizeOf(path) == record.num_bytes && HashOfFile(path) == record.content_hash;
+}
+
+// Where the scan of a record lies now.
+std::string FindFile(const ScanRecord& record, const AlignmentRecord& alignment) {
+  const std::string beside =
+      (fs::path(alignment.folder) / record.relative_path).lexically_normal().string();
+  std::set<std::string> folders;
+  std::string changed;
+  for (const std::string& path : {record.path, beside, record.absolute_path}) {
+    if (path.empty()) continue;
+    if (HasContentOf(record, path)) return path;
+    if (changed.empty() && SizeOf(path) >= 0) changed = path;
+    folders.insert(FolderOf(path));
+  }
+  for (const std::string& folder : folders) {
+    std::error_code error;
+    std::set<std::string> files;  // ordered: the same answer wherever
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      if (SizeOf(entry.path()) == record.num_bytes) files.insert(entry.path().string());
+    }
+    for (const std::string& path : files) {
+      if (HashOfFile(path) == record.content_hash) return path;
+    }
+  }
+  if (!changed.empty()) {
+    throw InputError(changed, "",
+                     "is no longer the scan that the model in " + alignment.folder +
+                         " was aligned to: its content has changed",
+                     std::string("Give that scan with --scan_path") + kToUseAnother);
+  }
+  throw InputError(
+      record.path, "",
+      "the scan that the model in " + alignment.folder + " was aligned to is no longer there",
+      "Say with --scan_path where it is now");
+}
+
+// What is read: a record, and where its file is.
+struct Found {
+  const ScanRecord* record;
+  std::string path;
+};
+
+std::vector<Found> FindScans(const AlignmentRecord& alignment,
+                             const std::vector<std::string>& paths) {
+  std::vector<Found> found;
+  if (paths.empty()) {
+    for (const ScanRecord& record : alignment.scans) {
+      found.push_back({&record, FindFile(record, alignment)});
+    }
+    return found;
+  }
+  std::set<const ScanRecord*> taken;
+  for (const std::string& path : paths) {
+    const std::string hash = HashOfFile(path);
+    const ScanRecord* match = nullptr;
+    bool twice = false;
+    for (const ScanRecord& record : alignment.scans) {
+      if (record.content_hash != hash) continue;
+      twice = taken.count(&record) > 0;
+      if (twice) continue;
+      match = &record;
+      break;
+    }
+    if (match == nullptr && twice) throw UsageError("--scan_path " + path + " is given twice");
+    if (match == nullptr) {
+      throw InputError(path, "",
+                       "is another scan than the model in " + alignment.folder +
+                           " was aligned to, " + alignment.scans[0].path +
+                           (alignment.scans.size() > 1 ? " and others" : ""),
+                       std::string("Give that one, or none: it is remembered") + kToUseAnother);
+    }
+    taken.insert(match);
+    found.push_back({match, path});
+  }
+  return found;
+}
+
+std::string Metres(double value) { return Significant(value, 6) + " m"; }
+
+void CheckOptions(const AlignmentRecord& alignment, const std::vector<Found>& found,
+                  const ScanReaderOptions& given) {
+  std::vector<std::string> problems;
+  const auto add = [&](const std::string& option, const ScanRecord& record,
+                       const std::string& how) {
+    problems.push_back(option + " contradicts the alignment in " + alignment.folder +
+                       ", for which " + record.path + " was read " + how +
+                       ". Leave the option out, or align anew with it");
+  };
+  for (const Found& one : found) {
+    const ScanRecord& record = *one.record;
+    if (given.azimuth != "auto" && !record.azimuth.empty() && given.azimuth != record.azimuth) {
+      add("--azimuth " + given.azimuth, record, record.azimuth);
+    }
+    const double unit = MetersPerUnit(given.units).value_or(record.meters_per_unit);
+    if (!given.units.empty() && std::abs(unit / record.meters_per_unit - 1) > 1e-9) {
+      add("--units " + given.units, record, "in units of " + Metres(record.meters_per_unit));
+    }
+    if (given.max_range > 0 && given.max_range != record.max_range) {
+      add("--max_range", record,
+          record.max_range > 0 ? "up to " + Metres(record.max_range) : "without such a limit");
+    }
+  }
+  ThrowIfProblems(problems);
+}
+
+// Stations as --scan_poses says them now must be those that are remembered.
+void CheckPoses(const AlignmentRecord& alignment, const std::vector<Found>& found,
+                const std::string& poses_path, const std::vector<Scan>& scans) {
+  if (poses_path.empty()) return;
+  ScanPoses poses(poses_path);
+  size_t scan = 0;
+  for (const Found& one : found) {
+    const int count = static_cast<int>(one.record->poses.size());
+    for (int k = 0; k < count; ++k, ++scan) {
+      const Rigid& known = one.record->poses[k].scan_from_station;
+      const Eigen::Vector3d up = known.rotation.conjugate() * scans[scan].up;
+      const auto said = poses.Take(one.path, k, count, up);
+      if (!said) continue;
+      const Rigid& now = said->scan_from_station;
+      if ((now.translation - known.translation).norm() <= kSamePosition &&
+          RotationAngle(now.rotation, known.rotation) <= kSameRotation) {
+        continue;
+      }
+      throw UsageError("--scan_poses " + poses_path + " puts " + one.path +
+                       " elsewhere than the alignment in " + alignment.folder +
+                       " has it. Leave the option out, or align anew with it");
+    }
+  }
+  poses.RequireAllTaken();
+}
+
+template <typename Value>
+Value ValueOf(const Json& json, const char* key) {
+  return json.at(key).get<Value>();
+}
+
+ScanRecord RecordFromJson(const Json& json) {
+  ScanRecord record;
+  record.path = ValueOf<std::string>(json, "path");
+  record.absolute_path = ValueOf<std::string>(json, "absolute_path");
+  record.relative_path = ValueOf<std::string>(json, "relative_path");
+  record.num_bytes = ValueOf<int64_t>(json, "num_bytes");
+  record.content_hash = ValueOf<std::string>(json, "content_hash");
+  record.azimuth = json.at("azimuth").is_null() ? "" : ValueOf<std::string>(json, "azimuth");
+  record.units = json.at("units").is_null() ? "" : ValueOf<std::string>(json, "units");
+  record.meters_per_unit = ValueOf<double>(json, "meters_per_unit");
+  record.max_range = ValueOf<double>(json, "max_range");
+  for (const Json& pose : json.at("poses")) {
+    const auto q = ValueOf<std::array<double, 4>>(pose, "rotation_wxyz");
+    const auto t = ValueOf<std::array<double, 3>>(pose, "translation");
+    record.poses.push_back({{QuaternionFromWxyz({q[0], q[1], q[2], q[3]}), {t[0], t[1], t[2]}},
+                            ValueOf<bool>(pose, "given")});
+  }
+  return record;
+}
+
+ScanReaderOptions OptionsOf(const ScanRecord& record) {
+  ScanReaderOptions options;
+  if (!record.azimuth.empty()) options.azimuth = record.azimuth;
+  options.units = record.units;
+  options.max_range = record.max_range;
+  return options;
+}
+
+}  // namespace
+
+std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderOptions& options,
+                                    const std::string& model_folder) {
+  std::vector<ScanRecord> records;
+  size_t scan = 0;
+  for (const PlacedScans::File& file : placed.files) {
+    std::error_code error;
+    ScanRecord record;
+    record.path = file.path;
+    const fs::path absolute = fs::weakly_canonical(fs::absolute(file.path), error);
+    record.absolute_path = absolute.string();
+    record.relative_path =
+        absolute.lexically_relative(fs::weakly_canonical(fs::absolute(model_folder), error))
+            .string();
+    record.num_bytes = SizeOf(file.path);
+    record.content_hash = HashOfFile(file.path);
+    record.azimuth = file.azimuth;
+    record.units = options.units;
+    record.meters_per_unit = file.meters_per_unit;
+    record.max_range = options.max_range;
+    for (const bool given : file.placed) {
+      record.poses.push_back({placed.scans[scan++].scan_from_station, given});
+    }
+    records.push_back(std::move(record));
+  }
+  return records;
+}
+
+Json ToJson(const std::vector<ScanRecord>& records) {
+  Json json = Json::array();
+  for (const ScanRecord& record : records) {
+    Json one;
+    one["path"] = record.path;
+    one["absolute_path"] = record.absolute_path;
+    one["relative_path"] = record.relative_path;
+    one["num_bytes"] = record.num_bytes;
+    one["content_hash"] = record.content_hash;
+    one["azimuth"] = record.azimuth.empty() ? Json(nullptr) : Json(record.azimuth);
+    one["units"] = record.units.empty() ? Json(nullptr) : Json(record.units);
+    one["meters_per_unit"] = record.meters_per_unit;
+    one["max_range"] = record.max_range;
+    one["poses"] = Json::array();
+    for (const ScanRecord::Pose& pose : record.poses) {
+      one["poses"].push_back(
+          {{"rotation_wxyz", ToJson(WxyzFromQuaternion(pose.scan_from_station.rotation))},
+           {"translation", ToJson(pose.scan_from_station.translation)},
+           {"given", pose.given}});
+    }
+    json.push_back(one);
+  }
+  return json;
+}
+
+AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
+  AlignmentRecord record;
+  record.folder = model_folder;
+  record.path = (fs::path(model_folder) / "alignment.json").string();
+  std::error_code error;
+  if (!fs::is_regular_file(record.path, error)) return record;
+  std::ifstream stream(record.path, std::ios::binary);
+  const Json json = Json::parse(stream, nullptr, false);
+  try {
+    if (!json.is_object()) throw InputError(record.path, "", "", "");
+    record.found = true;
+    record.trusted = json.value("trusted", true);
+    record.reason = json.value("reason", std::string());
+    if (!json.contains("scans")) return record;
+    for (const Json& scan : json.at("scans")) record.scans.push_back(RecordFromJson(scan));
+  } catch (const std::exception&) {
+    throw InputError(record.path, "", "is not as roomtex-align writes it",
+                     "Align anew, or remove it: then nothing is known of the scans of this model");
+  }
+  return record;
+}
+
+void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder) {
+  std::error_code error;
+  if (!paths.empty() || fs::exists(fs::path(model_folder) / "alignment.json", error)) return;
+  throw UsageError("--scan_path is required: " + model_folder +
+                   " is no model of roomtex-align, which would remember its scans");
+}
+
+PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest& request) {
+  if (alignment.scans.empty()) {
+    if (request.paths.empty() && alignment.found) {
+      throw UsageError("--scan_path is required: " + alignment.path +
+                       " does not say which scan the model was aligned to");
+    }
+    return ReadPlacedScans(request.paths, request.poses_path, request.options);
+  }
+  const std::vector<Found> found = FindScans(alignment, request.paths);
+  CheckOptions(alignment, found, request.options);
+  PlacedScans placed;
+  for (const Found& one : found) {
+    ScanFile file = ReadScanFile(one.path, OptionsOf(*one.record));
+    const std::vector<ScanRecord::Pose>& poses = one.record->poses;
+    if (file.scans.size() != poses.size()) {
+      throw InputError(alignment.path, "",
+                       "gives " + std::to_string(poses.size()) + " poses for the " +
+                           std::to_string(file.scans.size()) + " scans of " + one.path,
+                       "Align anew");
+    }
+    PlacedScans::File read{one.path, file.azimuth, file.meters_per_unit, {}};
+    for (size_t k = 0; k < poses.size(); ++k) {
+      if (poses[k].given) PlaceScan(poses[k].scan_from_station, &file.scans[k]);
+      read.placed.push_back(poses[k].given);
+      placed.scans.push_back(std::move(file.scans[k]));
+    }
+    placed.files.push_back(std::move(read));
+  }
+  CheckPoses(alignment, found, request.poses_path, placed.scans);
+  return placed;
+}
+
+void TakeOverTrust(const AlignmentRecord& record, bool accept, const Command::Context& context) {
+  if (record.trusted) return;
+  const std::string reason = "The alignment in " + record.folder + " is not to be trusted" +
+                             (record.reason.empty() ? "." : ": " + record.reason);
+  if (accept) {
+    context.Warn(reason);
+  } else {
+    context.report.SetUntrusted(reason + " (--accept_untrusted 1 takes it as it is.)");
+  }
+}
+
+}  // namespace roomtex

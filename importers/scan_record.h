@@ -1,0 +1,75 @@
+#pragma once
+// What an aligned model remembers of its scans and of how far it is to be trusted: keys `scans`,
+// `trusted` and `reason` of the alignment.json beside it (docs/commands.md). Who builds on the
+// model reads the same scans in the same way.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/command_line.h"
+#include "core/report.h"
+#include "core/similarity.h"
+#include "importers/scan_reader.h"
+
+namespace roomtex {
+
+// One scan file, as it was read.
+struct ScanRecord {
+  std::string path;                          // as it was given
+  std::string absolute_path, relative_path;  // relative to the folder of the model
+  int64_t num_bytes = 0;
+  std::string content_hash;    // HashOfFile()
+  std::string azimuth;         // "" = no RTPI
+  std::string units;           // as given, "" = by the file
+  double meters_per_unit = 1;  // in effect
+  double max_range = 0;        // metres, as given
+  struct Pose {
+    Rigid scan_from_station;
+    bool given = false;  // by --scan_poses, else the file's own
+  };
+  std::vector<Pose> poses;  // one per scan of the file
+};
+
+// Of scans as ReadPlacedScans() gave them. Hashes the files. model_folder: where the model is
+// written. Throws InputError.
+std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderOptions& options,
+                                    const std::string& model_folder);
+Json ToJson(const std::vector<ScanRecord>& records);
+
+struct AlignmentRecord {
+  std::string folder, path;  // of the model, of its alignment.json
+  bool found = false;        // false: the model was not made by roomtex-align
+  bool trusted = true;
+  std::string reason;
+  std::vector<ScanRecord> scans;  // empty: not remembered
+};
+// Throws InputError for a file that is there and cannot be understood.
+AlignmentRecord ReadAlignmentRecord(const std::string& model_folder);
+
+// What a command was given about scans; paths may be empty where a model remembers them.
+struct ScanRequest {
+  const std::vector<std::string>& paths;
+  const std::string& poses_path;
+  const ScanReaderOptions& options;
+};
+// Throws UsageError if there are no paths and nothing at model_folder could remember any: said
+// before anything is read.
+void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder);
+
+// The scans of an aligned model as it remembers them: those of request.paths (each must have the
+// content of one that is remembered, whatever its name), or all of them, looked for where they
+// were, at the same place relative to the model's folder, and under another name in either folder.
+// A model that remembers none: ReadPlacedScans() of the request. Throws UsageError for options that
+// contradict what is remembered (azimuth, units, max_range where they are given, poses), InputError
+// for another scan and for one that is not found.
+PlacedScans ReadScansOfModel(const AlignmentRecord& record, const ScanRequest& request);
+
+// The model's doubts are those of what is built on it: exit 4, or a warning if accept.
+void TakeOverTrust(const AlignmentRecord& record, bool accept, const Command::Context& context);
+// The option that sets `accept`.
+inline constexpr char kAcceptUntrustedHelp[] =
+    "Build on an alignment that is not trusted, with a warning; 0 = such results end with exit 4, "
+    "too.";
+
+}  // namespace roomtex
