@@ -352,6 +352,16 @@ std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const P
   return distinct;
 }
 
+std::vector<ViewPose> ViewPoseSolver::Solve(const PointPairs& pairs,
+                                            const std::optional<ViewPose>& start) const {
+  return SolveViewPoses(projection_, pairs,
+                        start ? std::optional<Rigid>(start->cam_from_scan) : std::nullopt);
+}
+
+Eigen::VectorXd ViewPoseSolver::Residuals(const PointPairs& pairs, const ViewPose& pose) const {
+  return PickResiduals(projection_, pairs, pose.cam_from_scan);
+}
+
 Eigen::VectorXd PickResiduals(const CameraProjection& projection, const PointPairs& pairs,
                               const Rigid& cam_from_scan) {
   Eigen::VectorXd residual_px(pairs.size());

@@ -98,10 +98,11 @@ void AddPicks(const PickTerms& terms, const std::vector<bool>& used, double sigm
   }
 }
 
-void AddScalePrior(const Similarity& s, const Similarity& start, Normal* normal) {
+void AddScalePrior(const Similarity& s, const Similarity& start, double scale_prior,
+                   Normal* normal) {
   const double off = std::log(s.scale / start.scale);
-  normal->matrix(6, 6) += 1 / (kScalePrior * kScalePrior);
-  normal->gradient[6] += off / (kScalePrior * kScalePrior);
+  normal->matrix(6, 6) += 1 / (scale_prior * scale_prior);
+  normal->gradient[6] += off / (scale_prior * scale_prior);
 }
 
 // The step to the minimum; none if the normal matrix has no inverse.
@@ -234,7 +235,7 @@ void JudgeAccuracy(const std::vector<Match>& matches, const std::vector<SurfaceP
   fit->facing /= std::max(1, num_counted);
   fit->surface_information = normal.matrix;
   AddPicks(terms, used, sigma_px, fit->scan_from_sparse, fit->pivot, &normal);
-  AddScalePrior(fit->scan_from_sparse, start, &normal);
+  AddScalePrior(fit->scan_from_sparse, start, kScalePrior, &normal);
   Vector7d step;
   if (!SolveStep(normal, &step, &fit->covariance)) fit->covariance.setConstant(kInfinity);
 }
@@ -328,7 +329,7 @@ Eigen::Matrix2Xd PickErrors(const SparseModel& model, const std::vector<Pick>& p
 
 SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& picks,
                          const std::vector<bool>& used, double sigma_px, const Similarity& start,
-                         const SimilarityFitOptions& options) {
+                         const SimilarityFitOptions& options, double scale_prior) {
   SimilarityFit fit;
   fit.scan_from_sparse = start;
   fit.pivot = Pivot(picks);
@@ -337,7 +338,7 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
   for (int i = 0; i < options.num_steps && !fit.converged; ++i) {
     Normal normal;
     AddPicks(terms, used, sigma_px, fit.scan_from_sparse, fit.pivot, &normal);
-    AddScalePrior(fit.scan_from_sparse, start, &normal);
+    AddScalePrior(fit.scan_from_sparse, start, scale_prior, &normal);
     Vector7d step;
     if (!SolveStep(normal, &step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(fit.scan_from_sparse, fit.pivot, step);
@@ -377,7 +378,7 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
                   fit.pivot, TukeyWeight(match.distance, own_gate) / (sigma * sigma), &normal);
     }
     AddPicks(terms, used, sigma_px, s, fit.pivot, &normal);
-    AddScalePrior(s, start, &normal);
+    AddScalePrior(s, start, kScalePrior, &normal);
     Vector7d step;
     if (!SolveStep(normal, &step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(s, fit.pivot, step);

@@ -98,8 +98,7 @@ AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::
     }
   } else {
     verdict.verdict = "untrusted";
-    const bool has_model =
-        has_report && report.contains("scan_from_sparse") && report["scan_from_sparse"].is_object();
+    const bool has_model = has_report && report.contains("images") && report["images"].is_array();
     verdict.headline = has_model ? "Not to be trusted: look at the reasons before you use it."
                                  : "There is no alignment: the picks contradict the scan or each "
                                    "other.";

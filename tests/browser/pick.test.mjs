@@ -418,7 +418,7 @@ test('too few picks: Align says so without running', async () => {
   await pageOn(async (page) => {
     await page.rowsAre(3);
     await page.page.click('#align-open');
-    assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);
+    assert.match(await page.text('#align .body'), /needs 6 picks; there are 3/);
   }, {picksFile: fileOf(places.slice(0, 3))});
 });
 
