@@ -1,5 +1,7 @@
 #include "align/fit/spread_picks.h"
 
+#include <random>
+
 #include <gmock/gmock.h>
 
 #include "align/fit/ray_similarity.h"
