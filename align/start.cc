@@ -121,7 +121,7 @@ std::optional<AlignmentStart> StartFromSpread(
   start.scale = choice->scale;
   start.scale_image_name = photo.name;
   start.position_sigma = SpreadPositionSigma(model, picks, fit);
-  start.pick_sigma_px = std::max(kLeastClickNoise, spread.sigma_px);
+  start.pick_sigma_px = spread.sigma_px;
   start.scan_from_sparse = fit.scan_from_sparse;
   start.scale_sigma = std::sqrt(std::max(0.0, fit.covariance(6, 6)));
   start.picks = OutcomesOf(picks);

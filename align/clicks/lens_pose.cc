@@ -17,16 +17,16 @@ namespace {
 
 // Focal lengths that are tried where none is known: shares of the photo's longer side, from a wide
 // lens (100 degrees across) to a long one (14).
-constexpr std::array<double, 9> kTriedFocal = {0.42, 0.56, 0.75, 1.0, 1.33, 1.78, 2.37, 3.16, 4.2};
+constexpr std::array<double, 6> kTriedFocal = {0.45, 0.7, 1.05, 1.6, 2.5, 4.0};
 constexpr size_t kMaxRefined = 4;  // starts that are refined with the lens
 // Third extent of the picks over the first below which they are flat: the depth of a plane and the
 // focal length can hardly be told apart.
 constexpr double kFlatShare = 0.04;
-constexpr double kPriorResiduals = 4;
 constexpr double kMinDepth = 1e-6;  // metres
-constexpr int kNumLens = 2;         // log of the focal length's change, radial term
+// Log of the focal length's change, radial term, shift of the principal point in pixels.
+constexpr int kNumLens = 4;
 
-using Matrix8d = Eigen::Matrix<double, 8, 8>;
+using Matrix10d = Eigen::Matrix<double, 10, 10>;
 
 // Reprojection error, pixels times weight; pose (w, t) as in view_pose.cc.
 struct LensPickCost {
@@ -37,7 +37,8 @@ struct LensPickCost {
     ceres::AngleAxisRotatePoint(pose, rotated, p);
     for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
     if (p[2] < T(kMinDepth)) return false;
-    const T params[4] = {T(focal) * exp(lens[0]), T(principal.x()), T(principal.y()), lens[1]};
+    const T params[4] = {T(focal) * exp(lens[0]), T(principal.x()) + lens[2],
+                         T(principal.y()) + lens[3], lens[1]};
     T x, y;
     camera_formulas::Project(CameraModel::kSimpleRadial, params, T(p[0] / p[2]), T(p[1] / p[2]), &x,
                              &y);
@@ -58,31 +59,38 @@ struct LensPriorCost {
   bool operator()(const T* const lens, T* residual) const {
     residual[0] = focal_weight * (lens[0] - T(focal_offset));
     residual[1] = radial_weight * lens[1];
+    residual[2] = principal_weight * (lens[2] - T(principal_offset.x()));
+    residual[3] = principal_weight * (lens[3] - T(principal_offset.y()));
     return true;
   }
-  double focal_offset, focal_weight, radial_weight;
+  double focal_offset, focal_weight, radial_weight, principal_weight;
+  Eigen::Vector2d principal_offset;
 };
 
 // Inverse of a normal matrix; infinite where something is open.
-Matrix8d InverseOf(const Matrix8d& normal) {
-  const Eigen::Matrix<double, 8, 1> size = normal.diagonal().cwiseSqrt();
-  const Matrix8d infinite = Matrix8d::Constant(std::numeric_limits<double>::infinity());
+Matrix10d InverseOf(const Matrix10d& normal) {
+  const Eigen::Matrix<double, 10, 1> size = normal.diagonal().cwiseSqrt();
+  const Matrix10d infinite = Matrix10d::Constant(std::numeric_limits<double>::infinity());
   if (!normal.allFinite() || !(size.minCoeff() > 0)) return infinite;
-  const Matrix8d balanced =
+  const Matrix10d balanced =
       size.cwiseInverse().asDiagonal() * normal * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix8d> solver(balanced);
+  const Eigen::SelfAdjointEigenSolver<Matrix10d> solver(balanced);
   if (!(solver.eigenvalues()[0] > 1e-13)) return infinite;
-  const Matrix8d inverse = solver.eigenvectors() *
-                           solver.eigenvalues().cwiseInverse().asDiagonal() *
-                           solver.eigenvectors().transpose();
+  const Matrix10d inverse = solver.eigenvectors() *
+                            solver.eigenvalues().cwiseInverse().asDiagonal() *
+                            solver.eigenvectors().transpose();
   return size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal();
 }
 
-Camera WithLens(Camera camera, double focal, double radial) {
+Camera WithLens(Camera camera, double focal, const Eigen::Vector2d& principal, double radial) {
   camera.params[0] = focal;
+  camera.params[1] = principal.x();
+  camera.params[2] = principal.y();
   if (camera.params.size() > 3) camera.params[3] = radial;
   return camera;
 }
+
+Eigen::Vector2d Principal(const Camera& camera) { return {camera.params[1], camera.params[2]}; }
 
 double SquareOf(double x) { return x * x; }
 
@@ -103,12 +111,6 @@ const char* FocalSourceName(FocalSource source) {
       return "picks";
   }
   return "";
-}
-
-double ClickSigma(double sum_px2, int redundancy) {
-  const double all = kPriorResiduals + std::max(0, redundancy);
-  const double together = std::sqrt((kPriorResiduals * SquareOf(kUsualClickSigma) + sum_px2) / all);
-  return redundancy > 0 ? std::max(together, std::sqrt(sum_px2 / redundancy)) : together;
 }
 
 std::string FindFocalProblem(const PointPairs& pairs) {
@@ -140,7 +142,7 @@ std::vector<ViewPose> LensPoseSolver::Starts(const PointPairs& pairs,
   }
   std::vector<ViewPose> starts;
   for (const double focal : focals) {
-    const Camera camera = WithLens(camera_, focal, 0);
+    const Camera camera = WithLens(camera_, focal, Principal(camera_), 0);
     for (ViewPose& pose : SolveViewPoses(CameraProjection(camera), pairs)) {
       pose.lens = camera;
       starts.push_back(pose);
@@ -159,24 +161,26 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   const Eigen::Quaterniond rotation = start.cam_from_scan.rotation;
   double pose[6] = {0, 0, 0, 0, 0, 0};
   Eigen::Map<Eigen::Vector3d>(pose + 3) = start.cam_from_scan.translation;
-  double lens[kNumLens] = {0, HasRadial() ? start.lens->params[3] : 0};
+  const Eigen::Vector2d principal = Principal(*start.lens);
+  double lens[kNumLens] = {0, HasRadial() ? start.lens->params[3] : 0, 0, 0};
   ceres::Problem problem;
   for (int i = 0; i < pairs.size(); ++i) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPickCost, 2, 6, kNumLens>(
-                                 new LensPickCost{focal,
-                                                  {camera_.params[1], camera_.params[2]},
-                                                  pairs.x_in_img.col(i),
-                                                  rotation * pairs.x_in_scan.col(i),
-                                                  pairs.WeightOf(i)}),
-                             nullptr, pose, lens);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<LensPickCost, 2, 6, kNumLens>(
+            new LensPickCost{focal, principal, pairs.x_in_img.col(i),
+                             rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
+        nullptr, pose, lens);
   }
   const bool by_exif = source_ == FocalSource::kExif;
   const double focal_weight = by_exif ? kUsualClickSigma / kExifFocalSigma : 0;
   // A camera without a radial term has none.
+  const double principal_weight =
+      kUsualClickSigma / (kPrincipalSigma * std::max(camera_.width, camera_.height));
   const double radial_weight = kUsualClickSigma / (HasRadial() ? kRadialSigma : 1e-9);
   problem.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<LensPriorCost, 2, kNumLens>(new LensPriorCost{
-          by_exif ? std::log(camera_.params[0] / focal) : 0, focal_weight, radial_weight}),
+      new ceres::AutoDiffCostFunction<LensPriorCost, 4, kNumLens>(
+          new LensPriorCost{by_exif ? std::log(camera_.params[0] / focal) : 0, focal_weight,
+                            radial_weight, principal_weight, Principal(camera_) - principal}),
       nullptr, lens);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
@@ -194,7 +198,8 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   result.cam_from_scan = {
       (RotationFromVector(Eigen::Map<const Eigen::Vector3d>(pose)) * rotation).normalized(),
       Eigen::Map<const Eigen::Vector3d>(pose + 3)};
-  result.lens = WithLens(camera_, focal * std::exp(lens[0]), lens[1]);
+  result.lens = WithLens(camera_, focal * std::exp(lens[0]),
+                         principal + Eigen::Vector2d(lens[2], lens[3]), lens[1]);
   if (!result.lens->Problems().empty()) return std::nullopt;
   result.residual_px = Residuals(pairs, result);
   const double of_picks = pairs.SumOfSquares(result.residual_px);
@@ -208,20 +213,20 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   // pose about its solution is the left Jacobian of w away from the one about the start.
   ceres::CRSMatrix jacobian;
   problem.Evaluate({}, nullptr, nullptr, nullptr, &jacobian);
-  Matrix8d normal = Matrix8d::Zero();
+  Matrix10d normal = Matrix10d::Zero();
   const double noise2 = SquareOf(ClickSigma(result.sum_px2, redundancy));
   for (int row = 0; row < jacobian.num_rows; ++row) {
-    Eigen::Matrix<double, 8, 1> j = Eigen::Matrix<double, 8, 1>::Zero();
+    Eigen::Matrix<double, 10, 1> j = Eigen::Matrix<double, 10, 1>::Zero();
     for (int k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
       j[jacobian.cols[k]] = jacobian.values[k];
     }
     const bool is_prior = row >= 2 * pairs.size();
     normal += j * j.transpose() / (is_prior ? SquareOf(kUsualClickSigma) : noise2);
   }
-  Matrix8d turned = Matrix8d::Identity();
+  Matrix10d turned = Matrix10d::Identity();
   turned.topLeftCorner<3, 3>() =
       RotationWithJacobian(Eigen::Map<const Eigen::Vector3d>(pose)).left_jacobian;
-  const Matrix8d covariance = turned * InverseOf(normal) * turned.transpose();
+  const Matrix10d covariance = turned * InverseOf(normal) * turned.transpose();
   if (covariance.allFinite()) {
     result.covariance = covariance.topLeftCorner<6, 6>();
     result.focal_sigma = std::sqrt(covariance(6, 6));

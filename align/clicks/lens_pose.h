@@ -1,6 +1,6 @@
 #pragma once
 // The pose of one photo together with its lens, where that is not known exactly: focal length and
-// one radial term (SIMPLE_RADIAL), the principal point in the middle of the photo. Resection with
+// one radial term (SIMPLE_RADIAL), the principal point near the middle of the photo. Resection with
 // unknown focal length (PnPf; Bujnak, Kukelova and Pajdla 2008); here the start is a search over
 // the focal length with view_pose.h at each, and the answer the most probable one (maximum a
 // posteriori) of clicks and what is known of the lens beforehand.
@@ -23,15 +23,10 @@ const char* FocalSourceName(FocalSource source);
 // One standard deviation of what EXIF says, as a share, and of the radial term k that a lens has.
 inline constexpr double kExifFocalSigma = 0.03;
 inline constexpr double kRadialSigma = 0.1;
-// Pixels per coordinate, of a click, before its residuals are known (docs/pick.md: one to two).
-inline constexpr double kUsualClickSigma = 1.5;
+// How far the principal point lies from the middle, as a share of the photo's longer side.
+inline constexpr double kPrincipalSigma = 0.01;
 // The fewest picks that tell a focal length that nobody knows.
 inline constexpr int kMinPicksForFocal = 8;
-
-// What the residuals of a photo's picks and the usual noise of clicks say together about a click
-// with weight 1 (standard deviation per coordinate): few small residuals say little, so that the
-// usual noise counts as much as four of them; large ones are believed.
-double ClickSigma(double sum_px2, int redundancy);
 
 // Why these picks do not tell the focal length: too few, or on one plane; without a full stop, ""
 // if they do.

@@ -14,7 +14,8 @@ namespace roomtex {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMinDepth = 1e-6;  // metres in front of the camera
+constexpr double kMinDepth = 1e-6;     // metres in front of the camera
+constexpr double kUsualResiduals = 4;  // what kUsualClickSigma counts as, beside real ones
 
 // Undistorted normalised coordinates of the clicks that have any, with their scan points.
 struct NormalisedPairs {
@@ -284,6 +285,13 @@ PointPairs PointPairs::Without(int index) const {
   rest.weight.resize(size() - 1);
   rest.weight << weight.head(index), weight.tail(size() - 1 - index);
   return rest;
+}
+
+double ClickSigma(double sum_px2, int redundancy) {
+  const double all = kUsualResiduals + std::max(0, redundancy);
+  const double together =
+      std::sqrt((kUsualResiduals * kUsualClickSigma * kUsualClickSigma + sum_px2) / all);
+  return redundancy > 0 ? std::max(together, std::sqrt(sum_px2 / redundancy)) : together;
 }
 
 double PointPairs::SumOfSquares(const Eigen::VectorXd& residual_px) const {

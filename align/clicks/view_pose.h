@@ -40,6 +40,13 @@ Eigen::Vector3d PrincipalExtents(const Eigen::Matrix3Xd& points);
 // noise of the scan and of the fingers, not depth that a pose could rest on.
 inline constexpr double kCoplanarShare = 0.01;
 
+// Pixels per coordinate, of a click, before its residuals are known (docs/pick.md: one to two).
+inline constexpr double kUsualClickSigma = 1.5;
+// What the residuals of a photo's picks and the usual noise of clicks say together about a click
+// with weight 1 (standard deviation per coordinate): few small residuals say little, so that the
+// usual noise counts as much as four of them; large ones are believed.
+double ClickSigma(double sum_px2, int redundancy);
+
 struct ViewPose {
   Rigid cam_from_scan;
   Eigen::VectorXd residual_px;  // distance between click and projection, one per pick

@@ -240,7 +240,7 @@ SpreadPickFit FitSpreadPicks(const SparseModel& model, const std::vector<Pick>& 
   }
   if (result.HasFit()) {
     const int redundancy = 2 * static_cast<int>(Indices(result.used).size()) - kUnknowns;
-    result.sigma_px = std::sqrt(solutions[0].sum_px2 / std::max(1, redundancy));
+    result.sigma_px = ClickSigma(solutions[0].sum_px2, redundancy);
     const double variance = std::pow(result.sigma_px / kNoHuber, 2);
     for (SimilarityFit& one : result.fits) one.covariance *= variance;
   }

@@ -22,7 +22,7 @@ struct SpreadPickFit {
   std::vector<bool> used;                // one per pick
   std::vector<double> leave_one_out_px;  // distance from where the other used picks put it; NaN
   std::vector<double> without_px2;       // as PickReview
-  // Standard deviation of a click with weight 1, per coordinate, from the residuals.
+  // Of a click with weight 1, per coordinate: ClickSigma() of the residuals.
   double sigma_px = 0;
   // Of the used picks if x of the scan is mirrored; whether that is so much better that it must be.
   double mirrored_rms_px = std::numeric_limits<double>::infinity();

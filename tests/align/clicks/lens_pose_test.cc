@@ -45,7 +45,7 @@ TEST(LensPose, ErrorsAgreeWithTheCovariance) {
   for (const bool by_exif : {false, true}) {
     double focal2 = 0;
     int within_two = 0;
-    constexpr int kTrials = 60;
+    constexpr int kTrials = 30;
     for (unsigned seed = 0; seed < kTrials; ++seed) {
       PickMaker maker = MakerWithLens(seed);
       const PointPairs pairs = maker.WithNoise(maker.General(by_exif ? 6 : 9), 1.5);

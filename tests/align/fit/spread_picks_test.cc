@@ -72,13 +72,6 @@ TEST(SpreadPicks, AreSixInTwoPhotosOrMore) {
   EXPECT_FALSE(AreSpreadPicks(off));
 }
 
-// With their true click noise for the scatter of a few residuals.
-double PositionSigma(const SpreadPickFit& fit, const Eigen::Vector3d& x_in_scan) {
-  SimilarityFit scaled = fit.fits[0];
-  scaled.covariance *= std::pow(1.5 / fit.sigma_px, 2);
-  return PositionSigmaAt(scaled, x_in_scan);
-}
-
 TEST(SpreadPicks, PlaceTheModelAsExactlyAsTheySay) {
   const SimulatedCase& one = MakeCase();
   for (const auto& [num_photos, per_photo] : {std::pair(2, 3), {3, 2}, {6, 1}}) {
@@ -94,7 +87,7 @@ TEST(SpreadPicks, PlaceTheModelAsExactlyAsTheySay) {
         const Eigen::Vector3d found = fit.fits[0].scan_from_sparse * x_in_sparse;
         const double off = (one.room->ScanFromSparse() * x_in_sparse - found).norm();
         EXPECT_LT(off, 0.02) << num_photos << " " << first;
-        EXPECT_LT(off, 3 * PositionSigma(fit, found)) << num_photos << " " << first;
+        EXPECT_LT(off, 3 * PositionSigmaAt(fit.fits[0], found)) << num_photos << " " << first;
       }
     }
   }
