@@ -198,7 +198,8 @@ double RotationSigma(const ViewPose& pose) {
 
 void WarnOfFewPicks(const AlignmentInput& input, const std::vector<PickView>& views,
                     std::vector<std::string>* warnings) {
-  for (const auto& [id, image] : input.model.images) {
+  for (const auto& entry : input.model.images) {
+    const SparseImage& image = entry.second;
     const bool has_view = std::any_of(views.begin(), views.end(), [&](const PickView& view) {
       return view.image == &image && view.HasPose();
     });
@@ -244,7 +245,8 @@ PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos
     if (pose.lens) {
       const double told = input.model.cameras.at(view.image->camera_id).MeanFocalLength();
       std::vector<std::string>* const said =
-          pose.focal_sigma > kFocalToName ? &alignment.warnings : &result.notes;
+          source == FocalSource::kPicks && pose.focal_sigma > kFocalToName ? &alignment.warnings
+                                                                           : &result.notes;
       said->push_back(LensSentence(view.image_name, pose, source, told));
       lens.focal_sigma = pose.focal_sigma * pose.lens->MeanFocalLength();
       lens.radial_sigma = pose.radial_sigma;

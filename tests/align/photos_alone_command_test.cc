@@ -50,10 +50,9 @@ TEST(PhotosAloneCommand, WritesAModelOfThePhotosAndAReportWithTheUsualKeys) {
   EXPECT_EQ(aligned.points.size(), 6u);
   for (const auto& [id, point] : aligned.points) EXPECT_GT(point.color.cast<int>().sum(), 0);
   const SimulatedRoom& room = *MakeCase(0, 6).room;
-  const double error =
-      (aligned.FindImage(alone.name)->cam_from_model.TargetOriginInSource() -
-       room.CamFromScan(room.BestPhotoForPicks()).TargetOriginInSource())
-          .norm();
+  const double error = (aligned.FindImage(alone.name)->cam_from_model.TargetOriginInSource() -
+                        room.CamFromScan(room.BestPhotoForPicks()).TargetOriginInSource())
+                           .norm();
   const Json report = Json::parse(ReadBytes(alone.files.folder / "aligned/alignment.json"));
   EXPECT_EQ(report["trusted"], true);
   EXPECT_LT(1000 * error, 2 * report["expected_error"]["at_cameras_mm"].get<double>());

@@ -138,7 +138,7 @@ export function showSummary(photo, session, {min_picks, has_model: hasModel}) {
   } else {
     add('Pose',
         `not solved; roomtex-align wants ${min_picks} picks, ` +
-            (hasModel ? 'here or in several photos' : 'in each photo'));
+            (hasModel ? 'here or in several photos' : 'in this photo'));
   }
   const similarity = session.similarity;
   if (similarity) {
