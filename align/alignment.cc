@@ -85,6 +85,10 @@ Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
   }
   const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
   if (!reason.empty()) result.reasons.push_back(reason);
+  if (result.reasons.empty() && result.fit.refined) {
+    Append(PicksOffWarnings(start, result.refined_pick_px, options.picks.min_bad_pick_px),
+           &result.warnings);
+  }
   return result;
 }
 

@@ -54,7 +54,7 @@ std::string ContradictionOnSurface(const AlignmentStart& start, const AlignmentF
 
 double PickRmsLimit(const AlignmentInput& input, const AlignmentStart& start,
                     const TrustOptions& trust) {
-  const SparseImage* image = input.model.FindImage(start.image_name);
+  const SparseImage* image = input.model.FindImage(start.scale_image_name);
   return trust.PickRmsLimit(input.model.cameras.at(image->camera_id));
 }
 
@@ -78,19 +78,30 @@ void JudgePicks(const AlignmentStart& start, double limit, const TrustOptions& t
   }
 }
 
+// Spread picks know the scale themselves, as exactly as scale_sigma says: features are a check, not
+// a need.
 void JudgeScale(const AlignmentStart& start, const TrustOptions& trust,
                 std::vector<std::string>* reasons) {
   const ScaleEstimate& scale = start.scale;
+  const bool is_spread = std::isfinite(start.scale_sigma);
   if (scale.num_features < trust.min_scale_features) {
+    if (is_spread) return;
     reasons->push_back("The scale rests on " + std::to_string(scale.num_features) +
                        " features of " + start.image_name + ", fewer than " +
                        std::to_string(trust.min_scale_features) + ".");
+  }
+  if (is_spread && start.scale_off > std::max(trust.max_scale_mad, 3 * start.scale_sigma)) {
+    reasons->push_back("The picks give a scale " + Number(100 * start.scale_off, 0) +
+                       " % off from that of the features of " + start.scale_image_name +
+                       " (limit " +
+                       Number(100 * std::max(trust.max_scale_mad, 3 * start.scale_sigma), 0) +
+                       " %). Check that the picks name the right photos.");
   }
   if (!(scale.relative_mad <= trust.max_scale_mad)) {
     reasons->push_back("The scale differs from feature to feature by " +
                        Number(100 * scale.relative_mad, 0) + " % (limit " +
                        Number(100 * trust.max_scale_mad, 0) + " %): the pose of " +
-                       start.image_name +
+                       start.scale_image_name +
                        " in the scan does not agree with its pose in the sparse model. "
                        "Check that the picks name the right photo.");
   }
@@ -281,6 +292,28 @@ std::string JudgePicksLeftOut(const AlignmentInput& input, const AlignmentStart&
          " pixels away from where the other picks put it, and without it only " +
          std::to_string(num_used) + " are left, fewer than " + std::to_string(kMinPicksPerPhoto) +
          ". The alignment was made from those. Correct or remove the pick, or add others.";
+}
+
+std::vector<std::string> PicksOffWarnings(const AlignmentStart& start,
+                                          const std::vector<double>& surface_px,
+                                          double min_bad_pick_px) {
+  std::vector<double> residuals;
+  for (size_t i = 0; i < start.picks.size(); ++i) {
+    if (start.picks[i].used) residuals.push_back(Weighted(start.picks[i], surface_px[i]));
+  }
+  const double median = Median(&residuals);
+  const double limit = std::max(min_bad_pick_px, 5 * median);
+  std::vector<std::string> warnings;
+  for (size_t i = 0; i < start.picks.size(); ++i) {
+    const Pick& pick = start.picks[i].pick;
+    if (!start.picks[i].used || !(Weighted(start.picks[i], surface_px[i]) > limit)) continue;
+    warnings.push_back("The pick on " + LineOf(pick) + " (" + pick.image_name + ") is " +
+                       Number(surface_px[i], 1) +
+                       " pixels away from where the aligned model puts it, half of the picks less "
+                       "than " +
+                       Number(median, 1) + ": correct or remove it.");
+  }
+  return warnings;
 }
 
 }  // namespace roomtex

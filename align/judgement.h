@@ -51,4 +51,11 @@ std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
 std::string JudgePicksLeftOut(const AlignmentInput& input, const AlignmentStart& start,
                               const std::vector<double>& surface_px, const TrustOptions& trust);
 
+// Picks that stand far off where the aligned model puts them although nothing suffers, since the
+// surface holds it: a wrong click is worth knowing of. Farther than five times the median and than
+// min_bad_pick_px; surface_px as above.
+std::vector<std::string> PicksOffWarnings(const AlignmentStart& start,
+                                          const std::vector<double>& surface_px,
+                                          double min_bad_pick_px);
+
 }  // namespace roomtex

@@ -89,12 +89,10 @@ std::string PoseProblem(const PickView& view) {
               : view.layout_problem);
 }
 
-void RefuseWithoutPose(const AlignmentInput& input, const std::vector<PickView>& views) {
-  bool layout_problem = false;
-  for (const PickView& view : views) {
-    if (view.HasPose()) return;
-    layout_problem |= !view.layout_problem.empty();
-  }
+[[noreturn]] void RefuseWithoutPose(const AlignmentInput& input,
+                                    const std::vector<PickView>& views) {
+  const bool layout_problem = std::any_of(
+      views.begin(), views.end(), [](const PickView& v) { return !v.layout_problem.empty(); });
   const std::string problem = views.empty() ? "no photo has enough picks" : PoseProblem(views[0]);
   if (layout_problem) {
     throw InputError(input.picks_path, "", problem,
@@ -102,6 +100,54 @@ void RefuseWithoutPose(const AlignmentInput& input, const std::vector<PickView>&
   }
   throw Contradiction(input.picks_path, "", problem,
                       "Check that the picks name the right photo, and pick again");
+}
+
+std::string LeftOut(const Pick& pick, const std::string& place, double distance_px) {
+  return "The pick on " + LineOf(pick) + " (" + pick.image_name + place + ") was left out: it is " +
+         Number(distance_px, 1) + " pixels away from where the other picks put it.";
+}
+
+// Picks that the reviews of their photos left out.
+void WarnOfLeftOut(const AlignmentInput& input, const std::vector<PickView>& views,
+                   std::vector<std::string>* warnings) {
+  for (const PickView& view : views) {
+    for (size_t k = 0; view.HasPose() && k < view.picks.size(); ++k) {
+      if (view.review.used[k]) continue;
+      const Pick& pick = input.picks[view.picks[k]];
+      const std::string place =
+          " at " + Number(pick.x_in_img.x(), 1) + ", " + Number(pick.x_in_img.y(), 1);
+      warnings->push_back(LeftOut(pick, place, view.review.leave_one_out_px[static_cast<int>(k)]));
+    }
+  }
+}
+
+// Of picks that place the model together, no photo having enough of its own.
+std::vector<std::string> CheckSpread(const AlignmentInput& input, const SpreadPickFit& spread) {
+  if (!spread.layout_problem.empty()) {
+    throw InputError(input.picks_path, "", spread.layout_problem,
+                     "Pick points that are spread over the photos, in depth, and not on one line");
+  }
+  if (spread.mirrored) {
+    throw Contradiction(
+        input.surveyed.scans()[0].path, "",
+        "the scan is a mirror image of the room: the picks of all photos together " +
+            Miss(spread.rms_px[0]) + ", but " + Miss(spread.mirrored_rms_px) +
+            " when the scan is reflected",
+        MirrorRemedy(input));
+  }
+  if (!spread.HasFit()) {
+    throw Contradiction(input.picks_path, "",
+                        "no place of the sparse model in the scan has the picks of all photos in "
+                        "front of their cameras",
+                        "Check that the picks name the right photos, and pick again, or six points "
+                        "in one photo");
+  }
+  std::vector<std::string> warnings;
+  for (size_t i = 0; i < input.picks.size(); ++i) {
+    if (spread.used[i] || !(input.picks[i].weight > 0)) continue;
+    warnings.push_back(LeftOut(input.picks[i], "", spread.leave_one_out_px[i]));
+  }
+  return warnings;
 }
 
 }  // namespace
@@ -165,23 +211,36 @@ std::vector<std::string> CheckViews(const AlignmentInput& input,
     warnings.push_back("The picks of this photo are used with those of the others only: " +
                        PoseProblem(view) + ".");
   }
-  RefuseWithoutPose(input, views);
-  for (const PickView& view : views) {
-    for (size_t k = 0; view.HasPose() && k < view.picks.size(); ++k) {
-      if (view.review.used[k]) continue;
-      const Pick& pick = input.picks[view.picks[k]];
-      warnings.push_back("The pick on " + LineOf(pick) + " (" + pick.image_name + " at " +
-                         Number(pick.x_in_img.x(), 1) + ", " + Number(pick.x_in_img.y(), 1) +
-                         ") was left out: it is " +
-                         Number(view.review.leave_one_out_px[static_cast<int>(k)], 1) +
-                         " pixels away from where the other picks put it.");
-    }
+  WarnOfLeftOut(input, views, &warnings);
+  return warnings;
+}
+
+std::vector<std::string> CheckPhotoViews(const AlignmentInput& input,
+                                         const std::vector<PickView>& views) {
+  if (views.empty()) {
+    throw InputError(
+        input.picks_path, "",
+        "no photo has " + std::to_string(kMinPicksPerPhoto) +
+            " picks that count; without a sparse model (--input_path) each photo needs "
+            "so many of its own",
+        "Add picks, well spread over the photo and in depth");
   }
+  std::vector<std::string> warnings;
+  for (const PickView& view : views) {
+    if (view.layout_problem.empty()) RefuseMirroredOrExchanged(input, view);
+    if (!view.HasPose()) warnings.push_back("A photo is left out: " + PoseProblem(view) + ".");
+  }
+  const bool any =
+      std::any_of(views.begin(), views.end(), [](const PickView& view) { return view.HasPose(); });
+  if (!any) RefuseWithoutPose(input, views);
+  WarnOfLeftOut(input, views, &warnings);
   return warnings;
 }
 
 std::vector<std::string> CheckStart(const AlignmentInput& input, const std::vector<PickView>& views,
                                     const PickStart& found) {
+  if (found.spread) return CheckSpread(input, *found.spread);
+  if (found.view < 0) RefuseWithoutPose(input, views);
   const PickView& view = views[found.view];
   if (!found.start) {
     throw Contradiction(
@@ -202,9 +261,7 @@ std::vector<std::string> CheckStart(const AlignmentInput& input, const std::vect
   }
   for (size_t i = 0; i < input.picks.size(); ++i) {
     if (std::isnan(found.joint->left_out_px[i])) continue;
-    warnings.push_back("The pick on " + LineOf(input.picks[i]) + " (" + input.picks[i].image_name +
-                       ") was left out: it is " + Number(found.joint->left_out_px[i], 1) +
-                       " pixels away from where the other picks put it.");
+    warnings.push_back(LeftOut(input.picks[i], "", found.joint->left_out_px[i]));
   }
   return warnings;
 }

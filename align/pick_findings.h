@@ -47,14 +47,18 @@ std::vector<std::string> CheckPicksOnScan(const AlignmentInput& input);
 bool MirroredPicksLieOnScan(const AlignmentInput& input);
 
 // Picks that say what is wrong with them are refused, as nothing that follows from them means
-// anything: throws Contradiction for exchanged picks, MirroredScan, and InputError or Contradiction
-// if no photo's picks fix a pose. Warns of photos whose picks do not, and of picks
-// that were left out.
+// anything: throws Contradiction for exchanged picks, MirroredScan. Warns of photos whose
+// picks fix no pose, and of picks that were left out.
 std::vector<std::string> CheckViews(const AlignmentInput& input,
                                     const std::vector<PickView>& views);
 
-// Throws Contradiction if there is no start; views are those that it was looked for in, one at
-// least with a pose. Warns of what does not go together with the other photos' picks.
+// The same of photos without a sparse model, each of which needs a pose of its own: one that has
+// none is left out, said in a warning. Throws InputError or Contradiction if none has.
+std::vector<std::string> CheckPhotoViews(const AlignmentInput& input,
+                                         const std::vector<PickView>& views);
+
+// Throws InputError or Contradiction if there is no start: views are those that it was looked for
+// in. Warns of what does not go together with the other photos' picks.
 std::vector<std::string> CheckStart(const AlignmentInput& input, const std::vector<PickView>& views,
                                     const PickStart& found);
 

@@ -11,6 +11,7 @@
 #include "align/alignment.h"
 #include "align/geo/geo_output.h"
 #include "align/mirrored_reading.h"
+#include "align/photo_alignment.h"
 #include "align/plane_bundle_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
@@ -35,6 +36,7 @@ struct Arguments {
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
+  PhotoCameraOptions camera;
   ScanPlaneOptions planes;
   std::string planes_path;
   int overlays = 0;
@@ -44,7 +46,9 @@ struct Arguments {
 
 void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("input_path", &a->input_path,
-                        "COLMAP's sparse model: a folder, .bin or .txt.");
+                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
+                        "--image_path that have six picks are placed each by its own.",
+                        Command::Kind::kOptional);
   command->AddInputPaths("scan_path", &a->scan_paths,
                          "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
                          "an --input_path that was aligned before: it remembers its scans.",
@@ -52,9 +56,8 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
                         "weight: 1 = ordinary, "
-                        "more = more exact, 0 = off); at least six in one photo; pixels of the "
-                        "photo as taken, metres "
-                        "in the scan frame.",
+                        "more = more exact, 0 = off); at least six, in one photo or spread "
+                        "over several; pixels of the photo as taken, metres in the scan frame.",
                         Command::Kind::kOptional);
   command->AddOutputPath(
       "output_path", &a->output_path,
@@ -82,6 +85,7 @@ void AddOptions(Arguments* a, Command* command) {
                    "say so, and trust nothing that rests on them.");
   command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
   command->Add(FieldsOf(&a->scan_reader));
+  command->Add(FieldsOf(&a->camera));
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
@@ -110,6 +114,18 @@ void CheckArguments(const Arguments& a) {
   std::vector<std::string> problems = a.scan_reader.Problems();
   AppendProblems(a.alignment.Problems(), &problems);
   AppendProblems(a.planes.Problems(), &problems);
+  AppendProblems(a.camera.Problems(), &problems);
+  if (a.input_path.empty() && a.image_path.empty()) {
+    problems.push_back(
+        "--input_path is missing: COLMAP's sparse model, or --image_path alone for photos that "
+        "have "
+        "six picks each");
+  }
+  if (!a.input_path.empty() && !a.camera.camera_params.empty()) {
+    problems.push_back(
+        "--camera_params is for photos without a sparse model: that of --input_path "
+        "has cameras");
+  }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {
     problems.push_back("--overlays needs the photos: give --image_path");
@@ -118,7 +134,7 @@ void CheckArguments(const Arguments& a) {
   RequireScans(a.scan_paths, a.input_path);
   ParseGeoOrigin(a.geo_origin);
   std::error_code ignored;
-  if (std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
+  if (!a.input_path.empty() && std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
     throw UsageError(
         "--output_path is the same folder as --input_path: the input model is never "
         "overwritten");
@@ -525,6 +541,93 @@ void Align(const Arguments& a, const Command::Context& context) {
   WriteAligned(a, model, reading, geo, told, context);
 }
 
+// Of photos without a sparse model: what was found of their cameras.
+void AddLenses(const PhotoAlignment& found, Json* images) {
+  for (Json& one : *images) {
+    const SparseImage* image = found.model.FindImage(one["name"].get<std::string>());
+    const Camera& camera = found.model.cameras.at(image->camera_id);
+    const PhotoAlignment::Lens& lens = found.lenses.at(image->image_id);
+    one["camera_model"] = CameraModelName(camera.model);
+    one["camera_params"] = camera.params;
+    one["focal_length_from"] = FocalSourceName(lens.source);
+    one["focal_length_sigma_px"] = NumberOrNull(lens.focal_sigma);
+    one["radial_sigma"] = NumberOrNull(lens.radial_sigma);
+  }
+}
+
+// What an alignment without a sparse model does not have.
+void NullWithoutModel(Report* report) {
+  Report& r = *report;
+  for (const char* key : {"scan_from_sparse", "scan_from_sparse_from_picks", "plane_bundle"}) {
+    r[key] = nullptr;
+  }
+  r["reprojection_rms_px"]["before"] = nullptr;
+  r["expected_error"]["at_far_corner_mm"] = nullptr;
+  r["expected_error"]["far_corner"] = nullptr;
+  r["expected_error"]["scale"] = nullptr;
+  r["placement"] = nullptr;
+}
+
+// None if the files contradict each other; `refusal` then says why.
+std::optional<PhotoAlignment> FindPhotoAlignment(const Arguments& a, const AlignmentInput& input,
+                                                 const PhotoModel& photos,
+                                                 const Command::Context& context,
+                                                 std::string* refusal) {
+  try {
+    return AlignPhotos(input, photos, a.alignment, &context.progress);
+  } catch (const Contradiction& contradiction) {
+    *refusal = contradiction.what();
+    return std::nullopt;
+  }
+}
+
+// One to a few photos, each by its own picks.
+void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
+  CheckArguments(a);
+  context.progress.Stage("read photos");
+  const std::vector<Pick> picks = ReadPicks(a.picks_path);
+  const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
+  CheckPickNames(a.picks_path, picks, photos.model);
+  const std::set<std::string> told = LookForPhotos(a, photos.model, context);
+  context.progress.Stage("read scan");
+  SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
+  options.num_threads = context.options.num_threads;
+  Reading reading(a, options);
+  for (const std::string& note : reading.placed.notes) context.Warn(note);
+  CompareStations(a, &reading.placed, context);
+  const std::optional<GeoReference> geo =
+      FindGeoReference(reading.placed, ParseGeoOrigin(a.geo_origin));
+  const AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path,
+                             reading.azimuth()};
+  std::string refusal;
+  std::optional<PhotoAlignment> found = FindPhotoAlignment(a, input, photos, context, &refusal);
+  if (!found) return WriteRefusal(a, refusal, context);
+  for (const std::string& note : found->notes) context.progress.Note(note);
+  for (const std::string& warning : found->alignment.warnings) context.Warn(warning);
+  for (const std::string& reason : found->alignment.reasons) context.report.SetUntrusted(reason);
+
+  ColorPoints(a.image_path, &found->model);
+  const ReprojectionErrors after = UpdateReprojectionErrors(&found->model);
+  FillReport(found->alignment, after.rms_px, &context.report);
+  NullWithoutModel(&context.report);
+  context.report["images"] = PhotosToJson(found->alignment, found->model);
+  AddLenses(*found, &context.report["images"]);
+  CompareWithPhotos(a, found->model, *reading.surveyed, told, context);
+
+  context.progress.Stage("write");
+  const std::string output_path = ChooseOutput(a, context);
+  WriteSparseModel(found->model, output_path);
+  // There is none: one of an earlier run would contradict.
+  for (const char* name : {"/scan_from_sparse.txt", "/scan_from_sparse_matrix.txt"}) {
+    std::error_code ignored;
+    std::filesystem::remove(output_path + name, ignored);
+  }
+  WriteGeo(a, found->model, reading.placed, geo, output_path, context);
+  context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
+  context.report.AddCopy(output_path + "/alignment.json");
+  WriteOverlayPictures(a, found->model, *reading.surveyed, told, output_path, context);
+}
+
 }  // namespace
 }  // namespace roomtex
 
@@ -536,6 +639,10 @@ int main(int argc, char** argv) {
       "--output_path aligned");
   roomtex::AddOptions(&arguments, &command);
   return command.Run(argc, argv, [&arguments](const roomtex::Command::Context& context) {
-    roomtex::Align(arguments, context);
+    if (arguments.input_path.empty()) {
+      roomtex::AlignPhotosAlone(arguments, context);
+    } else {
+      roomtex::Align(arguments, context);
+    }
   });
 }

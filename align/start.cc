@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "align/trust/expected_error.h"
+
 namespace roomtex {
 namespace {
 
@@ -57,12 +59,79 @@ void SetReviewed(const std::vector<PickView>& views, std::vector<PickOutcome>* o
 AlignmentStart StartFromView(const PickView& view, const PoseChoice& choice) {
   AlignmentStart start;
   start.source = AlignmentStart::Source::kPicks;
-  start.image_name = view.image_name;
+  start.image_name = start.scale_image_name = view.image_name;
   start.scale = choice.scale;
   start.position_sigma = view.review.pose().PositionSigma();
   start.pick_sigma_px = std::max(kLeastClickNoise, view.review.pose().sigma_px);
   start.scan_from_sparse = ScanFromSparse(view.review.poses[choice.index].cam_from_scan,
                                           view.image->cam_from_model, start.scale.scale);
+  return start;
+}
+
+// Of the photos with picks that count, the one with most sparse points: its features tell which of
+// several similarities is right, and check the scale.
+const SparseImage& FeaturePhotoOf(const SparseModel& model, const std::vector<Pick>& picks) {
+  const SparseImage* best = nullptr;
+  long most = -1;
+  for (const Pick& pick : picks) {
+    const SparseImage* image = model.FindImage(pick.image_name);
+    if (!(pick.weight > 0) || image == best) continue;
+    const long count = std::count_if(image->point3d_ids.begin(), image->point3d_ids.end(),
+                                     [](uint64_t id) { return id != kInvalidPoint3dId; });
+    if (count <= most) continue;
+    most = count;
+    best = image;
+  }
+  return *best;
+}
+
+// How exactly the picks fix the cameras of the photos that they were made in: the worst of them.
+double SpreadPositionSigma(const SparseModel& model, const std::vector<Pick>& picks,
+                           const SimilarityFit& fit) {
+  double sigma = 0;
+  for (const Pick& pick : picks) {
+    if (!(pick.weight > 0)) continue;
+    const Rigid& cam_from_sparse = model.FindImage(pick.image_name)->cam_from_model;
+    sigma = std::max(
+        sigma, PositionSigmaAt(fit, fit.scan_from_sparse * cam_from_sparse.TargetOriginInSource()));
+  }
+  return sigma;
+}
+
+// By picks of several photos none of which has enough; none if they fix nothing.
+std::optional<AlignmentStart> StartFromSpread(
+    const SparseModel& model, const std::vector<Pick>& picks, const SpreadPickFit& spread,
+    const AlignmentOptions& options, const ScaleOfPhoto& scale_of_photo, PoseChoice* choice) {
+  if (!spread.HasFit()) return std::nullopt;
+  const SparseImage& photo = FeaturePhotoOf(model, picks);
+  std::vector<ViewPose> poses;
+  for (size_t i = 0; i < spread.fits.size(); ++i) {
+    ViewPose pose;
+    pose.cam_from_scan = CamFromScan(photo.cam_from_model, spread.fits[i].scan_from_sparse);
+    pose.rms_px = spread.rms_px[i];
+    poses.push_back(pose);
+  }
+  *choice = ChoosePose(poses, options.scale, options.trust.min_scale_features,
+                       [&](const Rigid& cam_from_scan, const ScaleOptions& scale_options) {
+                         return scale_of_photo(photo, cam_from_scan, scale_options);
+                       });
+  const SimilarityFit& fit = spread.fits[choice->index];
+  AlignmentStart start;
+  start.source = AlignmentStart::Source::kPicks;
+  start.scale = choice->scale;
+  start.scale_image_name = photo.name;
+  start.position_sigma = SpreadPositionSigma(model, picks, fit);
+  start.pick_sigma_px = spread.sigma_px;
+  start.scan_from_sparse = fit.scan_from_sparse;
+  start.scale_sigma = std::sqrt(std::max(0.0, fit.covariance(6, 6)));
+  start.picks = OutcomesOf(picks);
+  for (size_t i = 0; i < picks.size(); ++i) {
+    start.picks[i].used = spread.used[i];
+    start.picks[i].leave_one_out_px = spread.leave_one_out_px[i];
+  }
+  if (start.scale.num_features >= options.trust.min_scale_features) {
+    start.scale_off = std::abs(std::log(start.scale.scale / fit.scan_from_sparse.scale));
+  }
   return start;
 }
 
@@ -101,6 +170,15 @@ PickStart StartFromPicks(const SparseModel& model, const std::vector<Pick>& pick
                          const AlignmentOptions& options, const ScaleOfPhoto& scale_of_photo) {
   PickStart found;
   found.view = ChooseView(views, choices);
+  const bool is_whole = found.view >= 0 && views[found.view].pairs.size() >= kMinPicksPerPhoto;
+  if (!is_whole && AreSpreadPicks(picks)) {
+    found.view = -1;
+    found.spread = FitSpreadPicks(model, picks, options.picks, options.fit);
+    found.start =
+        StartFromSpread(model, picks, *found.spread, options, scale_of_photo, &found.choice);
+    if (found.start) MeasurePicks(model, picks, &*found.start);
+    return found;
+  }
   if (found.view < 0) return found;
   const PickView& view = views[found.view];
   const bool is_chosen = !choices.empty() && choices[found.view];

@@ -1,7 +1,7 @@
 #pragma once
 // Where an alignment starts: a similarity for the sparse model, and what is known of it. By picks
 // it is the pose of one photo (thesis 7.1.1) with the scale by its features (7.1.2), or one answer
-// for the picks of several photos.
+// for the picks of several photos, even if none of them has enough for a pose.
 
 #include <limits>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "align/alignment_input.h"
 #include "align/clicks/pick_view.h"
 #include "align/fit/joint_picks.h"
+#include "align/fit/spread_picks.h"
 
 namespace roomtex {
 
@@ -37,8 +38,13 @@ struct AlignmentStart {
   double pick_rms_px = std::numeric_limits<double>::quiet_NaN();  // of those used
   double pick_max_px = std::numeric_limits<double>::quiet_NaN();  // of all that count
   // Of a start from picks.
-  std::string image_name;  // the photo whose picks gave the pose
+  std::string image_name;  // the photo whose picks gave the pose; "" where picks of several did
   ScaleEstimate scale;
+  std::string scale_image_name;  // the photo whose features these are
+  // Of spread picks, which know the scale themselves: how far that of the features is from theirs,
+  // as a share, and one standard deviation of theirs; NaN else.
+  double scale_off = std::numeric_limits<double>::quiet_NaN();
+  double scale_sigma = std::numeric_limits<double>::quiet_NaN();
 
   std::vector<bool> UsedPicks() const;
 };
@@ -52,15 +58,18 @@ std::vector<double> PickDistances(const SparseModel& model, const std::vector<Pi
 struct PickStart {
   int view = -1;  // of the views: the photo whose pose counts; -1 if none has a pose
   PoseChoice choice;
+  // Where no photo has kMinPicksPerPhoto picks with a pose, but all of them together are enough.
+  std::optional<SpreadPickFit> spread;
   // Where picks of other photos count as well.
   std::optional<JointPickFit> joint;
-  // None without a view, and where no feature of the photo fixes the scale.
+  // None without a view or a spread fit, and where no feature of the photo fixes the scale.
   std::optional<AlignmentStart> start;
 };
 
 // From views (of these picks) to the start; the same for the window and the command. The photo is
-// the one whose picks fix its camera best; one with kMinPicksPerPhoto picks goes before all others,
-// and of those that have fewer the one with more. choices: the poses of views where they are known
+// the one whose picks fix its camera best; one with kMinPicksPerPhoto picks goes before all others.
+// If there is none such, picks of several photos count together (AreSpreadPicks); else, of the
+// photos that have fewer, the one with more. choices: the poses of views where they are known
 // already (ChoosePoseOf); a view whose choice rests on no feature is passed over. Empty = none is.
 PickStart StartFromPicks(const SparseModel& model, const std::vector<Pick>& picks,
                          const std::vector<PickView>& views,

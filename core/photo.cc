@@ -233,6 +233,36 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure) {
   }
 }
 
+std::optional<double> ReadFocalLength(const std::string& path) {
+  SilenceExiv2();
+  const auto [width, height] = ReadPhotoSize(path);
+  if (width == 0) return std::nullopt;
+  constexpr double kFilmDiagonal = 43.2666;  // millimetres, of 36 x 24
+  std::optional<double> focal;
+  try {
+    const auto image = Exiv2::ImageFactory::open(path);
+    image->readMetadata();
+    const Exiv2::ExifData& exif = image->exifData();
+    if (const auto on_film = PositiveNumber(exif, "Exif.Photo.FocalLengthIn35mmFilm")) {
+      focal = *on_film / kFilmDiagonal * std::hypot(width, height);
+    } else {
+      const auto millimetres = PositiveNumber(exif, "Exif.Photo.FocalLength");
+      const auto resolution = PositiveNumber(exif, "Exif.Photo.FocalPlaneXResolution");
+      const auto unit = PositiveNumber(exif, "Exif.Photo.FocalPlaneResolutionUnit");
+      const auto full_width = PositiveNumber(exif, "Exif.Photo.PixelXDimension");
+      if (millimetres && resolution) {
+        const double per_unit = unit.value_or(2) == 3 ? 10 : 25.4;  // millimetres
+        focal = *millimetres * *resolution / per_unit * width / full_width.value_or(width);
+      }
+    }
+  } catch (const Exiv2::Error&) {
+    return std::nullopt;
+  }
+  // What no lens has is a mistake of the file: from fisheyes to telescopes.
+  const double share = focal.value_or(0) / std::max(width, height);
+  return share > 0.2 && share < 100 ? focal : std::nullopt;
+}
+
 std::optional<GpsData> ReadGpsData(const std::string& path) {
   SilenceExiv2();
   try {

@@ -46,6 +46,11 @@ ExposureData ReadExposureData(const std::string& path);
 // Writes the fields that are set into an existing JPEG.
 void WriteExposureData(const std::string& path, const ExposureData& exposure);
 
+// Focal length in pixels of the photo as stored, by EXIF: the equivalent on 35 mm film, which CIPA
+// DCG-001 takes by the diagonal, else the focal length with the resolution of the focal plane. Both
+// are rounded, and the first is meant for uncropped photos: good to some percent. None without.
+std::optional<double> ReadFocalLength(const std::string& path);
+
 // Where the camera's satellite receiver believed to be (EXIF GPS).
 struct GpsData {
   double latitude_deg = 0;                 // -90..90, north positive

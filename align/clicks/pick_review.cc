@@ -18,11 +18,7 @@ constexpr int kMaxExchanged = 12;
 // of the photo's diagonal.
 constexpr double kMaxExplainedShare = 0.015;
 
-bool IsExplained(double rms_px, double explained_rms_px, const Camera& camera,
-                 const PickReviewOptions& options) {
-  return rms_px > 0.5 * options.min_bad_pick_px && explained_rms_px * options.min_gain < rms_px &&
-         explained_rms_px < kMaxExplainedShare * std::hypot(camera.width, camera.height);
-}
+double DiagonalOf(const Camera& camera) { return std::hypot(camera.width, camera.height); }
 
 // The largest distance of any point from the line through the two points that are farthest apart
 // along the first principal axis, and the length of that line, metres.
@@ -73,20 +69,22 @@ PointPairs Selected(const PointPairs& pairs, const std::vector<int>& indices) {
 struct LeaveOneOut {
   // One per pick; infinite where the rest has no pose, NaN where not tried.
   Eigen::VectorXd distance_px;
-  int best = -1;  // pick without which the others fit best
+  Eigen::VectorXd sum_px2;  // of the rest; NaN where it has no pose
+  int best = -1;            // pick without which the others fit best
   double best_sum_px2 = std::numeric_limits<double>::infinity();
 };
 
-LeaveOneOut TryWithoutEach(const CameraProjection& projection, const PointPairs& pairs,
-                           const ViewPose& all, const PickReviewOptions& options) {
+LeaveOneOut TryWithoutEach(const PoseSolver& solver, const PointPairs& pairs, const ViewPose& all,
+                           const PickReviewOptions& options) {
   LeaveOneOut result;
-  result.distance_px = Eigen::VectorXd::Constant(pairs.size(), std::nan(""));
+  result.distance_px = result.sum_px2 = Eigen::VectorXd::Constant(pairs.size(), std::nan(""));
   for (const int i : ByResidual(all.residual_px, kMaxLeftOut)) {
     const PointPairs rest = pairs.Without(i);
     if (IsCollinear(rest.x_in_scan, options.min_line_share)) continue;
-    const auto poses = SolveViewPoses(projection, rest, all.cam_from_scan);
+    const auto poses = solver.Solve(rest, all);
     if (poses.empty()) continue;
-    result.distance_px[i] = PickResiduals(projection, pairs, poses[0].cam_from_scan)[i];
+    result.distance_px[i] = solver.Residuals(pairs, poses[0])[i];
+    result.sum_px2[i] = poses[0].sum_px2;
     if (poses[0].sum_px2 < result.best_sum_px2) {
       result.best_sum_px2 = poses[0].sum_px2;
       result.best = i;
@@ -96,14 +94,14 @@ LeaveOneOut TryWithoutEach(const CameraProjection& projection, const PointPairs&
 }
 
 // Chance that leaving out the best of n picks lowers the sum of squares from `all` to `rest`
-// although all picks are equally good: F test with 2 and nu = 2 n - 8 degrees of freedom, whose
-// tail is (rest / all)^(nu / 2), times n for the choice of the best (Bonferroni).
-double ChanceOfGain(double all, double rest, int n) {
+// although all picks are equally good: F test with 2 and nu = 2 n - unknowns - 2 degrees of
+// freedom, whose tail is (rest / all)^(nu / 2), times n for the choice of the best (Bonferroni).
+double ChanceOfGain(double all, double rest, int n, int num_unknowns) {
   if (!(all > 0)) return 1;
-  return n * std::pow(rest / all, 0.5 * (2 * n - 8));
+  return n * std::pow(rest / all, 0.5 * (2 * n - num_unknowns - 2));
 }
 
-void FindExchanged(const CameraProjection& projection, const PointPairs& pairs,
+void FindExchanged(const PoseSolver& solver, const PointPairs& pairs,
                    const PickReviewOptions& options, PickReview* review) {
   const double rms_px = review->RmsPx();
   if (rms_px < 0.5 * options.min_bad_pick_px) return;  // nothing to be explained
@@ -113,35 +111,38 @@ void FindExchanged(const CameraProjection& projection, const PointPairs& pairs,
       if (j <= i) continue;
       PointPairs exchanged = pairs;
       exchanged.x_in_img.col(i).swap(exchanged.x_in_img.col(j));
-      const auto poses = SolveViewPoses(projection, exchanged);
+      const auto poses = solver.Solve(exchanged, std::nullopt);
       if (poses.empty() || !(poses[0].rms_px < review->exchanged_rms_px)) continue;
       review->exchanged_rms_px = poses[0].rms_px;
       review->exchanged = {i, j};
     }
   }
-  if (!IsExplained(rms_px, review->exchanged_rms_px, projection.camera(), options)) {
+  if (!IsExplained(rms_px, review->exchanged_rms_px, DiagonalOf(solver.camera()), options)) {
     review->exchanged.reset();
   }
 }
 
 // Leaves out bad picks one after the other; gives the indices of those that stay.
-std::vector<int> LeaveOutBadPicks(const CameraProjection& projection, const PointPairs& pairs,
+std::vector<int> LeaveOutBadPicks(const PoseSolver& solver, const PointPairs& pairs,
                                   const PickReviewOptions& options, PickReview* review) {
   std::vector<int> kept(pairs.size());
   std::iota(kept.begin(), kept.end(), 0);
   for (int left_out = 0; review->HasPose(); ++left_out) {
     const PointPairs current = Selected(pairs, kept);
-    const LeaveOneOut trial = TryWithoutEach(projection, current, review->pose(), options);
+    const LeaveOneOut trial = TryWithoutEach(solver, current, review->pose(), options);
     for (size_t k = 0; k < kept.size(); ++k) {
       review->leave_one_out_px[kept[k]] = trial.distance_px[k];
+      review->without_px2[kept[k]] = trial.sum_px2[k];
     }
     const int n = current.size();
     if (review->exchanged || left_out >= pairs.size() / 6 || n < 6 || trial.best < 0) break;
     if (!(trial.distance_px[trial.best] > options.min_bad_pick_px)) break;
-    if (ChanceOfGain(review->pose().sum_px2, trial.best_sum_px2, n) > options.max_chance) break;
+    const double chance =
+        ChanceOfGain(review->pose().sum_px2, trial.best_sum_px2, n, solver.num_unknowns());
+    if (chance > options.max_chance) break;
     review->used[kept[trial.best]] = false;
     kept.erase(kept.begin() + trial.best);
-    review->poses = SolveViewPoses(projection, Selected(pairs, kept), review->pose().cam_from_scan);
+    review->poses = solver.Solve(Selected(pairs, kept), review->pose());
   }
   return kept;
 }
@@ -179,6 +180,12 @@ void PickReviewOptions::Declare(OptionFields* fields) {
 
 std::vector<std::string> PickReviewOptions::Problems() const { return ProblemsOf(*this); }
 
+bool IsExplained(double rms_px, double explained_rms_px, double diagonal_px,
+                 const PickReviewOptions& options) {
+  return rms_px > 0.5 * options.min_bad_pick_px && explained_rms_px * options.min_gain < rms_px &&
+         explained_rms_px < kMaxExplainedShare * diagonal_px;
+}
+
 std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
                               const PickReviewOptions& options) {
   const double diagonal = std::hypot(camera.width, camera.height);
@@ -211,23 +218,27 @@ std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
 
 PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
                        const PickReviewOptions& options) {
+  return ReviewPicks(ViewPoseSolver(projection), pairs, options);
+}
+
+PickReview ReviewPicks(const PoseSolver& solver, const PointPairs& pairs,
+                       const PickReviewOptions& options) {
   PickReview review;
   review.used.assign(pairs.size(), true);
-  review.poses = SolveViewPoses(projection, pairs);
+  review.poses = solver.Solve(pairs, std::nullopt);
   review.residual_px =
       review.HasPose()
           ? review.pose().residual_px
           : Eigen::VectorXd::Constant(pairs.size(), std::numeric_limits<double>::infinity());
-  review.leave_one_out_px = Eigen::VectorXd::Constant(pairs.size(), std::nan(""));
-  FindExchanged(projection, pairs, options, &review);
-  const std::vector<int> kept = LeaveOutBadPicks(projection, pairs, options, &review);
-  if (review.HasPose()) {
-    review.residual_px = PickResiduals(projection, pairs, review.pose().cam_from_scan);
-  }
-  const auto mirrored = SolveViewPoses(projection, Selected(pairs, kept).Mirrored());
+  review.leave_one_out_px = review.without_px2 =
+      Eigen::VectorXd::Constant(pairs.size(), std::nan(""));
+  FindExchanged(solver, pairs, options, &review);
+  const std::vector<int> kept = LeaveOutBadPicks(solver, pairs, options, &review);
+  if (review.HasPose()) review.residual_px = solver.Residuals(pairs, review.pose());
+  const auto mirrored = solver.Solve(Selected(pairs, kept).Mirrored(), std::nullopt);
   if (!mirrored.empty()) review.mirrored_rms_px = mirrored[0].rms_px;
   review.mirrored =
-      IsExplained(review.RmsPx(), review.mirrored_rms_px, projection.camera(), options);
+      IsExplained(review.RmsPx(), review.mirrored_rms_px, DiagonalOf(solver.camera()), options);
   return review;
 }
 

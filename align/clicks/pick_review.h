@@ -39,6 +39,11 @@ struct PickReviewOptions {
 std::string FindLayoutProblem(const PointPairs& pairs, const Camera& camera,
                               const PickReviewOptions& options);
 
+// Whether an explanation (mirrored, exchanged) that lets the picks miss by explained_rms_px instead
+// of rms_px is worth naming: clearly better, and good for a photo of this diagonal.
+bool IsExplained(double rms_px, double explained_rms_px, double diagonal_px,
+                 const PickReviewOptions& options);
+
 struct PickReview {
   // Locally best poses from the picks that are used, best first; empty if no pose has all of them
   // in front.
@@ -47,6 +52,9 @@ struct PickReview {
   Eigen::VectorXd residual_px;  // of every pick, under poses[0]
   // Distance of every pick from the pose that the other used picks give.
   Eigen::VectorXd leave_one_out_px;
+  // How well the other used picks fit without it, sum of squares: the smaller, the more it is this
+  // one that is wrong. NaN where not tried.
+  Eigen::VectorXd without_px2;
   // Two picks that fit min_gain times better when they exchange their places in the photo.
   std::optional<std::pair<int, int>> exchanged;
   double exchanged_rms_px = std::numeric_limits<double>::infinity();
@@ -65,6 +73,8 @@ struct PickReview {
 // pairs: at least 6 that have no layout problem. One in six may be bad and is found by leaving out
 // each in turn.
 PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,
+                       const PickReviewOptions& options);
+PickReview ReviewPicks(const PoseSolver& solver, const PointPairs& pairs,
                        const PickReviewOptions& options);
 
 }  // namespace roomtex

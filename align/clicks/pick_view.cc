@@ -16,14 +16,15 @@ PointPairs PairsOf(const std::vector<Pick>& picks, const std::vector<int>& indic
   return pairs;
 }
 
-// Three points fix a pose, unless they lie on one line.
+// Three points fix a pose but for a choice, unless they lie on one line, and no further one takes
+// that away: what else FindLayoutProblem() says of fewer than six makes the choice harder only.
 std::string LayoutProblemOf(const PointPairs& pairs, const Camera& camera,
                             const PickReviewOptions& options) {
-  if (pairs.size() > 3) return FindLayoutProblem(pairs, camera, options);
+  if (pairs.size() >= kMinPicksPerPhoto) return FindLayoutProblem(pairs, camera, options);
   const Eigen::Vector3d extents = PrincipalExtents(pairs.x_in_scan);
   if (extents[1] > options.min_line_share * extents[0]) return "";
-  return "the three picks lie on one straight line, around which the camera could turn freely; "
-         "pick a point beside it";
+  return "the picks lie on one straight line, around which the camera could turn freely; pick a "
+         "point beside it";
 }
 
 }  // namespace

@@ -175,13 +175,13 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
 }
 
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
-                    const SparseModel& model) {
+                    const SparseModel& model, const std::string& among) {
   for (const Pick& pick : picks) {
     const SparseImage* image = model.FindImage(pick.image_name);
     if (image == nullptr) {
       throw InputError(path, LinePosition(pick.line),
-                       fmt::format("the photo {} is not in the sparse model (nearest name: {})",
-                                   pick.image_name, NearestName(model, pick.image_name)),
+                       fmt::format("the photo {} is not {} (nearest name: {})", pick.image_name,
+                                   among, NearestName(model, pick.image_name)),
                        "Correct the name, or pick in a photo that COLMAP has registered");
     }
     const Camera& camera = model.cameras.at(image->camera_id);
@@ -199,15 +199,17 @@ void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model) {
   CheckPickNames(path, picks, model);
-  std::map<std::string, int> count;
-  for (const Pick& pick : picks) count[pick.image_name] += pick.weight > 0;
-  int most = 0;
-  for (const auto& [name, number] : count) most = std::max(most, number);
-  if (most >= kMinPicksPerPhoto) return;
+  const auto num_on =
+      std::count_if(picks.begin(), picks.end(), [](const Pick& pick) { return pick.weight > 0; });
+  if (num_on >= kMinPicksPerPhoto) return;
+  const std::string off =
+      num_on < static_cast<long>(picks.size())
+          ? fmt::format(", of which {} count, the others being switched off", num_on)
+          : "";
   throw InputError(path, "",
-                   fmt::format("holds {} picks, at most {} in one photo; at least {} in one photo "
-                               "are needed",
-                               picks.size(), most, kMinPicksPerPhoto),
+                   fmt::format("holds {} picks{}; at least {} are needed, in one photo or spread "
+                               "over several",
+                               picks.size(), off, kMinPicksPerPhoto),
                    "Add picks, well spread over the photo and in depth");
 }
 

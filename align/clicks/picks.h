@@ -28,7 +28,8 @@ struct Pick {
 // Where it stands, for a message: "line 4", or "a pick of a.jpg".
 std::string LineOf(const Pick& pick);
 
-// The fewest picks in one photo that fix its pose (thesis 7.1.1).
+// The fewest picks in one photo that fix its pose (thesis 7.1.1), and the fewest over several
+// photos that place a sparse model (spread_picks.h).
 inline constexpr int kMinPicksPerPhoto = 6;
 // The largest weight that a file or the window may give: a typing error is larger.
 inline constexpr double kMaxPickWeight = 1000;
@@ -41,9 +42,10 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks);
 
 // Throws InputError: a name that is not in the model (with the nearest one that is), a pixel
 // outside its photo.
+// `among`: what the names are looked up in, for the message.
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
-                    const SparseModel& model);
-// The same, and for fewer than kMinPicksPerPhoto picks in every photo.
+                    const SparseModel& model, const std::string& among = "in the sparse model");
+// The same, and for fewer than kMinPicksPerPhoto picks that count, over all photos.
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model);
 

@@ -8,6 +8,11 @@ namespace {
 
 constexpr double kClearlySmaller = 0.7;
 
+// Pixels, rms, up to which a pose may be the right one whatever the best one has. Four or five
+// picks leave two to four equations over: a wrong pose may fit them by chance, and the right one
+// then misses by the noise of the clicks.
+double LeastLimit(size_t num_picks) { return num_picks == 4 || num_picks == 5 ? 3.0 : 1.0; }
+
 }  // namespace
 
 PoseChoice ChoosePose(const std::vector<ViewPose>& poses, const ScaleOptions& options,
@@ -15,7 +20,8 @@ PoseChoice ChoosePose(const std::vector<ViewPose>& poses, const ScaleOptions& op
   PoseChoice choice;
   double best_mad = std::numeric_limits<double>::infinity(), second_mad = best_mad;
   int num_asked = 0;
-  const double rms_limit = std::max(1.5 * poses[0].rms_px, 1.0);
+  const double rms_limit =
+      std::max(1.5 * poses[0].rms_px, LeastLimit(static_cast<size_t>(poses[0].residual_px.size())));
   for (size_t i = 0; i < poses.size(); ++i) {
     const ViewPose& pose = poses[i];
     if (pose.rms_px > rms_limit) break;

@@ -20,8 +20,9 @@ struct PoseChoice {
 using ScaleOfPose = std::function<ScaleEstimate(const Rigid&, const ScaleOptions&)>;
 
 // poses: best first, at least one. Those that miss the picks by more than 1.5 times the rms of the
-// first (or a pixel) are not asked. A pose other than the first must have a clearly smaller spread
-// of the scale; with fewer than min_features features a scale says nothing.
+// first (or a pixel; of four or five picks, three pixels) are not asked. A pose other than the
+// first must have a clearly smaller spread of the scale; with fewer than min_features features a
+// scale says nothing.
 PoseChoice ChoosePose(const std::vector<ViewPose>& poses, const ScaleOptions& options,
                       int min_features, const ScaleOfPose& scale_of_pose);
 

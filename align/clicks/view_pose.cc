@@ -14,7 +14,8 @@ namespace roomtex {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMinDepth = 1e-6;  // metres in front of the camera
+constexpr double kMinDepth = 1e-6;     // metres in front of the camera
+constexpr double kUsualResiduals = 4;  // what kUsualClickSigma counts as, beside real ones
 
 // Undistorted normalised coordinates of the clicks that have any, with their scan points.
 struct NormalisedPairs {
@@ -286,6 +287,13 @@ PointPairs PointPairs::Without(int index) const {
   return rest;
 }
 
+double ClickSigma(double sum_px2, int redundancy) {
+  const double all = kUsualResiduals + std::max(0, redundancy);
+  const double together =
+      std::sqrt((kUsualResiduals * kUsualClickSigma * kUsualClickSigma + sum_px2) / all);
+  return redundancy > 0 ? std::max(together, std::sqrt(sum_px2 / redundancy)) : together;
+}
+
 double PointPairs::SumOfSquares(const Eigen::VectorXd& residual_px) const {
   return weight.size() == 0 ? residual_px.squaredNorm()
                             : residual_px.cwiseProduct(weight).squaredNorm();
@@ -350,6 +358,16 @@ std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const P
     distinct.push_back(pose);
   }
   return distinct;
+}
+
+std::vector<ViewPose> ViewPoseSolver::Solve(const PointPairs& pairs,
+                                            const std::optional<ViewPose>& start) const {
+  return SolveViewPoses(projection_, pairs,
+                        start ? std::optional<Rigid>(start->cam_from_scan) : std::nullopt);
+}
+
+Eigen::VectorXd ViewPoseSolver::Residuals(const PointPairs& pairs, const ViewPose& pose) const {
+  return PickResiduals(projection_, pairs, pose.cam_from_scan);
 }
 
 Eigen::VectorXd PickResiduals(const CameraProjection& projection, const PointPairs& pairs,

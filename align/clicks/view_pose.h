@@ -40,6 +40,13 @@ Eigen::Vector3d PrincipalExtents(const Eigen::Matrix3Xd& points);
 // noise of the scan and of the fingers, not depth that a pose could rest on.
 inline constexpr double kCoplanarShare = 0.01;
 
+// Pixels per coordinate, of a click, before its residuals are known (docs/pick.md: one to two).
+inline constexpr double kUsualClickSigma = 1.5;
+// What the residuals of a photo's picks and the usual noise of clicks say together about a click
+// with weight 1 (standard deviation per coordinate): few small residuals say little, so that the
+// usual noise counts as much as four of them; large ones are believed.
+double ClickSigma(double sum_px2, int redundancy);
+
 struct ViewPose {
   Rigid cam_from_scan;
   Eigen::VectorXd residual_px;  // distance between click and projection, one per pick
@@ -52,6 +59,10 @@ struct ViewPose {
   // last step times sigma_px^2. rad^2, rad m, m^2. Infinite where the picks do not determine the
   // pose.
   Matrix6d covariance = Matrix6d::Zero();
+  // Of a lens that was found with the pose (lens_pose.h): the camera, one standard deviation of its
+  // focal length, as a share, and of its radial term. None and 0 where the lens was known.
+  std::optional<Camera> lens;
+  double focal_sigma = 0, radial_sigma = 0;
 
   // Standard deviation of the camera's position, metres (root of the trace), from the covariance.
   double PositionSigma() const;
@@ -67,6 +78,35 @@ struct ViewPose {
 // collinear.
 std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const PointPairs& pairs,
                                      const std::optional<Rigid>& start = std::nullopt);
+
+// Finds poses: with a lens that is known (below), or with the lens (lens_pose.h).
+class PoseSolver {
+ public:
+  virtual ~PoseSolver() = default;
+  virtual const Camera& camera() const = 0;
+  // Equations that a solution takes, of two per pick.
+  virtual int num_unknowns() const = 0;
+  // As SolveViewPoses().
+  virtual std::vector<ViewPose> Solve(const PointPairs& pairs,
+                                      const std::optional<ViewPose>& start) const = 0;
+  // As PickResiduals().
+  virtual Eigen::VectorXd Residuals(const PointPairs& pairs, const ViewPose& pose) const = 0;
+};
+
+class ViewPoseSolver : public PoseSolver {
+ public:
+  // The projection must outlive it.
+  explicit ViewPoseSolver(const CameraProjection& projection) : projection_(projection) {}
+
+  const Camera& camera() const override { return projection_.camera(); }
+  int num_unknowns() const override { return 6; }
+  std::vector<ViewPose> Solve(const PointPairs& pairs,
+                              const std::optional<ViewPose>& start) const override;
+  Eigen::VectorXd Residuals(const PointPairs& pairs, const ViewPose& pose) const override;
+
+ private:
+  const CameraProjection& projection_;
+};
 
 // Distances in pixels between the clicks and the projections under a pose; infinite for points that
 // are not in front of the camera or outside the valid field of its lens.

@@ -127,7 +127,7 @@ void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,
   fit->facing /= std::max(1, num_counted);
   fit->surface_information = normal.matrix;
   normal.AddPicks(terms, used, sigma_px, weights.CommonSigma(), fit->scan_from_sparse, fit->pivot);
-  normal.AddScalePrior(fit->scan_from_sparse, start);
+  normal.AddScalePrior(fit->scan_from_sparse, start, kScalePrior);
   Vector7d step;
   if (!normal.SolveStep(&step, &fit->covariance)) {
     fit->covariance.setConstant(std::numeric_limits<double>::infinity());

@@ -70,7 +70,7 @@ void WeighByCells(const std::vector<SurfacePoint>& points, const ScanPatches& su
                          fit->pivot, TukeyWeight(match.distance, own_gate) / weights.Variance(k));
     }
     normal.AddPicks(terms, used, sigma_px, weights.CommonSigma(), s, fit->pivot);
-    normal.AddScalePrior(s, start);
+    normal.AddScalePrior(s, start, kScalePrior);
     Vector7d step;
     Matrix7d inverse;
     if (!normal.SolveStep(&step, &inverse)) return;
@@ -170,7 +170,7 @@ Eigen::Matrix2Xd PickErrors(const SparseModel& model, const std::vector<Pick>& p
 
 SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& picks,
                          const std::vector<bool>& used, double sigma_px, const Similarity& start,
-                         const SimilarityFitOptions& options) {
+                         const SimilarityFitOptions& options, double scale_prior) {
   SimilarityFit fit;
   fit.scan_from_sparse = start;
   fit.pivot = Pivot(picks);
@@ -179,7 +179,7 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
   for (int i = 0; i < options.num_steps && !fit.converged; ++i) {
     SimilarityNormal normal;
     normal.AddPicks(terms, used, sigma_px, 0, fit.scan_from_sparse, fit.pivot);
-    normal.AddScalePrior(fit.scan_from_sparse, start);
+    normal.AddScalePrior(fit.scan_from_sparse, start, scale_prior);
     Vector7d step;
     if (!normal.SolveStep(&step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(fit.scan_from_sparse, fit.pivot, step);
@@ -220,7 +220,7 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
                          TukeyWeight(match.distance, own_gate) / (sigma * sigma));
     }
     normal.AddPicks(terms, used, sigma_px, 0, s, fit.pivot);
-    normal.AddScalePrior(s, start);
+    normal.AddScalePrior(s, start, kScalePrior);
     Vector7d step;
     if (!normal.SolveStep(&step, &fit.covariance)) return fit;
     fit.scan_from_sparse = Moved(s, fit.pivot, step);

@@ -8,6 +8,7 @@
 // Point Algorithm for Registration of m-D Point Sets"), robust by Tukey's biweight (Beaton and
 // Tukey 1974). Beyond these: every distance is weighed by what is known of its point and its patch.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ inline constexpr double kClickHuber = 2.0;
 // How well the start's scale is believed, as a share: only speaks where nothing else fixes the
 // scale.
 inline constexpr double kScalePrior = 0.05;
+// In place of kScalePrior: nothing is believed of the start's scale.
+inline constexpr double kNoScalePrior = std::numeric_limits<double>::infinity();
 // Metres; what remains of every distance beyond the known noise (waviness of patches, slight
 // bends).
 inline constexpr double kSurfaceNoise = 0.001;
@@ -84,10 +87,11 @@ Eigen::Matrix2Xd PickErrors(const SparseModel& model, const std::vector<Pick>& p
                             const Similarity& scan_from_sparse);
 
 // Least squares over all picks with used[i] (Huber, click noise sigma_px): no surface. Thesis 7.1.3
-// knows picks of one photo only; this makes picks of several photos one answer.
+// knows picks of one photo only; this makes picks of several photos one answer. scale_prior: how
+// well the start's scale is believed, as a share.
 SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& picks,
                          const std::vector<bool>& used, double sigma_px, const Similarity& start,
-                         const SimilarityFitOptions& options);
+                         const SimilarityFitOptions& options, double scale_prior = kScalePrior);
 
 // The same with point-to-plane distances from the surface; the gate shrinks from `gate` metres. The
 // picks keep what the surface leaves open (one wall, two parallel walls); there may be none.

@@ -87,10 +87,11 @@ void SimilarityNormal::AddPicks(const PickTerms& terms, const std::vector<bool>&
   }
 }
 
-void SimilarityNormal::AddScalePrior(const Similarity& s, const Similarity& start) {
+void SimilarityNormal::AddScalePrior(const Similarity& s, const Similarity& start,
+                                     double scale_prior) {
   const double off = std::log(s.scale / start.scale);
-  matrix(6, 6) += 1 / (kScalePrior * kScalePrior);
-  gradient[6] += off / (kScalePrior * kScalePrior);
+  matrix(6, 6) += 1 / (scale_prior * scale_prior);
+  gradient[6] += off / (scale_prior * scale_prior);
 }
 
 void SimilarityNormal::AddDistance(double distance, const Eigen::Vector3d& x_in_scan,

@@ -71,7 +71,7 @@ struct SimilarityNormal {
   // than.
   void AddPicks(const PickTerms& terms, const std::vector<bool>& used, double sigma_px,
                 double surface_sigma, const Similarity& s, const Eigen::Vector3d& pivot);
-  void AddScalePrior(const Similarity& s, const Similarity& start);
+  void AddScalePrior(const Similarity& s, const Similarity& start, double scale_prior);
   // Distance of a point at x_in_scan along a normal of the surface.
   void AddDistance(double distance, const Eigen::Vector3d& x_in_scan,
                    const Eigen::Vector3d& surface_normal, const Eigen::Vector3d& pivot,

@@ -31,17 +31,10 @@ struct Stage {
   double seconds;
 };
 constexpr Stage kStages[] = {
-    {"read model", 0.1},
-    {"read scan", 0.3},
-    {"planes", 0.9},
-    {"scan surface", 0.1},
-    {"pose from picks", 0.05},
-    {"scale", 0.4},
-    {"surface refinement", 0.1},
-    {"trust", 0.05},
-    {"bundle adjustment", 6},
-    {"agreement", 0.9},
-    {"write", 0.1},
+    {"read model", 0.1},      {"read photos", 0.05},       {"read scan", 0.3},
+    {"planes", 0.9},          {"scan surface", 0.1},       {"pose from picks", 0.05},
+    {"scale", 0.4},           {"surface refinement", 0.1}, {"trust", 0.05},
+    {"bundle adjustment", 6}, {"agreement", 0.9},          {"write", 0.1},
     {"overlays", 0.9},
 };
 constexpr int kNumStages = sizeof kStages / sizeof kStages[0];

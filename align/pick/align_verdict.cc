@@ -52,15 +52,17 @@ void AddFacts(const Json& report, AlignVerdict* verdict) {
   const double scale = NumberAt(report, {"scale", "value"});
   facts.Add("Scale", scale, Number(scale, 5) + " m per unit of the sparse model");
   const double features = NumberAt(report, {"scale", "num_features"});
-  facts.Add("Features that fix the scale", features, Number(features, 0));
+  if (features > 0) facts.Add("Features that fix the scale", features, Number(features, 0));
   const double share = NumberAt(report, {"placement", "surface_share"});
   facts.Add("Sparse points on the scan's surface", share, Percent(share));
   const double rms = NumberAt(report, {"plane_rms_m", "after"});
   facts.Add("Their distance from it (rms)", rms, Millimetres(1000 * rms));
   const double before = NumberAt(report, {"reprojection_rms_px", "before"});
   const double after = NumberAt(report, {"reprojection_rms_px", "after"});
-  facts.Add("Reprojection error, before and after", after,
-            Number(before, 2) + " and " + Number(after, 2) + " px");
+  if (std::isfinite(before)) {  // not of photos without a sparse model
+    facts.Add("Reprojection error, before and after", after,
+              Number(before, 2) + " and " + Number(after, 2) + " px");
+  }
   const double agreement = NumberAt(report, {"agreement", "gradient_shift", "share"});
   const double chance = NumberAt(report, {"agreement", "gradient_shift", "chance", "share"});
   facts.Add("Photos and scan intensity agree", agreement,
@@ -98,8 +100,7 @@ AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::
     }
   } else {
     verdict.verdict = "untrusted";
-    const bool has_model =
-        has_report && report.contains("scan_from_sparse") && report["scan_from_sparse"].is_object();
+    const bool has_model = has_report && report.contains("images") && report["images"].is_array();
     verdict.headline = has_model ? "Not to be trusted: look at the reasons before you use it."
                                  : "There is no alignment: the picks contradict the scan or each "
                                    "other.";

@@ -52,10 +52,9 @@ cv::Vec4b ColorAt(const cv::Mat3b& photo, const Eigen::Vector2d& x_in_photo) {
 }  // namespace
 
 cv::Mat DrawBackProjection(const PickScene& scene, const ScanRays& rays, const PickPhoto& photo,
-                           const Rigid& cam_from_scan, int scan,
+                           const CameraProjection& projection, const Rigid& cam_from_scan, int scan,
                            const std::function<bool()>& give_up) {
   const ScanPlaces& places = scene.places(scan);
-  const CameraProjection& projection = *photo.projection;
   const Camera& camera = projection.camera();
   const double pixels = 1 / (camera.MeanFocalLength() * std::max(places.step(), 1e-9));
   const int min_width =

@@ -16,10 +16,10 @@ namespace roomtex {
 
 // 8-bit BGRA, a pixel per sample of the scan's picture: the photo's colour where it sees the
 // sample, alpha 0 where it does not (outside the photo, hidden by the scan's surface, not
-// measured). The photo is averaged over about a sample. Empty when give_up() became true. Throws
-// InputError if the photo cannot be read.
+// measured). projection: the photo's, or what its picks made of it. The photo is averaged over
+// about a sample. Empty when give_up() became true. Throws InputError if the photo cannot be read.
 cv::Mat DrawBackProjection(const PickScene& scene, const ScanRays& rays, const PickPhoto& photo,
-                           const Rigid& cam_from_scan, int scan,
+                           const CameraProjection& projection, const Rigid& cam_from_scan, int scan,
                            const std::function<bool()>& give_up);
 
 // The next smaller level of a pyramid (sizes as core/image_tiles.h), colours weighted by their

@@ -56,7 +56,7 @@ std::shared_ptr<const Json> PhotoSights::Edges(const PickPhoto& photo, const Pho
   const PickScene::Edges* edges = scene_.WaitForEdges(give_up);
   if (edges == nullptr) return nullptr;
   auto json = std::make_shared<const Json>(EdgesToJson(
-      SeeEdges(edges->edges, edges->free_space, *photo.projection, state.cam_from_scan)));
+      SeeEdges(edges->edges, edges->free_space, state.projection(photo), state.cam_from_scan)));
   const std::lock_guard<std::mutex> lock(mutex_);
   seen_.push_front({photo.id, revision, json});
   if (seen_.size() > kMaxSeen) seen_.pop_back();

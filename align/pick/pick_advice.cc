@@ -40,6 +40,18 @@ double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_s
 // As the page numbers the picks.
 std::string NumberOf(int index) { return std::to_string(index + 1); }
 
+std::string MirrorWarning(double rms_px, double mirrored_rms_px, const std::string& azimuth) {
+  return "The scan looks like a mirror image of the room: the picks miss by " + Number(rms_px, 1) +
+         " pixels (rms), but by " + Number(mirrored_rms_px, 1) +
+         " when the scan is reflected. End this session and read an RTPI scan with --azimuth " +
+         OtherAzimuth(azimuth) + ".";
+}
+
+std::string LeftOut(int index, double distance_px) {
+  return "Pick " + NumberOf(index) + " is left out: it is " + Number(distance_px, 1) +
+         " pixels away from where the others put it.";
+}
+
 std::string Count(int number, const std::string& noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
 }
@@ -58,12 +70,7 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vec
   std::vector<std::string> warnings;
   if (static_cast<int>(on.size()) < kMinPicksPerPhoto) return warnings;
   if (review.mirrored && !(review.exchanged && review.exchanged_rms_px < review.mirrored_rms_px)) {
-    warnings.push_back("The scan looks like a mirror image of the room: the picks miss by " +
-                       Number(review.RmsPx(), 1) + " pixels (rms), but by " +
-                       Number(review.mirrored_rms_px, 1) +
-                       " when the scan is reflected. End this session and read an RTPI scan with "
-                       "--azimuth " +
-                       OtherAzimuth(azimuth) + ".");
+    warnings.push_back(MirrorWarning(review.RmsPx(), review.mirrored_rms_px, azimuth));
   } else if (review.exchanged) {
     warnings.push_back("Picks " + NumberOf(on[review.exchanged->first]) + " and " +
                        NumberOf(on[review.exchanged->second]) +
@@ -73,9 +80,26 @@ std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vec
   }
   for (size_t i = 0; i < on.size(); ++i) {
     if (review.used[i]) continue;
-    warnings.push_back("Pick " + NumberOf(on[i]) + " is left out: it is " +
-                       Number(review.leave_one_out_px[static_cast<int>(i)], 1) +
-                       " pixels away from where the others put it.");
+    warnings.push_back(LeftOut(on[i], review.leave_one_out_px[static_cast<int>(i)]));
+  }
+  return warnings;
+}
+
+std::vector<std::string> SpreadWarnings(const SpreadPickFit& spread, const std::vector<int>& on,
+                                        const std::string& azimuth) {
+  if (!spread.layout_problem.empty()) return {AsSentence(spread.layout_problem)};
+  if (!spread.HasFit()) {
+    return {
+        "No place of the sparse model in the scan has the picks of all photos in front of their "
+        "cameras. Check that they are of these photos."};
+  }
+  std::vector<std::string> warnings;
+  if (spread.mirrored) {
+    warnings.push_back(MirrorWarning(spread.rms_px[0], spread.mirrored_rms_px, azimuth));
+  }
+  for (size_t i = 0; i < on.size(); ++i) {
+    if (spread.used[i] || !std::isfinite(spread.leave_one_out_px[i])) continue;
+    warnings.push_back(LeftOut(on[i], spread.leave_one_out_px[i]));
   }
   return warnings;
 }
@@ -138,55 +162,99 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
   return warnings;
 }
 
-std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
-                     const PickScene& scene) {
+namespace {
+
+// The picks that count, over the photos.
+struct Tally {
+  int num_half = 0, total = 0, most = 0;
+  std::string name;  // the photo with most
+};
+
+Tally TallyOf(const std::vector<SessionPick>& picks) {
+  Tally tally;
   std::map<std::string, int> on;
-  int num_half = 0;
   for (const SessionPick& pick : picks) {
-    if (!pick.complete()) ++num_half;
+    if (!pick.complete()) ++tally.num_half;
     if (pick.complete() && pick.weight > 0) ++on[pick.image_name];
   }
-  std::string name;
-  int most = 0;
   for (const auto& [image_name, count] : on) {
-    if (count <= most) continue;
-    most = count;
-    name = image_name;
+    tally.total += count;
+    if (count <= tally.most) continue;
+    tally.most = count;
+    tally.name = image_name;
   }
-  if (num_half > 0 && most < kMinPicksPerPhoto) {
+  return tally;
+}
+
+// Without a sparse model, of each photo.
+int NeededIn(FocalSource source) {
+  return source == FocalSource::kPicks ? kMinPicksForFocal : kMinPicksPerPhoto;
+}
+
+// While there are fewer than needed; with a sparse model they may lie in one photo or in several.
+std::string NextOfFew(const Tally& tally, int needed, const PickSolution& solution,
+                      const PickScene& scene) {
+  const PhotoState& photo = solution.photos.at(tally.name);
+  const std::string more = Count(needed - tally.most, "more pair");
+  const std::string where = scene.has_model() ? ", in this photo or in others" : " in this photo";
+  if (needed > kMinPicksPerPhoto) {
+    return more +
+           " to go in this photo: nothing says its focal length, and eight tell it, in front "
+           "of a plane and behind it.";
+  }
+  if (tally.most < 3) {
+    return more + " to go" + where + "; spread them over the photo and in depth.";
+  }
+  if (!photo.solved() && !solution.with_rays) return more + " to go; the scan is being prepared.";
+  if (!photo.solved()) {
+    return more + " to go. These alone fix no pose: " +
+           (photo.warnings.empty() ? "pick another point." : photo.warnings[0]);
+  }
+  return more + " to go" + where + ". Click one side: the other shows where to look.";
+}
+
+}  // namespace
+
+std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
+                     const PickScene& scene) {
+  const Tally tally = TallyOf(picks);
+  const int needed = scene.has_model() ? kMinPicksPerPhoto - (tally.total - tally.most)
+                                       : NeededIn(scene.focal_source(tally.name));
+  if (tally.num_half > 0 && tally.most < needed) {
     return "Click the same point on the other side.";
   }
-  if (most == 0) {
+  if (tally.total == 0) {
     return "Click a point that you recognise on both sides, such as a corner of a picture or of "
            "furniture: once in the photo, once in the scan.";
   }
-  const PhotoState& photo = solution.photos.at(name);
+  if (tally.most < needed) return NextOfFew(tally, needed, solution, scene);
+  const PhotoState& photo = solution.photos.at(tally.name);
   const auto bad =
       std::find_if(solution.picks.begin(), solution.picks.end(),
                    [](const PickState& state) { return state.status == PickState::Status::kBad; });
-  if (most < kMinPicksPerPhoto) {
-    const std::string more = Count(kMinPicksPerPhoto - most, "more pair");
-    if (most < 3) return more + " to go in this photo; spread them over the photo and in depth.";
-    if (!photo.solved() && !solution.with_rays) return more + " to go; the scan is being prepared.";
-    if (!photo.solved())
-      return more + " to go. These alone fix no pose: " +
-             (photo.warnings.empty() ? "pick another point." : photo.warnings[0]);
-    return more + " to go in this photo. Click one side: the other shows where to look.";
-  }
-  if (!photo.solved()) {
+  const bool is_whole = tally.most >= kMinPicksPerPhoto || !scene.has_model();
+  if (!photo.solved() || (!is_whole && !solution.scan_from_sparse)) {
+    if (!is_whole && !solution.with_rays) return "Enough picks; the scan is being prepared.";
+    if (!solution.warnings.empty()) return solution.warnings[0];
     return photo.warnings.empty() ? "These picks fix no pose: check them." : photo.warnings[0];
   }
   if (bad != solution.picks.end()) {
     return "A pick is left out as wrong (pick " + std::to_string(bad - solution.picks.begin() + 1) +
-           "): drag it to its place, or pick another point, so that six remain.";
+           "): drag it to its place, or pick another point, so that " +
+           (needed > kMinPicksPerPhoto ? "eight" : "six") + " remain.";
   }
   const TrustOptions trust;
-  const Camera& camera = scene.FindPhoto(name)->projection->camera();
-  if (photo.rms_px > trust.PickRmsLimit(camera)) {
-    return "The picks miss by " + Number(photo.rms_px, 1) +
+  const Camera& camera = scene.FindPhoto(tally.name)->projection->camera();
+  const double rms_px = is_whole ? photo.rms_px : solution.rms_px;
+  if (rms_px > trust.PickRmsLimit(camera)) {
+    return "The picks miss by " + Number(rms_px, 1) +
            " pixels: look at the worst one, or switch picks off one by one.";
   }
   if (!solution.with_rays) return "Enough picks; the scan is being prepared.";
+  if (!scene.has_model()) {
+    return "Enough picks for this photo: compare it with the scan by the back-projection, then "
+           "align. Another photo needs as many of its own.";
+  }
   if (!solution.scan_from_sparse) {
     return "The pose of the photo is known, but no sparse point of it lies on the scan: pick in a "
            "photo with more sparse points.";

@@ -15,6 +15,9 @@ std::string AsSentence(std::string text);
 // (from 1) in the sentences.
 std::vector<std::string> ReviewWarnings(const PickReview& review, const std::vector<int>& on,
                                         const std::string& azimuth);
+// The same of picks that place the model together, no photo having enough of its own.
+std::vector<std::string> SpreadWarnings(const SpreadPickFit& spread, const std::vector<int>& on,
+                                        const std::string& azimuth);
 // Nearly on one line, on one plane, crowded in a part of the photo.
 std::vector<std::string> SpreadWarnings(const PointPairs& pairs, const Camera& camera);
 // The picks of the photo agree with each other, but not with where the other photos have it.

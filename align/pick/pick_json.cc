@@ -115,8 +115,7 @@ SessionPick ParsePick(const Json& json, const std::string& what, const PickScene
   pick.image_name = name.get<std::string>();
   const PickPhoto* photo = scene.FindPhoto(pick.image_name);
   if (photo == nullptr) {
-    throw UsageError("The model has no photo \"" + pick.image_name.substr(0, kMaxShownName) +
-                     "\".");
+    throw UsageError("There is no photo \"" + pick.image_name.substr(0, kMaxShownName) + "\".");
   }
   const Camera& camera = photo->projection->camera();
   if (const Json& img = Member(json, "img"); !img.is_null()) {
@@ -180,6 +179,11 @@ Json PhotoToJson(const PhotoState& photo) {
   json["rms_px"] = NumberOrNull(photo.rms_px);
   json["rms_mm"] = NumberOrNull(1000 * photo.rms);
   json["position_sigma_mm"] = NumberOrNull(1000 * photo.position_sigma);
+  json["focal_length_px"] = nullptr;
+  if (photo.found_projection) {
+    json["focal_length_px"] = photo.found_projection->camera().MeanFocalLength();
+  }
+  json["focal_length_sigma_px"] = NumberOrNull(photo.focal_sigma);
   json["warnings"] = photo.warnings;
   json["ambiguous"] = photo.ambiguous;
   return json;

@@ -56,12 +56,7 @@ double ScoreOf(const SparseImage& image, const Camera& camera, const SparseModel
 
 PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
   RequireFolder(input.image_path, "Check --image_path");
-  progress->Stage("read model");
-  model_ = ReadSparseModel(input.input_path);
-  if (model_.images.empty()) {
-    throw InputError(input.input_path, "", "the sparse model has no photos",
-                     "Reconstruct the photos first (roomtex-mapper)");
-  }
+  ReadModel(progress);
   for (const auto& [id, camera] : model_.cameras) projections_.emplace(id, camera);
   AddPhotos();
   progress->Stage("read scan");
@@ -71,6 +66,26 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
     places_.push_back(std::make_unique<ScanPlaces>(scan.organised ? scan : panoramas_.back()));
   }
   progress->Finish();
+}
+
+void PickScene::ReadModel(Progress* progress) {
+  if (has_model()) {
+    progress->Stage("read model");
+    model_ = ReadSparseModel(input_.input_path);
+    if (!model_.images.empty()) return;
+    throw InputError(input_.input_path, "", "the sparse model has no photos",
+                     "Reconstruct the photos first (roomtex-mapper)");
+  }
+  progress->Stage("read photos");
+  PhotoModel photos = MakePhotoModel(input_.image_path, ListPhotoFiles(input_.image_path),
+                                     input_.camera, UnfitPhotos::kTaken);
+  model_ = std::move(photos.model);
+  focal_sources_ = std::move(photos.focal_sources);
+}
+
+FocalSource PickScene::focal_source(const std::string& name) const {
+  const auto at = focal_sources_.find(name);
+  return at == focal_sources_.end() ? FocalSource::kGiven : at->second;
 }
 
 void PickScene::ReadScans() {
@@ -135,8 +150,8 @@ void PickScene::AddPhotos() {
     std::string problem = photos_[0].problem;
     problem.pop_back();  // the full stop
     throw InputError(input_.image_path, "",
-                     "none of the model's " + std::to_string(photos_.size()) +
-                         " photos can be shown. " + problem,
+                     (has_model() ? "none of the model's " : "none of the ") +
+                         std::to_string(photos_.size()) + " photos can be shown. " + problem,
                      "Give the folder that COLMAP was given as --image_path");
   }
 }

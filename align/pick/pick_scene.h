@@ -1,5 +1,6 @@
 #pragma once
-// What roomtex-pick works on and what does not change while it runs: sparse model, photos, scans.
+// What roomtex-pick works on and what does not change while it runs: sparse model or photos alone,
+// scans.
 // What takes seconds is made in the background.
 
 #include <atomic>
@@ -11,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "align/clicks/photo_model.h"
 #include "align/pick/scan_places.h"
 #include "align/pick/scan_rays.h"
 #include "align/surveyed_scans.h"
@@ -25,8 +27,9 @@
 namespace roomtex {
 
 struct PickSceneInput {
-  std::string input_path, image_path, scan_poses;
-  std::vector<std::string> scan_paths;  // empty: those that the model remembers
+  std::string input_path, image_path, scan_poses;  // input_path "": the photos of image_path alone
+  PhotoCameraOptions camera;                       // of those
+  std::vector<std::string> scan_paths;             // empty: those that the model remembers
   ScanReaderOptions scan_reader;
   int num_threads = -1;
 };
@@ -61,7 +64,11 @@ class PickScene {
   const std::vector<std::string>& notes() const {
     return notes_;
   }  // on scans and photos; sentences
+  // Of photos alone: cameras as far as they are known, no points, poses that say nothing.
   const SparseModel& model() const { return model_; }
+  bool has_model() const { return !input_.input_path.empty(); }
+  // Whether its picks have to find the lens of a photo as well.
+  FocalSource focal_source(const std::string& name) const;
   const std::vector<Scan>& scans() const { return scans_; }
   int num_scans() const { return static_cast<int>(scans_.size()); }
   // The grid that is picked on: the scan's own, or of a mesh what PanoramaOfMesh() makes of it.
@@ -85,6 +92,7 @@ class PickScene {
   const Edges* WaitForEdges(const std::function<bool()>& give_up) const;
 
  private:
+  void ReadModel(Progress* progress);
   void AddPhotos();
   void ReadScans();
   void AddPanorama(const Scan& mesh);
@@ -94,6 +102,7 @@ class PickScene {
   std::string azimuth_;
   std::vector<std::string> notes_;
   SparseModel model_;
+  std::map<std::string, FocalSource> focal_sources_;  // without a sparse model
   std::vector<Scan> scans_;
   const SurveyedScans surveyed_{scans_};
   std::deque<Scan> panoramas_;  // of meshes

@@ -29,15 +29,21 @@ constexpr int kNumOverlays = 4;
 std::vector<std::string> AlignArguments(const PickScene& scene, const PickSession& session,
                                         const PickServer::Setup& setup) {
   const PickSceneInput& input = scene.input();
-  std::vector<std::string> arguments = {"--input_path", input.input_path};
+  std::vector<std::string> arguments;
   const auto add = [&](const std::string& name, const std::string& value) {
     arguments.push_back(name);
     arguments.push_back(value);
   };
+  if (scene.has_model()) add("--input_path", input.input_path);
   for (const std::string& path : input.scan_paths) add("--scan_path", path);
   add("--picks_path", session.picks_path());
   add("--output_path", setup.aligned_path);
   add("--image_path", input.image_path);
+  const PhotoCameraOptions no_camera;
+  if (input.camera.camera_model != no_camera.camera_model) {
+    add("--camera_model", input.camera.camera_model);
+  }
+  if (!input.camera.camera_params.empty()) add("--camera_params", input.camera.camera_params);
   if (!input.scan_poses.empty()) add("--scan_poses", input.scan_poses);
   const ScanReaderOptions &reader = input.scan_reader, defaults;
   if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
@@ -111,7 +117,7 @@ void PickServer::AddAlign() {
     const auto now = session_->Now();
     const bool any = std::any_of(now->picks.begin(), now->picks.end(),
                                  [](const SessionPick& pick) { return pick.complete(); });
-    if (!any) throw UsageError("There are no pairs yet: set six of them in one photo first.");
+    if (!any) throw UsageError("There are no pairs yet: set six of them first.");
     align_.Start();
     return align_.State();
   });
@@ -195,6 +201,7 @@ Json PickServer::State() {
   Json json;
   json["version"] = Version();
   json["min_picks"] = kMinPicksPerPhoto;
+  json["has_model"] = scene_.has_model();
   json["picks_path"] = session_->picks_path();
   json["aligned_path"] = setup_.aligned_path;
   json["ready"] = snapshot->solution.with_rays;
@@ -242,8 +249,9 @@ std::optional<LocalServer::Content> PickServer::BackTile(const Query& query, int
   if (photo.missing || rays == nullptr || !snapshot) return std::nullopt;
   auto bytes =
       back_projections_.Tile({photo_id, *scan, *revision}, *level, *x, *y, [&]() -> cv::Mat {
-        const Rigid& cam_from_scan = snapshot->solution.photos.at(photo.name()).cam_from_scan;
-        return DrawBackProjection(scene_, *rays, photo, cam_from_scan, *scan, give_up);
+        const PhotoState& state = snapshot->solution.photos.at(photo.name());
+        return DrawBackProjection(scene_, *rays, photo, state.projection(photo),
+                                  state.cam_from_scan, *scan, give_up);
       });
   if (!bytes) return std::nullopt;
   return Content{std::move(bytes), "image/png", "", true};

@@ -68,7 +68,8 @@ void PickSession::Read() {
   Snapshot snapshot;
   if (std::filesystem::exists(picks_path_)) {
     const std::vector<Pick> picks = ReadPicks(picks_path_);
-    CheckPickNames(picks_path_, picks, scene_.model());
+    CheckPickNames(picks_path_, picks, scene_.model(),
+                   scene_.has_model() ? "in the sparse model" : "among those of --image_path");
     for (const Pick& pick : picks) {
       SessionPick one{pick.image_name, pick.x_in_img, pick.x_in_scan, {}, pick.weight};
       one.spot = SpotOf(scene_, pick.x_in_scan);

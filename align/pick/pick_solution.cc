@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "align/pick/few_picks.h"
 #include "align/pick/pick_advice.h"
@@ -32,9 +33,24 @@ PickReview ReviewOfPoses(std::vector<ViewPose> poses, int num_picks) {
   PickReview review;
   review.poses = std::move(poses);
   review.used.assign(num_picks, true);
-  review.leave_one_out_px = Eigen::VectorXd::Constant(num_picks, kNoNumber);
+  review.leave_one_out_px = review.without_px2 = Eigen::VectorXd::Constant(num_picks, kNoNumber);
   if (review.HasPose()) review.residual_px = review.pose().residual_px;
   return review;
+}
+
+// A second pose fits the picks about as well as the first.
+bool FitsTwice(const PickReview& review) {
+  return review.poses.size() > 1 &&
+         review.poses[1].rms_px <= std::max(1.5 * review.poses[0].rms_px, 1.0);
+}
+
+// Without which the others fit best where that is known of all, else by residual.
+int WorstOf(const std::vector<int>& indices, const std::vector<PickState>& picks) {
+  const bool known = std::all_of(indices.begin(), indices.end(),
+                                 [&](int i) { return std::isfinite(picks[i].without_px2); });
+  const auto badness = [&](int i) { return known ? -picks[i].without_px2 : picks[i].residual_px; };
+  return *std::max_element(indices.begin(), indices.end(),
+                           [&](int a, int b) { return badness(a) < badness(b); });
 }
 
 }  // namespace
@@ -45,8 +61,10 @@ PickReview PickSolver::Review(const std::string& name, const CameraProjection& p
   if (found != reviewed_.end() && Equal(found->second.pairs, pairs)) return found->second.review;
   PickReview review;
   const int n = pairs.size();
-  if (n >= kMinPicksPerPhoto) {
-    review = ReviewPicks(projection, pairs, options_.picks);
+  const FocalSource source = scene_.focal_source(name);
+  if (n >= kMinPicksPerPhoto || !FocalProblemOf(source, pairs).empty()) {
+    review = scene_.has_model() ? ReviewPicks(projection, pairs, options_.picks)
+                                : ReviewPhotoPicks(projection, source, pairs, options_.picks);
   } else if (n == 3) {
     review = ReviewOfPoses(SolveThreePicks(projection, pairs), n);
   } else {
@@ -55,6 +73,7 @@ PickReview PickSolver::Review(const std::string& name, const CameraProjection& p
       const auto poses = SolveViewPoses(projection, pairs.Without(i), review.pose().cam_from_scan);
       if (poses.empty()) continue;
       review.leave_one_out_px[i] = PickResiduals(projection, pairs, poses[0].cam_from_scan)[i];
+      review.without_px2[i] = poses[0].sum_px2;
     }
   }
   reviewed_[name] = {pairs, review};
@@ -65,6 +84,7 @@ PickReview PickSolver::Review(const std::string& name, const CameraProjection& p
 std::optional<PoseChoice> PickSolver::SolveView(const ScaleOfPhoto& scale_of_photo, PickView* view,
                                                 PhotoState* photo) const {
   const int n = view->pairs.size();
+  const Camera& camera = scene_.FindPhoto(view->image_name)->projection->camera();
   const PickReview& review = view->review;
   std::optional<PoseChoice> choice;
   if (!review.HasPose()) {
@@ -77,14 +97,19 @@ std::optional<PoseChoice> PickSolver::SolveView(const ScaleOfPhoto& scale_of_pho
     choice = ChoosePoseOf(*view, options_.scale, options_.trust.min_scale_features, scale_of_photo);
     photo->ambiguous = choice->ambiguous;
   } else {
-    photo->ambiguous = n < kMinPicksPerPhoto && review.poses.size() > 1;
+    photo->ambiguous =
+        n < kMinPicksPerPhoto ? review.poses.size() > 1 : !scene_.has_model() && FitsTwice(review);
   }
   const int num_features = choice ? choice->scale.num_features : 0;
-  if (n == 3 && num_features < options_.trust.min_scale_features) {
+  // Three picks, or with all but one on a line: the sparse model has to say which pose it is.
+  const std::string problem =
+      n > 3 && n < kMinPicksPerPhoto ? FindLayoutProblem(view->pairs, camera, options_.picks) : "";
+  if ((n == 3 || !problem.empty()) && num_features < options_.trust.min_scale_features) {
     if (scale_of_photo) {
       photo->warnings.push_back(
-          "Three picks fit several poses, and too few sparse points of this photo lie on the scan "
-          "to tell which.");
+          n == 3 ? "Three picks fit several poses, and too few sparse points of this photo lie on "
+                   "the scan to tell which."
+                 : AsSentence(problem));
     }
     view->review.poses.clear();
     return choice;
@@ -92,6 +117,10 @@ std::optional<PoseChoice> PickSolver::SolveView(const ScaleOfPhoto& scale_of_pho
   const ViewPose& pose = review.poses[choice ? choice->index : 0];
   photo->cam_from_scan = pose.cam_from_scan;
   photo->by = n == 3 ? PhotoState::By::kSparseModel : PhotoState::By::kPicks;
+  if (pose.lens) {
+    photo->found_projection = std::make_shared<const CameraProjection>(*pose.lens);
+    photo->focal_sigma = pose.focal_sigma * pose.lens->MeanFocalLength();
+  }
   const double sigma = pose.PositionSigma();
   if (n >= 4 && std::isfinite(sigma)) photo->position_sigma = sigma;
   return choice;
@@ -118,16 +147,18 @@ PickSolver::Complete PickSolver::CompletePicks(const std::vector<SessionPick>& p
   return complete;
 }
 
-PickSolver::Views PickSolver::SolveViews(const Complete& complete, const ScanRays* rays,
+ScaleOfPhoto PickSolver::ScaleByRays(const ScanRays* rays) const {
+  if (rays == nullptr) return {};
+  return [this, rays](const SparseImage& image, const Rigid& cam_from_scan,
+                      const ScaleOptions& options) {
+    return EstimateScale(scene_.model(), image, cam_from_scan, rays->caster(), options,
+                         scene_.input().num_threads);
+  };
+}
+
+PickSolver::Views PickSolver::SolveViews(const Complete& complete,
+                                         const ScaleOfPhoto& scale_of_photo,
                                          PickSolution* solution) {
-  ScaleOfPhoto scale_of_photo;  // needs the rays
-  if (rays != nullptr) {
-    scale_of_photo = [&](const SparseImage& image, const Rigid& cam_from_scan,
-                         const ScaleOptions& options) {
-      return EstimateScale(scene_.model(), image, cam_from_scan, rays->caster(), options,
-                           scene_.input().num_threads);
-    };
-  }
   Views solved;
   solved.views =
       ReviewViews(scene_.model(), complete.picks, kMinPicks, options_.picks,
@@ -136,6 +167,9 @@ PickSolver::Views PickSolver::SolveViews(const Complete& complete, const ScanRay
   for (PickView& view : solved.views) {
     PhotoState& photo = solution->photos[view.image_name];
     solved.choices.emplace_back();
+    if (view.layout_problem.empty()) {
+      view.layout_problem = FocalProblemOf(scene_.focal_source(view.image_name), view.pairs);
+    }
     if (!view.layout_problem.empty()) {
       photo.warnings.push_back(AsSentence(view.layout_problem));
       continue;
@@ -149,17 +183,43 @@ PickSolver::Views PickSolver::SolveViews(const Complete& complete, const ScanRay
     for (size_t k = 0; view.HasPose() && k < on.size(); ++k) {
       PickState& state = solution->picks[on[k]];
       state.leave_one_out_px = view.review.leave_one_out_px[static_cast<int>(k)];
+      state.without_px2 = view.review.without_px2[static_cast<int>(k)];
       if (!view.review.used[k]) state.status = PickState::Status::kBad;
     }
   }
   return solved;
 }
 
+// What picks that place the model together say.
+void PickSolver::TakeSpread(const Complete& complete, const PickStart& found,
+                            PickSolution* solution) const {
+  solution->warnings = SpreadWarnings(*found.spread, complete.index, scene_.azimuth());
+  std::set<std::string> clicked;
+  for (const Pick& pick : complete.picks) {
+    if (pick.weight > 0) clicked.insert(pick.image_name);
+  }
+  for (const std::string& name : clicked) {
+    std::vector<std::string>& warnings = solution->photos[name].warnings;
+    warnings.insert(warnings.end(), solution->warnings.begin(), solution->warnings.end());
+  }
+  if (!found.start) return;
+  for (size_t k = 0; k < complete.index.size(); ++k) {
+    if (!(complete.picks[k].weight > 0)) continue;
+    PickState& state = solution->picks[complete.index[k]];
+    state.leave_one_out_px = found.spread->leave_one_out_px[k];
+    state.without_px2 = found.spread->without_px2[k];
+    PhotoState& photo = solution->photos[complete.picks[k].image_name];
+    photo.position_sigma = found.start->position_sigma;
+    photo.ambiguous = found.choice.ambiguous;
+  }
+}
+
 // One similarity for the model (thesis 7.1.3).
 void PickSolver::FitModel(const Complete& complete, const Views& views,
-                          PickSolution* solution) const {
-  const PickStart found =
-      StartFromPicks(scene_.model(), complete.picks, views.views, views.choices, options_, {});
+                          const ScaleOfPhoto& scale_of_photo, PickSolution* solution) const {
+  const PickStart found = StartFromPicks(scene_.model(), complete.picks, views.views, views.choices,
+                                         options_, scale_of_photo);
+  if (found.spread) TakeSpread(complete, found, solution);
   if (!found.start) return;
   solution->scale = found.start->scale;
   solution->scan_from_sparse = found.start->scan_from_sparse;
@@ -181,7 +241,7 @@ void PickSolver::FitModel(const Complete& complete, const Views& views,
 void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const {
   struct Sums {
     double px2 = 0, metres2 = 0, weights = 0;
-    int worst = -1;
+    std::vector<int> picks;
     void Add(const PickState& state, double weight) {
       px2 += std::pow(weight * state.residual_px, 2);
       metres2 += std::pow(weight * state.residual, 2);
@@ -199,7 +259,7 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
       if (state.status == PickState::Status::kUsed) state.status = PickState::Status::kWaiting;
       continue;
     }
-    const CameraProjection& projection = *scene_.FindPhoto(pick.image_name)->projection;
+    const CameraProjection& projection = photo.projection(*scene_.FindPhoto(pick.image_name));
     const auto x_in_img = projection.ImgFromCam(photo.cam_from_scan * *pick.x_in_scan);
     if (x_in_img) state.error_px = *x_in_img - *pick.x_in_img;
     state.residual_px = state.error_px.norm();
@@ -209,16 +269,15 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     all.Add(state, pick.weight);
     Sums& sums = of_photo[pick.image_name];
     sums.Add(state, pick.weight);
-    if (sums.worst < 0 || state.residual_px > solution->picks[sums.worst].residual_px) {
-      sums.worst = static_cast<int>(i);
-    }
+    sums.picks.push_back(static_cast<int>(i));
   }
   for (const auto& [name, sums] : of_photo) {
     PhotoState& photo = solution->photos[name];
     photo.rms_px = WeightedRms(sums.px2, sums.weights);
     photo.rms = WeightedRms(sums.metres2, sums.weights);
+    PickState& worst = solution->picks[WorstOf(sums.picks, solution->picks)];
     // Of three picks that fit exactly none is worse than another.
-    if (solution->picks[sums.worst].residual_px > 0.01) solution->picks[sums.worst].worst = true;
+    worst.worst = worst.residual_px > 0.01;
   }
   solution->rms_px = WeightedRms(all.px2, all.weights);
   solution->num_clicked_photos = static_cast<int>(of_photo.size());
@@ -232,7 +291,7 @@ void PickSolver::Predict(const std::vector<SessionPick>& picks, const ScanRays* 
     const PhotoState& photo = solution->photos[pick.image_name];
     if (pick.complete() || !photo.solved()) continue;
     PickState& state = solution->picks[i];
-    const CameraProjection& projection = *scene_.FindPhoto(pick.image_name)->projection;
+    const CameraProjection& projection = photo.projection(*scene_.FindPhoto(pick.image_name));
     if (pick.x_in_scan) {
       const auto x_in_img = projection.ImgFromCam(photo.cam_from_scan * *pick.x_in_scan);
       if (x_in_img && projection.InImage(*x_in_img)) state.predicted_img = x_in_img;
@@ -259,8 +318,9 @@ PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
   solution.picks.resize(picks.size());
   for (const PickPhoto& photo : scene_.photos()) solution.photos[photo.name()];
   const Complete complete = CompletePicks(picks, &solution);
-  const Views views = SolveViews(complete, rays, &solution);
-  if (rays != nullptr) FitModel(complete, views, &solution);
+  const ScaleOfPhoto scale_of_photo = ScaleByRays(scene_.has_model() ? rays : nullptr);
+  const Views views = SolveViews(complete, scale_of_photo, &solution);
+  if (scale_of_photo) FitModel(complete, views, scale_of_photo, &solution);
   Measure(picks, &solution);
   for (const PickView& view : views.views) {
     if (!view.HasPose()) continue;

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -26,7 +27,11 @@ struct PickState {
   // Metres between the picked point and the click's ray where that is as deep as the point.
   double residual = kNoNumber;
   double leave_one_out_px = kNoNumber;
-  bool worst = false;  // of the used picks of its photo
+  double without_px2 = kNoNumber;  // as PickReview
+  // Of the used picks of its photo the one whose left-out distance says most: without it the others
+  // fit best. (The residual, where that is not known.) With few picks a wrong one bends the
+  // solution to itself, and good ones with it.
+  bool worst = false;
   // Where the missing partner of a half pick should be.
   std::optional<Eigen::Vector2d> predicted_img;
   std::optional<ScanSpot> predicted_spot;
@@ -41,10 +46,17 @@ struct PhotoState {
   double rms_px = kNoNumber;  // weighted, of the used picks
   double rms = kNoNumber;     // metres, the same
   double position_sigma = kNoNumber;
+  // With a lens that the picks found, without a sparse model: its projection, and one standard
+  // deviation of the focal length in pixels.
+  std::shared_ptr<const CameraProjection> found_projection;
+  double focal_sigma = kNoNumber;
   bool ambiguous = false;
   std::vector<std::string> warnings;
 
   bool solved() const { return by != By::kNothing; }
+  const CameraProjection& projection(const PickPhoto& photo) const {
+    return found_projection ? *found_projection : *photo.projection;
+  }
 };
 
 struct PickSolution {
@@ -53,6 +65,8 @@ struct PickSolution {
   std::optional<Similarity> scan_from_sparse;
   ScaleEstimate scale;
   double rms_px = kNoNumber;  // of all used picks, as roomtex-align's picks.rms_px
+  // What is wrong with picks that count together over several photos.
+  std::vector<std::string> warnings;
   int num_clicked_photos = 0;
   bool with_rays = false;  // the ray caster stood
   std::string next;        // what to do now
@@ -80,10 +94,14 @@ class PickSolver {
   PickReview Review(const std::string& name, const CameraProjection& projection,
                     const PointPairs& pairs);
   Complete CompletePicks(const std::vector<SessionPick>& picks, PickSolution* solution) const;
-  Views SolveViews(const Complete& complete, const ScanRays* rays, PickSolution* solution);
+  Views SolveViews(const Complete& complete, const ScaleOfPhoto& scale_of_photo,
+                   PickSolution* solution);
   std::optional<PoseChoice> SolveView(const ScaleOfPhoto& scale_of_photo, PickView* view,
                                       PhotoState* photo) const;
-  void FitModel(const Complete& complete, const Views& views, PickSolution* solution) const;
+  ScaleOfPhoto ScaleByRays(const ScanRays* rays) const;  // empty without them
+  void FitModel(const Complete& complete, const Views& views, const ScaleOfPhoto& scale_of_photo,
+                PickSolution* solution) const;
+  void TakeSpread(const Complete& complete, const PickStart& found, PickSolution* solution) const;
   void Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const;
   void Predict(const std::vector<SessionPick>& picks, const ScanRays* rays,
                PickSolution* solution) const;

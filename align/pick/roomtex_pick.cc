@@ -28,7 +28,9 @@ struct Arguments {
 
 void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("input_path", &a->scene.input_path,
-                        "COLMAP's sparse model: a folder, .bin or .txt.");
+                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
+                        "--image_path are placed each by its own picks.",
+                        Command::Kind::kOptional);
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
   command->AddInputPaths("scan_path", &a->scene.scan_paths,
                          "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
@@ -40,7 +42,7 @@ void AddOptions(Arguments* a, Command* command) {
                          "is there is continued, and kept as it was with .bak behind its name.");
   command->AddString(
       "image_name", &a->image_name,
-      "Photo to begin with, as the model names it; empty = the best one to pick in.");
+      "Photo to begin with, by its name below --image_path; empty = the best one to pick in.");
   command->AddOutputPath("aligned_path", &a->aligned_path,
                          "Folder that the page's Align writes to; empty = aligned, beside the "
                          "picks.",
@@ -48,12 +50,19 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("scan_poses", &a->scene.scan_poses, ScanPosesHelp(),
                         Command::Kind::kOptional);
   command->Add(FieldsOf(&a->scene.scan_reader));
+  command->Add(FieldsOf(&a->scene.camera));
   command->Add(FieldsOf(&a->server));
 }
 
 void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->scene.scan_reader.Problems();
   AppendProblems(a->server.Problems(), &problems);
+  AppendProblems(a->scene.camera.Problems(), &problems);
+  if (!a->scene.input_path.empty() && !a->scene.camera.camera_params.empty()) {
+    problems.push_back(
+        "--camera_params is for photos without a sparse model: that of --input_path "
+        "has cameras");
+  }
   ThrowIfProblems(problems);
   RequireScans(a->scene.scan_paths, a->scene.input_path);
   const std::filesystem::path picks(a->output_path);
@@ -90,7 +99,7 @@ void ServePicking(Arguments a, const Command::Context& context) {
   a.scene.num_threads = context.options.num_threads;
   PickScene scene(a.scene, &context.progress);
   if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
-    throw UsageError("--image_name " + a.image_name + " is not in the sparse model");
+    throw UsageError("--image_name " + a.image_name + " is not among the photos");
   }
   for (const std::string& note : scene.notes()) context.Warn(note);
   WarnOfMissingPhotos(scene, context);

@@ -1,6 +1,7 @@
 // roomtex-pick in a browser, on a simulated room: by mouse and by keys, as its user works.
 
 import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, run, screenshot} from './browser.mjs';
@@ -414,11 +415,49 @@ test('picks that are wrong are refused in words', async () => {
   }, {picksFile: fileOf(wrong)});
 });
 
+test('six pairs in two photos are enough', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    await until(async () => (await page.rows()).every((row) => row.px !== null), 'all are solved');
+    for (const row of await page.rows()) {
+      assert.ok(row.px < 2.5, `pick ${row.number}: ${row.px} px`);
+    }
+    assert.match(await page.text('#summary-body'), /px rms in 2 photos/);
+    assert.match(await page.text('#next'), /Enough picks/);
+    await screenshot(page.page, 'pick-spread');
+  }, {picksFile: fileOf([...places.slice(0, 3), ...other_places.slice(0, 3)])});
+});
+
+test('photos alone: each is solved by its own pairs, and aligned', async () => {
+  const [camera] = readFileSync(capture('capture', 'cameras.txt'), 'utf8')
+                       .split('\n')
+                       .filter((line) => line && line[0] !== '#');
+  const [, model, , , ...params] = camera.trim().split(' ');
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    await until(async () => (await page.rows()).every((row) => row.px !== null), 'all are solved');
+    const summary = await page.text('#summary-body');
+    assert.match(summary, /its own picks/);
+    assert.doesNotMatch(summary, /Scale/);
+    await until(
+        async () => /Enough picks for this photo/.test(await page.text('#next')), 'enough picks');
+    await screenshot(page.page, 'pick-alone');
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.match(await page.text('#align .verdict'), /^✓\s*Trusted/);
+    await screenshot(page.page, 'pick-alone-aligned');
+  }, {
+    alone: true,
+    picksFile: fileOf(places.slice(0, 6)),
+    more: ['--camera_model', model, '--camera_params', params.join(',')],
+  });
+});
+
 test('too few picks: Align says so without running', async () => {
   await pageOn(async (page) => {
     await page.rowsAre(3);
     await page.page.click('#align-open');
-    assert.match(await page.text('#align .body'), /needs 6 picks in one photo; there are 3/);
+    assert.match(await page.text('#align .body'), /needs 6 picks; there are 3/);
   }, {picksFile: fileOf(places.slice(0, 3))});
 });
 

@@ -41,11 +41,10 @@ export function capture(...parts) {
   return path.join(folder, ...parts);
 }
 
-// Starts roomtex-pick on it.
-export function servePicks(picksPath, more = [], port = 0) {
+// Starts roomtex-pick on it; alone: on its photos, without the sparse model.
+export function servePicks(picksPath, more = [], port = 0, alone = false) {
   return serve('roomtex-pick', [
-    '--input_path',
-    capture('sparse'),
+    ...(alone ? [] : ['--input_path', capture('sparse')]),
     '--image_path',
     capture('capture', 'photos'),
     '--scan_path',
@@ -193,12 +192,14 @@ export class PickPage {
 }
 
 // Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
-// what `allowed` names. picksFile: what the picks file holds before; more: options of the command.
-export async function onPage(browser, body, {image_name, picksFile = '', allowed = [], more = []}) {
+// what `allowed` names. picksFile: what the picks file holds before; more: options of the command;
+// alone: without the sparse model.
+export async function onPage(
+    browser, body, {image_name, picksFile = '', allowed = [], more = [], alone = false}) {
   const folder = makeFolder();
   const picksPath = folder.path('picks.csv');
   if (picksFile) writeFileSync(picksPath, picksFile);
-  const server = await servePicks(picksPath, ['--image_name', image_name, ...more]);
+  const server = await servePicks(picksPath, ['--image_name', image_name, ...more], 0, alone);
   // Small: without a graphics processor the time goes into pixels.
   const page = await PickPage.open(browser, server, picksPath, {width: 1280, height: 720});
   try {

@@ -27,7 +27,7 @@ export class AlignDialog {
   #parts = {};
   #timer = 0;
 
-  // picks: Picks; facts: {min_picks, aligned_path}
+  // picks: Picks; facts: {min_picks, has_model, aligned_path}
   constructor(picks, facts) {
     this.picks = picks;
     this.facts = facts;
@@ -63,15 +63,17 @@ export class AlignDialog {
 
   async #start() {
     const {body} = this.#parts;
-    const most =
-        Math.max(0, ...Object.values(this.picks.session.photos).map((one) => one.num_complete));
-    if (most < this.facts.min_picks) {
+    const {min_picks, has_model: hasModel} = this.facts;
+    const counts = Object.values(this.picks.session.photos).map((one) => one.num_complete);
+    const count =
+        hasModel ? counts.reduce((sum, one) => sum + one, 0) : Math.max(0, ...counts);
+    if (count < min_picks) {
       this.#status = null;
       this.#buttons(false);
       body.replaceChildren(
           el('p', {},
-             `roomtex-align needs ${this.facts.min_picks} picks in one photo; ` +
-                 `there are ${most} so far.`),
+             `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
+                 `there are ${count} so far.`),
           el('p', {}, this.picks.session.next));
       return;
     }

@@ -138,7 +138,7 @@ function showAll() {
   const {editor, picks} = app;
   const {session} = picks;
   app.results.update(picks, editor.selected);
-  showSummary(editor.photo, session, app.server.min_picks);
+  showSummary(editor.photo, session, app.server);
   const counts = new Map();
   for (const {image_name} of picks.list) counts.set(image_name, (counts.get(image_name) ?? 0) + 1);
   app.strip.update(editor.photo.id, session.photos, counts);

@@ -112,7 +112,7 @@ export class Results {
 }
 
 // What the picks of the photo that is shown say about its pose, and the model as a whole.
-export function showSummary(photo, session, min_picks) {
+export function showSummary(photo, session, {min_picks, has_model: hasModel}) {
   const solution = session.photos[photo?.name];
   const body = byId('summary-body');
   const facts = [];
@@ -130,8 +130,15 @@ export function showSummary(photo, session, min_picks) {
     if (typeof solution.position_sigma_mm === 'number') {
       add('Camera', `± ${number(solution.position_sigma_mm, 1)} mm in position`);
     }
+    if (typeof solution.focal_length_px === 'number') {
+      add('Focal length',
+          `${number(solution.focal_length_px, 0)} px ± ` +
+              `${number(solution.focal_length_sigma_px, 0)}, by the picks`);
+    }
   } else {
-    add('Pose', `not solved; roomtex-align wants ${min_picks} picks in one photo`);
+    add('Pose',
+        `not solved; roomtex-align wants ${min_picks} picks, ` +
+            (hasModel ? 'here or in several photos' : 'in this photo'));
   }
   const similarity = session.similarity;
   if (similarity) {

@@ -91,7 +91,8 @@ export class Strip {
     const sees = typeof photo.scan_share === 'number' ?
         `, sees ${Math.round(100 * photo.scan_share)} % of the scan` :
         '';
-    const points = `${photo.num_points} points of the sparse model`;
+    const points =
+        photo.num_points > 0 ? `${photo.num_points} points of the sparse model` : 'a photo';
     element.title =
         `${photo.name}: ${photo.missing ? photo.problem || 'no such file' : points + sees}`;
   }

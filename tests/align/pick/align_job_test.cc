@@ -97,7 +97,7 @@ TEST_F(AlignButton, TooFewPicksFailWithTheMessage) {
   const Json state = Align();
   EXPECT_EQ(state["exit_code"], 3);
   EXPECT_EQ(state["verdict"], "failed");
-  EXPECT_THAT(state["sentences"].dump(), HasSubstr("at least 6 in one photo are needed"));
+  EXPECT_THAT(state["sentences"].dump(), HasSubstr("at least 6 are needed"));
   EXPECT_THAT(state["facts"], IsEmpty());
 }
 

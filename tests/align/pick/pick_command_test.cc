@@ -149,7 +149,8 @@ TEST(PickCommand, RefusesWhatCannotBeServed) {
   WriteBytes(folder / "broken.csv", "image_name,x\n");
   expect(Options(folder / "broken.csv"), 3, "line 1");
   EXPECT_EQ(ReadBytes(folder / "broken.csv"), "image_name,x\n");
-  expect("--output_path x.csv", 2, "--input_path");
+  expect("--output_path x.csv", 2, "--image_path");
+  expect(good + " --camera_params 500,300,200,0", 2, "photos without a sparse model");
   std::string elsewhere = Options(folder / "picks.csv");
   const std::string images = ThePickRoom().input().image_path;
   elsewhere.replace(elsewhere.find(images), images.size(), folder.path());

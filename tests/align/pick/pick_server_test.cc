@@ -524,16 +524,18 @@ TEST(PickScene, TakesAMeshAndSeveralScans) {
               IsNearRigid(ThePickRoom().room().CamFromScan(photo), 5e-3, 5e-3));
   // The photo on the picture of the mesh.
   const Rigid cam_from_scan = ThePickRoom().room().CamFromScan(photo);
-  const cv::Mat4b back = DrawBackProjection(scene, *rays, scene.photos()[photo], cam_from_scan, 1,
-                                            [] { return false; });
+  const cv::Mat4b back =
+      DrawBackProjection(scene, *rays, scene.photos()[photo], *scene.photos()[photo].projection,
+                         cam_from_scan, 1, [] { return false; });
   ASSERT_EQ(back.size(), cv::Size(2048, 1024));
   int seen = 0;
   for (const cv::Vec4b& color : back) seen += color[3] != 0;
   EXPECT_GT(seen, 20000);
   EXPECT_LT(seen, 1024 * 2048 / 3);
-  EXPECT_TRUE(DrawBackProjection(scene, *rays, scene.photos()[photo], cam_from_scan, 1, [] {
-                return true;
-              }).empty());
+  EXPECT_TRUE(DrawBackProjection(scene, *rays, scene.photos()[photo],
+                                 *scene.photos()[photo].projection, cam_from_scan, 1,
+                                 [] { return true; })
+                  .empty());
 }
 
 }  // namespace

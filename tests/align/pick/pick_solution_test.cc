@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/text.h"
 #include "tests/align/pick/pick_room.h"
 #include "tests/support/matchers.h"
 
@@ -106,6 +107,68 @@ TEST(PickSolution, OfPicksThatMissALittleTheWorstIsMarked) {
     EXPECT_EQ(solution.picks[i].status, Status::kUsed);
     EXPECT_EQ(solution.picks[i].worst, i == 5) << i;
   }
+}
+
+TEST(PickSolution, OfFivePicksTheWorstIsTheWrongOne) {
+  // Which neither residuals nor bare left-out distances always tell: without it the others fit.
+  for (int wrong = 0; wrong < 5; ++wrong) {
+    std::vector<SessionPick> picks = TruePicks(5);
+    *picks[wrong].x_in_img += Eigen::Vector2d(15, 20);
+    const PickSolution solution = Solve(picks);
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(solution.picks[i].worst, i == wrong) << wrong;
+    EXPECT_NEAR(solution.picks[wrong].leave_one_out_px, 25, 1);
+  }
+}
+
+TEST(PickSolution, AGoodFourthPickNeverTakesThePoseAway) {
+  // Also on one line with two of the three: there are several poses then, and the sparse model
+  // tells.
+  const PickRoom& room = ThePickRoom();
+  const std::vector<SessionPick> all = room.SmoothPicks(room.clicked_photo(), 40);
+  int tried = 0;
+  for (size_t a = 0; a + 3 < all.size(); a += 3) {
+    const std::vector<SessionPick> three(all.begin() + a, all.begin() + a + 3);
+    const PickSolution by_three = Solve(three);
+    if (!by_three.photos.at(ClickedName()).solved()) continue;
+    ++tried;
+    for (const double share : {0.0, 0.3, 0.5}) {
+      std::vector<SessionPick> four = three;
+      four.push_back(all[a + 3]);
+      if (share > 0) {
+        four[3].x_in_scan = (1 - share) * *three[0].x_in_scan + share * *three[1].x_in_scan;
+        four[3].x_in_img = room.Project(room.clicked_photo(), *four[3].x_in_scan);
+      }
+      *four[3].x_in_img += Eigen::Vector2d(1.2, -0.9);
+      const PickSolution by_four = Solve(four);
+      EXPECT_TRUE(by_four.photos.at(ClickedName()).solved()) << a << " " << share;
+      EXPECT_EQ(by_four.scan_from_sparse.has_value(), by_three.scan_from_sparse.has_value());
+      EXPECT_LT((by_four.photos.at(ClickedName()).cam_from_scan.TargetOriginInSource() -
+                 room.room().CamFromScan(room.clicked_photo()).TargetOriginInSource())
+                    .norm(),
+                0.3)
+          << a << " " << share;
+    }
+  }
+  EXPECT_GT(tried, 6);
+}
+
+TEST(PickSolution, PicksOfSeveralPhotosCountTogetherAsInTheAlignment) {
+  const PickRoom& room = ThePickRoom();
+  std::vector<SessionPick> picks;
+  for (const int photo : {room.clicked_photo(), room.other_photo(), 5}) {
+    for (const SessionPick& pick : room.SmoothPicks(photo, 2)) picks.push_back(pick);
+  }
+  const PickSolution solution = Solve(picks);
+  ASSERT_TRUE(solution.scan_from_sparse);
+  ExpectTruePoses(solution, 0.001);
+  EXPECT_THAT(solution.next, HasSubstr("Enough picks"));
+  for (const PickState& pick : solution.picks) EXPECT_LT(pick.leave_one_out_px, 0.1);
+  picks[3].x_in_img->x() += 80;
+  const PickSolution wrong = Solve(picks);
+  EXPECT_EQ(wrong.picks[3].status, Status::kBad);
+  ExpectTruePoses(wrong, 0.001);
+  picks.pop_back();
+  EXPECT_THAT(Solve(picks).next, HasSubstr("1 more pair"));
 }
 
 TEST(PickSolution, APickThatIsOffCountsForNothing) {
@@ -292,6 +355,67 @@ TEST(PickSolution, SixPicksGiveTheSimilarityOfTheAlignment) {
                              options);
       });
   ExpectSameBits(on_mesh.start.value().scan_from_sparse, by_command);
+}
+
+// The same room without its sparse model: photos alone, their camera told or to be found.
+std::unique_ptr<PickScene> PhotosAlone(const PhotoCameraOptions& camera) {
+  PickSceneInput input = ThePickRoom().input();
+  input.input_path = "";
+  input.camera = camera;
+  Progress progress(true);
+  auto scene = std::make_unique<PickScene>(input, &progress);
+  scene->Prepare();
+  scene->WaitForEdges([] { return false; });
+  return scene;
+}
+
+PhotoCameraOptions TrueCamera() {
+  const Camera& camera = ThePickRoom().room().camera();
+  PhotoCameraOptions options{CameraModelName(camera.model), ""};
+  for (const double param : camera.params) {
+    options.camera_params += (options.camera_params.empty() ? "" : ",") + Exact(param);
+  }
+  return options;
+}
+
+TEST(PickSolution, WithoutASparseModelAPhotoIsSolvedByItsOwnPicks) {
+  const auto scene = PhotosAlone(TrueCamera());
+  ASSERT_EQ(scene->photos().size(), 2u);  // of eight, those that are there
+  EXPECT_FALSE(scene->has_model());
+  PickSolver solver(*scene);
+  EXPECT_FALSE(solver.Solve(TruePicks(3)).photos.at(ClickedName()).solved());
+  EXPECT_TRUE(solver.Solve(TruePicks(5)).photos.at(ClickedName()).solved());
+  EXPECT_THAT(solver.Solve(TruePicks(5)).next, HasSubstr("1 more pair to go in this photo"));
+  const PickSolution solution = solver.Solve(TruePicks(6));
+  const PhotoState& photo = solution.photos.at(ClickedName());
+  ASSERT_TRUE(photo.solved());
+  EXPECT_THAT(
+      photo.cam_from_scan,
+      IsNearRigid(ThePickRoom().room().CamFromScan(ThePickRoom().clicked_photo()), 1e-4, 1e-4));
+  EXPECT_FALSE(solution.scan_from_sparse);
+  EXPECT_FALSE(photo.found_projection);
+  EXPECT_THAT(solution.next, HasSubstr("Enough picks for this photo"));
+  const std::string other = ThePickRoom().room().PhotoName(ThePickRoom().other_photo());
+  EXPECT_FALSE(solution.photos.at(other).solved());
+}
+
+TEST(PickSolution, WithoutASparseModelPicksTellAFocalLengthThatNobodyNames) {
+  const auto scene = PhotosAlone({});
+  PickSolver solver(*scene);
+  const std::vector<SessionPick> picks =
+      ThePickRoom().SmoothPicks(ThePickRoom().clicked_photo(), 12);
+  const PickSolution few = solver.Solve({picks.begin(), picks.begin() + 7});
+  EXPECT_FALSE(few.photos.at(ClickedName()).solved());
+  EXPECT_THAT(few.next,
+              HasSubstr("1 more pair to go in this photo: nothing says its focal length"));
+  const PickSolution solution = solver.Solve(picks);
+  const PhotoState& photo = solution.photos.at(ClickedName());
+  ASSERT_TRUE(photo.found_projection);
+  const double focal = ThePickRoom().room().camera().MeanFocalLength();
+  EXPECT_NEAR(photo.found_projection->camera().params[0] / focal, 1, 0.05);
+  EXPECT_GT(photo.focal_sigma, 0);
+  EXPECT_LT(photo.focal_sigma, 0.05 * focal);
+  EXPECT_THAT(solution.next, HasSubstr("Enough picks for this photo"));
 }
 
 TEST(PickSolution, BeforeTheRayCasterStandsThePoseIsThereAlready) {

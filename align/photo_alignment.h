@@ -1,0 +1,37 @@
+#pragma once
+// One to a few photos into the scan without a sparse model: each by its own picks.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "align/clicks/photo_model.h"
+
+namespace roomtex {
+
+struct PhotoAlignment {
+  // The photos that have a pose, their cameras as given or found, and the picks as points, in
+  // `scan`: the answer.
+  SparseModel model;
+  // As much of it as there is: start.picks, picks' numbers, placement, photo_sigmas, expected_error
+  // at the cameras, warnings, reasons. There is no similarity.
+  Alignment alignment;
+  struct Lens {
+    FocalSource source = FocalSource::kGiven;
+    double focal_sigma = 0;   // of the mean focal length, pixels; 0 = given
+    double radial_sigma = 0;  // of the radial term; 0 = given or none
+  };
+  std::map<uint32_t, Lens> lenses;  // by image_id
+  std::vector<std::string> notes;   // what was found of the lenses
+};
+
+// input.model: photos.model. Throws InputError for picks that fix no photo, Contradiction for picks
+// that are exchanged, not on the scan, or show that the scan is mirrored.
+PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos,
+                           const AlignmentOptions& options, Progress* progress);
+
+// Each point of the model takes the colour of a photo that sees it.
+void ColorPoints(const std::string& image_path, SparseModel* model);
+
+}  // namespace roomtex
