@@ -259,6 +259,19 @@ TEST(AlignCommand, RemembersItsScans) {
   EXPECT_EQ(scans[0]["max_range"], 30);
 }
 
+TEST(AlignCommand, NamesPhotosThatItLeavesOutAndStopsIfStrict) {
+  const CaseFolder files(MakeCase());
+  std::filesystem::create_directories(files.folder / "photos");
+  const std::string photos = "--image_path " + (files.folder / "photos");
+  ExpectFailure(files.Align(photos + " --strict 1"), 3,
+                "16 photos cannot be used. There is no photo");
+  EXPECT_FALSE(std::filesystem::exists(files.folder / "aligned"));
+  ASSERT_EQ(files.Align(photos).exit_code, 0);
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["photos_left_out"].size(), 16u);
+  EXPECT_EQ(report["photos_left_out"][0]["name"], "photo_000.jpg");
+}
+
 TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   SimulatedCase one = MakeCase();
   const CaseFolder files(one);

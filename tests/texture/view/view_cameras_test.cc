@@ -116,6 +116,8 @@ TEST_F(ViewCamerasOfTwo, PhotosComeInTheSizeAskedFor) {
   EXPECT_EQ(photo.rows, 133);
   EXPECT_NEAR(photo.at<cv::Vec3b>(60, 100)[2], 200, 4);
   EXPECT_EQ(cameras_.Photo(0, 200), bytes);  // kept
+  ASSERT_EQ(cameras_.left_out().size(), 1u);
+  EXPECT_NE(cameras_.left_out()[0].reason.find("There is no photo"), std::string::npos);
   EXPECT_FALSE(cameras_.Photo(1, 200));
   EXPECT_THROW(cameras_.Photo(2, 200), UsageError);
   EXPECT_THROW(cameras_.Photo(-1, 200), UsageError);
