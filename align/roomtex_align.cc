@@ -2,15 +2,19 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <optional>
 
 #include "align/alignment.h"
 #include "align/geo/geo_output.h"
+#include "align/lens_report.h"
 #include "align/plane_bundle_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
+#include "colmap_ext/lens_labels.h"
+#include "colmap_ext/mapper_verdict.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -28,7 +32,7 @@ struct Arguments {
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
   ScanPlaneOptions planes;
-  std::string planes_path;
+  std::string planes_path, refine_intrinsics = "auto";
   int overlays = 0;
 };
 
@@ -68,6 +72,10 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
                    "to it; 0 = one similarity by the picks alone.");
+  command->AddChoice("refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
+                     "Adjust focal length, principal point and distortion, one set for all photos of "
+                     "a lens: auto = where photos or scan contradict what was told, which is said; "
+                     "1 = always; 0 = never.");
   command->Add(FieldsOf(&o.bundle));
   command->Add(FieldsOf(&a->planes));
   command->AddOutputPath("Plane.output_path", &a->planes_path,
@@ -284,7 +292,9 @@ std::vector<ScanPlane> DetectPlanes(const Arguments& a, const SurveyedScans& sur
 std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput& input,
                                        const Command::Context& context) {
   try {
-    return AlignToScan(input, a.alignment, &context.progress);
+    AlignmentOptions options = a.alignment;
+    options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
+    return AlignToScan(input, options, &context.progress);
   } catch (const Contradiction& contradiction) {
     context.report.SetUntrusted(contradiction.what());
     context.report["scan_from_sparse"] = nullptr;
@@ -294,10 +304,31 @@ std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput&
   }
 }
 
+// What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one that
+// it refused, and photos are judged here, too.
+void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment,
+                        const Command::Context& context) {
+  const std::string source = "roomtex-mapper did not trust the sparse model: ";
+  const bool mended = alignment.lenses.mended || (alignment.adjusted() && alignment.adjustment.freed);
+  for (const std::string& reason : verdict.calibration) {
+    if (!mended) context.report.SetUntrusted(source + reason);
+  }
+  for (const std::string& reason : verdict.motion) context.report.SetUntrusted(source + reason);
+  for (const std::string& reason : verdict.photos) context.Warn(source + reason);
+}
+
+// What EXIF says of the photos' lenses, where the photos are given.
+LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) {
+  std::map<uint32_t, std::string> names;
+  for (const auto& [id, image] : model.images) names[id] = image.name;
+  return ReadLensLabels(names, image_path);
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
   SparseModel model = ReadSparseModel(a.input_path);
+  const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
   context.progress.Stage("read scan");
@@ -308,13 +339,18 @@ void Align(const Arguments& a, const Command::Context& context) {
   const SurveyedScans surveyed(placed.scans, options);
   const std::vector<ScanPlane> planes = DetectPlanes(a, surveyed, context);
   const std::optional<Alignment> found =
-      FindAlignment(a, {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth}, context);
+      FindAlignment(a,
+                    {model, surveyed, picks, a.picks_path, a.scan_reader.azimuth,
+                     PhotoLabels(model, a.image_path), verdict.refined},
+                    context);
   if (!found) return;
   const Alignment& alignment = *found;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
+  CarryMapperVerdict(verdict, alignment, context);
 
   context.progress.Stage("write");
+  if (alignment.lenses.mended) model = *alignment.lenses.mended;
   if (alignment.adjusted()) {
     model = alignment.adjustment.bundle.model;
   } else {
@@ -322,6 +358,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
+  context.report["cameras"] = CamerasToJson(alignment);
   context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);

@@ -40,6 +40,15 @@ ExposureData ReadExposureData(const std::string& path);
 // Writes the fields that are set into an existing JPEG.
 void WriteExposureData(const std::string& path, const ExposureData& exposure);
 
+// What EXIF says of the lens; empty where it does not.
+struct LensData {
+  std::string camera;  // as ExposureData::camera
+  // Millimetres; of a digital zoom, times its ratio.
+  std::optional<double> focal_length_mm;
+};
+// Missing or broken EXIF is no error: fields stay empty.
+LensData ReadLensData(const std::string& path);
+
 // Where the camera's satellite receiver believed to be (EXIF GPS).
 struct GpsData {
   double latitude_deg = 0;                 // -90..90, north positive
