@@ -50,8 +50,8 @@ void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
 // The input with its lenses as the photos have them.
 AlignmentInput WithLensesOf(const LensCheck& lenses, const AlignmentInput& input) {
   const SparseModel& model = lenses.mended ? *lenses.mended : input.model;
-  return {model,         input.surveyed,     input.picks, input.picks_path,
-          input.azimuth, input.photo_labels,   input.lenses_refined};
+  return {model,         input.surveyed,     input.picks,         input.picks_path,
+          input.azimuth, input.photo_labels, input.lenses_refined};
 }
 
 LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& options,
@@ -60,8 +60,9 @@ LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& option
   return CheckLenses(input.model, input.photo_labels, options.refine_intrinsics);
 }
 
-Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses, const AlignmentStart& start,
-                      const AlignmentOptions& options, Progress* progress) {
+Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
+                      const AlignmentStart& start, const AlignmentOptions& options,
+                      Progress* progress) {
   progress->Stage("surface refinement");
   Alignment result;
   result.start = start;

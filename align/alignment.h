@@ -22,11 +22,11 @@ struct Alignment {
   // The answer: from the input model to the aligned one, and of an adjusted model the best
   // similarity there is. Of a bent scan: to where the room really is.
   Similarity scan_from_sparse;
-  // What the photos say of the lenses. lenses.mended, if there is one, is the model that was aligned
-  // in the input's place.
+  // What the photos say of the lenses. lenses.mended, if there is one, is the model that was
+  // aligned in the input's place.
   LensCheck lenses;
   std::map<uint32_t, Camera> told_cameras;  // of the model that was aligned
-  AlignmentStart start;  // before the refinement on the surface
+  AlignmentStart start;                     // before the refinement on the surface
   AlignmentFit fit;
   // The adjustment to the surface, tried where the similarity is refined and trusted.
   // adjustment.bundle.model is the answer if adjusted().

@@ -72,10 +72,11 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
                    "to it; 0 = one similarity by the picks alone.");
-  command->AddChoice("refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
-                     "Adjust focal length, principal point and distortion, one set for all photos of "
-                     "a lens: auto = where photos or scan contradict what was told, which is said; "
-                     "1 = always; 0 = never.");
+  command->AddChoice(
+      "refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
+      "Adjust focal length, principal point and distortion, one set for all photos of "
+      "a lens: auto = where photos or scan contradict what was told, which is said; "
+      "1 = always; 0 = never.");
   command->Add(FieldsOf(&o.bundle));
   command->Add(FieldsOf(&a->planes));
   command->AddOutputPath("Plane.output_path", &a->planes_path,
@@ -304,12 +305,13 @@ std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput&
   }
 }
 
-// What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one that
-// it refused, and photos are judged here, too.
+// What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
+// that it refused, and photos are judged here, too.
 void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment,
                         const Command::Context& context) {
   const std::string source = "roomtex-mapper did not trust the sparse model: ";
-  const bool mended = alignment.lenses.mended || (alignment.adjusted() && alignment.adjustment.freed);
+  const bool mended =
+      alignment.lenses.mended || (alignment.adjusted() && alignment.adjustment.freed);
   for (const std::string& reason : verdict.calibration) {
     if (!mended) context.report.SetUntrusted(source + reason);
   }

@@ -91,9 +91,8 @@ LensSet LensPerPhoto(const LensSet& shared) {
 }
 
 size_t NumObservations(const SparseImage& image) {
-  return static_cast<size_t>(
-      std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
-                    [](uint64_t id) { return id != kInvalidPoint3dId; }));
+  return static_cast<size_t>(std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
+                                           [](uint64_t id) { return id != kInvalidPoint3dId; }));
 }
 
 // Photos that obey another focal length get lenses of their own, one for those of about the same.
@@ -164,7 +163,8 @@ LensFinding FindingOf(const SparseModel& model, const PhotoBundle& bundle, int i
     if (lens_of_image != index) continue;
     const SparseImage& image = model.images.at(id);
     finding.photos.push_back(image.name);
-    if (camera_ids.insert(image.camera_id).second) told.push_back(model.cameras.at(image.camera_id));
+    if (camera_ids.insert(image.camera_id).second)
+      told.push_back(model.cameras.at(image.camera_id));
   }
   finding.camera_ids.assign(camera_ids.begin(), camera_ids.end());
   finding.told = RicherCamera(MedianCamera(told));
@@ -200,7 +200,8 @@ std::string LensFinding::Sentence() const {
   const double told_px = told.MeanFocalLength(), found_px = found.MeanFocalLength();
   std::string who = "Camera " + std::to_string(camera_ids[0]);
   if (apart) {
-    who = photos[0] + (photos.size() > 1 ? " and " + std::to_string(photos.size() - 1) + " more photos" : "");
+    who = photos[0] +
+          (photos.size() > 1 ? " and " + std::to_string(photos.size() - 1) + " more photos" : "");
     return who + " obey a focal length of " + Number(found_px, 1) + " pixels instead of " +
            Number(told_px, 1) + ": a zoom or another focus. They got a camera of their own.";
   }
@@ -295,14 +296,12 @@ bool SharingIsTooDear(const SparseModel& thinned, const FreedLenses& freed, doub
   if (thinned.cameras.size() <= num_lenses) return false;
   const PhotoBundle held = AdjustPhotos(thinned, LensesOf(thinned), sigma_px);
   const double num_removed = 6.0 * static_cast<double>(thinned.cameras.size() - num_lenses);
-  return held.usable &&
-         freed.full.cost - held.cost > kMaxRisePerParam * freed.noise * num_removed;
+  return held.usable && freed.full.cost - held.cost > kMaxRisePerParam * freed.noise * num_removed;
 }
 
 }  // namespace
 
-LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels,
-                      RefineIntrinsics refine) {
+LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine) {
   LensCheck check;
   check.lens_of_camera = LensesAsTold(model, {});
   if (refine == RefineIntrinsics::kNever || model.images.size() < 2) return check;
@@ -313,8 +312,8 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels,
   const bool too_dear = SharingIsTooDear(thinned, *freed, sigma_px);
   LensSet mended = freed->sparing.lenses;
   for (size_t i = 0; i < mended.lenses.size(); ++i) {
-    LensFinding finding = FindingOf(model, freed->full, static_cast<int>(i), freed->noise,
-                                    i >= freed->num_shared);
+    LensFinding finding =
+        FindingOf(model, freed->full, static_cast<int>(i), freed->noise, i >= freed->num_shared);
     finding.used = refine == RefineIntrinsics::kAlways || finding.apart || !finding.told_alike ||
                    finding.deviations > kMaxDeviations;
     if (finding.sigmas.size() == 0 || too_dear) finding.used = false;

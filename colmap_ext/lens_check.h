@@ -67,7 +67,6 @@ Json LensToJson(const LensFinding& finding);
 // their camera and focal length, by image_id; may lack any) are one lens, as far as the photos
 // allow that: those that obey another focal length (by 1 %, and significantly) have their own. A
 // lens is used if its photos contradict what was told (auto), or in any case (always).
-LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels,
-                      RefineIntrinsics refine);
+LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine);
 
 }  // namespace roomtex

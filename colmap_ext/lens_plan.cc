@@ -77,8 +77,12 @@ LensPlan::LensPlan(const std::map<uint32_t, Camera>& cameras,
                          " of its photos and " + groups[0].label.text +
                          " of most. They are mapped with a camera of their own.");
       }
-      const Kind kind{camera.model, camera.width, camera.height, camera.params,
-                      camera.has_prior_focal_length, groups[i].label.text};
+      const Kind kind{camera.model,
+                      camera.width,
+                      camera.height,
+                      camera.params,
+                      camera.has_prior_focal_length,
+                      groups[i].label.text};
       auto at = shared.find(kind);
       if (at == shared.end()) {
         camera.camera_id = i == 0 ? camera_id : NextId(cameras_, database_cameras_);
@@ -106,9 +110,9 @@ bool LensPlan::IsAsInDatabase() const {
 }
 
 void LensPlan::Take(const LensCheck& found, const SparseModel& model) {
-  const bool any_main = std::any_of(
-      found.lenses.begin(), found.lenses.end(),
-      [](const LensFinding& lens) { return lens.used && !lens.apart; });
+  const bool any_main =
+      std::any_of(found.lenses.begin(), found.lenses.end(),
+                  [](const LensFinding& lens) { return lens.used && !lens.apart; });
   for (const LensFinding& lens : found.lenses) {
     if (!lens.used || (lens.apart && any_main)) continue;
     uint32_t camera_id = lens.camera_ids.front();

@@ -1,8 +1,8 @@
 #pragma once
-// Which photos of a database share a lens while they are mapped. COLMAP gives every photo a camera of
-// its own unless told --ImageReader.single_camera, and one camera to photos that were zoomed
-// differently if it was; its mapper then refines what the photos cannot tell apart, or holds what is
-// not the same.
+// Which photos of a database share a lens while they are mapped. COLMAP gives every photo a camera
+// of its own unless told --ImageReader.single_camera, and one camera to photos that were zoomed
+// differently if it was; its mapper then refines what the photos cannot tell apart, or holds what
+// is not the same.
 
 #include <cstdint>
 #include <map>

@@ -1,6 +1,6 @@
 #pragma once
-// What roomtex-mapper thought of the model it wrote: its report stands beside the model, so that what
-// is built on a model that it refused knows of it.
+// What roomtex-mapper thought of the model it wrote: its report stands beside the model, so that
+// what is built on a model that it refused knows of it.
 
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ struct MapperVerdict {
   // The mapper's reasons not to trust the model, in sentences, by what they are about.
   std::vector<std::string> calibration;  // the lenses
   std::vector<std::string> photos;       // single photos, or how many there are
-  std::vector<std::string> motion;       // how the cameras moved: before a wall there are two answers
+  std::vector<std::string> motion;  // how the cameras moved: before a wall there are two answers
 };
 
 // Of the model read from `folder`; empty if there is no report, or if it is of another model (other

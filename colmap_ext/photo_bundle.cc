@@ -79,7 +79,7 @@ std::set<uint32_t> HeldImages(const ObservedPoints& observed) {
 // A measurement of the distance between the first photo and the one farthest from it: what holds
 // the scale, which photos leave open, and changes nothing else.
 struct ScaleHold {
-  uint32_t image_id = 0;                           // the farther one
+  uint32_t image_id = 0;                            // the farther one
   Eigen::RowVector3d by = Eigen::Vector3d::Zero();  // its place, over the standard deviation
 };
 
@@ -193,8 +193,9 @@ class PhotoProblem {
       const Lens& lens = lenses_.lenses[i];
       if (!lens.free || !problem_->HasParameterBlock(params_[i].data())) continue;
       problem_->AddResidualBlock(
-          new ceres::NormalPrior(sigma_px * LensPrior(lens.told, lens.hold_centre), ParamsOf(lens.told)), nullptr,
-          params_[i].data());
+          new ceres::NormalPrior(sigma_px * LensPrior(lens.told, lens.hold_centre),
+                                 ParamsOf(lens.told)),
+          nullptr, params_[i].data());
     }
   }
 
@@ -229,9 +230,9 @@ class PhotoNormal {
   }
 
   void Evaluate() {
-    const bool wanted = num_unknowns_ <= kMaxUnknowns &&
-                        std::any_of(lens_offset_.begin(), lens_offset_.end(),
-                                    [](int offset) { return offset >= 0; });
+    const bool wanted =
+        num_unknowns_ <= kMaxUnknowns && std::any_of(lens_offset_.begin(), lens_offset_.end(),
+                                                     [](int offset) { return offset >= 0; });
     ReducedNormal normal(wanted ? num_unknowns_ : 0);
     size_t num_observations = 0;
     for (const auto& [id, seen] : observed_) {
@@ -391,7 +392,7 @@ SparseModel AdjustedByPhotos(const SparseModel& model, double sigma_px) {
 SparseModel WithLenses(const SparseModel& model, const LensSet& lenses) {
   SparseModel result = model;
   uint32_t next_id = result.cameras.empty() ? 1 : result.cameras.rbegin()->first + 1;
-  std::map<uint32_t, int> kept;                            // camera, lens that keeps it
+  std::map<uint32_t, int> kept;                          // camera, lens that keeps it
   std::map<std::pair<uint32_t, int>, uint32_t> divided;  // camera and lens, new camera
   for (auto& [id, image] : result.images) {
     const uint32_t camera_id = model.images.at(id).camera_id;

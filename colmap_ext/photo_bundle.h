@@ -13,9 +13,9 @@ namespace roomtex {
 
 // One set of intrinsics for some of a model's photos.
 struct Lens {
-  Camera camera;      // as it is now
-  Camera told;        // where it started, and what LensPrior holds it near
-  bool free = false;  // adjusted
+  Camera camera;             // as it is now
+  Camera told;               // where it started, and what LensPrior holds it near
+  bool free = false;         // adjusted
   bool hold_centre = false;  // LensPrior's
 };
 
@@ -45,8 +45,8 @@ double KeypointNoise(const SparseModel& model);
 // depend on the number of threads: Ceres runs on one.
 PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px);
 
-// The adjusted model by the best similarity to the input, cameras and points: a bundle adjustment by
-// photos is free to move and grow.
+// The adjusted model by the best similarity to the input, cameras and points: a bundle adjustment
+// by photos is free to move and grow.
 SparseModel PutBack(SparseModel adjusted, const SparseModel& input);
 
 // One lens per camera, held.

@@ -10,7 +10,8 @@ namespace {
 
 struct MixedBlock {
   int offset = 0;
-  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 12, 3> product;  // derivatives' product with the point
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 12, 3>
+      product;  // derivatives' product with the point
 };
 
 }  // namespace
@@ -34,9 +35,8 @@ void ReducedNormal::AddPoint(const std::vector<NormalTerms>& observations,
   for (const NormalTerms& observation : observations) {
     information += observation.by_point.transpose() * observation.by_point;
     for (const auto& block : observation.blocks) {
-      auto at = std::find_if(mixed.begin(), mixed.end(), [&](const MixedBlock& other) {
-        return other.offset == block.offset;
-      });
+      auto at = std::find_if(mixed.begin(), mixed.end(),
+                             [&](const MixedBlock& other) { return other.offset == block.offset; });
       if (at == mixed.end()) {
         mixed.push_back({block.offset, Eigen::MatrixXd::Zero(block.by.cols(), 3)});
         at = mixed.end() - 1;

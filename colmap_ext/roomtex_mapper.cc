@@ -55,7 +55,8 @@ void AddOptions(Options* options, Command* command) {
                      Kind::kOptional);
   command->AddChoice(
       "refine_intrinsics", &options->refine_intrinsics, kRefineIntrinsicsWords,
-      "Refine focal length and distortion: auto = of a calibrated camera where its photos contradict "
+      "Refine focal length and distortion: auto = of a calibrated camera where its photos "
+      "contradict "
       "it, which is said, and of an uncalibrated one (prior_focal_length = 0) where they determine "
       "it; 1 = always; 0 = never.");
   command->Add(FieldsOf(&options->init));
@@ -336,8 +337,8 @@ void CheckFinished(const Database& database, const MatchedImages& images, const 
   }
   Refuse("motion",
          "the model is contradicted by its own photos: for " +
-             std::to_string(check.contradicting.size()) + " of " +
-             std::to_string(check.num_pairs) + " pairs, e.g. " + names +
+             std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +
+             " pairs, e.g. " + names +
              ", a third photo supports another camera motion. Start from another pair "
              "(--Init.image_name1), or add photos that show something off the wall.",
          context, reasons);
@@ -362,10 +363,9 @@ void CheckLens(MapperRun* mapper, const Outcome& outcome, bool refined,
                   "to {:.2f} px "
                   "when focal length and distortion may change, so the model is bent. {}",
                   check.rms_fixed_px, check.rms_free_px,
-                  refined
-                      ? "Extract the features with a camera model that can describe the lens "
-                        "(--ImageReader.camera_model OPENCV)."
-                      : "Calibrate the camera, or give --refine_intrinsics auto."),
+                  refined ? "Extract the features with a camera model that can describe the lens "
+                            "(--ImageReader.camera_model OPENCV)."
+                          : "Calibrate the camera, or give --refine_intrinsics auto."),
       context, reasons);
 }
 
@@ -465,7 +465,8 @@ class Mapping {
     Pass best = Map(plan, refine_ == RefineIntrinsics::kAlways || (automatic && !calibrated));
     if (best.best.empty() || refine_ == RefineIntrinsics::kNever) return best;
     if (automatic && best.refine && !IsDetermined(best.lenses)) {
-      context_.Warn("the photos do not determine the focal length: it stays as the database has it");
+      context_.Warn(
+          "the photos do not determine the focal length: it stays as the database has it");
       return BetterOf(std::move(best), Map(plan, false));
     }
     for (int i = 0; automatic && i < kMaxMoreMappings && IsContradicted(best); ++i) {
@@ -514,11 +515,11 @@ class Mapping {
                                                ? Database::Schema::kColmap39
                                                : Database::Schema::kAsIs);
     const bool as_planned =
-        plan.IsAsInDatabase() ||
-        Database::SetCameras(database_copy, plan.cameras(), plan.images());
+        plan.IsAsInDatabase() || Database::SetCameras(database_copy, plan.cameras(), plan.images());
     Pass pass(as_planned ? plan : LensPlan(images_.cameras(), images_.images()), refine);
     pass.images = std::make_unique<MatchedImages>(
-        pass.plan.cameras(), pass.plan.images(), images_.pairs(), [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
+        pass.plan.cameras(), pass.plan.images(), images_.pairs(),
+        [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
     const std::string folder = scratch_ / ("pass_" + std::to_string(number));
     MakeFolder(folder);
     mapper_options_ = options_.mapper;
@@ -528,8 +529,8 @@ class Mapping {
     pass.mapper = std::make_unique<MapperRun>(&colmap_, database_copy, options_.image_path, folder,
                                               mapper_options_);
     context_.progress.Stage("initialise");
-    pass.best = TrySeeds(database_, pass.images.get(), pass.mapper.get(), options_, context_,
-                         &pass.trials);
+    pass.best =
+        TrySeeds(database_, pass.images.get(), pass.mapper.get(), options_, context_, &pass.trials);
     if (!pass.best.empty()) {
       context_.progress.Stage("check lenses");
       pass.lenses = CheckLenses(pass.model(), labels_, RefineIntrinsics::kAuto);

@@ -14,8 +14,8 @@ namespace {
 // 35 (one of 17: 90), 0.2 % of the range 126, 0.3 % or 0.3 degrees 198 to 249, 1 % 1808.
 constexpr double kMinBendShare = 0.008, kMinBendGain = 100;
 
-// A lens is freed when that lowers the cost of the photos by this share, and by this much; told right
-// it is a few.
+// A lens is freed when that lowers the cost of the photos by this share, and by this much; told
+// right it is a few.
 constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
 
 // From one similarity, to a scan that is bent or not, with lenses that are held or not.
@@ -93,8 +93,8 @@ class Adjuster {
     return std::make_unique<Trial>(input_, model, start, std::move(bend), free, options_);
   }
 
-  // The straight trial, or the one of the bent scan where the scan is bent. model: in its own frame,
-  // what the photos alone make of the trial's lenses.
+  // The straight trial, or the one of the bent scan where the scan is bent. model: in its own
+  // frame, what the photos alone make of the trial's lenses.
   TrialPointer WithBend(TrialPointer straight, const SparseModel& model) const {
     const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
     if (!options_.bend || fixed) return straight;

@@ -1,7 +1,7 @@
 #pragma once
 // The residuals of the plane-constrained bundle adjustment with their derivatives (thesis 7.2,
-// Appendix C): distances from planes, beside reprojection errors. Only plane_bundle.cc and tests use
-// them.
+// Appendix C): distances from planes, beside reprojection errors. Only plane_bundle.cc and tests
+// use them.
 
 #include <Eigen/Core>
 #include <ceres/sized_cost_function.h>

@@ -192,12 +192,12 @@ class RoundProblem {
       double* const params = params_[index].data();
       if (!problem_->HasParameterBlock(params) || !held.insert(index).second) continue;
       const auto told = round_.input.told.find(id);
-      const Camera& given = told != round_.input.told.end() ? told->second
-                                                            : round_.input.model.cameras.at(id);
+      const Camera& given =
+          told != round_.input.told.end() ? told->second : round_.input.model.cameras.at(id);
       const Eigen::Map<const Eigen::VectorXd> b(given.params.data(),
                                                 static_cast<int>(given.params.size()));
-      problem_->AddResidualBlock(
-          new ceres::NormalPrior(round_.sigma_px * LensPrior(given), b), nullptr, params);
+      problem_->AddResidualBlock(new ceres::NormalPrior(round_.sigma_px * LensPrior(given), b),
+                                 nullptr, params);
     }
   }
 

@@ -41,8 +41,8 @@ class ReducedSystem {
     AddPicks(&normal);
     for (const auto& [offset, camera_id] : lenses_) {
       const auto told = input_.told.find(camera_id);
-      const Eigen::MatrixXd prior = LensPrior(
-          told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id));
+      const Eigen::MatrixXd prior =
+          LensPrior(told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id));
       normal.AddInformation(offset, prior.transpose() * prior);
     }
     const Eigen::MatrixXd covariance = normal.Covariance();
