@@ -27,6 +27,7 @@ constexpr double kMaxDeviations = 6;
 constexpr double kOwnShare = 0.01, kOwnDeviations = 5;
 constexpr size_t kMaxPhotosApart = 150;  // of more photos none is looked at on its own
 constexpr size_t kMinObservationsApart = 40;
+constexpr size_t kMinPhotosOfSpread = 5;
 // By this much, in units of the noise's variance, principal point and tangential distortion must
 // lower the cost to be freed; two to four parameters.
 constexpr double kMinCentreGain = 30;
@@ -95,44 +96,76 @@ size_t NumObservations(const SparseImage& image) {
                                            [](uint64_t id) { return id != kInvalidPoint3dId; }));
 }
 
-// Photos that obey another focal length get lenses of their own, one for those of about the same.
-// False if there are none.
-bool SetApart(const SparseModel& model, double sigma_px, LensSet* lenses) {
-  if (model.images.size() > kMaxPhotosApart) return false;
-  const PhotoBundle own = AdjustPhotos(model, LensPerPhoto(*lenses), sigma_px);
-  if (!own.usable) return false;
-  const double noise = std::max(1.0, own.cost / std::max(1.0, own.redundancy));
+// What the photos say of their focal lengths one by one.
+struct OwnFocalLength {
+  uint32_t image_id = 0;
+  int lens = 0;             // that it shares with others
+  double focal_length = 0;  // pixels
+  double sigma = 0;         // as its keypoints' noise has it
+  double usual = 0;         // median of the photos that share the lens
+};
+
+// Of photos with enough observations; empty where there are too many photos to ask.
+std::vector<OwnFocalLength> OwnFocalLengths(const SparseModel& model, double sigma_px,
+                                            const LensSet& lenses) {
+  std::vector<OwnFocalLength> photos;
+  if (model.images.size() > kMaxPhotosApart) return photos;
+  const PhotoBundle own = AdjustPhotos(model, LensPerPhoto(lenses), sigma_px);
+  if (!own.usable) return photos;
+  const double noise = std::sqrt(std::max(1.0, own.cost / std::max(1.0, own.redundancy)));
   std::map<int, std::vector<double>> focal_lengths;
   for (const auto& [id, index] : own.lenses.of_image) {
-    focal_lengths[lenses->of_image.at(id)].push_back(
-        own.lenses.lenses[index].camera.MeanFocalLength());
-  }
-  struct Apart {
-    uint32_t image_id;
-    double focal_length;
-  };
-  std::map<int, std::vector<Apart>> apart;
-  for (const auto& [id, index] : own.lenses.of_image) {
-    const int lens = lenses->of_image.at(id);
-    const Camera& camera = own.lenses.lenses[index].camera;
-    const double usual = Median(focal_lengths.at(lens)), found = camera.MeanFocalLength();
-    const double sigma =
-        std::sqrt(noise) * MeanFocalSigma(camera, own.covariances[static_cast<size_t>(index)]);
     if (NumObservations(model.images.at(id)) < kMinObservationsApart) continue;
-    if (!(std::abs(found / usual - 1) > kOwnShare)) continue;
-    if (!(std::abs(found - usual) > kOwnDeviations * sigma)) continue;
-    apart[lens].push_back({id, found});
+    const Camera& camera = own.lenses.lenses[static_cast<size_t>(index)].camera;
+    const double sigma =
+        noise * MeanFocalSigma(camera, own.covariances[static_cast<size_t>(index)]);
+    photos.push_back({id, lenses.of_image.at(id), camera.MeanFocalLength(), sigma});
+    focal_lengths[photos.back().lens].push_back(camera.MeanFocalLength());
   }
-  for (auto& [lens, photos] : apart) {
-    if (2 * photos.size() >= focal_lengths.at(lens).size()) continue;  // nothing is usual
-    std::sort(photos.begin(), photos.end(),
-              [](const Apart& a, const Apart& b) { return a.focal_length < b.focal_length; });
+  for (OwnFocalLength& photo : photos) photo.usual = Median(focal_lengths.at(photo.lens));
+  return photos;
+}
+
+// How much more the photos' focal lengths differ than their keypoints' noise explains: rolling
+// shutters, blur and what a camera model lacks go with the photo, so that thousands of keypoints do
+// not average them out.
+double Spread(const std::vector<OwnFocalLength>& photos) {
+  std::vector<double> deviations;
+  for (const OwnFocalLength& photo : photos) {
+    if (std::isfinite(photo.sigma)) {
+      deviations.push_back(std::abs(photo.focal_length - photo.usual) / photo.sigma);
+    }
+  }
+  if (deviations.size() < kMinPhotosOfSpread) return 1;
+  return std::max(1.0, kSigmaPerMad * Median(deviations));
+}
+
+// Photos that obey another focal length get lenses of their own, one for those of about the same.
+// False if there are none.
+bool SetApart(const std::vector<OwnFocalLength>& photos, double spread, LensSet* lenses) {
+  std::map<int, std::vector<OwnFocalLength>> apart;
+  std::map<int, size_t> num_photos;
+  for (const OwnFocalLength& photo : photos) {
+    ++num_photos[photo.lens];
+    const double off = std::abs(photo.focal_length - photo.usual);
+    if (off > kOwnShare * photo.usual && off > kOwnDeviations * spread * photo.sigma) {
+      apart[photo.lens].push_back(photo);
+    }
+  }
+  bool any = false;
+  for (auto& [lens, others] : apart) {
+    if (2 * others.size() >= num_photos.at(lens)) continue;  // nothing is usual
+    any = true;
+    std::sort(others.begin(), others.end(), [](const OwnFocalLength& a, const OwnFocalLength& b) {
+      return a.focal_length < b.focal_length;
+    });
     double last = 0;
-    for (const Apart& photo : photos) {
+    for (const OwnFocalLength& photo : others) {
       if (!(photo.focal_length < last * (1 + 2 * kOwnShare))) {
         Lens own_lens = lenses->lenses[static_cast<size_t>(lens)];
+        const double ratio = photo.focal_length / own_lens.camera.MeanFocalLength();
         for (int k = 0; k < NumFocal(own_lens.camera); ++k) {
-          own_lens.camera.params[k] *= photo.focal_length / own_lens.camera.MeanFocalLength();
+          own_lens.camera.params[static_cast<size_t>(k)] *= ratio;
         }
         own_lens.told.params = own_lens.camera.params;
         lenses->lenses.push_back(own_lens);
@@ -141,7 +174,7 @@ bool SetApart(const SparseModel& model, double sigma_px, LensSet* lenses) {
       lenses->of_image[photo.image_id] = static_cast<int>(lenses->lenses.size()) - 1;
     }
   }
-  return !apart.empty();
+  return any;
 }
 
 Eigen::VectorXd Difference(const Camera& a, const Camera& b) {
@@ -276,7 +309,9 @@ std::optional<FreedLenses> FreeLenses(const SparseModel& thinned, const LensLabe
   freed.sparing = AdjustPhotos(thinned, lenses, sigma_px);
   if (!freed.sparing.usable) return std::nullopt;
   lenses = freed.sparing.lenses;
-  if (SetApart(freed.sparing.model, sigma_px, &lenses)) {
+  const auto photos = OwnFocalLengths(freed.sparing.model, sigma_px, lenses);
+  const double spread = Spread(photos);
+  if (SetApart(photos, spread, &lenses)) {
     freed.sparing = AdjustPhotos(freed.sparing.model, lenses, sigma_px);
     if (!freed.sparing.usable) return std::nullopt;
     lenses = freed.sparing.lenses;
@@ -284,7 +319,8 @@ std::optional<FreedLenses> FreeLenses(const SparseModel& thinned, const LensLabe
   for (Lens& lens : lenses.lenses) lens.hold_centre = false;
   freed.full = AdjustPhotos(freed.sparing.model, lenses, sigma_px);
   if (!freed.full.usable) return std::nullopt;
-  freed.noise = std::max(1.0, freed.full.cost / std::max(1.0, freed.full.redundancy));
+  freed.noise =
+      spread * spread * std::max(1.0, freed.full.cost / std::max(1.0, freed.full.redundancy));
   if (freed.sparing.cost - freed.full.cost > kMinCentreGain * freed.noise) {
     freed.sparing = freed.full;
   }

@@ -4,8 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "colmap_ext/photo_bundle.h"
-
 namespace roomtex {
 namespace {
 
@@ -27,13 +25,12 @@ struct Trial {
   PlaneBundleInput input;
   PlaneBundle bundle;
 
-  Trial(const ModelAdjustmentInput& adjustment, const SparseModel& model,
-        const Similarity& similarity, std::optional<BendFit> bend_fit, bool free,
-        const PlaneBundleOptions& given)
+  Trial(const ModelAdjustmentInput& adjustment, const Similarity& similarity,
+        std::optional<BendFit> bend_fit, bool free, const PlaneBundleOptions& given)
       : scan_from_sparse(similarity),
         bend(std::move(bend_fit)),
         options(given),
-        start(model),
+        start(adjustment.model),
         input{start,
               adjustment.planes,
               adjustment.patches,
@@ -64,6 +61,8 @@ bool IsScanBent(const PlaneBundle& straight, const PlaneBundle& bent) {
   return IsBetter(straight, bent, kMinBendShare, kMinBendGain);
 }
 
+// What a wrong lens explains is no bend, and a bent scan calibrates no lens: the lens is freed
+// first, and a bend must explain the photos better with the lens as it came.
 class Adjuster {
  public:
   Adjuster(const ModelAdjustmentInput& input, const Similarity& start,
@@ -71,51 +70,27 @@ class Adjuster {
       : input_(input), start_(start), options_(options) {}
 
   TrialPointer Run() {
-    const bool free = input_.lens == LensChoice::kFree;
-    TrialPointer best = Try(input_.model, start_, std::nullopt, free);
-    if (input_.lens != LensChoice::kByScan) return WithBend(std::move(best), input_.model);
-    TrialPointer freed = Try(input_.model, start_, std::nullopt, true);
-    if (!IsLensWrong(best->bundle, freed->bundle)) return WithBend(std::move(best), input_.model);
-    const SparseModel model = ByPhotosAlone(*freed);
-    freed = WithBend(std::move(freed), model);
-    TrialPointer held = WithBend(std::move(best), input_.model);
-    return held->bend && !IsLensWrong(held->bundle, freed->bundle) ? std::move(held)
-                                                                   : std::move(freed);
+    TrialPointer best = Try(start_, std::nullopt, input_.lens == LensChoice::kFree);
+    if (input_.lens == LensChoice::kByScan) {
+      TrialPointer freed = Try(start_, std::nullopt, true);
+      if (IsBetter(best->bundle, freed->bundle, kMinLensShare, kMinLensGain)) {
+        best = std::move(freed);
+      }
+    }
+    const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
+    if (!options_.bend || fixed) return best;
+    std::optional<BendFit> bend =
+        FitScanBend(input_.model, input_.points, input_.scans, input_.patches, input_.picks,
+                    input_.used, input_.pick_sigma_px, start_, options_.min_bend);
+    if (!bend) return best;
+    const Similarity start = bend->scan_from_sparse;
+    TrialPointer bent = Try(start, std::move(bend), false);
+    return IsScanBent(best->bundle, bent->bundle) ? std::move(bent) : std::move(best);
   }
 
  private:
-  static bool IsLensWrong(const PlaneBundle& held, const PlaneBundle& freed) {
-    return IsBetter(held, freed, kMinLensShare, kMinLensGain);
-  }
-
-  TrialPointer Try(const SparseModel& model, const Similarity& start, std::optional<BendFit> bend,
-                   bool free) const {
-    return std::make_unique<Trial>(input_, model, start, std::move(bend), free, options_);
-  }
-
-  // The straight trial, or the one of the bent scan where the scan is bent. model: in its own
-  // frame, what the photos alone make of the trial's lenses.
-  TrialPointer WithBend(TrialPointer straight, const SparseModel& model) const {
-    const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
-    if (!options_.bend || fixed) return straight;
-    const bool same = &model == &input_.model;
-    const std::vector<SurfacePoint> own_points =
-        same ? std::vector<SurfacePoint>()
-             : FindSurfacePoints(model, options_.min_track, straight->bundle.sigma_px);
-    std::optional<BendFit> bend = FitScanBend(
-        model, same ? input_.points : own_points, input_.scans, input_.patches, input_.picks,
-        input_.used, input_.pick_sigma_px, straight->scan_from_sparse, options_.min_bend);
-    if (!bend) return straight;
-    const Similarity start = bend->scan_from_sparse;
-    TrialPointer bent = Try(model, start, std::move(bend), straight->options.refine_intrinsics);
-    return IsScanBent(straight->bundle, bent->bundle) ? std::move(bent) : std::move(straight);
-  }
-
-  // The photos with the lens of an adjusted model, but not held on the surface; as it lay.
-  SparseModel ByPhotosAlone(const Trial& freed) const {
-    SparseModel model = input_.model;
-    model.cameras = freed.bundle.model.cameras;
-    return AdjustedByPhotos(model, freed.bundle.sigma_px);
+  TrialPointer Try(const Similarity& start, std::optional<BendFit> bend, bool free) const {
+    return std::make_unique<Trial>(input_, start, std::move(bend), free, options_);
   }
 
   const ModelAdjustmentInput& input_;

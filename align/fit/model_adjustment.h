@@ -50,8 +50,8 @@ struct ModelAdjustment {
 
 // From a similarity that lies on the surface. With options.bend, and unless the clicked photo is
 // fixed, a bent scan is told from a bent model by the photos: straightening it must lower the cost
-// of their observations. A lens is freed before a bend is looked for, and a bend that explains the
-// photos without it goes before it.
+// of their observations, below that of a straight scan with its lenses freed, too; on a bent scan
+// lenses stay as they came.
 ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
                             const PlaneBundleOptions& options);
 
