@@ -91,11 +91,12 @@ LensPlan::LensPlan(const std::map<uint32_t, Camera>& cameras,
       }
       for (const uint32_t id : groups[i].images) images_.at(id).camera_id = at->second;
     }
-    if (images_.at(ids[0]).camera_id != camera_id &&
-        std::none_of(images_.begin(), images_.end(),
-                     [&](const auto& one) { return one.second.camera_id == camera_id; })) {
-      cameras_.erase(camera_id);
-    }
+  }
+  // Those that another camera stands for.
+  for (const auto& [camera_id, ids] : of_camera) {
+    bool is_used = false;
+    for (const auto& [id, image] : images_) is_used |= image.camera_id == camera_id;
+    if (!is_used) cameras_.erase(camera_id);
   }
 }
 
