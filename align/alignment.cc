@@ -54,11 +54,36 @@ void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
   result->refined_pick_rms_px = PickRms(result->start.picks, result->refined_pick_px);
 }
 
-Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
-                      const AlignmentOptions& options, Progress* progress) {
+// The input with its lenses as the photos have them.
+AlignmentInput WithLensesOf(const LensCheck& lenses, const AlignmentInput& input) {
+  const SparseModel& model = lenses.mended ? *lenses.mended : input.model;
+  return {model,
+          input.surveyed,
+          input.picks,
+          input.picks_path,
+          input.azimuth,
+          input.photo_labels,
+          input.lenses_refined,
+          input.image_path,
+          input.num_threads};
+}
+
+LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& options,
+                     Progress* progress) {
+  progress->Stage("lenses");
+  return CheckLenses(input.model, input.photo_labels, options.refine_intrinsics);
+}
+
+Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
+                      const AlignmentStart& start, const AlignmentOptions& options,
+                      Progress* progress) {
   progress->Stage("surface refinement");
   Alignment result;
   result.start = start;
+  result.told_cameras = lenses.ToldCameras(input.model);
+  for (const LensFinding& lens : lenses.lenses) {
+    if (lens.used) result.warnings.push_back(lens.Sentence());
+  }
   result.reprojection_rms_px = ReprojectionRms(input.model);
   const double sigma_px =
       std::max(kLeastKeypointNoise, result.reprojection_rms_px / std::sqrt(2.0));
@@ -75,12 +100,12 @@ Alignment FitAndJudge(const AlignmentInput& input, const AlignmentStart& start,
   result.disagreement = std::move(judgement.disagreement);
   result.open = std::move(judgement.open);
   result.placement = judgement.placement;
-  result.warnings = std::move(judgement.warnings);
+  Append(std::move(judgement.warnings), &result.warnings);
   result.reasons = std::move(judgement.reasons);
 
   if (result.fit.refined && result.reasons.empty()) {
     progress->Stage("bundle adjustment");
-    result.adjustment = AdjustAlignment(input, start, result.fit, options);
+    result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
     TakeAdjustment(input, &result);
   }
   const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
@@ -109,8 +134,11 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentOptions& optio
   progress->Stage("scan surface");
   std::vector<std::string> warnings = CheckPicksOnScan(input);
   input.surveyed.patches();
-  const AlignmentStart start = FindStart(input, options, progress, &warnings);
-  Alignment result = FitAndJudge(input, start, options, progress);
+  LensCheck lenses = FindLenses(input, options, progress);
+  const AlignmentInput aligned = WithLensesOf(lenses, input);
+  const AlignmentStart start = FindStart(aligned, options, progress, &warnings);
+  Alignment result = FitAndJudge(aligned, lenses, start, options, progress);
+  result.lenses = std::move(lenses);
   Append(std::move(result.warnings), &warnings);
   result.warnings = std::move(warnings);
   return result;
@@ -120,7 +148,11 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentStart& start,
                       const AlignmentOptions& options, Progress* progress) {
   progress->Stage("scan surface");
   input.surveyed.patches();
-  return FitAndJudge(input, start, options, progress);
+  LensCheck lenses = FindLenses(input, options, progress);
+  const AlignmentInput aligned = WithLensesOf(lenses, input);
+  Alignment result = FitAndJudge(aligned, lenses, start, options, progress);
+  result.lenses = std::move(lenses);
+  return result;
 }
 
 }  // namespace roomtex

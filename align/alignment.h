@@ -13,6 +13,7 @@
 #include "align/judgement.h"
 #include "align/pick_findings.h"
 #include "align/start.h"
+#include "colmap_ext/lens_check.h"
 #include "core/progress.h"
 
 namespace roomtex {
@@ -21,7 +22,11 @@ struct Alignment {
   // The answer: from the input model to the aligned one, and of an adjusted model the best
   // similarity there is. Of a bent scan: to where the room really is.
   Similarity scan_from_sparse;
-  AlignmentStart start;  // before the refinement on the surface
+  // What the photos say of the lenses. lenses.mended, if there is one, is the model that was
+  // aligned in the input's place.
+  LensCheck lenses;
+  std::map<uint32_t, Camera> told_cameras;  // of the model that was aligned
+  AlignmentStart start;                     // before the refinement on the surface
   AlignmentFit fit;
   // The adjustment to the surface, tried where the similarity is refined and trusted.
   // adjustment.bundle.model is the answer if adjusted().

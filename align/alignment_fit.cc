@@ -42,15 +42,38 @@ AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& sta
   return fit;
 }
 
+namespace {
+
+// Photos that leave a focal length open by more than this share leave it to the scan: half of it is
+// as much as the rest of an alignment has.
+constexpr double kMaxOpenFocal = 0.001;
+
+LensChoice ChooseLens(const AlignmentInput& input, const LensCheck& lenses,
+                      RefineIntrinsics refine) {
+  if (refine == RefineIntrinsics::kNever) return LensChoice::kHeld;
+  if (refine == RefineIntrinsics::kAlways || lenses.mended || input.lenses_refined) {
+    return LensChoice::kFree;
+  }
+  const bool open =
+      std::any_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
+        return !(lens.focal_sigma < kMaxOpenFocal * lens.told.MeanFocalLength());
+      });
+  return open ? LensChoice::kByScan : LensChoice::kHeld;
+}
+
+}  // namespace
+
 ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
-                                const AlignmentFit& fit, const AlignmentOptions& options) {
+                                const AlignmentFit& fit, const LensCheck& lenses,
+                                const AlignmentOptions& options) {
   const SurveyedScans& surveyed = input.surveyed;
   // The clicked view keeps the pose of its clicks, so that the model starts there, too.
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
-  return AdjustModel(
-      {input.model, fit.points, surveyed.scans(), surveyed.planes(), surveyed.patches(),
-       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name, fit.pick_bend_px},
-      fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
+  return AdjustModel({input.model, fit.points, surveyed.scans(), surveyed.planes(),
+                      surveyed.patches(), input.picks, start.UsedPicks(), start.pick_sigma_px,
+                      start.image_name, ChooseLens(input, lenses, options.refine_intrinsics),
+                      lenses.lens_of_camera, lenses.ToldCameras(input.model), fit.pick_bend_px},
+                     fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
 }
 
 }  // namespace roomtex

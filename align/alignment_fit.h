@@ -32,8 +32,10 @@ struct AlignmentFit {
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
                           const AlignmentOptions& options);
 
-// Poses and points of a fit that is trusted, adjusted to the surface.
+// Poses and points of a fit that is trusted, adjusted to the surface, and lenses that the check of
+// the photos (of input.model) found wrong, or that photos leave to the scan.
 ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
-                                const AlignmentFit& fit, const AlignmentOptions& options);
+                                const AlignmentFit& fit, const LensCheck& lenses,
+                                const AlignmentOptions& options);
 
 }  // namespace roomtex

@@ -1,6 +1,8 @@
 #pragma once
 // What an alignment is made from.
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,12 +14,15 @@
 #include "align/surface/scan_patches.h"
 #include "align/surveyed_scans.h"
 #include "align/trust/trust.h"
+#include "colmap_ext/lens_check.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/scan_mesh.h"
 
 namespace roomtex {
 
 struct AlignmentOptions {
+  // Lenses by photos and scan (lens_check.h, model_adjustment.h); never: they stay as told.
+  RefineIntrinsics refine_intrinsics = RefineIntrinsics::kAuto;
   // Refine the similarity on the surface of the scan, and adjust poses and points to it.
   bool plane_constrained = true;
   PickReviewOptions picks;
@@ -39,6 +44,10 @@ struct AlignmentInput {
   // What was read from where, for the messages.
   std::string picks_path;
   std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
+  // What EXIF says of the photos' cameras (CheckLenses), by image_id; may be empty.
+  LensLabels photo_labels = {};
+  // The model's lenses are what a mapper made of them: the scan has the last word on them.
+  bool lenses_refined = false;
   // Folder of the photos, for a second opinion where few points lie on a rough surface; may be
   // empty.
   std::string image_path = "";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -10,6 +11,7 @@
 
 #include "align/alignment.h"
 #include "align/geo/geo_output.h"
+#include "align/lens_report.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
 #include "align/plane_bundle_report.h"
@@ -18,6 +20,8 @@
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
 #include "align/trust/station_check.h"
+#include "colmap_ext/lens_labels.h"
+#include "colmap_ext/mapper_verdict.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -38,7 +42,7 @@ struct Arguments {
   AlignmentOptions alignment;
   PhotoCameraOptions camera;
   ScanPlaneOptions planes;
-  std::string planes_path;
+  std::string planes_path, refine_intrinsics = "auto";
   int overlays = 0;
   bool register_stations = false;
   bool strict = false;
@@ -90,6 +94,11 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
                    "to it; 0 = one similarity by the picks alone.");
+  command->AddChoice(
+      "refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
+      "Adjust focal length, principal point and distortion, one set for all photos of "
+      "a lens: auto = where photos or scan contradict what was told, which is said; "
+      "1 = always; 0 = never.");
   command->Add(FieldsOf(&o.bundle));
   command->Add(FieldsOf(&a->planes));
   command->AddOutputPath("Plane.output_path", &a->planes_path,
@@ -410,10 +419,12 @@ void AlignScans(const Arguments& a, const AlignmentInput& input, Reading* readin
                         std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
                           return !file.azimuth.empty();
                         });
+  AlignmentOptions options = a.alignment;
+  options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
   AlignmentAttempt& attempt = reading->attempt;
-  attempt = AttemptAlignment(input, a.alignment, &context.progress);
+  attempt = AttemptAlignment(input, options, &context.progress);
   if (attempt.says_mirrored && !may_turn) return;
-  MirroredReading found = FindMirroredReading(input, attempt, a.alignment, &context.progress);
+  MirroredReading found = FindMirroredReading(input, attempt, options, &context.progress);
   if (found.kind == MirroredReading::Kind::kNone) return;
   if (found.kind == MirroredReading::Kind::kScan && may_turn) {
     TakeMirroredReading(std::move(found), reading, context);
@@ -497,10 +508,32 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
   if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
 }
 
+// What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
+// that it refused, and photos are judged here, too.
+void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment,
+                        const Command::Context& context) {
+  const std::string source = "roomtex-mapper did not trust the sparse model: ";
+  const bool mended =
+      alignment.lenses.mended || (alignment.adjusted() && alignment.adjustment.freed);
+  for (const std::string& reason : verdict.calibration) {
+    if (!mended) context.report.SetUntrusted(source + reason);
+  }
+  for (const std::string& reason : verdict.motion) context.report.SetUntrusted(source + reason);
+  for (const std::string& reason : verdict.photos) context.Warn(source + reason);
+}
+
+// What EXIF says of the photos' lenses, where the photos are given.
+LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) {
+  std::map<uint32_t, std::string> names;
+  for (const auto& [id, image] : model.images) names[id] = image.name;
+  return ReadLensLabels(names, image_path);
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
   SparseModel model = ReadSparseModel(a.input_path);
+  const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
@@ -515,7 +548,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
-             {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(), a.image_path,
+             {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(),
+              PhotoLabels(model, a.image_path), verdict.refined, a.image_path,
               context.options.num_threads},
              &reading, context);
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
@@ -526,7 +560,9 @@ void Align(const Arguments& a, const Command::Context& context) {
   const Alignment& alignment = *reading.attempt.alignment;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
+  CarryMapperVerdict(verdict, alignment, context);
 
+  if (alignment.lenses.mended) model = *alignment.lenses.mended;
   if (alignment.adjusted()) {
     model = alignment.adjustment.bundle.model;
   } else {
@@ -534,6 +570,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
+  context.report["cameras"] = CamerasToJson(alignment);
   context.report["images"] = PhotosToJson(alignment, model);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);

@@ -28,14 +28,18 @@ std::vector<double> OpenCvParams(const Camera& camera) {
 
 }  // namespace
 
+Camera RicherCamera(const Camera& camera) {
+  Camera rich = camera;
+  std::vector<double> params = OpenCvParams(camera);
+  if (params.empty()) return rich;
+  rich.model = CameraModel::kOpenCv;
+  rich.params = std::move(params);
+  return rich;
+}
+
 SparseModel WithRicherCameras(const SparseModel& model) {
   SparseModel result = model;
-  for (auto& [camera_id, camera] : result.cameras) {
-    std::vector<double> params = OpenCvParams(camera);
-    if (params.empty()) continue;
-    camera.model = CameraModel::kOpenCv;
-    camera.params = std::move(params);
-  }
+  for (auto& [camera_id, camera] : result.cameras) camera = RicherCamera(camera);
   return result;
 }
 

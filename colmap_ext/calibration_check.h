@@ -27,6 +27,8 @@ struct CalibrationCheck {
   bool Fits() const { return Gain() <= MaxGain(); }
 };
 
+// The camera as OPENCV, if it is a pinhole or has one or two radial parameters; others stay.
+Camera RicherCamera(const Camera& camera);
 // Every camera in a model that can describe what its own cannot: OPENCV for pinholes and for one or
 // two radial parameters; others stay.
 SparseModel WithRicherCameras(const SparseModel& model);

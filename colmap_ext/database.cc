@@ -554,4 +554,35 @@ void Database::CopyWithCameras(const std::string& path,
   });
 }
 
+bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
+                          const std::map<uint32_t, DatabaseImage>& images) {
+  SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
+  if (copy.tableExists("rigs")) return false;
+  SQLite::Transaction transaction(copy);
+  copy.exec("DELETE FROM cameras");
+  SQLite::Statement add(copy,
+                        "INSERT INTO cameras(camera_id, model, width, height, params, "
+                        "prior_focal_length) VALUES(?, ?, ?, ?, ?, ?)");
+  for (const auto& [camera_id, camera] : cameras) {
+    add.bind(1, static_cast<int64_t>(camera_id));
+    add.bind(2, static_cast<int>(camera.model));
+    add.bind(3, camera.width);
+    add.bind(4, camera.height);
+    add.bindNoCopy(5, camera.params.data(),
+                   static_cast<int>(camera.params.size() * sizeof(double)));
+    add.bind(6, camera.has_prior_focal_length ? 1 : 0);
+    add.exec();
+    add.reset();
+  }
+  SQLite::Statement update(copy, "UPDATE images SET camera_id = ? WHERE image_id = ?");
+  for (const auto& [image_id, image] : images) {
+    update.bind(1, static_cast<int64_t>(image.camera_id));
+    update.bind(2, static_cast<int64_t>(image_id));
+    update.exec();
+    update.reset();
+  }
+  transaction.commit();
+  return true;
+}
+
 }  // namespace roomtex

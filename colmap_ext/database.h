@@ -68,6 +68,11 @@ class Database {
   // (which it must have) replaced. Needs no WAL file beside it.
   void CopyWithCameras(const std::string& path, const std::map<uint32_t, Camera>& cameras) const;
 
+  // Gives the images of a copy that CopyForMapper made these cameras. False, and nothing done,
+  // where rigs name the cameras, too (COLMAP 4.x).
+  static bool SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
+                         const std::map<uint32_t, DatabaseImage>& images);
+
   const std::string& path() const;
 
  private:

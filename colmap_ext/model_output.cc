@@ -7,6 +7,7 @@
 
 #include <stdlib.h>
 
+#include "colmap_ext/mapper_verdict.h"
 #include "core/error.h"
 
 namespace roomtex {
@@ -36,8 +37,9 @@ void RequireReplaceableModel(const std::string& folder) {
                      "Remove it or give another --output_path");
   }
   static const std::set<std::string> model_files = {
-      "cameras.bin", "images.bin",   "points3D.bin", "rigs.bin",   "frames.bin", "cameras.txt",
-      "images.txt",  "points3D.txt", "rigs.txt",     "frames.txt", "project.ini"};
+      "cameras.bin", "images.bin",  "points3D.bin", "rigs.bin",
+      "frames.bin",  "cameras.txt", "images.txt",   "points3D.txt",
+      "rigs.txt",    "frames.txt",  "project.ini",  kMapperReportName};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (model_files.count(name) > 0) continue;

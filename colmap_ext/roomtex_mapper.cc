@@ -5,12 +5,19 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <memory>
 #include <set>
+#include <utility>
 
 #include <fmt/core.h>
 
 #include "colmap_ext/calibration_check.h"
+#include "colmap_ext/lens_check.h"
+#include "colmap_ext/lens_labels.h"
+#include "colmap_ext/lens_plan.h"
 #include "colmap_ext/mapper_run.h"
+#include "colmap_ext/mapper_verdict.h"
 #include "colmap_ext/model_check.h"
 #include "colmap_ext/model_output.h"
 #include "colmap_ext/view_chaining.h"
@@ -30,6 +37,7 @@ struct Options {
   InitOptions init;
   MapperOptions mapper;
   ChainOptions chain;
+  std::string refine_intrinsics = "auto";
 };
 
 void AddOptions(Options* options, Command* command) {
@@ -45,8 +53,12 @@ void AddOptions(Options* options, Command* command) {
       "from), roomtex-mapper.log (what COLMAP said).");
   command->AddString("colmap", &options->colmap, "COLMAP's program: a path, or a name on the PATH.",
                      Kind::kOptional);
-  command->AddBool("refine_intrinsics", &options->mapper.refine_intrinsics,
-                   "Refine focal length and distortion; 0 keeps the calibrated camera as it is.");
+  command->AddChoice(
+      "refine_intrinsics", &options->refine_intrinsics, kRefineIntrinsicsWords,
+      "Refine focal length and distortion: auto = of a calibrated camera where its photos "
+      "contradict "
+      "it, which is said, and of an uncalibrated one (prior_focal_length = 0) where they determine "
+      "it; 1 = always; 0 = never.");
   command->Add(FieldsOf(&options->init));
   command->Add(FieldsOf(&options->chain));
   command->PassThrough(
@@ -86,13 +98,14 @@ void CheckDatabase(const MatchedImages& images, const Options& options,
                          missing,
                      "Give the folder that was given to colmap feature_extractor");
   }
+  if (RefineIntrinsicsFromWord(options.refine_intrinsics) != RefineIntrinsics::kNever) return;
   for (const auto& [camera_id, camera] : images.cameras()) {
     if (camera.has_prior_focal_length) continue;
     context.Warn(
         "camera " + std::to_string(camera_id) +
         " has prior_focal_length = 0: COLMAP guessed its focal length and verified its pairs "
         "as uncalibrated. Give --ImageReader.camera_params to colmap feature_extractor, or "
-        "--refine_intrinsics 1 here");
+        "--refine_intrinsics auto here");
   }
 }
 
@@ -194,17 +207,27 @@ std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& image
       name1, name2, trial.decision.confidence, trial.decision.num_views, cure);
 }
 
-void JudgeTrust(const Outcome& outcome, const MatchedImages& images, Report* report) {
+// Not to be trusted. about: what roomtex-align goes by when it reads this (mapper_verdict.h).
+void Refuse(const std::string& about, const std::string& reason, const Command::Context& context,
+            Json* reasons) {
+  context.report.SetUntrusted(reason);
+  reasons->push_back({{"about", about}, {"reason", reason}});
+}
+
+void JudgeTrust(const Outcome& outcome, const MatchedImages& images,
+                const Command::Context& context, Json* reasons) {
   const PairTrial& trial = outcome.seed.trial;
   if (outcome.seed.ambiguous) {
-    report->SetUntrusted(AmbiguousSentence(trial, images));
+    Refuse("motion", AmbiguousSentence(trial, images), context, reasons);
   }
   const size_t num_registered = outcome.result.model.images.size();
   if (2 * num_registered < images.images().size()) {
-    report->SetUntrusted("only " + std::to_string(num_registered) + " of " +
-                         std::to_string(images.images().size()) +
-                         " photos could be registered. Take more photos between those that are "
-                         "missing, or match them more thoroughly.");
+    Refuse("photos",
+           "only " + std::to_string(num_registered) + " of " +
+               std::to_string(images.images().size()) +
+               " photos could be registered. Take more photos between those that are "
+               "missing, or match them more thoroughly.",
+           context, reasons);
   }
 }
 
@@ -269,7 +292,7 @@ void ChainLeftOut(const Database& database, const MatchedImages& images, MapperR
 
 // The third-view test on pairs that the model was not started from.
 void CheckFinished(const Database& database, const MatchedImages& images, const Options& options,
-                   const Command::Context& context, const Outcome& outcome) {
+                   const Command::Context& context, const Outcome& outcome, Json* reasons) {
   const SparseModel& model = outcome.result.model;
   MatchedImages model_images = ImagesOfModel(database, images, model);
   ModelCheckOptions check_options;
@@ -302,26 +325,28 @@ void CheckFinished(const Database& database, const MatchedImages& images, const 
     if (found != check.support.end()) image["match_support"] = found->second;
   }
   if (!check.doubtful.empty()) {
-    context.report.SetUntrusted(
-        "photos stand where most of their own matches do not put them: " + doubtful +
-        " of the matches obey the model. Take these photos out (they may show a repeated pattern, "
-        "or something that moved) and map again.");
+    Refuse("photos",
+           "photos stand where most of their own matches do not put them: " + doubtful +
+               " of the matches obey the model. Take these photos out (they may show a repeated "
+               "pattern, or something that moved) and map again.",
+           context, reasons);
   }
   if (static_cast<double>(check.contradicting.size()) <=
       check_options.max_contradicting * check.num_pairs) {
     return;
   }
-  context.report.SetUntrusted(
-      "the model is contradicted by its own photos: for " +
-      std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +
-      " pairs, e.g. " + names +
-      ", a third photo supports another camera motion. Start from another pair "
-      "(--Init.image_name1), or add photos that show something off the wall.");
+  Refuse("motion",
+         "the model is contradicted by its own photos: for " +
+             std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +
+             " pairs, e.g. " + names +
+             ", a third photo supports another camera motion. Start from another pair "
+             "(--Init.image_name1), or add photos that show something off the wall.",
+         context, reasons);
 }
 
-// Whether the errors shrink when the lens may change.
-void CheckLens(MapperRun* mapper, const Outcome& outcome, const Options& options,
-               const Command::Context& context) {
+// Whether the errors shrink when the lens may change. refined: the mapper did refine it.
+void CheckLens(MapperRun* mapper, const Outcome& outcome, bool refined,
+               const Command::Context& context, Json* reasons) {
   context.progress.Stage("check calibration");
   const CalibrationCheck check =
       CheckCalibration(outcome.result.model, [&](const SparseModel& model, bool refine) {
@@ -332,15 +357,16 @@ void CheckLens(MapperRun* mapper, const Outcome& outcome, const Options& options
   json["rms_fixed_px"] = check.rms_fixed_px;
   json["rms_free_px"] = check.rms_free_px;
   if (check.Fits()) return;
-  context.report.SetUntrusted(
+  Refuse(
+      "calibration",
       fmt::format("the camera's calibration does not fit the photos: their error falls from {:.2f} "
                   "to {:.2f} px "
                   "when focal length and distortion may change, so the model is bent. {}",
                   check.rms_fixed_px, check.rms_free_px,
-                  options.mapper.refine_intrinsics
-                      ? "Extract the features with a camera model that can describe the lens "
-                        "(--ImageReader.camera_model OPENCV)."
-                      : "Calibrate the camera, or give --refine_intrinsics 1."));
+                  refined ? "Extract the features with a camera model that can describe the lens "
+                            "(--ImageReader.camera_model OPENCV)."
+                          : "Calibrate the camera, or give --refine_intrinsics auto."),
+      context, reasons);
 }
 
 // Seeds one after the other until COLMAP makes something of one.
@@ -396,6 +422,154 @@ std::vector<Outcome> TrySeeds(const Database& database, MatchedImages* images, M
   return best;
 }
 
+// The photos of one way to see the lenses, mapped.
+struct Pass {
+  Pass(LensPlan planned, bool refined) : plan(std::move(planned)), refine(refined) {}
+
+  LensPlan plan;
+  bool refine;
+  std::unique_ptr<MatchedImages> images;
+  std::unique_ptr<MapperRun> mapper;
+  std::vector<Outcome> best;  // at most one
+  LensCheck lenses;
+  Json trials = Json::array();
+
+  const SparseModel& model() const { return best[0].result.model; }
+};
+
+class Mapping {
+ public:
+  Mapping(const Options& options, const Command::Context& context, const Database& database,
+          const MatchedImages& images, const ScratchFolder& scratch)
+      : options_(options),
+        context_(context),
+        database_(database),
+        images_(images),
+        scratch_(scratch),
+        refine_(RefineIntrinsicsFromWord(options.refine_intrinsics)),
+        colmap_(options.colmap, options.output_path + "/roomtex-mapper.log") {
+    for (const auto& [id, image] : images.images()) names_[id] = image.name;
+    labels_ = ReadLensLabels(names_, options.image_path);
+  }
+
+  // With the lenses as the database has them, and, if the photos know better, once more.
+  Pass Run() {
+    LensPlan plan = refine_ == RefineIntrinsics::kNever
+                        ? LensPlan(images_.cameras(), images_.images())
+                        : LensPlan(images_.cameras(), images_.images(), labels_);
+    for (const std::string& note : plan.notes()) context_.Warn(note);
+    const bool calibrated =
+        std::all_of(plan.cameras().begin(), plan.cameras().end(),
+                    [](const auto& one) { return one.second.has_prior_focal_length; });
+    const bool automatic = refine_ == RefineIntrinsics::kAuto;
+    Pass best = Map(plan, refine_ == RefineIntrinsics::kAlways || (automatic && !calibrated));
+    if (best.best.empty() || refine_ == RefineIntrinsics::kNever) return best;
+    if (automatic && best.refine && !IsDetermined(best.lenses)) {
+      context_.Warn(
+          "the photos do not determine the focal length: it stays as the database has it");
+      return BetterOf(std::move(best), Map(plan, false));
+    }
+    for (int i = 0; automatic && i < kMaxMoreMappings && IsContradicted(best); ++i) {
+      plan.Take(best.lenses, best.model());
+      best = BetterOf(std::move(best), Map(plan, true));
+    }
+    return best;
+  }
+
+ private:
+  // As a share; larger is no determination.
+  static constexpr double kMaxFocalSigma = 0.03;
+
+  static constexpr int kMaxMoreMappings = 2;
+
+  static bool IsDetermined(const LensCheck& check) {
+    return std::all_of(check.lenses.begin(), check.lenses.end(), [](const LensFinding& lens) {
+      return lens.focal_sigma < kMaxFocalSigma * lens.found.MeanFocalLength();
+    });
+  }
+
+  // And says so.
+  bool IsContradicted(const Pass& pass) const {
+    bool contradicted = false;
+    for (const LensFinding& lens : pass.lenses.lenses) {
+      if (!lens.used) continue;
+      contradicted = true;
+      context_.Warn(lens.Sentence() +
+                    (pass.refine ? "" : " --refine_intrinsics 0 keeps what was told."));
+    }
+    return contradicted && IsDetermined(pass.lenses);
+  }
+
+  // The later one, if it lost no photos.
+  static Pass BetterOf(Pass first, Pass second) {
+    if (second.best.empty()) return first;
+    if (second.model().images.size() < first.model().images.size()) return first;
+    return second;
+  }
+
+  Pass Map(const LensPlan& plan, bool refine) {
+    const int number = ++num_passes_;
+    const std::string database_copy = scratch_ / ("database_" + std::to_string(number) + ".db");
+    const int version = colmap_.VersionNumber();
+    database_.CopyForMapper(database_copy, version > 0 && version < 310
+                                               ? Database::Schema::kColmap39
+                                               : Database::Schema::kAsIs);
+    const bool as_planned =
+        plan.IsAsInDatabase() || Database::SetCameras(database_copy, plan.cameras(), plan.images());
+    Pass pass(as_planned ? plan : LensPlan(images_.cameras(), images_.images()), refine);
+    pass.images = std::make_unique<MatchedImages>(
+        pass.plan.cameras(), pass.plan.images(), images_.pairs(),
+        [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
+    const std::string folder = scratch_ / ("pass_" + std::to_string(number));
+    MakeFolder(folder);
+    mapper_options_ = options_.mapper;
+    mapper_options_.refine_intrinsics = refine;
+    mapper_options_.num_threads = context_.options.num_threads;
+    mapper_options_.random_seed = context_.options.random_seed;
+    pass.mapper = std::make_unique<MapperRun>(&colmap_, database_copy, options_.image_path, folder,
+                                              mapper_options_);
+    context_.progress.Stage("initialise");
+    pass.best =
+        TrySeeds(database_, pass.images.get(), pass.mapper.get(), options_, context_, &pass.trials);
+    if (!pass.best.empty()) {
+      context_.progress.Stage("check lenses");
+      pass.lenses = CheckLenses(pass.model(), labels_, RefineIntrinsics::kAuto);
+    }
+    return pass;
+  }
+
+  const Options& options_;
+  const Command::Context& context_;
+  const Database& database_;
+  const MatchedImages& images_;
+  const ScratchFolder& scratch_;
+  const RefineIntrinsics refine_;
+  ColmapProgram colmap_;
+  MapperOptions mapper_options_;
+  std::map<uint32_t, std::string> names_;
+  LensLabels labels_;
+  int num_passes_ = 0;
+};
+
+// Models with the cameras of the user's database.
+void WriteModels(const Options& options, const Pass& pass, const ScratchFolder& scratch) {
+  const Outcome& outcome = pass.best[0];
+  const std::string init_scratch = scratch / "init";
+  SparseModel pair_model = outcome.seed.pair_model;
+  std::string folder = outcome.result.folder;
+  if (!pass.plan.IsAsInDatabase()) {
+    SparseModel model = outcome.result.model;
+    pass.plan.Restore(&model);
+    pass.plan.Restore(&pair_model);
+    folder = scratch / "restored";
+    WriteSparseModel(model, folder);
+  }
+  WriteSparseModel(pair_model, init_scratch);
+  ThrowIfInterrupted();
+  ReplaceFolder(init_scratch, options.output_path + "/init", scratch.path());
+  ReplaceFolder(folder, options.output_path + "/0", scratch.path());
+}
+
 void MapPhotos(const Options& options, const Command::Context& context) {
   std::vector<std::string> problems = options.init.Problems();
   AppendProblems(options.chain.Problems(), &problems);
@@ -403,51 +577,44 @@ void MapPhotos(const Options& options, const Command::Context& context) {
   RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
   context.progress.Stage("read database");
   const Database database(options.database_path);
-  MatchedImages images(database);
+  const MatchedImages images(database);
   CheckDatabase(images, options, context);
 
   MakeFolder(options.output_path);
-  const std::string model_path = options.output_path + "/0",
-                    init_path = options.output_path + "/init";
+  const std::string model_path = options.output_path + "/0";
   RequireReplaceableModel(model_path);
-  RequireReplaceableModel(init_path);
+  RequireReplaceableModel(options.output_path + "/init");
   const SignalGuard signals;
   const ScratchFolder scratch(options.output_path);
-  const std::string log_path = options.output_path + "/roomtex-mapper.log";
-  std::ofstream(log_path, std::ios::trunc) << "roomtex-mapper " << Version() << "\n";
-  ColmapProgram colmap(options.colmap, log_path);
-  MapperOptions mapper_options = options.mapper;
-  mapper_options.num_threads = context.options.num_threads;
-  mapper_options.random_seed = context.options.random_seed;
+  std::ofstream(options.output_path + "/roomtex-mapper.log", std::ios::trunc)
+      << "roomtex-mapper " << Version() << "\n";
   const std::vector<std::string>& passed = options.mapper.mapper_arguments;
   for (size_t i = 0; i < passed.size(); i += 2) {
     if (passed[i].rfind("--Mapper.init_", 0) != 0) continue;
     context.Warn(passed[i] + " has no effect: the first pair is chosen here, by --Init.*");
   }
-  const std::string database_copy = scratch / "database.db";
-  MapperRun mapper(&colmap, database_copy, options.image_path, scratch.path(), mapper_options);
-  const int version = colmap.VersionNumber();
-  database.CopyForMapper(database_copy, version > 0 && version < 310 ? Database::Schema::kColmap39
-                                                                     : Database::Schema::kAsIs);
 
-  Json trials = Json::array();
-  context.progress.Stage("initialise");
-  std::vector<Outcome> best = TrySeeds(database, &images, &mapper, options, context, &trials);
-  context.report["pairs_tried"] = trials.size();
-  context.report["pair_trials"] = trials;
-  if (best.empty()) ThrowNothingWorked(options.database_path, trials);
-  const Outcome& outcome = best[0];
-  FillReport(outcome, images, &context.report);
-  JudgeTrust(outcome, images, &context.report);
-  CheckFinished(database, images, options, context, outcome);
-  CheckLens(&mapper, outcome, options, context);
+  Mapping mapping(options, context, database, images, scratch);
+  Pass pass = mapping.Run();
+  context.report["pairs_tried"] = pass.trials.size();
+  context.report["pair_trials"] = pass.trials;
+  if (pass.best.empty()) ThrowNothingWorked(options.database_path, pass.trials);
+  const Outcome& outcome = pass.best[0];
+  FillReport(outcome, *pass.images, &context.report);
+  context.report["refined_intrinsics"] = pass.refine;
+  context.report["cameras"] = Json::array();
+  for (const LensFinding& lens : pass.lenses.lenses) {
+    context.report["cameras"].push_back(LensToJson(lens));
+  }
+  Json reasons = Json::array();
+  JudgeTrust(outcome, *pass.images, context, &reasons);
+  CheckFinished(database, *pass.images, options, context, outcome, &reasons);
+  CheckLens(pass.mapper.get(), outcome, pass.refine, context, &reasons);
+  context.report["reasons"] = reasons;
 
   context.progress.Stage("write model");
-  const std::string init_scratch = scratch / "init";
-  WriteSparseModel(outcome.seed.pair_model, init_scratch);
-  ThrowIfInterrupted();
-  ReplaceFolder(init_scratch, init_path, scratch.path());
-  ReplaceFolder(outcome.result.folder, model_path, scratch.path());
+  WriteModels(options, pass, scratch);
+  context.report.AddCopy(model_path + "/" + kMapperReportName);
   std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
               model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
               outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);

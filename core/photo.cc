@@ -76,6 +76,11 @@ std::vector<unsigned char> ReadBytes(const std::string& path) {
 // Exiv2 prints warnings about files to stderr by default; a library does not print.
 void SilenceExiv2() { Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute); }
 
+std::string CameraName(const Exiv2::ExifData& exif) {
+  const std::string make = Text(exif, "Exif.Image.Make"), model = Text(exif, "Exif.Image.Model");
+  return make.empty() || model.empty() ? make + model : make + " " + model;
+}
+
 // Degrees of three fractions: degrees, minutes, seconds (cameras may put fractions into any). The
 // sign is that of the reference letter, `negative` = S or W.
 std::optional<double> Angle(const Exiv2::ExifData& exif, const std::string& key, char positive,
@@ -184,6 +189,22 @@ std::array<int, 2> ReadPhotoSize(const std::string& path) {
   }
 }
 
+LensData ReadLensData(const std::string& path) {
+  SilenceExiv2();
+  LensData data;
+  try {
+    auto image = Exiv2::ImageFactory::open(path);
+    image->readMetadata();
+    const Exiv2::ExifData& exif = image->exifData();
+    data.camera = CameraName(exif);
+    data.focal_length_mm = PositiveNumber(exif, "Exif.Photo.FocalLength");
+    const auto zoom = PositiveNumber(exif, "Exif.Photo.DigitalZoomRatio");
+    if (data.focal_length_mm && zoom) *data.focal_length_mm *= *zoom;
+  } catch (const std::exception&) {
+  }
+  return data;
+}
+
 ExposureData ReadExposureData(const std::string& path) {
   SilenceExiv2();
   ExposureData data;
@@ -202,8 +223,7 @@ ExposureData ReadExposureData(const std::string& path) {
     }
     data.f_number = PositiveNumber(exif, "Exif.Photo.FNumber");
     data.iso = PositiveNumber(exif, "Exif.Photo.ISOSpeedRatings");
-    const std::string make = Text(exif, "Exif.Image.Make"), model = Text(exif, "Exif.Image.Model");
-    data.camera = make.empty() || model.empty() ? make + model : make + " " + model;
+    data.camera = CameraName(exif);
     data.date_time = Text(exif, "Exif.Photo.DateTimeOriginal");
   } catch (const std::exception&) {
   }

@@ -50,6 +50,14 @@ void WriteExposureData(const std::string& path, const ExposureData& exposure);
 // DCG-001 takes by the diagonal, else the focal length with the resolution of the focal plane. Both
 // are rounded, and the first is meant for uncropped photos: good to some percent. None without.
 std::optional<double> ReadFocalLength(const std::string& path);
+// What EXIF says of the lens; empty where it does not.
+struct LensData {
+  std::string camera;  // as ExposureData::camera
+  // Millimetres; of a digital zoom, times its ratio.
+  std::optional<double> focal_length_mm;
+};
+// Missing or broken EXIF is no error: fields stay empty.
+LensData ReadLensData(const std::string& path);
 
 // Where the camera's satellite receiver believed to be (EXIF GPS).
 struct GpsData {

@@ -80,7 +80,7 @@ run_all() {
   run align_picks roomtex-align --input_path in/room_sparse/0 --scan_path in/room/scan.rtpi \
     --picks_path in/room/picks.csv --plane_constrained 0 --output_path aligned_picks
   run align_lens roomtex-align --input_path in/room_sparse/0 --scan_path in/room/scan.rtpi \
-    --picks_path in/room/picks.csv --PlaneBA.refine_intrinsics 1 --output_path aligned_lens
+    --picks_path in/room/picks.csv --refine_intrinsics 1 --output_path aligned_lens
   run align_mesh roomtex-align --input_path in/room_sparse/0 --scan_path import/room.ply \
     --picks_path in/room/picks.csv --output_path aligned_mesh
   run align_stations roomtex-align --input_path in/stations/truth --scan_path in/stations/scan.rtpi \

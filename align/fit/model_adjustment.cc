@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 namespace roomtex {
 namespace {
@@ -11,43 +12,106 @@ namespace {
 // 35 (one of 17: 90), 0.2 % of the range 126, 0.3 % or 0.3 degrees 198 to 249, 1 % 1808.
 constexpr double kMinBendShare = 0.008, kMinBendGain = 100;
 
-// From one similarity, to a scan that is bent or not.
+// A lens is freed when that lowers the cost of the photos by this share, and by this much; told
+// right it is a few.
+constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
+
+// From one similarity, to a scan that is bent or not, with lenses that are held or not.
 struct Trial {
+  Similarity scan_from_sparse;
+  std::optional<BendFit> bend;
+  PlaneBundleOptions options;
   SparseModel start;
   PlaneBundleInput input;
   PlaneBundle bundle;
 
-  Trial(const ModelAdjustmentInput& adjustment, const Similarity& scan_from_sparse,
-        const ScanBend& bend, const PlaneBundleOptions& options)
-      : start(adjustment.model),
-        input{start,           adjustment.planes,        adjustment.patches,       adjustment.picks,
-              adjustment.used, adjustment.pick_sigma_px, adjustment.clicked_image, bend} {
+  Trial(const ModelAdjustmentInput& adjustment, const Similarity& similarity,
+        std::optional<BendFit> bend_fit, bool free, const PlaneBundleOptions& given)
+      : scan_from_sparse(similarity),
+        bend(std::move(bend_fit)),
+        options(given),
+        start(adjustment.model),
+        input{start,
+              adjustment.planes,
+              adjustment.patches,
+              adjustment.picks,
+              adjustment.used,
+              adjustment.pick_sigma_px,
+              adjustment.clicked_image,
+              bend ? bend->bend : ScanBend(),
+              adjustment.lens_of_camera,
+              adjustment.told} {
     input.pick_bend_px = adjustment.pick_bend_px;
+    options.refine_intrinsics = free;
     TransformModel(scan_from_sparse, &start);
     bundle = AdjustToSurface(input, options);
   }
+  Trial(const Trial&) = delete;
 };
+using TrialPointer = std::unique_ptr<Trial>;
+
+// Of the photos' cost: b's is lower than a's by more than this share and this much.
+bool IsBetter(const PlaneBundle& a, const PlaneBundle& b, double share, double gain) {
+  if (!b.usable) return false;
+  return !a.usable || a.image_cost - b.image_cost > std::max(gain, share * a.image_cost);
+}
 
 // Keypoints are noisy, so that a sparse model is bent a little, too; adjusting its poses takes that
 // away and costs nothing. A bent scan, however, contradicts the photos.
 bool IsScanBent(const PlaneBundle& straight, const PlaneBundle& bent) {
-  if (!bent.usable) return false;
-  return !straight.usable || straight.image_cost - bent.image_cost >
-                                 std::max(kMinBendGain, kMinBendShare * straight.image_cost);
+  return IsBetter(straight, bent, kMinBendShare, kMinBendGain);
 }
 
-// The straight scan again, from where the bent one has brought the model: what looks like a bend
-// may only have been the better start (a large room, blurred photos, few of them), and then there
-// is no cost left between the two.
-bool IsStraightAfterAll(const ModelAdjustmentInput& adjustment, const PlaneBundle& bent,
-                        const PlaneBundleOptions& options) {
-  PlaneBundleInput input{
-      bent.model,      adjustment.planes,        adjustment.patches,      adjustment.picks,
-      adjustment.used, adjustment.pick_sigma_px, adjustment.clicked_image};
-  input.sigma_px = bent.sigma_px;
-  input.pick_bend_px = adjustment.pick_bend_px;
-  return !IsScanBent(AdjustToSurface(input, options), bent);
-}
+// What a wrong lens explains is no bend, and a bent scan calibrates no lens: the lens is freed
+// first, and a bend must explain the photos better with the lens as it came.
+class Adjuster {
+ public:
+  Adjuster(const ModelAdjustmentInput& input, const Similarity& start,
+           const PlaneBundleOptions& options)
+      : input_(input), start_(start), options_(options) {}
+
+  TrialPointer Run() {
+    TrialPointer best = Try(start_, std::nullopt, input_.lens == LensChoice::kFree);
+    if (input_.lens == LensChoice::kByScan) {
+      TrialPointer freed = Try(start_, std::nullopt, true);
+      if (IsBetter(best->bundle, freed->bundle, kMinLensShare, kMinLensGain)) {
+        best = std::move(freed);
+      }
+    }
+    const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
+    if (!options_.bend || fixed) return best;
+    std::optional<BendFit> bend =
+        FitScanBend(input_.model, input_.points, input_.scans, input_.patches, input_.picks,
+                    input_.used, input_.pick_sigma_px, start_, options_.min_bend);
+    if (!bend) return best;
+    const Similarity start = bend->scan_from_sparse;
+    TrialPointer bent = Try(start, std::move(bend), false);
+    if (!IsScanBent(best->bundle, bent->bundle) || IsStraightAfterAll(*bent)) return best;
+    return bent;
+  }
+
+ private:
+  TrialPointer Try(const Similarity& start, std::optional<BendFit> bend, bool free) const {
+    return std::make_unique<Trial>(input_, start, std::move(bend), free, options_);
+  }
+
+  // The straight scan again, from where the bent one has brought the model: what looks like a bend
+  // may only have been the better start (a large room, blurred photos, few of them), and then there
+  // is no cost left between the two.
+  bool IsStraightAfterAll(const Trial& bent) const {
+    PlaneBundleInput again{bent.bundle.model,    input_.planes, input_.patches,
+                           input_.picks,         input_.used,   input_.pick_sigma_px,
+                           input_.clicked_image, ScanBend(),    input_.lens_of_camera,
+                           input_.told};
+    again.sigma_px = bent.bundle.sigma_px;
+    again.pick_bend_px = input_.pick_bend_px;
+    return !IsScanBent(AdjustToSurface(again, bent.options), bent.bundle);
+  }
+
+  const ModelAdjustmentInput& input_;
+  const Similarity& start_;
+  const PlaneBundleOptions& options_;
+};
 
 }  // namespace
 
@@ -55,31 +119,15 @@ ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity&
                             const PlaneBundleOptions& options) {
   ModelAdjustment result;
   result.scan_from_sparse = start;
-  auto trial = std::make_unique<Trial>(input, start, ScanBend(), options);
-  const bool fixed = options.fix_clicked_view && !input.clicked_image.empty();
-  if (options.bend && !fixed) {
-    result.bend = FitScanBend(input.model, input.points, input.scans, input.patches, input.picks,
-                              input.used, input.pick_sigma_px, start, options.min_bend);
-  }
-  if (result.bend) {
-    const Similarity& scan_from_sparse = result.bend->scan_from_sparse;
-    auto bent = std::make_unique<Trial>(input, scan_from_sparse, result.bend->bend, options);
-    if (IsScanBent(trial->bundle, bent->bundle) &&
-        !IsStraightAfterAll(input, bent->bundle, options)) {
-      result.scan_from_sparse = scan_from_sparse;
-      trial = std::move(bent);
-    } else {
-      result.bend.reset();
-    }
-  }
+  const TrialPointer trial = Adjuster(input, start, options).Run();
   result.bundle = std::move(trial->bundle);
-  if (!result.bundle.usable) {
-    result.bend.reset();
-    result.scan_from_sparse = start;
-    return result;
-  }
-  result.scan_from_sparse = result.bundle.adjusted_from_input * result.scan_from_sparse;
-  result.covariances = FindPoseCovariances(trial->input, result.bundle, options);
+  if (!result.bundle.usable) return result;
+  result.bend = trial->bend;
+  result.freed = trial->options.refine_intrinsics;
+  result.scan_from_sparse = result.bundle.adjusted_from_input * trial->scan_from_sparse;
+  BundleCovariances covariances = FindCovariances(trial->input, result.bundle, trial->options);
+  result.covariances = std::move(covariances.poses);
+  result.camera_covariances = std::move(covariances.cameras);
   return result;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The aligned model adjusted to the surface of the scan, bent or not (thesis 7.2).
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,13 @@
 
 namespace roomtex {
 
+// What becomes of the lenses when a model is adjusted to the surface.
+enum class LensChoice {
+  kHeld,
+  kFree,
+  kByScan,  // freed if the model fits the surface better for it
+};
+
 struct ModelAdjustmentInput {
   const SparseModel& model;                 // in its own frame
   const std::vector<SurfacePoint>& points;  // of the model
@@ -22,7 +30,11 @@ struct ModelAdjustmentInput {
   std::vector<bool> used;          // one per pick
   double pick_sigma_px = 1.5;
   std::string clicked_image;  // for PlaneBundleOptions::fix_clicked_view; may be empty
-  double pick_bend_px = 0;    // PlaneBundleInput
+  LensChoice lens = LensChoice::kHeld;
+  // As in PlaneBundleInput.
+  std::map<uint32_t, int> lens_of_camera = {};
+  std::map<uint32_t, Camera> told = {};
+  double pick_bend_px = 0;  // PlaneBundleInput
 };
 
 struct ModelAdjustment {
@@ -32,11 +44,15 @@ struct ModelAdjustment {
   // really is). If the bundle is not usable: the start's.
   Similarity scan_from_sparse;
   PoseCovariances covariances;
+  bool freed = false;  // lenses were adjusted
+  // Of their parameters, by camera_id.
+  std::map<uint32_t, Eigen::MatrixXd> camera_covariances;
 };
 
 // From a similarity that lies on the surface. With options.bend, and unless the clicked photo is
 // fixed, a bent scan is told from a bent model by the photos: straightening it must lower the cost
-// of their observations.
+// of their observations, below that of a straight scan with its lenses freed, too; on a bent scan
+// lenses stay as they came.
 ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
                             const PlaneBundleOptions& options);
 

@@ -9,6 +9,7 @@
 #include "align/fit/bent_model.h"
 #include "align/fit/plane_bundle_costs.h"
 #include "align/fit/plane_bundle_round.h"
+#include "colmap_ext/photo_bundle.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/robust_kernel.h"
@@ -55,21 +56,6 @@ std::vector<double> ReprojectionDistances(const SparseModel& model) {
     }
   }
   return distances;
-}
-
-// Standard deviation of a keypoint's coordinate: from the median of the residuals, because outliers
-// do not move it, and enlarged, because the fitted points and poses have made residuals smaller
-// than the noise (degrees of freedom).
-double ImageNoise(const SparseModel& model) {
-  std::vector<double> errors = ReprojectionDistances(model);
-  const auto num_points =
-      std::count_if(model.points.begin(), model.points.end(),
-                    [](const auto& point) { return point.second.track.size() >= 2; });
-  const double num_equations = 2.0 * static_cast<double>(errors.size());
-  const double num_unknowns =
-      3.0 * static_cast<double>(num_points) + 6.0 * static_cast<double>(model.images.size());
-  const double free_share = std::max(0.2, 1 - num_unknowns / std::max(1.0, num_equations));
-  return std::max(0.1, Median(std::move(errors)) / kMedianLengthPerSigma / std::sqrt(free_share));
 }
 
 double ImageCost(const SparseModel& model, double sigma_px) {
@@ -351,8 +337,6 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
                "The photo of the picks keeps the pose that they give, as in the thesis (and no "
                "bend of the scan is looked for); 0 = its picks hold it as far as their noise "
                "allows.");
-  fields->Bool("PlaneBA.refine_intrinsics", &refine_intrinsics,
-               "Refine the cameras, too, each with one set of parameters for its photos.");
   fields->Bool("PlaneBA.bend", &bend,
                "Look for a smooth bend of the scan (ranges, azimuths; one scan with a grid) and "
                "fit the photos to the bent scan.");
@@ -373,7 +357,7 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
   PlaneBundle result;
   result.model = input.model;
   result.reprojection_rms_before = UpdateReprojectionErrors(&result.model).rms_px;
-  result.sigma_px = input.sigma_px > 0 ? input.sigma_px : ImageNoise(result.model);
+  result.sigma_px = input.sigma_px > 0 ? input.sigma_px : KeypointNoise(result.model);
   result.reason = RunRounds(input, options, &result);
   if (result.reason.empty()) {
     MoveIdle(input, &result);

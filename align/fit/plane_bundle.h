@@ -3,6 +3,7 @@
 // model with its points held on the surface of the scan: plane-constrained bundle adjustment
 // (thesis 7.2, Appendix C).
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,7 +33,8 @@ struct PlaneBundleOptions {
   // The photo of the picks keeps its pose, as in the thesis; else its picks hold it no more than
   // their noise allows.
   bool fix_clicked_view = false;
-  // Cameras are refined, too, each with one set of parameters for all its photos.
+  // Lenses are adjusted, too (PlaneBundleInput::lens_of_camera), held near what was told by
+  // LensPrior. No option of its own: see AlignmentOptions::refine_intrinsics.
   bool refine_intrinsics = false;
   // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
   // metres, rms over the points on the surface. Smaller ones are within the noise.
@@ -55,6 +57,9 @@ struct PlaneBundleInput {
   double pick_sigma_px = 1.5;      // click noise, per coordinate
   std::string clicked_image;       // for fix_clicked_view
   ScanBend bend = ScanBend();      // where the scan has what the photos see
+  // Cameras with the same number are one lens; one that lacks here is a lens of its own.
+  std::map<uint32_t, int> lens_of_camera = {};
+  std::map<uint32_t, Camera> told = {};  // as told, where the model's cameras are no longer that
   // Image noise per coordinate, pixels; 0 = from the residuals of `model`.
   double sigma_px = 0;
   // Pixels; how far picks are off, however well they are made, because model and scan disagree.

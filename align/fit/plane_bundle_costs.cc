@@ -2,16 +2,10 @@
 
 #include <cmath>
 
-#include "core/projection_jacobian.h"
-#include "core/twist.h"
-
 namespace roomtex {
 namespace {
 
-constexpr double kMinDepth = 1e-3;  // metres in front of the camera
-
 using RowMatrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
-using RowMatrix26 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
 
 }  // namespace
 
@@ -23,72 +17,6 @@ bool PlaneCost::Evaluate(double const* const* parameters, double* residuals,
   if (jacobians != nullptr && jacobians[0] != nullptr) {
     Eigen::Map<RowMatrix23> by_q(jacobians[0]);
     by_q.row(0) = by_q.row(1) = weight * normal_.transpose();
-  }
-  return true;
-}
-
-PoseParameters::PoseParameters(const Rigid& cam_from_scan)
-    : start_rotation(cam_from_scan.rotation),
-      start_matrix(cam_from_scan.rotation.toRotationMatrix()) {
-  Eigen::Map<Eigen::Vector3d>(values + 3) = cam_from_scan.TargetOriginInSource();
-}
-
-Rigid PoseParameters::CamFromScan() const {
-  const Eigen::Map<const Eigen::Vector3d> w(values), centre(values + 3);
-  Rigid cam_from_scan;
-  cam_from_scan.rotation = (RotationFromVector(w) * start_rotation).normalized();
-  cam_from_scan.translation = -(cam_from_scan.rotation * centre);
-  return cam_from_scan;
-}
-
-ReprojectionCost::ReprojectionCost(const PoseParameters& pose, const Camera& camera,
-                                   const Eigen::Vector2d& x_in_img, double weight,
-                                   bool refine_intrinsics)
-    : pose_(pose),
-      camera_(camera),
-      x_in_img_(x_in_img),
-      weight_(weight),
-      refine_intrinsics_(refine_intrinsics) {
-  set_num_residuals(2);
-  *mutable_parameter_block_sizes() = {6, 3};
-  if (refine_intrinsics) {
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.params.size()));
-  }
-}
-
-bool ReprojectionCost::Evaluate(double const* const* parameters, double* residuals,
-                                double** jacobians) const {
-  const Eigen::Map<const Eigen::Vector3d> w(parameters[0]), centre(parameters[0] + 3);
-  const Eigen::Map<const Eigen::Vector3d> q(parameters[1]);
-  const double* const intrinsics = refine_intrinsics_ ? parameters[2] : camera_.params.data();
-  const RotationAndJacobian turn = RotationWithJacobian(w);
-  const Eigen::Matrix3d rotation = turn.rotation * pose_.start_matrix;
-  const Eigen::Vector3d p = rotation * (q - centre);
-  if (!(p.z() > kMinDepth)) return false;
-  const double x = p.x() / p.z(), y = p.y() / p.z();
-  const int num_params = static_cast<int>(camera_.params.size());
-  const auto seen = ProjectRay<0>(camera_.model, intrinsics, num_params, x, y);
-  Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = weight_ * (seen.x_in_img - x_in_img_);
-  if (!residual.allFinite()) return false;
-  if (jacobians == nullptr) return true;
-
-  RowMatrix23 ray_by_p;
-  ray_by_p << 1, 0, -x, 0, 1, -y;
-  const RowMatrix23 by_p = weight_ / p.z() * seen.by_ray * ray_by_p;
-  const RowMatrix23 by_q = by_p * rotation;
-  if (jacobians[0] != nullptr) {
-    Eigen::Map<RowMatrix26> by_pose(jacobians[0]);
-    // p = exp(w) p0: a small step dw turns p by L dw, which moves it by (L dw) x p.
-    by_pose.leftCols<3>() = -by_p * CrossMatrix(p) * turn.left_jacobian;
-    by_pose.rightCols<3>() = -by_q;
-  }
-  if (jacobians[1] != nullptr) Eigen::Map<RowMatrix23>{jacobians[1]} = by_q;
-  if (refine_intrinsics_ && jacobians[2] != nullptr) {
-    using ByParams = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto seen_by = ProjectRay<kMaxCameraParams>(camera_.model, intrinsics, num_params, x, y);
-    Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
-        weight_ * seen_by.by_params.leftCols(num_params);
   }
   return true;
 }

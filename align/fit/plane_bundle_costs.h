@@ -1,19 +1,14 @@
 #pragma once
 // The residuals of the plane-constrained bundle adjustment with their derivatives (thesis 7.2,
-// Appendix C). Only plane_bundle.cc and tests use them.
+// Appendix C): distances from planes, beside reprojection errors. Only plane_bundle.cc and tests
+// use them.
 
 #include <Eigen/Core>
-#include <ceres/cost_function.h>
 #include <ceres/sized_cost_function.h>
 
-#include "core/camera_model.h"
-#include "core/similarity.h"
+#include "colmap_ext/reprojection_cost.h"
 
 namespace roomtex {
-
-// Reprojection and click errors beyond this many standard deviations count linearly (Huber 1964),
-// in the adjustment and in what is said of its result.
-inline constexpr double kReprojectionHuber = 2.5;
 
 // Thesis (C.3): (beta / sqrt 2) * n . (q - t), twice: point q (3 parameters, `scan`, metres) off
 // the plane (t, n); beta in pixels per metre, residuals in pixels. Jacobian: twice (beta / sqrt 2)
@@ -30,35 +25,6 @@ class PlaneCost : public ceres::SizedCostFunction<2, 3> {
  private:
   double beta_;
   Eigen::Vector3d point_, normal_;
-};
-
-// A pose near `cam_from_scan`: x_in_cam = exp(w) R (x_in_scan - centre).
-struct PoseParameters {
-  // w (radians), centre (`scan`).
-  double values[6] = {0, 0, 0, 0, 0, 0};
-  Eigen::Quaterniond start_rotation = Eigen::Quaterniond::Identity();  // R
-  Eigen::Matrix3d start_matrix = Eigen::Matrix3d::Identity();          // of R
-
-  explicit PoseParameters(const Rigid& cam_from_scan);
-  Rigid CamFromScan() const;
-};
-
-// weight * (projection - x_in_img), pixels. Parameters: the pose (6, PoseParameters), the point (3,
-// `scan`) and, with refine_intrinsics, those of the camera. Fails for a point that is not in front
-// of the camera. `pose` and `camera` must outlive it.
-class ReprojectionCost : public ceres::CostFunction {
- public:
-  ReprojectionCost(const PoseParameters& pose, const Camera& camera,
-                   const Eigen::Vector2d& x_in_img, double weight, bool refine_intrinsics);
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override;
-
- private:
-  const PoseParameters& pose_;
-  const Camera& camera_;
-  Eigen::Vector2d x_in_img_;
-  double weight_;
-  bool refine_intrinsics_;
 };
 
 }  // namespace roomtex

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <set>
 
 #include <ceres/loss_function.h>
 #include <ceres/normal_prior.h>
@@ -13,7 +14,7 @@
 #include <ceres/solver.h>
 
 #include "align/fit/plane_bundle_costs.h"
-#include "core/camera_formulas.h"
+#include "colmap_ext/lens_prior.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -26,9 +27,6 @@ constexpr double kCauchy = 3.0;
 constexpr double kFunctionTolerance = 1e-5;
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
-// How well the given intrinsics are believed when they are refined: weak, but keeps parameters that
-// the photos say nothing about. Focal lengths and principal point as a share of the focal length.
-constexpr double kLinearPrior = 0.02, kDistortionPrior = 0.05;
 
 class RoundProblem {
  public:
@@ -90,9 +88,16 @@ class RoundProblem {
 
  private:
   void MakeParameters() {
+    std::map<int, size_t> index_of_lens;
     for (const auto& [id, camera] : model_.cameras) {
       projections_.emplace(id, camera);
       camera_index_[id] = params_.size();
+      const auto lens = round_.input.lens_of_camera.find(id);
+      if (lens != round_.input.lens_of_camera.end()) {
+        const auto [at, is_first] = index_of_lens.emplace(lens->second, params_.size());
+        camera_index_[id] = at->second;
+        if (!is_first) continue;
+      }
       params_.push_back({});
       std::copy(camera.params.begin(), camera.params.end(), params_.back().begin());
     }
@@ -181,21 +186,19 @@ class RoundProblem {
     }
   }
 
+  // One per lens.
   void AddIntrinsicsPriors() {
+    std::set<size_t> held;
     for (const auto& [id, index] : camera_index_) {
       double* const params = params_[index].data();
-      if (!problem_->HasParameterBlock(params)) continue;
-      const Camera& given = round_.input.model.cameras.at(id);
-      const int n = static_cast<int>(given.params.size());
-      Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
-      for (int i = 0; i < n; ++i) {
-        const double sigma = i < camera_formulas::NumLinearParams(given.model)
-                                 ? kLinearPrior * given.MeanFocalLength()
-                                 : kDistortionPrior;
-        a(i, i) = round_.sigma_px / sigma;
-      }
-      const Eigen::Map<const Eigen::VectorXd> b(given.params.data(), n);
-      problem_->AddResidualBlock(new ceres::NormalPrior(a, b), nullptr, params);
+      if (!problem_->HasParameterBlock(params) || !held.insert(index).second) continue;
+      const auto told = round_.input.told.find(id);
+      const Camera& given =
+          told != round_.input.told.end() ? told->second : round_.input.model.cameras.at(id);
+      const Eigen::Map<const Eigen::VectorXd> b(given.params.data(),
+                                                static_cast<int>(given.params.size()));
+      problem_->AddResidualBlock(new ceres::NormalPrior(round_.sigma_px * LensPrior(given), b),
+                                 nullptr, params);
     }
   }
 

@@ -1,70 +1,80 @@
 #include "align/fit/pose_covariance.h"
 
-#include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
-
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 
 #include "align/fit/plane_bundle_costs.h"
 #include "align/surface/surface_cells.h"
+#include "colmap_ext/lens_prior.h"
+#include "colmap_ext/reduced_normal.h"
 #include "core/robust_kernel.h"
 
 namespace roomtex {
 namespace {
 
-using Matrix63 = Eigen::Matrix<double, 6, 3>;
-
-// The parts of one residual of a photo: derivatives by its pose and by the point, over its noise.
-struct Terms {
-  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
-  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
-};
-
 class ReducedSystem {
  public:
   ReducedSystem(const PlaneBundleInput& input, const PlaneBundle& bundle,
                 const PlaneBundleOptions& options)
-      : input_(input), bundle_(bundle) {
+      : input_(input), bundle_(bundle), with_lenses_(options.refine_intrinsics) {
     for (const auto& [id, image] : bundle.model.images) {
       if (bundle.idle_images.count(id) > 0) continue;
       const bool fixed = options.fix_clicked_view && image.name == input.clicked_image;
-      if (!fixed) index_.emplace(id, static_cast<int>(index_.size()));
+      if (!fixed) pose_offset_.emplace(id, 6 * static_cast<int>(pose_offset_.size()));
       poses_.emplace(id, PoseParameters(image.cam_from_model));
+      if (with_lenses_) camera_offset_[image.camera_id] = -1;
     }
+    num_unknowns_ = 6 * static_cast<int>(pose_offset_.size());
+    PlaceLenses();
   }
 
-  size_t num_poses() const { return index_.size(); }
+  size_t num_poses() const { return pose_offset_.size(); }
 
-  void Assemble() {
-    const int n = 6 * static_cast<int>(num_poses());
-    matrix_ = Eigen::MatrixXd::Zero(n, n);
-    std::map<uint64_t, Eigen::Matrix3d> surface = SurfaceInformation();
+  BundleCovariances Find() const {
+    ReducedNormal normal(num_unknowns_);
+    const std::map<uint64_t, Eigen::Matrix3d> surface = SurfaceInformation();
     for (const auto& [id, point] : bundle_.model.points) {
       const auto at = surface.find(id);
-      AddPoint(point, at == surface.end() ? Eigen::Matrix3d::Zero() : at->second);
+      AddPoint(point, at == surface.end() ? Eigen::Matrix3d::Zero() : at->second, &normal);
     }
-    AddPicks();
-  }
-
-  PoseCovariances Invert() const {
-    PoseCovariances covariances;
-    const Eigen::VectorXd size = matrix_.diagonal().cwiseSqrt();
-    if (!matrix_.allFinite() || !(size.minCoeff() > 0)) return covariances;
-    const Eigen::VectorXd scale = size.cwiseInverse();
-    const Eigen::LLT<Eigen::MatrixXd> solver(scale.asDiagonal() * matrix_ * scale.asDiagonal());
-    if (solver.info() != Eigen::Success) return covariances;
-    const Eigen::MatrixXd inverse =
-        solver.solve(Eigen::MatrixXd::Identity(matrix_.rows(), matrix_.cols()));
-    for (const auto& [id, index] : index_) {
-      const auto own = scale.segment<6>(6 * index).asDiagonal();
-      covariances[id] = own * inverse.block<6, 6>(6 * index, 6 * index) * own;
+    AddPicks(&normal);
+    for (const auto& [offset, camera_id] : lenses_) {
+      const auto told = input_.told.find(camera_id);
+      const Eigen::MatrixXd prior =
+          LensPrior(told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id));
+      normal.AddInformation(offset, prior.transpose() * prior);
     }
-    return covariances;
+    const Eigen::MatrixXd covariance = normal.Covariance();
+    BundleCovariances found;
+    if (covariance.size() == 0) return found;
+    for (const auto& [id, offset] : pose_offset_) {
+      found.poses[id] = covariance.block<6, 6>(offset, offset);
+    }
+    for (const auto& [id, offset] : camera_offset_) {
+      const int n = static_cast<int>(bundle_.model.cameras.at(id).params.size());
+      found.cameras[id] = covariance.block(offset, offset, n, n);
+    }
+    return found;
   }
 
  private:
+  // Behind the poses.
+  void PlaceLenses() {
+    std::map<int, int> offset_of_lens;
+    for (auto& [id, offset] : camera_offset_) {
+      offset = num_unknowns_;
+      const auto lens = input_.lens_of_camera.find(id);
+      if (lens != input_.lens_of_camera.end()) {
+        const auto [at, is_first] = offset_of_lens.emplace(lens->second, num_unknowns_);
+        offset = at->second;
+        if (!is_first) continue;
+      }
+      lenses_.emplace(offset, id);
+      num_unknowns_ += static_cast<int>(bundle_.model.cameras.at(id).params.size());
+    }
+  }
+
   // Inverse covariance of the points by what is known of their surfaces.
   std::map<uint64_t, Eigen::Matrix3d> SurfaceInformation() const {
     std::vector<Eigen::Vector3d> places, normals;
@@ -84,85 +94,83 @@ class ReducedSystem {
 
   // False where the photo does not see the point.
   bool Evaluate(uint32_t image_id, const Eigen::Vector3d& x_in_scan,
-                const Eigen::Vector2d& x_in_img, double sigma_px, Terms* terms) const {
+                const Eigen::Vector2d& x_in_img, double sigma_px, NormalTerms* terms) const {
     const auto pose = poses_.find(image_id);
     if (pose == poses_.end()) return false;
     const Camera& camera = bundle_.model.cameras.at(bundle_.model.images.at(image_id).camera_id);
-    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, false);
-    const double* const parameters[2] = {pose->second.values, x_in_scan.data()};
+    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, with_lenses_);
+    const double* const parameters[3] = {pose->second.values, x_in_scan.data(),
+                                         camera.params.data()};
     Eigen::Vector2d residual;
-    double* jacobians[2] = {terms->by_pose.data(), terms->by_point.data()};
+    Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
+    NormalTerms::Block by_lens;
+    by_lens.by.setZero(2, static_cast<int>(camera.params.size()));
+    double* jacobians[3] = {by_pose.data(), terms->by_point.data(), by_lens.by.data()};
     if (!cost.Evaluate(parameters, residual.data(), jacobians)) return false;
-    const double deviations = residual.norm();
-    const double weight = std::sqrt(HuberWeight(deviations, kReprojectionHuber));
-    terms->by_pose *= weight;
+    const double weight = std::sqrt(HuberWeight(residual.norm(), kReprojectionHuber));
+    const auto offset = pose_offset_.find(image_id);
+    if (offset != pose_offset_.end()) {
+      terms->blocks.push_back({offset->second, weight * by_pose});
+    }
+    if (with_lenses_) {
+      by_lens.offset = camera_offset_.at(camera.camera_id);
+      by_lens.by *= weight;
+      terms->blocks.push_back(std::move(by_lens));
+    }
     terms->by_point *= weight;
-    return terms->by_pose.allFinite() && terms->by_point.allFinite();
+    return by_pose.allFinite() && terms->by_point.allFinite();
   }
 
-  void AddPoint(const SparsePoint& point, const Eigen::Matrix3d& surface_information) {
-    std::vector<std::pair<int, Matrix63>> mixed;  // pose index, derivatives' product
-    Eigen::Matrix3d information = surface_information;
-    std::vector<std::pair<int, Eigen::Matrix<double, 6, 6>>> own;
-    int num_seen = 0;
+  void AddPoint(const SparsePoint& point, const Eigen::Matrix3d& surface_information,
+                ReducedNormal* normal) const {
+    std::vector<NormalTerms> observations;
     for (const TrackElement& element : point.track) {
-      Terms terms;
+      NormalTerms terms;
       const SparseImage& image = bundle_.model.images.at(element.image_id);
-      if (!Evaluate(element.image_id, point.x_in_model, image.points2d[element.point2d_index],
-                    bundle_.sigma_px, &terms)) {
-        continue;
-      }
-      ++num_seen;
-      information += terms.by_point.transpose() * terms.by_point;
-      const auto at = index_.find(element.image_id);
-      if (at == index_.end()) continue;
-      mixed.emplace_back(at->second, terms.by_pose.transpose() * terms.by_point);
-      own.emplace_back(at->second, terms.by_pose.transpose() * terms.by_pose);
-    }
-    const Eigen::Matrix3d covariance = information.inverse();
-    if (num_seen < 2 || !covariance.allFinite()) return;
-    for (const auto& [index, product] : own) matrix_.block<6, 6>(6 * index, 6 * index) += product;
-    for (const auto& [i, by_i] : mixed) {
-      const Matrix63 weighted = by_i * covariance;
-      for (const auto& [j, by_j] : mixed) {
-        matrix_.block<6, 6>(6 * i, 6 * j).noalias() -= weighted * by_j.transpose();
+      if (Evaluate(element.image_id, point.x_in_model, image.points2d[element.point2d_index],
+                   bundle_.sigma_px, &terms)) {
+        observations.push_back(std::move(terms));
       }
     }
+    if (observations.size() >= 2) normal->AddPoint(observations, surface_information);
   }
 
-  void AddPicks() {
+  void AddPicks(ReducedNormal* normal) const {
     for (size_t i = 0; i < input_.picks.size(); ++i) {
       const Pick& pick = input_.picks[i];
       const SparseImage* const image = bundle_.model.FindImage(pick.image_name);
       if (!input_.used[i] || image == nullptr) continue;
-      const auto at = index_.find(image->image_id);
-      Terms terms;
-      if (at == index_.end() ||
-          !Evaluate(image->image_id, pick.x_in_scan, pick.x_in_img,
+      NormalTerms terms;
+      if (!Evaluate(image->image_id, pick.x_in_scan, pick.x_in_img,
                     std::hypot(input_.pick_sigma_px / pick.weight, input_.pick_bend_px), &terms)) {
         continue;
       }
-      matrix_.block<6, 6>(6 * at->second, 6 * at->second) +=
-          terms.by_pose.transpose() * terms.by_pose;
+      normal->AddKnownPoint(terms);
     }
   }
 
   const PlaneBundleInput& input_;
   const PlaneBundle& bundle_;
+  const bool with_lenses_;
   std::map<uint32_t, PoseParameters> poses_;
-  std::map<uint32_t, int> index_;
-  Eigen::MatrixXd matrix_;
+  std::map<uint32_t, int> pose_offset_, camera_offset_;
+  std::map<int, uint32_t> lenses_;  // offset of a lens, one of its cameras
+  int num_unknowns_ = 0;
 };
 
 }  // namespace
 
 PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
                                     const PlaneBundleOptions& options) {
+  return FindCovariances(input, bundle, options).poses;
+}
+
+BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
+                                  const PlaneBundleOptions& options) {
   if (!bundle.usable) return {};
-  ReducedSystem system(input, bundle, options);
+  const ReducedSystem system(input, bundle, options);
   if (system.num_poses() == 0 || system.num_poses() > kMaxPosesWithCovariance) return {};
-  system.Assemble();
-  return system.Invert();
+  return system.Find();
 }
 
 }  // namespace roomtex

@@ -25,4 +25,13 @@ inline constexpr size_t kMaxPosesWithCovariance = 400;
 PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
                                     const PlaneBundleOptions& options);
 
+// The same, and that of the cameras' parameters where lenses are adjusted (of cameras that are one
+// lens the same), by camera_id; what a lens leaves open is in the poses', too.
+struct BundleCovariances {
+  PoseCovariances poses;
+  std::map<uint32_t, Eigen::MatrixXd> cameras;
+};
+BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
+                                  const PlaneBundleOptions& options);
+
 }  // namespace roomtex

@@ -467,6 +467,36 @@ TEST(Alignment, AStartTakesTheFewPicksThereAre) {
   EXPECT_LT(alignment.refined_pick_rms_px, 5);
 }
 
+// A mapper that holds a wrong lens bends the model; the photos know the lens, and the scan knows it
+// better.
+TEST(Alignment, AWrongLensIsNoticedAndMended) {
+  const SimulatedCase& right = MakeCase(0, 6);
+  SimulatedCase wrong = right;
+  Camera& camera = wrong.model.cameras.begin()->second;
+  const double focal_length = camera.MeanFocalLength();
+  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.03;
+  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  const Alignment alignment = AlignCase(wrong);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  ASSERT_TRUE(alignment.lenses.mended);
+  EXPECT_THAT(alignment.warnings, testing::Contains(HasSubstr("standard deviations")));
+  ASSERT_TRUE(alignment.adjusted());
+  EXPECT_TRUE(alignment.adjustment.freed);
+  EXPECT_FALSE(alignment.adjustment.bend);
+  const SparseModel& model = alignment.adjustment.bundle.model;
+  EXPECT_NEAR(model.cameras.begin()->second.MeanFocalLength() / focal_length, 1, 0.001);
+  EXPECT_LT(WorstPoseErrors(*wrong.room, model, Similarity()).position, 0.004);
+  // Told to keep it, it is wrong or refused.
+  AlignmentOptions options;
+  options.refine_intrinsics = RefineIntrinsics::kNever;
+  EXPECT_FALSE(AlignCase(wrong, options).lenses.mended);
+  // A right one stays as it is.
+  const Alignment& usual = AlignedCase(0, 6);
+  EXPECT_FALSE(usual.lenses.mended);
+  ASSERT_EQ(usual.lenses.lenses.size(), 1u);
+  EXPECT_FALSE(usual.lenses.lenses[0].used);
+}
+
 TEST(Alignment, FewFeaturesAreNotTrusted) {
   SimulatedCase one = MakeCase();
   SparseImage& image = one.model.images.at(one.model.FindImage(one.picks[0].image_name)->image_id);

@@ -209,10 +209,10 @@ TEST_F(MapperCommand, SaysThatTheCalibrationDoesNotFit) {
   views_.cameras.at(1).model = CameraModel::kPinhole;  // the database knows nothing of k1
   views_.cameras.at(1).params.resize(4);
   WriteSimulatedDatabase(views_, folder_.path());
-  CommandResult result = Run();
+  CommandResult result = Run("--refine_intrinsics 0");
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_NE(result.err.find("calibration does not fit"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("--refine_intrinsics 1"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("--refine_intrinsics auto"), std::string::npos) << result.err;
   const nlohmann::json check = Report()["check"]["calibration"];
   EXPECT_LT(check["rms_free_px"].get<double>(), 0.8 * check["rms_fixed_px"].get<double>());
 
@@ -307,19 +307,51 @@ TEST_F(MapperCommand, HandsMapperOptionsOn) {
   EXPECT_LT(strict["num_points"], usual["num_points"]);
 }
 
-TEST_F(MapperCommand, RefinesIntrinsicsOnlyWhenAsked) {
+TEST_F(MapperCommand, RefinesACalibrationThatThePhotosContradictUnlessForbidden) {
   SimulatedViewsOptions options = RoomOptions(6);
   options.distortion = false;
   views_ = SimulateViews(options);
   const double true_f = views_.cameras.at(1).params[0];
-  SimulatedViews wrong = views_;  // the database believes a focal length 1 % off
-  wrong.cameras.at(1).params[0] = wrong.cameras.at(1).params[1] = 1.01 * true_f;
+  SimulatedViews wrong = views_;  // the database believes a focal length 3 % off
+  wrong.cameras.at(1).params[0] = wrong.cameras.at(1).params[1] = 1.03 * true_f;
   WriteSimulatedDatabase(wrong, folder_.path());
-  ASSERT_EQ(Run().exit_code, 0);
-  EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], 1.01 * true_f);
-  ASSERT_EQ(Run("--refine_intrinsics 1").exit_code, 0);
-  EXPECT_NEAR(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], true_f,
-              0.003 * true_f);
+  ASSERT_EQ(Run("--refine_intrinsics 0").exit_code % 4, 0);  // trusted or not
+  EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], 1.03 * true_f);
+  EXPECT_FALSE(Report()["refined_intrinsics"]);
+  for (const std::string refine : {"1", "auto"}) {
+    const CommandResult result = Run("--refine_intrinsics " + refine);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NEAR(ReadSparseModel(folder_ / "sparse/0").cameras.at(1).params[0], true_f,
+                0.003 * true_f);
+    EXPECT_TRUE(Report()["refined_intrinsics"]);
+    if (refine == "auto") {
+      EXPECT_NE(result.err.find("standard deviations"), std::string::npos) << result.err;
+    }
+  }
+  // What it thinks of the model stands beside it, and the model can be replaced.
+  EXPECT_TRUE(fs::exists(folder_ / "sparse/0/roomtex-mapper.json"));
+}
+
+// COLMAP gives every photo a camera of its own unless told otherwise.
+TEST_F(MapperCommand, PhotosThatAreToldTheSameShareALens) {
+  views_ = SimulateViews(RoomOptions(6));
+  const Camera camera = views_.cameras.at(1);
+  for (auto& [image_id, image] : views_.images) {
+    image.camera_id = 10 + image_id;
+    views_.cameras[image.camera_id] = camera;
+    views_.cameras[image.camera_id].camera_id = image.camera_id;
+    views_.cameras[image.camera_id].has_prior_focal_length = false;
+  }
+  views_.cameras.erase(1);
+  WriteSimulatedDatabase(views_, folder_.path());
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
+  ASSERT_EQ(model.cameras.size(), 6u);
+  for (const auto& [image_id, image] : model.images) {
+    EXPECT_EQ(image.camera_id, 10 + image_id);
+    EXPECT_EQ(model.cameras.at(image.camera_id).params, model.cameras.begin()->second.params);
+  }
 }
 
 TEST_F(MapperCommand, GivesTheSameTwice) {

@@ -1,0 +1,27 @@
+#pragma once
+// What roomtex-mapper thought of the model it wrote: its report stands beside the model, so that
+// what is built on a model that it refused knows of it.
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+// In the model's folder.
+inline constexpr char kMapperReportName[] = "roomtex-mapper.json";
+
+struct MapperVerdict {
+  bool refined = false;  // the lenses are what the mapper made of them, not what was told
+  // The mapper's reasons not to trust the model, in sentences, by what they are about.
+  std::vector<std::string> calibration;  // the lenses
+  std::vector<std::string> photos;       // single photos, or how many there are
+  std::vector<std::string> motion;  // how the cameras moved: before a wall there are two answers
+};
+
+// Of the model read from `folder`; empty if there is no report, or if it is of another model (other
+// numbers of photos and points), or cannot be read.
+MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& model);
+
+}  // namespace roomtex

@@ -1,0 +1,414 @@
+#include "colmap_ext/photo_bundle.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include <ceres/loss_function.h>
+#include <ceres/normal_prior.h>
+#include <ceres/ordered_groups.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include "colmap_ext/lens_prior.h"
+#include "colmap_ext/reduced_normal.h"
+#include "colmap_ext/reprojection_cost.h"
+#include "core/robust_kernel.h"
+#include "core/similarity.h"
+#include "core/statistics.h"
+
+namespace roomtex {
+namespace {
+
+// More photos than this have a sparse reduced system.
+constexpr size_t kMaxDensePhotos = 80;
+constexpr int kMaxIterations = 60;
+constexpr double kFunctionTolerance = 1e-7;
+// Fewer leave a photo's pose open.
+constexpr int kMinObservations = 6;
+// How exactly the scale is held, a share.
+constexpr double kScaleShare = 1e-3;
+// More unknowns than these would need too large a dense matrix for their covariance.
+constexpr int kMaxUnknowns = 4000;
+
+Eigen::VectorXd ParamsOf(const Camera& camera) {
+  return Eigen::Map<const Eigen::VectorXd>(camera.params.data(),
+                                           static_cast<int>(camera.params.size()));
+}
+
+// The observations that an adjustment uses: of points that two photos see.
+struct Observed {
+  uint32_t image_id = 0;
+  Eigen::Vector2d x_in_img;
+};
+using ObservedPoints = std::map<uint64_t, std::vector<Observed>>;
+
+ObservedPoints FindObserved(const SparseModel& model, const LensSet& lenses) {
+  std::vector<CameraProjection> projections;
+  for (const Lens& lens : lenses.lenses) projections.emplace_back(lens.camera);
+  ObservedPoints observed;
+  for (const auto& [id, point] : model.points) {
+    std::vector<Observed> seen;
+    for (const TrackElement& element : point.track) {
+      const SparseImage& image = model.images.at(element.image_id);
+      const CameraProjection& projection = projections[lenses.of_image.at(element.image_id)];
+      if (!projection.ImgFromCam(image.cam_from_model * point.x_in_model)) continue;
+      seen.push_back({element.image_id, image.points2d[element.point2d_index]});
+    }
+    if (seen.size() >= 2) observed.emplace(id, std::move(seen));
+  }
+  return observed;
+}
+
+// Photos that their observations hold; the first of them holds the frame.
+std::set<uint32_t> HeldImages(const ObservedPoints& observed) {
+  std::map<uint32_t, int> count;
+  for (const auto& [id, seen] : observed) {
+    for (const Observed& one : seen) ++count[one.image_id];
+  }
+  std::set<uint32_t> held;
+  for (const auto& [id, number] : count) {
+    if (number >= kMinObservations) held.insert(id);
+  }
+  return held;
+}
+
+// A measurement of the distance between the first photo and the one farthest from it: what holds
+// the scale, which photos leave open, and changes nothing else.
+struct ScaleHold {
+  uint32_t image_id = 0;                            // the farther one
+  Eigen::RowVector3d by = Eigen::Vector3d::Zero();  // its place, over the standard deviation
+};
+
+ScaleHold FindScaleHold(const SparseModel& model, const std::set<uint32_t>& held) {
+  const auto place = [&](uint32_t id) {
+    return model.images.at(id).cam_from_model.TargetOriginInSource();
+  };
+  const Eigen::Vector3d first = place(*held.begin());
+  ScaleHold hold{*held.begin()};
+  for (const uint32_t id : held) {
+    if ((place(id) - first).norm() > (place(hold.image_id) - first).norm()) hold.image_id = id;
+  }
+  const Eigen::Vector3d apart = place(hold.image_id) - first;
+  if (apart.norm() > 0) hold.by = apart.transpose() / (kScaleShare * apart.squaredNorm());
+  return hold;
+}
+
+class PhotoProblem {
+ public:
+  PhotoProblem(const SparseModel& model, const LensSet& lenses, const ObservedPoints& observed,
+               double sigma_px)
+      : lenses_(lenses), loss_(kReprojectionHuber * sigma_px) {
+    ceres::Problem::Options options;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.disable_all_safety_checks = true;
+    problem_ = std::make_unique<ceres::Problem>(options);
+    for (const auto& [id, image] : model.images) {
+      pose_index_[id] = poses_.size();
+      poses_.emplace_back(image.cam_from_model);
+    }
+    params_.resize(lenses.lenses.size());
+    for (size_t i = 0; i < params_.size(); ++i) {
+      const std::vector<double>& params = lenses.lenses[i].camera.params;
+      std::copy(params.begin(), params.end(), params_[i].begin());
+    }
+    points_.reserve(observed.size());  // Ceres keeps pointers into it
+    for (const auto& [id, seen] : observed) {
+      points_.push_back(model.points.at(id).x_in_model);
+      for (const Observed& one : seen) Add(one, points_.back().data());
+    }
+    AddPriors(sigma_px);
+    HoldFrame(model, HeldImages(observed), sigma_px);
+  }
+
+  bool Solve() {
+    ceres::Solver::Options o;
+    o.linear_solver_type =
+        poses_.size() > kMaxDensePhotos ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
+    o.max_num_iterations = kMaxIterations;
+    o.function_tolerance = kFunctionTolerance;
+    o.parameter_tolerance = 1e-10;
+    o.gradient_tolerance = 1e-12;
+    o.num_threads = 1;
+    o.logging_type = ceres::SILENT;
+    o.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    const auto order = [&](double* block, int group) {
+      if (problem_->HasParameterBlock(block)) {
+        o.linear_solver_ordering->AddElementToGroup(block, group);
+      }
+    };
+    for (Eigen::Vector3d& point : points_) order(point.data(), 0);
+    for (PoseParameters& pose : poses_) order(pose.values, 1);
+    for (auto& params : params_) order(params.data(), 2);
+    ceres::Solver::Summary summary;
+    ceres::Solve(o, problem_.get(), &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  void Write(const ObservedPoints& observed, PhotoBundle* result) const {
+    for (const auto& [id, index] : pose_index_) {
+      result->model.images.at(id).cam_from_model = poses_[index].CamFromScan();
+    }
+    size_t next = 0;
+    for (const auto& [id, seen] : observed) {
+      result->model.points.at(id).x_in_model = points_[next++];
+    }
+    for (size_t i = 0; i < params_.size(); ++i) {
+      std::vector<double>& params = result->lenses.lenses[i].camera.params;
+      std::copy_n(params_[i].begin(), params.size(), params.begin());
+    }
+  }
+
+ private:
+  void Add(const Observed& one, double* point) {
+    PoseParameters& pose = poses_[pose_index_.at(one.image_id)];
+    const int index = lenses_.of_image.at(one.image_id);
+    const Lens& lens = lenses_.lenses[index];
+    auto* const cost = new ReprojectionCost(pose, lens.camera, one.x_in_img, 1, lens.free);
+    if (lens.free) {
+      problem_->AddResidualBlock(cost, &loss_, pose.values, point, params_[index].data());
+    } else {
+      problem_->AddResidualBlock(cost, &loss_, pose.values, point);
+    }
+  }
+
+  void HoldFrame(const SparseModel& model, const std::set<uint32_t>& held, double sigma_px) {
+    if (held.size() < 2) return;
+    problem_->SetParameterBlockConstant(poses_[pose_index_.at(*held.begin())].values);
+    const ScaleHold hold = FindScaleHold(model, held);
+    if (hold.by.isZero(0)) return;
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(1, 6);
+    a.rightCols<3>() = sigma_px * hold.by;
+    double* const pose = poses_[pose_index_.at(hold.image_id)].values;
+    problem_->AddResidualBlock(
+        new ceres::NormalPrior(a, Eigen::Map<const Eigen::Matrix<double, 6, 1>>(pose)), nullptr,
+        pose);
+  }
+
+  void AddPriors(double sigma_px) {
+    for (size_t i = 0; i < params_.size(); ++i) {
+      const Lens& lens = lenses_.lenses[i];
+      if (!lens.free || !problem_->HasParameterBlock(params_[i].data())) continue;
+      problem_->AddResidualBlock(
+          new ceres::NormalPrior(sigma_px * LensPrior(lens.told, lens.hold_centre),
+                                 ParamsOf(lens.told)),
+          nullptr, params_[i].data());
+    }
+  }
+
+  const LensSet& lenses_;
+  std::map<uint32_t, size_t> pose_index_;
+  std::vector<PoseParameters> poses_;
+  std::vector<std::array<double, kMaxCameraParams>> params_;
+  std::vector<Eigen::Vector3d> points_;
+  ceres::HuberLoss loss_;
+  std::unique_ptr<ceres::Problem> problem_;
+};
+
+// Sets cost and redundancy, and the covariances of the lenses. One photo and the distance of
+// another from it hold frame and scale, which no lens depends on.
+class PhotoNormal {
+ public:
+  PhotoNormal(const ObservedPoints& observed, double sigma_px, PhotoBundle* result)
+      : observed_(observed), sigma_px_(sigma_px), result_(*result) {
+    for (const auto& [id, image] : result_.model.images) {
+      poses_.emplace(id, PoseParameters(image.cam_from_model));
+    }
+    held_ = HeldImages(observed);
+    for (const uint32_t id : held_) {
+      if (id == *held_.begin()) continue;
+      pose_offset_[id] = num_unknowns_;
+      num_unknowns_ += 6;
+    }
+    for (const Lens& lens : result_.lenses.lenses) {
+      lens_offset_.push_back(lens.free ? num_unknowns_ : -1);
+      if (lens.free) num_unknowns_ += static_cast<int>(lens.camera.params.size());
+    }
+  }
+
+  void Evaluate() {
+    const bool wanted =
+        num_unknowns_ <= kMaxUnknowns && std::any_of(lens_offset_.begin(), lens_offset_.end(),
+                                                     [](int offset) { return offset >= 0; });
+    ReducedNormal normal(wanted ? num_unknowns_ : 0);
+    size_t num_observations = 0;
+    for (const auto& [id, seen] : observed_) {
+      std::vector<NormalTerms> observations;
+      for (const Observed& one : seen) {
+        NormalTerms terms;
+        if (!AddCost(one, result_.model.points.at(id).x_in_model, &terms)) continue;
+        ++num_observations;
+        observations.push_back(std::move(terms));
+      }
+      if (wanted && observations.size() >= 2) {
+        normal.AddPoint(observations, Eigen::Matrix3d::Zero());
+      }
+    }
+    result_.redundancy = 2.0 * static_cast<double>(num_observations) -
+                         3.0 * static_cast<double>(observed_.size()) - num_unknowns_ + 1;
+    result_.covariances.assign(result_.lenses.lenses.size(), Eigen::MatrixXd());
+    if (wanted) FindCovariances(&normal);
+  }
+
+ private:
+  bool AddCost(const Observed& one, const Eigen::Vector3d& x_in_model, NormalTerms* terms) {
+    const int index = result_.lenses.of_image.at(one.image_id);
+    const Lens& lens = result_.lenses.lenses[index];
+    const ReprojectionCost cost(poses_.at(one.image_id), lens.camera, one.x_in_img, 1 / sigma_px_,
+                                lens.free);
+    const double* const parameters[3] = {poses_.at(one.image_id).values, x_in_model.data(),
+                                         lens.camera.params.data()};
+    Eigen::Vector2d residual;
+    Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
+    NormalTerms::Block by_lens;
+    by_lens.by.setZero(2, static_cast<int>(lens.camera.params.size()));
+    double* jacobians[3] = {by_pose.data(), terms->by_point.data(), by_lens.by.data()};
+    if (!cost.Evaluate(parameters, residual.data(), jacobians)) return false;
+    const double deviations = residual.norm();
+    result_.cost += HuberCost(deviations, kReprojectionHuber);
+    const double weight = std::sqrt(HuberWeight(deviations, kReprojectionHuber));
+    const auto offset = pose_offset_.find(one.image_id);
+    if (offset != pose_offset_.end()) {
+      terms->blocks.push_back({offset->second, weight * by_pose});
+    }
+    if (lens_offset_[index] >= 0) {
+      by_lens.offset = lens_offset_[index];
+      by_lens.by *= weight;
+      terms->blocks.push_back(std::move(by_lens));
+    }
+    terms->by_point *= weight;
+    return true;
+  }
+
+  void FindCovariances(ReducedNormal* normal) {
+    if (!pose_offset_.empty()) {
+      const ScaleHold hold = FindScaleHold(result_.model, held_);
+      const auto offset = pose_offset_.find(hold.image_id);
+      if (offset != pose_offset_.end()) {
+        normal->AddInformation(offset->second + 3, hold.by.transpose() * hold.by);
+      }
+    }
+    for (size_t i = 0; i < lens_offset_.size(); ++i) {
+      if (lens_offset_[i] < 0) continue;
+      const Lens& lens = result_.lenses.lenses[i];
+      const Eigen::MatrixXd prior = LensPrior(lens.told, lens.hold_centre);
+      normal->AddInformation(lens_offset_[i], prior.transpose() * prior);
+    }
+    const Eigen::MatrixXd covariance = normal->Covariance();
+    for (size_t i = 0; i < lens_offset_.size() && covariance.size() > 0; ++i) {
+      const int n = static_cast<int>(result_.lenses.lenses[i].camera.params.size());
+      if (lens_offset_[i] < 0) continue;
+      result_.covariances[i] = covariance.block(lens_offset_[i], lens_offset_[i], n, n);
+    }
+  }
+
+  const ObservedPoints& observed_;
+  const double sigma_px_;
+  PhotoBundle& result_;
+  std::map<uint32_t, PoseParameters> poses_;
+  std::map<uint32_t, int> pose_offset_;
+  std::set<uint32_t> held_;
+  std::vector<int> lens_offset_;  // -1 = held
+  int num_unknowns_ = 0;
+};
+
+}  // namespace
+
+double KeypointNoise(const SparseModel& model) {
+  std::map<uint32_t, CameraProjection> projections;
+  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  std::vector<double> errors;
+  double num_points = 0;
+  for (const auto& [id, point] : model.points) {
+    num_points += point.track.size() >= 2;
+    for (const TrackElement& element : point.track) {
+      const SparseImage& image = model.images.at(element.image_id);
+      const auto x =
+          projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
+      if (x) errors.push_back((*x - image.points2d[element.point2d_index]).norm());
+    }
+  }
+  const double num_equations = 2.0 * static_cast<double>(errors.size());
+  const double num_unknowns = 3.0 * num_points + 6.0 * static_cast<double>(model.images.size());
+  const double free_share = std::max(0.2, 1 - num_unknowns / std::max(1.0, num_equations));
+  return std::max(0.1, Median(std::move(errors)) / kMedianLengthPerSigma / std::sqrt(free_share));
+}
+
+PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px) {
+  PhotoBundle result;
+  result.model = model;
+  result.lenses = lenses;
+  const ObservedPoints observed = FindObserved(model, lenses);
+  if (observed.empty() || model.images.size() < 2) return result;
+  PhotoProblem problem(model, lenses, observed, sigma_px);
+  if (problem.Solve()) {
+    problem.Write(observed, &result);
+    result.usable = std::all_of(result.lenses.lenses.begin(), result.lenses.lenses.end(),
+                                [](const Lens& lens) { return lens.camera.Problems().empty(); });
+    if (!result.usable) {
+      result.model = model;
+      result.lenses = lenses;
+    }
+  }
+  PhotoNormal(observed, sigma_px, &result).Evaluate();
+  return result;
+}
+
+SparseModel PutBack(SparseModel adjusted, const SparseModel& input) {
+  const size_t num_images = input.images.size(), num_points = input.points.size();
+  Eigen::Matrix3Xd from(3, num_images + num_points), to(3, num_images + num_points);
+  int i = 0;
+  for (const auto& [id, image] : input.images) {
+    from.col(i) = adjusted.images.at(id).cam_from_model.TargetOriginInSource();
+    to.col(i++) = image.cam_from_model.TargetOriginInSource();
+  }
+  for (const auto& [id, point] : input.points) {
+    from.col(i) = adjusted.points.at(id).x_in_model;
+    to.col(i++) = point.x_in_model;
+  }
+  TransformModel(FitSimilarity(from, to), &adjusted);
+  return adjusted;
+}
+
+LensSet LensesOf(const SparseModel& model) {
+  LensSet lenses;
+  std::map<uint32_t, int> index;
+  for (const auto& [id, camera] : model.cameras) {
+    index[id] = static_cast<int>(lenses.lenses.size());
+    lenses.lenses.push_back({camera, camera, false});
+  }
+  for (const auto& [id, image] : model.images) lenses.of_image[id] = index.at(image.camera_id);
+  return lenses;
+}
+
+SparseModel AdjustedByPhotos(const SparseModel& model, double sigma_px) {
+  PhotoBundle bundle = AdjustPhotos(model, LensesOf(model), sigma_px);
+  return bundle.usable ? PutBack(std::move(bundle.model), model) : model;
+}
+
+SparseModel WithLenses(const SparseModel& model, const LensSet& lenses) {
+  SparseModel result = model;
+  uint32_t next_id = result.cameras.empty() ? 1 : result.cameras.rbegin()->first + 1;
+  std::map<uint32_t, int> kept;                          // camera, lens that keeps it
+  std::map<std::pair<uint32_t, int>, uint32_t> divided;  // camera and lens, new camera
+  for (auto& [id, image] : result.images) {
+    const uint32_t camera_id = model.images.at(id).camera_id;
+    const int lens = lenses.of_image.at(id);
+    const auto [at, is_first] = kept.emplace(camera_id, lens);
+    if (at->second != lens) {
+      const auto [other, is_new] = divided.emplace(std::pair(camera_id, lens), next_id);
+      if (is_new) ++next_id;
+      image.camera_id = other->second;
+    }
+    Camera camera = lenses.lenses[lens].camera;
+    camera.camera_id = image.camera_id;
+    camera.has_prior_focal_length = model.cameras.at(camera_id).has_prior_focal_length;
+    result.cameras[image.camera_id] = std::move(camera);
+  }
+  return result;
+}
+
+}  // namespace roomtex

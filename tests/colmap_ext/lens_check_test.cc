@@ -1,0 +1,148 @@
+#include "colmap_ext/lens_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "capture/simulation/simulated_room.h"
+
+namespace roomtex {
+namespace {
+
+using testing::HasSubstr;
+
+// A room with 16 photos, true poses and points, keypoints with 0.7 pixels of noise.
+const SparseModel& TrueModel(int seed = 1) {
+  static std::map<int, SparseModel> models;
+  auto at = models.find(seed);
+  if (at == models.end()) {
+    SimulatedRoomOptions options;
+    options.random_seed = seed;
+    options.num_photos = 16;
+    at = models.emplace(seed, SimulatedRoom(options).MakeSparseModel(2500, 0.7)).first;
+  }
+  return at->second;
+}
+
+// What a mapper makes of the photos that holds their cameras.
+SparseModel Mapped(const SparseModel& model) { return AdjustedByPhotos(model, 0.7); }
+
+void Scale(double factor, Camera* camera) {
+  camera->params[0] *= factor;
+  camera->params[1] *= factor;
+}
+
+// Largest distance of a camera from its true place after the best similarity, as a share of the
+// room.
+double WorstPlace(const SparseModel& model, const SparseModel& truth) {
+  Eigen::Matrix3Xd from(3, truth.images.size()), to(3, truth.images.size());
+  int i = 0;
+  for (const auto& [id, image] : truth.images) {
+    from.col(i) = model.images.at(id).cam_from_model.TargetOriginInSource();
+    to.col(i++) = image.cam_from_model.TargetOriginInSource();
+  }
+  const Similarity fit = FitSimilarity(from, to);
+  double worst = 0;
+  for (i = 0; i < from.cols(); ++i) {
+    worst = std::max(worst, (fit * from.col(i) - to.col(i)).norm());
+  }
+  const Eigen::Vector3d middle = to.rowwise().mean();
+  return worst / std::sqrt((to.colwise() - middle).colwise().squaredNorm().mean());
+}
+
+TEST(LensCheck, ALensThatIsToldRightStays) {
+  for (int seed = 1; seed <= 2; ++seed) {
+    const LensCheck check = CheckLenses(Mapped(TrueModel(seed)), {}, RefineIntrinsics::kAuto);
+    ASSERT_EQ(check.lenses.size(), 1u);
+    EXPECT_FALSE(check.lenses[0].used);
+    EXPECT_FALSE(check.mended);
+    EXPECT_LT(check.lenses[0].deviations, 5);
+    EXPECT_LT(check.lenses[0].FocalDeviations(), 4);
+  }
+}
+
+TEST(LensCheck, AWrongFocalLengthIsFoundAndMended) {
+  const SparseModel& truth = TrueModel(2);
+  const double best = WorstPlace(Mapped(truth), truth);
+  for (const double factor : {0.8, 0.97, 1.01, 1.2}) {
+    SparseModel wrong = truth;
+    Scale(factor, &wrong.cameras.at(1));
+    wrong = Mapped(wrong);
+    const LensCheck check = CheckLenses(wrong, {}, RefineIntrinsics::kAuto);
+    ASSERT_EQ(check.lenses.size(), 1u);
+    const LensFinding& lens = check.lenses[0];
+    const double f = truth.cameras.at(1).MeanFocalLength();
+    ASSERT_TRUE(lens.used) << factor;
+    EXPECT_LT(std::abs(lens.found.MeanFocalLength() - f), 4 * lens.focal_sigma + 0.1) << factor;
+    EXPECT_GT(WorstPlace(wrong, truth), 2 * best);
+    EXPECT_LT(WorstPlace(*check.mended, truth), 1.3 * best);
+    EXPECT_THAT(lens.Sentence(), HasSubstr("standard deviations"));
+  }
+  // Told not to look, it does not.
+  SparseModel wrong = truth;
+  Scale(1.2, &wrong.cameras.at(1));
+  EXPECT_FALSE(CheckLenses(wrong, {}, RefineIntrinsics::kNever).mended);
+}
+
+TEST(LensCheck, CamerasThatWereRefinedOneByOneAreOneLens) {
+  const SparseModel& truth = TrueModel(3);
+  SparseModel each = truth;
+  LensSet own;
+  for (auto& [id, image] : each.images) {
+    Camera camera = truth.cameras.at(1);
+    camera.camera_id = 100 + id;
+    Scale(1.2, &camera);
+    own.of_image[id] = static_cast<int>(own.lenses.size());
+    own.lenses.push_back({camera, camera, true});
+    image.camera_id = camera.camera_id;
+    each.cameras[camera.camera_id] = camera;
+  }
+  each.cameras.erase(1);
+  const PhotoBundle mapped = AdjustPhotos(each, own, 0.7);
+  ASSERT_TRUE(mapped.usable);
+  const SparseModel model = WithLenses(mapped.model, mapped.lenses);
+  const LensCheck check = CheckLenses(model, {}, RefineIntrinsics::kAuto);
+  ASSERT_EQ(check.lenses.size(), 1u);
+  const LensFinding& lens = check.lenses[0];
+  EXPECT_TRUE(lens.used);
+  EXPECT_EQ(lens.camera_ids.size(), 16u);
+  EXPECT_LT(std::abs(lens.found.MeanFocalLength() - truth.cameras.at(1).MeanFocalLength()),
+            4 * lens.focal_sigma);
+  ASSERT_TRUE(check.mended);
+  EXPECT_LT(WorstPlace(*check.mended, truth), 1.3 * WorstPlace(Mapped(truth), truth));
+  EXPECT_LT(WorstPlace(*check.mended, truth), 0.5 * WorstPlace(model, truth));
+  for (const auto& [id, camera] : check.mended->cameras) {
+    EXPECT_EQ(camera.params, check.mended->cameras.begin()->second.params);
+    EXPECT_EQ(check.lens_of_camera.at(id), 0);
+  }
+}
+
+TEST(LensCheck, AZoomedPhotoGetsACameraOfItsOwn) {
+  const SparseModel& truth = TrueModel(1);
+  SparseModel zoomed = truth;
+  SparseImage& image = zoomed.images.at(4);
+  const std::string name = image.name;
+  const Camera& camera = truth.cameras.at(1);
+  const Eigen::Vector2d centre(camera.params[2], camera.params[3]);
+  for (Eigen::Vector2d& x : image.points2d) x = centre + 1.3 * (x - centre);
+  // The mapper places it somewhere behind.
+  zoomed = Mapped(zoomed);
+  const LensCheck check = CheckLenses(zoomed, {}, RefineIntrinsics::kAuto);
+  ASSERT_EQ(check.lenses.size(), 2u);
+  const LensFinding& apart = check.lenses[1];
+  EXPECT_TRUE(apart.apart);
+  EXPECT_EQ(apart.photos, std::vector<std::string>{name});
+  EXPECT_NEAR(apart.found.MeanFocalLength() / camera.MeanFocalLength(), 1.3, 0.01);
+  ASSERT_TRUE(check.mended);
+  EXPECT_EQ(check.mended->cameras.size(), 2u);
+  EXPECT_NE(check.mended->images.at(4).camera_id, 1u);
+  EXPECT_GT(WorstPlace(zoomed, truth), 50 * WorstPlace(Mapped(truth), truth));
+  EXPECT_LT(WorstPlace(*check.mended, truth), 1.5 * WorstPlace(Mapped(truth), truth));
+}
+
+}  // namespace
+}  // namespace roomtex
