@@ -87,8 +87,9 @@ PlacedList<Camera> ParseCameras(const std::string& bytes, const std::string& pat
     if (num_params < 0) {
       throw InputError(path, BytePosition(placed.position),
                        "camera " + std::to_string(camera.camera_id) + " has the model id " +
-                           std::to_string(model_id) + ", expected 0 to 10",
-                       "Use one of COLMAP's camera models SIMPLE_PINHOLE to THIN_PRISM_FISHEYE");
+                           std::to_string(model_id) + ", expected 0 to " +
+                           std::to_string(kNumCameraModels - 1),
+                       "Use one of COLMAP's camera models SIMPLE_PINHOLE to EQUIRECTANGULAR");
     }
     camera.model = static_cast<CameraModel>(model_id);
     const uint64_t width = reader.Take<uint64_t>("a camera's width");

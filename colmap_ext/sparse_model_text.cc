@@ -158,7 +158,7 @@ PlacedList<Camera> ParseTextCameras(const std::string& bytes, const std::string&
     if (!model) {
       reader.Fail("camera " + std::to_string(camera.camera_id) + " has the unknown model \"" +
                       model_name.substr(0, 40) + "\"",
-                  "one of COLMAP's camera models SIMPLE_PINHOLE to THIN_PRISM_FISHEYE");
+                  "one of COLMAP's camera models SIMPLE_PINHOLE to EQUIRECTANGULAR");
     }
     camera.model = *model;
     camera.width = static_cast<int>(words.Whole<uint32_t>(INT32_MAX));
