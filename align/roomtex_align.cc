@@ -11,6 +11,7 @@
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -23,6 +24,7 @@ namespace {
 
 struct Arguments {
   std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
+  std::string panoramas_path;
   std::string geo_origin;
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
@@ -60,6 +62,8 @@ void AddOptions(Arguments* a, Command* command) {
                   "--image_path.");
   command->AddInputPath("database_path", &a->database_path,
                         "COLMAP's database; not needed for an alignment by picks.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("panoramas_path", &a->panoramas_path, PanoramasHelp(),
                         Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
@@ -297,7 +301,9 @@ std::optional<Alignment> FindAlignment(const Arguments& a, const AlignmentInput&
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
-  SparseModel model = ReadSparseModel(a.input_path);
+  std::vector<std::string> face_warnings;
+  SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
+  for (const std::string& warning : face_warnings) context.Warn(warning);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);
   context.progress.Stage("read scan");

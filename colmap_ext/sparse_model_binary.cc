@@ -231,13 +231,36 @@ void WritePoints(const SparseModel& model, const SparseModelFormat::Write& write
   writer.Flush();
 }
 
+FrameOfImage ParseFrames(const std::string& bytes, const std::string& path) {
+  constexpr int32_t kCameraSensor = 0;
+  ByteReader reader(bytes, path);
+  const size_t count = reader.TakeCount("frames", 4 + 4 + 7 * 8 + 4);
+  FrameOfImage frame_of_image;
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t frame_id = reader.Take<uint32_t>("a frame's id");
+    reader.Take<uint32_t>("a frame's rig");
+    // COLMAP writes the pose of an image from this one: it stands there, too.
+    for (int k = 0; k < 7; ++k) reader.Take<double>("a frame's pose");
+    const uint32_t num_images = reader.Take<uint32_t>("a frame's number of images");
+    for (uint32_t k = 0; k < num_images; ++k) {
+      const int32_t sensor = reader.Take<int32_t>("a sensor of a frame");
+      reader.Take<uint32_t>("a sensor of a frame");
+      const uint64_t image_id = reader.Take<uint64_t>("an image of a frame");
+      if (sensor == kCameraSensor) frame_of_image[static_cast<uint32_t>(image_id)] = frame_id;
+    }
+  }
+  reader.ExpectEnd();
+  return frame_of_image;
+}
+
 std::string Position(long long byte) { return BytePosition(byte); }
 
 }  // namespace
 
 const SparseModelFormat& SparseModelBinary() {
-  static const SparseModelFormat format = {".bin",      Position,     ParseCameras, ParseImages,
-                                           ParsePoints, WriteCameras, WriteImages,  WritePoints};
+  static const SparseModelFormat format = {".bin",       Position,    ParseCameras,
+                                           ParseImages,  ParsePoints, ParseFrames,
+                                           WriteCameras, WriteImages, WritePoints};
   return format;
 }
 

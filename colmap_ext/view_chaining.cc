@@ -26,7 +26,7 @@ constexpr double kMinShareKept = 0.8;
 // Growth of the error among the neighbours that counts as a jump.
 constexpr double kMaxGrowth = 1.1;
 // Poses nearer than this are one solution.
-constexpr double kEqualRotationDeg = 2, kEqualCentre = 0.1;
+constexpr double kSamePoseTurnDeg = 2, kEqualCentre = 0.1;
 // Common points and pair points in the refinement of a pose; more hardly help.
 constexpr int kMaxCommonPoints = 200, kMaxPairPoints = 250;
 
@@ -92,7 +92,7 @@ bool SamePose(const Candidate& a, const Candidate& b) {
       (a.view.cam_from_model.TargetOriginInSource() - b.view.cam_from_model.TargetOriginInSource())
           .norm();
   return RotationAngle(a.view.cam_from_model.rotation, b.view.cam_from_model.rotation) <
-             RadFromDeg(kEqualRotationDeg) &&
+             RadFromDeg(kSamePoseTurnDeg) &&
          distance < kEqualCentre * std::max(a.baseline, b.baseline);
 }
 

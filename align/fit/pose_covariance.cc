@@ -10,6 +10,7 @@
 #include "align/fit/plane_bundle_costs.h"
 #include "align/surface/surface_cells.h"
 #include "core/robust_kernel.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -27,15 +28,26 @@ class ReducedSystem {
   ReducedSystem(const PlaneBundleInput& input, const PlaneBundle& bundle,
                 const PlaneBundleOptions& options)
       : input_(input), bundle_(bundle) {
+    std::map<uint32_t, uint32_t> first_of_frame;
     for (const auto& [id, image] : bundle.model.images) {
       if (bundle.idle_images.count(id) > 0) continue;
+      // Photos of one frame have one pose, that of its first.
+      const uint32_t first = image.frame_id == kNoFrame
+                                 ? id
+                                 : first_of_frame.emplace(image.frame_id, id).first->second;
+      const Rigid& rig_from_scan = bundle.model.images.at(first).cam_from_model;
+      poses_.emplace(id, PoseParameters(rig_from_scan));
+      cam_from_rig_[id] = first == id ? Rigid() : image.cam_from_model * rig_from_scan.Inverse();
       const bool fixed = options.fix_clicked_view && image.name == input.clicked_image;
-      if (!fixed) index_.emplace(id, static_cast<int>(index_.size()));
-      poses_.emplace(id, PoseParameters(image.cam_from_model));
+      if (first != id && index_.count(first) > 0) {
+        index_[id] = index_.at(first);
+      } else if (first == id && !fixed) {
+        index_[id] = num_poses_++;
+      }
     }
   }
 
-  size_t num_poses() const { return index_.size(); }
+  size_t num_poses() const { return static_cast<size_t>(num_poses_); }
 
   void Assemble() {
     const int n = 6 * static_cast<int>(num_poses());
@@ -60,11 +72,27 @@ class ReducedSystem {
     for (const auto& [id, index] : index_) {
       const auto own = scale.segment<6>(6 * index).asDiagonal();
       covariances[id] = own * inverse.block<6, 6>(6 * index, 6 * index) * own;
+      if (bundle_.model.images.at(id).frame_id != kNoFrame) {
+        const Eigen::Matrix<double, 6, 6> cam_by_rig = CameraByRig(id);
+        covariances[id] = cam_by_rig * covariances[id] * cam_by_rig.transpose();
+      }
     }
     return covariances;
   }
 
  private:
+  // How (w, centre) of a camera go with those of its rig: w_cam = R w, and the camera's place c in
+  // the rig turns with it.
+  Eigen::Matrix<double, 6, 6> CameraByRig(uint32_t image_id) const {
+    const Rigid& cam_from_rig = cam_from_rig_.at(image_id);
+    const Rigid rig_from_scan = poses_.at(image_id).CamFromScan();
+    Eigen::Matrix<double, 6, 6> cam_by_rig = Eigen::Matrix<double, 6, 6>::Identity();
+    cam_by_rig.topLeftCorner<3, 3>() = cam_from_rig.rotation.toRotationMatrix();
+    cam_by_rig.bottomLeftCorner<3, 3>() = rig_from_scan.rotation.conjugate().toRotationMatrix() *
+                                          CrossMatrix(cam_from_rig.TargetOriginInSource());
+    return cam_by_rig;
+  }
+
   // Inverse covariance of the points by what is known of their surfaces.
   std::map<uint64_t, Eigen::Matrix3d> SurfaceInformation() const {
     std::vector<Eigen::Vector3d> places, normals;
@@ -88,7 +116,8 @@ class ReducedSystem {
     const auto pose = poses_.find(image_id);
     if (pose == poses_.end()) return false;
     const Camera& camera = bundle_.model.cameras.at(bundle_.model.images.at(image_id).camera_id);
-    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, false);
+    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, false,
+                                cam_from_rig_.at(image_id));
     const double* const parameters[2] = {pose->second.values, x_in_scan.data()};
     Eigen::Vector2d residual;
     double* jacobians[2] = {terms->by_pose.data(), terms->by_point.data()};
@@ -149,7 +178,9 @@ class ReducedSystem {
   const PlaneBundleInput& input_;
   const PlaneBundle& bundle_;
   std::map<uint32_t, PoseParameters> poses_;
+  std::map<uint32_t, Rigid> cam_from_rig_;
   std::map<uint32_t, int> index_;
+  int num_poses_ = 0;
   Eigen::MatrixXd matrix_;
 };
 

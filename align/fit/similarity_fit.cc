@@ -41,9 +41,9 @@ class PickTerms {
   Eigen::Vector2d Error(int i, const Similarity& scan_from_sparse) const {
     const Term& term = terms_[i];
     const Rigid cam_from_scan = CamFromScan(term.cam_from_sparse, scan_from_sparse);
-    const auto x = term.projection->ImgFromCam(cam_from_scan * term.pick->x_in_scan);
-    if (!x) return Eigen::Vector2d::Constant(kInfinity);
-    return *x - term.pick->x_in_img;
+    const auto error =
+        term.projection->ImgError(cam_from_scan * term.pick->x_in_scan, term.pick->x_in_img);
+    return error ? *error : Eigen::Vector2d::Constant(kInfinity);
   }
   double Weight(int i) const { return terms_[i].pick->weight; }
 
@@ -278,12 +278,14 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     Rigid pose;
     Eigen::Vector3d centre;
     double focal_length;
+    bool is_perspective;
   };
   std::map<uint32_t, View> views;
   for (const auto& [id, image] : model.images) {
     const Rigid& pose = image.cam_from_model;
     views[id] = {pose.rotation.toRotationMatrix(), pose, pose.TargetOriginInSource(),
-                 model.cameras.at(image.camera_id).MeanFocalLength()};
+                 model.cameras.at(image.camera_id).MeanFocalLength(),
+                 model.cameras.at(image.camera_id).IsPerspective()};
   }
   std::vector<SurfacePoint> points;
   for (const auto& [id, sparse] : model.points) {
@@ -296,9 +298,16 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     for (const TrackElement& element : sparse.track) {
       const View& view = views.at(element.image_id);
       const Eigen::Vector3d p = view.pose * sparse.x_in_model;
-      if (!(p.z() > 0)) continue;
-      Eigen::Matrix<double, 2, 3> jacobian;  // of an undistorted projection: enough for a weight
-      jacobian << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
+      if (view.is_perspective && !(p.z() > 0)) continue;
+      // Of an undistorted projection: enough for a weight.
+      Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
+      if (view.is_perspective) {
+        jacobian.topRows<2>() << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(),
+            -p.y() / (p.z() * p.z());
+      } else {
+        const Eigen::Vector3d ray = p.normalized();
+        jacobian = (Eigen::Matrix3d::Identity() - ray * ray.transpose()) / p.norm();
+      }
       jacobian *= view.focal_length * view.rotation;
       information += jacobian.transpose() * jacobian;
       const Eigen::Vector3d offset = view.centre - sparse.x_in_model;

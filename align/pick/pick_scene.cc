@@ -66,7 +66,9 @@ double ScoreOf(const SparseImage& image, const Camera& camera, const SparseModel
 PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
   RequireFolder(input.image_path, "Check --image_path");
   progress->Stage("read model");
-  model_ = ReadSparseModel(input.input_path);
+  std::vector<std::string> warnings;
+  model_ = ReadModelOfPanoramas(input.input_path, input.panoramas_path, &warnings);
+  for (const std::string& warning : warnings) progress->Note(warning);
   if (model_.images.empty()) {
     throw InputError(input.input_path, "", "the sparse model has no photos",
                      "Reconstruct the photos first (roomtex-mapper)");

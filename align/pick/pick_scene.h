@@ -25,6 +25,7 @@ namespace roomtex {
 
 struct PickSceneInput {
   std::string input_path, image_path, scan_poses;
+  std::string panoramas_path;  // of MergeFaces(); may be empty
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
   int num_threads = -1;

@@ -41,6 +41,8 @@ void AddOptions(Arguments* a, Command* command) {
                          "Folder that the page's Align writes to; empty = aligned, beside the "
                          "picks.",
                          Command::Kind::kOptional);
+  command->AddInputPath("panoramas_path", &a->scene.panoramas_path, PanoramasHelp(),
+                        Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scene.scan_poses, ScanPosesHelp(),
                         Command::Kind::kOptional);
   command->Add(FieldsOf(&a->scene.scan_reader));
