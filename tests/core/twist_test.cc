@@ -11,10 +11,10 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 
-const Eigen::Vector3d kTurn(0.3, -0.4, 1.2), kPoint(0.5, 2, -3);
+const Eigen::Vector3d kTurn(0.3, -0.4, 1.2), kTurnedPoint(0.5, 2, -3);
 
 TEST(CrossMatrix, MultipliesAsTheCrossProduct) {
-  EXPECT_THAT(CrossMatrix(kTurn) * kPoint, IsNearMatrix(kTurn.cross(kPoint), 1e-15));
+  EXPECT_THAT(CrossMatrix(kTurn) * kTurnedPoint, IsNearMatrix(kTurn.cross(kTurnedPoint), 1e-15));
 }
 
 TEST(RotationFromVector, TurnsByItsLengthAboutItsDirection) {
@@ -53,9 +53,9 @@ TEST(RotationWithJacobian, LeftJacobianAgreesWithNumericDifferences) {
 TEST(Moved, OfARigidDoesWhatItsFormulaSays) {
   const Rigid pose = {RotationFromVector({1, 2, 0.5}), {4, 5, 6}};
   const Vector6 step = 1e-5 * (Vector6() << 1, -2, 3, 0.4, 0.5, -0.6).finished();
-  const Eigen::Vector3d x = pose * kPoint;
+  const Eigen::Vector3d x = pose * kTurnedPoint;
   const Eigen::Vector3d expected = x + step.head<3>().cross(x - pose.translation) + step.tail<3>();
-  EXPECT_THAT(Moved(pose, step) * kPoint, IsNearMatrix(expected, 1e-8));
+  EXPECT_THAT(Moved(pose, step) * kTurnedPoint, IsNearMatrix(expected, 1e-8));
   EXPECT_EQ(Moved(pose, Vector6::Zero()).rotation.coeffs(), pose.rotation.coeffs());
 }
 
@@ -63,10 +63,10 @@ TEST(Moved, OfASimilarityDoesWhatItsFormulaSays) {
   const Similarity s = {2.5, RotationFromVector({1, 2, 0.5}), {4, 5, 6}};
   const Eigen::Vector3d pivot(1, -1, 2);
   const Vector7 step = 1e-5 * (Vector7() << 1, -2, 3, 0.4, 0.5, -0.6, 0.7).finished();
-  const Eigen::Vector3d x = s * kPoint;
+  const Eigen::Vector3d x = s * kTurnedPoint;
   const Eigen::Vector3d expected =
       x + step.head<3>() + step.segment<3>(3).cross(x - pivot) + step[6] * (x - pivot);
-  EXPECT_THAT(Moved(s, pivot, step) * kPoint, IsNearMatrix(expected, 1e-8));
+  EXPECT_THAT(Moved(s, pivot, step) * kTurnedPoint, IsNearMatrix(expected, 1e-8));
 }
 
 TEST(AngleBetween, IsExactForSmallAngles) {

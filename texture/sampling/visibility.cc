@@ -20,8 +20,9 @@ constexpr double kMinSize = 0.02;  // radians
 constexpr double kGapSpacings = 1.5;
 // Shadows need not be exact to the pixel.
 constexpr float kShadowEdgePx = 1e6f;
-// Of a panorama; what is larger may meet a pole or the seam.
-constexpr float kMaxDirectPx = 24;
+// Of a panorama: what is larger may meet the seam, or have bent edges; and what is as near to a
+// pole as this share of the height.
+constexpr float kMaxDirectPx = 4, kPoleShare = 0.06f;
 // No lens sees nearer; keeps a surface that touches the camera from hiding everything.
 constexpr double kNearDepth = 0.01;
 // Automatic depth tolerance, shares of the depth.
@@ -113,9 +114,9 @@ class TriangleSplitter {
   cv::Mat1f* out_;
 };
 
-// The same for a panorama. Its raster is closed at the left and right, and at the poles the sides
-// of a triangle are bent without limit: there triangles are split down to a pixel, and what holds
-// the pole itself is drawn from its sides to the border.
+// The same for a panorama. Its raster is closed at the left and right, and straight lines are bent,
+// the more the nearer to a pole. Whether an edge is split depends on it alone, so that triangles
+// that share it leave no crack. What holds a pole is drawn from its sides to the border.
 class PanoramaSplitter {
  public:
   PanoramaSplitter(const PhotoProjector& projector, float scale_x, float scale_y, float max_edge_px,
@@ -123,6 +124,7 @@ class PanoramaSplitter {
       : projector_(projector), scale_x_(scale_x), scale_y_(scale_y), out_(out) {
     px_per_radian_ = projector.camera().camera().MeanFocalLength() * scale_x;
     max_edge_px_ = std::min<double>(max_edge_px, kMaxEdge * px_per_radian_);
+    max_bend_px_ = max_edge_px < kShadowEdgePx ? kMaxBendPx : kMaxShadowBendPx;
   }
 
   void Draw(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) const {
@@ -134,8 +136,10 @@ class PanoramaSplitter {
 
  private:
   static constexpr double kMaxEdge = 0.2;     // radians
-  static constexpr double kPoleEdgePx = 1.5;  // next to the poles
-  static constexpr int kMaxPanoramaSplits = 28;
+  static constexpr double kMinEdgePx = 1.5;   // next to the poles
+  static constexpr double kMaxBendPx = 0.05;  // of an edge, off its straight line
+  static constexpr double kMaxShadowBendPx = 1;
+  static constexpr int kMaxPanoramaSplits = 40;
 
   struct Corner {
     Eigen::Vector3d x_in_cam, ray;
@@ -146,22 +150,28 @@ class PanoramaSplitter {
     return {x_in_cam, x_in_cam / std::max(distance, kNearDepth), distance};
   }
 
+  // Pixels by which an edge is too long; 0 = it is not. An edge of length l is bent by
+  // l^2 tan(latitude) / 8.
+  double Excess(const Corner& a, const Corner& b) const {
+    const double length = (a.ray - b.ray).norm() * px_per_radian_;
+    const double sine = std::min(1.0, std::max(std::abs(a.ray.y()), std::abs(b.ray.y())));
+    const double bend = sine / std::sqrt(std::max(1e-12, 1 - sine * sine)) / (8 * px_per_radian_);
+    const double limit = std::clamp(std::sqrt(max_bend_px_ / std::max(bend, 1e-12)), kMinEdgePx,
+                                    std::max(kMinEdgePx, max_edge_px_));
+    return std::max(0.0, length - limit);
+  }
+
   void Split(const Corner& a, const Corner& b, const Corner& c, int depth) const {
     if (std::max({a.distance, b.distance, c.distance}) < kNearDepth) return;
-    const double ab = (a.ray - b.ray).norm(), bc = (b.ray - c.ray).norm(),
-                 ca = (c.ray - a.ray).norm();
-    const double longest = std::max({ab, bc, ca});
-    const double from_pole =
-        1 - std::max({std::abs(a.ray.y()), std::abs(b.ray.y()), std::abs(c.ray.y())});
-    const double limit = std::clamp(0.5 * std::sqrt(2 * from_pole) * px_per_radian_, kPoleEdgePx,
-                                    std::max(kPoleEdgePx, max_edge_px_));
-    if (longest * px_per_radian_ <= limit || depth >= kMaxPanoramaSplits) {
+    const double ab = Excess(a, b), bc = Excess(b, c), ca = Excess(c, a);
+    const double worst = std::max({ab, bc, ca});
+    if (!(worst > 0) || depth >= kMaxPanoramaSplits) {
       if (std::min({a.distance, b.distance, c.distance}) >= kNearDepth) DrawSmall(a, b, c);
       return;
     }
-    if (ab == longest) {
+    if (ab == worst) {
       Halve(a, b, c, depth);
-    } else if (bc == longest) {
+    } else if (bc == worst) {
       Halve(b, c, a, depth);
     } else {
       Halve(c, a, b, depth);
@@ -217,7 +227,7 @@ class PanoramaSplitter {
 
   const PhotoProjector& projector_;
   float scale_x_, scale_y_;
-  double px_per_radian_, max_edge_px_;
+  double px_per_radian_, max_edge_px_, max_bend_px_;
   cv::Mat1f* out_;
 };
 
@@ -292,14 +302,16 @@ DepthMap::DepthMap(int photo_width, int photo_height, double scale, bool wraps) 
 void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
                     float max_edge_px) {
   const CpuTimer timer(CpuStage::kDepthMap);
+  const auto width = static_cast<float>(inverse_depth_.cols);
+  const auto height = static_cast<float>(inverse_depth_.rows);
   const bool panorama = projector.camera().camera().IsPanorama();
   const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &inverse_depth_);
   const PanoramaSplitter panorama_splitter(projector, scale_x_, scale_y_, max_edge_px,
                                            &inverse_depth_);
-  // A triangle of a panorama that is small in the raster neither meets a pole nor the seam.
+  // A triangle of a panorama that is small in the raster does not meet the seam; nor, away from
+  // there, a pole.
   const float max_direct_px = panorama ? std::min(max_edge_px, kMaxDirectPx) : max_edge_px;
-  const auto width = static_cast<float>(inverse_depth_.cols);
-  const auto height = static_cast<float>(inverse_depth_.rows);
+  const float pole_rows = panorama ? kPoleShare * height : -1;
   ProjectedBlock projected;
   std::vector<RasterVertex> vertices;
   for (const MeshTile& tile : tiles) {
@@ -318,7 +330,8 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
         const float low_x = std::min({a.x, b.x, c.x}), high_x = std::max({a.x, b.x, c.x});
         const float low_y = std::min({a.y, b.y, c.y}), high_y = std::max({a.y, b.y, c.y});
         const float size = std::max(high_x - low_x, high_y - low_y);
-        if (size <= max_direct_px) {
+        if (size <= max_direct_px &&
+            (!panorama || (low_y > pole_rows && high_y < height - pole_rows))) {
           if (high_x < 0 || high_y < 0 || low_x > width || low_y > height) continue;
           DrawTriangle(a, b, c, &inverse_depth_);
           continue;
