@@ -7,6 +7,7 @@
 #include <set>
 
 #include "align/pick/mesh_panorama.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"

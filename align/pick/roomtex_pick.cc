@@ -10,6 +10,7 @@
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_server.h"
 #include "align/pick/pick_session.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/open_browser.h"

@@ -32,6 +32,12 @@ TEST(PanoramaAlignment, SixPicksAndTheSurfaceGiveMillimetres) {
     const PoseErrors refined = WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse);
     EXPECT_LT(refined.position, 0.003) << seed;
     EXPECT_LT(refined.rotation, RadFromDeg(0.05)) << seed;
+    const PoseErrors adjusted =
+        WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity());
+    EXPECT_LT(adjusted.position, 0.003) << seed;
+    RecordProperty("picks_mm_" + std::to_string(seed), std::to_string(1000 * from_picks.position));
+    RecordProperty("surface_mm_" + std::to_string(seed), std::to_string(1000 * refined.position));
+    RecordProperty("adjusted_mm_" + std::to_string(seed), std::to_string(1000 * adjusted.position));
     // Click noise is 1.5 pixels.
     EXPECT_LT(alignment.refined_pick_rms_px, 4);
   }
