@@ -75,6 +75,19 @@ void Polish(const CameraProjection& projection, const PointPairs& pairs, Rigid* 
   }
 }
 
+// A direction that has three unit vectors (columns) before it, as far as can be: their sum, or the
+// axis of the cone through them where they point apart.
+Eigen::Vector3d AxisBefore(const Eigen::Matrix3d& directions) {
+  const Eigen::Vector3d sum = directions.rowwise().sum().normalized();
+  Eigen::Vector3d axis = (directions.col(1) - directions.col(0))
+                             .cross(directions.col(2) - directions.col(0))
+                             .normalized();
+  if (axis.dot(directions.col(0)) < 0) axis = -axis;
+  const double before_sum = (sum.transpose() * directions).minCoeff();
+  const double before_axis = (axis.transpose() * directions).minCoeff();
+  return before_axis > before_sum ? axis : sum;
+}
+
 }  // namespace
 
 std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs) {
@@ -90,7 +103,7 @@ std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const 
   // The closed form wants rays that point forward: a camera that sees all around is turned to them.
   Eigen::Quaterniond ahead_from_cam = Eigen::Quaterniond::Identity();
   if (!projection.camera().IsPerspective()) {
-    ahead_from_cam.setFromTwoVectors(directions.rowwise().sum(), Eigen::Vector3d::UnitZ());
+    ahead_from_cam.setFromTwoVectors(AxisBefore(directions), Eigen::Vector3d::UnitZ());
   }
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d ray = ahead_from_cam * directions.col(i);

@@ -15,6 +15,8 @@ namespace roomtex {
 namespace {
 
 constexpr int kCellPx = 18;  // of the lattice, in a photo of 2000 pixels
+// A panorama bends lines more than a lens does.
+constexpr double kPanoramaCell = 0.5;
 constexpr size_t kCacheBytes = 64 << 20;
 
 Eigen::Vector3f Direction(const CameraProjection& projection, const Eigen::Vector2d& x_in_img) {
@@ -64,7 +66,8 @@ PhotoLattice MakePhotoLattice(const Camera& camera) {
   const CameraProjection projection(camera);
   PhotoLattice lattice;
   // Finer for larger photos only as far as their distortion asks for it: it goes with the angle.
-  const double cell = kCellPx * std::max(1.0, std::max(camera.width, camera.height) / 2000.0);
+  const double cell = kCellPx * std::max(1.0, std::max(camera.width, camera.height) / 2000.0) *
+                      (camera.IsPanorama() ? kPanoramaCell : 1);
   lattice.columns = 1 + std::max(2, static_cast<int>(std::ceil(camera.width / cell)));
   lattice.rows = 1 + std::max(2, static_cast<int>(std::ceil(camera.height / cell)));
   for (int row = 0; row < lattice.rows; ++row) {
