@@ -76,7 +76,7 @@ class ByteReader {
 
 PlacedList<Camera> ParseCameras(const std::string& bytes, const std::string& path) {
   ByteReader reader(bytes, path);
-  const size_t count = reader.TakeCount("cameras", 4 + 4 + 8 + 8 + 3 * 8);
+  const size_t count = reader.TakeCount("cameras", 4 + 4 + 8 + 8 + 2 * 8);
   PlacedList<Camera> cameras(count);
   for (Placed<Camera>& placed : cameras) {
     placed.position = reader.position();

@@ -50,6 +50,24 @@ TEST(SparseModel, WholeTextWinsOverHalfABinary) {
   EXPECT_EQ(ReadSparseModel(folder.path()).images.size(), 5u);
 }
 
+TEST(SparseModel, EveryCameraModelComesBack) {
+  for (int id = 0; id < kNumCameraModels; ++id) {
+    SparseModel model;
+    Camera& camera = model.cameras[4];
+    camera.camera_id = 4;
+    camera.model = static_cast<CameraModel>(id);
+    camera.width = 640;
+    camera.height = 320;
+    camera.params = std::vector<double>(NumCameraParams(id), 0.25);
+    ASSERT_TRUE(camera.Problems().empty());
+    const TempFolder binary, text;
+    WriteSparseModel(model, binary.path());
+    ExpectSameModel(ReadSparseModel(binary.path()), model);
+    WriteSparseModelText(model, text.path());
+    ExpectSameModel(ReadSparseModel(text.path()), model);
+  }
+}
+
 TEST(SparseModel, FramesSayWhichImagesMoveAsOne) {
   const TempFolder folder;
   WriteSparseModelText(MakeSparseModel(), folder.path());
