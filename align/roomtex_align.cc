@@ -22,6 +22,7 @@
 #include "align/trust/station_check.h"
 #include "colmap_ext/lens_labels.h"
 #include "colmap_ext/mapper_verdict.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -36,6 +37,7 @@ namespace {
 
 struct Arguments {
   std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
+  std::string panoramas_path;
   std::string geo_origin;
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
@@ -82,6 +84,8 @@ void AddOptions(Arguments* a, Command* command) {
                   "--image_path.");
   command->AddInputPath("database_path", &a->database_path,
                         "COLMAP's database; not needed for an alignment by picks.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("panoramas_path", &a->panoramas_path, PanoramasHelp(),
                         Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->AddBool("register_stations", &a->register_stations,
@@ -532,7 +536,9 @@ LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) 
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
-  SparseModel model = ReadSparseModel(a.input_path);
+  std::vector<std::string> face_warnings;
+  SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
+  for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
   const std::vector<Pick> picks = ReadPicks(a.picks_path);
   CheckPicksAgainstModel(a.picks_path, picks, model);

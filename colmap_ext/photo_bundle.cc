@@ -25,7 +25,7 @@ namespace {
 
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
-constexpr int kMaxIterations = 60;
+constexpr int kMaxBundleSteps = 60;
 constexpr double kFunctionTolerance = 1e-7;
 // Fewer leave a photo's pose open.
 constexpr int kMinObservations = 6;
@@ -128,7 +128,7 @@ class PhotoProblem {
     ceres::Solver::Options o;
     o.linear_solver_type =
         poses_.size() > kMaxDensePhotos ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    o.max_num_iterations = kMaxIterations;
+    o.max_num_iterations = kMaxBundleSteps;
     o.function_tolerance = kFunctionTolerance;
     o.parameter_tolerance = 1e-10;
     o.gradient_tolerance = 1e-12;

@@ -29,8 +29,10 @@ Rigid PoseParameters::CamFromScan() const {
 
 ReprojectionCost::ReprojectionCost(const PoseParameters& pose, const Camera& camera,
                                    const Eigen::Vector2d& x_in_img, double weight,
-                                   bool refine_intrinsics)
+                                   bool refine_intrinsics, const Rigid& cam_from_rig)
     : pose_(pose),
+      cam_from_rig_(cam_from_rig.rotation.toRotationMatrix()),
+      rig_in_cam_(cam_from_rig.translation),
       camera_(camera),
       x_in_img_(x_in_img),
       weight_(weight),
@@ -49,30 +51,29 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   const double* const intrinsics = refine_intrinsics_ ? parameters[2] : camera_.params.data();
   const RotationAndJacobian turn = RotationWithJacobian(w);
   const Eigen::Matrix3d rotation = turn.rotation * pose_.start_matrix;
-  const Eigen::Vector3d p = rotation * (q - centre);
-  if (!(p.z() > kMinDepth)) return false;
-  const double x = p.x() / p.z(), y = p.y() / p.z();
+  const Eigen::Vector3d p_in_rig = rotation * (q - centre);
+  const Eigen::Vector3d p = cam_from_rig_ * p_in_rig + rig_in_cam_;
+  if (!((camera_.IsPerspective() ? p.z() : p.norm()) > kMinDepth)) return false;
   const int num_params = static_cast<int>(camera_.params.size());
-  const auto seen = ProjectRay<0>(camera_.model, intrinsics, num_params, x, y);
+  const auto seen = ErrorOfPoint<0>(camera_.model, intrinsics, num_params, p, x_in_img_);
   Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = weight_ * (seen.x_in_img - x_in_img_);
+  residual = weight_ * seen.error;
   if (!residual.allFinite()) return false;
   if (jacobians == nullptr) return true;
 
-  RowMatrix23 ray_by_p;
-  ray_by_p << 1, 0, -x, 0, 1, -y;
-  const RowMatrix23 by_p = weight_ / p.z() * seen.by_ray * ray_by_p;
+  const RowMatrix23 by_p = weight_ * seen.by_point * cam_from_rig_;
   const RowMatrix23 by_q = by_p * rotation;
   if (jacobians[0] != nullptr) {
     Eigen::Map<RowMatrix26> by_pose(jacobians[0]);
-    // p = exp(w) p0: a small step dw turns p by L dw, which moves it by (L dw) x p.
-    by_pose.leftCols<3>() = -by_p * CrossMatrix(p) * turn.left_jacobian;
+    // p_in_rig = exp(w) p0: a small step dw turns it by L dw, which moves it by (L dw) x p_in_rig.
+    by_pose.leftCols<3>() = -by_p * CrossMatrix(p_in_rig) * turn.left_jacobian;
     by_pose.rightCols<3>() = -by_q;
   }
   if (jacobians[1] != nullptr) Eigen::Map<RowMatrix23>{jacobians[1]} = by_q;
   if (refine_intrinsics_ && jacobians[2] != nullptr) {
     using ByParams = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto seen_by = ProjectRay<kMaxCameraParams>(camera_.model, intrinsics, num_params, x, y);
+    const auto seen_by =
+        ErrorOfPoint<kMaxCameraParams>(camera_.model, intrinsics, num_params, p, x_in_img_);
     Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
         weight_ * seen_by.by_params.leftCols(num_params);
   }

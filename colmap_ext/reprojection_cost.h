@@ -25,18 +25,22 @@ struct PoseParameters {
   Rigid CamFromScan() const;
 };
 
-// weight * (projection - x_in_img), pixels. Parameters: the pose (6, PoseParameters), the point (3,
-// `scan`) and, with refine_intrinsics, those of the camera. Fails for a point that is not in front
-// of the camera. `pose` and `camera` must outlive it.
+// weight * CameraProjection::ImgError, pixels. Parameters: the pose (6, PoseParameters) of the
+// camera, or of the rig that holds it (cam_from_rig is fixed), the point (3, `scan`) and, with
+// refine_intrinsics, those of the camera. Fails for a point that is not in front of the camera.
+// `pose` and `camera` must outlive it.
 class ReprojectionCost : public ceres::CostFunction {
  public:
   ReprojectionCost(const PoseParameters& pose, const Camera& camera,
-                   const Eigen::Vector2d& x_in_img, double weight, bool refine_intrinsics);
+                   const Eigen::Vector2d& x_in_img, double weight, bool refine_intrinsics,
+                   const Rigid& cam_from_rig = Rigid());
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   const PoseParameters& pose_;
+  Eigen::Matrix3d cam_from_rig_;
+  Eigen::Vector3d rig_in_cam_;
   const Camera& camera_;
   Eigen::Vector2d x_in_img_;
   double weight_;

@@ -100,6 +100,12 @@ void CheckDatabase(const MatchedImages& images, const Options& options,
   }
   if (RefineIntrinsicsFromWord(options.refine_intrinsics) != RefineIntrinsics::kNever) return;
   for (const auto& [camera_id, camera] : images.cameras()) {
+    if (camera.IsPanorama()) {
+      throw InputError(path, "camera " + std::to_string(camera_id),
+                       "is EQUIRECTANGULAR: panoramas have no picture plane to start from",
+                       "Cut them into faces with roomtex-import, or use colmap mapper of COLMAP "
+                       "4.1");
+    }
     if (camera.has_prior_focal_length) continue;
     context.Warn(
         "camera " + std::to_string(camera_id) +

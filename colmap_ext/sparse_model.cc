@@ -244,6 +244,19 @@ void WriteFiles(const SparseModel& model, const std::string& folder,
   for (const std::unique_ptr<OutputFile>& file : files) file->Commit();
 }
 
+// A frame of one image is no frame.
+void SetFrames(const FrameOfImage& frame_of_image, SparseModel* model) {
+  std::map<uint32_t, int> sizes;
+  for (const auto& [image_id, frame_id] : frame_of_image) {
+    if (model->images.count(image_id) > 0) ++sizes[frame_id];
+  }
+  for (const auto& [image_id, frame_id] : frame_of_image) {
+    if (sizes[frame_id] > 1 && model->images.count(image_id) > 0) {
+      model->images.at(image_id).frame_id = frame_id;
+    }
+  }
+}
+
 }  // namespace
 
 const SparseImage* SparseModel::FindImage(const std::string& name) const {
@@ -287,8 +300,14 @@ SparseModel ReadSparseModel(const std::string& folder) {
   auto cameras = parse(format.parse_cameras, kFiles[0]);
   auto images = parse(format.parse_images, kFiles[1]);
   auto points = parse(format.parse_points, kFiles[2]);
-  return AssembleSparseModel(format, folder, std::move(cameras), std::move(images),
-                             std::move(points));
+  SparseModel model =
+      AssembleSparseModel(format, folder, std::move(cameras), std::move(images), std::move(points));
+  const std::string frames_path = FilePath(folder, "frames", format);
+  std::error_code error;
+  if (fs::is_regular_file(frames_path, error)) {
+    SetFrames(format.parse_frames(ReadAll(frames_path), frames_path), &model);
+  }
+  return model;
 }
 
 void WriteSparseModel(const SparseModel& model, const std::string& folder) {
@@ -326,11 +345,10 @@ ReprojectionErrors UpdateReprojectionErrors(SparseModel* model) {
     double point_sum = 0;
     for (const TrackElement& element : point.track) {
       const View& view = views.at(element.image_id);
-      const std::optional<Eigen::Vector2d> x_in_img =
-          view.projection->ImgFromCam(view.image->cam_from_model * point.x_in_model);
-      const double error = x_in_img
-                               ? (*x_in_img - view.image->points2d[element.point2d_index]).norm()
-                               : view.half_diagonal;
+      const std::optional<Eigen::Vector2d> difference =
+          view.projection->ImgError(view.image->cam_from_model * point.x_in_model,
+                                    view.image->points2d[element.point2d_index]);
+      const double error = difference ? difference->norm() : view.half_diagonal;
       point_sum += error;
       sum_of_squares += error * error;
     }

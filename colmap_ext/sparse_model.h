@@ -15,6 +15,7 @@
 namespace roomtex {
 
 inline constexpr uint64_t kInvalidPoint3dId = UINT64_MAX;
+inline constexpr uint32_t kNoFrame = UINT32_MAX;
 
 struct SparseImage {
   uint32_t image_id = 0;
@@ -24,6 +25,9 @@ struct SparseImage {
   Rigid cam_from_model;
   std::vector<Eigen::Vector2d> points2d;  // `img`; all keypoints of the database, in row order
   std::vector<uint64_t> point3d_ids;      // one per point2d; kInvalidPoint3dId = none
+  // Of a COLMAP 4 model: the frame of a rig that this image was taken in, together with others.
+  // Images of one frame move as one: their poses against each other are those of the rig.
+  uint32_t frame_id = kNoFrame;
 };
 
 struct TrackElement {
@@ -48,11 +52,11 @@ struct SparseModel {
   const SparseImage* FindImage(const std::string& name) const;
 };
 
-// Reads the model in a folder: cameras/images/points3D as .bin (preferred) or .txt; rigs and frames
-// files of 4.x are tolerated. Throws InputError: no model there, truncated or impossible counts
-// (checked against the bytes left before anything is allocated), unknown camera model, image
-// without camera, NaN pose, track elements and keypoints that do not answer each other, ids or
-// names given twice ...
+// Reads the model in a folder: cameras/images/points3D as .bin (preferred) or .txt, and of 4.x
+// which images were taken together (frames.bin or .txt; the poses stand in images as well). Throws
+// InputError: no model there, truncated or impossible counts (checked against the bytes left before
+// anything is allocated), unknown camera model, image without camera, NaN pose, track elements and
+// keypoints that do not answer each other, ids or names given twice ...
 SparseModel ReadSparseModel(const std::string& folder);
 
 // Writes cameras.bin, images.bin, points3D.bin (each aside and renamed); makes the folder.

@@ -76,7 +76,7 @@ class ByteReader {
 
 PlacedList<Camera> ParseCameras(const std::string& bytes, const std::string& path) {
   ByteReader reader(bytes, path);
-  const size_t count = reader.TakeCount("cameras", 4 + 4 + 8 + 8 + 3 * 8);
+  const size_t count = reader.TakeCount("cameras", 4 + 4 + 8 + 8 + 2 * 8);
   PlacedList<Camera> cameras(count);
   for (Placed<Camera>& placed : cameras) {
     placed.position = reader.position();
@@ -87,8 +87,9 @@ PlacedList<Camera> ParseCameras(const std::string& bytes, const std::string& pat
     if (num_params < 0) {
       throw InputError(path, BytePosition(placed.position),
                        "camera " + std::to_string(camera.camera_id) + " has the model id " +
-                           std::to_string(model_id) + ", expected 0 to 10",
-                       "Use one of COLMAP's camera models SIMPLE_PINHOLE to THIN_PRISM_FISHEYE");
+                           std::to_string(model_id) + ", expected 0 to " +
+                           std::to_string(kNumCameraModels - 1),
+                       "Use one of COLMAP's camera models SIMPLE_PINHOLE to EQUIRECTANGULAR");
     }
     camera.model = static_cast<CameraModel>(model_id);
     const uint64_t width = reader.Take<uint64_t>("a camera's width");
@@ -230,13 +231,36 @@ void WritePoints(const SparseModel& model, const SparseModelFormat::Write& write
   writer.Flush();
 }
 
+FrameOfImage ParseFrames(const std::string& bytes, const std::string& path) {
+  constexpr int32_t kCameraSensor = 0;
+  ByteReader reader(bytes, path);
+  const size_t count = reader.TakeCount("frames", 4 + 4 + 7 * 8 + 4);
+  FrameOfImage frame_of_image;
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t frame_id = reader.Take<uint32_t>("a frame's id");
+    reader.Take<uint32_t>("a frame's rig");
+    // COLMAP writes the pose of an image from this one: it stands there, too.
+    for (int k = 0; k < 7; ++k) reader.Take<double>("a frame's pose");
+    const uint32_t num_images = reader.Take<uint32_t>("a frame's number of images");
+    for (uint32_t k = 0; k < num_images; ++k) {
+      const int32_t sensor = reader.Take<int32_t>("a sensor of a frame");
+      reader.Take<uint32_t>("a sensor of a frame");
+      const uint64_t image_id = reader.Take<uint64_t>("an image of a frame");
+      if (sensor == kCameraSensor) frame_of_image[static_cast<uint32_t>(image_id)] = frame_id;
+    }
+  }
+  reader.ExpectEnd();
+  return frame_of_image;
+}
+
 std::string Position(long long byte) { return BytePosition(byte); }
 
 }  // namespace
 
 const SparseModelFormat& SparseModelBinary() {
-  static const SparseModelFormat format = {".bin",      Position,     ParseCameras, ParseImages,
-                                           ParsePoints, WriteCameras, WriteImages,  WritePoints};
+  static const SparseModelFormat format = {".bin",       Position,    ParseCameras,
+                                           ParseImages,  ParsePoints, ParseFrames,
+                                           WriteCameras, WriteImages, WritePoints};
   return format;
 }
 

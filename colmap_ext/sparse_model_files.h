@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct Placed {
 template <typename Entry>
 using PlacedList = std::vector<Placed<Entry>>;
 
+// By image_id.
+using FrameOfImage = std::map<uint32_t, uint32_t>;
+
 // One way of writing a model. `path` is for messages only. Parsers throw InputError for everything
 // that one file alone can show: truncated, impossible counts, unknown camera model, numbers that
 // are not finite.
@@ -30,6 +34,8 @@ struct SparseModelFormat {
   PlacedList<Camera> (*parse_cameras)(const std::string& bytes, const std::string& path);
   PlacedList<SparseImage> (*parse_images)(const std::string& bytes, const std::string& path);
   PlacedList<SparsePoint> (*parse_points)(const std::string& bytes, const std::string& path);
+  // Of COLMAP 4: frame by image.
+  FrameOfImage (*parse_frames)(const std::string& bytes, const std::string& path);
   // Hand the file to `write` piece by piece.
   using Write = std::function<void(const std::string& piece)>;
   void (*write_cameras)(const SparseModel& model, const Write& write);

@@ -158,7 +158,7 @@ PlacedList<Camera> ParseTextCameras(const std::string& bytes, const std::string&
     if (!model) {
       reader.Fail("camera " + std::to_string(camera.camera_id) + " has the unknown model \"" +
                       model_name.substr(0, 40) + "\"",
-                  "one of COLMAP's camera models SIMPLE_PINHOLE to THIN_PRISM_FISHEYE");
+                  "one of COLMAP's camera models SIMPLE_PINHOLE to EQUIRECTANGULAR");
     }
     camera.model = *model;
     camera.width = static_cast<int>(words.Whole<uint32_t>(INT32_MAX));
@@ -331,14 +331,37 @@ void WriteTextPoints(const SparseModel& model, const SparseModelFormat::Write& w
   writer.Flush();
 }
 
+FrameOfImage ParseTextFrames(const std::string& bytes, const std::string& path) {
+  constexpr char kExpected[] =
+      "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS and (SENSOR_TYPE SENSOR_ID DATA_ID) each";
+  FrameOfImage frame_of_image;
+  LineReader reader(bytes, path);
+  std::string_view line;
+  while (reader.NextNotBlank(&line)) {
+    Words words(line, reader, kExpected);
+    const uint32_t frame_id = words.Id();
+    words.Id();
+    for (int k = 0; k < 7; ++k) words.Number();
+    const uint32_t num_images = words.Id();
+    for (uint32_t k = 0; k < num_images; ++k) {
+      const std::string_view sensor = words.Word();
+      words.Id();
+      const uint32_t image_id = words.Id();
+      if (sensor == "CAMERA") frame_of_image[image_id] = frame_id;
+    }
+    words.ExpectEnd();
+  }
+  return frame_of_image;
+}
+
 std::string PositionOfLine(long long line) { return LinePosition(static_cast<long>(line)); }
 
 }  // namespace
 
 const SparseModelFormat& SparseModelText() {
-  static const SparseModelFormat format = {".txt",          PositionOfLine,  ParseTextCameras,
-                                           ParseTextImages, ParseTextPoints, WriteTextCameras,
-                                           WriteTextImages, WriteTextPoints};
+  static const SparseModelFormat format = {".txt",           PositionOfLine,  ParseTextCameras,
+                                           ParseTextImages,  ParseTextPoints, ParseTextFrames,
+                                           WriteTextCameras, WriteTextImages, WriteTextPoints};
   return format;
 }
 

@@ -25,15 +25,38 @@ constexpr std::array<ModelEntry, kNumCameraModels> kModels = {{{"SIMPLE_PINHOLE"
                                                                {"FOV", 5},
                                                                {"SIMPLE_RADIAL_FISHEYE", 4},
                                                                {"RADIAL_FISHEYE", 5},
-                                                               {"THIN_PRISM_FISHEYE", 12}}};
+                                                               {"THIN_PRISM_FISHEYE", 12},
+                                                               {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                                               {"SIMPLE_DIVISION", 4},
+                                                               {"DIVISION", 5},
+                                                               {"SIMPLE_FISHEYE", 3},
+                                                               {"FISHEYE", 4},
+                                                               {"EUCM", 6},
+                                                               {"EQUIRECTANGULAR", 2}}};
 
 const double* DistortionParams(const Camera& camera) {
   return camera.params.data() + camera_formulas::NumLinearParams(camera.model);
 }
 
+// The ray of a position in the equidistant plane: as far from (0, 0) as its angle from the optical
+// axis.
+Eigen::Vector3d RayFromAngles(const Eigen::Vector2d& angles) {
+  const double angle = angles.norm();
+  const double sine_over_angle = angle > 1e-9 ? std::sin(angle) / angle : 1.0;
+  return {angles.x() * sine_over_angle, angles.y() * sine_over_angle, std::cos(angle)};
+}
+
+// From the plane where a model's field is searched and inverted, which is (x/z, y/z) for a
+// perspective camera and the equidistant one for the others, to distorted coordinates.
 Eigen::Vector2d DistortPoint(const Camera& camera, const Eigen::Vector2d& x) {
-  Eigen::Vector2d xd;
-  camera_formulas::Distort(camera.model, DistortionParams(camera), x.x(), x.y(), &xd.x(), &xd.y());
+  const double* const k = DistortionParams(camera);
+  Eigen::Vector2d flat = x, xd;
+  if (camera_formulas::FlatteningOf(camera.model) == camera_formulas::Flattening::kDivision ||
+      camera_formulas::FlatteningOf(camera.model) == camera_formulas::Flattening::kUnified) {
+    const Eigen::Vector3d ray = RayFromAngles(x);
+    camera_formulas::Flatten(camera.model, k, ray.x(), ray.y(), ray.z(), &flat.x(), &flat.y());
+  }
+  camera_formulas::Distort(camera.model, k, flat.x(), flat.y(), &xd.x(), &xd.y());
   return xd;
 }
 
@@ -53,28 +76,34 @@ bool IsDistorted(CameraModel model) {
   return model != CameraModel::kSimplePinhole && model != CameraModel::kPinhole;
 }
 
-// The radius up to which the distortion is one-to-one: along each of 16 directions the first one
-// where its Jacobian is no longer positive definite enough to be inverted; the smallest over the
-// directions. Steps are equal in angle, up to 89.5 degrees off the optical axis.
-double MaxRadius(const Camera& camera) {
-  if (!IsDistorted(camera.model)) return std::numeric_limits<double>::infinity();
-  constexpr int kNumDirections = 16, kNumSteps = 900;
-  const double max_angle = RadFromDeg(89.5);
-  int last_valid = kNumSteps;
+// The angle from the optical axis up to which the distortion is one-to-one: along each of 16
+// directions the first one where its Jacobian is no longer positive definite enough to be inverted;
+// the smallest over the directions. Steps are equal in angle: of a perspective camera up to 89.5
+// degrees, else up to 179.
+double MaxAngle(const Camera& camera) {
+  constexpr int kNumDirections = 16;
+  const bool perspective = camera.IsPerspective();
+  const int num_steps = perspective ? 900 : 1800;
+  const double max_angle = RadFromDeg(perspective ? 89.5 : 179);
+  int last_valid = num_steps;
   for (int d = 0; d < kNumDirections; ++d) {
     const double direction = 2 * kPi * d / kNumDirections;
     const Eigen::Vector2d unit(std::cos(direction), std::sin(direction));
     for (int step = 1; step <= last_valid; ++step) {
-      const double radius = std::tan(max_angle * step / kNumSteps);
+      const double angle = max_angle * step / num_steps;
+      const double radius = perspective ? std::tan(angle) : angle;
+      const double by_angle = perspective ? 1 + radius * radius : 1;
       const Eigen::Matrix2d jacobian = DistortionJacobian(camera, radius * unit);
-      const double radial_gain = unit.dot(jacobian * unit) * (1 + radius * radius);
-      if (!(jacobian.determinant() > 0) || !(radial_gain > 0.02)) {
+      const double radial_gain = unit.dot(jacobian * unit) * by_angle;
+      // Beyond a pole of the formula (EUCM) positions come back from the other side.
+      const bool outward = unit.dot(DistortPoint(camera, radius * unit)) > 0;
+      if (!(jacobian.determinant() > 0) || !(radial_gain > 0.02) || !outward) {
         last_valid = step - 1;
         break;
       }
     }
   }
-  return std::tan(max_angle * last_valid / kNumSteps);
+  return max_angle * last_valid / num_steps;
 }
 
 }  // namespace
@@ -93,8 +122,30 @@ std::optional<CameraModel> CameraModelFromName(const std::string& name) {
   return std::nullopt;
 }
 
+bool Camera::IsPerspective() const { return camera_formulas::IsPerspective(model); }
+
 double Camera::MeanFocalLength() const {
+  if (IsPanorama()) return params[0] / (2 * kPi);
   return camera_formulas::HasOneFocalLength(model) ? params[0] : 0.5 * (params[0] + params[1]);
+}
+
+void Camera::Resize(int new_width, int new_height) {
+  const double scale_x = static_cast<double>(new_width) / width;
+  const double scale_y = static_cast<double>(new_height) / height;
+  if (IsPanorama()) {
+    params = {params[0] * scale_x, params[1] * scale_y};
+  } else if (camera_formulas::HasOneFocalLength(model)) {
+    params[0] *= 0.5 * (scale_x + scale_y);
+    params[1] *= scale_x;
+    params[2] *= scale_y;
+  } else {
+    params[0] *= scale_x;
+    params[1] *= scale_y;
+    params[2] *= scale_x;
+    params[3] *= scale_y;
+  }
+  width = new_width;
+  height = new_height;
 }
 
 std::vector<std::string> Camera::Problems() const {
@@ -102,8 +153,8 @@ std::vector<std::string> Camera::Problems() const {
   std::vector<std::string> problems;
   const int expected = NumCameraParams(static_cast<int>(model));
   if (expected < 0) {
-    return {who + " has model id " + std::to_string(static_cast<int>(model)) +
-            ", expected 0 to 10"};
+    return {who + " has model id " + std::to_string(static_cast<int>(model)) + ", expected 0 to " +
+            std::to_string(kNumCameraModels - 1)};
   }
   if (static_cast<int>(params.size()) != expected) {
     return {who + " (" + CameraModelName(model) + ") has " + std::to_string(params.size()) +
@@ -118,47 +169,99 @@ std::vector<std::string> Camera::Problems() const {
   }
   const bool one_focal_length = camera_formulas::HasOneFocalLength(model);
   if (!(params[0] > 0) || (!one_focal_length && !(params[1] > 0))) {
-    problems.push_back(who + " has a focal length that is not positive");
+    problems.push_back(who + (IsPanorama() ? " has a width or height that is not positive"
+                                           : " has a focal length that is not positive"));
+  }
+  if (model == CameraModel::kEucm && !(params[4] >= 0 && params[4] <= 1 && params[5] > 0)) {
+    problems.push_back(who + " (EUCM) has alpha " + std::to_string(params[4]) + " and beta " +
+                       std::to_string(params[5]) + ", expected 0 <= alpha <= 1 and beta > 0");
   }
   return problems;
 }
 
 CameraProjection::CameraProjection(const Camera& camera)
-    : camera_(camera), max_radius_(MaxRadius(camera)) {}
+    : camera_(camera),
+      is_perspective_(camera.IsPerspective()),
+      max_radius_(std::numeric_limits<double>::infinity()),
+      max_angle_(kPi) {
+  if (camera.IsPanorama() || !IsDistorted(camera.model)) {
+    if (is_perspective_) max_angle_ = kPi / 2;
+    return;
+  }
+  max_angle_ = MaxAngle(camera);
+  if (max_angle_ < kPi / 2) max_radius_ = std::tan(max_angle_);
+}
 
 std::optional<Eigen::Vector2d> CameraProjection::ImgFromCam(const Eigen::Vector3d& x_in_cam) const {
-  if (!(x_in_cam.z() > 1e-12) || !x_in_cam.allFinite()) return std::nullopt;
-  const double x = x_in_cam.x() / x_in_cam.z();
-  const double y = x_in_cam.y() / x_in_cam.z();
-  if (x * x + y * y > max_radius_ * max_radius_) return std::nullopt;
+  if (!x_in_cam.allFinite()) return std::nullopt;
   Eigen::Vector2d x_in_img;
-  camera_formulas::Project(camera_.model, camera_.params.data(), x, y, &x_in_img.x(),
+  const double* const params = camera_.params.data();
+  if (is_perspective_) {
+    if (!(x_in_cam.z() > 1e-12)) return std::nullopt;
+    const double x = x_in_cam.x() / x_in_cam.z();
+    const double y = x_in_cam.y() / x_in_cam.z();
+    if (x * x + y * y > max_radius_ * max_radius_) return std::nullopt;
+    camera_formulas::Project(camera_.model, params, x, y, &x_in_img.x(), &x_in_img.y());
+    return x_in_img;
+  }
+  const double distance = x_in_cam.norm();
+  if (!(distance > 1e-12)) return std::nullopt;
+  const Eigen::Vector3d ray = x_in_cam / distance;
+  if (!(std::atan2(ray.head<2>().norm(), ray.z()) <= max_angle_)) return std::nullopt;
+  camera_formulas::Project(camera_.model, params, ray.x(), ray.y(), ray.z(), &x_in_img.x(),
                            &x_in_img.y());
   return x_in_img;
 }
 
-std::optional<Eigen::Vector2d> CameraProjection::CamFromImg(const Eigen::Vector2d& x_in_img) const {
+std::optional<Eigen::Vector2d> CameraProjection::ImgError(const Eigen::Vector3d& x_in_cam,
+                                                          const Eigen::Vector2d& x_in_img) const {
+  const auto seen = ImgFromCam(x_in_cam);
+  if (!seen || !camera_.IsPanorama()) {
+    return seen ? std::optional<Eigen::Vector2d>(*seen - x_in_img) : std::nullopt;
+  }
+  Eigen::Vector2d error;
+  camera_formulas::ImgError(camera_.model, camera_.params.data(), x_in_cam.x(), x_in_cam.y(),
+                            x_in_cam.z(), x_in_img, &error.x(), &error.y());
+  return error;
+}
+
+std::optional<Eigen::Vector3d> CameraProjection::RayFromImg(const Eigen::Vector2d& x_in_img) const {
   if (!x_in_img.allFinite()) return std::nullopt;
   const std::vector<double>& p = camera_.params;
-  const Eigen::Vector2d target =
+  if (camera_.IsPanorama()) {
+    if (!(x_in_img.y() >= 0 && x_in_img.y() <= p[1])) return std::nullopt;
+    return Eigen::Vector3d(camera_formulas::PanoramaFrame(p[0], p[1], x_in_img).row(2));
+  }
+  const Eigen::Vector2d distorted =
       camera_formulas::HasOneFocalLength(camera_.model)
           ? Eigen::Vector2d((x_in_img.x() - p[1]) / p[0], (x_in_img.y() - p[2]) / p[0])
           : Eigen::Vector2d((x_in_img.x() - p[2]) / p[0], (x_in_img.y() - p[3]) / p[1]);
-  if (!IsDistorted(camera_.model)) return target;
+  if (!IsDistorted(camera_.model)) return distorted.homogeneous();
+  const auto x = Undistort(distorted, is_perspective_ ? max_radius_ : max_angle_);
+  if (!x) return std::nullopt;
+  return is_perspective_ ? Eigen::Vector3d(x->homogeneous()) : RayFromAngles(*x);
+}
 
-  // Newton with steps halved while they do not help: the distortion is one-to-one within
-  // max_radius_.
-  Eigen::Vector2d x = target;
-  if (x.norm() > max_radius_) x *= 0.99 * max_radius_ / x.norm();
-  Eigen::Vector2d error = DistortPoint(camera_, x) - target;
+std::optional<Eigen::Vector2d> CameraProjection::CamFromImg(const Eigen::Vector2d& x_in_img) const {
+  const auto ray = RayFromImg(x_in_img);
+  if (!ray || !(ray->z() > 1e-6)) return std::nullopt;
+  return ray->hnormalized();
+}
+
+// Newton with steps halved while they do not help: the distortion is one-to-one within the limit.
+std::optional<Eigen::Vector2d> CameraProjection::Undistort(const Eigen::Vector2d& distorted,
+                                                           double limit) const {
+  Eigen::Vector2d x = distorted;
+  if (x.norm() > limit) x *= 0.99 * limit / x.norm();
+  Eigen::Vector2d error = DistortPoint(camera_, x) - distorted;
   for (int iteration = 0; iteration < 60 && error.norm() > 1e-13; ++iteration) {
     const Eigen::Vector2d step = DistortionJacobian(camera_, x).partialPivLu().solve(error);
     double fraction = 1.0;
     bool better = false;
     for (int halving = 0; halving < 12; ++halving, fraction *= 0.5) {
       const Eigen::Vector2d candidate = x - fraction * step;
-      if (!(candidate.norm() <= max_radius_)) continue;
-      const Eigen::Vector2d candidate_error = DistortPoint(camera_, candidate) - target;
+      if (!(candidate.norm() <= limit)) continue;
+      const Eigen::Vector2d candidate_error = DistortPoint(camera_, candidate) - distorted;
       if (candidate_error.norm() < error.norm()) {
         x = candidate;
         error = candidate_error;

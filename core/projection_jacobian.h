@@ -43,4 +43,43 @@ ProjectedRay<kParams> ProjectRay(CameraModel model, const double* params, int nu
   return projected;
 }
 
+// CameraProjection::ImgError of any camera, for a point in `cam` that it sees.
+template <int kParams>
+struct PointError {
+  Eigen::Vector2d error;
+  Eigen::Matrix<double, 2, 3> by_point;
+  Eigen::Matrix<double, 2, kParams> by_params;  // as in ProjectedRay; a panorama's are 0
+};
+
+template <int kParams>
+PointError<kParams> ErrorOfPoint(CameraModel model, const double* params, int num_params,
+                                 const Eigen::Vector3d& x_in_cam, const Eigen::Vector2d& x_in_img) {
+  PointError<kParams> result;
+  if (camera_formulas::IsPerspective(model)) {
+    const double x = x_in_cam.x() / x_in_cam.z(), y = x_in_cam.y() / x_in_cam.z();
+    const auto seen = ProjectRay<kParams>(model, params, num_params, x, y);
+    result.error = seen.x_in_img - x_in_img;
+    Eigen::Matrix<double, 2, 3> ray_by_point;
+    ray_by_point << 1, 0, -x, 0, 1, -y;
+    result.by_point = 1 / x_in_cam.z() * seen.by_ray * ray_by_point;
+    result.by_params = seen.by_params;
+    return result;
+  }
+  using Jet = ceres::Jet<double, kParams + 3>;
+  Jet jets[kMaxCameraParams], point[3], error[2];
+  for (int i = 0; i < num_params; ++i) {
+    jets[i] = Jet(params[i]);
+    if constexpr (kParams > 0) jets[i].v[i] = 1;
+  }
+  for (int i = 0; i < 3; ++i) point[i] = Jet(x_in_cam[i], kParams + i);
+  camera_formulas::ImgError(model, jets, point[0], point[1], point[2], x_in_img, &error[0],
+                            &error[1]);
+  for (int i = 0; i < 2; ++i) {
+    result.error[i] = error[i].a;
+    result.by_point.row(i) = error[i].v.template tail<3>().transpose();
+    result.by_params.row(i) = error[i].v.template head<kParams>().transpose();
+  }
+  return result;
+}
+
 }  // namespace roomtex

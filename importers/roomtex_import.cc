@@ -9,6 +9,7 @@
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
 #include "importers/length_unit.h"
+#include "importers/panorama_cutter.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
@@ -24,6 +25,7 @@ struct ImportOptions {
   std::vector<std::string> output_paths;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
+  FaceOptions faces;  // of panoramas
 };
 
 bool IsSameFile(const std::string& a, const std::string& b) {
@@ -196,6 +198,26 @@ class Importer {
   std::vector<std::vector<Triangle>> meshes_;
 };
 
+void CutPanoramasOf(const ImportOptions& options, const Command::Context& context) {
+  ThrowIfProblems(options.faces.Problems());
+  if (options.output_paths.size() != 1) {
+    throw UsageError("Of panoramas one --output_path is made: the folder for their faces.");
+  }
+  const std::string& folder = options.output_paths[0];
+  const fs::path input = options.input_path;
+  if (IsSameFile(folder, fs::is_directory(input) ? input.string() : input.parent_path().string())) {
+    throw UsageError("--output_path " + folder +
+                     " is the folder of the panoramas: give another one for their faces.");
+  }
+  const std::vector<CutPanorama> panoramas = CutPanoramas(
+      options.input_path, folder, options.faces, context.options.num_threads, &context.progress);
+  context.progress.Finish();
+  context.report["num_panoramas"] = panoramas.size();
+  context.report["faces_per_panorama"] = panoramas[0].faces.size();
+  context.report["face_size_px"] = panoramas[0].face_camera.width;
+  std::cout << (fs::path(folder) / "panoramas.json").string() << "\n";
+}
+
 }  // namespace
 }  // namespace roomtex
 
@@ -211,13 +233,22 @@ int main(int argc, char** argv) {
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
   command.AddInputPath("input_path", &options.input_path,
                        "The scan. A PTX may hold several: .ply and .ptx outputs then hold all of "
-                       "them, the others are written one per scan as NAME_1, NAME_2 ...");
+                       "them, the others are written one per scan as NAME_1, NAME_2 ... Or a "
+                       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
+                       "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
   command.AddOutputPaths("output_path", &options.output_paths,
                          "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
-                         "image, .rtpi (RTPI 3.0) or .ptx.");
+                         "image, .rtpi (RTPI 3.0) or .ptx. Of panoramas: the folder for their "
+                         "faces, panoramas.json (which face is which part of which panorama) and "
+                         "camera_options.txt (for colmap feature_extractor).");
   command.Add(FieldsOf(&options.reader));
   command.Add(FieldsOf(&options.mesh));
+  command.Add(FieldsOf(&options.faces));
   return command.Run(argc, argv, [&options](const Command::Context& context) {
-    roomtex::Importer(options, context).Run();
+    if (roomtex::IsPanoramaInput(options.input_path)) {
+      roomtex::CutPanoramasOf(options, context);
+    } else {
+      roomtex::Importer(options, context).Run();
+    }
   });
 }

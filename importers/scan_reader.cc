@@ -26,7 +26,7 @@ const char kKnownFormats[] =
     "Give an RTPI, a PTX, an organised PCD, a PLY or an OBJ mesh (the content counts, not the "
     "name)";
 
-bool StartsWith(std::string_view text, std::string_view start) {
+bool BeginsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
 }
 
@@ -53,9 +53,9 @@ bool IsWholeNumber(std::string_view line) {
 bool LooksLikePcd(std::string_view bytes) {
   while (!bytes.empty()) {
     const std::string_view line = TakeLine(&bytes);
-    if (line.empty() || StartsWith(line, "#")) continue;
+    if (line.empty() || BeginsWith(line, "#")) continue;
     for (const char* keyword : {"VERSION", "FIELDS", "COLUMNS"}) {
-      if (StartsWith(line, keyword)) return true;
+      if (BeginsWith(line, keyword)) return true;
     }
     return false;
   }
@@ -69,7 +69,7 @@ bool LooksLikePtx(std::string_view bytes) {
   while (!bytes.empty() && line.empty()) line = TakeLine(&bytes);
   if (!IsWholeNumber(line)) return false;
   line = TakeLine(&bytes);
-  return line.empty() || IsWholeNumber(StartsWith(line, "-") ? line.substr(1) : line);
+  return line.empty() || IsWholeNumber(BeginsWith(line, "-") ? line.substr(1) : line);
 }
 
 // The name of a format that users may take for a scan, "" if it is none of these.
@@ -81,7 +81,7 @@ std::string ForeignFormat(std::string_view bytes) {
       {"glTF", "a glTF model"},        {"OFF", "an OFF mesh"},
       {"solid ", "an STL mesh"},       {"SQLite format", "a database"}};
   for (const auto& [magic, name] : kMagics) {
-    if (StartsWith(bytes, magic)) return name;
+    if (BeginsWith(bytes, magic)) return name;
   }
   return "";
 }
@@ -154,7 +154,7 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
   const double meters_per_unit = MetersPerUnitOr(options.units, 1);
   ScanFile file;
   file.meters_per_unit = meters_per_unit;
-  if (StartsWith(start, "ply\n") || StartsWith(start, "ply\r")) {
+  if (BeginsWith(start, "ply\n") || BeginsWith(start, "ply\r")) {
     file.format = "PLY";
     file.scans.push_back(ReadPly(path, {meters_per_unit, options.max_range}, &file.byte_order));
   } else if (LooksLikePcd(start)) {

@@ -22,9 +22,12 @@ struct VisiblePart {
 constexpr double kMargin = 0.1;
 
 bool IsInView(const CameraProjection& projection, double max_radius2, const Eigen::Vector3d& p) {
-  if (!(p.z() > 1e-6)) return false;  // NaN (missing) as well
-  const double x = p.x() / p.z(), y = p.y() / p.z();
-  if (x * x + y * y > max_radius2) return false;
+  if (!(projection.Depth(p) > 1e-6)) return false;  // NaN (missing) as well
+  if (projection.camera().IsPanorama()) return true;
+  if (projection.camera().IsPerspective()) {
+    const double x = p.x() / p.z(), y = p.y() / p.z();
+    if (x * x + y * y > max_radius2) return false;
+  }
   const auto x_in_img = projection.ImgFromCam(p);
   if (!x_in_img) return false;
   const double dx = kMargin * projection.camera().width;
@@ -79,15 +82,14 @@ class DepthFinder {
               const RayCaster& surface)
       : projection_(projection), cam_from_scan_(cam_from_scan), surface_(surface) {}
 
-  // Depth (z in `cam`) of the nearest scan surface behind a pixel.
+  // Depth (CameraProjection::Depth) of the nearest scan surface behind a pixel.
   std::optional<double> At(const Eigen::Vector2d& x_in_img) const {
-    const auto x_in_cam = projection_.CamFromImg(x_in_img);
-    if (!x_in_cam) return std::nullopt;
-    const Eigen::Vector3d direction =
-        (cam_from_scan_.rotation.conjugate() * x_in_cam->homogeneous()).normalized();
+    const auto ray = projection_.RayFromImg(x_in_img);
+    if (!ray) return std::nullopt;
+    const Eigen::Vector3d direction = (cam_from_scan_.rotation.conjugate() * *ray).normalized();
     const auto hit = surface_.Cast(cam_from_scan_.TargetOriginInSource(), direction);
     if (!hit) return std::nullopt;
-    return (cam_from_scan_ * hit->point).z();
+    return projection_.Depth(cam_from_scan_ * hit->point);
   }
 
   // The surface around the pixel has no edge: on a plane the inverse depth is linear over the
@@ -167,7 +169,7 @@ ScaleEstimate EstimateScale(const SparseModel& model, const SparseImage& image,
     if (image.point3d_ids[i] == kInvalidPoint3dId) continue;
     const auto point = model.points.find(image.point3d_ids[i]);
     if (point == model.points.end()) continue;
-    const double alpha = (image.cam_from_model * point->second.x_in_model).z();
+    const double alpha = projection.Depth(image.cam_from_model * point->second.x_in_model);
     if (alpha > 0) features.push_back({image.points2d[i], alpha, false, 0});
   }
   if (features.size() > static_cast<size_t>(options.max_features)) {

@@ -1,6 +1,7 @@
 #include "align/clicks/view_pose.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -17,23 +18,38 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMinDepth = 1e-6;     // metres in front of the camera
 constexpr double kUsualResiduals = 4;  // what kUsualClickSigma counts as, beside real ones
 
-// Undistorted normalised coordinates of the clicks that have any, with their scan points.
+// The viewing rays of the clicks that have any, with their scan points.
 struct NormalisedPairs {
-  Eigen::Matrix2Xd x_in_cam;  // (x/z, y/z)
+  Eigen::Matrix3Xd ray;  // CameraProjection::RayFromImg
   Eigen::Matrix3Xd x_in_scan;
+  bool is_perspective = true;
+
+  int size() const { return static_cast<int>(ray.cols()); }
+  // Two vectors across the ray; of (x, y, 1) those that give the equations of thesis 7.1.1.
+  std::array<Eigen::Vector3d, 2> Across(int i) const {
+    const Eigen::Vector3d r = ray.col(i);
+    if (is_perspective) return {Eigen::Vector3d(1, 0, -r.x()), Eigen::Vector3d(0, 1, -r.y())};
+    const Eigen::Vector3d first = r.unitOrthogonal();
+    return {first, r.cross(first)};
+  }
+  // The point (`cam`) can be what click i shows.
+  bool IsAhead(int i, const Eigen::Vector3d& x_in_cam) const {
+    return is_perspective ? x_in_cam.z() > kMinDepth : ray.col(i).dot(x_in_cam) > kMinDepth;
+  }
 };
 
 NormalisedPairs Normalise(const CameraProjection& projection, const PointPairs& pairs) {
-  NormalisedPairs result{Eigen::Matrix2Xd(2, pairs.size()), Eigen::Matrix3Xd(3, pairs.size())};
+  NormalisedPairs result{Eigen::Matrix3Xd(3, pairs.size()), Eigen::Matrix3Xd(3, pairs.size()),
+                         projection.camera().IsPerspective()};
   int count = 0;
   for (int i = 0; i < pairs.size(); ++i) {
-    const auto x = projection.CamFromImg(pairs.x_in_img.col(i));
-    if (!x) continue;
-    result.x_in_cam.col(count) = *x;
+    const auto ray = projection.RayFromImg(pairs.x_in_img.col(i));
+    if (!ray) continue;
+    result.ray.col(count) = *ray;
     result.x_in_scan.col(count) = pairs.x_in_scan.col(i);
     ++count;
   }
-  result.x_in_cam.conservativeResize(2, count);
+  result.ray.conservativeResize(3, count);
   result.x_in_scan.conservativeResize(3, count);
   return result;
 }
@@ -71,34 +87,33 @@ Eigen::Quaterniond NearestRotation(const Eigen::Matrix3d& matrix) {
 
 // Thesis step 5: T for a given R, linear in the equations x z = X_x + T_x, y z = X_y + T_y.
 Eigen::Vector3d BestTranslation(const NormalisedPairs& pairs, const Eigen::Quaterniond& rotation) {
-  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  const int n = pairs.size();
   Eigen::MatrixXd a(2 * n, 3);
   Eigen::VectorXd b(2 * n);
   for (int i = 0; i < n; ++i) {
     const Eigen::Vector3d p = rotation * pairs.x_in_scan.col(i);
-    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
-    a.row(2 * i) << 1, 0, -x.x();
-    a.row(2 * i + 1) << 0, 1, -x.y();
-    b[2 * i] = x.x() * p.z() - p.x();
-    b[2 * i + 1] = x.y() * p.z() - p.y();
+    const auto across = pairs.Across(i);
+    for (int k = 0; k < 2; ++k) {
+      a.row(2 * i + k) = across[k].transpose();
+      b[2 * i + k] = -across[k].dot(p);
+    }
   }
   return a.colPivHouseholderQr().solve(b);
 }
 
 // Thesis steps 2 to 5. None if the projection matrix is not determined (coplanar picks).
 std::optional<Rigid> PoseFromProjectionMatrix(const NormalisedPairs& pairs, const Frame& frame) {
-  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  const int n = pairs.size();
   const double size = frame.extents.norm();
   if (n < 6 || !(frame.extents[2] > 1e-6 * size)) return std::nullopt;
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, 12);
   for (int i = 0; i < n; ++i) {
     Eigen::Vector4d p;
     p << (pairs.x_in_scan.col(i) - frame.centre) / size, 1;
-    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
-    a.block<1, 4>(2 * i, 0) = p.transpose();
-    a.block<1, 4>(2 * i, 8) = -x.x() * p.transpose();
-    a.block<1, 4>(2 * i + 1, 4) = p.transpose();
-    a.block<1, 4>(2 * i + 1, 8) = -x.y() * p.transpose();
+    const auto across = pairs.Across(i);
+    for (int k = 0; k < 6; ++k) {
+      a.block<1, 4>(2 * i + k / 3, 4 * (k % 3)) = across[k / 3][k % 3] * p.transpose();
+    }
   }
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
   const Eigen::VectorXd p = svd.matrixV().col(11);
@@ -112,7 +127,7 @@ std::optional<Rigid> PoseFromProjectionMatrix(const NormalisedPairs& pairs, cons
 
 // The pose that the homography between the plane through the points and the photo gives.
 std::optional<Rigid> PoseFromPlane(const NormalisedPairs& pairs, const Frame& frame) {
-  const int n = static_cast<int>(pairs.x_in_cam.cols());
+  const int n = pairs.size();
   const double size = frame.extents.norm();
   if (n < 4 || !(frame.extents[1] > 1e-9 * size)) return std::nullopt;
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, 9);
@@ -120,15 +135,25 @@ std::optional<Rigid> PoseFromPlane(const NormalisedPairs& pairs, const Frame& fr
     const Eigen::Vector3d local =
         frame.axes.transpose() * (pairs.x_in_scan.col(i) - frame.centre) / size;
     const Eigen::RowVector3d p(local.x(), local.y(), 1);
-    const Eigen::Vector2d x = pairs.x_in_cam.col(i);
-    a.block<1, 3>(2 * i, 0) = p;
-    a.block<1, 3>(2 * i, 6) = -x.x() * p;
-    a.block<1, 3>(2 * i + 1, 3) = p;
-    a.block<1, 3>(2 * i + 1, 6) = -x.y() * p;
+    const auto across = pairs.Across(i);
+    for (int k = 0; k < 6; ++k) {
+      a.block<1, 3>(2 * i + k / 3, 3 * (k % 3)) = across[k / 3][k % 3] * p;
+    }
   }
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
   const Eigen::VectorXd h = svd.matrixV().col(8);
-  const double sign = h[8] < 0 ? -1 : 1;  // the centre of the points is in front
+  double ahead = h[8];  // the centre of the points is in front
+  if (!pairs.is_perspective) {
+    ahead = 0;
+    for (int i = 0; i < n; ++i) {
+      const Eigen::Vector3d local =
+          frame.axes.transpose() * (pairs.x_in_scan.col(i) - frame.centre) / size;
+      const Eigen::Vector3d p(local.x(), local.y(), 1);
+      const Eigen::Vector3d seen(h.head<3>().dot(p), h.segment<3>(3).dot(p), h.tail<3>().dot(p));
+      ahead += pairs.ray.col(i).dot(seen.normalized());
+    }
+  }
+  const double sign = ahead < 0 ? -1 : 1;
   Eigen::Matrix3d m;
   m.col(0) = sign * Eigen::Vector3d(h[0], h[3], h[6]);
   m.col(1) = sign * Eigen::Vector3d(h[1], h[4], h[7]);
@@ -161,12 +186,16 @@ struct PickCost {
     T p[3];
     ceres::AngleAxisRotatePoint(pose, rotated, p);
     for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
-    if (p[2] < T(kMinDepth)) return false;
     T params[kMaxCameraParams], x, y;
     for (size_t i = 0; i < camera->params.size(); ++i) params[i] = T(camera->params[i]);
-    camera_formulas::Project(camera->model, params, T(p[0] / p[2]), T(p[1] / p[2]), &x, &y);
-    residual[0] = weight * (x - T(x_in_img.x()));
-    residual[1] = weight * (y - T(x_in_img.y()));
+    if (camera_formulas::IsPerspective(camera->model)) {
+      if (p[2] < T(kMinDepth)) return false;
+      for (int i = 0; i < 2; ++i) p[i] = p[i] / p[2];
+      p[2] = T(1);
+    }
+    camera_formulas::ImgError(camera->model, params, p[0], p[1], p[2], x_in_img, &x, &y);
+    residual[0] = weight * x;
+    residual[1] = weight * y;
     return true;
   }
   const Camera* camera;
@@ -251,17 +280,19 @@ Matrix6d InverseNormal(const Matrix6d& normal) {
 // Thesis steps 6 and 7, from one start. None if no point lies in front, or the solution leaves the
 // lens' field.
 std::optional<ViewPose> Refine(const CameraProjection& projection, const PointPairs& pairs,
-                               const Frame& frame, Rigid start) {
-  const auto num_in_front = [&pairs](const Rigid& pose) {
+                               const NormalisedPairs& normalised, const Frame& frame, Rigid start) {
+  const Eigen::Matrix3Xd& points =
+      normalised.is_perspective ? pairs.x_in_scan : normalised.x_in_scan;
+  const auto num_in_front = [&](const Rigid& pose) {
     int count = 0;
-    for (int i = 0; i < pairs.size(); ++i) count += (pose * pairs.x_in_scan.col(i)).z() > kMinDepth;
+    for (int i = 0; i < points.cols(); ++i) count += normalised.IsAhead(i, pose * points.col(i));
     return count;
   };
   if (num_in_front(start) == 0) {
     const Eigen::Vector3d normal = frame.axes.col(2);
     start = ReflectAboutPlane(start, normal, normal.dot(frame.centre));
   }
-  if (num_in_front(start) < pairs.size()) return std::nullopt;
+  if (num_in_front(start) < points.cols()) return std::nullopt;
   PoseProblem problem(projection, pairs, start);
   if (!problem.Solve()) return std::nullopt;
   ViewPose result;
@@ -335,11 +366,11 @@ std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const P
   }
   std::vector<ViewPose> found;
   for (const Rigid& one : starts) {
-    const auto refined = Refine(projection, pairs, frame, one);
+    const auto refined = Refine(projection, pairs, normalised, frame, one);
     if (!refined) continue;
     // The reflected solution of the refined pose is a better start than that of the rough one.
     found.push_back(*refined);
-    const auto reflected = Refine(projection, pairs, frame,
+    const auto reflected = Refine(projection, pairs, normalised, frame,
                                   ReflectedAlongSight(normalised, frame, refined->cam_from_scan));
     if (reflected) found.push_back(*reflected);
   }
@@ -374,8 +405,9 @@ Eigen::VectorXd PickResiduals(const CameraProjection& projection, const PointPai
                               const Rigid& cam_from_scan) {
   Eigen::VectorXd residual_px(pairs.size());
   for (int i = 0; i < pairs.size(); ++i) {
-    const auto x = projection.ImgFromCam(cam_from_scan * pairs.x_in_scan.col(i));
-    residual_px[i] = x ? (*x - pairs.x_in_img.col(i)).norm() : kInfinity;
+    const auto error =
+        projection.ImgError(cam_from_scan * pairs.x_in_scan.col(i), pairs.x_in_img.col(i));
+    residual_px[i] = error ? error->norm() : kInfinity;
   }
   return residual_px;
 }

@@ -1,5 +1,6 @@
 #include "align/fit/bent_model.h"
 
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -54,8 +55,17 @@ Rigid BentPose(const SparseModel& straight, const SparseImage& image, const Scan
 SparseModel BendModel(const SparseModel& straight, const ScanBend& bend) {
   SparseModel bent = straight;
   if (bend.IsNone()) return bent;
+  std::map<uint32_t, uint32_t> first_of_frame;  // photos of one frame follow its first
   for (auto& [id, image] : bent.images) {
-    image.cam_from_model = BentPose(straight, straight.images.at(id), bend);
+    const uint32_t first =
+        image.frame_id == kNoFrame ? id : first_of_frame.emplace(image.frame_id, id).first->second;
+    if (first == id) {
+      image.cam_from_model = BentPose(straight, straight.images.at(id), bend);
+    } else {
+      image.cam_from_model = straight.images.at(id).cam_from_model *
+                             straight.images.at(first).cam_from_model.Inverse() *
+                             bent.images.at(first).cam_from_model;
+    }
   }
   for (auto& [id, point] : bent.points) point.x_in_model = bend.Bend(point.x_in_model);
   return bent;

@@ -50,9 +50,10 @@ std::vector<double> ReprojectionDistances(const SparseModel& model) {
   for (const auto& [id, point] : model.points) {
     for (const TrackElement& element : point.track) {
       const SparseImage& image = model.images.at(element.image_id);
-      const auto x =
-          projections.at(image.camera_id).ImgFromCam(image.cam_from_model * point.x_in_model);
-      if (x) distances.push_back((*x - image.points2d[element.point2d_index]).norm());
+      const auto error = projections.at(image.camera_id)
+                             .ImgError(image.cam_from_model * point.x_in_model,
+                                       image.points2d[element.point2d_index]);
+      if (error) distances.push_back(error->norm());
     }
   }
   return distances;
@@ -182,7 +183,13 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
            " photos against the others by more than " + Number(limit, 3) + " m or " +
            Number(kMaxTurn_deg, 0) + " degrees.";
   }
-  result->idle_images.insert(runaway.begin(), runaway.end());
+  for (const uint32_t id : runaway) {
+    const uint32_t frame_id = input.model.images.at(id).frame_id;
+    result->idle_images.insert(id);
+    for (const auto& [other, image] : input.model.images) {
+      if (frame_id != kNoFrame && image.frame_id == frame_id) result->idle_images.insert(other);
+    }
+  }
   if (!runaway.empty()) {
     result->adjusted_from_input =
         FitModels(input.model, result->model, result->constraints, result->idle_images);
@@ -199,10 +206,10 @@ double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
     const SparseImage* const image = model.FindImage(input.picks[i].image_name);
     if (!input.used[i] || image == nullptr) continue;
     const Camera& camera = model.cameras.at(image->camera_id);
-    const auto x =
-        CameraProjection(camera).ImgFromCam(image->cam_from_model * input.picks[i].x_in_scan);
+    const auto error = CameraProjection(camera).ImgError(
+        image->cam_from_model * input.picks[i].x_in_scan, input.picks[i].x_in_img);
     diagonal = std::max(diagonal, std::hypot(camera.width, camera.height));
-    sum += x ? (*x - input.picks[i].x_in_img).squaredNorm() : diagonal * diagonal;
+    sum += error ? error->squaredNorm() : diagonal * diagonal;
     ++count;
   }
   const double limit = std::max({kMaxPickDeviations * input.pick_sigma_px, kMaxPickShare * diagonal,
@@ -261,16 +268,26 @@ std::vector<SurfaceConstraint> Straightened(std::vector<SurfaceConstraint> const
   return constraints;
 }
 
-// Photos that the sparse points do not hold.
+// Tells photos that move by themselves from those of one frame of a rig, which move as one.
+uint64_t FrameOf(const SparseImage& image) {
+  constexpr uint64_t kFrames = uint64_t{1} << 32;
+  return image.frame_id == kNoFrame ? image.image_id : kFrames + image.frame_id;
+}
+
+// Photos that the sparse points do not hold, those of one frame together.
 void FindIdleImages(const PlaneBundleInput& input, const PlaneBundleOptions& options,
                     PlaneBundle* result) {
+  std::map<uint32_t, long> seen_by_frame;
   for (const auto& [id, image] : input.model.images) {
-    if (options.fix_clicked_view && image.name == input.clicked_image) continue;
     const auto seen =
         std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(), [&](uint64_t point_id) {
           return point_id != kInvalidPoint3dId && input.model.points.at(point_id).track.size() >= 2;
         });
-    if (seen < kMinObservations) result->idle_images.insert(id);
+    seen_by_frame[FrameOf(image)] += seen;
+  }
+  for (const auto& [id, image] : input.model.images) {
+    if (options.fix_clicked_view && image.name == input.clicked_image) continue;
+    if (seen_by_frame.at(FrameOf(image)) < kMinObservations) result->idle_images.insert(id);
   }
 }
 

@@ -74,7 +74,10 @@ class RoundProblem {
     for (const auto& [id, index] : pose_index_) {
       const double* const pose = poses_[index].values;
       if (!problem_->HasParameterBlock(pose) || problem_->IsParameterBlockConstant(pose)) continue;
-      model->images.at(id).cam_from_model = poses_[index].CamFromScan();
+      const Rigid rig_from_scan = poses_[index].CamFromScan();
+      SparseImage& image = model->images.at(id);
+      image.cam_from_model =
+          image.frame_id == kNoFrame ? rig_from_scan : cam_from_rig_.at(id) * rig_from_scan;
     }
     for (const auto& [id, index] : point_index_) {
       model->points.at(id).x_in_model = points_[index];
@@ -101,10 +104,20 @@ class RoundProblem {
       params_.push_back({});
       std::copy(camera.params.begin(), camera.params.end(), params_.back().begin());
     }
+    std::map<uint32_t, uint32_t> first_of_frame;  // its image whose pose is that of the rig
     for (const auto& [id, image] : model_.images) {
       if (round_.idle_images.count(id) > 0) continue;
+      const uint32_t first = image.frame_id == kNoFrame
+                                 ? id
+                                 : first_of_frame.emplace(image.frame_id, id).first->second;
+      if (first != id) {
+        pose_index_[id] = pose_index_.at(first);
+        cam_from_rig_[id] = image.cam_from_model * model_.images.at(first).cam_from_model.Inverse();
+        continue;
+      }
       pose_index_[id] = poses_.size();
       poses_.emplace_back(image.cam_from_model);
+      cam_from_rig_[id] = Rigid();
     }
     for (const auto& [id, point] : model_.points) {
       const Eigen::Vector3d& x_in_model = point.x_in_model;
@@ -131,7 +144,8 @@ class RoundProblem {
     const Camera& camera = model_.cameras.at(model_.images.at(image_id).camera_id);
     PoseParameters& pose = poses_[pose_index_.at(image_id)];
     const bool refine = round_.options.refine_intrinsics;
-    auto* const cost = new ReprojectionCost(pose, camera, x_in_img, weight, refine);
+    auto* const cost =
+        new ReprojectionCost(pose, camera, x_in_img, weight, refine, cam_from_rig_.at(image_id));
     if (refine) {
       problem_->AddResidualBlock(cost, &reprojection_loss_, pose.values, point,
                                  params_[camera_index_.at(camera.camera_id)].data());
@@ -213,6 +227,7 @@ class RoundProblem {
   const SparseModel& model_;
   std::map<uint32_t, CameraProjection> projections_;
   std::map<uint32_t, size_t> camera_index_, pose_index_;
+  std::map<uint32_t, Rigid> cam_from_rig_;  // by image; the rig is the first image of its frame
   std::map<uint64_t, size_t> point_index_;
   std::vector<std::array<double, kMaxCameraParams>> params_;
   std::vector<PoseParameters> poses_;

@@ -9,6 +9,7 @@
 #include "colmap_ext/lens_prior.h"
 #include "colmap_ext/reduced_normal.h"
 #include "core/robust_kernel.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -18,18 +19,29 @@ class ReducedSystem {
   ReducedSystem(const PlaneBundleInput& input, const PlaneBundle& bundle,
                 const PlaneBundleOptions& options)
       : input_(input), bundle_(bundle), with_lenses_(options.refine_intrinsics) {
+    std::map<uint32_t, uint32_t> first_of_frame;
     for (const auto& [id, image] : bundle.model.images) {
       if (bundle.idle_images.count(id) > 0) continue;
+      // Photos of one frame have one pose, that of its first.
+      const uint32_t first = image.frame_id == kNoFrame
+                                 ? id
+                                 : first_of_frame.emplace(image.frame_id, id).first->second;
+      const Rigid& rig_from_scan = bundle.model.images.at(first).cam_from_model;
+      poses_.emplace(id, PoseParameters(rig_from_scan));
+      cam_from_rig_[id] = first == id ? Rigid() : image.cam_from_model * rig_from_scan.Inverse();
       const bool fixed = options.fix_clicked_view && image.name == input.clicked_image;
-      if (!fixed) pose_offset_.emplace(id, 6 * static_cast<int>(pose_offset_.size()));
-      poses_.emplace(id, PoseParameters(image.cam_from_model));
       if (with_lenses_) camera_offset_[image.camera_id] = -1;
+      if (first != id && pose_offset_.count(first) > 0) {
+        pose_offset_.emplace(id, pose_offset_.at(first));
+      } else if (first == id && !fixed) {
+        pose_offset_.emplace(id, 6 * num_poses_++);
+      }
     }
-    num_unknowns_ = 6 * static_cast<int>(pose_offset_.size());
+    num_unknowns_ = 6 * num_poses_;
     PlaceLenses();
   }
 
-  size_t num_poses() const { return pose_offset_.size(); }
+  size_t num_poses() const { return static_cast<size_t>(num_poses_); }
 
   BundleCovariances Find() const {
     ReducedNormal normal(num_unknowns_);
@@ -50,6 +62,9 @@ class ReducedSystem {
     if (covariance.size() == 0) return found;
     for (const auto& [id, offset] : pose_offset_) {
       found.poses[id] = covariance.block<6, 6>(offset, offset);
+      if (bundle_.model.images.at(id).frame_id == kNoFrame) continue;
+      const Eigen::Matrix<double, 6, 6> cam_by_rig = CameraByRig(id);
+      found.poses[id] = cam_by_rig * found.poses[id] * cam_by_rig.transpose();
     }
     for (const auto& [id, offset] : camera_offset_) {
       const int n = static_cast<int>(bundle_.model.cameras.at(id).params.size());
@@ -59,6 +74,18 @@ class ReducedSystem {
   }
 
  private:
+  // How (w, centre) of a camera go with those of its rig: w_cam = R w, and the camera's place c in
+  // the rig turns with it.
+  Eigen::Matrix<double, 6, 6> CameraByRig(uint32_t image_id) const {
+    const Rigid& cam_from_rig = cam_from_rig_.at(image_id);
+    const Rigid rig_from_scan = poses_.at(image_id).CamFromScan();
+    Eigen::Matrix<double, 6, 6> cam_by_rig = Eigen::Matrix<double, 6, 6>::Identity();
+    cam_by_rig.topLeftCorner<3, 3>() = cam_from_rig.rotation.toRotationMatrix();
+    cam_by_rig.bottomLeftCorner<3, 3>() = rig_from_scan.rotation.conjugate().toRotationMatrix() *
+                                          CrossMatrix(cam_from_rig.TargetOriginInSource());
+    return cam_by_rig;
+  }
+
   // Behind the poses.
   void PlaceLenses() {
     std::map<int, int> offset_of_lens;
@@ -98,7 +125,8 @@ class ReducedSystem {
     const auto pose = poses_.find(image_id);
     if (pose == poses_.end()) return false;
     const Camera& camera = bundle_.model.cameras.at(bundle_.model.images.at(image_id).camera_id);
-    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, with_lenses_);
+    const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, with_lenses_,
+                                cam_from_rig_.at(image_id));
     const double* const parameters[3] = {pose->second.values, x_in_scan.data(),
                                          camera.params.data()};
     Eigen::Vector2d residual;
@@ -153,6 +181,8 @@ class ReducedSystem {
   const PlaneBundle& bundle_;
   const bool with_lenses_;
   std::map<uint32_t, PoseParameters> poses_;
+  std::map<uint32_t, Rigid> cam_from_rig_;
+  int num_poses_ = 0;
   std::map<uint32_t, int> pose_offset_, camera_offset_;
   std::map<int, uint32_t> lenses_;  // offset of a lens, one of its cameras
   int num_unknowns_ = 0;

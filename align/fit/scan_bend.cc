@@ -239,10 +239,8 @@ class BendSolver {
   std::optional<Eigen::Vector2d> PickError(size_t i, const State& state) const {
     const SparseImage* const image = model_.FindImage(picks_[i].image_name);
     const Rigid cam_from_scan = CamFromScan(image->cam_from_model, state.scan_from_sparse);
-    const auto x = projections_.at(image->camera_id)
-                       .ImgFromCam(cam_from_scan * state.bend.Straighten(picks_[i].x_in_scan));
-    if (!x) return std::nullopt;
-    return Eigen::Vector2d(*x - picks_[i].x_in_img);
+    return projections_.at(image->camera_id)
+        .ImgError(cam_from_scan * state.bend.Straighten(picks_[i].x_in_scan), picks_[i].x_in_img);
   }
 
   void AddPicks(const State& state, Matrix* normal, Vector* gradient) const {

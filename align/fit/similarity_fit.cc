@@ -120,12 +120,14 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     Rigid pose;
     Eigen::Vector3d centre;
     double focal_length;
+    bool is_perspective;
   };
   std::map<uint32_t, View> views;
   for (const auto& [id, image] : model.images) {
     const Rigid& pose = image.cam_from_model;
     views[id] = {pose.rotation.toRotationMatrix(), pose, pose.TargetOriginInSource(),
-                 model.cameras.at(image.camera_id).MeanFocalLength()};
+                 model.cameras.at(image.camera_id).MeanFocalLength(),
+                 model.cameras.at(image.camera_id).IsPerspective()};
   }
   std::vector<SurfacePoint> points;
   for (const auto& [id, sparse] : model.points) {
@@ -138,9 +140,16 @@ std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_tr
     for (const TrackElement& element : sparse.track) {
       const View& view = views.at(element.image_id);
       const Eigen::Vector3d p = view.pose * sparse.x_in_model;
-      if (!(p.z() > 0)) continue;
-      Eigen::Matrix<double, 2, 3> jacobian;  // of an undistorted projection: enough for a weight
-      jacobian << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
+      if (view.is_perspective && !(p.z() > 0)) continue;
+      // Of an undistorted projection: enough for a weight.
+      Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
+      if (view.is_perspective) {
+        jacobian.topRows<2>() << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(),
+            -p.y() / (p.z() * p.z());
+      } else {
+        const Eigen::Vector3d ray = p.normalized();
+        jacobian = (Eigen::Matrix3d::Identity() - ray * ray.transpose()) / p.norm();
+      }
       jacobian *= view.focal_length * view.rotation;
       information += jacobian.transpose() * jacobian;
       const Eigen::Vector3d offset = view.centre - sparse.x_in_model;

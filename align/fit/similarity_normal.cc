@@ -24,9 +24,10 @@ PickTerms::PickTerms(const SparseModel& model, const std::vector<Pick>& picks) {
 Eigen::Vector2d PickTerms::Error(int i, const Similarity& scan_from_sparse) const {
   const Term& term = terms_[i];
   const Rigid cam_from_scan = CamFromScan(term.cam_from_sparse, scan_from_sparse);
-  const auto x = term.projection->ImgFromCam(cam_from_scan * term.pick->x_in_scan);
-  if (!x) return Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
-  return *x - term.pick->x_in_img;
+  const auto error =
+      term.projection->ImgError(cam_from_scan * term.pick->x_in_scan, term.pick->x_in_img);
+  if (error) return *error;
+  return Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
 }
 
 double PickTerms::PixelsPerMetre(int i, const Similarity& scan_from_sparse) const {

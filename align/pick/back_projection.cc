@@ -75,8 +75,10 @@ cv::Mat DrawBackProjection(const PickScene& scene, const ScanRays& rays, const P
     for (int column = 0; column < picture.cols; ++column) {
       const Eigen::Vector3d& x_in_scan = places.scan().points[places.SampleAt(column, row)];
       const Eigen::Vector3d x = rotation * x_in_scan + cam_from_scan.translation;
-      if (!(x.z() > 1e-6)) continue;  // NaN as well
-      if (x.head<2>().squaredNorm() > max_radius2 * x.z() * x.z()) continue;
+      if (!(projection.Depth(x) > 1e-6)) continue;  // NaN as well
+      if (camera.IsPerspective() && x.head<2>().squaredNorm() > max_radius2 * x.z() * x.z()) {
+        continue;
+      }
       const auto x_in_img = projection.ImgFromCam(x);
       if (!x_in_img || !projection.InImage(*x_in_img)) continue;
       if (rays.IsHidden(centre, x_in_scan)) continue;

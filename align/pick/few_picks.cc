@@ -20,6 +20,7 @@ constexpr double kSameRotation = 1e-4, kSamePosition = 1e-4;
 // nowhere.
 constexpr double kMaxStartShare = 0.3;
 constexpr size_t kMaxStarts = 6;
+constexpr double kMinForward = 0.02;  // z of a ray that the closed form can take
 
 PointPairs Chosen(const PointPairs& pairs, const std::vector<int>& indices) {
   const int n = static_cast<int>(indices.size());
@@ -47,8 +48,8 @@ void AddIfNew(const ViewPose& pose, std::vector<ViewPose>* poses) {
 Vector6d Errors(const CameraProjection& projection, const PointPairs& pairs, const Rigid& pose) {
   Vector6d errors = Vector6d::Constant(std::numeric_limits<double>::quiet_NaN());
   for (int i = 0; i < 3; ++i) {
-    const auto x = projection.ImgFromCam(pose * pairs.x_in_scan.col(i));
-    if (x) errors.segment<2>(2 * i) = *x - pairs.x_in_img.col(i);
+    const auto error = projection.ImgError(pose * pairs.x_in_scan.col(i), pairs.x_in_img.col(i));
+    if (error) errors.segment<2>(2 * i) = *error;
   }
   return errors;
 }
@@ -74,18 +75,42 @@ void Polish(const CameraProjection& projection, const PointPairs& pairs, Rigid* 
   }
 }
 
+// A direction that has three unit vectors (columns) before it, as far as can be: their sum, or the
+// axis of the cone through them where they point apart.
+Eigen::Vector3d AxisBefore(const Eigen::Matrix3d& directions) {
+  const Eigen::Vector3d sum = directions.rowwise().sum().normalized();
+  Eigen::Vector3d axis = (directions.col(1) - directions.col(0))
+                             .cross(directions.col(2) - directions.col(0))
+                             .normalized();
+  if (axis.dot(directions.col(0)) < 0) axis = -axis;
+  const double before_sum = (sum.transpose() * directions).minCoeff();
+  const double before_axis = (axis.transpose() * directions).minCoeff();
+  return before_axis > before_sum ? axis : sum;
+}
+
 }  // namespace
 
 std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs) {
   const Eigen::Vector3d centre = pairs.x_in_scan.rowwise().mean();
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> rays;
+  Eigen::Matrix3d directions;
   for (int i = 0; i < 3; ++i) {
-    const auto x = projection.CamFromImg(pairs.x_in_img.col(i));
-    if (!x) return {};
+    const auto ray = projection.RayFromImg(pairs.x_in_img.col(i));
+    if (!ray) return {};
+    directions.col(i) = *ray;
+  }
+  // The closed form wants rays that point forward: a camera that sees all around is turned to them.
+  Eigen::Quaterniond ahead_from_cam = Eigen::Quaterniond::Identity();
+  if (!projection.camera().IsPerspective()) {
+    ahead_from_cam.setFromTwoVectors(AxisBefore(directions), Eigen::Vector3d::UnitZ());
+  }
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d ray = ahead_from_cam * directions.col(i);
+    if (!(ray.z() > kMinForward)) return {};
     const Eigen::Vector3d p = pairs.x_in_scan.col(i) - centre;
     points.emplace_back(p.x(), p.y(), p.z());
-    rays.emplace_back(x->x(), x->y());
+    rays.emplace_back(ray.x() / ray.z(), ray.y() / ray.z());
   }
   std::vector<cv::Mat> rotations, translations;
   cv::solveP3P(points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations,
@@ -99,8 +124,9 @@ std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const 
     }
     if (!axis.allFinite() || !translation.allFinite()) continue;
     ViewPose pose;
-    pose.cam_from_scan.rotation = RotationFromVector(axis);
-    pose.cam_from_scan.translation = translation - pose.cam_from_scan.rotation * centre;
+    pose.cam_from_scan.rotation = ahead_from_cam.conjugate() * RotationFromVector(axis);
+    pose.cam_from_scan.translation =
+        ahead_from_cam.conjugate() * translation - pose.cam_from_scan.rotation * centre;
     Polish(projection, pairs, &pose.cam_from_scan);
     pose.residual_px = PickResiduals(projection, pairs, pose.cam_from_scan);
     if (!pose.residual_px.allFinite()) continue;  // a point behind the camera

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "align/pick/mesh_panorama.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/scan_record.h"
@@ -71,7 +72,9 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
 void PickScene::ReadModel(Progress* progress) {
   if (has_model()) {
     progress->Stage("read model");
-    model_ = ReadSparseModel(input_.input_path);
+    std::vector<std::string> warnings;
+    model_ = ReadModelOfPanoramas(input_.input_path, input_.panoramas_path, &warnings);
+    for (const std::string& warning : warnings) progress->Note(warning);
     if (!model_.images.empty()) return;
     throw InputError(input_.input_path, "", "the sparse model has no photos",
                      "Reconstruct the photos first (roomtex-mapper)");

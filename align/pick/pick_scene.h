@@ -28,6 +28,7 @@ namespace roomtex {
 
 struct PickSceneInput {
   std::string input_path, image_path, scan_poses;  // input_path "": the photos of image_path alone
+  std::string panoramas_path;                      // of MergeFaces(); may be empty
   PhotoCameraOptions camera;                       // of those
   std::vector<std::string> scan_paths;             // empty: those that the model remembers
   ScanReaderOptions scan_reader;

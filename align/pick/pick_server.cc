@@ -45,6 +45,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
   }
   if (!input.camera.camera_params.empty()) add("--camera_params", input.camera.camera_params);
   if (!input.scan_poses.empty()) add("--scan_poses", input.scan_poses);
+  if (!input.panoramas_path.empty()) add("--panoramas_path", input.panoramas_path);
   const ScanReaderOptions &reader = input.scan_reader, defaults;
   if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
   if (reader.units != defaults.units) add("--units", reader.units);

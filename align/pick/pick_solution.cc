@@ -15,9 +15,10 @@ constexpr int kMinPicks = 3;  // in one photo, that can say something about its 
 double MetresOff(const CameraProjection& projection, const Rigid& cam_from_scan,
                  const SessionPick& pick) {
   const Eigen::Vector3d x_in_cam = cam_from_scan * *pick.x_in_scan;
-  const auto ray = projection.CamFromImg(*pick.x_in_img);
-  if (!ray || !(x_in_cam.z() > 0)) return kNoNumber;
-  return (x_in_cam.z() * ray->homogeneous() - x_in_cam).norm();
+  const auto ray = projection.RayFromImg(*pick.x_in_img);
+  const double depth = projection.Depth(x_in_cam);
+  if (!ray || !(depth > 0)) return kNoNumber;
+  return (depth * *ray - x_in_cam).norm();
 }
 
 double WeightedRms(double sum, double sum_of_weights) {
@@ -260,8 +261,8 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
       continue;
     }
     const CameraProjection& projection = photo.projection(*scene_.FindPhoto(pick.image_name));
-    const auto x_in_img = projection.ImgFromCam(photo.cam_from_scan * *pick.x_in_scan);
-    if (x_in_img) state.error_px = *x_in_img - *pick.x_in_img;
+    const auto error = projection.ImgError(photo.cam_from_scan * *pick.x_in_scan, *pick.x_in_img);
+    if (error) state.error_px = *error;
     state.residual_px = state.error_px.norm();
     state.residual = MetresOff(projection, photo.cam_from_scan, pick);
     if (state.status != PickState::Status::kUsed) continue;
@@ -297,10 +298,9 @@ void PickSolver::Predict(const std::vector<SessionPick>& picks, const ScanRays* 
       if (x_in_img && projection.InImage(*x_in_img)) state.predicted_img = x_in_img;
     }
     if (!pick.x_in_img || rays == nullptr) continue;
-    const auto ray = projection.CamFromImg(*pick.x_in_img);
+    const auto ray = projection.RayFromImg(*pick.x_in_img);
     if (!ray) continue;
-    const Eigen::Vector3d direction =
-        photo.cam_from_scan.rotation.conjugate() * ray->homogeneous().normalized();
+    const Eigen::Vector3d direction = photo.cam_from_scan.rotation.conjugate() * ray->normalized();
     const auto hit = rays->caster().Cast(photo.cam_from_scan.TargetOriginInSource(), direction);
     if (!hit) continue;
     const int scan = rays->ScanOf(hit->triangle);

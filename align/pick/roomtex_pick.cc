@@ -10,6 +10,7 @@
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_server.h"
 #include "align/pick/pick_session.h"
+#include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/open_browser.h"
@@ -47,6 +48,8 @@ void AddOptions(Arguments* a, Command* command) {
                          "Folder that the page's Align writes to; empty = aligned, beside the "
                          "picks.",
                          Command::Kind::kOptional);
+  command->AddInputPath("panoramas_path", &a->scene.panoramas_path, PanoramasHelp(),
+                        Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &a->scene.scan_poses, ScanPosesHelp(),
                         Command::Kind::kOptional);
   command->Add(FieldsOf(&a->scene.scan_reader));

@@ -8,6 +8,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "align/trust/perspective_views.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
 #include "core/parallel.h"
@@ -138,12 +139,12 @@ void MeasureImages(const ScanView& view, const cv::Mat& photo, const CameraSetup
   }
 }
 
-PhotoAgreement MeasurePhoto(const SparseModel& aligned, const SparseImage& image,
+PhotoAgreement MeasurePhoto(const PerspectiveViews& views, const SparseImage& image,
                             const std::string& image_path, const ScanViewer& viewer,
                             const CameraSetup& setup, const AgreementOptions& options) {
   PhotoAgreement result;
-  const Camera& camera = aligned.cameras.at(image.camera_id);
-  const auto photo = ReadPhotoOf(image, camera, image_path, &result.warning);
+  const Camera& camera = views.model().cameras.at(image.camera_id);
+  const auto photo = views.Read(image, image_path, &result.warning);
   if (!photo) return result;
   const ScanView view = viewer.Look(*setup.lattice, camera, image.cam_from_model, setup.cell_px);
   if (view.valid_share < kMinValidShare) return result;
@@ -220,9 +221,10 @@ double PatchNcc(const cv::Mat1b& a, const cv::Mat1b& b, const cv::Mat1b& valid, 
 Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_path,
                            const ScanViewer& viewer, const AgreementOptions& options,
                            int num_threads, std::vector<std::string>* warnings) {
+  const PerspectiveViews views(aligned);
   // Every num_sets-th of them make a set of its own that is spread over all.
   const std::vector<const SparseImage*> images =
-      SpreadImages(aligned, kMaxSets * options.num_photos);
+      SpreadImages(views.model(), kMaxSets * options.num_photos);
   const int num_images = static_cast<int>(images.size());
   const int num_sets = std::max(1, (num_images + options.num_photos - 1) / options.num_photos);
   std::map<uint32_t, CameraSetup> setups;
@@ -234,11 +236,11 @@ Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_
       members.push_back(i);
       const uint32_t camera_id = images[i]->camera_id;
       if (setups.count(camera_id)) continue;
-      setups.emplace(camera_id, SetUpCamera(aligned.cameras.at(camera_id), viewer, options));
+      setups.emplace(camera_id, SetUpCamera(views.model().cameras.at(camera_id), viewer, options));
     }
     ParallelFor(num_threads, 0, static_cast<int>(members.size()), [&](int k) {
       const int i = members[k];
-      photos[i] = MeasurePhoto(aligned, *images[i], image_path, viewer,
+      photos[i] = MeasurePhoto(views, *images[i], image_path, viewer,
                                setups.at(images[i]->camera_id), options);
     });
     bool any = false;

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "align/trust/perspective_views.h"
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
@@ -292,7 +293,8 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     if (!scan.organised) continue;
     for (ScanEdge& edge : FindScanEdges(scan, options.edges)) edges.push_back(std::move(edge));
   }
-  const std::vector<const SparseImage*> images = SpreadImages(aligned, count);
+  const PerspectiveViews views(aligned);
+  const std::vector<const SparseImage*> images = SpreadImages(views.model(), count);
   struct Setup {
     CameraProjection projection;
     int cell_px;
@@ -310,7 +312,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     while (!taken.insert(name).second) name += "_";
     paths.push_back(folder + "/" + name + ".jpg");
     if (setups.count(image->camera_id)) continue;
-    const Camera& camera = aligned.cameras.at(image->camera_id);
+    const Camera& camera = views.model().cameras.at(image->camera_id);
     const double pixels = static_cast<double>(camera.width) * camera.height;
     int cell_px =
         std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / options.max_view_cells))));
@@ -326,7 +328,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     const SparseImage& image = *images[i];
     const Setup& setup = setups.at(image.camera_id);
     const Camera& camera = setup.projection.camera();
-    const auto photo = ReadPhotoOf(image, camera, image_path, &problems[i]);
+    const auto photo = views.Read(image, image_path, &problems[i]);
     if (!photo) return;
     const ScanView view = viewer.Look(setup.lattice, camera, image.cam_from_model, setup.cell_px);
     const cv::Mat sheet = DrawOverlay(

@@ -196,6 +196,22 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
                   {1, scan_from_room.rotation, scan_from_room.translation});
 }
 
+// COLMAP before 4.1 gets faces of the panoramas; picks and colours are those of the panoramas.
+std::string CommandsForPanoramas(const std::string& scans) {
+  return "export QT_QPA_PLATFORM=offscreen\n"
+         "roomtex-import --input_path photos --output_path faces\n"
+         "colmap feature_extractor --database_path database.db --image_path faces "
+         "--SiftExtraction.use_gpu 0 $(cat faces/camera_options.txt)\n"
+         "colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0\n"
+         "roomtex-mapper --database_path database.db --image_path faces --output_path sparse\n"
+         "roomtex-align --input_path sparse/0 --panoramas_path faces/panoramas.json --image_path "
+         "photos" +
+         scans +
+         " --picks_path picks.csv --output_path aligned\n"
+         "roomtex-texture --input_path aligned --image_path photos" +
+         scans + " --output_path textured\n";
+}
+
 std::string CommandsToType(bool paired, const std::string& scans) {
   // The photos for COLMAP and those for the colours.
   const std::string mapped = paired ? "linked/patterned" : "photos";
@@ -231,38 +247,37 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   if (options.num_stations > 1) scans += " --scan_poses scan_poses.txt";
   std::ostringstream text;
   const bool paired = options.projectors > 0;
-  text << "A simulated room: " << room.NumPhotos() << " photos and " << options.num_stations
-       << (options.num_stations == 1 ? " range scan" : " range scans")
-       << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
-       << "photos/             the photos"
-       << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
-       << (paired
-               ? "                    every place twice, the camera unmoved: in the light of the "
-                 "projectors,\n"
-                 "                    then without it\n"
-               : "")
-       << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
-       << (options.num_stations > 1
-               ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
-               : "")
-       << "picks.csv           clicks: a pixel of a photo and the scan point seen there\n"
-       << "cameras.txt         the calibrated camera\n"
-       << "camera_options.txt  the same as options of colmap feature_extractor\n"
-       << "truth/              what the tools have to find out: the true poses in the scan frame "
-          "(a COLMAP\n"
-       << "                    text model), exposures.csv (EV relative to nominal), "
-          "scan_from_room.txt\n"
-       << "                    (scale, quaternion w x y z, translation; room: z up, origin in a "
-          "corner\n"
-       << "                    of the floor) and true_colors.ply (scan points in grid order, "
-          "missing\n"
-       << "                    ones left out, with their true colour)\n"
-       << (paired ? "                    associations.csv (which photos belong together), "
-                    "pattern_N.png and\n"
-                    "                    projectors.txt (what the projectors throw, from where)\n"
-                  : "")
-       << "\nType, in this folder:\n\n"
-       << CommandsToType(paired, scans);
+  text
+      << "A simulated room: " << room.NumPhotos() << " photos and " << options.num_stations
+      << (options.num_stations == 1 ? " range scan" : " range scans")
+      << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
+      << "photos/             the photos"
+      << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
+      << (paired ? "                    every place twice, the camera unmoved: in the light of the "
+                   "projectors,\n"
+                   "                    then without it\n"
+                 : "")
+      << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
+      << (options.num_stations > 1 ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
+                                   : "")
+      << "picks.csv           clicks: a pixel of a photo and the scan point seen there\n"
+      << "cameras.txt         the calibrated camera\n"
+      << "camera_options.txt  the same as options of colmap feature_extractor\n"
+      << "truth/              what the tools have to find out: the true poses in the scan frame "
+         "(a COLMAP\n"
+      << "                    text model), exposures.csv (EV relative to nominal), "
+         "scan_from_room.txt\n"
+      << "                    (scale, quaternion w x y z, translation; room: z up, origin in a "
+         "corner\n"
+      << "                    of the floor) and true_colors.ply (scan points in grid order, "
+         "missing\n"
+      << "                    ones left out, with their true colour)\n"
+      << (paired ? "                    associations.csv (which photos belong together), "
+                   "pattern_N.png and\n"
+                   "                    projectors.txt (what the projectors throw, from where)\n"
+                 : "")
+      << "\nType, in this folder:\n\n"
+      << (room.camera().IsPanorama() ? CommandsForPanoramas(scans) : CommandsToType(paired, scans));
   WriteText(folder + "/README.txt", text.str());
 }
 

@@ -37,17 +37,19 @@ PhotoRenderer::PhotoRenderer(const RoomScene& scene, const CameraProjection& cam
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < lattice_columns_; ++column) {
-      const auto ray = camera.CamFromImg(Eigen::Vector2d(column * kStep, row * kStep));
-      lattice_.push_back(ray ? *ray : Eigen::Vector2d(nan, nan));
+      Eigen::Vector2d at(column * kStep, row * kStep);
+      if (camera.camera().IsPanorama()) at.y() = std::min<double>(at.y(), height_);
+      const auto ray = camera.RayFromImg(at);
+      lattice_.push_back(ray ? *ray : Eigen::Vector3d(nan, nan, nan));
     }
   }
 }
 
-Eigen::Vector2d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
+Eigen::Vector3d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
   const double x = x_in_img / kStep, y = y_in_img / kStep;
   const int column = static_cast<int>(x), row = static_cast<int>(y);
   const double s = x - column, t = y - row;
-  const Eigen::Vector2d* node = &lattice_[row * lattice_columns_ + column];
+  const Eigen::Vector3d* node = &lattice_[row * lattice_columns_ + column];
   return (1 - t) * ((1 - s) * node[0] + s * node[1]) +
          t * ((1 - s) * node[lattice_columns_] + s * node[lattice_columns_ + 1]);
 }
@@ -56,7 +58,7 @@ PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_
                                          double y_in_img, double pixel_size,
                                          const ProjectedLight* projected) const {
   const auto direction_at = [&](double x, double y) -> Eigen::Vector3d {
-    return room_from_cam.leftCols<3>() * RayAt(x, y).homogeneous().normalized();
+    return room_from_cam.leftCols<3>() * RayAt(x, y).normalized();
   };
   Eigen::Vector3d origin = room_from_cam.col(3);
   Eigen::Vector3d direction = direction_at(x_in_img, y_in_img);

@@ -39,7 +39,7 @@ class PhotoRenderer {
     LinearRgb color = LinearRgb::Zero();
     int place = -1;  // tells surfaces apart
   };
-  Eigen::Vector2d RayAt(double x_in_img, double y_in_img) const;
+  Eigen::Vector3d RayAt(double x_in_img, double y_in_img) const;
   using Pose = Eigen::Matrix<double, 3, 4>;
   Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size,
              const ProjectedLight* projected) const;
@@ -49,10 +49,10 @@ class PhotoRenderer {
   const RoomScene& scene_;
   int width_, height_;
   Eigen::Vector2d principal_point_;
-  // (x/z, y/z) of the rays through a lattice of kStep pixels, linear between: exact to 0.001 px.
+  // RayFromImg() through a lattice of kStep pixels, linear between: exact to 0.001 px.
   static constexpr int kStep = 4;
   int lattice_columns_;
-  std::vector<Eigen::Vector2d> lattice_;
+  std::vector<Eigen::Vector3d> lattice_;
 };
 
 }  // namespace roomtex

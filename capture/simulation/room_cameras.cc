@@ -37,6 +37,18 @@ std::vector<double> DistortionOf(CameraModel model) {
       return {0.02, -0.01, 0.003, -0.001};
     case CameraModel::kThinPrismFisheye:
       return {0.02, -0.01, 0.0006, -0.0004, 0.003, -0.001, 0.0005, 0.0004};
+    case CameraModel::kRadTanThinPrismFisheye:
+      return {0.02,   -0.01,   0.003,  -0.001,  0.0003, -0.0001,
+              0.0006, -0.0004, 0.0005, -0.0002, 0.0004, 0.0001};
+    case CameraModel::kSimpleDivision:
+    case CameraModel::kDivision:
+      return {-0.07};
+    case CameraModel::kSimpleFisheye:
+    case CameraModel::kFisheye:
+    case CameraModel::kEquirectangular:
+      return {};
+    case CameraModel::kEucm:
+      return {0.55, 1.05};
   }
   return {};
 }
@@ -89,9 +101,9 @@ std::vector<float> MeterPlaces(const RoomScene& scene, const ProjectedLight* pro
   for (int k = 0; k < 40 * 27; ++k) {
     const Eigen::Vector2d at((k % 40 + 0.5) / 40 * camera.width,
                              (k / 40 + 0.5) / 27 * camera.height);
-    const auto ray = projection.CamFromImg(at);
+    const auto ray = projection.RayFromImg(at);
     if (!ray) continue;
-    const Eigen::Vector3d direction = room_from_cam.rotation * ray->homogeneous().normalized();
+    const Eigen::Vector3d direction = room_from_cam.rotation * ray->normalized();
     const auto hit = scene.Cast(room_from_cam.translation, direction);
     if (!hit || scene.patches()[hit->patch].shines) continue;
     LinearRgb added = LinearRgb::Zero();
@@ -107,6 +119,8 @@ float Brightest(std::vector<float> brightest) {
 }
 
 constexpr double kBurnsOut = 0.95;
+// A camera that sees all around is held almost upright.
+constexpr double kLevelShare = 0.2;
 
 }  // namespace
 
@@ -117,12 +131,23 @@ Camera MakeRoomCamera(const SimulatedRoomOptions& options) {
   camera.width = options.photo_width;
   camera.height = options.photo_height;
   camera.has_prior_focal_length = true;
-  const bool fisheye = camera.model == CameraModel::kOpenCvFisheye ||
-                       camera.model == CameraModel::kSimpleRadialFisheye ||
-                       camera.model == CameraModel::kRadialFisheye ||
-                       camera.model == CameraModel::kThinPrismFisheye;
+  if (camera.IsPanorama()) {
+    camera.params = {static_cast<double>(camera.width), static_cast<double>(camera.height)};
+    return camera;
+  }
+  const bool fisheye =
+      camera_formulas::FlatteningOf(camera.model) == camera_formulas::Flattening::kEquidistant;
   const double half_angle = RadFromDeg(options.field_of_view_deg) / 2;
-  const double focal = 0.5 * camera.width / (fisheye ? half_angle : std::tan(half_angle));
+  std::vector<double> distortion = DistortionOf(camera.model);
+  if (!options.distortion) std::fill(distortion.begin(), distortion.end(), 0.0);
+  if (!options.distortion && camera.model == CameraModel::kEucm) distortion = {0, 1};  // a pinhole
+  double border = fisheye ? half_angle : std::tan(half_angle);                         // flattened
+  if (!fisheye && !camera.IsPerspective()) {
+    double beside = 0;
+    camera_formulas::Flatten(camera.model, distortion.data(), std::sin(half_angle), 0.0,
+                             std::cos(half_angle), &border, &beside);
+  }
+  const double focal = 0.5 * camera.width / border;
   // The optical axis of a real camera misses the middle of the sensor a little.
   const double cx = 0.503 * camera.width, cy = 0.497 * camera.height;
   if (camera_formulas::HasOneFocalLength(camera.model)) {
@@ -130,15 +155,14 @@ Camera MakeRoomCamera(const SimulatedRoomOptions& options) {
   } else {
     camera.params = {focal, 1.0006 * focal, cx, cy};
   }
-  for (const double value : DistortionOf(camera.model)) {
-    camera.params.push_back(options.distortion ? value : 0.0);
-  }
+  camera.params.insert(camera.params.end(), distortion.begin(), distortion.end());
   return camera;
 }
 
 std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomScene& scene) {
   std::vector<Rigid> poses;
   const Eigen::Vector2d middle(0.5 * options.width, 0.5 * options.depth);
+  const bool level = MakeRoomCamera(options).IsPanorama();
   for (int i = 0; i < options.num_photos; ++i) {
     RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 201, i));
     const double around = 2 * kPi * (i + random.Uniform(-0.15, 0.15)) / options.num_photos;
@@ -149,7 +173,8 @@ std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomS
     offset *= random.Uniform(0.86, 1.0);
     // Across the room: towards the opposite place of the oval.
     const double yaw = std::atan2(-offset.y(), -offset.x()) + RadFromDeg(random.Uniform(-9, 9));
-    const double pitch = RadFromDeg(high ? random.Uniform(-21, -11) : random.Uniform(1, 11));
+    double pitch = RadFromDeg(high ? random.Uniform(-21, -11) : random.Uniform(1, 11));
+    if (level) pitch *= kLevelShare;
     const double roll = RadFromDeg(random.Uniform(-3, 3));
     Eigen::Vector3d place;
     for (int attempt = 0; attempt < 14; ++attempt, offset *= 0.93) {

@@ -21,11 +21,11 @@ std::optional<SurfacePoint> RandomPoint(const RoomPhotos& photos, RandomStream* 
   const int photo = random->Index(static_cast<int>(photos.cam_from_room.size()));
   const Eigen::Vector2d x_in_img(random->Uniform(0, camera.width),
                                  random->Uniform(0, camera.height));
-  const auto ray = photos.camera.CamFromImg(x_in_img);
+  const auto ray = photos.camera.RayFromImg(x_in_img);
   if (!ray) return std::nullopt;
   const Rigid room_from_cam = photos.cam_from_room[photo].Inverse();
-  const auto hit = photos.scene.Cast(room_from_cam.translation,
-                                     room_from_cam.rotation * ray->homogeneous().normalized());
+  const auto hit =
+      photos.scene.Cast(room_from_cam.translation, room_from_cam.rotation * ray->normalized());
   if (!hit || photos.scene.SurfaceOf(hit->patch).kind != Surface::Kind::kOpaque)
     return std::nullopt;
   return SurfacePoint{hit->point, photos.scene.patches()[hit->patch].Normal(),
@@ -128,8 +128,8 @@ std::vector<PickCandidate> FindPickCandidates(const RoomPhotos& photos, const Ro
       if (sample.missing || sample.hit.patch != static_cast<int>(i)) continue;
       const auto x_in_img = photos.See(photo, sample.hit.point, patch.Normal());
       if (!x_in_img) continue;
-      candidates.push_back(
-          {*x_in_img, sample.x_in_station, (photos.cam_from_room[photo] * sample.hit.point).z()});
+      candidates.push_back({*x_in_img, sample.x_in_station,
+                            photos.camera.Depth(photos.cam_from_room[photo] * sample.hit.point)});
     }
   }
   return candidates;

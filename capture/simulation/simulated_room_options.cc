@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "capture/simulation/camera_faults.h"
+#include "core/camera_formulas.h"
 #include "core/camera_model.h"
 #include "core/option_fields.h"
 
@@ -48,11 +49,20 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       .Within(1, 1000);
   fields->Int("photo_width", &photo_width, "pixels").Within(64, 20000, "pixels");
   fields->Int("photo_height", &photo_height, "pixels").Within(64, 20000, "pixels");
-  fields->Number("field_of_view_deg", &field_of_view_deg, "horizontal, degrees").Within(20, 100);
+  fields
+      ->Number("field_of_view_deg", &field_of_view_deg,
+               "horizontal, degrees; beyond 100 for fisheyes; a panorama has 360")
+      .Within(20, 240);
   fields->Text("camera_model", &camera_model, "any of COLMAP's camera models");
   fields->Require(
       CameraModelFromName(camera_model).has_value(),
       "--camera_model \"" + camera_model + "\" is none of COLMAP's, e.g. OPENCV or SIMPLE_RADIAL");
+  const auto model = CameraModelFromName(camera_model);
+  fields->Require(!model || !camera_formulas::IsPerspective(*model) || field_of_view_deg <= 100,
+                  "--field_of_view_deg above 100 needs a fisheye, e.g. --camera_model FISHEYE");
+  fields->Require(model != CameraModel::kEquirectangular || photo_width == 2 * photo_height,
+                  "--camera_model EQUIRECTANGULAR needs a --photo_width of twice --photo_height, "
+                  "e.g. 4096 and 2048");
   fields->Bool("distortion", &distortion, "lens distortion (0 = all its parameters zero)");
   fields
       ->Number("exposure_range_ev", &exposure_range_ev,

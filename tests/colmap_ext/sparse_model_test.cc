@@ -50,11 +50,47 @@ TEST(SparseModel, WholeTextWinsOverHalfABinary) {
   EXPECT_EQ(ReadSparseModel(folder.path()).images.size(), 5u);
 }
 
-TEST(SparseModel, RigsAndFramesAreToleratedWhenReadAndRefusedWhenWritten) {
+TEST(SparseModel, EveryCameraModelComesBack) {
+  for (int id = 0; id < kNumCameraModels; ++id) {
+    SparseModel model;
+    Camera& camera = model.cameras[4];
+    camera.camera_id = 4;
+    camera.model = static_cast<CameraModel>(id);
+    camera.width = 640;
+    camera.height = 320;
+    camera.params = std::vector<double>(NumCameraParams(id), 0.25);
+    ASSERT_TRUE(camera.Problems().empty());
+    const TempFolder binary, text;
+    WriteSparseModel(model, binary.path());
+    ExpectSameModel(ReadSparseModel(binary.path()), model);
+    WriteSparseModelText(model, text.path());
+    ExpectSameModel(ReadSparseModel(text.path()), model);
+  }
+}
+
+TEST(SparseModel, FramesSayWhichImagesMoveAsOne) {
+  const TempFolder folder;
+  WriteSparseModelText(MakeSparseModel(), folder.path());
+  WriteBytes(folder / "frames.txt",
+             "# FRAME_ID, RIG_ID, RIG_FROM_WORLD[], NUM_DATA_IDS, DATA_IDS[]\n"
+             "7 1 1 0 0 0 0 0 0 2 CAMERA 3 50 CAMERA 12 43\n"
+             "8 1 1 0 0 0 0 0 0 2 CAMERA 3 36 CAMERA 12 999\n"
+             "9 1 1 0 0 0 0 0 0 2 IMU 1 50 CAMERA 12 29\n");
+  const SparseModel model = ReadSparseModel(folder.path());
+  EXPECT_EQ(model.images.at(50).frame_id, 7u);
+  EXPECT_EQ(model.images.at(43).frame_id, 7u);
+  // Alone in their frames, as far as the model goes.
+  EXPECT_EQ(model.images.at(36).frame_id, kNoFrame);
+  EXPECT_EQ(model.images.at(29).frame_id, kNoFrame);
+  WriteBytes(folder / "frames.txt", "7 1 1 0 0 0 0 0 0 2 CAMERA 3 50\n");
+  EXPECT_INPUT_ERROR(ReadSparseModel(folder.path()), "frames.txt");
+}
+
+TEST(SparseModel, RigsAreToleratedWhenReadAndRefusedWhenWritten) {
   const TempFolder folder;
   WriteSparseModel(MakeSparseModel(), folder.path());
   WriteBytes(folder / "rigs.bin", "whatever");
-  WriteBytes(folder / "frames.bin", "whatever");
+  WriteBytes(folder / "frames.bin", std::string(8, '\0'));  // none
   ExpectSameModel(ReadSparseModel(folder.path()), MakeSparseModel());
   const std::string before = ReadBytes(folder / "images.bin");
   EXPECT_INPUT_ERROR(WriteSparseModel(SparseModel(), folder.path()), "rigs.bin");

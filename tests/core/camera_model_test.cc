@@ -49,12 +49,28 @@ Camera TypicalCamera(CameraModel model) {
     case CameraModel::kThinPrismFisheye:
       return MakeCamera(model,
                         {300, 305, 318, 243, -0.02, 0.01, 1e-3, -2e-3, -0.004, 0.001, 2e-3, -1e-3});
+    case CameraModel::kRadTanThinPrismFisheye:
+      return MakeCamera(model, {300, 305, 318, 243, -0.02, 0.03, -0.02, 0.004, 1e-3, -3e-4, 1e-3,
+                                -2e-3, 2e-3, -3e-4, -1e-3, 2e-4});
+    case CameraModel::kSimpleDivision:
+      return MakeCamera(model, {500, 318, 243, -0.15});
+    case CameraModel::kDivision:
+      return MakeCamera(model, {500, 510, 318, 243, -0.1});
+    case CameraModel::kSimpleFisheye:
+      return MakeCamera(model, {300, 318, 243});
+    case CameraModel::kFisheye:
+      return MakeCamera(model, {300, 305, 318, 243});
+    case CameraModel::kEucm:
+      return MakeCamera(model, {300, 305, 318, 243, 0.6, 1.1});
+    case CameraModel::kEquirectangular:
+      return MakeCamera(model, {640, 480});
   }
   return {};
 }
 
-// The formulas of the documentation of OpenCV (calib3d, fisheye), Devernay & Faugeras 2001 (FOV)
-// and Weng et al. 1992 (thin prism), written without a look at core/: rays (x, y, 1) to pixels.
+// The formulas of the documentation of OpenCV (calib3d, fisheye), Devernay & Faugeras 2001 (FOV),
+// Weng et al. 1992 (thin prism), Fitzgibbon 2001 (division), Khomutenko et al. 2016 (EUCM) and
+// Project Aria (Fisheye624), written without a look at core/: rays (x, y, 1) to pixels.
 Eigen::Vector2d ReferenceProjection(const Camera& camera, double x, double y) {
   const Params& p = camera.params;
   const double r = std::sqrt(x * x + y * y), theta = std::atan(r);
@@ -110,6 +126,41 @@ Eigen::Vector2d ReferenceProjection(const Camera& camera, double x, double y) {
       return pixel_two(u * d + 2 * p[6] * u * v + p[7] * (t2 + 2 * u * u) + p[10] * t2,
                        v * d + p[6] * (t2 + 2 * v * v) + 2 * p[7] * u * v + p[11] * t2);
     }
+    case CameraModel::kRadTanThinPrismFisheye: {
+      double d = 1;
+      for (int i = 0; i < 6; ++i) d += p[4 + i] * std::pow(theta, 2 * (i + 1));
+      const Eigen::Vector2d ray(x, y), tangential(p[10], p[11]);
+      const Eigen::Vector2d q = r > 0 ? Eigen::Vector2d(d * theta / r * ray) : ray;
+      const double q2 = q.squaredNorm();
+      const Eigen::Vector2d prism(p[12] * q2 + p[13] * q2 * q2, p[14] * q2 + p[15] * q2 * q2);
+      const Eigen::Vector2d xd = q + 2 * q.dot(tangential) * q + q2 * tangential + prism;
+      return pixel_two(xd.x(), xd.y());
+    }
+    case CameraModel::kSimpleDivision:
+    case CameraModel::kDivision: {
+      // The distorted radius whose ray (rd, 1 + k rd^2) this is, by bisection.
+      const bool one = camera.model == CameraModel::kSimpleDivision;
+      const double k = one ? p[3] : p[4];
+      double low = 0, high = 10 * r + 1e-9;
+      for (int i = 0; i < 200; ++i) {
+        const double rd = 0.5 * (low + high);
+        (rd < r * (1 + k * rd * rd) ? low : high) = rd;
+      }
+      const double gain = r > 0 ? low / r : 0;
+      return one ? pixel_one(x * gain, y * gain) : pixel_two(x * gain, y * gain);
+    }
+    case CameraModel::kSimpleFisheye:
+      return r > 0 ? pixel_one(x * theta / r, y * theta / r) : pixel_one(0, 0);
+    case CameraModel::kFisheye:
+      return r > 0 ? pixel_two(x * theta / r, y * theta / r) : pixel_two(0, 0);
+    case CameraModel::kEucm: {
+      const double denominator = p[4] * std::sqrt(p[5] * r * r + 1) + 1 - p[4];
+      return pixel_two(x / denominator, y / denominator);
+    }
+    case CameraModel::kEquirectangular: {
+      const double longitude = std::atan2(x, 1), latitude = std::atan2(-y, std::hypot(x, 1));
+      return {(longitude / (2 * kPi) + 0.5) * p[0], (0.5 - latitude / kPi) * p[1]};
+    }
   }
   return {};
 }
@@ -138,7 +189,14 @@ TEST_P(EveryModel, NameAndNumberOfParametersAreColmaps) {
                                                   {"FOV", 5},
                                                   {"SIMPLE_RADIAL_FISHEYE", 4},
                                                   {"RADIAL_FISHEYE", 5},
-                                                  {"THIN_PRISM_FISHEYE", 12}};
+                                                  {"THIN_PRISM_FISHEYE", 12},
+                                                  {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                                  {"SIMPLE_DIVISION", 4},
+                                                  {"DIVISION", 5},
+                                                  {"SIMPLE_FISHEYE", 3},
+                                                  {"FISHEYE", 4},
+                                                  {"EUCM", 6},
+                                                  {"EQUIRECTANGULAR", 2}};
   EXPECT_STREQ(CameraModelName(model_), expected[GetParam()].first);
   EXPECT_EQ(NumCameraParams(GetParam()), expected[GetParam()].second);
   EXPECT_EQ(CameraModelFromName(expected[GetParam()].first), model_);
@@ -158,7 +216,9 @@ TEST_P(EveryModel, ProjectsAsTheFormulasSay) {
 TEST_P(EveryModel, OpticalAxisMeetsThePrincipalPoint) {
   const auto x_in_img = projection_.ImgFromCam({0, 0, 3});
   ASSERT_TRUE(x_in_img);
-  EXPECT_THAT(*x_in_img, IsNearMatrix(Eigen::Vector2d(318, 243), 1e-12));
+  const Eigen::Vector2d centre =
+      camera_.IsPanorama() ? Eigen::Vector2d(320, 240) : Eigen::Vector2d(318, 243);
+  EXPECT_THAT(*x_in_img, IsNearMatrix(centre, 1e-12));
 }
 
 TEST_P(EveryModel, UnprojectionInvertsOverTheWholeImage) {
@@ -166,12 +226,17 @@ TEST_P(EveryModel, UnprojectionInvertsOverTheWholeImage) {
   for (double x = 0; x <= 640; x += 16) {
     for (double y = 0; y <= 480; y += 16) {
       ++num_pixels;
-      const auto ray = projection_.CamFromImg({x, y});
+      const auto ray = projection_.RayFromImg({x, y});
       if (!ray) continue;
       ++num_valid;
-      const auto again = projection_.ImgFromCam(ray->homogeneous());
+      EXPECT_NEAR(camera_.IsPerspective() ? ray->z() : ray->norm(), 1, 1e-12);
+      const auto again = projection_.ImgFromCam(2.5 * *ray);
       ASSERT_TRUE(again);
-      EXPECT_THAT(*again, IsNearMatrix(Eigen::Vector2d(x, y), 1e-6));
+      const bool pole = camera_.IsPanorama() && (y == 0 || y == 480);
+      // At the poles all x are one ray, and at the seam 0 is the width.
+      const double apart = std::remainder(again->x() - x, camera_.IsPanorama() ? 640 : 1e9);
+      EXPECT_NEAR(pole ? 0 : apart, 0, 1e-6);
+      EXPECT_NEAR(again->y(), y, 1e-6);
     }
   }
   EXPECT_EQ(num_valid, num_pixels);
@@ -194,9 +259,14 @@ TEST_P(EveryModel, ProjectionIsInvertedByUnprojection) {
 TEST_P(EveryModel, PointsBehindOrNowhereAreRefused) {
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector3d& x_in_cam :
-       {Eigen::Vector3d(0, 0, -1), Eigen::Vector3d(0.1, 0.1, 0), Eigen::Vector3d(0, 0, 0),
-        Eigen::Vector3d(nan, 0, 1), Eigen::Vector3d(0, nan, 1), Eigen::Vector3d(0, 0, nan),
-        Eigen::Vector3d(inf, 0, 1), Eigen::Vector3d(0, 0, inf)}) {
+       {Eigen::Vector3d(0, 0, -1), Eigen::Vector3d(0.1, 0.1, 0)}) {
+    if (camera_.IsPerspective()) {
+      EXPECT_FALSE(projection_.ImgFromCam(x_in_cam)) << x_in_cam.transpose();
+    }
+  }
+  for (const Eigen::Vector3d& x_in_cam :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(nan, 0, 1), Eigen::Vector3d(0, nan, 1),
+        Eigen::Vector3d(0, 0, nan), Eigen::Vector3d(inf, 0, 1), Eigen::Vector3d(0, 0, inf)}) {
     EXPECT_FALSE(projection_.ImgFromCam(x_in_cam)) << x_in_cam.transpose();
   }
   for (const Eigen::Vector2d& x_in_img : {Eigen::Vector2d(nan, 0), Eigen::Vector2d(0, inf)}) {
@@ -210,9 +280,15 @@ TEST_P(EveryModel, NothingFoldsBack) {
   for (int d = 0; d < 24; ++d) {
     const Eigen::Vector2d direction(std::cos(2 * kPi * d / 24), std::sin(2 * kPi * d / 24));
     double last = 0;
-    for (double angle_deg = 0.25; angle_deg < 89.9; angle_deg += 0.25) {
-      const Eigen::Vector2d ray = std::tan(RadFromDeg(angle_deg)) * direction;
-      const auto x_in_img = projection_.ImgFromCam(ray.homogeneous());
+    if (camera_.IsPanorama()) continue;
+    for (double angle_deg = 0.25; angle_deg < 179.9; angle_deg += 0.25) {
+      const double angle = RadFromDeg(angle_deg);
+      const Eigen::Vector3d ray(std::sin(angle) * direction.x(), std::sin(angle) * direction.y(),
+                                std::cos(angle));
+      const auto x_in_img = projection_.ImgFromCam(ray);
+      if (std::abs(angle - projection_.max_angle()) > 1e-3) {
+        EXPECT_EQ(x_in_img.has_value(), angle < projection_.max_angle()) << angle_deg;
+      }
       if (!x_in_img) break;
       const double distance = (*x_in_img - Eigen::Vector2d(318, 243)).norm();
       EXPECT_GT(distance, last) << angle_deg;
@@ -250,6 +326,104 @@ TEST_P(EveryModel, JetsAreTheNumericDerivatives) {
                   IsNearMatrix(numeric, 1e-4))
           << "parameter " << i << " at " << ray.transpose();
     }
+  }
+}
+
+// And those of whole rays, in front and behind, against CameraProjection.
+TEST_P(EveryModel, DerivativesByThePointAreTheNumericOnes) {
+  const int num_params = static_cast<int>(camera_.params.size());
+  int num_seen = 0;
+  for (int i = 0; i < 60; ++i) {
+    const double z = 1 - (2 * i + 1.0) / 60, r = std::sqrt(1 - z * z);
+    const Eigen::Vector3d point(2 * r * std::cos(2.4 * i), 2 * r * std::sin(2.4 * i), 2 * z);
+    const auto x_in_img = projection_.ImgFromCam(1.01 * point + Eigen::Vector3d(0.01, -0.02, 0.01));
+    if (!x_in_img || !projection_.ImgError(point, *x_in_img) ||
+        (camera_.IsPerspective() && z < 0.2)) {
+      continue;
+    }
+    ++num_seen;
+    const auto seen =
+        ErrorOfPoint<kMaxCameraParams>(model_, camera_.params.data(), num_params, point, *x_in_img);
+    EXPECT_THAT(seen.error, IsNearMatrix(*projection_.ImgError(point, *x_in_img), 1e-9));
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d step = 1e-6 * Eigen::Vector3d::Unit(k);
+      const auto more = projection_.ImgError(point + step, *x_in_img);
+      const auto less = projection_.ImgError(point - step, *x_in_img);
+      if (!more || !less) continue;
+      EXPECT_THAT(Eigen::Vector2d(seen.by_point.col(k)),
+                  IsNearMatrix(((*more - *less) / 2e-6).eval(), 1e-3 + 1e-6 * more->norm()));
+    }
+  }
+  EXPECT_GT(num_seen, camera_.IsPanorama() ? 59 : 10);
+}
+
+TEST(CameraProjection, FisheyesSeeBehindThemselves) {
+  // 220 degrees across: 1.92 rad at the border.
+  for (const CameraModel model :
+       {CameraModel::kSimpleFisheye, CameraModel::kFisheye, CameraModel::kOpenCvFisheye,
+        CameraModel::kEucm, CameraModel::kSimpleDivision}) {
+    Params params = {160, 320, 320};
+    if (model == CameraModel::kFisheye) params = {160, 160, 320, 320};
+    if (model == CameraModel::kOpenCvFisheye) params = {160, 160, 320, 320, 0.01, 0, 0, 0};
+    if (model == CameraModel::kEucm) params = {110, 110, 320, 320, 0.65, 1.0};
+    if (model == CameraModel::kSimpleDivision) params = {110, 320, 320, -0.3};
+    const CameraProjection projection(MakeCamera(model, params, 640, 640));
+    EXPECT_GT(projection.max_angle(), RadFromDeg(105)) << CameraModelName(model);
+    const Eigen::Vector3d behind(std::sin(1.8), 0, std::cos(1.8));
+    const auto x_in_img = projection.ImgFromCam(3 * behind);
+    ASSERT_TRUE(x_in_img) << CameraModelName(model);
+    EXPECT_THAT(projection.RayFromImg(*x_in_img).value(), IsNearMatrix(behind, 1e-9));
+    EXPECT_FALSE(projection.CamFromImg(*x_in_img));
+    EXPECT_NEAR(projection.Depth(3 * behind), 3, 1e-12);
+  }
+}
+
+TEST(CameraProjection, EucmEndsWhereItsFormulaDoes) {
+  // Khomutenko et al. 2016, (7): alpha > 1/2 reaches z > -(1 - alpha) / alpha d.
+  const CameraProjection projection(MakeCamera(CameraModel::kEucm, {200, 200, 320, 240, 0.6, 1.0}));
+  EXPECT_NEAR(projection.max_angle(), kPi - std::acos(0.4 / 0.6), 0.01);
+}
+
+TEST(CameraProjection, DivisionIsItsOwnInverseFormula) {
+  // Fitzgibbon 2001: a pixel's ray is (x, y, 1 + k r^2).
+  for (const double k : {-0.2, 0.0, 0.1}) {
+    const CameraProjection projection(MakeCamera(CameraModel::kSimpleDivision, {500, 320, 240, k}));
+    const Eigen::Vector2d x(0.3, -0.4);
+    const auto ray = projection.CamFromImg(500 * x + Eigen::Vector2d(320, 240));
+    ASSERT_TRUE(ray);
+    EXPECT_THAT(*ray, IsNearMatrix(Eigen::Vector2d(x / (1 + k * 0.25)), 1e-9));
+  }
+}
+
+TEST(CameraProjection, APanoramaHasNoSeamAndNoPoles) {
+  const CameraProjection projection(
+      MakeCamera(CameraModel::kEquirectangular, {2000, 1000}, 2000, 1000));
+  EXPECT_THAT(projection.ImgFromCam({0, 0, 2}).value(),
+              IsNearMatrix(Eigen::Vector2d(1000, 500), 1e-9));
+  EXPECT_THAT(projection.ImgFromCam({2, 0, 0}).value(),
+              IsNearMatrix(Eigen::Vector2d(1500, 500), 1e-9));
+  EXPECT_THAT(projection.ImgFromCam({0, -2, 0})->y(), testing::DoubleNear(0, 1e-9));
+  // One pixel across the seam is one pixel.
+  const auto left = projection.RayFromImg({0.5, 500}), right = projection.RayFromImg({1999.5, 500});
+  EXPECT_THAT(projection.ImgError(*right, {0.5, 500}).value(),
+              IsNearMatrix(Eigen::Vector2d(-1, 0), 1e-6));
+  EXPECT_THAT(projection.ImgError(*left, {1999.5, 500}).value(),
+              IsNearMatrix(Eigen::Vector2d(1, 0), 1e-6));
+  // Half around, close to the pole, is a step over the pole.
+  const auto near = projection.RayFromImg({500, 1});
+  EXPECT_THAT(projection.ImgError(*near, {1500, 1}).value(),
+              IsNearMatrix(Eigen::Vector2d(0, -2), 1e-6));
+  EXPECT_NEAR(projection.camera().MeanFocalLength(), 1000 / kPi, 1e-9);
+}
+
+TEST(Camera, ResizedItSeesTheSame) {
+  for (int id = 0; id < kNumCameraModels; ++id) {
+    const Camera camera = TypicalCamera(static_cast<CameraModel>(id));
+    Camera half = camera;
+    half.Resize(camera.width / 2, camera.height / 2);
+    const Eigen::Vector3d x_in_cam(0.2, -0.3, 1);
+    EXPECT_THAT((2 * CameraProjection(half).ImgFromCam(x_in_cam).value()).eval(),
+                IsNearMatrix(CameraProjection(camera).ImgFromCam(x_in_cam).value(), 1e-9));
   }
 }
 
@@ -346,10 +520,10 @@ TEST(Camera, ProblemsAreNamed) {
   EXPECT_THAT(problem(CameraModel::kSimplePinhole, {-1, 320, 240}), HasSubstr("focal length"));
   EXPECT_THAT(problem(CameraModel::kPinhole, {500, 500, std::nan(""), 240}), HasSubstr("finite"));
   EXPECT_THAT(problem(CameraModel::kPinhole, {500, 500, 320, 240}, 0), HasSubstr("0 x 480"));
-  EXPECT_THAT(problem(static_cast<CameraModel>(11), {500, 500, 320, 240}),
-              HasSubstr("model id 11"));
+  EXPECT_THAT(problem(static_cast<CameraModel>(18), {500, 500, 320, 240}),
+              HasSubstr("model id 18"));
   EXPECT_EQ(NumCameraParams(-1), -1);
-  EXPECT_EQ(NumCameraParams(11), -1);
+  EXPECT_EQ(NumCameraParams(18), -1);
   EXPECT_FALSE(CameraModelFromName("simple_radial"));
   EXPECT_EQ(MakeCamera(CameraModel::kPinhole, {500, 510, 320, 240}).MeanFocalLength(), 505);
   EXPECT_EQ(MakeCamera(CameraModel::kSimplePinhole, {500, 320, 240}).MeanFocalLength(), 500);

@@ -45,6 +45,34 @@ class ImportCommand : public testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(ImportCommand, CutsPanoramasIntoFaces) {
+  std::filesystem::create_directory(folder_ / "panoramas");
+  for (const char* name : {"a.jpg", "b.png"}) {
+    cv::imwrite(folder_ / "panoramas" + "/" + name,
+                cv::Mat(128, 256, CV_8UC3, cv::Scalar(40, 90, 160)));
+  }
+  const CommandResult result =
+      RunOn("panoramas", "--quiet --Faces.around 4 --Faces.poles 1" + Output("faces"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("panoramas.json"));
+  const auto json = nlohmann::json::parse(ReadBytes(folder_ / "faces/panoramas.json"));
+  ASSERT_EQ(json["panoramas"].size(), 2u);
+  EXPECT_EQ(json["panoramas"][1]["name"], "b.png");
+  ASSERT_EQ(json["panoramas"][1]["faces"].size(), 6u);
+  for (const auto& face : json["panoramas"][1]["faces"]) {
+    const cv::Mat picture = cv::imread(folder_ / ("faces/" + face["name"].get<std::string>()));
+    EXPECT_EQ(picture.cols, 81);  // 256 / pi
+    EXPECT_NEAR(picture.at<cv::Vec3b>(40, 40)[2], 160, 3);
+  }
+  EXPECT_THAT(ReadBytes(folder_ / "faces/camera_options.txt"),
+              HasSubstr("--ImageReader.camera_model SIMPLE_PINHOLE"));
+  cv::imwrite(folder_ / "photo.jpg", cv::Mat(200, 300, CV_8UC3, cv::Scalar(0, 0, 0)));
+  const CommandResult refused = RunOn("photo.jpg", Output("other"));
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("twice as wide as high"));
+  EXPECT_EQ(RunOn("panoramas", Output("panoramas")).exit_code, 2);
+}
+
 TEST_F(ImportCommand, WritesEveryFormatAndTheReport) {
   const CommandResult result = RunOn(
       "room.rtpi", "--quiet --report_path " + (folder_ / "report.json") + Output("a.ply") +

@@ -9,7 +9,6 @@
 #include <fmt/core.h>
 
 #include "colmap_ext/database.h"
-#include "core/camera_formulas.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
@@ -169,20 +168,7 @@ std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
 
 Camera ScaleCamera(const Camera& camera, int width, int height) {
   Camera scaled = camera;
-  const double x = static_cast<double>(width) / camera.width;
-  const double y = static_cast<double>(height) / camera.height;
-  if (camera_formulas::HasOneFocalLength(camera.model)) {
-    scaled.params[0] *= 0.5 * (x + y);
-    scaled.params[1] *= x;
-    scaled.params[2] *= y;
-  } else {
-    scaled.params[0] *= x;
-    scaled.params[1] *= y;
-    scaled.params[2] *= x;
-    scaled.params[3] *= y;
-  }
-  scaled.width = width;
-  scaled.height = height;
+  scaled.Resize(width, height);
   return scaled;
 }
 

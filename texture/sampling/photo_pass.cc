@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include <opencv2/core.hpp>
+
 #include "core/cpu_stages.h"
 #include "core/parallel.h"
 #include "core/photo.h"
@@ -16,6 +18,9 @@ struct SlotObservation {
   int slot;
   Observation observation;
 };
+
+// Of a panorama: reaches as far as a cubic or a footprint.
+constexpr int kSeamPx = 20;
 
 // What one photo sees, tile by tile; tile_end[i] is the end of tile i's part.
 struct PhotoObservations {
@@ -39,7 +44,10 @@ class PhotoObserver {
         projector_(view),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
         image_(std::move(picture)) {
-    if (view.tone && !view.tone->vignetting.is_none()) {
+    if (view.camera.IsPanorama()) {
+      seam_px_ = std::min(kSeamPx, image_.cols);
+      cv::copyMakeBorder(image_, image_, 0, 0, seam_px_, seam_px_, cv::BORDER_WRAP);
+    } else if (view.tone && !view.tone->vignetting.is_none()) {
       vignetting_.emplace(view.tone->vignetting, projector_.camera());
     }
   }
@@ -63,6 +71,7 @@ class PhotoObserver {
     const auto height = static_cast<float>(projector_.height());
     const float focal_length = static_cast<float>(projector_.camera().camera().MeanFocalLength());
     const bool scanner_known = tile.scanner.allFinite();
+    const auto seam = static_cast<float>(seam_px_);
     for (int i = 0; i < tile.points.size(); ++i) {
       const float x = projected_.x[i], y = projected_.y[i], depth = projected_.depth[i];
       if (!(depth > 0) || !(x >= 0 && y >= 0 && x <= width && y <= height)) continue;
@@ -79,11 +88,14 @@ class PhotoObserver {
           static_cast<float>(input_.angular_spacing) * to_scanner.norm() * focal_length / depth;
       const PhotoColor color =
           blend_.footprint > 0
-              ? LookUpPhoto(image_, x, y, static_cast<float>(blend_.footprint) * spacing_px)
-              : LookUpPhoto(image_, x, y);
+              ? LookUpPhoto(image_, x + seam, y, static_cast<float>(blend_.footprint) * spacing_px)
+              : LookUpPhoto(image_, x + seam, y);
       const Eigen::Vector3f& normal = tile.normals[i];
       const Eigen::Vector3f camera_direction = to_camera.normalized();
-      float weight = ThesisWeight(x, y, width, height, sight != Sight::kClear) * color.reliability;
+      // A panorama has no left and right border.
+      const float from_side = seam_px_ > 0 ? 0.5f * width : x;
+      float weight =
+          ThesisWeight(from_side, y, width, height, sight != Sight::kClear) * color.reliability;
       if (blend_.angle_weight) {
         weight *= AngleWeight(camera_direction, to_scanner.normalized(), normal);
       }
@@ -105,7 +117,8 @@ class PhotoObserver {
   const BlendOptions& blend_;
   PhotoProjector projector_;
   PhotoVisibility visibility_;
-  cv::Mat image_;  // sRGB
+  cv::Mat image_;    // sRGB
+  int seam_px_ = 0;  // columns that a panorama's image goes on for beyond both borders
   std::optional<VignettingFactor> vignetting_;
   ProjectedBlock projected_;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/camera_formulas.h"
+#include "core/frames.h"
 
 namespace roomtex {
 namespace {
@@ -31,6 +32,27 @@ void ProjectAll(const FloatPose& pose, const float* params, float max_radius2,
     projected->x[i] = img_x;
     projected->y[i] = img_y;
     projected->depth[i] = inverse > 0 && x * x + y * y <= max_radius2 ? z : 0.0f;
+  }
+}
+
+// The same for cameras that see rays of any direction.
+template <CameraModel kModel>
+void ProjectAllAround(const FloatPose& pose, const float* params, float min_cosine,
+                      const PointBlock& block, ProjectedBlock* projected) {
+  const Eigen::Matrix3f& r = pose.rotation;
+  const Eigen::Vector3f& t = pose.translation;
+  const int n = block.size();
+  for (int i = 0; i < n; ++i) {
+    const float px = block.x[i], py = block.y[i], pz = block.z[i];
+    const float x = r(0, 0) * px + r(0, 1) * py + r(0, 2) * pz + t[0];
+    const float y = r(1, 0) * px + r(1, 1) * py + r(1, 2) * pz + t[1];
+    const float z = r(2, 0) * px + r(2, 1) * py + r(2, 2) * pz + t[2];
+    const float distance = std::sqrt(x * x + y * y + z * z);
+    float img_x, img_y;
+    camera_formulas::Project(kModel, params, x, y, z, &img_x, &img_y);
+    projected->x[i] = img_x;
+    projected->y[i] = img_y;
+    projected->depth[i] = distance > 1e-6f && z >= min_cosine * distance ? distance : 0.0f;
   }
 }
 
@@ -64,6 +86,8 @@ void PhotoProjector::Project(const PointBlock& block, ProjectedBlock* projected)
   const FloatPose pose{rotation_, (cam_from_scan_ * block.origin).cast<float>()};
   const double radius = std::min(camera_.max_radius(), 1e15);
   const float max_radius2 = static_cast<float>(radius * radius);
+  const double angle = camera_.max_angle();
+  const float min_cosine = angle < kPi ? static_cast<float>(std::cos(angle)) : -2.0f;
   const float* p = params_.data();
   switch (camera_.camera().model) {
 #define ROOMTEX_CASE(model) \
@@ -74,18 +98,30 @@ void PhotoProjector::Project(const PointBlock& block, ProjectedBlock* projected)
     ROOMTEX_CASE(kSimpleRadial);
     ROOMTEX_CASE(kRadial);
     ROOMTEX_CASE(kOpenCv);
-    ROOMTEX_CASE(kOpenCvFisheye);
     ROOMTEX_CASE(kFullOpenCv);
     ROOMTEX_CASE(kFov);
+#undef ROOMTEX_CASE
+#define ROOMTEX_CASE(model) \
+  case CameraModel::model:  \
+    return ProjectAllAround<CameraModel::model>(pose, p, min_cosine, block, projected)
+    ROOMTEX_CASE(kOpenCvFisheye);
     ROOMTEX_CASE(kSimpleRadialFisheye);
     ROOMTEX_CASE(kRadialFisheye);
     ROOMTEX_CASE(kThinPrismFisheye);
+    ROOMTEX_CASE(kRadTanThinPrismFisheye);
+    ROOMTEX_CASE(kSimpleDivision);
+    ROOMTEX_CASE(kDivision);
+    ROOMTEX_CASE(kSimpleFisheye);
+    ROOMTEX_CASE(kFisheye);
+    ROOMTEX_CASE(kEucm);
+    ROOMTEX_CASE(kEquirectangular);
 #undef ROOMTEX_CASE
   }
 }
 
 // A box in (x/z, y/z) around the rays of the image's border. Where the lens reaches a position by
-// no ray, the limit of its distortion takes the border's place.
+// no ray, the limit of its distortion takes the border's place; where that lies behind the camera,
+// there is no frustum.
 void PhotoProjector::FindFrustum() {
   const double width = camera_.camera().width, height = camera_.camera().height;
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
@@ -106,6 +142,9 @@ void PhotoProjector::FindFrustum() {
       high = high.cwiseMax(*ray);
     }
   }
+  constexpr double kWidestBox = 30;  // x/z; beyond, a box bounds nothing
+  const bool narrow = whole && std::max(-low.minCoeff(), high.maxCoeff()) < kWidestBox;
+  if (!camera_.camera().IsPerspective() && !narrow) return;
   if (!whole) {
     const double limit = std::min(camera_.max_radius(), 1e6);
     low.setConstant(-limit);

@@ -38,7 +38,8 @@ struct PointBlock {
   void Add(const Eigen::Vector3d& point);
 };
 
-// Positions in `img` and depths along the optical axis, metres; depth 0 = the camera model gives no
+// Positions in `img` and depths, metres: along the optical axis, or the distance for cameras that
+// see more than what lies in front (Camera::IsPerspective). Depth 0 = the camera model gives no
 // position (behind the camera, or where the distortion folds).
 struct ProjectedBlock {
   std::vector<float> x, y, depth;
@@ -73,7 +74,8 @@ class PhotoProjector {
   Eigen::Matrix3f rotation_;
   Eigen::Vector3d centre_;
   std::vector<float> params_;
-  // Inward unit normals in `cam` of the planes through the camera's centre that bound its view.
+  // Inward unit normals in `cam` of the planes through the camera's centre that bound its view;
+  // none if it sees behind itself.
   std::vector<Eigen::Vector3d> frustum_;
 };
 

@@ -42,12 +42,13 @@ struct OcclusionOptions {
   std::vector<std::string> Problems() const;
 };
 
-// Inverse depth along the optical axis (1/metres; 0 = nothing) on a raster over the photo's area.
+// Inverse depth (1/metres, see ProjectedBlock; 0 = nothing) on a raster over the photo's area.
 // The nearest surface wins, so that the order of drawing does not matter.
 class DepthMap {
  public:
-  // scale: pixels of the map per pixel of the photo, <= 1.
-  DepthMap(int photo_width, int photo_height, double scale);
+  // scale: pixels of the map per pixel of the photo, <= 1. wraps: the left border of the photo
+  // continues the right one (a panorama).
+  DepthMap(int photo_width, int photo_height, double scale, bool wraps = false);
 
   // Draws the tiles that the photo may see. Triangles longer than max_edge_px (map pixels) are
   // split, because a lens bends their sides.
@@ -67,6 +68,7 @@ class DepthMap {
  private:
   cv::Mat1f inverse_depth_;
   float scale_x_, scale_y_;
+  bool wraps_;
 };
 
 // Depth boundaries of a map (thesis 8.1.3), 255 or 0: where the inverse depth departs from that of
@@ -93,7 +95,7 @@ class PhotoVisibility {
   PhotoVisibility(const PhotoProjector& projector, const std::vector<OccluderTiles>& occluders,
                   double angular_spacing, const OcclusionOptions& options);
 
-  // x, y in `img`, inside the photo; depth along the optical axis, metres.
+  // x, y in `img`, inside the photo; depth in metres, see ProjectedBlock.
   // Thesis 8.1.2, made exact at pixel borders: hidden only if all four map pixels around the
   // position show a nearer surface.
   Sight Look(float x, float y, float depth) const;
@@ -108,6 +110,7 @@ class PhotoVisibility {
   cv::Mat1b mask_;
   // Hidden when farther than 1 / w by more than share * depth + distance.
   float share_ = 0, distance_ = 0;
+  bool wraps_ = false;
   bool IsBehind(float inverse_depth, float depth, float times) const {
     return depth * (1 - times * share_) - times * distance_ > 1 / inverse_depth;
   }

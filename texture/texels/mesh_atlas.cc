@@ -233,8 +233,9 @@ double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>&
       const Eigen::Vector3d to_camera = photo.centre() - probes.points[i];
       if (to_camera.cast<float>().dot(probes.normals[i]) <= 0) continue;
       const Eigen::Vector3d in_cam = photo.cam_from_scan() * probes.points[i];
-      const double size = in_cam.z() / photo.camera().camera().MeanFocalLength();
-      if (!(in_cam.z() > 0) || size >= least) continue;
+      const double depth = photo.camera().Depth(in_cam);
+      const double size = depth / photo.camera().camera().MeanFocalLength();
+      if (!(depth > 0) || size >= least) continue;
       const auto position = photo.camera().ImgFromCam(in_cam);
       if (position && photo.camera().InImage(*position)) least = size;
     }

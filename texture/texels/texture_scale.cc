@@ -20,7 +20,9 @@ double MedianPixelsPerSample(const PhotoPassInput& input, const ObservationStore
       if (slot % stride != 0 || store.Count(slot) == 0) continue;
       const PhotoView& photo = photos[store.Begin(slot)->photo];
       const Eigen::Vector3f point(tile.points.x[i], tile.points.y[i], tile.points.z[i]);
-      const double depth = (photo.cam_from_scan * (tile.points.origin + point.cast<double>())).z();
+      const Eigen::Vector3d in_cam =
+          photo.cam_from_scan * (tile.points.origin + point.cast<double>());
+      const double depth = photo.camera.IsPerspective() ? in_cam.z() : in_cam.norm();
       const double spacing = input.angular_spacing * (tile.scanner - point).norm();
       if (depth > 0) {
         pixels.push_back(static_cast<float>(spacing * photo.camera.MeanFocalLength() / depth));

@@ -125,6 +125,10 @@ void FindTones(const std::vector<SampleTile>& tiles, const std::vector<ExposureD
     for (const Eigen::Vector3f& gain : first.gains) log_gains.push_back(std::log(gain[1]));
     const int num_lenses = 1 + *std::max_element(lens.begin(), lens.end());
     of_lens = FitVignetting(*samples, lens, num_lenses, log_gains);
+    for (size_t i = 0; i < photos->size(); ++i) {
+      // Stitched from several lenses.
+      if ((*photos)[i].camera.IsPanorama()) of_lens[lens[i]] = Vignetting();
+    }
     ApplyVignetting(of_lens, lens, samples);
   }
   const bool any_vignetting =

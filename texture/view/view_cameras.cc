@@ -14,13 +14,18 @@ namespace roomtex {
 namespace {
 
 constexpr int kCellPx = 18;  // of the lattice, in a photo of 2000 pixels
+// A panorama bends lines more than a lens does.
+constexpr double kPanoramaCell = 0.5;
 constexpr size_t kCacheBytes = 64 << 20;
 
 Eigen::Vector3f Direction(const CameraProjection& projection, const Eigen::Vector2d& x_in_img) {
-  const auto ray = projection.CamFromImg(x_in_img);
+  const auto ray = projection.RayFromImg(x_in_img);
   if (!ray) return Eigen::Vector3f::Zero();
-  return Eigen::Vector3d(ray->x(), ray->y(), 1).normalized().cast<float>();
+  return ray->normalized().cast<float>();
 }
+
+// A panorama is drawn, and looked out of, as if it saw 90 x 53 degrees.
+constexpr double kPanoramaHalfWidth = 1, kPanoramaHalfHeight = 0.5;  // x/z, y/z
 
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -60,7 +65,8 @@ PhotoLattice MakePhotoLattice(const Camera& camera) {
   const CameraProjection projection(camera);
   PhotoLattice lattice;
   // Finer for larger photos only as far as their distortion asks for it: it goes with the angle.
-  const double cell = kCellPx * std::max(1.0, std::max(camera.width, camera.height) / 2000.0);
+  const double cell = kCellPx * std::max(1.0, std::max(camera.width, camera.height) / 2000.0) *
+                      (camera.IsPanorama() ? kPanoramaCell : 1);
   lattice.columns = 1 + std::max(2, static_cast<int>(std::ceil(camera.width / cell)));
   lattice.rows = 1 + std::max(2, static_cast<int>(std::ceil(camera.height / cell)));
   for (int row = 0; row < lattice.rows; ++row) {
@@ -114,6 +120,11 @@ Json ViewCameras::ToJson() const {
     for (const Eigen::Vector2d& at : {Eigen::Vector2d(0, 0), Eigen::Vector2d(w, 0),
                                       Eigen::Vector2d(w, h), Eigen::Vector2d(0, h)}) {
       Eigen::Vector3d corner = Direction(projection, at).cast<double>();
+      if (camera.IsPanorama()) {
+        corner = Eigen::Vector3d((2 * at.x() / w - 1) * kPanoramaHalfWidth,
+                                 (2 * at.y() / h - 1) * kPanoramaHalfHeight, 1)
+                     .normalized();
+      }
       if (corner.isZero()) {  // beyond the field of a fisheye
         const double f = camera.MeanFocalLength();
         corner = Eigen::Vector3d((at.x() - w / 2) / f, (at.y() - h / 2) / f, 1).normalized();
@@ -125,7 +136,8 @@ Json ViewCameras::ToJson() const {
                     {"name", image.name},
                     {"width", camera.width},
                     {"height", camera.height},
-                    {"focal", camera.MeanFocalLength()},
+                    {"focal", camera.IsPanorama() ? 0.5 * camera.height / kPanoramaHalfHeight
+                                                  : camera.MeanFocalLength()},
                     {"center", Vector(image.cam_from_model.TargetOriginInSource())},
                     {"rotation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
                     {"corners", corners},

@@ -19,8 +19,8 @@ namespace roomtex {
 // straight lines are good to a tenth of a pixel, whatever the distortion.
 struct PhotoLattice {
   int columns = 0, rows = 0;  // nodes
-  // Row by row from the upper left corner of the photo: unit vectors in `cam`; zero where no ray of
-  // the camera's valid field goes.
+  // Row by row from the upper left corner of the photo: unit vectors in `cam`, of a panorama all
+  // around; zero where no ray of the camera's valid field goes.
   std::vector<Eigen::Vector3f> directions;
 };
 PhotoLattice MakePhotoLattice(const Camera& camera);

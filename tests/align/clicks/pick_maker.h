@@ -44,6 +44,28 @@ inline Camera TestCamera(CameraModel model = CameraModel::kOpenCv) {
     case CameraModel::kThinPrismFisheye:
       camera.params = {1500, 1490, 960, 650, -0.02, 0.01, 1e-3, -8e-4, 1e-3, -5e-4, 1e-3, 5e-4};
       break;
+    case CameraModel::kRadTanThinPrismFisheye:
+      camera.params = {1500, 1490,  960,  650,   -0.02, 0.01, 1e-3, -5e-4,
+                       1e-4, -1e-4, 1e-3, -8e-4, 1e-3,  2e-4, 5e-4, -2e-4};
+      break;
+    case CameraModel::kSimpleDivision:
+      camera.params = {1500, 960, 650, -0.08};
+      break;
+    case CameraModel::kDivision:
+      camera.params = {1500, 1490, 960, 650, -0.08};
+      break;
+    case CameraModel::kSimpleFisheye:
+      camera.params = {700, 960, 650};
+      break;
+    case CameraModel::kFisheye:
+      camera.params = {500, 495, 960, 650};  // 220 degrees across
+      break;
+    case CameraModel::kEucm:
+      camera.params = {600, 595, 960, 650, 0.62, 1.05};
+      break;
+    case CameraModel::kEquirectangular:
+      camera.params = {1936, 1288};
+      break;
   }
   return camera;
 }
@@ -65,16 +87,15 @@ class PickMaker {
 
   // All over the photo, 1.5 to 5 m deep.
   PointPairs General(int count) {
-    return Make(count, [&](const Eigen::Vector2d&) { return Uniform(1.5, 5); });
+    return Make(count, [&](const Eigen::Vector3d&) { return Uniform(1.5, 5); });
   }
 
   // On a plane through the point 3 m ahead; tilt: angle of its normal from the optical axis,
   // radians.
   PointPairs Coplanar(int count, double tilt) {
     const Eigen::Vector3d normal(std::sin(tilt), 0, std::cos(tilt));
-    return Make(count, [&](const Eigen::Vector2d& x) {
-      return 3 * normal.z() / normal.dot(x.homogeneous());
-    });
+    return Make(count,
+                [&](const Eigen::Vector3d& ray) { return 3 * normal.z() / normal.dot(ray); });
   }
 
   PointPairs WithNoise(PointPairs pairs, double sigma_px) {
@@ -93,10 +114,14 @@ class PickMaker {
     PointPairs pairs{Eigen::Matrix2Xd(2, count), Eigen::Matrix3Xd(3, count)};
     for (int i = 0; i < count; ++i) {
       const Eigen::Vector2d x_in_img(Uniform(30, 1900), Uniform(30, 1250));
-      const Eigen::Vector2d x = projection.CamFromImg(x_in_img).value();
-      const Eigen::Vector3d ray = x.homogeneous();
+      const Eigen::Vector3d ray = projection.RayFromImg(x_in_img).value();
+      const double distance = depth(ray);
+      if (!(distance > 0 && distance < 15) && !projection.camera().IsPerspective()) {
+        --i;  // looks away from the plane
+        continue;
+      }
       pairs.x_in_img.col(i) = x_in_img;
-      pairs.x_in_scan.col(i) = cam_from_scan.Inverse() * Eigen::Vector3d(depth(x) * ray);
+      pairs.x_in_scan.col(i) = cam_from_scan.Inverse() * Eigen::Vector3d(distance * ray);
     }
     return pairs;
   }

@@ -108,9 +108,9 @@ struct AutomaticReprojection {
     }
     ceres::AngleAxisRotatePoint(pose, started, p);
     T x, y;
-    camera_formulas::Project(model, parameters[2], T(p[0] / p[2]), T(p[1] / p[2]), &x, &y);
-    residuals[0] = T(weight) * (x - T(x_in_img.x()));
-    residuals[1] = T(weight) * (y - T(x_in_img.y()));
+    camera_formulas::ImgError(model, parameters[2], p[0], p[1], p[2], x_in_img, &x, &y);
+    residuals[0] = T(weight) * x;
+    residuals[1] = T(weight) * y;
     return true;
   }
   CameraModel model;
@@ -137,7 +137,7 @@ TEST(ReprojectionCost, HasTheDerivativesOfAutomaticDifferencesForEveryCamera) {
       automatic.SetNumResiduals(2);
       const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(0), 0.6, true);
       const Eigen::Vector3d point = pairs.x_in_scan.col(0);
-      if ((pose.CamFromScan() * point).z() < 0.5) continue;
+      if (camera.IsPerspective() && (pose.CamFromScan() * point).z() < 0.5) continue;
       const std::vector<const double*> parameters{pose.values, point.data(), camera.params.data()};
       const Evaluation own = Evaluate(cost, parameters), theirs = Evaluate(automatic, parameters);
       EXPECT_THAT(own.residuals, IsNearMatrix(theirs.residuals, 1e-6)) << id;
@@ -152,6 +152,35 @@ TEST(ReprojectionCost, HasTheDerivativesOfAutomaticDifferencesForEveryCamera) {
                    {pose.values, point.data()});
       EXPECT_EQ(held.jacobians.size(), 2u);
       EXPECT_THAT(held.jacobians[0], IsNearMatrix(own.jacobians[0], 0.0));
+    }
+  }
+}
+
+// Derivatives by the pose of the rig, for a camera that stands and looks elsewhere in it.
+TEST(ReprojectionCost, HasTheNumericDerivativesByThePoseOfARig) {
+  for (const CameraModel model :
+       {CameraModel::kOpenCv, CameraModel::kFisheye, CameraModel::kEquirectangular}) {
+    PickMaker maker(7, model);
+    const Camera camera = maker.projection.camera();
+    const PointPairs pairs = maker.General(6);
+    const Rigid cam_from_rig{
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, -1).normalized())),
+        Eigen::Vector3d(0.2, -0.1, 0.05)};
+    PoseParameters pose(cam_from_rig.Inverse() * maker.cam_from_scan);
+    for (int i = 0; i < pairs.size(); ++i) {
+      const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(i), 1, false, cam_from_rig);
+      const Eigen::Vector3d point = pairs.x_in_scan.col(i);
+      const Evaluation own = Evaluate(cost, {pose.values, point.data()});
+      EXPECT_LT(own.residuals.norm(), 1e-6);
+      for (int k = 0; k < 6; ++k) {
+        PoseParameters more = pose, less = pose;
+        more.values[k] += 1e-6;
+        less.values[k] -= 1e-6;
+        const Eigen::VectorXd numeric = (Evaluate(cost, {more.values, point.data()}).residuals -
+                                         Evaluate(cost, {less.values, point.data()}).residuals) /
+                                        2e-6;
+        EXPECT_THAT(Eigen::VectorXd(own.jacobians[0].col(k)), IsNearMatrix(numeric, 1e-2));
+      }
     }
   }
 }

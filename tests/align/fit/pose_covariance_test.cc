@@ -14,12 +14,17 @@ struct Adjusted {
   PoseCovariances covariances;
 };
 
-Adjusted Adjust(const Reconstruction& one, const PlaneBundleOptions& options = {}) {
-  const PlaneBundleInput input = one.room.Input(one.model);
+Adjusted Adjust(const SurfaceRoom& room, const SparseModel& model,
+                const PlaneBundleOptions& options = {}) {
+  const PlaneBundleInput input = room.Input(model);
   Adjusted adjusted{AdjustToSurface(input, options), {}};
   EXPECT_TRUE(adjusted.bundle.usable) << adjusted.bundle.reason;
   adjusted.covariances = FindPoseCovariances(input, adjusted.bundle, options);
   return adjusted;
+}
+
+Adjusted Adjust(const Reconstruction& one, const PlaneBundleOptions& options = {}) {
+  return Adjust(one.room, one.model, options);
 }
 
 // e^T C^-1 e of a position that is off by e has the mean 3. What is common to half a metre of
@@ -52,6 +57,42 @@ TEST(PoseCovariance, SaysHowFarThePosesAreOff) {
   EXPECT_GT(rotation / count, 0.4);
   EXPECT_LT(rotation / count, 3.5);
   EXPECT_EQ(num_far, 0);
+}
+
+// Every three photos are one frame of a rig, whose shape is known.
+TEST(PoseCovariance, PhotosOfOneFrameMoveAsOneAndAreHeldBetter) {
+  const Reconstruction& one = StraightRoom(1);
+  const Adjusted alone = Adjust(one);
+  SparseModel rigged = one.model;
+  const SimulatedRoom& room = one.room.room;
+  std::vector<Rigid> true_from_first;
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const int first = photo - photo % 3;
+    true_from_first.push_back(room.CamFromScan(photo) * room.CamFromScan(first).Inverse());
+    SparseImage& image = rigged.images.at(rigged.FindImage(room.PhotoName(photo))->image_id);
+    image.frame_id = first / 3;
+    image.cam_from_model =
+        true_from_first.back() * rigged.FindImage(room.PhotoName(first))->cam_from_model;
+  }
+  const Adjusted adjusted = Adjust(one.room, rigged);
+  double sigma_alone = 0, sigma_rigged = 0, deviations2 = 0;
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const SparseModel& model = adjusted.bundle.model;
+    const SparseImage* image = model.FindImage(room.PhotoName(photo));
+    const SparseImage* first = model.FindImage(room.PhotoName(photo - photo % 3));
+    EXPECT_THAT(image->cam_from_model * first->cam_from_model.Inverse(),
+                IsNearRigid(true_from_first[photo], 1e-9, 1e-9));
+    const auto& covariance = adjusted.covariances.at(image->image_id);
+    const Eigen::Matrix3d of_position = covariance.block<3, 3>(3, 3);
+    sigma_rigged += std::sqrt(of_position.trace());
+    sigma_alone += std::sqrt(alone.covariances.at(image->image_id).block<3, 3>(3, 3).trace());
+    const Eigen::Vector3d offset = image->cam_from_model.TargetOriginInSource() -
+                                   room.CamFromScan(photo).TargetOriginInSource();
+    deviations2 += offset.dot(of_position.llt().solve(offset)) / room.NumPhotos();
+  }
+  EXPECT_LT(sigma_rigged, 0.9 * sigma_alone);
+  EXPECT_LT(deviations2, 4);
+  EXPECT_LT(PoseErrorsOf(room, adjusted.bundle.model).position.median, 0.0015);
 }
 
 TEST(PoseCovariance, LeavesOutThePhotoThatIsFixed) {

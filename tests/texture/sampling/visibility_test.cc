@@ -72,6 +72,47 @@ TEST(Rasterizer, NearerSurfaceWinsInAnyOrder) {
   EXPECT_EQ(first(1, 1), 2);
 }
 
+// Fisheyes that see behind themselves, and panoramas.
+TEST(PhotoProjector, AgreesWithCamerasThatSeeAllAround) {
+  const TwoWalls scene;
+  PhotoView view = scene.View({0.3, -0.2, 0.5}, "a");
+  for (const auto& [model, params] : std::vector<std::pair<CameraModel, std::vector<double>>>{
+           {CameraModel::kFisheye, {170, 172, 320, 240}},
+           {CameraModel::kOpenCvFisheye, {170, 172, 320, 240, 0.01, -0.002, 0, 0}},
+           {CameraModel::kEucm, {120, 120, 320, 240, 0.65, 1.05}},
+           {CameraModel::kSimpleDivision, {120, 320, 240, -0.25}},
+           {CameraModel::kEquirectangular, {640, 480}}}) {
+    view.camera.model = model;
+    view.camera.params = params;
+    const PhotoProjector projector(view);
+    const CameraProjection exact(view.camera);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> coordinate(-5, 5);
+    PointBlock block;
+    std::vector<Eigen::Vector3d> points;
+    for (int i = 0; i < 500; ++i) {
+      points.emplace_back(coordinate(random), coordinate(random), coordinate(random));
+      block.Add(points.back());
+    }
+    ProjectedBlock projected;
+    projector.Project(block, &projected);
+    int num_behind = 0;
+    for (int i = 0; i < 500; ++i) {
+      const Eigen::Vector3d in_cam = view.cam_from_scan * points[i];
+      const auto expected = exact.ImgFromCam(in_cam);
+      ASSERT_EQ(expected.has_value(), projected.depth[i] > 0) << i;
+      if (!expected) continue;
+      EXPECT_NEAR(projected.depth[i], in_cam.norm(), 1e-4);
+      if (!exact.InImage(*expected)) continue;
+      EXPECT_TRUE(projector.MaySee(points[i], 0));
+      num_behind += in_cam.z() < 0;
+      EXPECT_NEAR(projected.x[i], expected->x(), 5e-3) << CameraModelName(model);
+      EXPECT_NEAR(projected.y[i], expected->y(), 5e-3) << CameraModelName(model);
+    }
+    EXPECT_GT(num_behind, 10) << CameraModelName(model);
+  }
+}
+
 TEST(PhotoProjector, AgreesWithTheCameraModelAndTheFrustum) {
   const TwoWalls scene;
   PhotoView view = scene.View({0.3, -0.2, 0.5}, "a");

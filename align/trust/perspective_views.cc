@@ -1,0 +1,70 @@
+#include "align/trust/perspective_views.h"
+
+#include <algorithm>
+
+#include "align/trust/scan_view.h"
+#include "core/panorama_faces.h"
+
+namespace roomtex {
+namespace {
+
+// As many as cover the horizon without overlap.
+FaceOptions FourFaces() {
+  FaceOptions options;
+  options.around = 4;
+  return options;
+}
+
+std::string FaceName(const std::string& name, int number) {
+  const size_t dot = std::min(name.rfind('.'), name.size());
+  return name.substr(0, dot) + "_face" + std::to_string(number) + name.substr(dot);
+}
+
+}  // namespace
+
+PerspectiveViews::PerspectiveViews(const SparseModel& model) : model_(model) {
+  if (std::none_of(model.cameras.begin(), model.cameras.end(),
+                   [](const auto& camera) { return camera.second.IsPanorama(); })) {
+    return;
+  }
+  views_.emplace();
+  const std::vector<Eigen::Quaterniond> rotations = FaceRotations(FourFaces());
+  for (const auto& [id, camera] : model.cameras) {
+    views_->cameras[id] = camera.IsPanorama() ? FaceCamera(camera, FourFaces()) : camera;
+  }
+  uint32_t next_id = model.images.empty() ? 1 : model.images.rbegin()->first + 1;
+  for (const auto& [id, image] : model.images) {
+    SparseImage view;
+    view.image_id = id;
+    view.camera_id = image.camera_id;
+    view.name = image.name;
+    view.cam_from_model = image.cam_from_model;
+    if (!model.cameras.at(image.camera_id).IsPanorama()) {
+      views_->images[id] = view;
+      continue;
+    }
+    for (size_t k = 0; k < rotations.size(); ++k) {
+      view.image_id = next_id++;
+      view.name = FaceName(image.name, static_cast<int>(k) + 1);
+      view.cam_from_model = Rigid{rotations[k], Eigen::Vector3d::Zero()} * image.cam_from_model;
+      faces_[view.image_id] = {&image, rotations[k]};
+      views_->images[view.image_id] = view;
+    }
+  }
+}
+
+std::optional<cv::Mat> PerspectiveViews::Read(const SparseImage& image,
+                                              const std::string& image_path,
+                                              std::string* warning) const {
+  const auto face = faces_.find(image.image_id);
+  if (face == faces_.end()) {
+    return ReadPhotoOf(image, model_.cameras.at(image.camera_id), image_path, warning);
+  }
+  const SparseImage& panorama = *face->second.panorama;
+  const auto photo =
+      ReadPhotoOf(panorama, model_.cameras.at(panorama.camera_id), image_path, warning);
+  if (!photo) return std::nullopt;
+  return CutFace(*photo, views_->cameras.at(image.camera_id), face->second.face_from_panorama);
+}
+
+}  // namespace roomtex

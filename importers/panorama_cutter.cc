@@ -1,0 +1,133 @@
+#include "importers/panorama_cutter.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+
+namespace fs = std::filesystem;
+namespace roomtex {
+namespace {
+
+constexpr int kJpegQuality = 96;
+// A picture all around is twice as wide as high, but for this share.
+constexpr double kMaxShapeError = 0.01;
+
+bool IsPhotoName(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return extension == ".jpg" || extension == ".jpeg" || extension == ".png" ||
+         extension == ".tif" || extension == ".tiff";
+}
+
+// Paths of the panoramas, by name.
+std::vector<fs::path> FindPanoramas(const std::string& input_path) {
+  if (!fs::is_directory(input_path)) return {input_path};
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::directory_iterator(input_path)) {
+    if (entry.is_regular_file() && IsPhotoName(entry.path())) paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  if (paths.empty()) {
+    throw InputError(input_path, "", "holds no picture (.jpg, .png, .tif)",
+                     "Give a panorama or a folder of them");
+  }
+  return paths;
+}
+
+CutPanorama Describe(const fs::path& path, const FaceOptions& options) {
+  CutPanorama panorama;
+  panorama.name = path.filename().string();
+  const auto [width, height] = ReadPhotoSize(path.string());
+  panorama.width = width;
+  panorama.height = height;
+  if (!(width > 0) || !(std::abs(0.5 * width / height - 1) <= kMaxShapeError)) {
+    throw InputError(path.string(), "",
+                     "has " + std::to_string(width) + " x " + std::to_string(height) +
+                         " pixels, expected a panorama all around (equirectangular), twice as wide "
+                         "as high",
+                     "Export the panorama whole from the camera's program, or leave it out");
+  }
+  panorama.face_camera = FaceCamera(panorama.PanoramaCamera(), options);
+  int number = 0;
+  for (const Eigen::Quaterniond& rotation : FaceRotations(options)) {
+    panorama.faces.push_back(
+        {path.stem().string() + "/face_" + std::to_string(++number) + ".jpg", rotation});
+  }
+  return panorama;
+}
+
+void WriteFaces(const fs::path& path, const CutPanorama& panorama, const fs::path& folder,
+                int num_threads) {
+  const cv::Mat picture = ReadPhoto(path.string());
+  MakeFolder((folder / path.stem()).string());
+  ParallelFor(num_threads, 0, static_cast<int>(panorama.faces.size()), [&](int i) {
+    const CutPanorama::Face& face = panorama.faces[i];
+    std::vector<uchar> bytes;
+    cv::imencode(".jpg", CutFace(picture, panorama.face_camera, face.face_from_panorama), bytes,
+                 {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+    OutputFile file((folder / face.name).string());
+    file.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                        static_cast<std::streamsize>(bytes.size()));
+    file.Commit();
+  });
+}
+
+void WriteCameraOptions(const Camera& camera, const std::string& path) {
+  std::ostringstream params;
+  params.precision(17);
+  for (size_t i = 0; i < camera.params.size(); ++i)
+    params << (i > 0 ? "," : "") << camera.params[i];
+  OutputFile file(path);
+  file.stream() << "--ImageReader.single_camera 1 --ImageReader.camera_model "
+                << CameraModelName(camera.model) << " --ImageReader.camera_params " << params.str()
+                << "\n";
+  file.Commit();
+}
+
+}  // namespace
+
+bool IsPanoramaInput(const std::string& input_path) {
+  std::error_code error;
+  return fs::is_directory(input_path, error) || IsPhotoName(input_path);
+}
+
+std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
+                                      const std::string& output_folder, const FaceOptions& options,
+                                      int num_threads, Progress* progress) {
+  const std::vector<fs::path> paths = FindPanoramas(input_path);
+  std::vector<CutPanorama> panoramas;
+  std::set<std::string> folders;
+  for (const fs::path& path : paths) {
+    panoramas.push_back(Describe(path, options));
+    if (folders.insert(path.stem().string()).second) continue;
+    throw InputError(path.string(), "", "has the name of another panorama, but for its ending",
+                     "Give the panoramas names of their own");
+  }
+  MakeFolder(output_folder);
+  progress->Stage("cut panoramas", static_cast<int>(paths.size()));
+  for (size_t i = 0; i < paths.size(); ++i) {
+    WriteFaces(paths[i], panoramas[i], output_folder, num_threads);
+    progress->Tick();
+  }
+  const Camera& camera = panoramas[0].face_camera;
+  const bool is_one = std::all_of(panoramas.begin(), panoramas.end(), [&](const CutPanorama& p) {
+    return p.face_camera.width == camera.width && p.face_camera.params == camera.params;
+  });
+  const fs::path folder = output_folder;
+  if (is_one) WriteCameraOptions(camera, (folder / "camera_options.txt").string());
+  WritePanoramaSet(panoramas, (folder / "panoramas.json").string());
+  return panoramas;
+}
+
+}  // namespace roomtex
