@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/camera_formulas.h"
+
 namespace roomtex {
 
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
@@ -28,11 +30,23 @@ namespace {
 // as much as the rest of an alignment has.
 constexpr double kMaxOpenFocal = 0.001;
 
+// A principal point in the very middle of the photos is nobody's measurement.
+bool IsCentreCalibrated(const LensCheck& lenses) {
+  return std::all_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
+    const Camera& told = lens.told;
+    const size_t first = camera_formulas::HasOneFocalLength(told.model) ? 1 : 2;
+    const bool in_the_middle =
+        told.params[first] == told.width / 2.0 && told.params[first + 1] == told.height / 2.0;
+    return lens.told_alike && !in_the_middle;
+  });
+}
+
 LensChoice ChooseLens(const AlignmentInput& input, const LensCheck& lenses,
                       RefineIntrinsics refine) {
   if (refine == RefineIntrinsics::kNever) return LensChoice::kHeld;
   if (refine == RefineIntrinsics::kAlways || lenses.mended || input.lenses_refined) {
-    return LensChoice::kFree;
+    return !input.lenses_refined && IsCentreCalibrated(lenses) ? LensChoice::kFreeButCentre
+                                                               : LensChoice::kFree;
   }
   const bool open =
       std::any_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
