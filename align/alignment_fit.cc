@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/camera_formulas.h"
+
 namespace roomtex {
 namespace {
 
@@ -47,12 +49,29 @@ namespace {
 // Photos that leave a focal length open by more than this share leave it to the scan: half of it is
 // as much as the rest of an alignment has.
 constexpr double kMaxOpenFocal = 0.001;
+// Metres; a scan that differs in shape from the photos by more (rms) calibrates no lens.
+constexpr double kMaxCalibratingScan = 0.01;
 
-LensChoice ChooseLens(const AlignmentInput& input, const LensCheck& lenses,
+// A principal point in the very middle of the photos is nobody's measurement.
+bool IsCentreCalibrated(const LensCheck& lenses) {
+  return std::all_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
+    const Camera& told = lens.told;
+    const size_t first = camera_formulas::HasOneFocalLength(told.model) ? 1 : 2;
+    const bool in_the_middle =
+        told.params[first] == told.width / 2.0 && told.params[first + 1] == told.height / 2.0;
+    return lens.told_alike && !in_the_middle;
+  });
+}
+
+LensChoice ChooseLens(const AlignmentInput& input, const AlignmentFit& fit, const LensCheck& lenses,
                       RefineIntrinsics refine) {
   if (refine == RefineIntrinsics::kNever) return LensChoice::kHeld;
+  if (refine == RefineIntrinsics::kAuto && fit.disagreement.rms > kMaxCalibratingScan) {
+    return LensChoice::kHeld;
+  }
   if (refine == RefineIntrinsics::kAlways || lenses.mended || input.lenses_refined) {
-    return LensChoice::kFree;
+    return !input.lenses_refined && IsCentreCalibrated(lenses) ? LensChoice::kFreeButCentre
+                                                               : LensChoice::kFree;
   }
   const bool open =
       std::any_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
@@ -71,7 +90,7 @@ ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStar
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
   return AdjustModel({input.model, fit.points, surveyed.scans(), surveyed.planes(),
                       surveyed.patches(), input.picks, start.UsedPicks(), start.pick_sigma_px,
-                      start.image_name, ChooseLens(input, lenses, options.refine_intrinsics),
+                      start.image_name, ChooseLens(input, fit, lenses, options.refine_intrinsics),
                       lenses.lens_of_camera, lenses.ToldCameras(input.model), fit.pick_bend_px},
                      fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
 }

@@ -337,10 +337,23 @@ bool SharingIsTooDear(const SparseModel& thinned, const FreedLenses& freed, doub
 
 }  // namespace
 
+namespace {
+
+// A panorama has no lens, and a bundle adjustment of single photos would take rigs apart.
+bool HasPanoramasOrRigs(const SparseModel& model) {
+  return std::any_of(model.cameras.begin(), model.cameras.end(),
+                     [](const auto& camera) { return camera.second.IsPanorama(); }) ||
+         std::any_of(model.images.begin(), model.images.end(),
+                     [](const auto& image) { return image.second.frame_id != kNoFrame; });
+}
+
+}  // namespace
+
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine) {
   LensCheck check;
   check.lens_of_camera = LensesAsTold(model, {});
   if (refine == RefineIntrinsics::kNever || model.images.size() < 2) return check;
+  if (HasPanoramasOrRigs(model)) return check;
   const double sigma_px = KeypointNoise(model);
   const SparseModel thinned = ThinnedModel(model, kLensPointsPerImage);
   const std::optional<FreedLenses> freed = FreeLenses(thinned, labels, sigma_px);

@@ -66,7 +66,8 @@ Json LensToJson(const LensFinding& finding);
 // Cameras of the same model and photo size whose photos have the same label (what EXIF says of
 // their camera and focal length, by image_id; may lack any) are one lens, as far as the photos
 // allow that: those that obey another focal length (by 1 %, and significantly) have their own. A
-// lens is used if its photos contradict what was told (auto), or in any case (always).
+// lens is used if its photos contradict what was told (auto), or in any case (always). Models with
+// panoramas or rigs keep theirs.
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine);
 
 }  // namespace roomtex

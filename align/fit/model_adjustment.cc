@@ -16,6 +16,9 @@ constexpr double kMinBendShare = 0.008, kMinBendGain = 100;
 // right it is a few.
 constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
 
+// What of the lenses is adjusted; the centre is principal point and tangential distortion.
+enum class Freed { kNothing, kNotCentre, kAll };
+
 // From one similarity, to a scan that is bent or not, with lenses that are held or not.
 struct Trial {
   Similarity scan_from_sparse;
@@ -26,7 +29,7 @@ struct Trial {
   PlaneBundle bundle;
 
   Trial(const ModelAdjustmentInput& adjustment, const Similarity& similarity,
-        std::optional<BendFit> bend_fit, bool free, const PlaneBundleOptions& given)
+        std::optional<BendFit> bend_fit, Freed freed, const PlaneBundleOptions& given)
       : scan_from_sparse(similarity),
         bend(std::move(bend_fit)),
         options(given),
@@ -42,7 +45,8 @@ struct Trial {
               adjustment.lens_of_camera,
               adjustment.told} {
     input.pick_bend_px = adjustment.pick_bend_px;
-    options.refine_intrinsics = free;
+    options.refine_intrinsics = freed != Freed::kNothing;
+    options.hold_centre = freed == Freed::kNotCentre;
     TransformModel(scan_from_sparse, &start);
     bundle = AdjustToSurface(input, options);
   }
@@ -71,9 +75,14 @@ class Adjuster {
       : input_(input), start_(start), options_(options) {}
 
   TrialPointer Run() {
-    TrialPointer best = Try(start_, std::nullopt, input_.lens == LensChoice::kFree);
-    if (input_.lens == LensChoice::kByScan) {
-      TrialPointer freed = Try(start_, std::nullopt, true);
+    // More of the lens where that explains the photos better. The centre comes last: a scan that
+    // leaves a direction open takes a shift along it for one of the centre.
+    const Freed first = input_.lens == LensChoice::kFree            ? Freed::kAll
+                        : input_.lens == LensChoice::kFreeButCentre ? Freed::kNotCentre
+                                                                    : Freed::kNothing;
+    TrialPointer best = Try(start_, std::nullopt, first);
+    if (input_.lens == LensChoice::kByScan || input_.lens == LensChoice::kFreeButCentre) {
+      TrialPointer freed = Try(start_, std::nullopt, Freed::kAll);
       if (IsBetter(best->bundle, freed->bundle, kMinLensShare, kMinLensGain)) {
         best = std::move(freed);
       }
@@ -85,14 +94,14 @@ class Adjuster {
                     input_.used, input_.pick_sigma_px, start_, options_.min_bend);
     if (!bend) return best;
     const Similarity start = bend->scan_from_sparse;
-    TrialPointer bent = Try(start, std::move(bend), false);
+    TrialPointer bent = Try(start, std::move(bend), Freed::kNothing);
     if (!IsScanBent(best->bundle, bent->bundle) || IsStraightAfterAll(*bent)) return best;
     return bent;
   }
 
  private:
-  TrialPointer Try(const Similarity& start, std::optional<BendFit> bend, bool free) const {
-    return std::make_unique<Trial>(input_, start, std::move(bend), free, options_);
+  TrialPointer Try(const Similarity& start, std::optional<BendFit> bend, Freed freed) const {
+    return std::make_unique<Trial>(input_, start, std::move(bend), freed, options_);
   }
 
   // The straight scan again, from where the bent one has brought the model: what looks like a bend

@@ -17,7 +17,8 @@ namespace roomtex {
 enum class LensChoice {
   kHeld,
   kFree,
-  kByScan,  // freed if the model fits the surface better for it
+  kFreeButCentre,  // principal point and tangential distortion only if the photos ask for it
+  kByScan,         // freed if the model fits the surface better for it
 };
 
 struct ModelAdjustmentInput {

@@ -36,6 +36,7 @@ struct PlaneBundleOptions {
   // Lenses are adjusted, too (PlaneBundleInput::lens_of_camera), held near what was told by
   // LensPrior. No option of its own: see AlignmentOptions::refine_intrinsics.
   bool refine_intrinsics = false;
+  bool hold_centre = false;  // LensPrior's
   // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
   // metres, rms over the points on the surface. Smaller ones are within the noise.
   bool bend = true;

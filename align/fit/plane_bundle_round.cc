@@ -211,8 +211,9 @@ class RoundProblem {
           told != round_.input.told.end() ? told->second : round_.input.model.cameras.at(id);
       const Eigen::Map<const Eigen::VectorXd> b(given.params.data(),
                                                 static_cast<int>(given.params.size()));
-      problem_->AddResidualBlock(new ceres::NormalPrior(round_.sigma_px * LensPrior(given), b),
-                                 nullptr, params);
+      problem_->AddResidualBlock(
+          new ceres::NormalPrior(round_.sigma_px * LensPrior(given, round_.options.hold_centre), b),
+          nullptr, params);
     }
   }
 

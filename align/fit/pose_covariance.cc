@@ -18,7 +18,10 @@ class ReducedSystem {
  public:
   ReducedSystem(const PlaneBundleInput& input, const PlaneBundle& bundle,
                 const PlaneBundleOptions& options)
-      : input_(input), bundle_(bundle), with_lenses_(options.refine_intrinsics) {
+      : input_(input),
+        bundle_(bundle),
+        with_lenses_(options.refine_intrinsics),
+        hold_centre_(options.hold_centre) {
     std::map<uint32_t, uint32_t> first_of_frame;
     for (const auto& [id, image] : bundle.model.images) {
       if (bundle.idle_images.count(id) > 0) continue;
@@ -54,7 +57,8 @@ class ReducedSystem {
     for (const auto& [offset, camera_id] : lenses_) {
       const auto told = input_.told.find(camera_id);
       const Eigen::MatrixXd prior =
-          LensPrior(told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id));
+          LensPrior(told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id),
+                    hold_centre_);
       normal.AddInformation(offset, prior.transpose() * prior);
     }
     const Eigen::MatrixXd covariance = normal.Covariance();
@@ -179,7 +183,7 @@ class ReducedSystem {
 
   const PlaneBundleInput& input_;
   const PlaneBundle& bundle_;
-  const bool with_lenses_;
+  const bool with_lenses_, hold_centre_;
   std::map<uint32_t, PoseParameters> poses_;
   std::map<uint32_t, Rigid> cam_from_rig_;
   int num_poses_ = 0;

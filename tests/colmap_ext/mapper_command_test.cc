@@ -439,12 +439,12 @@ TEST_F(MapperCommand, RefusesAnOutputThatCannotBeWritten) {
   EXPECT_NE(result.err.find("is a file"), std::string::npos) << result.err;
 }
 
-TEST_F(MapperCommand, WarnsOfACameraWithoutPriorFocalLength) {
+TEST_F(MapperCommand, WarnsOfACameraWithoutPriorFocalLengthThatIsNotRefined) {
   SimulatedViewsOptions options = RoomOptions(3);
   Simulate(options);
   SQLite::Database(folder_ / "database.db", SQLite::OPEN_READWRITE)
       .exec("UPDATE cameras SET prior_focal_length = 0");
-  const CommandResult result = Run();
+  const CommandResult result = Run("--refine_intrinsics 0");
   EXPECT_EQ(result.exit_code, 0) << result.err;
   ASSERT_EQ(Report()["warnings"].size(), 1u);
   EXPECT_NE(Report()["warnings"][0].get<std::string>().find("prior_focal_length"),
