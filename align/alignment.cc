@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 namespace roomtex {
 namespace {
@@ -12,6 +14,15 @@ constexpr double kLeastKeypointNoise = 0.3;
 
 void Append(std::vector<std::string> more, std::vector<std::string>* all) {
   std::move(more.begin(), more.end(), std::back_inserter(*all));
+}
+
+// Metres; model and scan that differ by less leave nothing to mend.
+constexpr double kSameShape = 0.01;
+// Where they differ by more, another lens has to bring them nearer by this factor.
+constexpr double kClearlyNearer = 0.95;
+
+double KeypointSigma(double reprojection_rms_px) {
+  return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
 }
 
 // RMS over all observations, pixels.
@@ -85,8 +96,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
     if (lens.used) result.warnings.push_back(lens.Sentence());
   }
   result.reprojection_rms_px = ReprojectionRms(input.model);
-  const double sigma_px =
-      std::max(kLeastKeypointNoise, result.reprojection_rms_px / std::sqrt(2.0));
+  const double sigma_px = KeypointSigma(result.reprojection_rms_px);
   result.fit = FitAlignment(input, start, sigma_px, options);
   result.scan_from_sparse = result.fit.scan_from_sparse;
   result.refined_pick_px = result.fit.pick_px;
@@ -117,6 +127,41 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   return result;
 }
 
+// How far model and scan differ in shape, metres; infinite where the picks lead nowhere.
+double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& options,
+                       Progress* progress) {
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
+  try {
+    std::vector<std::string> ignored;  // comes again for the lenses that are chosen
+    const AlignmentStart start = FindStart(input, options, progress, &ignored);
+    const AlignmentFit fit =
+        FitAlignment(input, start, KeypointSigma(ReprojectionRms(input.model)), options);
+    return fit.surface.converged ? fit.disagreement.rms : kNowhere;
+  } catch (const InputError&) {
+    return kNowhere;
+  }
+}
+
+// Photos that hardly move, or a camera model that lacks a term of the lens, let the photos find a
+// lens that is no better than the one they contradict. The scan has the last word: the better lens
+// brings the model clearly nearer to its shape.
+bool ScanSpeaksForTold(const AlignmentInput& told, const AlignmentInput& mended,
+                       const AlignmentOptions& options, Progress* progress) {
+  const double difference = ShapeDifference(mended, options, progress);
+  return difference > kSameShape &&
+         kClearlyNearer * ShapeDifference(told, options, progress) < difference;
+}
+
+std::string KeepTold(LensCheck* lenses) {
+  std::string text;
+  for (LensFinding& lens : lenses->lenses) {
+    if (!std::exchange(lens.used, false)) continue;
+    text += lens.Sentence() + " ";
+  }
+  lenses->mended.reset();
+  return text + "With it the sparse model lies nearer to the scan.";
+}
+
 }  // namespace
 
 std::vector<std::string> AlignmentOptions::Problems() const {
@@ -135,6 +180,10 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentOptions& optio
   std::vector<std::string> warnings = CheckPicksOnScan(input);
   input.surveyed.patches();
   LensCheck lenses = FindLenses(input, options, progress);
+  if (lenses.mended && options.refine_intrinsics == RefineIntrinsics::kAuto &&
+      ScanSpeaksForTold(input, WithLensesOf(lenses, input), options, progress)) {
+    warnings.push_back(KeepTold(&lenses));
+  }
   const AlignmentInput aligned = WithLensesOf(lenses, input);
   const AlignmentStart start = FindStart(aligned, options, progress, &warnings);
   Alignment result = FitAndJudge(aligned, lenses, start, options, progress);

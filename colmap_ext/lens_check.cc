@@ -236,7 +236,8 @@ std::string LensFinding::Sentence() const {
     who = photos[0] +
           (photos.size() > 1 ? " and " + std::to_string(photos.size() - 1) + " more photos" : "");
     return who + " obey a focal length of " + Number(found_px, 1) + " pixels instead of " +
-           Number(told_px, 1) + ": a zoom or another focus. They got a camera of their own.";
+           Number(told_px, 1) + ": a zoom or another focus. " +
+           (used ? "They got a camera of their own." : "The lens as told is kept.");
   }
   if (camera_ids.size() > 1) {
     who = "Cameras " + std::to_string(camera_ids.front()) + " to " +
@@ -244,7 +245,8 @@ std::string LensFinding::Sentence() const {
   }
   return who + ": focal length " + Number(told_px, 1) + " pixels as told, " + Number(found_px, 1) +
          " +- " + Number(focal_sigma, 1) + " by the photos (" + Number(deviations, 0) +
-         " standard deviations, distortion included). The lens found is used.";
+         " standard deviations, distortion included). The lens " +
+         (used ? "found is used." : "as told is kept.");
 }
 
 Json LensToJson(const LensFinding& finding) {

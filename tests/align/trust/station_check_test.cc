@@ -40,7 +40,7 @@ void Displace(const Eigen::Vector3d& metres, double deg, Scan* scan) {
 TEST(StationCheck, StationsThatStandRightAgree) {
   const StationCheck check = CheckStations(Stations(2));
   ASSERT_EQ(check.pairs.size(), 1u);
-  EXPECT_GT(check.pairs[0].num_patches, 1000);
+  EXPECT_GT(check.pairs[0].num_patches, 400);
   EXPECT_LT(check.pairs[0].offset, 0.004);
   EXPECT_THAT(check.wrong, IsEmpty());
 }
