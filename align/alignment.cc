@@ -18,8 +18,9 @@ void Append(std::vector<std::string> more, std::vector<std::string>* all) {
 
 // Metres; model and scan that differ by less leave nothing to mend.
 constexpr double kSameShape = 0.01;
-// Where they differ by more, another lens has to bring them nearer by this factor.
-constexpr double kClearlyNearer = 0.95;
+// Where they differ by more, another lens has to bring them nearer by this factor, and to differ in
+// its focal length by so many standard deviations: distortion alone is too little to go by there.
+constexpr double kClearlyNearer = 0.95, kSameFocalDeviations = 3;
 
 double KeypointSigma(double reprojection_rms_px) {
   return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
@@ -145,11 +146,16 @@ double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& opti
 // Photos that hardly move, or a camera model that lacks a term of the lens, let the photos find a
 // lens that is no better than the one they contradict. The scan has the last word: the better lens
 // brings the model clearly nearer to its shape.
-bool ScanSpeaksForTold(const AlignmentInput& told, const AlignmentInput& mended,
+bool ScanSpeaksForTold(const AlignmentInput& told, const LensCheck& lenses,
                        const AlignmentOptions& options, Progress* progress) {
-  const double difference = ShapeDifference(mended, options, progress);
-  return difference > kSameShape &&
-         kClearlyNearer * ShapeDifference(told, options, progress) < difference;
+  const double difference = ShapeDifference(WithLensesOf(lenses, told), options, progress);
+  if (!(difference > kSameShape)) return false;
+  const bool same_focal = std::all_of(
+      lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
+        return !lens.used || (lens.told_alike && !lens.apart &&
+                              lens.FocalDeviations() < kSameFocalDeviations);
+      });
+  return same_focal || kClearlyNearer * ShapeDifference(told, options, progress) < difference;
 }
 
 std::string KeepTold(LensCheck* lenses) {
@@ -181,7 +187,7 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentOptions& optio
   input.surveyed.patches();
   LensCheck lenses = FindLenses(input, options, progress);
   if (lenses.mended && options.refine_intrinsics == RefineIntrinsics::kAuto &&
-      ScanSpeaksForTold(input, WithLensesOf(lenses, input), options, progress)) {
+      ScanSpeaksForTold(input, lenses, options, progress)) {
     warnings.push_back(KeepTold(&lenses));
   }
   const AlignmentInput aligned = WithLensesOf(lenses, input);
