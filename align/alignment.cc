@@ -150,10 +150,10 @@ bool ScanSpeaksForTold(const AlignmentInput& told, const LensCheck& lenses,
                        const AlignmentOptions& options, Progress* progress) {
   const double difference = ShapeDifference(WithLensesOf(lenses, told), options, progress);
   if (!(difference > kSameShape)) return false;
-  const bool same_focal = std::all_of(
-      lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
-        return !lens.used || (lens.told_alike && !lens.apart &&
-                              lens.FocalDeviations() < kSameFocalDeviations);
+  const bool same_focal =
+      std::all_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
+        return !lens.used ||
+               (lens.told_alike && !lens.apart && lens.FocalDeviations() < kSameFocalDeviations);
       });
   return same_focal || kClearlyNearer * ShapeDifference(told, options, progress) < difference;
 }
