@@ -306,7 +306,7 @@ TEST_F(BadDatabase, CameraRowsAreChecked) {
        "params holds 1 bytes, expected 64"},
       {"UPDATE cameras SET params = NULL WHERE camera_id = 7", "params holds 0 bytes, expected 64"},
       {"UPDATE cameras SET model = 2 WHERE camera_id = 7", "params holds 64 bytes, expected 32"},
-      {"UPDATE cameras SET model = 11 WHERE camera_id = 7", "model is \"11\""},
+      {"UPDATE cameras SET model = 18 WHERE camera_id = 7", "model is \"18\""},
       {"UPDATE cameras SET model = 'PINHOLE' WHERE camera_id = 7", "model is \"PINHOLE\""},
       {"UPDATE cameras SET width = -1 WHERE camera_id = 7", "width is \"-1\""},
       {"UPDATE cameras SET height = 0 WHERE camera_id = 7", "height is \"0\""},
