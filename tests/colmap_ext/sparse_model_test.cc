@@ -315,9 +315,9 @@ TEST(BadSparseModel, UnknownCameraModelOfALaterColmapIsRefused) {
   const TempFolder folder;
   WriteSparseModel(MakeSparseModel(), folder.path());
   std::string bytes = ReadBytes(folder / "cameras.bin");
-  bytes[8 + 4] = 17;
+  bytes[8 + 4] = 18;
   WriteBytes(folder / "cameras.bin", bytes);
-  EXPECT_INPUT_ERROR(ReadSparseModel(folder.path()), "byte 8: camera 3 has the model id 17");
+  EXPECT_INPUT_ERROR(ReadSparseModel(folder.path()), "byte 8: camera 3 has the model id 18");
 }
 
 TEST(BadSparseModel, UnwritableOutputIsRefused) {
