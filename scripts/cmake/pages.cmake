@@ -27,7 +27,9 @@ function(roomtex_page target name)
        "#pragma once\n#include \"core/page.h\"\nnamespace roomtex {\nextern const Page ${variable};\n}\n")
   file(CONFIGURE OUTPUT ${folder}/${name}_page.cc @ONLY CONTENT
        "#include \"${name}_page.h\"\n${symbols}namespace roomtex {\nconst Page ${variable} = {\n${entries}};\n}\n")
-  set_source_files_properties(${folder}/${name}_page.cc PROPERTIES OBJECT_DEPENDS "${paths}")
+  # A unity file would not know what it depends on.
+  set_source_files_properties(${folder}/${name}_page.cc
+    PROPERTIES OBJECT_DEPENDS "${paths}" SKIP_UNITY_BUILD_INCLUSION ON)
   target_sources(${target} PRIVATE ${folder}/${name}_page.cc)
   target_include_directories(${target} PRIVATE ${folder})
 endfunction()

@@ -47,6 +47,22 @@ function crossMoved() {
   return cross[side] !== null && crossShown(side);
 }
 
+// Enter never puts a half's partner where nobody pointed: a prediction may still be on its way.
+function takeOrSet() {
+  const {editor, panes, lastInput} = app;
+  if (editor.takeSnap()) return true;
+  if (!crossMoved()) {
+    if (editor.acceptGhost()) return true;
+    const {side} = editor;
+    const byMouse = lastInput[side] === 'mouse' && panes[side].cursor;
+    if (editor.half && !byMouse) {
+      say('Nothing is predicted here yet; the arrows move the crosshair, Space sets a point');
+      return true;
+    }
+  }
+  return setPoint();
+}
+
 function zoom(factor) {
   const {editor, picks, panes} = app;
   const {side} = editor;
@@ -102,8 +118,7 @@ export const kKeys = [
         keys: ['Enter'],
         shown: 'Enter',
         does: 'takes the predicted partner, or the nearest place that can be picked',
-        run: () =>
-            app.editor.takeSnap() || (!crossMoved() && app.editor.acceptGhost()) || setPoint(),
+        run: () => takeOrSet(),
       },
       {
         keys: ['Space'],
