@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include "core/balanced_inverse.h"
 #include "core/camera_formulas.h"
 #include "core/text.h"
 #include "core/twist.h"
@@ -66,21 +66,6 @@ struct LensPriorCost {
   double focal_offset, focal_weight, radial_weight, principal_weight;
   Eigen::Vector2d principal_offset;
 };
-
-// Inverse of a normal matrix; infinite where something is open.
-Matrix10d InverseOf(const Matrix10d& normal) {
-  const Eigen::Matrix<double, 10, 1> size = normal.diagonal().cwiseSqrt();
-  const Matrix10d infinite = Matrix10d::Constant(std::numeric_limits<double>::infinity());
-  if (!normal.allFinite() || !(size.minCoeff() > 0)) return infinite;
-  const Matrix10d balanced =
-      size.cwiseInverse().asDiagonal() * normal * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix10d> solver(balanced);
-  if (!(solver.eigenvalues()[0] > 1e-13)) return infinite;
-  const Matrix10d inverse = solver.eigenvectors() *
-                            solver.eigenvalues().cwiseInverse().asDiagonal() *
-                            solver.eigenvectors().transpose();
-  return size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal();
-}
 
 Camera WithLens(Camera camera, double focal, const Eigen::Vector2d& principal, double radial) {
   camera.params[0] = focal;
@@ -226,8 +211,8 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   Matrix10d turned = Matrix10d::Identity();
   turned.topLeftCorner<3, 3>() =
       RotationWithJacobian(Eigen::Map<const Eigen::Vector3d>(pose)).left_jacobian;
-  const Matrix10d covariance = turned * InverseOf(normal) * turned.transpose();
-  if (covariance.allFinite()) {
+  if (const auto inverse = BalancedInverse<10>(normal, 1e-13)) {
+    const Matrix10d covariance = turned * *inverse * turned.transpose();
     result.covariance = covariance.topLeftCorner<6, 6>();
     result.focal_sigma = std::sqrt(covariance(6, 6));
     result.radial_sigma = HasRadial() ? std::sqrt(covariance(7, 7)) : 0;

@@ -9,6 +9,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include "core/balanced_inverse.h"
 #include "core/camera_formulas.h"
 
 namespace roomtex {
@@ -262,19 +263,9 @@ class PoseProblem {
   ceres::Problem problem_;
 };
 
+// Infinite where the picks leave something open.
 Matrix6d InverseNormal(const Matrix6d& normal) {
-  // Rotation and metres differ in size: equilibrate before judging whether the matrix has an
-  // inverse.
-  const Eigen::Matrix<double, 6, 1> scale = normal.diagonal().cwiseSqrt();
-  if (!(scale.minCoeff() > 0) || !normal.allFinite()) return Matrix6d::Constant(kInfinity);
-  const Matrix6d balanced =
-      scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(balanced);
-  if (!(solver.eigenvalues()[0] > 1e-13)) return Matrix6d::Constant(kInfinity);
-  const Matrix6d inverse = solver.eigenvectors() *
-                           solver.eigenvalues().cwiseInverse().asDiagonal() *
-                           solver.eigenvectors().transpose();
-  return scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
+  return BalancedInverse<6>(normal, 1e-13).value_or(Matrix6d::Constant(kInfinity));
 }
 
 // Thesis steps 6 and 7, from one start. None if no point lies in front, or the solution leaves the

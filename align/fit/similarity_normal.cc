@@ -4,8 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-
+#include "core/balanced_inverse.h"
 #include "core/frames.h"
 #include "core/robust_kernel.h"
 #include "core/twist.h"
@@ -106,16 +105,9 @@ void SimilarityNormal::AddDistance(double distance, const Eigen::Vector3d& x_in_
 }
 
 bool SimilarityNormal::SolveStep(Vector7d* step, Matrix7d* inverse) const {
-  const Vector7d size = matrix.diagonal().cwiseSqrt();
-  if (!matrix.allFinite() || !(size.minCoeff() > 0)) return false;
-  const Matrix7d balanced =
-      size.cwiseInverse().asDiagonal() * matrix * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix7d> solver(balanced);
-  if (!(solver.eigenvalues()[0] > 1e-12)) return false;
-  const Matrix7d balanced_inverse = solver.eigenvectors() *
-                                    solver.eigenvalues().cwiseInverse().asDiagonal() *
-                                    solver.eigenvectors().transpose();
-  *inverse = size.cwiseInverse().asDiagonal() * balanced_inverse * size.cwiseInverse().asDiagonal();
+  const auto found = BalancedInverse<7>(matrix, 1e-12);
+  if (!found) return false;
+  *inverse = *found;
   *step = -*inverse * gradient;
   return step->allFinite();
 }
