@@ -68,16 +68,7 @@ void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
 
 // The input with its lenses as the photos have them.
 AlignmentInput WithLensesOf(const LensCheck& lenses, const AlignmentInput& input) {
-  const SparseModel& model = lenses.mended ? *lenses.mended : input.model;
-  return {model,
-          input.surveyed,
-          input.picks,
-          input.picks_path,
-          input.azimuth,
-          input.photo_labels,
-          input.lenses_refined,
-          input.image_path,
-          input.num_threads};
+  return input.With(lenses.mended ? *lenses.mended : input.model, input.surveyed, input.picks);
 }
 
 LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& options,

@@ -52,6 +52,13 @@ struct AlignmentInput {
   // empty.
   std::string image_path = "";
   int num_threads = -1;  // for that; changes nothing
+
+  // The same of another model, other scans or picks; all must outlive the result.
+  AlignmentInput With(const SparseModel& other_model, const SurveyedScans& other_scans,
+                      const std::vector<Pick>& other_picks) const {
+    return {other_model,  other_scans,    other_picks, picks_path, azimuth,
+            photo_labels, lenses_refined, image_path,  num_threads};
+  }
 };
 
 }  // namespace roomtex

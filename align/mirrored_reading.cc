@@ -95,8 +95,7 @@ MirroredReading FindMirroredReading(const AlignmentInput& input, const Alignment
   reading.surveyed =
       std::make_unique<const SurveyedScans>(*reading.scans, input.surveyed.options());
   reading.attempt =
-      AttemptQuietly({input.model, *reading.surveyed, input.picks, input.picks_path, input.azimuth},
-                     options, progress);
+      AttemptQuietly(input.With(input.model, *reading.surveyed, input.picks), options, progress);
   const bool by_picks = attempt.picks_on_mirror_image && reading.attempt.alignment;
   if (by_picks || IsBelieved(reading.attempt, attempt)) {
     reading.kind = MirroredReading::Kind::kScan;
@@ -106,8 +105,8 @@ MirroredReading FindMirroredReading(const AlignmentInput& input, const Alignment
   if (input.surveyed.scans().size() > 1) return reading;
   const std::vector<Pick> picks =
       MirrorPicks(input.picks, input.surveyed.scans()[0].scan_from_station);
-  const AlignmentAttempt both = AttemptQuietly(
-      {input.model, *reading.surveyed, picks, input.picks_path, input.azimuth}, options, progress);
+  const AlignmentAttempt both =
+      AttemptQuietly(input.With(input.model, *reading.surveyed, picks), options, progress);
   if (!IsBelieved(both, attempt)) return reading;
   reading.kind = MirroredReading::Kind::kScanAndPicks;
   reading.evidence = Evidence(both, attempt);

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "align/alignment.h"
+#include "align/alignment_report.h"
 #include "align/geo/geo_output.h"
 #include "align/lens_report.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
-#include "align/plane_bundle_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
@@ -156,128 +156,6 @@ void CheckArguments(const Arguments& a) {
   if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
 }
 
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json PicksToJson(const Alignment& alignment) {
-  Json json;
-  int num_used = 0;
-  Json per_pick = Json::array();
-  const AlignmentStart& start = alignment.start;
-  for (size_t i = 0; i < start.picks.size(); ++i) {
-    const PickOutcome& outcome = start.picks[i];
-    num_used += outcome.used;
-    Json one;
-    one["image_name"] = outcome.pick.image_name;
-    one["x"] = outcome.pick.x_in_img.x();
-    one["y"] = outcome.pick.x_in_img.y();
-    one["line"] = outcome.pick.line;
-    one["residual_px"] = NumberOrNull(outcome.residual_px);
-    one["refined_residual_px"] = NumberOrNull(alignment.refined_pick_px[i]);
-    one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
-    one["used"] = outcome.used;
-    one["weight"] = outcome.pick.weight;
-    per_pick.push_back(one);
-  }
-  json["count"] = start.picks.size();
-  json["num_used"] = num_used;
-  json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
-  json["rms_px"] = NumberOrNull(start.pick_rms_px);
-  json["max_px"] = NumberOrNull(start.pick_max_px);
-  json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
-  json["position_sigma_m"] = NumberOrNull(start.position_sigma);
-  json["per_pick"] = per_pick;
-  return json;
-}
-
-// One standard deviation, by what clicks, keypoints and the scan's noise leave open.
-Json ExpectedErrorToJson(const ExpectedError& error) {
-  Json json;
-  json["at_cameras_mm"] = NumberOrNull(1000 * error.at_cameras);
-  json["at_far_corner_mm"] = NumberOrNull(1000 * error.at_far_corner);
-  json["far_corner"] = {error.far_corner.x(), error.far_corner.y(), error.far_corner.z()};
-  json["rotation_deg"] = NumberOrNull(DegFromRad(error.rotation));
-  json["scale"] = NumberOrNull(error.scale);
-  return json;
-}
-
-// One standard deviation of each photo of an adjusted model; null for one that took no part.
-Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
-  Json json = Json::array();
-  for (const auto& [image_id, image] : aligned.images) {
-    const auto at = alignment.photo_sigmas.find(image_id);
-    const bool known = at != alignment.photo_sigmas.end();
-    Json one;
-    one["name"] = image.name;
-    one["position_sigma_mm"] = known ? NumberOrNull(1000 * at->second.position) : Json(nullptr);
-    one["rotation_sigma_deg"] =
-        known ? NumberOrNull(DegFromRad(at->second.rotation)) : Json(nullptr);
-    json.push_back(one);
-  }
-  return json;
-}
-
-Json OpenDirectionsToJson(const OpenDirections& open) {
-  const auto to_json = [](const std::vector<Eigen::Vector3d>& directions) {
-    Json json = Json::array();
-    for (const Eigen::Vector3d& d : directions) json.push_back({d.x(), d.y(), d.z()});
-    return json;
-  };
-  Json json;
-  json["degenerate"] = !open.None();
-  json["num_facings"] = open.num_facings;
-  json["open_translations"] = to_json(open.slides);
-  json["open_rotations"] = to_json(open.turns);
-  json["open_scale"] = open.scale;
-  json["position_sigma_mm"] = NumberOrNull(1000 * open.slide_sigma);
-  return json;
-}
-
-Json PlacementToJson(const Placement& placement) {
-  Json json;
-  json["num_points"] = placement.num_points;
-  json["num_on_surface"] = placement.num_on_surface;
-  json["num_floating"] = placement.num_floating;
-  json["num_hidden"] = placement.num_hidden;
-  json["surface_share"] = placement.SurfaceShare();
-  json["changed_share"] = placement.ChangedShare();
-  json["camera_share"] = placement.CameraShare();
-  return json;
-}
-
-// The keys of docs/commands.md; `planes` and those of the photos follow in Align().
-void FillReport(const Alignment& alignment, double reprojection_rms_after, Report* report) {
-  Report& r = *report;
-  r["scan_from_sparse"] = ToJson(alignment.scan_from_sparse);
-  r["scan_from_sparse_from_picks"] = ToJson(alignment.start.scan_from_sparse);
-  r["picks"] = PicksToJson(alignment);
-  const ScaleEstimate& scale = alignment.start.scale;
-  const bool has_scale = scale.num_features > 0;
-  r["scale"]["value"] = has_scale ? Json(scale.scale) : Json(nullptr);
-  r["scale"]["num_features"] = scale.num_features;
-  r["scale"]["relative_mad"] = has_scale ? Json(scale.relative_mad) : Json(nullptr);
-  r["planes"] = Json::array();
-  const bool refined = alignment.fit.refined;
-  const SimilarityFit& fit = alignment.fit.surface;
-  // Of the similarity by the picks and the refined one; the adjustment has its own below.
-  r["plane_rms_m"]["before"] = refined ? Json(fit.rms_before) : Json(nullptr);
-  r["plane_rms_m"]["after"] = refined ? Json(fit.rms_after) : Json(nullptr);
-  r["plane_rms_m"]["num_points"] = refined ? fit.num_points : 0;
-  const PlaneBundle& bundle = alignment.adjustment.bundle;
-  if (alignment.adjusted()) {
-    r["plane_rms_m"]["before"] = bundle.plane_rms_before;
-    r["plane_rms_m"]["after"] = bundle.plane_rms_after;
-    r["plane_rms_m"]["num_points"] = bundle.constraints.size();
-  }
-  r["plane_bundle"] = PlaneBundleToJson(alignment);
-  r["reprojection_rms_px"]["before"] = alignment.reprojection_rms_px;
-  r["reprojection_rms_px"]["after"] = reprojection_rms_after;
-  r["placement"] = PlacementToJson(alignment.placement);
-  r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
-  r["expected_error"]["disagreement_mm"] = NumberOrNull(1000 * alignment.disagreement.rms);
-  r["surface_geometry"] = refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
-  r["agreement"] = nullptr;
-}
-
 // The model on the Earth, with --geo_origin; the report's `geo`.
 void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans& placed,
               const std::optional<GeoReference>& geo, const std::string& output_path,
@@ -368,18 +246,46 @@ PlacedScans ReadScansToAlign(const Arguments& a) {
                           {a.scan_paths, a.scan_poses, a.scan_reader});
 }
 
+// Scans of several stations against each other; the report's `stations`.
+void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Context& context) {
+  std::vector<Scan>* const scans = &placed->scans;
+  context.report["stations"] = Json::array();
+  if (scans->size() < 2) return;
+  context.progress.Stage("stations");
+  if (a.register_stations) {
+    for (const int moved : RegisterStations(scans)) {
+      context.Warn((*scans)[moved].path + " was moved onto the other scans");
+      int scan = 0;
+      for (PlacedScans::File& file : placed->files) {
+        for (size_t k = 0; k < file.placed.size(); ++k, ++scan) {
+          if (scan == moved) file.placed[k] = true;  // the aligned model remembers where it is now
+        }
+      }
+    }
+  }
+  const StationCheck check = CheckStations(*scans);
+  context.report["stations"] = StationsToJson(check, *scans);
+  if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
+}
+
 // The scans as they are read, and the alignment to them. The reading may turn out to be the other
 // one (--azimuth auto).
 struct Reading {
-  Reading(const Arguments& a, const SurveyOptions& options)
-      : placed(ReadScansToAlign(a)),
-        surveyed(std::make_unique<const SurveyedScans>(placed.scans, options)) {}
+  Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
+    for (const std::string& note : placed.notes) context.Warn(note);
+    CompareStations(a, &placed, context);
+    geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
+    SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
+    options.num_threads = context.options.num_threads;
+    surveyed = std::make_unique<const SurveyedScans>(placed.scans, options);
+  }
   Reading(const Reading&) = delete;  // the survey is one of these scans
   Reading& operator=(const Reading&) = delete;
 
   PlacedScans placed;
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
+  std::optional<GeoReference> geo;
   AlignmentAttempt attempt;
 
   // Of the first RTPI scan; "" = there is none.
@@ -465,51 +371,28 @@ void WriteRefusal(const Arguments& a, const std::string& refusal, const Command:
   context.report.AddCopy(output_path + "/alignment.json");
 }
 
-void WriteAligned(const Arguments& a, const SparseModel& model, const Reading& reading,
-                  const std::optional<GeoReference>& geo, const std::set<std::string>& told,
-                  const Command::Context& context) {
-  const std::string output_path = ChooseOutput(a, context);
-  const Similarity& scan_from_sparse = reading.attempt.alignment->scan_from_sparse;
+// The aligned model and what belongs to it; without scan_from_sparse there was no sparse model.
+void WriteAligned(const Arguments& a, const SparseModel& model,
+                  const std::optional<Similarity>& scan_from_sparse, const Reading& reading,
+                  const std::set<std::string>& told, const Command::Context& context) {
   context.progress.Stage("write");
+  const std::string output_path = ChooseOutput(a, context);
+  const std::string transform_path = output_path + "/scan_from_sparse.txt";
+  const std::string matrix_path = output_path + "/scan_from_sparse_matrix.txt";
   WriteSparseModel(model, output_path);
-  WriteSimilarity(output_path + "/scan_from_sparse.txt", scan_from_sparse);
-  WriteSimilarityMatrix(output_path + "/scan_from_sparse_matrix.txt", scan_from_sparse);
-  WriteGeo(a, model, reading.placed, geo, output_path, context);
+  if (scan_from_sparse) {
+    WriteSimilarity(transform_path, *scan_from_sparse);
+    WriteSimilarityMatrix(matrix_path, *scan_from_sparse);
+  } else {
+    // One of an earlier run would contradict.
+    std::error_code ignored;
+    std::filesystem::remove(transform_path, ignored);
+    std::filesystem::remove(matrix_path, ignored);
+  }
+  WriteGeo(a, model, reading.placed, reading.geo, output_path, context);
   context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
   context.report.AddCopy(output_path + "/alignment.json");
   WriteOverlayPictures(a, model, *reading.surveyed, told, output_path, context);
-}
-
-// Scans of several stations against each other; the report's `stations`.
-void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Context& context) {
-  std::vector<Scan>* const scans = &placed->scans;
-  context.report["stations"] = Json::array();
-  if (scans->size() < 2) return;
-  context.progress.Stage("stations");
-  if (a.register_stations) {
-    for (const int moved : RegisterStations(scans)) {
-      context.Warn((*scans)[moved].path + " was moved onto the other scans");
-      int scan = 0;
-      for (PlacedScans::File& file : placed->files) {
-        for (size_t k = 0; k < file.placed.size(); ++k, ++scan) {
-          if (scan == moved) file.placed[k] = true;  // the aligned model remembers where it is now
-        }
-      }
-    }
-  }
-  const StationCheck check = CheckStations(*scans);
-  for (const StationPair& pair : check.pairs) {
-    Json one;
-    one["first"] = (*scans)[pair.first].path;
-    one["second"] = (*scans)[pair.second].path;
-    one["num_patches"] = pair.num_patches;
-    one["offset_mm"] = 1000 * pair.offset;
-    one["offset_sigma_mm"] = 1000 * pair.sigma;
-    one["turn_deg"] = DegFromRad(pair.turn);
-    one["agree"] = !pair.Disagrees();
-    context.report["stations"].push_back(one);
-  }
-  if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
 }
 
 // What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
@@ -544,13 +427,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   CheckPicksAgainstModel(a.picks_path, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
-  SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
-  options.num_threads = context.options.num_threads;
-  Reading reading(a, options);
-  for (const std::string& note : reading.placed.notes) context.Warn(note);
-  CompareStations(a, &reading.placed, context);
-  const std::optional<GeoReference> geo =
-      FindGeoReference(reading.placed, ParseGeoOrigin(a.geo_origin));
+  Reading reading(a, context);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
@@ -581,34 +458,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   CompareWithPhotos(a, model, *reading.surveyed, told, context);
-  WriteAligned(a, model, reading, geo, told, context);
-}
-
-// Of photos without a sparse model: what was found of their cameras.
-void AddLenses(const PhotoAlignment& found, Json* images) {
-  for (Json& one : *images) {
-    const SparseImage* image = found.model.FindImage(one["name"].get<std::string>());
-    const Camera& camera = found.model.cameras.at(image->camera_id);
-    const PhotoAlignment::Lens& lens = found.lenses.at(image->image_id);
-    one["camera_model"] = CameraModelName(camera.model);
-    one["camera_params"] = camera.params;
-    one["focal_length_from"] = FocalSourceName(lens.source);
-    one["focal_length_sigma_px"] = NumberOrNull(lens.focal_sigma);
-    one["radial_sigma"] = NumberOrNull(lens.radial_sigma);
-  }
-}
-
-// What an alignment without a sparse model does not have.
-void NullWithoutModel(Report* report) {
-  Report& r = *report;
-  for (const char* key : {"scan_from_sparse", "scan_from_sparse_from_picks", "plane_bundle"}) {
-    r[key] = nullptr;
-  }
-  r["reprojection_rms_px"]["before"] = nullptr;
-  r["expected_error"]["at_far_corner_mm"] = nullptr;
-  r["expected_error"]["far_corner"] = nullptr;
-  r["expected_error"]["scale"] = nullptr;
-  r["placement"] = nullptr;
+  WriteAligned(a, model, alignment.scan_from_sparse, reading, told, context);
 }
 
 // None if the files contradict each other; `refusal` then says why.
@@ -633,13 +483,7 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   CheckPickNames(a.picks_path, picks, photos.model);
   const std::set<std::string> told = LookForPhotos(a, photos.model, context);
   context.progress.Stage("read scan");
-  SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
-  options.num_threads = context.options.num_threads;
-  Reading reading(a, options);
-  for (const std::string& note : reading.placed.notes) context.Warn(note);
-  CompareStations(a, &reading.placed, context);
-  const std::optional<GeoReference> geo =
-      FindGeoReference(reading.placed, ParseGeoOrigin(a.geo_origin));
+  Reading reading(a, context);
   const AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path,
                              reading.azimuth()};
   std::string refusal;
@@ -656,19 +500,7 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   context.report["images"] = PhotosToJson(found->alignment, found->model);
   AddLenses(*found, &context.report["images"]);
   CompareWithPhotos(a, found->model, *reading.surveyed, told, context);
-
-  context.progress.Stage("write");
-  const std::string output_path = ChooseOutput(a, context);
-  WriteSparseModel(found->model, output_path);
-  // There is none: one of an earlier run would contradict.
-  for (const char* name : {"/scan_from_sparse.txt", "/scan_from_sparse_matrix.txt"}) {
-    std::error_code ignored;
-    std::filesystem::remove(output_path + name, ignored);
-  }
-  WriteGeo(a, found->model, reading.placed, geo, output_path, context);
-  context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
-  context.report.AddCopy(output_path + "/alignment.json");
-  WriteOverlayPictures(a, found->model, *reading.surveyed, told, output_path, context);
+  WriteAligned(a, found->model, std::nullopt, reading, told, context);
 }
 
 }  // namespace

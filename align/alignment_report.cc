@@ -1,0 +1,174 @@
+#include "align/alignment_report.h"
+
+#include <cmath>
+
+#include "align/plane_bundle_report.h"
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json PicksToJson(const Alignment& alignment) {
+  Json json;
+  int num_used = 0;
+  Json per_pick = Json::array();
+  const AlignmentStart& start = alignment.start;
+  for (size_t i = 0; i < start.picks.size(); ++i) {
+    const PickOutcome& outcome = start.picks[i];
+    num_used += outcome.used;
+    Json one;
+    one["image_name"] = outcome.pick.image_name;
+    one["x"] = outcome.pick.x_in_img.x();
+    one["y"] = outcome.pick.x_in_img.y();
+    one["line"] = outcome.pick.line;
+    one["residual_px"] = NumberOrNull(outcome.residual_px);
+    one["refined_residual_px"] = NumberOrNull(alignment.refined_pick_px[i]);
+    one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
+    one["used"] = outcome.used;
+    one["weight"] = outcome.pick.weight;
+    per_pick.push_back(one);
+  }
+  json["count"] = start.picks.size();
+  json["num_used"] = num_used;
+  json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
+  json["rms_px"] = NumberOrNull(start.pick_rms_px);
+  json["max_px"] = NumberOrNull(start.pick_max_px);
+  json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
+  json["position_sigma_m"] = NumberOrNull(start.position_sigma);
+  json["per_pick"] = per_pick;
+  return json;
+}
+
+// One standard deviation, by what clicks, keypoints and the scan's noise leave open.
+Json ExpectedErrorToJson(const ExpectedError& error) {
+  Json json;
+  json["at_cameras_mm"] = NumberOrNull(1000 * error.at_cameras);
+  json["at_far_corner_mm"] = NumberOrNull(1000 * error.at_far_corner);
+  json["far_corner"] = {error.far_corner.x(), error.far_corner.y(), error.far_corner.z()};
+  json["rotation_deg"] = NumberOrNull(DegFromRad(error.rotation));
+  json["scale"] = NumberOrNull(error.scale);
+  return json;
+}
+
+Json OpenDirectionsToJson(const OpenDirections& open) {
+  const auto to_json = [](const std::vector<Eigen::Vector3d>& directions) {
+    Json json = Json::array();
+    for (const Eigen::Vector3d& d : directions) json.push_back({d.x(), d.y(), d.z()});
+    return json;
+  };
+  Json json;
+  json["degenerate"] = !open.None();
+  json["num_facings"] = open.num_facings;
+  json["open_translations"] = to_json(open.slides);
+  json["open_rotations"] = to_json(open.turns);
+  json["open_scale"] = open.scale;
+  json["position_sigma_mm"] = NumberOrNull(1000 * open.slide_sigma);
+  return json;
+}
+
+Json PlacementToJson(const Placement& placement) {
+  Json json;
+  json["num_points"] = placement.num_points;
+  json["num_on_surface"] = placement.num_on_surface;
+  json["num_floating"] = placement.num_floating;
+  json["num_hidden"] = placement.num_hidden;
+  json["surface_share"] = placement.SurfaceShare();
+  json["changed_share"] = placement.ChangedShare();
+  json["camera_share"] = placement.CameraShare();
+  return json;
+}
+
+}  // namespace
+
+void FillReport(const Alignment& alignment, double reprojection_rms_after, Report* report) {
+  Report& r = *report;
+  r["scan_from_sparse"] = ToJson(alignment.scan_from_sparse);
+  r["scan_from_sparse_from_picks"] = ToJson(alignment.start.scan_from_sparse);
+  r["picks"] = PicksToJson(alignment);
+  const ScaleEstimate& scale = alignment.start.scale;
+  const bool has_scale = scale.num_features > 0;
+  r["scale"]["value"] = has_scale ? Json(scale.scale) : Json(nullptr);
+  r["scale"]["num_features"] = scale.num_features;
+  r["scale"]["relative_mad"] = has_scale ? Json(scale.relative_mad) : Json(nullptr);
+  r["planes"] = Json::array();
+  const bool refined = alignment.fit.refined;
+  const SimilarityFit& fit = alignment.fit.surface;
+  // Of the similarity by the picks and the refined one; the adjustment has its own below.
+  r["plane_rms_m"]["before"] = refined ? Json(fit.rms_before) : Json(nullptr);
+  r["plane_rms_m"]["after"] = refined ? Json(fit.rms_after) : Json(nullptr);
+  r["plane_rms_m"]["num_points"] = refined ? fit.num_points : 0;
+  const PlaneBundle& bundle = alignment.adjustment.bundle;
+  if (alignment.adjusted()) {
+    r["plane_rms_m"]["before"] = bundle.plane_rms_before;
+    r["plane_rms_m"]["after"] = bundle.plane_rms_after;
+    r["plane_rms_m"]["num_points"] = bundle.constraints.size();
+  }
+  r["plane_bundle"] = PlaneBundleToJson(alignment);
+  r["reprojection_rms_px"]["before"] = alignment.reprojection_rms_px;
+  r["reprojection_rms_px"]["after"] = reprojection_rms_after;
+  r["placement"] = PlacementToJson(alignment.placement);
+  r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
+  r["expected_error"]["disagreement_mm"] = NumberOrNull(1000 * alignment.disagreement.rms);
+  r["surface_geometry"] = refined ? OpenDirectionsToJson(alignment.open) : Json(nullptr);
+  r["agreement"] = nullptr;
+}
+
+Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
+  Json json = Json::array();
+  for (const auto& [image_id, image] : aligned.images) {
+    const auto at = alignment.photo_sigmas.find(image_id);
+    const bool known = at != alignment.photo_sigmas.end();
+    Json one;
+    one["name"] = image.name;
+    one["position_sigma_mm"] = known ? NumberOrNull(1000 * at->second.position) : Json(nullptr);
+    one["rotation_sigma_deg"] =
+        known ? NumberOrNull(DegFromRad(at->second.rotation)) : Json(nullptr);
+    json.push_back(one);
+  }
+  return json;
+}
+
+Json StationsToJson(const StationCheck& check, const std::vector<Scan>& scans) {
+  Json json = Json::array();
+  for (const StationPair& pair : check.pairs) {
+    Json one;
+    one["first"] = scans[pair.first].path;
+    one["second"] = scans[pair.second].path;
+    one["num_patches"] = pair.num_patches;
+    one["offset_mm"] = 1000 * pair.offset;
+    one["offset_sigma_mm"] = 1000 * pair.sigma;
+    one["turn_deg"] = DegFromRad(pair.turn);
+    one["agree"] = !pair.Disagrees();
+    json.push_back(one);
+  }
+  return json;
+}
+
+void AddLenses(const PhotoAlignment& found, Json* images) {
+  for (Json& one : *images) {
+    const SparseImage* image = found.model.FindImage(one["name"].get<std::string>());
+    const Camera& camera = found.model.cameras.at(image->camera_id);
+    const PhotoAlignment::Lens& lens = found.lenses.at(image->image_id);
+    one["camera_model"] = CameraModelName(camera.model);
+    one["camera_params"] = camera.params;
+    one["focal_length_from"] = FocalSourceName(lens.source);
+    one["focal_length_sigma_px"] = NumberOrNull(lens.focal_sigma);
+    one["radial_sigma"] = NumberOrNull(lens.radial_sigma);
+  }
+}
+
+void NullWithoutModel(Report* report) {
+  Report& r = *report;
+  for (const char* key : {"scan_from_sparse", "scan_from_sparse_from_picks", "plane_bundle"}) {
+    r[key] = nullptr;
+  }
+  r["reprojection_rms_px"]["before"] = nullptr;
+  r["expected_error"]["at_far_corner_mm"] = nullptr;
+  r["expected_error"]["far_corner"] = nullptr;
+  r["expected_error"]["scale"] = nullptr;
+  r["placement"] = nullptr;
+}
+
+}  // namespace roomtex
