@@ -15,6 +15,7 @@
 #include "align/lens_report.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
+#include "align/plane_bundle_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
