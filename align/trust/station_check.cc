@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "align/fit/similarity_accuracy.h"
 #include "align/fit/similarity_normal.h"
@@ -19,13 +20,14 @@
 namespace roomtex {
 namespace {
 
-constexpr int kMaxPatches = 20000;  // of one scan that are tried
-constexpr int kMinCommon = 200;     // fewer patches on the other's surface are no overlap
+constexpr int kMaxPatches = 6000;  // of one scan that are tried
+constexpr int kMinCommon = 200;    // fewer patches on the other's surface are no overlap
 constexpr double kMinCommonShare = 0.1;
 // Metres: how far off a station is looked for, and the gate of the last steps.
 constexpr double kFirstGate = 0.2, kLastGate = 0.02;
 constexpr double kGateShrink = 0.8;
-constexpr int kNumSteps = 40, kNumRegisterings = 3;
+constexpr int kMaxSteps = 40, kNumRegisterings = 3;
+constexpr double kSettled = 1e-5;  // metres and radians of a step at the last gate
 // What is known without any surface: keeps open directions where they are (metres, radians).
 constexpr double kPriorMove = 0.05, kPriorTurn = 0.02;
 // An offset counts from here on (metres), and when it is this many standard deviations.
@@ -53,10 +55,12 @@ struct Solution {
   std::vector<SurfaceMatch> matches;
 };
 
-bool Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface, double gate,
-          const Eigen::Vector3d& pivot, Solution* solution) {
+// Returns the length of the step, metres and radians; infinite without overlap.
+double Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface, double gate,
+            const Eigen::Vector3d& pivot, Solution* solution) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
   solution->matches = FindMatches(points, surface, solution->moved, gate, gate);
-  if (static_cast<int>(solution->matches.size()) < kMinCommon) return false;
+  if (static_cast<int>(solution->matches.size()) < kMinCommon) return kNone;
   const SurfaceWeights weights(solution->matches, surface);
   SimilarityNormal normal;
   for (size_t k = 0; k < solution->matches.size(); ++k) {
@@ -75,11 +79,11 @@ bool Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface, d
   normal.matrix(6, 6) = 1;
   normal.gradient[6] = 0;
   Vector7d step;
-  if (!normal.SolveStep(&step, &solution->covariance)) return false;
+  if (!normal.SolveStep(&step, &solution->covariance)) return kNone;
   solution->covariance(6, 6) = 0;
   step[6] = 0;
   solution->moved = Moved(solution->moved, pivot, step);
-  return true;
+  return step.norm();
 }
 
 // How far the common surface moves across itself, and how well that is known.
@@ -100,8 +104,15 @@ void MeasureOffset(const std::vector<SurfacePoint>& points, const ScanPatches& s
   pair->sigma = std::sqrt(variance / count);
 }
 
+Eigen::AlignedBox3d BoundsOf(const ScanPatches& patches) {
+  Eigen::AlignedBox3d bounds;
+  for (const ScanPatch& patch : patches.patches()) bounds.extend(patch.point);
+  return bounds;
+}
+
 StationPair ComparePair(const ScanPatches& first, const ScanPatches& second) {
   StationPair pair;
+  if (BoundsOf(first).exteriorDistance(BoundsOf(second)) > kFirstGate) return pair;
   const std::vector<SurfacePoint> points = PatchesAsPoints(second);
   Solution solution;
   solution.matches = FindMatches(points, first, Similarity(), kFirstGate, kFirstGate);
@@ -114,8 +125,10 @@ StationPair ComparePair(const ScanPatches& first, const ScanPatches& second) {
     pivot += points[match.point].x_in_sparse / static_cast<double>(solution.matches.size());
   }
   double gate = kFirstGate;
-  for (int i = 0; i < kNumSteps; ++i) {
-    if (!Step(points, first, gate, pivot, &solution)) return pair;
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const double length = Step(points, first, gate, pivot, &solution);
+    if (!std::isfinite(length)) return pair;
+    if (gate == kLastGate && length < kSettled) break;
     gate = std::max(kLastGate, kGateShrink * gate);
   }
   pair.num_patches = static_cast<int>(solution.matches.size());
@@ -147,10 +160,27 @@ std::vector<int> FindWrong(const std::vector<StationPair>& pairs, size_t num_sca
   return wrong;
 }
 
+ScanPatches PatchesOf(const Scan& scan) { return ScanPatches({scan}, ScanPatchOptions()); }
+
 std::vector<ScanPatches> PatchesOf(const std::vector<Scan>& scans) {
   std::vector<ScanPatches> patches;
-  for (const Scan& scan : scans) patches.emplace_back(std::vector<Scan>{scan}, ScanPatchOptions());
+  patches.reserve(scans.size());
+  for (const Scan& scan : scans) patches.push_back(PatchesOf(scan));
   return patches;
+}
+
+StationCheck ComparePatches(const std::vector<ScanPatches>& patches) {
+  StationCheck check;
+  for (int i = 0; i < static_cast<int>(patches.size()); ++i) {
+    for (int j = i + 1; j < static_cast<int>(patches.size()); ++j) {
+      StationPair pair = ComparePair(patches[i], patches[j]);
+      pair.first = i;
+      pair.second = j;
+      if (pair.num_patches > 0) check.pairs.push_back(pair);
+    }
+  }
+  check.wrong = FindWrong(check.pairs, patches.size());
+  return check;
 }
 
 }  // namespace
@@ -177,25 +207,14 @@ std::string StationCheck::Sentence(const std::vector<Scan>& scans) const {
 }
 
 StationCheck CheckStations(const std::vector<Scan>& scans) {
-  StationCheck check;
-  if (scans.size() < 2) return check;
-  const std::vector<ScanPatches> patches = PatchesOf(scans);
-  for (int i = 0; i < static_cast<int>(scans.size()); ++i) {
-    for (int j = i + 1; j < static_cast<int>(scans.size()); ++j) {
-      StationPair pair = ComparePair(patches[i], patches[j]);
-      pair.first = i;
-      pair.second = j;
-      if (pair.num_patches > 0) check.pairs.push_back(pair);
-    }
-  }
-  check.wrong = FindWrong(check.pairs, scans.size());
-  return check;
+  return scans.size() < 2 ? StationCheck() : ComparePatches(PatchesOf(scans));
 }
 
 std::vector<int> RegisterStations(std::vector<Scan>* scans) {
   std::set<int> moved;
+  std::vector<ScanPatches> patches = PatchesOf(*scans);
   for (int round = 0; round < kNumRegisterings; ++round) {
-    const StationCheck check = CheckStations(*scans);
+    const StationCheck check = ComparePatches(patches);
     // The worst that is not the first: onto all that are not contradicted, together.
     const auto worst =
         std::find_if(check.wrong.begin(), check.wrong.end(), [](int scan) { return scan != 0; });
@@ -206,11 +225,11 @@ std::vector<int> RegisterStations(std::vector<Scan>* scans) {
           scan != 0 && std::count(check.wrong.begin(), check.wrong.end(), scan) > 0;
       if (scan != *worst && !doubted) others.push_back((*scans)[scan]);
     }
-    const StationPair pair = ComparePair(ScanPatches(others, ScanPatchOptions()),
-                                         ScanPatches({(*scans)[*worst]}, ScanPatchOptions()));
+    const StationPair pair = ComparePair(ScanPatches(others, ScanPatchOptions()), patches[*worst]);
     if (pair.num_patches == 0) break;
     Scan& scan = (*scans)[*worst];
     PlaceScan(pair.first_from_second * scan.scan_from_station, &scan);
+    patches[*worst] = PatchesOf(scan);
     moved.insert(*worst);
   }
   return {moved.begin(), moved.end()};
