@@ -59,7 +59,8 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                          "model.rtpi) into.");
   command->AddInputPath("database_path", &o->sources.database_path,
                         "COLMAP database: its intrinsics are used instead of the model's, by image "
-                        "name.",
+                        "name; not for a model of roomtex-align, whose poses go with its own "
+                        "intrinsics.",
                         Command::Kind::kOptional);
   command->AddInputPath(
       "associations_path", &o->sources.associations_path,
@@ -358,7 +359,10 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
 
   context.progress.Stage("read model");
   const SparseModel model = ReadSparseModel(options.input_path);
-  PhotoList list = ListPhotos(model, options.sources);
+  const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  PhotoSources sources = options.sources;
+  sources.aligned_model = alignment.found;
+  PhotoList list = ListPhotos(model, sources);
   if (options.strict) ThrowIfAnyLeftOut(list.left_out, options.sources.image_path);
   for (const std::string& warning : list.warnings) context.Warn(warning);
   if (list.photos.empty()) {
@@ -368,7 +372,6 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   if (list.photos.size() >= kMaxPhotos) {
     throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
   }
-  const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");

@@ -98,31 +98,55 @@ std::map<std::string, std::string> ChooseFiles(const SparseModel& model,
   return file_of;
 }
 
+bool SameLens(const Camera& a, const Camera& b) {
+  constexpr double kRounding = 1e-9;
+  if (a.model != b.model || a.width != b.width || a.height != b.height) return false;
+  return std::equal(a.params.begin(), a.params.end(), b.params.begin(), b.params.end(),
+                    [](double one, double other) {
+                      return std::abs(one - other) <= kRounding * std::max(1.0, std::abs(one));
+                    });
+}
+
 // Cameras by image name: from the database if there is one.
 class CameraSource {
  public:
-  CameraSource(const SparseModel& model, const std::string& database_path)
-      : model_(model), database_path_(database_path) {
-    if (database_path.empty()) return;
-    const Database database(database_path);
+  CameraSource(const SparseModel& model, const PhotoSources& sources)
+      : model_(model),
+        database_path_(sources.database_path),
+        aligned_model_(sources.aligned_model) {
+    if (database_path_.empty()) return;
+    const Database database(database_path_);
     cameras_ = database.ReadCameras();
     for (const auto& [id, image] : database.ReadImages()) camera_of_[image.name] = image.camera_id;
   }
 
-  const Camera& Find(const SparseImage& image) const {
-    if (database_path_.empty()) return model_.cameras.at(image.camera_id);
+  const Camera& Find(const SparseImage& image) {
+    const Camera& of_model = model_.cameras.at(image.camera_id);
+    if (database_path_.empty()) return of_model;
     const auto found = camera_of_.find(image.name);
     if (found == camera_of_.end()) {
       throw InputError(database_path_, "",
                        "has no image named " + image.name + ", which the model holds",
                        "Give the database that the model was made from");
     }
-    return cameras_.at(found->second);
+    const Camera& of_database = cameras_.at(found->second);
+    if (!aligned_model_ || SameLens(of_model, of_database)) return of_database;
+    others_.push_back(image.name);
+    return of_model;
+  }
+
+  // "" if the database had every photo's lens as the model has it, or was followed.
+  std::string Warning() const {
+    if (others_.empty()) return "";
+    return database_path_ + " has another lens than the aligned model for " + Enumerate(others_) +
+           ": the model's is used, which its poses were found with.";
   }
 
  private:
   const SparseModel& model_;
   std::string database_path_;
+  bool aligned_model_;
+  std::vector<std::string> others_;  // photos whose lens differs
   std::map<uint32_t, Camera> cameras_;
   std::map<std::string, uint32_t> camera_of_;
 };
@@ -176,7 +200,7 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
   RequireFolder(sources.image_path, "Check --image_path: it is the folder that COLMAP was given");
   PhotoList list;
   const auto file_of = ChooseFiles(model_in_scan, sources, &list.warnings);
-  const CameraSource cameras(model_in_scan, sources.database_path);
+  CameraSource cameras(model_in_scan, sources);
   std::vector<std::string> notes;
   for (const auto& [id, image] : model_in_scan.images) {
     const auto file = file_of.find(image.name);
@@ -198,6 +222,7 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
     if (!fit.note.empty()) notes.push_back(fit.note);
   }
   for (const std::string& note : FirstNotes(notes)) list.warnings.push_back(note);
+  if (!cameras.Warning().empty()) list.warnings.push_back(cameras.Warning());
   std::sort(list.photos.begin(), list.photos.end(),
             [](const PhotoView& a, const PhotoView& b) { return a.name < b.name; });
   std::sort(list.left_out.begin(), list.left_out.end(),

@@ -1,9 +1,10 @@
 #include "texture/sampling/photo_list.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
+#include "tests/colmap_ext/database_maker.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -139,6 +140,29 @@ TEST_F(PhotoListTest, RefusesBrokenTables) {
 TEST_F(PhotoListTest, NamesPhotosThatTheDatabaseLacks) {
   sources_.database_path = folder_ / "none.db";
   EXPECT_INPUT_ERROR(Names(), "none.db");
+}
+
+// The poses of an aligned model were found with its own lens, which may have been adjusted.
+TEST_F(PhotoListTest, AnAlignedModelKeepsItsLensAgainstTheDatabase) {
+  sources_.database_path = folder_ / "told.db";
+  {
+    DatabaseMaker database(sources_.database_path, DatabaseMaker::Schema::k38);
+    database.AddCamera(model_.cameras[1]);
+    Camera told = model_.cameras[1];
+    told.camera_id = 2;
+    told.params[0] = 55;
+    database.AddCamera(told);
+    database.AddImage(1, "c.png", 1);
+    database.AddImage(2, "b.png", 2);
+    database.AddImage(3, "a.png", 1);
+  }
+  const PhotoList by_database = ListPhotos(model_, sources_);
+  EXPECT_EQ(by_database.photos[1].camera.params[0], 55);
+  EXPECT_THAT(by_database.warnings, testing::IsEmpty());
+  sources_.aligned_model = true;
+  const PhotoList aligned = ListPhotos(model_, sources_);
+  EXPECT_EQ(aligned.photos[1].camera.params, model_.cameras[1].params);
+  EXPECT_THAT(aligned.warnings, testing::ElementsAre(testing::HasSubstr("for b.png")));
 }
 
 }  // namespace
