@@ -475,9 +475,11 @@ class Mapping {
           "the photos do not determine the focal length: it stays as the database has it");
       return BetterOf(std::move(best), Map(plan, false));
     }
+    KeepCalibrated(&best);
     for (int i = 0; automatic && i < kMaxMoreMappings && IsContradicted(best); ++i) {
       plan.Take(best.lenses, best.model());
       best = BetterOf(std::move(best), Map(plan, true));
+      KeepCalibrated(&best);
     }
     return best;
   }
@@ -486,12 +488,32 @@ class Mapping {
   // As a share; larger is no determination.
   static constexpr double kMaxFocalSigma = 0.03;
 
+  // A calibrated lens stays unless the photos know theirs so well, or are so sure that it is wrong:
+  // of one plane, or of a walk along a wall, they take a bent room for another lens.
+  static constexpr double kMaxFocalSigmaOfCalibrated = 0.004;
+  static constexpr double kSureDeviations = 15;  // LensFinding::deviations
+
   static constexpr int kMaxMoreMappings = 2;
 
   static bool IsDetermined(const LensCheck& check) {
     return std::all_of(check.lenses.begin(), check.lenses.end(), [](const LensFinding& lens) {
       return lens.focal_sigma < kMaxFocalSigma * lens.found.MeanFocalLength();
     });
+  }
+
+  void KeepCalibrated(Pass* pass) const {
+    for (LensFinding& lens : pass->lenses.lenses) {
+      const Camera& told = pass->plan.cameras().at(lens.camera_ids[0]);
+      if (refine_ != RefineIntrinsics::kAuto || !lens.used || lens.apart) continue;
+      if (!told.has_prior_focal_length || lens.deviations > kSureDeviations) continue;
+      const double sigma = lens.focal_sigma / told.MeanFocalLength();
+      if (sigma < kMaxFocalSigmaOfCalibrated) continue;
+      lens.used = false;
+      context_.Warn(fmt::format(
+          "The photos would have a focal length of {:.1f} pixels instead of {:.1f}, but know it to "
+          "{:.1f} % only: the calibrated lens stays.",
+          lens.found.MeanFocalLength(), told.MeanFocalLength(), 100 * sigma));
+    }
   }
 
   // And says so.

@@ -14,8 +14,9 @@ function(roomtex_precompiled name)
   target_precompile_headers(${name} PRIVATE ${precompiled_headers} ${ARGN})
 endfunction()
 roomtex_precompiled(roomtex_precompiled)
-# Tests are compiled more often than they run: a third of the time goes into optimising them.
-set(roomtex_test_options ${roomtex_warnings} -O1)
+# Tests are compiled more often than they run: a third of the time goes into optimising them. What is looked at under
+# sanitizers is the code that they call.
+set(roomtex_test_options ${roomtex_warnings} -O1 -fno-sanitize=all)
 
 # roomtex_library(NAME [INSTALLED] ROOMS folders... [EXCEPT files...] PUBLIC ... PRIVATE ...): every .cc of the
 # rooms, apart from the mains of commands (roomtex_*.cc). INSTALLED: users may link it, see install.cmake.

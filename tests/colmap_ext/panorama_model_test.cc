@@ -57,7 +57,7 @@ class FacesOfPanoramas : public testing::Test {
     for (uint64_t id = 1; id <= 400; ++id) AddPoint(id, rotations);
   }
 
-  double Gaussian(double sigma) { return std::normal_distribution<double>(0, sigma)(random_); }
+  double Gaussian(double sigma) { return sigma * std::normal_distribution<double>()(random_); }
 
   void AddPoint(uint64_t id, const std::vector<Eigen::Quaterniond>& rotations) {
     const CameraProjection camera(faces_.cameras.at(1));

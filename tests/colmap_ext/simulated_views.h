@@ -101,7 +101,7 @@ inline SimulatedViews SimulateViews(const SimulatedViewsOptions& options) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   const auto normal = [&](double sigma) {
-    return std::normal_distribution<double>(0, sigma)(random);
+    return sigma * std::normal_distribution<double>()(random);
   };
   SimulatedViews views;
   const double distance = 3;

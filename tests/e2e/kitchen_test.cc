@@ -24,9 +24,6 @@ namespace {
 
 using nlohmann::json;
 
-// Poses are compared here, of planes and chains with those of all photos: by one lens, as its
-// owners state it. What photos say about lenses has tests of its own.
-const std::string kLensAsTold = "--refine_intrinsics 0";
 const std::string kKitchen = DataFolder("kitchen");
 
 json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
@@ -77,7 +74,7 @@ class Kitchen : public testing::Test {
                     "--ImageReader.single_camera 1 --ImageReader.camera_model SIMPLE_RADIAL "
                     "--ImageReader.camera_params 525.9,320,240,-0.025");
     mapper_ =
-        RunCommandLine("roomtex-mapper " + kLensAsTold + " --database_path " +
+        RunCommandLine("roomtex-mapper --database_path " +
                        (*folder_ / "database.db") + " --image_path " + images + " --output_path " +
                        (*folder_ / "sparse") + " --report_path " + (*folder_ / "mapper.json"));
     align_ = RunCommandLine(AlignLine("counterclockwise", "aligned"));
@@ -173,7 +170,7 @@ TEST_F(Kitchen, EachOfItsLargePlanesAloneGivesTheSamePosesOrARefusal) {
     const int num_images =
         WritePlanarSubset(*folder_ / "database.db", all, planes[k], name + ".db");
     const CommandResult result =
-        RunCommandLine("roomtex-mapper " + kLensAsTold + " --database_path " + name +
+        RunCommandLine("roomtex-mapper --database_path " + name +
                        ".db --image_path " + kKitchen + "/images --output_path " + name);
     if (result.exit_code == 4 || result.exit_code == 3) continue;
     ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -194,7 +191,7 @@ TEST_F(Kitchen, AChainOfNeighboursWithFewCommonPointsIsRegisteredPhotoByPhoto) {
     const std::string name = *folder_ / ("chain" + std::to_string(seed));
     ASSERT_EQ(WriteChainSubset(*folder_ / "database.db", 16, 40, seed, name + ".db"), 16);
     const CommandResult result = RunCommandLine(
-        "roomtex-mapper " + kLensAsTold + " --database_path " + name + ".db --image_path " +
+        "roomtex-mapper --database_path " + name + ".db --image_path " +
         kKitchen + "/images --output_path " + name + " --report_path " + name + ".json");
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const ModelErrors errors =
