@@ -8,8 +8,6 @@
 namespace roomtex {
 namespace {
 
-// Metres from the nearest sample of the scan up to which a pick counts as being on the scan.
-constexpr double kPickReach = 0.06;
 // More are not needed to tell whether picks and scan belong together.
 constexpr size_t kMaxPicksOnScan = 100;
 

@@ -12,6 +12,9 @@
 
 namespace roomtex {
 
+// Metres from the nearest sample of the scan up to which a pick counts as being on the scan.
+inline constexpr double kPickReach = 0.06;
+
 // The files are fine, but what they say contradicts each other so plainly that there is no
 // alignment: exit 4.
 class Contradiction : public InputError {

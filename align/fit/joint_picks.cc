@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/statistics.h"
+
 namespace roomtex {
 
 JointPickFit FitPicksJointly(const SparseModel& model, const std::vector<Pick>& picks,
@@ -24,9 +26,9 @@ JointPickFit FitPicksJointly(const SparseModel& model, const std::vector<Pick>& 
       const double residual = errors.col(static_cast<int>(i)).norm();
       if (joint.used[i]) residuals.push_back(picks[i].weight * residual);
     }
-    std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
-    // Median of a Rayleigh distribution: 1.177 sigma; 4.5 sigma is exceeded by 1 click in 25 000.
-    const double limit = std::max(min_bad_pick_px, 4.5 / 1.177 * residuals[residuals.size() / 2]);
+    // 4.5 standard deviations are exceeded by 1 click in 25 000.
+    const double limit =
+        std::max(min_bad_pick_px, 4.5 / kMedianLengthPerSigma * Median(&residuals));
     for (size_t i = 0; i < picks.size(); ++i) {
       const double residual = errors.col(static_cast<int>(i)).norm();
       if (!joint.used[i] || !(picks[i].weight * residual > limit)) continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "align/pick_findings.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -14,9 +15,6 @@ namespace {
 constexpr double kThinShare = 0.12, kCrowdedShare = 0.1;
 // Photo and sparse model disagree: joint residuals over those of the photo alone, and pixels.
 constexpr double kModelFactor = 3, kModelPx = 4;
-
-// Metres from the surface to which a pick counts as on it; as roomtex-align has it.
-constexpr double kPickReach = 0.06;
 
 std::string OtherAzimuth(const std::string& azimuth) {
   return azimuth == "counterclockwise" ? "clockwise" : "counterclockwise";

@@ -198,6 +198,39 @@ TEST_F(MapperCommand, DoesNotTrustABentModel) {
   EXPECT_FALSE(Report()["check"]["contradicting"].empty());
 }
 
+// A photo of another room with the same pictures on the walls: some of its matches put it here, the
+// others there. Wherever it was registered, the rest of its matches disobeys.
+TEST_F(MapperCommand, LeavesOutAPhotoThatItsOwnMatchesContradict) {
+  views_ = SimulateViews(RoomOptions(8));
+  const uint32_t stranger = 5;
+  const CameraProjection projection(views_.cameras.at(1));
+  Rigid elsewhere = views_.cam_from_scene.at(stranger);
+  elsewhere.translation += Eigen::Vector3d(0.35, -0.2, 0.3);
+  std::vector<Eigen::Vector2d>& keypoints = views_.keypoints.at(stranger);
+  for (size_t row = 0; row < keypoints.size(); ++row) {
+    const int point = views_.point_of_keypoint.at(stranger)[row];
+    if (point < 0 || point % 5 > 1) continue;
+    const auto img = projection.ImgFromCam(elsewhere * views_.points_in_scene[point]);
+    if (img) keypoints[row] = *img;
+  }
+  WriteSimulatedDatabase(views_, folder_.path());
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string name = views_.images.at(stranger).name;
+  EXPECT_NE(result.err.find(name + " is left out"), std::string::npos) << result.err;
+  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
+  EXPECT_EQ(model.images.size(), 7u);
+  EXPECT_EQ(model.FindImage(name), nullptr);
+  ExpectNearTruth(model, 0.02, 0.01);
+  const nlohmann::json report = Report();
+  EXPECT_EQ(report["num_reg_images"], 7);
+  for (const auto& image : report["images"]) {
+    EXPECT_EQ(image["registered"].get<bool>(), image["name"] != name);
+    if (image["name"] != name) continue;
+    EXPECT_NE(image["reason"].get<std::string>().find("of its own matches"), std::string::npos);
+  }
+}
+
 // Before a wall poses and points take up a wrong lens, and the model is bent.
 TEST_F(MapperCommand, SaysThatTheCalibrationDoesNotFit) {
   SimulatedViewsOptions options;

@@ -73,10 +73,9 @@ class Kitchen : public testing::Test {
     ExtractAndMatch(*folder_ / "database.db", images,
                     "--ImageReader.single_camera 1 --ImageReader.camera_model SIMPLE_RADIAL "
                     "--ImageReader.camera_params 525.9,320,240,-0.025");
-    mapper_ =
-        RunCommandLine("roomtex-mapper --database_path " +
-                       (*folder_ / "database.db") + " --image_path " + images + " --output_path " +
-                       (*folder_ / "sparse") + " --report_path " + (*folder_ / "mapper.json"));
+    mapper_ = RunCommandLine("roomtex-mapper --database_path " + (*folder_ / "database.db") +
+                             " --image_path " + images + " --output_path " + (*folder_ / "sparse") +
+                             " --report_path " + (*folder_ / "mapper.json"));
     align_ = RunCommandLine(AlignLine("counterclockwise", "aligned"));
     texture_ = RunCommandLine("roomtex-texture --input_path " + (*folder_ / "aligned") +
                               " --image_path " + images + " --scan_path " + kKitchen +
@@ -170,8 +169,8 @@ TEST_F(Kitchen, EachOfItsLargePlanesAloneGivesTheSamePosesOrARefusal) {
     const int num_images =
         WritePlanarSubset(*folder_ / "database.db", all, planes[k], name + ".db");
     const CommandResult result =
-        RunCommandLine("roomtex-mapper --database_path " + name +
-                       ".db --image_path " + kKitchen + "/images --output_path " + name);
+        RunCommandLine("roomtex-mapper --database_path " + name + ".db --image_path " + kKitchen +
+                       "/images --output_path " + name);
     if (result.exit_code == 4 || result.exit_code == 3) continue;
     ASSERT_EQ(result.exit_code, 0) << result.err;
     ++num_trusted;
@@ -190,9 +189,9 @@ TEST_F(Kitchen, AChainOfNeighboursWithFewCommonPointsIsRegisteredPhotoByPhoto) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const std::string name = *folder_ / ("chain" + std::to_string(seed));
     ASSERT_EQ(WriteChainSubset(*folder_ / "database.db", 16, 40, seed, name + ".db"), 16);
-    const CommandResult result = RunCommandLine(
-        "roomtex-mapper --database_path " + name + ".db --image_path " +
-        kKitchen + "/images --output_path " + name + " --report_path " + name + ".json");
+    const CommandResult result =
+        RunCommandLine("roomtex-mapper --database_path " + name + ".db --image_path " + kKitchen +
+                       "/images --output_path " + name + " --report_path " + name + ".json");
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const ModelErrors errors =
         CompareModels(ReadSparseModel(name + "/0"), ReadSparseModel(*folder_ / "sparse/0"));

@@ -11,8 +11,8 @@
 namespace roomtex {
 
 struct PhotoSources {
-  std::string image_path;         // folder of the photos
-  std::string database_path;      // "" = intrinsics from the model
+  std::string image_path;     // folder of the photos
+  std::string database_path;  // "" = intrinsics from the model
   // The model's poses go with its own intrinsics (roomtex-align may have adjusted both): those of
   // the database that differ are not used, which is warned of.
   bool aligned_model = false;

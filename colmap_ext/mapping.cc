@@ -1,0 +1,283 @@
+#include "colmap_ext/mapping.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "colmap_ext/mapping_report.h"
+#include "colmap_ext/model_check.h"
+#include "core/output_file.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+bool Better(const MapperResult& a, const MapperResult& b) {
+  if (a.model.images.size() != b.model.images.size()) {
+    return a.model.images.size() > b.model.images.size();
+  }
+  return a.model.points.size() > b.model.points.size();
+}
+
+// The matches as rays by the intrinsics of the model, which may have been refined.
+MatchedImages ImagesOfModel(const Database& database, const MatchedImages& images,
+                            const SparseModel& model) {
+  std::map<uint32_t, Camera> cameras = images.cameras();
+  for (const auto& [camera_id, camera] : model.cameras) cameras[camera_id] = camera;
+  return MatchedImages(cameras, images.images(), images.pairs(),
+                       [&database](uint32_t image_id) { return database.ReadKeypoints(image_id); });
+}
+
+HypothesisOptions PairOptions(const MappingOptions& options, const Command::Context& context) {
+  HypothesisOptions pair;
+  pair.keypoint_noise_px = options.init.keypoint_noise_px;
+  pair.max_error_px = options.init.max_error_px;
+  pair.random_seed = static_cast<uint64_t>(context.options.random_seed);
+  return pair;
+}
+
+// Registers what the mapper left out.
+void ChainLeftOut(const Database& database, const MatchedImages& images, MapperRun* mapper,
+                  const MappingOptions& options, const Command::Context& context,
+                  MappingOutcome* outcome) {
+  MatchedImages model_images = ImagesOfModel(database, images, outcome->result.model);
+  context.progress.Stage("chain photos");
+  ViewChainer chainer(&model_images, options.chain, PairOptions(options, context),
+                      context.options.num_threads);
+  ChainResult chain = chainer.Run(std::move(outcome->result), [&](const SparseModel& poses) {
+    ThrowIfInterrupted();
+    return mapper->Adjust(poses);
+  });
+  outcome->result = std::move(chain.result);
+  outcome->chained = std::move(chain.chained);
+  outcome->reasons = std::move(chain.reasons);
+}
+
+// Seeds one after the other until COLMAP makes something of one.
+std::vector<MappingOutcome> TrySeeds(const Database& database, MatchedImages* images,
+                                     MapperRun* mapper, const MappingOptions& options,
+                                     const Command::Context& context, Json* trials) {
+  const int num_images = static_cast<int>(images->images().size());
+  std::vector<MappingOutcome> best;  // at most one
+  Initializer initializer(images, options.init, context.options.num_threads,
+                          static_cast<uint64_t>(context.options.random_seed));
+  for (int tried = 0; tried < options.init.max_pairs; ++tried) {
+    if (tried > 0) context.progress.Stage("initialise");
+    std::optional<Seed> seed = initializer.Next();
+    ThrowIfInterrupted();
+    if (!seed) break;
+    context.progress.Note("pair " + images->images().at(seed->trial.image_id1).name + ", " +
+                          images->images().at(seed->trial.image_id2).name + ": " +
+                          std::to_string(seed->pair_model.points.size()) + " points, " +
+                          std::to_string(seed->poses.images.size() - 2) + " third views agree");
+    context.progress.Stage("colmap mapper", num_images);
+    MappingOutcome outcome;
+    outcome.result = mapper->Run(*seed, num_images, [&] { context.progress.Tick(); });
+    outcome.seed = std::move(*seed);
+    const int num_mapped = static_cast<int>(outcome.result.model.images.size());
+    if (options.chain.enabled && !outcome.result.folder.empty() && num_mapped < num_images) {
+      ChainLeftOut(database, *images, mapper, options, context, &outcome);
+    }
+    const bool all_in_seed = static_cast<int>(outcome.seed.poses.images.size()) == num_images;
+    if (outcome.result.problem.empty() && !outcome.result.grew && !all_in_seed) {
+      outcome.result.problem = "no further photo could be registered";
+    }
+    trials->push_back(
+        TrialJson(outcome.seed.trial, *images,
+                  outcome.result.problem.empty()
+                      ? std::to_string(outcome.result.model.images.size()) + " photos registered"
+                      : outcome.result.problem));
+    if (!outcome.result.problem.empty()) {
+      context.Warn("starting from " + images->images().at(outcome.seed.trial.image_id1).name +
+                   " and " + images->images().at(outcome.seed.trial.image_id2).name + ": " +
+                   outcome.result.problem);
+    }
+    if (outcome.result.folder.empty()) continue;
+    const bool enough = 2 * outcome.result.model.images.size() >= images->images().size();
+    if (best.empty() || Better(outcome.result, best[0].result)) {
+      best.clear();
+      best.push_back(std::move(outcome));
+    }
+    if (enough) break;
+  }
+  for (const PairTrial& trial : initializer.Rejected()) {
+    trials->push_back(TrialJson(trial, *images, trial.problem));
+  }
+  return best;
+}
+
+// As a share; larger is no determination.
+constexpr double kMaxFocalSigma = 0.03;
+
+// A calibrated lens stays unless the photos know theirs so well, or are so sure that it is wrong:
+// of one plane, or of a walk along a wall, they take a bent room for another lens.
+constexpr double kMaxFocalSigmaOfCalibrated = 0.004;
+constexpr double kSureDeviations = 15;  // LensFinding::deviations
+
+constexpr int kMaxMoreMappings = 2;
+
+// Photos that the others contradict are left out up to this share of all; of more, nobody knows
+// which are right.
+constexpr double kMaxLeftOut = 0.2;
+constexpr int kMaxLeavings = 2;
+
+bool IsDetermined(const LensCheck& check) {
+  return std::all_of(check.lenses.begin(), check.lenses.end(), [](const LensFinding& lens) {
+    return lens.focal_sigma < kMaxFocalSigma * lens.found.MeanFocalLength();
+  });
+}
+
+// The later one, if it lost no photos.
+MappingPass BetterOf(MappingPass first, MappingPass second) {
+  if (second.best.empty()) return first;
+  if (second.model().images.size() < first.model().images.size()) return first;
+  return second;
+}
+
+}  // namespace
+
+ModelCheck CheckMapping(const Database& database, const MappingPass& pass,
+                        const MappingOptions& options, const Command::Context& context) {
+  MatchedImages images = ImagesOfModel(database, *pass.images, pass.model());
+  ModelCheckOptions check_options;
+  check_options.pair = PairOptions(options, context);
+  check_options.min_confidence = options.init.min_confidence;
+  const PairTrial& trial = pass.best[0].seed.trial;
+  return CheckModel(&images, pass.model(), {trial.image_id1, trial.image_id2}, check_options,
+                    context.options.num_threads);
+}
+
+Mapping::Mapping(const MappingOptions& options, const Command::Context& context,
+                 const Database& database, const MatchedImages& images,
+                 const ScratchFolder& scratch)
+    : options_(options),
+      context_(context),
+      database_(database),
+      images_(images),
+      scratch_(scratch),
+      refine_(RefineIntrinsicsFromWord(options.refine_intrinsics)),
+      colmap_(options.colmap, options.output_path + "/roomtex-mapper.log") {
+  for (const auto& [id, image] : images.images()) names_[id] = image.name;
+  labels_ = ReadLensLabels(names_, options.image_path);
+}
+
+MappingPass Mapping::MapAsLensesAre() {
+  LensPlan plan = refine_ == RefineIntrinsics::kNever
+                      ? LensPlan(images_.cameras(), images_.images())
+                      : LensPlan(images_.cameras(), images_.images(), labels_);
+  for (const std::string& note : plan.notes()) context_.Warn(note);
+  const bool calibrated =
+      std::all_of(plan.cameras().begin(), plan.cameras().end(),
+                  [](const auto& one) { return one.second.has_prior_focal_length; });
+  const bool automatic = refine_ == RefineIntrinsics::kAuto;
+  MappingPass best = Map(plan, refine_ == RefineIntrinsics::kAlways || (automatic && !calibrated));
+  if (best.best.empty() || refine_ == RefineIntrinsics::kNever) return best;
+  if (automatic && best.refine && !IsDetermined(best.lenses)) {
+    context_.Warn("the photos do not determine the focal length: it stays as the database has it");
+    return BetterOf(std::move(best), Map(plan, false));
+  }
+  KeepCalibrated(&best);
+  for (int i = 0; automatic && i < kMaxMoreMappings && IsContradicted(best); ++i) {
+    plan.Take(best.lenses, best.model());
+    best = BetterOf(std::move(best), Map(plan, true));
+    KeepCalibrated(&best);
+  }
+  return best;
+}
+
+void Mapping::KeepCalibrated(MappingPass* pass) const {
+  for (LensFinding& lens : pass->lenses.lenses) {
+    const Camera& told = pass->plan.cameras().at(lens.camera_ids[0]);
+    if (refine_ != RefineIntrinsics::kAuto || !lens.used || lens.apart) continue;
+    if (!told.has_prior_focal_length || lens.deviations > kSureDeviations) continue;
+    const double sigma = lens.focal_sigma / told.MeanFocalLength();
+    if (sigma < kMaxFocalSigmaOfCalibrated) continue;
+    lens.used = false;
+    context_.Warn(fmt::format(
+        "The photos would have a focal length of {:.1f} pixels instead of {:.1f}, but know it to "
+        "{:.1f} % only: the calibrated lens stays.",
+        lens.found.MeanFocalLength(), told.MeanFocalLength(), 100 * sigma));
+  }
+}
+
+bool Mapping::IsContradicted(const MappingPass& pass) const {
+  bool contradicted = false;
+  for (const LensFinding& lens : pass.lenses.lenses) {
+    if (!lens.used) continue;
+    contradicted = true;
+    context_.Warn(lens.Sentence() +
+                  (pass.refine ? "" : " --refine_intrinsics 0 keeps what was told."));
+  }
+  return contradicted && IsDetermined(pass.lenses);
+}
+
+MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
+  const int number = ++num_passes_;
+  const std::string database_copy = scratch_ / ("database_" + std::to_string(number) + ".db");
+  const int version = colmap_.VersionNumber();
+  database_.CopyForMapper(database_copy, version > 0 && version < 310 ? Database::Schema::kColmap39
+                                                                      : Database::Schema::kAsIs);
+  const bool as_planned =
+      plan.IsAsInDatabase() || Database::SetCameras(database_copy, plan.cameras(), plan.images());
+  MappingPass pass(as_planned ? plan : LensPlan(images_.cameras(), images_.images()), refine);
+  pass.images = std::make_unique<MatchedImages>(
+      pass.plan.cameras(), pass.plan.images(), images_.pairs(),
+      [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
+  const std::string folder = scratch_ / ("pass_" + std::to_string(number));
+  MakeFolder(folder);
+  mapper_options_ = options_.mapper;
+  mapper_options_.refine_intrinsics = refine;
+  mapper_options_.num_threads = context_.options.num_threads;
+  mapper_options_.random_seed = context_.options.random_seed;
+  pass.mapper = std::make_unique<MapperRun>(&colmap_, database_copy, options_.image_path, folder,
+                                            mapper_options_);
+  context_.progress.Stage("initialise");
+  pass.best =
+      TrySeeds(database_, pass.images.get(), pass.mapper.get(), options_, context_, &pass.trials);
+  if (!pass.best.empty()) {
+    context_.progress.Stage("check lenses");
+    pass.lenses = CheckLenses(pass.model(), labels_, RefineIntrinsics::kAuto);
+  }
+  return pass;
+}
+
+MappingPass Mapping::Run() {
+  MappingPass pass = MapAsLensesAre();
+  for (int i = 0; i < kMaxLeavings && !pass.best.empty(); ++i) {
+    const size_t before = pass.model().images.size();
+    LeaveOutDoubtful(&pass);
+    if (pass.model().images.size() == before) break;
+  }
+  return pass;
+}
+
+void Mapping::LeaveOutDoubtful(MappingPass* pass) const {
+  context_.progress.Stage("check photos");
+  MappingOutcome& outcome = pass->best[0];
+  const ModelCheck check = CheckMapping(database_, *pass, options_, context_);
+  const auto num_photos = static_cast<double>(pass->model().images.size());
+  if (check.doubtful.empty() ||
+      static_cast<double>(check.doubtful.size()) > kMaxLeftOut * num_photos) {
+    return;
+  }
+  SparseModel poses;
+  poses.cameras = pass->model().cameras;
+  for (const auto& [id, image] : pass->model().images) {
+    poses.images[id] = {id, image.camera_id, image.name, image.cam_from_model, {}, {}};
+  }
+  for (const uint32_t image_id : check.doubtful) poses.images.erase(image_id);
+  MapperResult adjusted = pass->mapper->Adjust(poses);
+  if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) return;
+  adjusted.grew = outcome.result.grew;
+  outcome.result = std::move(adjusted);
+  for (const uint32_t image_id : check.doubtful) {
+    const std::string share = Percent(check.support.at(image_id));
+    outcome.reasons[image_id] = "stood where only " + share + " of its own matches put it";
+    context_.Warn(names_.at(image_id) + " is left out: only " + share +
+                  " of its own matches obey the model. It may show a repeated pattern, another "
+                  "room, or something that moved.");
+  }
+}
+
+}  // namespace roomtex

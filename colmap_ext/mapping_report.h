@@ -1,0 +1,18 @@
+#pragma once
+// What roomtex-mapper reports of its mapping (docs/commands.md), and its longer sentences.
+
+#include <string>
+
+#include "colmap_ext/mapping.h"
+#include "core/report.h"
+
+namespace roomtex {
+
+// One of `pair_trials`.
+Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::string& outcome);
+// The pair, the counts, `init` and `images`.
+void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& images, Report* report);
+// Names the pair, and the photo that would cure it.
+std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& images);
+
+}  // namespace roomtex
