@@ -227,13 +227,14 @@ int main(int argc, char** argv) {
   options.reader.azimuth = "clockwise";  // conversions do not depend on what a header says
   Command command(
       "roomtex-import",
-      "Reads a range scan (RTPI, PTX, organised PCD; PLY meshes) and writes it as mesh, "
+      "Reads a range scan (RTPI, PTX, E57, organised PCD; meshes) and writes it as mesh, "
       "cloud, intensity image or scan. The content of the input decides its format, "
       "the extension of an output its own.",
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
   command.AddInputPath("input_path", &options.input_path,
-                       "The scan. A PTX may hold several: .ply and .ptx outputs then hold all of "
-                       "them, the others are written one per scan as NAME_1, NAME_2 ... Or a "
+                       "The scan. A PTX or E57 may hold several: .ply and .ptx outputs then hold "
+                       "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
+                       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
                        "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
                        "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
   command.AddOutputPaths("output_path", &options.output_paths,
