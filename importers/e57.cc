@@ -94,8 +94,9 @@ class E57ScanReader {
       for (int64_t i = 0; i < count; ++i) {
         const Eigen::Vector3d point = PointInScan(i);
         if (!(point.x() == point.x())) continue;
-        const int cell =
-            scan_.Index(grid_->ColumnOf(reader_.Column(i)), grid_->RowOf(reader_.Row(i)));
+        const int column = grid_->ColumnOf(reader_.Column(i)), row = grid_->RowOf(reader_.Row(i));
+        if (column < 0 || row < 0) continue;
+        const int cell = scan_.Index(column, row);
         const float number = reader_.HasReturns() ? static_cast<float>(reader_.Return(i)) : 0;
         // Of two in one cell the first return stays.
         const bool is_free = scan_.IsMissing(cell);

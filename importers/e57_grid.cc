@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/frames.h"
+#include "core/text.h"
 #include "importers/e57_records.h"
 
 namespace roomtex {
@@ -18,6 +19,7 @@ constexpr double kSmallGrid = 1 << 16;  // cells that are always fine
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = -low;
 
+  // NaN is no index.
   void Add(const double* values, int64_t count) {
     for (int64_t i = 0; i < count; ++i) {
       low = std::min(low, values[i]);
@@ -34,15 +36,15 @@ double MostCells(int64_t num_records) {
 }
 
 std::string SizeText(const Range& columns, const Range& rows) {
-  return std::to_string(static_cast<int64_t>(columns.Count())) + " columns x " +
-         std::to_string(static_cast<int64_t>(rows.Count())) + " rows";
+  return Number(columns.Count(), 0) + " columns x " + Number(rows.Count(), 0) + " rows";
 }
 
 // The values that occur, in order. Sorted now and then, so that they take no more room than those.
 class Occurring {
  public:
   void Add(const double* values, int64_t count) {
-    values_.insert(values_.end(), values, values + count);
+    std::copy_if(values, values + count, std::back_inserter(values_),
+                 [](double value) { return std::isfinite(value); });
     if (values_.size() > 2 * num_distinct_ + (1 << 16)) Sort();
   }
   std::vector<double> Take() {
@@ -63,9 +65,11 @@ class Occurring {
 }  // namespace
 
 int E57Grid::Axis::Of(double index) const {
-  if (indices.empty()) return static_cast<int>(index - first);
-  return static_cast<int>(std::lower_bound(indices.begin(), indices.end(), index) -
-                          indices.begin());
+  if (indices.empty()) {
+    return index >= first && index < first + count ? static_cast<int>(index - first) : -1;
+  }
+  const auto at = std::lower_bound(indices.begin(), indices.end(), index);
+  return at != indices.end() && *at == index ? static_cast<int>(at - indices.begin()) : -1;
 }
 
 std::optional<E57Grid> E57Grid::Find(const E57Pages& pages, const E57Scan& scan,
@@ -79,7 +83,7 @@ std::optional<E57Grid> E57Grid::Find(const E57Pages& pages, const E57Scan& scan,
   }
   const double most_cells = MostCells(records.num_records());
   const auto is_fine = [&](double num_rows, double num_columns) {
-    return num_rows * num_columns <= most_cells;
+    return num_rows >= 1 && num_columns >= 1 && num_rows * num_columns <= most_cells;
   };
   if (scan.index_bounds) {
     const E57Scan::IndexBounds& b = *scan.index_bounds;

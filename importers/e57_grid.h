@@ -23,6 +23,7 @@ class E57Grid {
 
   int num_rows() const { return rows_.count; }
   int num_columns() const { return columns_.count; }
+  // -1 for what is no index (fields of floats may be NaN).
   int RowOf(double index) const { return rows_.Of(index); }
   int ColumnOf(double index) const { return columns_.Of(index); }
 

@@ -8,11 +8,13 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
+#include "importers/e57_images.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/scan_path.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_writer.h"
 
@@ -23,6 +25,8 @@ namespace {
 struct ImportOptions {
   std::string input_path;
   std::vector<std::string> output_paths;
+  std::string images_path;  // of an E57: folder for its photos
+  bool cut_panoramas = false;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
   FaceOptions faces;  // of panoramas
@@ -45,7 +49,7 @@ void CheckOutputs(const ImportOptions& options) {
     if (ScanWriterExtension(path).empty()) {
       problems.push_back("--output_path " + path + ": unknown extension, expected one of " + known);
     }
-    if (IsSameFile(path, options.input_path)) {
+    if (IsSameFile(path, SplitScanPath(options.input_path).file)) {
       problems.push_back("--output_path " + path + " is the input: give another path");
     }
     for (size_t k = 0; k < i; ++k) {
@@ -218,6 +222,42 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   std::cout << (fs::path(folder) / "panoramas.json").string() << "\n";
 }
 
+// The photos of an E57 as files, those with a pose as a COLMAP model beside them.
+void WriteImages(const ImportOptions& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.reader.Problems();
+  AppendProblems(options.faces.Problems(), &problems);
+  ThrowIfProblems(problems);
+  E57ImageOptions images;
+  images.meters_per_unit = MetersPerUnit(options.reader.units).value_or(1);
+  images.check = options.reader.e57_check && options.output_paths.empty();  // or done already
+  images.cut_panoramas = options.cut_panoramas;
+  images.faces = options.faces;
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
+                                            options.images_path, images, &context.progress);
+  context.progress.Finish();
+  for (const std::string& note : photos.notes) context.Warn(note);
+  Json json = Json::array();
+  for (const E57Photos::Photo& photo : photos.photos) {
+    json.push_back(
+        {{"file", photo.file}, {"name", photo.name}, {"kind", photo.kind}, {"posed", photo.posed}});
+  }
+  context.report["images"] = json;
+  std::cout << options.images_path << ": " << photos.photos.size() << " photos, "
+            << photos.posed.size() << " with a pose\n";
+}
+
+void RunImport(const ImportOptions& options, const Command::Context& context) {
+  if (options.output_paths.empty() && options.images_path.empty()) {
+    throw UsageError("--output_path is missing: what is to be written?");
+  }
+  if (IsPanoramaInput(options.input_path)) {
+    CutPanoramasOf(options, context);
+    return;
+  }
+  if (!options.output_paths.empty()) Importer(options, context).Run();
+  if (!options.images_path.empty()) WriteImages(options, context);
+}
+
 }  // namespace
 }  // namespace roomtex
 
@@ -241,15 +281,21 @@ int main(int argc, char** argv) {
                          "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
                          "image, .rtpi (RTPI 3.0) or .ptx. Of panoramas: the folder for their "
                          "faces, panoramas.json (which face is which part of which panorama) and "
-                         "camera_options.txt (for colmap feature_extractor).");
+                         "camera_options.txt (for colmap feature_extractor).",
+                         Command::Kind::kOptional);
+  command.AddOutputPath("images_path", &options.images_path,
+                        "E57: folder for its photos, written as they are. Those with a pose also "
+                        "become a COLMAP model in its folder sparse, in the frame of the scans: "
+                        "what roomtex-texture takes as --input_path.",
+                        Command::Kind::kOptional);
+  command.AddBool(
+      "E57.cut_panoramas", &options.cut_panoramas,
+      "With --images_path: panoramas as faces (--Faces.*) of perspective cameras in the "
+      "model, for programs that know no EQUIRECTANGULAR.");
   command.Add(FieldsOf(&options.reader));
   command.Add(FieldsOf(&options.mesh));
   command.Add(FieldsOf(&options.faces));
   return command.Run(argc, argv, [&options](const Command::Context& context) {
-    if (roomtex::IsPanoramaInput(options.input_path)) {
-      roomtex::CutPanoramasOf(options, context);
-    } else {
-      roomtex::Importer(options, context).Run();
-    }
+    roomtex::RunImport(options, context);
   });
 }

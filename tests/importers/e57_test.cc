@@ -381,6 +381,24 @@ TEST_F(E57, MemoryFollowsThePointsNotTheirIndices) {
   EXPECT_THAT(notes_, testing::ElementsAre(HasSubstr("is read as a cloud")));
 }
 
+TEST_F(E57, IndicesMayBeFloatsAndNoNumbers) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = HUGE_VALF;
+  const auto read = [&](const std::vector<float>& rows) {
+    E57Bytes file;
+    const std::string x = StreamOf<float>({1, 2, 3, 4});
+    const uint64_t offset =
+        file.AddPoints({x, x, x, StreamOf(rows), StreamOf<float>({0, 1, 0, 1})});
+    return Read(file.Finish(
+        E57Xml(ScanXml(offset, 4,
+                       SinglesXml() + Element("rowIndex", "Float", "", "precision=\"single\"") +
+                           Element("columnIndex", "Float", "", "precision=\"single\"")))));
+  };
+  EXPECT_EQ(read({0, 0, 1, 1})[0].NumMissing(), 0);
+  EXPECT_EQ(read({0, 0, 1, nan})[0].NumMissing(), 1);
+  EXPECT_EQ(read({0, -inf, 1, inf})[0].NumMissing(), 2);
+  EXPECT_EQ(read({nan, nan, nan, nan})[0].kind(), Scan::Kind::kCloud);
+}
+
 class E57WithScans : public E57 {
  protected:
   // Three scans, the second without points.
