@@ -9,6 +9,7 @@
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
 #include "importers/e57_images.h"
+#include "importers/e57_writer.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
 #include "importers/ply.h"
@@ -133,6 +134,8 @@ class Importer {
       WriteScan(file_.scans[0], meshes_[0], path, writer);
     } else if (extension == ".ptx") {
       WritePtx(file_.scans, path);
+    } else if (extension == ".e57") {
+      WriteE57(file_.scans, path);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
@@ -180,8 +183,9 @@ class Importer {
     context_.report["bounds"] = {{"min", ToJson(bounds.min)}, {"max", ToJson(bounds.max)}};
     if (each.size() > 1) context_.report["scans"] = each;
     if (each.size() > 1) {
-      context_.progress.Note(std::to_string(each.size()) +
-                             " scans: .ply and .ptx hold all of them, other outputs are numbered");
+      context_.progress.Note(
+          std::to_string(each.size()) +
+          " scans: .ply, .ptx and .e57 hold all of them, other outputs are numbered");
     }
   }
 
@@ -271,18 +275,20 @@ int main(int argc, char** argv) {
       "cloud, intensity image or scan. The content of the input decides its format, "
       "the extension of an output its own.",
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
-  command.AddInputPath("input_path", &options.input_path,
-                       "The scan. A PTX or E57 may hold several: .ply and .ptx outputs then hold "
-                       "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
-                       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
-                       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
-                       "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
-  command.AddOutputPaths("output_path", &options.output_paths,
-                         "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
-                         "image, .rtpi (RTPI 3.0) or .ptx. Of panoramas: the folder for their "
-                         "faces, panoramas.json (which face is which part of which panorama) and "
-                         "camera_options.txt (for colmap feature_extractor).",
-                         Command::Kind::kOptional);
+  command.AddInputPath(
+      "input_path", &options.input_path,
+      "The scan. A PTX or E57 may hold several: .ply, .ptx and .e57 outputs then hold "
+      "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
+      "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
+      "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
+      "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
+  command.AddOutputPaths(
+      "output_path", &options.output_paths,
+      "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
+      "image, .rtpi (RTPI 3.0), .ptx or .e57. Of panoramas: the folder for their "
+      "faces, panoramas.json (which face is which part of which panorama) and "
+      "camera_options.txt (for colmap feature_extractor).",
+      Command::Kind::kOptional);
   command.AddOutputPath("images_path", &options.images_path,
                         "E57: folder for its photos, written as they are. Those with a pose also "
                         "become a COLMAP model in its folder sparse, in the frame of the scans: "
