@@ -143,8 +143,8 @@ class BitColumn {
 // A scan as columns of bits: what is in it, and in which packets it goes.
 class ScanColumns {
  public:
-  ScanColumns(const Scan& scan, const CellColors* colors)
-      : scan_(scan), colors_(colors), station_from_scan_(scan.scan_from_station.Inverse()) {
+  ScanColumns(const Scan& scan, const CellColors* colors, const Rigid& station_from_scan)
+      : scan_(scan), colors_(colors), station_from_scan_(station_from_scan) {
     FindBounds();
     const char* const kNames[] = {"cartesianX", "cartesianY", "cartesianZ"};
     for (int i = 0; i < 3; ++i) columns_.emplace_back(kNames[i], low_[i], high_[i]);
@@ -339,7 +339,13 @@ uint64_t E57Writer::PhysicalOffset() const { return num_pages_ * kPageSize + pag
 
 void E57Writer::AddScan(const Scan& scan, const CellColors* colors) {
   if (!scan.organised) throw std::invalid_argument("E57Writer needs organised scans");
-  ScanColumns columns(scan, colors);
+  if (stations_.empty()) {
+    file_from_scan_ = Eigen::Quaterniond::FromTwoVectors(scan.up, Eigen::Vector3d::UnitZ());
+  }
+  // The station's frame is turned like the file's: there, too, z is up.
+  const Rigid turned{file_from_scan_, Eigen::Vector3d::Zero()};
+  const Rigid file_from_station = turned * scan.scan_from_station * turned.Inverse();
+  ScanColumns columns(scan, colors, file_from_station.Inverse() * turned);
   Align();
   const uint64_t offset = PhysicalOffset();
   // The data begin right behind the header of 32 bytes, over a checksum if one lies between.
@@ -354,14 +360,14 @@ void E57Writer::AddScan(const Scan& scan, const CellColors* colors) {
   const std::string name = scan.name.empty() ? "scan " + std::to_string(number) : scan.name;
   scans_xml_ += Structure(
       "vectorChild",
-      Text("guid", guid) + Text("name", name) + PoseXml(scan.scan_from_station) +
-          IndexBoundsXml(scan) + LimitsXml(scan, colors != nullptr) + columns.BoundsXml() +
+      Text("guid", guid) + Text("name", name) + PoseXml(file_from_station) + IndexBoundsXml(scan) +
+          LimitsXml(scan, colors != nullptr) + columns.BoundsXml() +
           Element("points", "CompressedVector",
                   "\n" + Structure("prototype", columns.Prototype()) +
                       Element("codecs", "Vector", "", " allowHeterogeneousChildren=\"1\""),
                   " fileOffset=\"" + std::to_string(offset) + "\" recordCount=\"" +
                       std::to_string(columns.num_records()) + "\""));
-  stations_.push_back({guid, scan.Station()});
+  stations_.push_back({guid, file_from_station.translation});
 }
 
 void E57Writer::AddPhoto(const Photo& photo) {
@@ -388,20 +394,21 @@ void E57Writer::AddPhoto(const Photo& photo) {
            Float("pixelWidth", kPixel) + Float("principalPointX", camera.params[one ? 1 : 2]) +
            Float("principalPointY", camera.params[one ? 2 : 3]);
   }
-  const Rigid scan_from_camera =
-      photo.cam_from_scan.Inverse() * Rigid{CamFromStandard(camera), Eigen::Vector3d::Zero()};
+  const Rigid file_from_camera = Rigid{file_from_scan_, Eigen::Vector3d::Zero()} *
+                                 photo.cam_from_scan.Inverse() *
+                                 Rigid{CamFromStandard(camera), Eigen::Vector3d::Zero()};
   ContentHash content;
   content.Add(photo.bytes);
   const auto nearest =
       std::min_element(stations_.begin(), stations_.end(), [&](const Station& a, const Station& b) {
-        return (a.place - scan_from_camera.translation).norm() <
-               (b.place - scan_from_camera.translation).norm();
+        return (a.place - file_from_camera.translation).norm() <
+               (b.place - file_from_camera.translation).norm();
       });
   images_xml_ += Structure(
       "vectorChild",
       Text("guid", Guid(content, ++num_photos_)) + Text("name", photo.name) +
           (nearest != stations_.end() ? Text("associatedData3DGuid", nearest->guid) : "") +
-          PoseXml(scan_from_camera) +
+          PoseXml(file_from_camera) +
           Structure(camera.IsPanorama() ? "sphericalRepresentation" : "pinholeRepresentation",
                     xml));
 }

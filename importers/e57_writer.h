@@ -16,7 +16,8 @@ namespace roomtex {
 using CellColors = std::vector<std::array<uint8_t, 3>>;
 
 // Sections are written as they are added, the XML at the end: memory does not follow the scans. No
-// index packet: some programs do not read files with one.
+// index packet: some programs do not read files with one. In an E57 z is up: scans whose up axis is
+// another (RTPI: y) are turned, and the photos with them.
 class E57Writer {
  public:
   // Throws InputError if the file cannot be written.
@@ -54,6 +55,7 @@ class E57Writer {
   uint64_t PhysicalOffset() const;
 
   OutputFile output_;
+  Eigen::Quaterniond file_from_scan_ = Eigen::Quaterniond::Identity();  // by the first scan's up
   std::string page_, first_page_;
   uint64_t num_pages_ = 0;
   std::vector<Station> stations_;

@@ -163,6 +163,39 @@ TEST_F(E57Written, PhotosComeBackWithCameraAndPose) {
   }
 }
 
+// RTPI: x right, y up, z backward. In an E57 z is up.
+TEST_F(E57Written, ScansWithAnotherUpAxisAreTurned) {
+  const Scan upright = MadeRoom(60, 30, Pose());
+  const Eigen::Quaterniond scan_from_file(
+      Eigen::AngleAxisd(-kPi / 2, Eigen::Vector3d::UnitX()));  // z becomes y
+  const Rigid turned{scan_from_file, Eigen::Vector3d::Zero()};
+  Scan scan = upright;
+  scan.up = Eigen::Vector3d::UnitY();
+  scan.scan_from_station = turned * Pose() * turned.Inverse();
+  for (Eigen::Vector3d& point : scan.points) point = scan_from_file * point;
+  Camera camera;
+  camera.width = 64, camera.height = 48;
+  camera.params = {50, 50, 32, 24};
+  const Rigid cam_from_file{Eigen::Quaterniond(0.7, 0.3, -0.4, 0.5).normalized(), {1, -2, 3}};
+  E57Writer writer(Path());
+  writer.AddScan(scan, nullptr);
+  writer.AddPhoto({"a", "no picture", camera, cam_from_file * turned.Inverse()});
+  writer.Commit();
+  const Scan again = ReadScan(Path(), {});
+  ASSERT_EQ(again.num_rows, 30);
+  EXPECT_THAT(again.scan_from_station, IsNearRigid(Pose(), 1e-12, 1e-9));
+  for (size_t i = 0; i < upright.points.size(); ++i) {
+    ASSERT_EQ(again.IsMissing(static_cast<int>(i)), upright.IsMissing(static_cast<int>(i)));
+    if (upright.IsMissing(static_cast<int>(i))) continue;
+    ASSERT_THAT(again.points[i], IsNearMatrix(upright.points[i], 1e-6));
+  }
+  const E57Document document = ReadE57Document(E57Pages(Path(), true));
+  EXPECT_THAT(*document.images[0].file_from_camera,
+              IsNearRigid(cam_from_file.Inverse() *
+                              Rigid{Eigen::Quaterniond(0, 1, 0, 0), Eigen::Vector3d::Zero()},
+                          1e-12, 1e-9));
+}
+
 // Some programs (Rhino 8, FARO SCENE) do not read files with an index packet, or wrong pages.
 TEST_F(E57Written, TheFileIsAsOtherReadersWantIt) {
   WriteE57({MadeRoom(100, 80, Pose())}, Path());
