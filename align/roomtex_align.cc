@@ -57,7 +57,7 @@ void AddOptions(Arguments* a, Command* command) {
                         "--image_path that have six picks are placed each by its own.",
                         Command::Kind::kOptional);
   command->AddInputPaths("scan_path", &a->scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a .ply mesh. Not needed for "
+                         "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh. Not needed for "
                          "an --input_path that was aligned before: it remembers its scans.",
                          Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,

@@ -1,6 +1,6 @@
 #pragma once
 // The range scan: measured 3D points with intensity, organised in the grid in which the scanner
-// took them (thesis 5.1.1), or a plain triangle mesh that has no grid.
+// took them (thesis 5.1.1), or a plain triangle mesh, or points, without a grid.
 
 #include <array>
 #include <limits>
@@ -18,6 +18,13 @@ using Triangle = std::array<int, 3>;
 
 struct Scan {
   std::string path;  // the file it came from, for messages and reports
+  std::string name;  // of the station, "" if the file gives none
+
+  // A grid, a triangle mesh or points alone.
+  enum class Kind { kGrid, kMesh, kCloud };
+  Kind kind() const {
+    return organised ? Kind::kGrid : triangles.empty() ? Kind::kCloud : Kind::kMesh;
+  }
 
   // The grid. Sample (column, row) has the index row * num_columns + column; row 0 is the TOP row
   // (largest elevation), columns keep the order of the file. A mesh without a grid is not

@@ -8,11 +8,14 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
+#include "importers/e57_images.h"
+#include "importers/e57_writer.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/scan_path.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_writer.h"
 
@@ -23,6 +26,8 @@ namespace {
 struct ImportOptions {
   std::string input_path;
   std::vector<std::string> output_paths;
+  std::string images_path;  // of an E57: folder for its photos
+  bool cut_panoramas = false;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
   FaceOptions faces;  // of panoramas
@@ -45,7 +50,7 @@ void CheckOutputs(const ImportOptions& options) {
     if (ScanWriterExtension(path).empty()) {
       problems.push_back("--output_path " + path + ": unknown extension, expected one of " + known);
     }
-    if (IsSameFile(path, options.input_path)) {
+    if (IsSameFile(path, SplitScanPath(options.input_path).file)) {
       problems.push_back("--output_path " + path + " is the input: give another path");
     }
     for (size_t k = 0; k < i; ++k) {
@@ -129,6 +134,8 @@ class Importer {
       WriteScan(file_.scans[0], meshes_[0], path, writer);
     } else if (extension == ".ptx") {
       WritePtx(file_.scans, path);
+    } else if (extension == ".e57") {
+      WriteE57(file_.scans, path);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
@@ -176,8 +183,9 @@ class Importer {
     context_.report["bounds"] = {{"min", ToJson(bounds.min)}, {"max", ToJson(bounds.max)}};
     if (each.size() > 1) context_.report["scans"] = each;
     if (each.size() > 1) {
-      context_.progress.Note(std::to_string(each.size()) +
-                             " scans: .ply and .ptx hold all of them, other outputs are numbered");
+      context_.progress.Note(
+          std::to_string(each.size()) +
+          " scans: .ply, .ptx and .e57 hold all of them, other outputs are numbered");
     }
   }
 
@@ -218,6 +226,42 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   std::cout << (fs::path(folder) / "panoramas.json").string() << "\n";
 }
 
+// The photos of an E57 as files, those with a pose as a COLMAP model beside them.
+void WriteImages(const ImportOptions& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.reader.Problems();
+  AppendProblems(options.faces.Problems(), &problems);
+  ThrowIfProblems(problems);
+  E57ImageOptions images;
+  images.meters_per_unit = MetersPerUnit(options.reader.units).value_or(1);
+  images.check = options.reader.e57_check && options.output_paths.empty();  // or done already
+  images.cut_panoramas = options.cut_panoramas;
+  images.faces = options.faces;
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
+                                            options.images_path, images, &context.progress);
+  context.progress.Finish();
+  for (const std::string& note : photos.notes) context.Warn(note);
+  Json json = Json::array();
+  for (const E57Photos::Photo& photo : photos.photos) {
+    json.push_back(
+        {{"file", photo.file}, {"name", photo.name}, {"kind", photo.kind}, {"posed", photo.posed}});
+  }
+  context.report["images"] = json;
+  std::cout << options.images_path << ": " << photos.photos.size() << " photos, "
+            << photos.posed.size() << " with a pose\n";
+}
+
+void RunImport(const ImportOptions& options, const Command::Context& context) {
+  if (options.output_paths.empty() && options.images_path.empty()) {
+    throw UsageError("--output_path is missing: what is to be written?");
+  }
+  if (IsPanoramaInput(options.input_path)) {
+    CutPanoramasOf(options, context);
+    return;
+  }
+  if (!options.output_paths.empty()) Importer(options, context).Run();
+  if (!options.images_path.empty()) WriteImages(options, context);
+}
+
 }  // namespace
 }  // namespace roomtex
 
@@ -227,28 +271,37 @@ int main(int argc, char** argv) {
   options.reader.azimuth = "clockwise";  // conversions do not depend on what a header says
   Command command(
       "roomtex-import",
-      "Reads a range scan (RTPI, PTX, organised PCD; PLY meshes) and writes it as mesh, "
+      "Reads a range scan (RTPI, PTX, E57, organised PCD; meshes) and writes it as mesh, "
       "cloud, intensity image or scan. The content of the input decides its format, "
       "the extension of an output its own.",
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
-  command.AddInputPath("input_path", &options.input_path,
-                       "The scan. A PTX may hold several: .ply and .ptx outputs then hold all of "
-                       "them, the others are written one per scan as NAME_1, NAME_2 ... Or a "
-                       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
-                       "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
-  command.AddOutputPaths("output_path", &options.output_paths,
-                         "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
-                         "image, .rtpi (RTPI 3.0) or .ptx. Of panoramas: the folder for their "
-                         "faces, panoramas.json (which face is which part of which panorama) and "
-                         "camera_options.txt (for colmap feature_extractor).");
+  command.AddInputPath(
+      "input_path", &options.input_path,
+      "The scan. A PTX or E57 may hold several: .ply, .ptx and .e57 outputs then hold "
+      "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
+      "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
+      "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
+      "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
+  command.AddOutputPaths(
+      "output_path", &options.output_paths,
+      "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
+      "image, .rtpi (RTPI 3.0), .ptx or .e57. Of panoramas: the folder for their "
+      "faces, panoramas.json (which face is which part of which panorama) and "
+      "camera_options.txt (for colmap feature_extractor).",
+      Command::Kind::kOptional);
+  command.AddOutputPath("images_path", &options.images_path,
+                        "E57: folder for its photos, written as they are. Those with a pose also "
+                        "become a COLMAP model in its folder sparse, in the frame of the scans: "
+                        "what roomtex-texture takes as --input_path.",
+                        Command::Kind::kOptional);
+  command.AddBool(
+      "E57.cut_panoramas", &options.cut_panoramas,
+      "With --images_path: panoramas as faces (--Faces.*) of perspective cameras in the "
+      "model, for programs that know no EQUIRECTANGULAR.");
   command.Add(FieldsOf(&options.reader));
   command.Add(FieldsOf(&options.mesh));
   command.Add(FieldsOf(&options.faces));
   return command.Run(argc, argv, [&options](const Command::Context& context) {
-    if (roomtex::IsPanoramaInput(options.input_path)) {
-      roomtex::CutPanoramasOf(options, context);
-    } else {
-      roomtex::Importer(options, context).Run();
-    }
+    roomtex::RunImport(options, context);
   });
 }

@@ -9,6 +9,8 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "importers/e57.h"
+#include "importers/e57_pages.h"
 #include "importers/file_reader.h"
 #include "importers/length_unit.h"
 #include "importers/obj.h"
@@ -16,6 +18,7 @@
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/scan_path.h"
 #include "importers/scan_poses.h"
 
 namespace roomtex {
@@ -23,8 +26,8 @@ namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an organised PCD, a PLY or an OBJ mesh (the content counts, not the "
-    "name)";
+    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh (the content counts, not "
+    "the name)";
 
 bool BeginsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
@@ -75,11 +78,11 @@ bool LooksLikePtx(std::string_view bytes) {
 // The name of a format that users may take for a scan, "" if it is none of these.
 std::string ForeignFormat(std::string_view bytes) {
   static const std::pair<std::string_view, const char*> kMagics[] = {
-      {"ASTM-E57", "an E57 file"},     {"LASF", "a LAS or LAZ file"},
-      {"PK\x03\x04", "a zip archive"}, {"\x1f\x8b", "a gzip file"},
-      {"\x89PNG", "a PNG image"},      {"\xff\xd8", "a JPEG photo"},
-      {"glTF", "a glTF model"},        {"OFF", "an OFF mesh"},
-      {"solid ", "an STL mesh"},       {"SQLite format", "a database"}};
+      {"LASF", "a LAS or LAZ file"},  {"PK\x03\x04", "a zip archive"},
+      {"\x1f\x8b", "a gzip file"},    {"\x89PNG", "a PNG image"},
+      {"\xff\xd8", "a JPEG photo"},   {"glTF", "a glTF model"},
+      {"OFF", "an OFF mesh"},         {"solid ", "an STL mesh"},
+      {"SQLite format", "a database"}};
   for (const auto& [magic, name] : kMagics) {
     if (BeginsWith(bytes, magic)) return name;
   }
@@ -118,6 +121,24 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   return file;
 }
 
+ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
+  ScanFile file;
+  file.format = "E57";
+  file.byte_order = "little";
+  file.meters_per_unit = MetersPerUnitOr(options.units, 1);
+  file.scans = ReadE57(path.file, path.part,
+                       {file.meters_per_unit, options.max_range, options.e57_check}, &file.notes);
+  for (const Scan& scan : file.scans) {
+    if (scan.kind() != Scan::Kind::kCloud) continue;
+    throw InputError(
+        path.file, "",
+        "the scan " + Quoted(scan.name) + " is a cloud of points without the scanner's grid",
+        "Export it as a structured E57 (with rows and columns), or name another scan "
+        "behind #");
+  }
+  return file;
+}
+
 }  // namespace
 
 void ScanReaderOptions::Declare(OptionFields* fields) {
@@ -138,17 +159,27 @@ void ScanReaderOptions::Declare(OptionFields* fields) {
       .NotNegative()
       .Finite()
       .Says("must be 0 (no limit) or a number of metres");
+  fields->Bool("E57.check", &e57_check,
+               "Compare the checksums of an E57 file before it is read; 0 = take a damaged file as "
+               "it is.");
 }
 
 std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf(*this); }
 
-ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
+ScanFile ReadScanFile(const std::string& given_path, const ScanReaderOptions& options) {
   ThrowIfProblems(options.Problems());
+  const ScanPath parts = SplitScanPath(given_path);
+  const std::string& path = parts.file;
   std::string start;
   {
     const FileReader reader(path);
     if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
     start = reader.ReadSome(0, kLookAt);
+  }
+  if (LooksLikeE57(start)) return ReadAsE57(parts, options);
+  if (!parts.part.empty()) {
+    throw InputError(path, "", "is no E57: a single scan of it cannot be named",
+                     "Leave out " + Quoted("#" + parts.part));
   }
   if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
   const double meters_per_unit = MetersPerUnitOr(options.units, 1);
@@ -186,7 +217,8 @@ Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
   if (file.scans.size() > 1) {
     throw InputError(path, "",
                      "holds " + std::to_string(file.scans.size()) + " scans, expected one",
-                     "Split it, or use a command that takes several scans");
+                     file.format == "E57" ? "Name one of them behind #: " + path + "#1"
+                                          : "Split it, or use a command that takes several scans");
   }
   return std::move(file.scans.front());
 }
@@ -212,6 +244,9 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     const int count = static_cast<int>(file.scans.size());
     PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
+    if (file.format == "E57") {
+      for (const std::string& note : file.notes) placed.notes.push_back(path + ": " + note + ".");
+    }
     for (int k = 0; k < count; ++k) {
       Scan& scan = file.scans[k];
       const Eigen::Vector3d up_in_station = scan.scan_from_station.rotation.conjugate() * scan.up;
@@ -220,7 +255,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
       if (pose) {
         PlaceScan(pose->scan_from_station, &scan);
         if (pose->station) placed.stations.push_back(*pose->station);
-      } else if (file.format != "PTX" || poses.surveyed()) {
+      } else if (!file.CarriesPoses() || poses.surveyed()) {
         missing.push_back({path, k, count});
       }
       placed.scans.push_back(std::move(scan));

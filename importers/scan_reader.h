@@ -17,28 +17,34 @@ struct ScanReaderOptions {
   // of real scanners are "counterclockwise"; the wrong one mirrors the room. "auto": by the header
   // where it is one of the scanner's own (AzimuthOfScanner), else clockwise.
   std::string azimuth = "auto";
-  // RTPI, PTX, PCD, PLY, OBJ: unit of the coordinates in the file; "" = what the file says, metres
-  // if it does not. One of "", "meters", "millimeters", "centimeters", "feet", "inches".
+  // Unit of the coordinates in the file; "" = what the file says, metres if it does not. One of "",
+  // "meters", "millimeters", "centimeters", "feet", "inches".
   std::string units;
   // Metres; samples farther away count as missing. 0 = the limit that the file gives, if any.
   double max_range = 0;
+  // E57: compare the checksums of the whole file before anything is read from it.
+  bool e57_check = true;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
 
-// All scans of one file (a PTX may hold several), and what the file is.
+// All scans of one file (a PTX or an E57 may hold several), and what the file is.
 struct ScanFile {
   std::vector<Scan> scans;         // at least one
-  std::string format;              // "RTPI", "PTX", "PCD", "PLY" or "OBJ"
+  std::string format;              // "RTPI", "PTX", "PCD", "PLY", "OBJ" or "E57"
   std::string byte_order;          // "little", "big" or "text"
   std::vector<std::string> notes;  // assumptions about the file that a user should know
   // RTPI: as it was read, "clockwise" or "counterclockwise"; and what there is to say about it, a
   // sentence or "". Other formats: "".
   std::string azimuth, azimuth_note;
   double meters_per_unit = 1;
+
+  // The file says where each of its scans stands.
+  bool CarriesPoses() const { return format == "PTX" || format == "E57"; }
 };
-// Throws InputError (missing, not a scan, broken ...).
+// path: a file, or one scan of an E57 (scan_path.h). Throws InputError (missing, not a scan, broken
+// ...).
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options);
 
 // The only scan of the file. Throws InputError as above, and for a file with several.
@@ -50,11 +56,11 @@ Scan ReadScan(const std::string& path, const ScanReaderOptions& options);
 //   NAME qw qx qy qz tx ty tz                 metres
 //   NAME geo LATITUDE LONGITUDE HEIGHT HEADING    a surveyed station, see SurveyedStation; degrees
 // `#` starts a comment. NAME is the path or the file name (in double quotes if it has spaces); scan
-// k (from 1) of a file with several is NAME#k. A pose here replaces that of a PTX or PCD. Surveyed
-// stations stand alone: then every scan needs one, and the scan frame is east-north-up about the
-// FIRST STATION OF THE FILE (z up, whatever the format of the scans); the scanner was levelled, or
-// the file's own pose says how it leant. Several scans without a pose (PTX carries its own) are an
-// InputError.
+// k (from 1) of a file with several is NAME#k. A pose here replaces that of a PTX, E57 or PCD.
+// Surveyed stations stand alone: then every scan needs one, and the scan frame is east-north-up
+// about the FIRST STATION OF THE FILE (z up, whatever the format of the scans); the scanner was
+// levelled, or the file's own pose says how it leant. Several scans without a pose (PTX and E57
+// carry their own) are an InputError.
 struct PlacedScans {
   std::vector<Scan> scans;
   // The files that they came from, in the order of the paths.
@@ -64,7 +70,7 @@ struct PlacedScans {
     std::vector<bool> placed;  // one per scan of the file: its pose is one of poses_path
   };
   std::vector<File> files;
-  std::vector<std::string> notes;  // on azimuths; sentences
+  std::vector<std::string> notes;  // on azimuths and on scans of an E57; sentences
   // With surveyed stations: the scan frame, and one station per scan.
   std::optional<GeoFrame> enu;
   std::vector<SurveyedStation> stations;

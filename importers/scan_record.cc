@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "importers/content_hash.h"
 #include "importers/length_unit.h"
+#include "importers/scan_path.h"
 #include "importers/scan_poses.h"
 
 namespace roomtex {
@@ -74,28 +75,33 @@ std::string FindFile(const ScanRecord& record, const AlignmentRecord& alignment)
       "Say with --scan_path where it is now");
 }
 
-// What is read: a record, and where its file is.
+// What is read: a record, and where its file is, with the part of it.
 struct Found {
   const ScanRecord* record;
   std::string path;
 };
+
+std::string WithPart(const std::string& path, const ScanRecord& record) {
+  return record.part.empty() ? path : path + "#" + record.part;
+}
 
 std::vector<Found> FindScans(const AlignmentRecord& alignment,
                              const std::vector<std::string>& paths) {
   std::vector<Found> found;
   if (paths.empty()) {
     for (const ScanRecord& record : alignment.scans) {
-      found.push_back({&record, FindFile(record, alignment)});
+      found.push_back({&record, WithPart(FindFile(record, alignment), record)});
     }
     return found;
   }
   std::set<const ScanRecord*> taken;
   for (const std::string& path : paths) {
-    const std::string hash = HashOfFile(path);
+    const ScanPath given = SplitScanPath(path);
+    const std::string hash = HashOfFile(given.file);
     const ScanRecord* match = nullptr;
     bool twice = false;
     for (const ScanRecord& record : alignment.scans) {
-      if (record.content_hash != hash) continue;
+      if (record.content_hash != hash || record.part != given.part) continue;
       twice = taken.count(&record) > 0;
       if (twice) continue;
       match = &record;
@@ -105,7 +111,8 @@ std::vector<Found> FindScans(const AlignmentRecord& alignment,
     if (match == nullptr) {
       throw InputError(path, "",
                        "is another scan than the model in " + alignment.folder +
-                           " was aligned to, " + alignment.scans[0].path +
+                           " was aligned to, " +
+                           WithPart(alignment.scans[0].path, alignment.scans[0]) +
                            (alignment.scans.size() > 1 ? " and others" : ""),
                        std::string("Give that one, or none: it is remembered") + kToUseAnother);
     }
@@ -177,6 +184,7 @@ Value ValueOf(const Json& json, const char* key) {
 ScanRecord RecordFromJson(const Json& json) {
   ScanRecord record;
   record.path = ValueOf<std::string>(json, "path");
+  record.part = json.value("part", std::string());
   record.absolute_path = ValueOf<std::string>(json, "absolute_path");
   record.relative_path = ValueOf<std::string>(json, "relative_path");
   record.num_bytes = ValueOf<int64_t>(json, "num_bytes");
@@ -194,8 +202,9 @@ ScanRecord RecordFromJson(const Json& json) {
   return record;
 }
 
-ScanReaderOptions OptionsOf(const ScanRecord& record) {
+ScanReaderOptions OptionsOf(const ScanRecord& record, const ScanReaderOptions& given) {
   ScanReaderOptions options;
+  options.e57_check = given.e57_check;
   if (!record.azimuth.empty()) options.azimuth = record.azimuth;
   options.units = record.units;
   options.max_range = record.max_range;
@@ -211,14 +220,16 @@ std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderO
   for (const PlacedScans::File& file : placed.files) {
     std::error_code error;
     ScanRecord record;
-    record.path = file.path;
-    const fs::path absolute = fs::weakly_canonical(fs::absolute(file.path), error);
+    const ScanPath path = SplitScanPath(file.path);
+    record.path = path.file;
+    record.part = path.part;
+    const fs::path absolute = fs::weakly_canonical(fs::absolute(path.file), error);
     record.absolute_path = absolute.string();
     record.relative_path =
         absolute.lexically_relative(fs::weakly_canonical(fs::absolute(model_folder), error))
             .string();
-    record.num_bytes = SizeOf(file.path);
-    record.content_hash = HashOfFile(file.path);
+    record.num_bytes = SizeOf(path.file);
+    record.content_hash = HashOfFile(path.file);
     record.azimuth = file.azimuth;
     record.units = options.units;
     record.meters_per_unit = file.meters_per_unit;
@@ -236,6 +247,7 @@ Json ToJson(const std::vector<ScanRecord>& records) {
   for (const ScanRecord& record : records) {
     Json one;
     one["path"] = record.path;
+    if (!record.part.empty()) one["part"] = record.part;
     one["absolute_path"] = record.absolute_path;
     one["relative_path"] = record.relative_path;
     one["num_bytes"] = record.num_bytes;
@@ -297,7 +309,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
   CheckOptions(alignment, found, request.options);
   PlacedScans placed;
   for (const Found& one : found) {
-    ScanFile file = ReadScanFile(one.path, OptionsOf(*one.record));
+    ScanFile file = ReadScanFile(one.path, OptionsOf(*one.record, request.options));
     const std::vector<ScanRecord::Pose>& poses = one.record->poses;
     if (file.scans.size() != poses.size()) {
       throw InputError(alignment.path, "",

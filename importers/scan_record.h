@@ -16,7 +16,8 @@ namespace roomtex {
 
 // One scan file, as it was read.
 struct ScanRecord {
-  std::string path;                          // as it was given
+  std::string path;                          // as it was given, without the part
+  std::string part;                          // of an E57: the one scan that was read, "" = all
   std::string absolute_path, relative_path;  // relative to the folder of the model
   int64_t num_bytes = 0;
   std::string content_hash;    // HashOfFile()

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "importers/e57_writer.h"
 #include "importers/pcd.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
@@ -33,7 +34,8 @@ void WriteIntensityImage(const Scan& scan, const std::string& path) {
 }  // namespace
 
 const std::vector<std::string>& ScanWriterExtensions() {
-  static const std::vector<std::string> kExtensions = {".ply", ".pcd", ".png", ".rtpi", ".ptx"};
+  static const std::vector<std::string> kExtensions = {".ply",  ".pcd", ".png",
+                                                       ".rtpi", ".ptx", ".e57"};
   return kExtensions;
 }
 
@@ -49,7 +51,8 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   const std::string extension = ScanWriterExtension(path);
   if (extension.empty()) {
     throw UsageError(path +
-                     ": the extension names no known format (.ply, .pcd, .png, .rtpi, .ptx)");
+                     ": the extension names no known format (.ply, .pcd, .png, .rtpi, .ptx, "
+                     ".e57)");
   }
   if (!scan.organised && extension != ".ply") {
     throw InputError(scan.path, "",
@@ -61,6 +64,7 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension == ".png") WriteIntensityImage(scan, path);
   if (extension == ".rtpi") WriteRtpi(RtpiFromScan(scan, options.counterclockwise), path);
   if (extension == ".ptx") WritePtx({scan}, path);
+  if (extension == ".e57") WriteE57({scan}, path);
 }
 
 }  // namespace roomtex

@@ -9,7 +9,7 @@
 
 namespace roomtex {
 
-// ".ply", ".pcd", ".png", ".rtpi", ".ptx".
+// ".ply", ".pcd", ".png", ".rtpi", ".ptx", ".e57".
 const std::vector<std::string>& ScanWriterExtensions();
 // The extension in small letters, if it is one of these, otherwise "".
 std::string ScanWriterExtension(const std::string& path);
@@ -25,6 +25,7 @@ struct ScanWriterOptions {
 //          (IntensityAsGrey)
 //   .rtpi  RTPI 3.0 (RtpiFromScan says how intensities are scaled)
 //   .ptx   PTX (ptx.h), intensity 0..1
+//   .e57   structured E57 (e57_writer.h)
 // A mesh without a grid can become a .ply only; for the others it is an InputError. Throws
 // UsageError for another extension.
 void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,

@@ -7,7 +7,7 @@ packages=(
   colmap
   libeigen3-dev libceres-dev libopencv-dev libpcl-dev libembree-dev libgeographiclib-dev
   libexiv2-dev libsqlite3-dev libsqlitecpp-dev libtinygltf-dev libcli11-dev nlohmann-json3-dev
-  libcpp-httplib-dev libfmt-dev
+  libcpp-httplib-dev libfmt-dev libpugixml-dev
   libmeshoptimizer-dev
   libboost-dev libgtest-dev libgmock-dev libbenchmark-dev
   chromium

@@ -16,6 +16,7 @@
 #include "texture/colorize.h"
 #include "texture/output/evidence.h"
 #include "texture/output/output_set.h"
+#include "texture/output/write_e57.h"
 #include "texture/output/write_glb.h"
 #include "texture/output/write_obj.h"
 #include "texture/output/write_ply.h"
@@ -37,7 +38,7 @@ struct TextureOptions {
   ColorizeOptions colorize;
   GlbOptions glb;
   std::string image_format = "png";
-  bool output_obj = false;
+  bool output_obj = false, output_e57 = false, e57_images = false;
   bool output_evidence = true;
 };
 
@@ -47,11 +48,12 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
   command->AddInputPath("image_path", &o->sources.image_path,
                         "Folder of the photos, as COLMAP was given it.");
-  command->AddInputPaths("scan_path", &o->scan_paths,
-                         "Range scan: .rtpi, .ptx, organised .pcd, or a mesh, .ply or .obj. Not "
-                         "needed for a model of roomtex-align, which remembers its scans and how "
-                         "they were read.",
-                         Command::Kind::kOptional);
+  command->AddInputPaths(
+      "scan_path", &o->scan_paths,
+      "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh, .ply or .obj. Not "
+      "needed for a model of roomtex-align, which remembers its scans and how "
+      "they were read.",
+      Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
@@ -82,6 +84,12 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
   command->AddBool("output_obj", &o->output_obj,
                    "Also write model.obj, model.mtl and their texture images model_0.png ... into "
                    "the output folder; the up axis stays the scan's.");
+  command->AddBool("output_e57", &o->output_e57,
+                   "Also write model.e57: all stations in one structured E57, with intensity, "
+                   "colour and pose. Scans with a grid only.");
+  command->AddBool("E57.images", &o->e57_images,
+                   "model.e57 also holds the photos, undistorted, with their cameras and poses: "
+                   "what programs for splatting read. Writes model.e57, too.");
   command->AddBool("output_evidence", &o->output_evidence,
                    "Also write evidence.ply: a point per vertex of model.ply, in its order, with "
                    "scan intensity, number of photos and their disagreement, for roomtex-view and "
@@ -110,8 +118,12 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
   command->Add(FieldsOf(&o->mesh));
 }
 
-void CheckScans(const std::vector<Scan>& scans) {
+void CheckScans(const std::vector<Scan>& scans, const TextureOptions& options) {
   for (const Scan& scan : scans) {
+    if (!scan.organised && (options.output_e57 || options.e57_images)) {
+      throw InputError(scan.path, "", "has no grid, which model.e57 needs",
+                       "Leave out --output_e57 and --E57.images");
+    }
     if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
     throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
   }
@@ -274,7 +286,7 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
   std::string older;
   for (const char* name :
        {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model.obj", "model.mtl",
-        "model_0.png", "model_0.jpg", "evidence.ply"}) {
+        "model_0.png", "model_0.jpg", "model.e57", "evidence.ply"}) {
     const bool written = std::find(names.begin(), names.end(), name) != names.end();
     if (written || !std::filesystem::exists(folder + "/" + name)) continue;
     older += (older.empty() ? "" : ", ") + std::string(name);
@@ -297,7 +309,8 @@ void FillScansReport(const PlacedScans& placed, Report* report) {
 
 // The files appear together, or none of them.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-              const TextureOptions& options, const Command::Context& context) {
+              const std::vector<PhotoView>& photos, const TextureOptions& options,
+              const Command::Context& context) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
@@ -319,6 +332,9 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   if (options.output_obj) {
     WriteColoredObj(scans, colored, glb,
                     [&set](const std::string& name) { return set.Path(name); });
+  }
+  if (options.output_e57 || options.e57_images) {
+    WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, set.Path("model.e57"));
   }
   context.report["files"] = set.names();
   WarnOfOlderFiles(set.names(), options.output_path, context);
@@ -379,7 +395,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
       ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
   for (const std::string& note : placed.notes) context.Warn(note);
   const std::vector<Scan>& scans = placed.scans;
-  CheckScans(scans);
+  CheckScans(scans, options);
   ProtectInputs(options, placed);
   MakeFolder(options.output_path);
   context.report.AddCopy(options.output_path + "/report.json");
@@ -401,7 +417,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("write");
-  WriteAll(scans, result.scans, options, context);
+  WriteAll(scans, result.scans, list.photos, options, context);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
   context.report["cpu_seconds"] = cpu;

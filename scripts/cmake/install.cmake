@@ -77,5 +77,5 @@ COLMAP models, aligning one to the other, colouring scans from photos.")
 # What roomtexConfig.cmake finds.
 string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   libeigen3-dev nlohmann-json3-dev libcli11-dev libopencv-dev libceres-dev libembree-dev libgeographiclib-dev
-  libsqlitecpp-dev libsqlite3-dev libfmt-dev libexiv2-dev libpcl-dev libtinygltf-dev libmeshoptimizer-dev pkg-config)
+  libsqlitecpp-dev libsqlite3-dev libpugixml-dev libfmt-dev libexiv2-dev libpcl-dev libtinygltf-dev libmeshoptimizer-dev pkg-config)
 include(CPack)

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "importers/content_hash.h"
+#include "tests/importers/e57_bytes.h"
 #include "tests/importers/rtpi_bytes.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -119,6 +120,24 @@ TEST_F(ScanRecords, PosesAreRememberedToTheLastBit) {
                                   "a.rtpi 0.9 0.1 0.2 0.37 0.1 0.2 0.3\n"
                                   "b.rtpi 1 0 0 0 4 5 6.001\n");
   EXPECT_THROW(Read({}, {}, other), UsageError);
+}
+
+TEST_F(ScanRecords, OneScanOfAnE57IsRemembered) {
+  const std::string path = Write("scans/site.e57", E57OfWalls({"hall", "attic", "roof"}));
+  Align({path + "#roof", path + "#2"});
+  const PlacedScans now = Read();
+  ASSERT_THAT(now.scans, SizeIs(2));
+  EXPECT_EQ(now.scans[0].name, "roof");
+  EXPECT_EQ(now.scans[1].name, "attic");
+  EXPECT_THAT(now.scans[0].points[0].y(), 5);
+  EXPECT_EQ(Read({path + "#2"}).scans[0].name, "attic");
+  EXPECT_INPUT_ERROR(Read({path}), "is another scan than the model");
+  EXPECT_INPUT_ERROR(Read({path + "#hall"}), path + "#roof and others");
+  fs::rename(path, folder_ / "scans/renamed.e57");
+  EXPECT_EQ(Read().scans[1].name, "attic");
+  fs::rename(folder_ / "scans/renamed.e57", path);
+  Align({path});
+  EXPECT_THAT(Read().scans, SizeIs(3));
 }
 
 TEST_F(ScanRecords, ARenamedScanIsFound) {

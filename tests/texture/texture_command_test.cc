@@ -13,6 +13,8 @@
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
 #include "core/photo.h"
+#include "importers/e57_images.h"
+#include "importers/e57_records.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "importers/scan_writer.h"
@@ -467,6 +469,63 @@ TEST_F(TextureCommand, WritesObjFilesBesideTheOthers) {
   EXPECT_EQ(mesh.up, Eigen::Vector3d::UnitY());
   EXPECT_EQ(cv::imread(Path("obj/model_0.jpg")).cols, 501);
   EXPECT_EQ(LoadGlb(Path("obj/model.glb")).images.at(0).mimeType, "image/jpeg");
+}
+
+// RTPI has y up, an E57 z: what was (x, y, z) is (x, -z, y).
+TEST_F(TextureCommand, WritesAnE57ThatGivesTheSameColoursAgain) {
+  ASSERT_EQ(Texture("e57", "--E57.images 1").exit_code, 0);
+  const PlyVertices direct = ReadPly(Path("e57/model.ply"));
+  const Scan scan = ReadScan(Path("e57/model.e57"), {});
+  ASSERT_EQ(scan.num_columns, 500);
+  ASSERT_EQ(scan.num_rows, 190);
+  const E57Pages pages(Path("e57/model.e57"), true);
+  const E57Document document = ReadE57Document(pages);
+  std::vector<int> rgb;
+  for (const char* name : {"colorRed", "colorGreen", "colorBlue"}) {
+    rgb.push_back(document.scans[0].points.Find(name));
+  }
+  E57Records records(pages, document.scans[0].points, rgb);
+  size_t vertex = 0;
+  while (const int64_t count = records.Next()) {
+    for (int64_t i = 0; i < count; ++i, ++vertex) {
+      for (size_t k = 0; k < 3; ++k) {
+        ASSERT_EQ(records.Values(k)[i], direct.colors[vertex][static_cast<int>(k)]);
+      }
+    }
+  }
+  ASSERT_EQ(vertex, direct.points.size());
+  vertex = 0;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    const auto& was = direct.points[vertex++];
+    ASSERT_NEAR(scan.points[i].x(), was.x(), 2e-6);
+    ASSERT_NEAR(scan.points[i].y(), -was.z(), 2e-6);
+    ASSERT_NEAR(scan.points[i].z(), was.y(), 2e-6);
+  }
+  // Its own photos, and no reconstruction, colour it again.
+  Progress quiet(true);
+  const E57Photos photos = ExtractE57Images(Path("e57/model.e57"), Path("e57_photos"), {}, &quiet);
+  EXPECT_EQ(photos.posed.size(), 12u);
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --Texture.scale 1 --input_path " + Path("e57_photos/sparse") +
+      " --image_path " + Path("e57_photos") + " --scan_path " + Path("e57/model.e57#1") +
+      " --Exposure.mode match --output_path " + Path("e57_again"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const PlyVertices again = ReadPly(Path("e57_again/model.ply"));
+  ASSERT_EQ(again.points.size(), direct.points.size());
+  double squares = 0;
+  size_t num_seen = 0, num_alike = 0;
+  for (size_t v = 0; v < again.points.size(); ++v) {
+    num_alike += (again.views[v] > 0) == (direct.views[v] > 0);
+    if (again.views[v] == 0 || direct.views[v] == 0) continue;
+    ++num_seen;
+    for (int k = 0; k < 3; ++k) {
+      const double difference = int{again.colors[v][k]} - int{direct.colors[v][k]};
+      squares += difference * difference;
+    }
+  }
+  EXPECT_GT(num_alike, 0.98 * again.points.size());
+  EXPECT_LT(std::sqrt(squares / (3.0 * static_cast<double>(num_seen))), 12);
 }
 
 TEST_F(TextureCommand, DoesNotWriteOverTheScanItReads) {
