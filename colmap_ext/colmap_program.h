@@ -8,17 +8,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/child_program.h"
+
 namespace roomtex {
 
 // Options of one call in order, e.g. {"--Mapper.multiple_models", "0"}.
 using ColmapOptions = std::vector<std::pair<std::string, std::string>>;
 
-struct ColmapRun {
-  bool success = false;
-  std::string failure;  // "ended with exit code 1", "was killed by signal 6"; "" on success
-  std::vector<std::string> last;  // last lines it printed
-  std::string LastLines() const;  // joined by " | "
-};
+using ColmapRun = ChildRun;
 
 class ColmapProgram {
  public:
@@ -50,25 +47,5 @@ class ColmapProgram {
   std::string path_, log_path_, version_;
   std::map<std::string, std::set<std::string>> options_of_command_;
 };
-
-// Thrown where a signal asks the command to stop, so that destructors tidy up. Not a
-// std::exception: only main() may swallow it.
-struct Interrupted {
-  int signal = 0;
-};
-
-// While this lives, SIGINT, SIGTERM and SIGHUP kill the running program (with all it has started)
-// and become Interrupted at the next ThrowIfInterrupted(). At most one at a time.
-class SignalGuard {
- public:
-  SignalGuard();
-  ~SignalGuard();
-  SignalGuard(const SignalGuard&) = delete;
-  SignalGuard& operator=(const SignalGuard&) = delete;
-};
-void ThrowIfInterrupted();
-
-// Ends this process the way the signal would have, so that a calling shell sees it.
-[[noreturn]] void DieBySignal(int signal);
 
 }  // namespace roomtex

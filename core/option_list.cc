@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -25,13 +26,6 @@ namespace {
 
 bool StartsWith(const std::string& text, const std::string& start) {
   return text.compare(0, start.size(), start) == 0;
-}
-
-std::string Trimmed(const std::string& text) {
-  const char* spaces = " \t\r";
-  const size_t first = text.find_first_not_of(spaces);
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(spaces) + 1 - first);
 }
 
 // Decimal number, the whole text; NaN if it is none. A leading + is allowed.

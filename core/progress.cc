@@ -10,6 +10,7 @@ namespace roomtex {
 namespace {
 
 constexpr int kBarWidth = 32;
+constexpr double kSecondsBetweenLines = 20;  // of one stage, without a terminal
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -27,7 +28,7 @@ void Progress::Stage(const std::string& name, int total) {
   stage_ = name;
   total_ = total;
   done_ = 0;
-  started_ = redrawn_ = std::chrono::steady_clock::now();
+  started_ = redrawn_ = said_ = std::chrono::steady_clock::now();
   if (terminal_) Redraw();
 }
 
@@ -35,6 +36,25 @@ void Progress::Tick() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
   if (terminal_ && SecondsSince(redrawn_) > 0.1) Redraw();
+}
+
+void Progress::Share(double share, const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (quiet_ || stage_.empty()) return;
+  const double bounded = std::min(share, 1.0);
+  if (terminal_) {
+    if (SecondsSince(redrawn_) < 0.1) return;
+    redrawn_ = std::chrono::steady_clock::now();
+    const int filled = share < 0 ? 0 : static_cast<int>(kBarWidth * bounded);
+    std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %s", stage_.c_str(), filled,
+                 "################################", kBarWidth - filled, "", text.c_str());
+    std::fflush(stderr);
+  } else if (SecondsSince(said_) > kSecondsBetweenLines) {
+    said_ = std::chrono::steady_clock::now();
+    const std::string done =
+        share < 0 ? "" : std::to_string(static_cast<int>(100 * bounded)) + " %, ";
+    std::fprintf(stderr, "  %s: %s%s\n", stage_.c_str(), done.c_str(), text.c_str());
+  }
 }
 
 void Progress::Finish() {

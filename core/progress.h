@@ -22,6 +22,9 @@ class Progress {
   void Stage(const std::string& name, int total = 0);
   // One more of the steps is done. Safe from several threads.
   void Tick();
+  // The share of the running stage that is done, and what else there is to say ("about 3 min
+  // left"): drawn on a terminal, otherwise a line now and then. Negative: not known.
+  void Share(double share, const std::string& text);
   // Ends the running stage.
   void Finish();
 
@@ -38,7 +41,7 @@ class Progress {
   std::mutex mutex_;
   std::string stage_;
   int total_ = 0, done_ = 0;
-  std::chrono::steady_clock::time_point started_, redrawn_;
+  std::chrono::steady_clock::time_point started_, redrawn_, said_;
   std::vector<std::pair<std::string, double>> stages_;
 };
 

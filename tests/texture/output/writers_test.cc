@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "importers/obj.h"
 #include "importers/ply.h"
-#include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/sampling/two_walls.h"
 #include "texture/output/output_set.h"
@@ -22,6 +21,7 @@
 #include "texture/output/write_obj.h"
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
+#include "texture/render/ply_vertices.h"
 #include "texture/texels/gutters.h"
 
 namespace roomtex {

@@ -9,8 +9,8 @@
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
 #include "tests/support/folders.h"
-#include "tests/support/mesh_renderer.h"
 #include "tests/support/temp_folder.h"
+#include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
 namespace {

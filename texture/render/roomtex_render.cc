@@ -1,4 +1,4 @@
-// roomtex-render: pictures of a coloured model.ply, to look at results. Not installed.
+// roomtex-render: pictures of the coloured scan, to look at results without a display.
 //   one picture: from the pose of a photo of a COLMAP model, the photo beside it
 //   --folder_path: a set of them from photos' poses, from new viewpoints in the room and from
 //   outside, and a contact sheet of all
@@ -18,7 +18,7 @@
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "core/statistics.h"
-#include "tests/support/mesh_renderer.h"
+#include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
 namespace {
@@ -121,7 +121,7 @@ class PictureSet {
       if (!options_.image_path.empty()) {
         const cv::Mat both = Beside(options_.image_path + "/" + image.name, picture);
         pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
-        WritePicture(FileOf("photo_" + std::to_string(i + 1)), both);
+        Write("photo_" + std::to_string(i + 1), image.name, both);
         pictures_.emplace_back("the scan from there", picture);
       } else {
         Add("photo_" + std::to_string(i + 1), "from " + image.name, picture);
@@ -231,8 +231,12 @@ class PictureSet {
     return options_.folder_path + "/" + name + ".png";
   }
   void Add(const std::string& file, const std::string& caption, const cv::Mat& picture) {
-    WritePicture(FileOf(file), picture);
+    Write(file, caption, picture);
     pictures_.emplace_back(caption, picture);
+  }
+  void Write(const std::string& file, const std::string& caption, const cv::Mat& picture) {
+    WritePicture(FileOf(file), picture);
+    context_.report["pictures"].push_back({{"file", file + ".png"}, {"shows", caption}});
     context_.progress.Tick();
   }
 
@@ -242,11 +246,35 @@ class PictureSet {
   std::vector<std::pair<std::string, cv::Mat>> pictures_;
 };
 
+Json CameraToJson(const SparseImage& image, const Camera& camera) {
+  Json json;
+  json["name"] = image.name;
+  json["centre"] = ToJson(image.cam_from_model.TargetOriginInSource());
+  json["rotation_wxyz"] = ToJson(WxyzFromQuaternion(image.cam_from_model.rotation));
+  json["width"] = camera.width;
+  json["height"] = camera.height;
+  json["focal_px"] = camera.MeanFocalLength();
+  return json;
+}
+
+// What a plan of the room needs.
+void DescribeRoom(const SparseModel& model, const RoomBox& box, const Eigen::Vector3d& up,
+                  Report* report) {
+  (*report)["up"] = ToJson(up);
+  (*report)["room"] = {{"low", ToJson(box.low)}, {"high", ToJson(box.high)}};
+  Json cameras = Json::array();
+  for (const auto& [id, image] : model.images) {
+    cameras.push_back(CameraToJson(image, model.cameras.at(image.camera_id)));
+  }
+  (*report)["cameras"] = cameras;
+}
+
 void RenderSet(const RenderOptions& options, const SparseModel& model, const ColoredMesh& mesh,
                const Command::Context& context) {
   context.progress.Stage("render", options.num_photos + options.num_ring + 3);
   const RoomBox box = FindRoomBox(mesh);
   const Eigen::Vector3d up = FindUp(model);
+  DescribeRoom(model, box, up, &context.report);
   PictureSet set(options, context);
   {
     const MeshRenderer renderer(mesh);
@@ -288,7 +316,7 @@ void RenderModel(const RenderOptions& options, const Command::Context& context) 
 int main(int argc, char** argv) {
   using namespace roomtex;
   RenderOptions o;
-  Command command("roomtex-render", "Renders a coloured model.ply, to look at results.",
+  Command command("roomtex-render", "Pictures of the coloured scan, without a display.",
                   "roomtex-render --ply_path textured/model.ply --input_path aligned --image_path "
                   "images --folder_path pictures");
   command.AddInputPath("ply_path", &o.ply_path, "model.ply: the colours of the vertices",

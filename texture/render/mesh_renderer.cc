@@ -1,4 +1,4 @@
-#include "tests/support/mesh_renderer.h"
+#include "texture/render/mesh_renderer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
-#include "tests/support/ply_vertices.h"
+#include "texture/render/ply_vertices.h"
 
 namespace roomtex {
 namespace {

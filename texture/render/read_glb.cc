@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
-#include "tests/support/mesh_renderer.h"
+#include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
 namespace {

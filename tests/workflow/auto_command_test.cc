@@ -1,0 +1,210 @@
+// roomtex-auto as a user types it, with the real COLMAP: from photos, scan and picks to the report.
+// Label `e2e`.
+
+#include <algorithm>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/folders.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+json ReadJson(const std::string& path) { return json::parse(ReadBytes(path)); }
+
+class AutoCommand : public testing::Test {
+ protected:
+  // All tests look at one capture, and go on in one output folder, in their order.
+  static void SetUpTestSuite() {
+    folder_ = new TempFolder;
+    Simulate("capture",
+             "--num_photos 12 --photo_width 640 --photo_height 427 --scan_columns 700 "
+             "--scan_rows 280");
+    Simulate("other",
+             "--random_seed 9 --num_photos 3 --photo_width 240 --photo_height 160 "
+             "--scan_columns 500 --scan_rows 200");
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+  static void Simulate(const std::string& name, const std::string& options) {
+    const CommandResult result = RunCommandLine("roomtex-simulate --quiet --output_path " +
+                                                (*folder_ / name) + " " + options);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  static std::string Arguments(const std::string& scan = "capture/scan.rtpi") {
+    return "roomtex-auto --quality low --image_path " + (*folder_ / "capture/photos") +
+           " --scan_path " + (*folder_ / scan) + " --cameras_path " +
+           (*folder_ / "capture/cameras.txt") + " --output_path " + Result("");
+  }
+  static std::string Result(const std::string& name) {
+    return name.empty() ? *folder_ / "result" : *folder_ / ("result/" + name);
+  }
+  static std::string Picks() { return " --picks_path " + (*folder_ / "capture/picks.csv"); }
+
+  // Starts it in a shell, waits for a file, sends it a signal; its exit code and what still runs in
+  // the result's folder.
+  static CommandResult StopWhenThereIs(const std::string& file, const std::string& signal) {
+    WriteBytes(*folder_ / "stop.sh",
+               BinFolder() + "/" + Arguments() + Picks() +
+                   " &\npid=$!\nfor i in $(seq 600); do [ -e " + Result(file) +
+                   " ] && break; sleep 0.05; done\nsleep 0.3\nkill -" + signal +
+                   " $pid\nwait $pid\ncode=$?\nsleep 0.5\n"
+                   "for p in /proc/[0-9]*/cmdline; do tr '\\0' ' ' <$p 2>/dev/null | grep -F "
+                   "'database_path " +
+                   Result("") + "'; done\nexit $code\n");
+    return RunProgram("bash " + (*folder_ / "stop.sh"));
+  }
+  static fs::file_time_type TimeOf(const std::string& name) {
+    return fs::last_write_time(Result(name));
+  }
+
+  static TempFolder* folder_;
+};
+TempFolder* AutoCommand::folder_ = nullptr;
+
+TEST_F(AutoCommand, PrintsTheCommandsWithoutRunningThem) {
+  const CommandResult result = RunCommandLine(Arguments() + " --dry_run");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const char* command : {"feature_extractor", "exhaustive_matcher", "roomtex-mapper",
+                              "roomtex-align", "roomtex-texture"}) {
+    EXPECT_THAT(result.out, HasSubstr(command));
+  }
+  EXPECT_FALSE(fs::exists(Result("")));
+}
+
+TEST_F(AutoCommand, RefusesBadOptionsAndMissingFiles) {
+  EXPECT_EQ(RunCommandLine(Arguments() + " --from nowhere").exit_code, 2);
+  EXPECT_EQ(RunCommandLine(Arguments() + " --quality best").exit_code, 2);
+  const CommandResult result = RunCommandLine(Arguments("no.e57"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("does not exist"));
+  EXPECT_FALSE(fs::exists(Result("")));
+}
+
+// As Ctrl-C, which whoever runs tests in the background has switched off.
+TEST_F(AutoCommand, ASignalEndsColmapToo) {
+  const CommandResult result = StopWhenThereIs("log/features.log", "TERM");
+  EXPECT_EQ(result.exit_code, 143) << result.err;
+  EXPECT_EQ(result.out, "") << "still running";
+  EXPECT_THAT(result.err, HasSubstr("started again, it goes on"));
+  EXPECT_FALSE(fs::exists(Result("database.db")));
+}
+
+TEST_F(AutoCommand, GoesOnWhereItWasKilled) {
+  const CommandResult killed = StopWhenThereIs("log/matches.log", "KILL");
+  EXPECT_EQ(killed.exit_code, 137);
+  EXPECT_EQ(killed.out, "") << "still running";
+  EXPECT_FALSE(fs::exists(Result("database.db")));
+  EXPECT_EQ(ReadJson(Result("steps.json"))["steps"]["features"]["state"], "done");
+
+  const CommandResult result = RunCommandLine(Arguments() + " --until mapper");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("features: done before"));
+  EXPECT_THAT(result.err, HasSubstr("exhaustive_matcher"));
+  EXPECT_TRUE(fs::exists(Result("database.db")));
+  EXPECT_TRUE(fs::exists(Result("sparse/0/images.bin")));
+  EXPECT_FALSE(fs::exists(Result("aligned")));
+}
+
+// The scan of another room, and nobody has clicked.
+TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
+  const CommandResult result = RunCommandLine(Arguments("other/scan.rtpi"));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("mapper: done before"));
+  EXPECT_THAT(result.err, HasSubstr("roomtex-pick --input_path " + Result("sparse/0")));
+  EXPECT_THAT(result.err, HasSubstr("start again"));
+  EXPECT_FALSE(fs::exists(Result("textured")));
+  const json report = ReadJson(Result("report.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_EQ(report["verdict"]["state"], "untrusted");
+  EXPECT_THAT(ReadBytes(Result("report.html")), HasSubstr("What to do now"));
+}
+
+TEST_F(AutoCommand, GoesOnFromThereWithPicks) {
+  fs::copy_file(*folder_ / "capture/picks.csv", Result("picks.csv"));
+  const CommandResult result = RunCommandLine(Arguments());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("mapper: done before"));
+  EXPECT_TRUE(fs::exists(Result("aligned/images.bin")));
+  EXPECT_TRUE(fs::exists(Result("textured/model.glb")));
+  EXPECT_TRUE(fs::exists(Result("pictures/contact_sheet.png")));
+}
+
+TEST_F(AutoCommand, ReportsInOneFileThatNeedsNoOther) {
+  const std::string page = ReadBytes(Result("report.html"));
+  for (const char* text :
+       {"the result can be trusted", "photo_011.jpg", "roomtex-texture --input_path", "<svg",
+        "What the photos saw", "COLMAP 3"}) {
+    EXPECT_THAT(page, HasSubstr(text));
+  }
+  for (const char* text : {"http://", "https://", "<script", "<link", "url(//"}) {
+    EXPECT_THAT(page, Not(HasSubstr(text)));
+  }
+  // Four photos beside the scan, four overlays, two views from outside.
+  size_t num_pictures = 0;
+  for (size_t at = page.find("<img "); at != std::string::npos; at = page.find("<img ", at + 1)) {
+    ++num_pictures;
+  }
+  EXPECT_EQ(num_pictures, 10u);
+  const json report = ReadJson(Result("report.json"));
+  EXPECT_EQ(report["command"], "roomtex-auto");
+  EXPECT_EQ(report["trusted"], true);
+  EXPECT_EQ(report["verdict"]["state"], "trusted");
+  EXPECT_EQ(report["photos"].size(), 12u);
+  EXPECT_GT(report["photos"][0]["expected_error_mm"], 0);
+  EXPECT_EQ(report["steps"].size(), 6u);
+  EXPECT_GT(report["total"]["peak_memory_bytes"], 10'000'000);
+  EXPECT_GT(report["coverage"]["all"], 0.5);
+  EXPECT_LE(report["coverage"]["all"], 1.0);
+}
+
+TEST_F(AutoCommand, DoesNothingTwice) {
+  const auto model = TimeOf("textured/model.ply"), database = TimeOf("database.db");
+  const CommandResult result = RunCommandLine(Arguments());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("pictures: done before"));
+  EXPECT_THAT(result.err, Not(HasSubstr("$ ")));
+  EXPECT_EQ(TimeOf("textured/model.ply"), model);
+  EXPECT_EQ(TimeOf("database.db"), database);
+}
+
+TEST_F(AutoCommand, OnlyOneStepIsRunAgainWhenAskedFor) {
+  const auto model = TimeOf("textured/model.ply"), aligned = TimeOf("aligned/images.bin");
+  const CommandResult result = RunCommandLine(Arguments() + " --only texture");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(TimeOf("textured/model.ply"), model);
+  EXPECT_EQ(TimeOf("aligned/images.bin"), aligned);
+}
+
+TEST_F(AutoCommand, AChangedOptionIsRunAgainFromItsStepOn) {
+  const auto aligned = TimeOf("aligned/images.bin"), model = TimeOf("textured/model.ply");
+  const CommandResult result =
+      RunCommandLine(Arguments() + " --Texture.unseen black --until texture");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("align: done before"));
+  EXPECT_EQ(TimeOf("aligned/images.bin"), aligned);
+  EXPECT_NE(TimeOf("textured/model.ply"), model);
+}
+
+TEST_F(AutoCommand, OneRunAtATime) {
+  WriteBytes(*folder_ / "lock.sh", "exec 9>" + Result("log/lock") + "\nflock 9\n" + BinFolder() +
+                                       "/" + Arguments() + "\n");
+  const CommandResult result = RunProgram("bash " + (*folder_ / "lock.sh"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("another roomtex-auto works in it"));
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,42 @@
+#include "workflow/html_text.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+TEST(HtmlText, IsOnlyText) {
+  EXPECT_EQ(HtmlText("<b a=\"1\">R&D's</b>"), "&lt;b a=&quot;1&quot;&gt;R&amp;D&#39;s&lt;/b&gt;");
+  EXPECT_EQ(HtmlText("Küche 1.jpg"), "Küche 1.jpg");
+}
+
+// RFC 4648, section 10.
+TEST(Base64, OfTheVectorsOfItsRfc) {
+  const auto encode = [](const std::string& text) {
+    return Base64(std::vector<uint8_t>(text.begin(), text.end()));
+  };
+  EXPECT_EQ(encode(""), "");
+  EXPECT_EQ(encode("f"), "Zg==");
+  EXPECT_EQ(encode("fo"), "Zm8=");
+  EXPECT_EQ(encode("foo"), "Zm9v");
+  EXPECT_EQ(encode("foob"), "Zm9vYg==");
+  EXPECT_EQ(encode("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(Base64({0xff, 0xfe, 0xfd}), "//79");
+}
+
+TEST(HtmlPicture, IsNoWiderThanAskedForAndInThePageItself) {
+  const TempFolder folder;
+  cv::imwrite(folder / "a.png", cv::Mat3b(40, 100, cv::Vec3b(1, 2, 3)));
+  const std::string tag = HtmlPicture(folder / "a.png", 50, "a \"view\"");
+  EXPECT_NE(tag.find("width=\"50\" height=\"20\" src=\"data:image/jpeg;base64,"),
+            std::string::npos);
+  EXPECT_NE(tag.find("alt=\"a &quot;view&quot;\""), std::string::npos);
+  EXPECT_EQ(HtmlPicture(folder / "none.png", 50, ""), "");
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,70 @@
+#include "workflow/auto_options.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/option_fields.h"
+#include "workflow/step.h"
+
+namespace roomtex {
+namespace {
+
+const std::vector<std::string> kAutoWords = {"auto", "1", "0"};
+
+void RequireStepName(const std::string& option, const std::string& name,
+                     std::vector<std::string>* problems) {
+  const std::vector<std::string> names = StepNames();
+  if (name.empty() || std::find(names.begin(), names.end(), name) != names.end()) return;
+  std::string all;
+  for (const std::string& one : names) all += (all.empty() ? "" : ", ") + one;
+  problems->push_back("--" + option + " is \"" + name + "\", expected one of " + all);
+}
+
+}  // namespace
+
+void AutoOptions::Declare(OptionFields* fields) {
+  fields->Choice("quality", &quality, {"low", "medium", "high"},
+                 "low: smaller pictures, fewer features, colours at the scan's samples only; high: "
+                 "more features, guided matching, 60 % more time and more.");
+  fields->Choice("patterned", &patterned, kAutoWords,
+                 "Every place was photographed twice, with a projected pattern and without: COLMAP "
+                 "gets the one, the colours come from the other; auto = look.");
+  fields->Choice("use_gpu", &use_gpu, kAutoWords,
+                 "COLMAP's features and matches on the graphics card; auto = where there is one "
+                 "and COLMAP is built for it.");
+  fields->Choice("sequence", &sequence, kAutoWords,
+                 "The photos follow each other, as those of a video: only neighbours are matched; "
+                 "auto = of a video with more than 150 pictures.");
+  fields
+      ->Int("video_frames", &video_frames,
+            "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")
+      .NotNegative();
+  fields->Bool("accept_untrusted", &accept_untrusted,
+               "Go on behind a step whose answer is not to be trusted, with a warning; 0 = stop "
+               "there with exit 4.");
+  fields->Bool("dry_run", &dry_run,
+               "Print the command lines on stdout as far as they are known, and run none.");
+}
+
+std::vector<std::string> AutoOptions::Problems() const {
+  std::vector<std::string> problems = ProblemsOf(*this);
+  const int num_sources = !image_path.empty() + !panoramas_path.empty() + !video_path.empty();
+  if (num_sources != 1) {
+    problems.emplace_back("give one of --image_path, --panoramas_path and --video_path");
+  }
+  if (!camera_params.empty() && camera_model.empty()) {
+    problems.emplace_back("--camera_params needs --camera_model, e.g. OPENCV");
+  }
+  if (!camera_params.empty() && !cameras_path.empty()) {
+    problems.emplace_back("give --camera_params or --cameras_path, not both");
+  }
+  if (!only.empty() && !(from.empty() && until.empty())) {
+    problems.emplace_back("--only goes with neither --from nor --until");
+  }
+  RequireStepName("from", from, &problems);
+  RequireStepName("until", until, &problems);
+  RequireStepName("only", only, &problems);
+  return problems;
+}
+
+}  // namespace roomtex

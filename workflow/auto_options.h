@@ -1,0 +1,35 @@
+#pragma once
+// What roomtex-auto is told.
+
+#include <string>
+#include <vector>
+
+namespace roomtex {
+
+class OptionFields;
+
+// Options that are handed on to the command of one step: {"--Mapper.x", "1", ...}.
+struct PassedOptions {
+  std::vector<std::string> features, matches, mapper, align, texture;
+};
+
+struct AutoOptions {
+  // One of the first three.
+  std::string image_path, panoramas_path, video_path;
+  std::vector<std::string> scan_paths;
+  std::string scan_poses, azimuth = "auto", units;
+  std::string output_path, picks_path;
+  std::string camera_model, camera_params, cameras_path;
+  std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";
+  int video_frames = 0;
+  std::string from, until, only;
+  bool accept_untrusted = false, dry_run = false;
+  std::string colmap = "colmap";
+  PassedOptions passed;
+  int num_threads = -1, random_seed = 0;  // as for all commands
+
+  void Declare(OptionFields* fields);  // those of one value that have no path
+  std::vector<std::string> Problems() const;
+};
+
+}  // namespace roomtex

@@ -1,0 +1,142 @@
+// What is known of one run (step.h).
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "core/child_program.h"
+#include "core/report.h"
+#include "workflow/step.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+
+bool IsThere(const std::string& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+Json ReadJsonFile(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const Json json = Json::parse(stream, nullptr, false);
+  return json.is_object() ? json : Json();
+}
+
+void AddOption(const std::string& name, const std::string& value, CommandLine* line) {
+  if (value.empty()) return;
+  line->push_back(name);
+  line->push_back(value);
+}
+
+std::string Chain::PhotoFolder() const {
+  if (!options_.video_path.empty()) return At("frames");
+  if (!options_.panoramas_path.empty()) return At("faces");
+  return options_.image_path;
+}
+
+bool Chain::IsAssociated() const {
+  if (options_.patterned == "0" || options_.image_path.empty()) return false;
+  if (options_.patterned == "auto" && !seems_patterned_.value_or(false)) return false;
+  const Json report = ReadJsonFile(ReportOf("associate"));
+  return report.is_object() && report.value("trusted", false) && IsThere(At("linked/patterned"));
+}
+
+std::string Chain::ColmapFolder() const {
+  return IsAssociated() ? At("linked/patterned") : PhotoFolder();
+}
+
+std::string Chain::ColorFolder() const {
+  if (!options_.panoramas_path.empty()) return options_.panoramas_path;
+  return IsAssociated() ? At("linked/plain") : PhotoFolder();
+}
+
+std::string Chain::PicksPath() const {
+  if (!options_.picks_path.empty()) return options_.picks_path;
+  return IsThere(At("picks.csv")) ? At("picks.csv") : "";
+}
+
+std::string Chain::AlignedPath() const {
+  std::error_code none, none_aside;
+  const std::string aside = At("aligned.untrusted");
+  const auto time = fs::last_write_time(At("aligned/alignment.json"), none);
+  const auto aside_time = fs::last_write_time(aside + "/images.bin", none_aside);
+  if (!options_.accept_untrusted || none_aside) return At("aligned");
+  return none || aside_time > time ? aside : At("aligned");
+}
+
+const std::vector<PhotoFacts>& Chain::Photos(const std::string& folder) {
+  const auto known = std::find_if(photos_.begin(), photos_.end(),
+                                  [&](const auto& one) { return one.first == folder; });
+  if (known != photos_.end()) return known->second;
+  photos_.reserve(8);  // few folders: references stay
+  photos_.emplace_back(folder, ReadPhotoFacts(folder));
+  return photos_.back().second;
+}
+
+const ColmapFacts& Chain::Colmap() {
+  if (!colmap_) colmap_ = ReadColmapFacts(options_.colmap);
+  return *colmap_;
+}
+
+const std::set<std::string>& Chain::ColmapOptions(const std::string& command) {
+  const auto known = std::find_if(colmap_options_.begin(), colmap_options_.end(),
+                                  [&](const auto& one) { return one.first == command; });
+  if (known != colmap_options_.end()) return known->second;
+  colmap_options_.reserve(8);
+  colmap_options_.emplace_back(command, ReadColmapOptions(Colmap().path, command));
+  return colmap_options_.back().second;
+}
+
+bool Chain::SeemsPatterned() {
+  if (!seems_patterned_) {
+    seems_patterned_ = LooksPatterned(options_.image_path, Photos(options_.image_path));
+  }
+  return *seems_patterned_;
+}
+
+CommandLine Chain::PickCommand() const {
+  CommandLine line = {"roomtex-pick", "--input_path", At("sparse/0"), "--image_path",
+                      ColorFolder()};
+  if (!options_.panoramas_path.empty()) {
+    AddOption("--panoramas_path", At("faces/panoramas.json"), &line);
+  }
+  for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
+  AddOption("--scan_poses", options_.scan_poses, &line);
+  if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
+  AddOption("--units", options_.units, &line);
+  AddOption("--output_path", options_.picks_path.empty() ? At("picks.csv") : options_.picks_path,
+            &line);
+  return line;
+}
+
+CommandLine Chain::AutoCommand() const {
+  CommandLine line = {"roomtex-auto"};
+  AddOption("--image_path", options_.image_path, &line);
+  AddOption("--panoramas_path", options_.panoramas_path, &line);
+  AddOption("--video_path", options_.video_path, &line);
+  for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
+  AddOption("--scan_poses", options_.scan_poses, &line);
+  if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
+  AddOption("--units", options_.units, &line);
+  AddOption("--output_path", options_.output_path, &line);
+  AddOption("--picks_path", options_.picks_path, &line);
+  AddOption("--camera_model", options_.camera_model, &line);
+  AddOption("--camera_params", options_.camera_params, &line);
+  AddOption("--cameras_path", options_.cameras_path, &line);
+  if (options_.quality != "medium") AddOption("--quality", options_.quality, &line);
+  if (options_.patterned != "auto") AddOption("--patterned", options_.patterned, &line);
+  if (options_.use_gpu != "auto") AddOption("--use_gpu", options_.use_gpu, &line);
+  if (options_.sequence != "auto") AddOption("--sequence", options_.sequence, &line);
+  if (options_.video_frames > 0) {
+    AddOption("--video_frames", std::to_string(options_.video_frames), &line);
+  }
+  if (options_.colmap != "colmap") AddOption("--colmap", options_.colmap, &line);
+  const PassedOptions& passed = options_.passed;
+  for (const auto* more :
+       {&passed.features, &passed.matches, &passed.mapper, &passed.align, &passed.texture}) {
+    line.insert(line.end(), more->begin(), more->end());
+  }
+  return line;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,233 @@
+#include "workflow/report_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/child_program.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+const Json& At(const Json& json, std::initializer_list<const char*> keys) {
+  static const Json kNull;
+  const Json* at = &json;
+  for (const char* key : keys) {
+    if (!at->is_object() || !at->contains(key)) return kNull;
+    at = &(*at)[key];
+  }
+  return *at;
+}
+
+// NaN where there is none.
+double NumberAt(const Json& json, std::initializer_list<const char*> keys) {
+  const Json& at = At(json, keys);
+  return at.is_number() ? at.get<double>() : std::nan("");
+}
+
+std::string Millimetres(double mm) {
+  if (mm >= 1000) return Number(mm / 1000, 2) + " m";
+  return Number(mm, mm < 10 ? 1 : 0) + " mm";
+}
+
+const StepOutcome* StepNamed(const RunResult& result, const std::string& name) {
+  for (const StepOutcome& step : result.steps) {
+    if (step.name == name && step.known) return &step;
+  }
+  return nullptr;
+}
+
+Json ReportOfStep(const RunResult& result, const std::string& name) {
+  const StepOutcome* const step = StepNamed(result, name);
+  return step == nullptr ? Json() : step->report;
+}
+
+class ReportMaker {
+ public:
+  ReportMaker(Chain* chain, const RunResult& result)
+      : chain_(*chain),
+        result_(result),
+        mapper_(ReportOfStep(result, "mapper")),
+        align_(ReportOfStep(result, "align")),
+        texture_(ReportOfStep(result, "texture")) {}
+
+  Json Keys() {
+    Json keys;
+    keys["verdict"] = Verdict();
+    keys["remedies"] = result_.stop.remedies;
+    keys["facts"] = Facts();
+    keys["notices"] = Notices();
+    keys["photos"] = Photos();
+    keys["steps"] = Steps();
+    keys["total"] = Total();
+    keys["versions"] = {{"roomtex", Version()}, {"colmap", chain_.Colmap().version}};
+    keys["command_line"] = CommandText(chain_.AutoCommand());
+    return keys;
+  }
+
+ private:
+  bool IsAccepted() const {
+    return std::any_of(result_.steps.begin(), result_.steps.end(), [](const StepOutcome& step) {
+      return step.known && step.name != "associate" && step.record.state == StepState::kUntrusted;
+    });
+  }
+
+  Json Verdict() const {
+    Json verdict;
+    std::vector<std::string> sentences;
+    const Stop& stop = result_.stop;
+    const double mm = NumberAt(align_, {"expected_error", "at_cameras_mm"});
+    const double coverage = NumberAt(texture_, {"coverage"});
+    if (stop.stopped) {
+      const bool untrusted = stop.exit_code == kExitUntrusted;
+      verdict["state"] = untrusted ? "untrusted" : "failed";
+      verdict["headline"] = untrusted ? "Not finished: " + Doubt(stop.step)
+                                      : "Not finished: the step " + stop.step + " failed";
+      sentences.push_back(stop.reason);
+    } else if (!result_.whole) {
+      verdict["state"] = "unfinished";
+      verdict["headline"] = "Not finished: only some of the steps were asked for";
+    } else if (IsAccepted()) {
+      verdict["state"] = "untrusted";
+      verdict["headline"] = "Finished, but not to be trusted";
+      for (const StepOutcome& step : result_.steps) {
+        if (step.known && !step.record.reason.empty()) {
+          sentences.push_back(step.name + ": " + step.record.reason);
+        }
+      }
+    } else {
+      verdict["state"] = "trusted";
+      verdict["headline"] = "The room is coloured, and the result can be trusted";
+      if (std::isfinite(mm)) {
+        sentences.push_back("The photos stand in the scan to about " + Millimetres(mm) +
+                            " (one standard deviation).");
+      }
+      if (std::isfinite(coverage)) {
+        sentences.push_back(Percent(coverage) +
+                            " of the scan's samples have a colour from a photo.");
+      }
+    }
+    verdict["sentences"] = sentences;
+    return verdict;
+  }
+
+  static std::string Doubt(const std::string& step) {
+    if (step == "mapper") return "it is not sure where the photos stand to each other";
+    if (step == "align") return "it is not sure where the photos stand in the scan";
+    return "the step " + step + " is not to be trusted";
+  }
+
+  void Fact(const std::string& name, double value, const std::string& text, Json* facts) const {
+    if (std::isfinite(value)) facts->push_back({{"name", name}, {"value", text}});
+  }
+
+  Json Facts() const {
+    Json facts = Json::array();
+    const double registered = NumberAt(mapper_, {"num_reg_images"});
+    Fact("Photos registered", registered,
+         Number(registered, 0) + " of " + Number(NumberAt(mapper_, {"num_images"}), 0), &facts);
+    const double mm = NumberAt(align_, {"expected_error", "at_cameras_mm"});
+    Fact("Expected error at the photos", mm, Millimetres(mm), &facts);
+    const double corner = NumberAt(align_, {"expected_error", "at_far_corner_mm"});
+    Fact("Expected error at the far corner", corner, Millimetres(corner), &facts);
+    const double agree = NumberAt(align_, {"agreement", "gradient_shift", "share"});
+    const double chance = NumberAt(align_, {"agreement", "gradient_shift", "chance", "share"});
+    Fact("Photos agree with the scan's intensity", agree,
+         "at " + Percent(agree) + " of the places (" + Percent(chance) + " by chance)", &facts);
+    const double coverage = NumberAt(texture_, {"coverage"});
+    Fact("Samples with colour", coverage, Percent(coverage), &facts);
+    const double views = NumberAt(texture_, {"views_mean"});
+    Fact("Photos that see a sample, mean", views, Number(views, 1), &facts);
+    const double disagreement = NumberAt(texture_, {"disagreement", "after"});
+    Fact("Photos disagree by", disagreement, Number(disagreement, 1) + " of 255 levels", &facts);
+    const double error = NumberAt(mapper_, {"mean_reprojection_error_px"});
+    Fact("Reprojection error", error, Number(error, 2) + " px", &facts);
+    return facts;
+  }
+
+  Json Notices() const {
+    Json notices = Json::array();
+    for (const StepOutcome& step : result_.steps) {
+      const Json& warnings = At(step.report, {"warnings"});
+      if (!step.known || !warnings.is_array()) continue;
+      for (const Json& warning : warnings) {
+        notices.push_back({{"step", step.name}, {"text", warning}});
+      }
+    }
+    return notices;
+  }
+
+  // One per photo that any step knew, by name.
+  Json Photos() const {
+    std::map<std::string, Json> photos;
+    const Json& mapped = At(mapper_, {"images"});
+    for (const Json& image : mapped.is_array() ? mapped : Json::array()) {
+      Json& photo = photos[image.at("name")];
+      photo["registered_by"] = image.value("by", "none");
+      photo["match_support"] = image.contains("match_support") ? image["match_support"] : Json();
+      if (image.contains("reason")) photo["left_out"] = image["reason"];
+    }
+    const Json& aligned = At(align_, {"images"});
+    for (const Json& image : aligned.is_array() ? aligned : Json::array()) {
+      photos[image.at("name")]["expected_error_mm"] = image.value("position_sigma_mm", Json());
+    }
+    for (const Json* report : {&align_, &texture_}) {
+      const Json& left_out = At(*report, {"photos_left_out"});
+      for (const Json& one : left_out.is_array() ? left_out : Json::array()) {
+        photos[one.at("name")]["left_out"] = one.at("reason");
+      }
+    }
+    const Json& told = At(texture_, {"exposure_gain"});
+    const Json gains = told.is_object() ? told : Json::object();
+    for (const auto& [name, gain] : gains.items()) {
+      if (gain.is_number() && gain.get<double>() > 0) {
+        photos[name]["exposure_ev"] = -std::log2(gain.get<double>());
+      }
+      photos[name]["samples_seen"] = At(texture_, {"samples_seen", name.c_str()});
+    }
+    Json list = Json::array();
+    for (const auto& [name, photo] : photos) {
+      Json one = {{"name", name}};
+      one.update(photo);
+      list.push_back(one);
+    }
+    return list;
+  }
+
+  Json Steps() const {
+    Json steps = Json::array();
+    for (const StepOutcome& step : result_.steps) {
+      if (!step.known) continue;
+      Json json = {{"name", step.name}, {"does", step.does}, {"ran_now", step.ran}};
+      json.update(RecordToJson(step.record));
+      steps.push_back(json);
+    }
+    return steps;
+  }
+
+  Json Total() const {
+    double seconds = 0, cpu_seconds = 0;
+    long long memory = 0;
+    for (const StepOutcome& step : result_.steps) {
+      seconds += step.record.seconds;
+      cpu_seconds += step.record.cpu_seconds;
+      memory = std::max(memory, step.record.peak_memory_bytes);
+    }
+    return {{"seconds", seconds}, {"cpu_seconds", cpu_seconds}, {"peak_memory_bytes", memory}};
+  }
+
+  Chain& chain_;
+  const RunResult& result_;
+  const Json mapper_, align_, texture_;
+};
+
+}  // namespace
+
+Json MakeReportKeys(Chain* chain, const RunResult& result) {
+  return ReportMaker(chain, result).Keys();
+}
+
+}  // namespace roomtex

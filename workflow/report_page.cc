@@ -1,0 +1,341 @@
+#include "workflow/report_page.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/frames.h"
+#include "core/output_file.h"
+#include "core/text.h"
+#include "workflow/evidence_points.h"
+#include "workflow/html_text.h"
+#include "workflow/remaining_time.h"
+#include "workflow/report_style.h"
+#include "workflow/room_coverage.h"
+#include "workflow/room_plan.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kWide = 1440, kNarrow = 720;  // pixels of pictures
+
+std::string Tag(const std::string& tag, const std::string& text) {
+  return "<" + tag + ">" + HtmlText(text) + "</" + tag.substr(0, tag.find(' ')) + ">";
+}
+
+std::string Memory(double bytes) {
+  return bytes < 1e9 ? Number(bytes / 1e6, 0) + " MB" : Number(bytes / 1e9, 1) + " GB";
+}
+
+std::string Time(double seconds) {
+  return seconds < 100 ? Number(seconds, 1) + " s" : DurationText(seconds);
+}
+
+// A number and its unit stay on one line.
+std::string WithUnits(std::string text) {
+  for (const char* unit : {" %", " mm", " m", " px", " s", " min", " GB", " MB"}) {
+    for (size_t at = text.find(unit); at != std::string::npos; at = text.find(unit, at + 1)) {
+      const bool follows_number = at > 0 && std::isdigit(static_cast<unsigned char>(text[at - 1]));
+      if (follows_number) text.replace(at, 1, "\u00a0");
+    }
+  }
+  return text;
+}
+
+// A dash where there is no number.
+std::string Cell(const Json& json, const char* key, double factor, int digits) {
+  const bool has = json.contains(key) && json[key].is_number();
+  return "<td class=\"n\">" + (has ? Number(factor * json[key].get<double>(), digits) : "–") +
+         "</td>";
+}
+
+class Page {
+ public:
+  Page(Chain* chain, Json* keys) : chain_(*chain), keys_(*keys) {
+    pictures_ = ReadJsonFile(chain->ReportOf("pictures"));
+    align_ = ReadJsonFile(chain->ReportOf("align"));
+  }
+
+  std::string Make() {
+    Verdict();
+    if (HasStep("pictures")) {
+      FromOutside();
+      BesidePhotos();
+    }
+    if (HasStep("align")) Overlays();
+    if (HasStep("texture") && HasStep("pictures")) Plans();
+    Notices();
+    Photos();
+    Steps();
+    return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta "
+           "name=\"viewport\" "
+           "content=\"width=device-width, initial-scale=1\"><meta name=\"generator\" "
+           "content=\"roomtex\"><title>" +
+           HtmlText(keys_["verdict"]["headline"]) + "</title><style>" + kReportStyle +
+           "</style></head>\n<body><main>\n" + body_ + "</main></body></html>\n";
+  }
+
+ private:
+  // Has come to its end, in this run or before.
+  bool HasStep(const std::string& name) const {
+    for (const Json& step : keys_["steps"]) {
+      if (step["name"] != name) continue;
+      return step["state"] == "done" || step["state"] == "untrusted";
+    }
+    return false;
+  }
+  void Heading(const std::string& text) { body_ += Tag("h2", text) + "\n"; }
+
+  void Verdict() {
+    const Json& verdict = keys_["verdict"];
+    const std::string state = verdict["state"];
+    const std::string word = state == "trusted"     ? "Trusted"
+                             : state == "untrusted" ? "Not to be trusted"
+                             : state == "failed"    ? "Failed"
+                                                    : "Not finished";
+    body_ += "<header class=\"" + state + "\"><p class=\"state\">" + word + "</p>" +
+             Tag("h1", verdict["headline"]);
+    for (const Json& sentence : verdict["sentences"]) body_ += Tag("p", WithUnits(sentence));
+    body_ += "</header>\n";
+    if (!keys_["remedies"].empty()) {
+      body_ += "<section class=\"todo\"><h2>What to do now</h2><ul>";
+      for (const Json& remedy : keys_["remedies"]) body_ += "<li>" + Remedy(remedy) + "</li>";
+      body_ += "</ul></section>\n";
+    }
+    body_ += "<dl class=\"facts\">";
+    for (const Json& fact : keys_["facts"]) {
+      body_ += "<div>" + Tag("dt", fact["name"]) + Tag("dd", WithUnits(fact["value"])) + "</div>";
+    }
+    body_ += "</dl>\n";
+  }
+
+  // A command line behind a sentence is set apart.
+  static std::string Remedy(const std::string& text) {
+    const size_t command = text.find(": roomtex-");
+    if (command == std::string::npos) return HtmlText(text);
+    return HtmlText(text.substr(0, command + 1)) + Tag("pre", text.substr(command + 2));
+  }
+
+  void Figure(const std::string& path, int width, const std::string& alt,
+              const std::string& caption) {
+    const std::string picture = HtmlPicture(path, width, alt);
+    if (picture.empty()) return;
+    body_ += "<figure>" + picture + Tag("figcaption", caption) + "</figure>\n";
+  }
+
+  void FromOutside() {
+    Heading("The room from outside");
+    body_ +=
+        "<p class=\"quiet\">Without its ceiling, and through the walls that turn their back. Dark: "
+        "what the scanner did not see.</p><div class=\"two\">";
+    for (const char* name : {"open_1", "open_2"}) {
+      Figure(chain_.At("pictures/") + name + ".png", kNarrow, "The coloured room from outside",
+             name == std::string("open_1") ? "From one side" : "From the other");
+    }
+    body_ += "</div>\n";
+  }
+
+  void BesidePhotos() {
+    Heading("Photo and coloured scan");
+    body_ +=
+        "<p class=\"quiet\">Left a photo, right the coloured scan from the same place. They should "
+        "show the same at the same place.</p>\n";
+    if (!pictures_.is_object() || !pictures_.contains("pictures")) return;
+    for (const Json& picture : pictures_["pictures"]) {
+      const std::string file = picture["file"];
+      if (file.rfind("photo_", 0) != 0) continue;
+      Figure(chain_.At("pictures/") + file, kWide, "Photo and coloured scan beside each other",
+             picture["shows"]);
+    }
+  }
+
+  void Overlays() {
+    const Json paths =
+        align_.is_object() && align_.contains("overlays") ? align_["overlays"] : Json();
+    if (!paths.is_array() || paths.empty()) return;
+    Heading("The scan's edges on the photos");
+    body_ +=
+        "<p class=\"quiet\">Photo, the scan's intensity from its place, and the scan's edges on "
+        "the "
+        "photo; below, parts of it three times as large. Cyan: creases, to a tenth of a sample; a "
+        "misfit of a pixel shows there. Yellow and magenta lines lie anywhere between two "
+        "samples.</p>\n";
+    for (const Json& path : paths) {
+      if (!path.is_string()) continue;
+      const std::string text = path;
+      Figure(text, kWide, "The scan's edges on a photo", text.substr(text.rfind('/') + 1));
+    }
+  }
+
+  static Json PlaceToJson(const ViewingPlace& place) {
+    Json json;
+    json["centre_in_plan"] = ToJson(place.centre);
+    json["direction_in_plan"] = ToJson(place.forward);
+    json["area_m2"] = place.area_m2;
+    json["nearest_photo"] = place.nearest_photo;
+    json["distance_m"] = place.distance;
+    return json;
+  }
+
+  void Plans() {
+    const std::string evidence = chain_.At("textured/evidence.ply");
+    if (!IsThere(evidence) || !pictures_.is_object()) return;
+    const std::vector<EvidencePoint> points = ReadEvidence(evidence);
+    const Json& up = pictures_["up"];
+    const PlanFrame frame =
+        MakePlanFrame(points, {up[0].get<double>(), up[1].get<double>(), up[2].get<double>()},
+                      align_.is_object() ? align_.value("planes", Json()) : Json());
+    const std::vector<PlanCamera> cameras = ReadPlanCameras(pictures_["cameras"], frame);
+    const RoomCoverage coverage = MeasureCoverage(points, frame, cameras);
+    keys_["coverage"] = {{"all", coverage.all},
+                         {"walls_and_things", coverage.walls},
+                         {"floor", coverage.floor},
+                         {"ceiling", coverage.ceiling},
+                         {"surface_m2", coverage.surface_m2},
+                         {"unseen_m2", coverage.unseen_m2}};
+    keys_["places_to_photograph"] = Json::array();
+    for (const ViewingPlace& place : coverage.places) {
+      keys_["places_to_photograph"].push_back(PlaceToJson(place));
+    }
+    Heading("What the photos saw");
+    CoverageText(coverage);
+    body_ +=
+        "<div class=\"two\"><figure>" +
+        DrawPlan(points, frame, cameras, coverage.places, PlanShows::kCoverage) +
+        "<div class=\"key\"><span><i style=\"background:#3b78b5\"></i>two photos or more</span>"
+        "<span><i style=\"background:#e6a82a\"></i>one photo</span>"
+        "<span><i style=\"background:#c93535\"></i>no photo</span><span>pale: floor</span></div>"
+        "<figcaption>Plan, cut below the ceiling. Wedges with numbers: the photos, numbered as in "
+        "the table below.</figcaption></figure><figure>" +
+        DrawPlan(points, frame, cameras, {}, PlanShows::kDisagreement) +
+        "<div class=\"key\"><span>photos agree<span class=\"ramp\"></span>disagree by " +
+        Number(kWorstDisagreement, 0) +
+        " levels or more</span><span><i style=\"background:#999\"></i>fewer than two photos</span>"
+        "</div><figcaption>How far the photos disagree in colour. Red: something moved, shines, or "
+        "lies a little out of place.</figcaption></figure></div>\n";
+  }
+
+  void CoverageText(const RoomCoverage& coverage) {
+    body_ += "<p>" + Percent(coverage.all) +
+             " of the scanned surface is on a photo (walls and things " + Percent(coverage.walls) +
+             ", floor " + Percent(coverage.floor) + ", ceiling " + Percent(coverage.ceiling) +
+             "); about " + Number(coverage.unseen_m2, 1) + " of " + Number(coverage.surface_m2, 0) +
+             " m² are on none.</p>\n";
+    if (coverage.places.empty()) {
+      body_ += "<p>No further photo from where somebody can stand would show much more.</p>\n";
+      return;
+    }
+    body_ += "<p>To see more, photograph from here, in this order:</p><ul>";
+    for (size_t i = 0; i < coverage.places.size(); ++i) {
+      const ViewingPlace& place = coverage.places[i];
+      const double tilt = DegFromRad(std::asin(std::clamp(place.forward.z(), -1.0, 1.0)));
+      const std::string tilted = std::abs(tilt) < 15 ? "level"
+                                 : tilt > 0          ? "tilted up"
+                                                     : "tilted down";
+      body_ += "<li><b>" + std::string(1, static_cast<char>('A' + i)) +
+               "</b>: " + Number(place.distance, 1) + " m from where " +
+               HtmlText(place.nearest_photo) + " was taken, " + Number(place.centre.z(), 1) +
+               " m above the floor, along the arrow, " + tilted + ": about " +
+               Number(place.area_m2, 1) + " m² more.</li>";
+    }
+    body_ += "</ul>\n";
+  }
+
+  void Notices() {
+    if (keys_["notices"].empty()) return;
+    Heading("What the steps noticed");
+    body_ += "<ul>";
+    for (const Json& notice : keys_["notices"]) {
+      body_ += "<li>" + Tag("b", notice["step"]) + ": " + HtmlText(notice["text"]) + "</li>";
+    }
+    body_ += "</ul>\n";
+  }
+
+  // Numbered as in the plan, where it is.
+  std::string NumberOf(const std::string& name) const {
+    if (!pictures_.is_object() || !pictures_.contains("cameras")) return "";
+    std::vector<std::string> names;
+    for (const Json& camera : pictures_["cameras"]) names.push_back(camera["name"]);
+    std::sort(names.begin(), names.end());
+    const auto found = std::find(names.begin(), names.end(), name);
+    return found == names.end() ? "" : std::to_string(found - names.begin() + 1);
+  }
+
+  void Photos() {
+    const Json& photos = keys_["photos"];
+    if (photos.empty()) return;
+    Heading("Photos");
+    body_ +=
+        "<p class=\"quiet\">Registered: seed = of the first photos, mapper = by COLMAP, chained = "
+        "by its "
+        "neighbours alone. Error: expected, one standard deviation. Support: share of its matches "
+        "that obey the model. Exposure: brighter (+) or darker (-) than the reference photo.</p>"
+        "<div class=\"table\"><table><thead><tr><th class=\"n\">No.</th><th>Photo</th>"
+        "<th>Registered</th><th class=\"n\">Error, mm</th><th class=\"n\">Support, %</th>"
+        "<th class=\"n\">Exposure, EV</th><th class=\"n\">Samples</th><th>Left out because</th>"
+        "</tr></thead><tbody>";
+    for (const Json& photo : photos) {
+      const std::string name = photo["name"];
+      const std::string left_out = photo.value("left_out", "");
+      body_ += left_out.empty() ? "<tr>" : "<tr class=\"out\">";
+      body_ += "<td class=\"n\">" + NumberOf(name) + "</td>" + Tag("td", name) +
+               Tag("td", photo.value("registered_by", "–")) +
+               Cell(photo, "expected_error_mm", 1, 1) + Cell(photo, "match_support", 100, 0) +
+               Cell(photo, "exposure_ev", 1, 1) + Cell(photo, "samples_seen", 1, 0) +
+               Tag("td", left_out) + "</tr>";
+    }
+    body_ += "</tbody></table></div>\n";
+  }
+
+  void Steps() {
+    Heading("Times and memory");
+    body_ +=
+        "<div class=\"table\"><table><thead><tr><th>Step</th><th></th><th class=\"n\">Time</th>"
+        "<th class=\"n\">Processor</th><th class=\"n\">Memory</th></tr></thead><tbody>";
+    for (const Json& step : keys_["steps"]) {
+      body_ += "<tr>" + Tag("td", step["name"]) + Tag("td", step["does"]) +
+               Tag("td class=\"n\"", Time(step["seconds"])) +
+               Tag("td class=\"n\"", Time(step["cpu_seconds"])) +
+               Tag("td class=\"n\"", Memory(step["peak_memory_bytes"])) + "</tr>";
+    }
+    const Json& total = keys_["total"];
+    body_ +=
+        "<tr class=\"sum\"><td>All</td><td></td>" + Tag("td class=\"n\"", Time(total["seconds"])) +
+        Tag("td class=\"n\"", Time(total["cpu_seconds"])) +
+        Tag("td class=\"n\"", Memory(total["peak_memory_bytes"])) + "</tr></tbody></table></div>\n";
+    Heading("The commands");
+    const Json& versions = keys_["versions"];
+    body_ += "<p class=\"quiet\">roomtex " + HtmlText(versions["roomtex"]) + ", " +
+             HtmlText(versions["colmap"]) + ". Typed one after the other they do the same.</p>\n";
+    for (const Json& step : keys_["steps"]) {
+      body_ += Tag("h3", step["name"]);
+      for (const Json& note : step["notes"]) {
+        body_ += "<p class=\"quiet small\">" + HtmlText(note) + "</p>";
+      }
+      std::string lines;
+      for (const Json& line : step["commands"]) {
+        lines += (lines.empty() ? "" : "\n") + line.get<std::string>();
+      }
+      body_ += Tag("pre", lines) + "\n";
+    }
+    body_ += Tag("h3", "all of it") + Tag("pre", keys_["command_line"]) + "\n";
+  }
+
+  Chain& chain_;
+  Json& keys_;
+  Json pictures_, align_;
+  std::string body_;
+};
+
+}  // namespace
+
+void WriteReportPage(Chain* chain, Json* keys) {
+  const std::string page = Page(chain, keys).Make();
+  OutputFile file(chain->At("report.html"));
+  file.stream() << page;
+  file.Commit();
+}
+
+}  // namespace roomtex

@@ -1,0 +1,15 @@
+#pragma once
+// report.html: one file without anything from outside, to read, print and give away.
+
+#include <string>
+
+#include "core/report.h"
+#include "workflow/step.h"
+
+namespace roomtex {
+
+// keys: of MakeReportKeys(). Adds `coverage` and `places_to_photograph` to them where the room was
+// coloured. Written aside and renamed. Throws InputError.
+void WriteReportPage(Chain* chain, Json* keys);
+
+}  // namespace roomtex

@@ -1,0 +1,461 @@
+#include "workflow/run_steps.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+#include "core/child_program.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/text.h"
+#include "workflow/remaining_time.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr char kReportStep[] = "report";
+
+// Without what a result does not depend on.
+std::string EssentialText(const CommandLine& line) {
+  CommandLine essential;
+  for (size_t i = 0; i < line.size(); ++i) {
+    const std::string& word = line[i];
+    const bool is_threads =
+        word == "--num_threads" ||
+        (word.size() > 12 && word.compare(word.size() - 12, 12, ".num_threads") == 0);
+    if (is_threads) {
+      ++i;
+    } else {
+      essential.push_back(word);
+    }
+  }
+  return CommandText(essential);
+}
+
+std::string Joined(const std::vector<std::string>& texts, const char* between) {
+  std::string joined;
+  for (const std::string& text : texts) joined += (joined.empty() ? "" : between) + text;
+  return joined;
+}
+
+std::string FileName(const std::string& path) {
+  const fs::path trimmed = path.back() == '/' ? fs::path(path).parent_path() : fs::path(path);
+  return trimmed.filename().string();
+}
+
+class StepRunner {
+ public:
+  StepRunner(Chain* chain, const Command::Context& context)
+      : chain_(*chain), context_(context), state_(chain->At("steps.json")) {}
+
+  RunResult Run() {
+    std::vector<const StepRow*> rows;
+    for (const StepRow& row : StepTable()) rows.push_back(&row);
+    PlanTime();
+    for (const StepRow* row : rows) {
+      ThrowIfInterrupted();
+      if (row->name == std::string(kReportStep)) break;
+      if (!row->applies(&chain_)) continue;
+      if (!RunRow(*row)) break;
+    }
+    result_.whole = !result_.stop.stopped && WholeUntil("pictures");
+    return std::move(result_);
+  }
+
+ private:
+  // ---- which steps
+
+  static int IndexOf(const std::string& name) {
+    const std::vector<std::string> names = StepNames();
+    return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+  }
+  int First() const {
+    const AutoOptions& o = chain_.options();
+    const std::string& name = o.only.empty() ? o.from : o.only;
+    return name.empty() ? 0 : IndexOf(name);
+  }
+  int Last() const {
+    const AutoOptions& o = chain_.options();
+    const std::string& name = o.only.empty() ? o.until : o.only;
+    return name.empty() ? static_cast<int>(StepNames().size()) : IndexOf(name);
+  }
+  bool IsForced() const { return !chain_.options().only.empty() || !chain_.options().from.empty(); }
+  bool WholeUntil(const std::string& last) const {
+    return std::any_of(result_.steps.begin(), result_.steps.end(), [&](const StepOutcome& step) {
+      const StepState state = step.record.state;
+      return step.name == last && step.known &&
+             (state == StepState::kDone || state == StepState::kUntrusted);
+    });
+  }
+
+  // False: the run ends here.
+  bool RunRow(const StepRow& row) {
+    const int index = IndexOf(row.name);
+    StepOutcome outcome;
+    outcome.name = row.name;
+    outcome.does = row.does;
+    if (index < First() || index > Last()) {
+      Remember(&outcome);
+      if (index < First()) RequireMade(row);
+      result_.steps.push_back(outcome);
+      return true;
+    }
+    const Step step = MakeStep(row);
+    const MadeFrom made_from = MadeFromOf(step);
+    const std::optional<std::string> why = WhyRun(step, made_from);
+    if (why) {
+      RunStep(step, made_from, *why);
+      outcome.ran = true;
+    } else {
+      context_.progress.Note(step.name + ": done before, nothing has changed");
+    }
+    time_.Finish(step.name, why ? state_.Find(step.name)->seconds : 0);
+    Remember(&outcome);
+    result_.steps.push_back(outcome);
+    return GoesOnBehind(outcome);
+  }
+
+  void Remember(StepOutcome* outcome) const {
+    const StepRecord* const record = state_.Find(outcome->name);
+    if (record == nullptr) return;
+    outcome->known = true;
+    outcome->record = *record;
+    outcome->report = ReadJsonFile(chain_.ReportOf(outcome->name));
+  }
+
+  Step MakeStep(const StepRow& row) {
+    Step step = row.make(&chain_);
+    step.name = row.name;
+    return step;
+  }
+
+  // A step that --from passes over must have left something.
+  void RequireMade(const StepRow& row) {
+    if (IsConsumed(row.name)) return;
+    for (const std::string& path : MakeStep(row).outputs) {
+      if (IsThere(path)) continue;
+      throw InputError(path, "",
+                       std::string("is not there: the step ") + row.name + " has to run first",
+                       "Start without --from, or with --from " + std::string(row.name));
+    }
+  }
+
+  // ---- what is up to date
+
+  // The database of the features becomes that of the matches.
+  static bool IsConsumed(const std::string& name) { return name == "features"; }
+
+  MadeFrom MadeFromOf(const Step& step) {
+    MadeFrom from;
+    from["roomtex"] = Version();
+    bool uses_colmap = step.name == "mapper";
+    for (size_t i = 0; i < step.commands.size(); ++i) {
+      from["options" + (i == 0 ? "" : " " + std::to_string(i + 1))] =
+          EssentialText(step.commands[i]);
+      uses_colmap |= step.commands[i][0] == chain_.options().colmap;
+    }
+    if (uses_colmap) from["COLMAP"] = chain_.Colmap().version;
+    for (const std::string& path : step.inputs) {
+      const std::string signature = Signature(path);
+      if (signature.empty()) {
+        throw InputError(path, "", "does not exist, and the step " + step.name + " needs it",
+                         "Check the path");
+      }
+      from[FileName(path)] = signature;
+    }
+    for (const auto& [path, content] : step.files) from[FileName(path)] = HashText(content);
+    if (step.name == "matches") {
+      const StepRecord* const features = state_.Find("features");
+      if (features != nullptr) from["features"] = HashText(Json(features->made_from).dump());
+    }
+    return from;
+  }
+
+  // Why a step has to run; none if it has not.
+  std::optional<std::string> WhyRun(const Step& step, const MadeFrom& made_from) {
+    if (IsForced()) return "asked for";
+    const StepRecord* const record = state_.Find(step.name);
+    if (record == nullptr) return "for the first time";
+    const std::vector<std::string> changed = Differences(record->made_from, made_from);
+    if (!changed.empty()) return "changed: " + Joined(changed, ", ");
+    if (record->state == StepState::kStarted) return "it was interrupted";
+    if (record->state == StepState::kFailed) return "it failed the last time";
+    if (IsConsumed(step.name)) {
+      if (MatchesAreDone()) return std::nullopt;
+      if (!IsThere(step.outputs[0])) return "its result is not there";
+      if (HoldsOtherMatches()) return "it holds matches by other options";
+      return std::nullopt;
+    }
+    if (!OutputsAreAsLeft(*record)) return "its result was changed or removed";
+    return std::nullopt;
+  }
+
+  // Matches were begun in another way than they would be now.
+  bool HoldsOtherMatches() {
+    const StepRecord* const record = state_.Find("matches");
+    if (record == nullptr || record->state == StepState::kDone) return false;
+    const Step step = MakeStep(*RowOf("matches"));
+    return !Differences(record->made_from, MadeFromOf(step)).empty();
+  }
+
+  // With the features that are there now.
+  bool MatchesAreDone() {
+    const StepRecord* const record = state_.Find("matches");
+    if (record == nullptr || record->state != StepState::kDone) return false;
+    const Step step = MakeStep(*RowOf("matches"));
+    return Differences(record->made_from, MadeFromOf(step)).empty() && OutputsAreAsLeft(*record);
+  }
+
+  static const StepRow* RowOf(const std::string& name) {
+    for (const StepRow& row : StepTable()) {
+      if (row.name == name) return &row;
+    }
+    return nullptr;
+  }
+
+  // ---- running
+
+  void RunStep(const Step& step, const MadeFrom& made_from, const std::string& why) {
+    PrepareDatabase(step, made_from);
+    StepRecord record;
+    record.made_from = made_from;
+    record.notes = step.notes;
+    for (const CommandLine& line : step.commands) record.commands.push_back(CommandText(line));
+    state_.Set(step.name, record);
+    for (const std::string& note : step.notes) context_.progress.Note(note);
+    for (const auto& [path, content] : step.files) {
+      OutputFile file(path);
+      file.stream() << content;
+      file.Commit();
+    }
+    std::ofstream(chain_.LogOf(step.name), std::ios::trunc)
+        << "roomtex-auto " << Version() << ": " << step.name << ", " << why << "\n";
+    std::error_code ignored;
+    fs::remove(chain_.ReportOf(step.name), ignored);
+    context_.progress.Stage(step.name);
+    started_ = std::chrono::steady_clock::now();
+    running_ = step.name;
+    share_ = -1;
+    if (step.action) {
+      context_.progress.Note("$ " + record.commands[0]);
+      step.action([this](double share) {
+        share_ = share;
+        ShowTime();
+      });
+      record.state = StepState::kDone;
+    } else {
+      RunCommands(step, &record);
+    }
+    record.seconds = Elapsed();
+    for (const std::string& path : step.outputs) {
+      if (!IsConsumed(step.name)) record.outputs[path] = Signature(path);
+    }
+    state_.Set(step.name, record);
+    context_.progress.Finish();
+  }
+
+  // COLMAP goes on where it was, if the database is one of the same photos and options; otherwise
+  // it is made anew.
+  void PrepareDatabase(const Step& step, const MadeFrom& made_from) {
+    const std::string partial = chain_.At(kPartialDatabase);
+    if (step.name == "features") {
+      const StepRecord* const before = state_.Find(step.name);
+      const bool same = before != nullptr && before->state == StepState::kStarted &&
+                        Differences(before->made_from, made_from).empty();
+      if (!same) RemoveDatabase(partial);
+    }
+    if (step.name == "matches" && !IsThere(partial)) {
+      throw InputError(partial, "", "is not there: the step features has to run first",
+                       "Start with --from features");
+    }
+  }
+
+  static void RemoveDatabase(const std::string& path) {
+    std::error_code ignored;
+    for (const char* more : {"", "-journal", "-wal", "-shm"}) fs::remove(path + more, ignored);
+  }
+
+  void RunCommands(const Step& step, StepRecord* record) {
+    record->state = StepState::kDone;
+    for (const CommandLine& line : step.commands) {
+      if (line[0] != "mv") context_.progress.Note("$ " + CommandText(line));
+      ++command_;
+      const ChildRun run = RunOne(step, line);
+      record->cpu_seconds += run.cpu_seconds;
+      record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
+      if (run.success) continue;
+      const bool is_ours = line[0].rfind("roomtex-", 0) == 0;
+      const bool without_picks =
+          step.name == "align" && chain_.PicksPath().empty() && run.exit_code == kExitUsage;
+      record->reason =
+          is_ours ? ReasonOf(step, run) : line[0] + " " + run.failure + ": " + run.LastLines();
+      const bool untrusted = is_ours && (run.exit_code == kExitUntrusted || without_picks);
+      record->state = untrusted ? StepState::kUntrusted : StepState::kFailed;
+      exit_code_ = untrusted                            ? kExitUntrusted
+                   : is_ours && run.exit_code < 128     ? run.exit_code
+                   : line[0] == chain_.options().colmap ? kExitInput
+                                                        : kExitInternalError;
+      return;
+    }
+  }
+
+  ChildRun RunOne(const Step& step, const CommandLine& line) {
+    CommandLine arguments = line;
+    const bool is_ours = line[0].rfind("roomtex-", 0) == 0;
+    arguments[0] = line[0] == chain_.options().colmap
+                       ? chain_.Colmap().path
+                       : FindProgram(is_ours ? BesideThisProgram(line[0]) : line[0],
+                                     "Install all commands of roomtex together");
+    ChildSettings settings;
+    settings.log_path = chain_.LogOf(step.name);
+    settings.stop_signal = is_ours ? SIGTERM : SIGKILL;
+    settings.on_line = [&](const std::string& text) {
+      const double share = ShareOfLine(text);
+      if (share >= 0) share_ = share / static_cast<double>(step.commands.size());
+      const bool is_warning = text.rfind("warning: ", 0) == 0;
+      if (is_ours && is_warning) context_.Warn(step.name + ": " + text.substr(9));
+    };
+    settings.on_wait = [this] { ShowTime(); };
+    return RunChild(arguments, settings);
+  }
+
+  // The command's own reason, or what it said last.
+  std::string ReasonOf(const Step& step, const ChildRun& run) const {
+    const Json report = ReadJsonFile(chain_.ReportOf(step.name));
+    if (report.is_object() && report.value("reason", std::string()) != "") {
+      return report["reason"].get<std::string>();
+    }
+    for (size_t i = run.last.size(); i-- > 0;) {
+      const std::string prefix = step.commands[0][0] + ": ";
+      if (run.last[i].rfind(prefix, 0) == 0) return run.last[i].substr(prefix.size());
+    }
+    return run.failure + (run.last.empty() ? "" : ": " + run.last.back());
+  }
+
+  // ---- time
+
+  double Elapsed() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  }
+
+  void PlanTime() {
+    std::vector<std::string> steps;
+    std::map<std::string, double> last_time;
+    for (const StepRow& row : StepTable()) {
+      const int index = IndexOf(row.name);
+      if (index < First() || index > Last() || !row.applies(&chain_)) continue;
+      steps.emplace_back(row.name);
+      const StepRecord* const record = state_.Find(row.name);
+      if (record != nullptr && record->seconds > 0) last_time[row.name] = record->seconds;
+    }
+    time_.SetSteps(steps, last_time);
+    const AutoOptions& options = chain_.options();
+    if (options.image_path.empty()) return;
+    const std::vector<PhotoFacts>& photos = chain_.Photos(options.image_path);
+    double megapixels = 0;
+    for (const PhotoFacts& photo : photos) megapixels += photo.Megapixels();
+    time_.SetPhotos(photos.size(), megapixels / static_cast<double>(photos.size()));
+  }
+
+  void ShowTime() {
+    const double left = time_.Seconds(running_, share_, Elapsed());
+    double share = share_;
+    if (share < 0) share = std::min(0.95, Elapsed() / std::max(1.0, time_.Expected(running_)));
+    context_.progress.Share(share, "about " + DurationText(left) + " left for everything");
+  }
+
+  // ---- where it ends
+
+  bool GoesOnBehind(const StepOutcome& outcome) {
+    const StepRecord& record = outcome.record;
+    if (record.state == StepState::kDone) return true;
+    const AutoOptions& options = chain_.options();
+    const bool untrusted = record.state == StepState::kUntrusted;
+    if (untrusted && outcome.name == "associate" && options.patterned == "auto") {
+      context_.progress.Note("no pairs of patterned and plain photos: all are ordinary photos");
+      return true;
+    }
+    if (untrusted && options.accept_untrusted && !record.outputs.empty() &&
+        HasModel(outcome.name)) {
+      context_.Warn(outcome.name + " is not to be trusted: " + record.reason);
+      return true;
+    }
+    result_.stop.stopped = true;
+    result_.stop.step = outcome.name;
+    result_.stop.reason = record.reason;
+    result_.stop.exit_code = untrusted         ? static_cast<int>(kExitUntrusted)
+                             : exit_code_ != 0 ? exit_code_
+                                               : static_cast<int>(kExitInput);
+    result_.stop.remedies = Remedies(outcome.name, untrusted);
+    return false;
+  }
+
+  bool HasModel(const std::string& step) const {
+    return step != "align" || IsThere(chain_.AlignedPath() + "/images.bin");
+  }
+
+  std::vector<std::string> Remedies(const std::string& step, bool untrusted) const {
+    std::vector<std::string> remedies;
+    const std::string again = CommandText(chain_.AutoCommand());
+    if (!untrusted) {
+      remedies.push_back("What it printed: " + chain_.LogOf(step));
+      remedies.push_back("Then start again, it goes on from here: " + again);
+      return remedies;
+    }
+    if (step == "align") {
+      const bool has_picks = !chain_.PicksPath().empty();
+      remedies.push_back((has_picks ? "Look at the picks and mend them: "
+                                    : "Pick six points that photo and scan both show: ") +
+                         CommandText(chain_.PickCommand()));
+    } else if (step == "mapper") {
+      remedies.emplace_back(
+          "Add photos where it says that they are missing: between photos that do not see the "
+          "same, taken from another place, not only turned");
+    } else if (step == "associate") {
+      remedies.emplace_back("If these are ordinary photos, start again with --patterned 0");
+    }
+    remedies.push_back("Then start again, it goes on from here: " + again);
+    if (HasModel(step) && step != "associate") {
+      remedies.push_back("To go on all the same: " + again + " --accept_untrusted 1");
+    }
+    return remedies;
+  }
+
+  Chain& chain_;
+  const Command::Context& context_;
+  RunState state_;
+  RemainingTime time_;
+  RunResult result_;
+  std::chrono::steady_clock::time_point started_;
+  std::string running_;
+  double share_ = -1;
+  int command_ = 0, exit_code_ = 0;
+};
+
+}  // namespace
+
+RunResult RunSteps(Chain* chain, const Command::Context& context) {
+  return StepRunner(chain, context).Run();
+}
+
+void PrintSteps(Chain* chain) {
+  for (const StepRow& row : StepTable()) {
+    if (row.name == std::string(kReportStep) || !row.applies(chain)) continue;
+    Step step;
+    try {
+      step = row.make(chain);
+    } catch (const InputError&) {
+      std::printf("# %s: known when the steps before have run\n", row.name);
+      continue;
+    }
+    std::printf("# %s: %s\n", row.name, row.does);
+    for (const std::string& note : step.notes) std::printf("#   %s\n", note.c_str());
+    for (const CommandLine& line : step.commands) std::printf("%s\n", CommandText(line).c_str());
+  }
+}
+
+}  // namespace roomtex

@@ -1,0 +1,42 @@
+#pragma once
+// Runs the steps of the table that are not done yet.
+
+#include <string>
+#include <vector>
+
+#include "core/command_line.h"
+#include "workflow/run_state.h"
+#include "workflow/step.h"
+
+namespace roomtex {
+
+// What became of a step in this run.
+struct StepOutcome {
+  std::string name, does;
+  bool ran = false;    // false: was done before, or is not asked for
+  bool known = false;  // it has a record, of this run or an earlier one
+  StepRecord record;
+  Json report;  // its command's own; null if there is none
+};
+
+// Why a run ended before its last step.
+struct Stop {
+  bool stopped = false;
+  std::string step, reason;
+  int exit_code = 0;                  // kExitUntrusted, kExitInput or kExitInternalError
+  std::vector<std::string> remedies;  // what a person can do, sentences and command lines
+};
+
+struct RunResult {
+  std::vector<StepOutcome> steps;  // that apply, in the table's order
+  Stop stop;
+  bool whole = false;  // every step up to the pictures is done
+};
+
+// Prints the command lines as it goes. Throws Interrupted when a signal stops it.
+RunResult RunSteps(Chain* chain, const Command::Context& context);
+
+// Prints the command lines on stdout, as far as they are known before the steps have run.
+void PrintSteps(Chain* chain);
+
+}  // namespace roomtex

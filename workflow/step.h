@@ -1,0 +1,90 @@
+#pragma once
+// The steps from photos and a scan to a coloured room: one table. A step is commands, as a user
+// would type them; roomtex-auto runs them and remembers what came out (run_state.h).
+
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/report.h"
+#include "workflow/auto_options.h"
+#include "workflow/capture_facts.h"
+
+namespace roomtex {
+
+using CommandLine = std::vector<std::string>;  // the program's name first
+
+struct Step {
+  std::string name;
+  std::vector<CommandLine> commands;
+  // Written before the commands run: path and content of lists that they read.
+  std::vector<std::pair<std::string, std::string>> files;
+  std::vector<std::string> notes;            // what was chosen, and why
+  std::vector<std::string> inputs, outputs;  // files and folders
+  // Instead of commands, for what has no command of its own; told how much is done.
+  std::function<void(const std::function<void(double)>&)> action;
+};
+
+// One run: its options, the places of its files, and what has been seen so far.
+class Chain {
+ public:
+  explicit Chain(const AutoOptions& options) : options_(options) {}
+
+  const AutoOptions& options() const { return options_; }
+  std::string At(const std::string& name) const { return options_.output_path + "/" + name; }
+  std::string LogOf(const std::string& step) const { return At("log/" + step + ".log"); }
+  std::string ReportOf(const std::string& step) const { return At("log/" + step + ".json"); }
+
+  // The photos as they were given, or as they were cut out of videos or panoramas.
+  std::string PhotoFolder() const;
+  // The same; where a pattern was projected, those with it and those without.
+  std::string ColmapFolder() const;
+  std::string ColorFolder() const;
+  bool IsAssociated() const;  // patterned and plain photos were told apart
+  // The picks; "" = there are none.
+  std::string PicksPath() const;
+  // The aligned model, also one that was put beside a trusted one.
+  std::string AlignedPath() const;
+
+  // Read when they are first asked for.
+  const std::vector<PhotoFacts>& Photos(const std::string& folder);
+  const ColmapFacts& Colmap();
+  const std::set<std::string>& ColmapOptions(const std::string& command);
+  bool SeemsPatterned();
+
+  // What a person types to pick points.
+  CommandLine PickCommand() const;
+  // The command line of this run, to start it again.
+  CommandLine AutoCommand() const;
+
+ private:
+  const AutoOptions& options_;
+  std::vector<std::pair<std::string, std::vector<PhotoFacts>>> photos_;
+  std::optional<ColmapFacts> colmap_;
+  std::vector<std::pair<std::string, std::set<std::string>>> colmap_options_;
+  std::optional<bool> seems_patterned_;
+};
+
+// A row of the table.
+struct StepRow {
+  const char* name;
+  const char* does;
+  bool (*applies)(Chain*);
+  Step (*make)(Chain*);
+};
+const std::vector<StepRow>& StepTable();
+std::vector<std::string> StepNames();
+
+// Small things that all of it uses.
+bool IsThere(const std::string& path);
+Json ReadJsonFile(const std::string& path);  // null if it is not there or no JSON object
+// Nothing if the value is empty.
+void AddOption(const std::string& name, const std::string& value, CommandLine* line);
+
+// Where COLMAP's steps leave the database until it holds all matches.
+inline constexpr char kPartialDatabase[] = "database.partial.db";
+
+}  // namespace roomtex
