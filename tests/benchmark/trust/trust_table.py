@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How far the trust of roomtex-align can be trusted: every case of trust_sets.sh is aligned, compared with its truth
+"""How far the trust of roomtex-align can be trusted: every case of trust_sets.py is aligned, compared with its truth
 or reference, and printed as a row of a Markdown table (docs/real-rooms.md); last, in how many photos the true error
 lay below one, two and three times the expected one.
 
-  tests/benchmark/trust/trust_sets.sh SETS DATA        # captures, databases, sparse models (an hour)
+  tests/benchmark/trust/trust_sets.py --bin build/bin SETS --data DATA   # captures, databases, models (an hour)
   tests/benchmark/trust/trust_table.py --bin build/bin SETS [NAME...]
 """
 
@@ -126,8 +126,7 @@ def score(case, args):
         expected = sigma.get("position_sigma_mm")
         if expected is None:
             expected = report["expected_error"]["at_cameras_mm"]
-        left_out = sigma.get("agrees") is False
-        row["photos"].append((photo, 1000 * off, turn, expected, left_out))
+        row["photos"].append((photo, 1000 * off, turn, expected))
     row["said"] = report["expected_error"]["at_cameras_mm"]
     row["registered"] = len(found)
     return row
@@ -139,7 +138,7 @@ def main():
     parser.add_argument("--out", default="/tmp/trust_table")
     parser.add_argument("--option", action="append", default=[], help="passed on to roomtex-align")
     parser.add_argument("--photos", action="store_true", help="a line per photo as well")
-    parser.add_argument("sets", help="folder of trust_sets.sh")
+    parser.add_argument("sets", help="folder of trust_sets.py")
     parser.add_argument("names", nargs="*", help="cases to run; none = all")
     args = parser.parse_args()
     cases = []
@@ -152,7 +151,7 @@ def main():
     below, photos, wrong = [0, 0, 0], 0, 0
     for case in cases:
         row = score(case, args)
-        told = [p for p in row.get("photos", []) if not p[4]]
+        told = row.get("photos", [])
         off = median([p[1] for p in told])
         is_right = (off <= row["limit"]) == (row["exit"] == 0)
         wrong += not is_right
@@ -168,7 +167,7 @@ def main():
             (row["reason"] or "; ".join(row["warnings"])).replace("\n", " ")[:400]))
         if args.photos:
             for p in row.get("photos", []):
-                print("  {} {:.1f} mm {:.2f} deg, expected {} {}".format(*p[:3], p[3], "left out" if p[4] else ""))
+                print("  {} {:.1f} mm {:.2f} deg, expected {}".format(*p))
         sys.stdout.flush()
     if photos:
         print("\nTrusted photos: {}; below 1, 2, 3 times the expected error: {} %. Wrong verdicts: {} of {}.".format(
