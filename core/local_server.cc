@@ -129,6 +129,21 @@ void SetError(httplib::Response& response, int status, const std::string& senten
   SetJson(response, status, ErrorText(sentence));
 }
 
+constexpr char kLacksToken[] =
+    "The address lacks the token; open the address that the command has printed.";
+
+// For people who open a link that was copied, or kept from an earlier run.
+std::string RefusalPage() {
+  return "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Not this address</title>"
+         "<link rel=\"icon\" href=\"data:,\"><h1>This address does not open anything</h1><p>" +
+         std::string(kLacksToken) +
+         "</p><p>Every start makes a new address: a link from an earlier run has ended with it. "
+         "Start "
+         "the command again and open what it prints. What stands behind the # of an old link is "
+         "the "
+         "point of view: put it behind the new address.</p></html>";
+}
+
 void SetContent(const httplib::Request& request, const LocalServer::Content& content,
                 httplib::Response& response) {
   const std::string etag = "\"" + content.etag + "\"";
@@ -407,7 +422,7 @@ std::string LocalServer::Impl::Objection(const httplib::Request& request) const 
   const std::string given = request.path.substr(0, token.size() + 1);
   const bool ends = request.path.size() == given.size() || request.path[given.size()] == '/';
   if (!EqualSecrets(given, "/" + token) || !ends) {
-    return "The address lacks the token; open the address that the command has printed.";
+    return kLacksToken;
   }
   return "";
 }
@@ -419,7 +434,17 @@ httplib::Server::HandlerResponse LocalServer::Impl::Check(const httplib::Request
     return httplib::Server::HandlerResponse::Handled;
   };
   const std::string objection = Objection(request);
-  if (!objection.empty()) return refuse(403, objection);
+  if (!objection.empty()) {
+    const bool is_person =
+        objection == kLacksToken && request.method == "GET" &&
+        request.get_header_value("Accept").find("text/html") != std::string::npos;
+    if (is_person) {
+      response.status = 403;
+      response.set_content(RefusalPage(), "text/html; charset=utf-8");
+      return httplib::Server::HandlerResponse::Handled;
+    }
+    return refuse(403, objection);
+  }
   const std::string path = request.path.substr(token.size() + 1);
   if (path.empty()) {  // the page's relative URLs need the slash
     response.set_header("Location", "/" + token + "/");

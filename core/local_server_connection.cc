@@ -20,8 +20,8 @@ constexpr int kMaxFields = 100;         // header lines of a request
 constexpr double kFarewellSeconds = 2;  // for the last bytes when stopping or refusing
 constexpr size_t kReadBytes = size_t{1} << 16;
 const char kHeadEnd[] = "\r\n\r\n";
-const std::array<const char*, 5> kUsedFields = {"host", "origin", "content-type", "if-none-match",
-                                                "accept-encoding"};
+const std::array<const char*, 6> kUsedFields = {"host",          "origin",          "content-type",
+                                                "if-none-match", "accept-encoding", "accept"};
 // Scripts, styles and pictures only from us; blob: is how three.js hands textures on.
 const char kContentPolicy[] =
     "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' blob:; "

@@ -13,10 +13,11 @@
 namespace roomtex {
 namespace {
 
-constexpr double kCell = 0.1;                    // metres
-constexpr double kNearFloor = 0.15;              // metres from floor or ceiling that count as such
-constexpr double kPlaceStep = 0.35;              // metres between places that are tried
-constexpr double kRoomToStand = 0.3;             // metres around a place without anything
+constexpr double kCell = 0.1;          // metres
+constexpr double kNearFloor = 0.15;    // metres from floor or ceiling that count as such
+constexpr double kPlaceStep = 0.35;    // metres between places that are tried
+constexpr double kRoomToStand = 0.3;   // metres around a place without anything
+constexpr double kLowestThing = 0.35;  // metres above the floor: what is lower is stepped over
 constexpr double kNearest = 0.6, kFarthest = 5;  // metres between a place and what it shows
 constexpr size_t kMaxPlaces = 4, kMaxTargets = 2500;
 constexpr double kLeastGain = 0.25;   // square metres that make a place worth while
@@ -82,6 +83,15 @@ class CellGrid {
     }
     return true;
   }
+  // For somebody who holds a camera there: not over a table or in a shelf either.
+  bool HasRoomToStand(const Eigen::Vector3d& x) const {
+    for (double height = kLowestThing; height < x.z(); height += 2 * kCell) {
+      if (!HasRoom({x.x(), x.y(), height})) return false;
+    }
+    return HasRoom(x);
+  }
+
+ private:
   bool HasRoom(const Eigen::Vector3d& x) const {
     for (double dx = -kRoomToStand; dx <= kRoomToStand; dx += kCell) {
       for (double dy = -kRoomToStand; dy <= kRoomToStand; dy += kCell) {
@@ -90,8 +100,6 @@ class CellGrid {
     }
     return true;
   }
-
- private:
   std::optional<int64_t> IndexOf(const Eigen::Vector3d& x) const {
     int64_t index = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -152,7 +160,7 @@ class PlaceSearch {
     for (double x = kPlaceStep / 2; x < frame.Size().x(); x += kPlaceStep) {
       for (double y = kPlaceStep / 2; y < frame.Size().y(); y += kPlaceStep) {
         const Eigen::Vector3d place(x, y, height);
-        if (grid.HasRoom(place) && IsReached(place)) places_.push_back(place);
+        if (grid.HasRoomToStand(place) && IsReached(place)) places_.push_back(place);
       }
     }
   }

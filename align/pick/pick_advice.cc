@@ -222,8 +222,8 @@ std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& 
     return "Click the same point on the other side.";
   }
   if (tally.total == 0) {
-    return "Click a point that you recognise on both sides, such as a corner of a picture or of "
-           "furniture: once in the photo, once in the scan.";
+    return "Click a point that you recognise on both sides, such as the corner of a picture or a "
+           "switch: once in the photo, once in the scan.";
   }
   if (tally.most < needed) return NextOfFew(tally, needed, solution, scene);
   const PhotoState& photo = solution.photos.at(tally.name);

@@ -132,6 +132,43 @@ test('views stay when the window is resized and the divider dragged', async () =
   });
 });
 
+test('keys that look act on the picture under the mouse, not on the focused one', async () => {
+  await pageOn(async (page) => {
+    await page.zoomTo('photo', places[0].img, 3);
+    await page.zoomTo('scan', places[0].scan, 3);
+    await page.page.focus('#photo-pane');
+    const photo = await page.view('photo'), scan = await page.view('scan');
+    await page.page.mouse.move(scan.box.x + scan.box.width / 2, scan.box.y + scan.box.height / 2);
+    await page.page.keyboard.press('f');
+    await until(async () => (await page.view('scan')).text !== scan.text, 'whole scan');
+    assert.equal((await page.view('photo')).text, photo.text);
+    // Without the mouse over either, the focus counts.
+    await page.page.mouse.move(5, 5);
+    await page.page.keyboard.press('f');
+    await until(async () => (await page.view('photo')).text !== photo.text, 'whole photo');
+  });
+});
+
+test('in a window of 900 x 700 every control is in reach', async () => {
+  await pageOn(async (page) => {
+    await page.page.setViewportSize({width: 900, height: 700});
+    await page.redrawn();
+    const hidden = await page.page.evaluate(
+        () => [...document.querySelectorAll(
+                   '#bar button, .side .tools button, .side .tools select, .side .tools input')]
+                  .filter((one) => {
+                    if (!one.checkVisibility()) return false;
+                    const {x, y, width, height} = one.getBoundingClientRect();
+                    const top = document.elementFromPoint(x + width / 2, y + height / 2);
+                    return !(top && (one.contains(top) || one.closest('label')?.contains(top)));
+                  })
+                  .map((one) => one.id));
+    assert.deepEqual(hidden, []);
+    assert.ok((await page.view('scan')).box.height > 200, 'the pictures keep their room');
+    await screenshot(page.page, 'pick-900');
+  });
+});
+
 test('a press that moves pans, one that does not sets a point', async () => {
   await pageOn(async (page) => {
     const img = [480, 320];

@@ -319,6 +319,11 @@ test('everything works by keyboard alone', async () => {
   await page.keyboard.press('Enter');
   await page.waitForFunction(() => roomtexView.cameras.photoShown);
   assert.equal(await page.textContent('#standing-name'), 'photo_001.jpg');
+  // The list has the focus still: Space fades the photo, as everywhere.
+  const opacity = () => page.evaluate(() => roomtexView.cameras.opacity);
+  const shown = await opacity();
+  await page.keyboard.press(' ');
+  assert.notEqual(await opacity(), shown);
   await page.keyboard.press('.');
   assert.equal(await page.textContent('#standing-name'), 'photo_002.jpg');
   await page.keyboard.press('Escape');

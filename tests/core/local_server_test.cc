@@ -48,6 +48,19 @@ TEST_F(ServedPage, NeedsTheToken) {
   EXPECT_EQ(GetStatus("/", {{"Cookie", "token=" + base_.substr(1)}}), 403);
 }
 
+TEST_F(ServedPage, TellsAPersonWithALinkOfAnEarlierRunWhatToDo) {
+  const httplib::Headers browser = {{"Accept", "text/html,application/xhtml+xml,*/*;q=0.8"}};
+  const auto answer = Client().Get("/0123456789012345678901234567890123456789/", browser);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->status, 403);
+  EXPECT_THAT(answer->get_header_value("Content-Type"), StartsWith("text/html"));
+  EXPECT_THAT(answer->body, HasSubstr("Start the command again"));
+  EXPECT_THAT(answer->body, Not(HasSubstr(base_.substr(1))));
+  const auto program = Client().Get("/0123/");
+  ASSERT_TRUE(program);
+  EXPECT_THAT(program->get_header_value("Content-Type"), HasSubstr("json"));
+}
+
 TEST_F(ServedPage, NamesThatAreNotOursAreRefused) {
   const std::string port = std::to_string(port_);
   for (const std::string& host : {"evil.example:" + port, std::string("evil.example"),

@@ -107,6 +107,25 @@ TEST(MeasureCoverage, SendsToWhereTheUnseenWallIsInSight) {
   }
 }
 
+// A table of 0.8 m over the half of the room that would be the best place.
+TEST(MeasureCoverage, SendsNobodyOntoATable) {
+  std::vector<EvidencePoint> points = Room();
+  for (double x = 0.8; x <= 2.2; x += 0.03) {
+    for (double y = 0; y <= kDepth; y += 0.03) {
+      EvidencePoint point;
+      point.x_in_scan = InScan(x, y, 0.8).cast<float>();
+      point.views = 2;
+      points.push_back(point);
+    }
+  }
+  const PlanFrame frame = Frame();
+  const RoomCoverage coverage = MeasureCoverage(points, frame, {CameraAt(1.5, 1.5, frame)});
+  ASSERT_FALSE(coverage.places.empty());
+  const Eigen::Vector3d along = (frame.plan_from_scan * InScan(1, 0, 0)).normalized();
+  const double from_wall = (coverage.places[0].centre - frame.InPlan(InScan(0, 0, 0))).dot(along);
+  EXPECT_TRUE(from_wall < 0.7 || from_wall > 2.3) << from_wall;
+}
+
 TEST(MeasureCoverage, SendsNowhereWhereEverythingIsSeen) {
   std::vector<EvidencePoint> points = Room();
   for (EvidencePoint& point : points) point.views = 1;

@@ -63,9 +63,15 @@ function takeOrSet() {
   return setPoint();
 }
 
+// The picture under the mouse; without one, that of the focus.
+function lookedAt() {
+  const {editor, panes} = app;
+  return kSides.find((side) => panes[side].cursor !== null) ?? editor.side;
+}
+
 function zoom(factor) {
   const {editor, picks, panes} = app;
-  const {side} = editor;
+  const side = lookedAt();
   const {view} = panes[side];
   const place = editor.placeOf(picks.find(editor.selected), side) ??
       (crossShown(side) ? editor.crossOf(side, view) : null);
@@ -98,7 +104,7 @@ function escape() {
   if (!kSides.some((side) => app.panes[side].cancel())) app.editor.back();
 }
 
-const pane = () => app.panes[app.editor.side];
+const pane = () => app.panes[lookedAt()];
 const otherPane = () => app.panes[app.editor.side === 'photo' ? 'scan' : 'photo'];
 const arrowKeys = (name) => [name, `Ctrl+${name}`, `Shift+${name}`, `Ctrl+Shift+${name}`];
 
@@ -199,7 +205,7 @@ export const kKeys = [
       {mouse: 'Drag', does: 'moves the picture, as Ctrl with the arrows does'},
       {keys: ['+', '='], shown: '+ –', does: 'zoom in and out', run: () => zoom(1.4)},
       {keys: ['-'], run: () => zoom(1 / 1.4)},
-      {keys: ['F', '0'], shown: 'F', does: 'whole picture', run: () => pane().fit()},
+      {keys: ['F', '0'], shown: 'F', does: 'whole picture, of the one under the mouse', run: () => pane().fit()},
       {keys: ['1'], shown: '1', does: 'one pixel on one pixel', run: () => pane().oneToOne()},
       {keys: ['L'], shown: 'L', does: 'loupes on or off', run: () => toggleLoupes()},
       {

@@ -114,6 +114,9 @@ export class Pane {
         context, this.picture, this.view, this.store, {ratio: this.ratio, tone: this.tone});
     for (const layer of this.layers) urls.push(...layer(context, this.view, this.ratio, this));
     this.store.want(this, urls);
+    // A frame that only clears may never reach the screen: what was drawn before would stay there.
+    drawing.fillStyle = 'rgba(0, 0, 0, 0.004)';
+    drawing.fillRect(0, 0, this.overlay.width, this.overlay.height);
     drawing.scale(this.ratio, this.ratio);
     for (const draw of this.drawings) {
       drawing.save();

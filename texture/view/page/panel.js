@@ -249,7 +249,10 @@ export class Panel {
     if (to !== undefined) {
       this.#activate(this.options[to]);
     } else if ((event.key === 'Enter' || event.key === ' ') && now >= 0) {
-      this.viewer.standIn(this.options[now].camera);
+      const {camera} = this.options[now];
+      // Standing there already, Space fades the photo as it does everywhere.
+      if (event.key === ' ' && camera === this.viewer.target) return;
+      this.viewer.standIn(camera);
     } else {
       return;
     }
@@ -314,8 +317,10 @@ export class Panel {
       ']': () => this.#fade(0.1),
       Escape: () => this.#escape(),
     };
-    if (!onButton) {
+    if (!onButton || on === $('camera-list')) {
       acts[' '] = () => this.#fade(viewer.cameras.opacity > 0 ? -1 : 1);
+    }
+    if (!onButton) {
       acts.Enter = () => {
         if (!viewer.measuring) return;
         this.byKeys = true;
