@@ -47,11 +47,16 @@ struct ScanFile {
 // ...).
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options);
 
-// The only scan of the file. Throws InputError as above, and for a file with several.
+// Throws InputError if one of the scans is a cloud (Scan::Kind): nothing here runs on points alone
+// yet.
+void RequireSurfaces(const ScanFile& file);
+
+// The only scan of the file, a grid or a mesh. Throws InputError as above, and for a file with
+// several.
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options);
 
-// Several scans in one scan frame, all scans of all files. poses_path ("" = none) gives
-// scan_from_station per scan, one line each:
+// Several scans in one scan frame, all scans of all files, grids and meshes. poses_path ("" = none)
+// gives scan_from_station per scan, one line each:
 //   NAME m00 ... m33                          4x4, row by row, metres
 //   NAME qw qx qy qz tx ty tz                 metres
 //   NAME geo LATITUDE LONGITUDE HEIGHT HEADING    a surveyed station, see SurveyedStation; degrees
