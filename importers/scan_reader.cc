@@ -21,14 +21,15 @@
 #include "importers/rtpi.h"
 #include "importers/scan_path.h"
 #include "importers/scan_poses.h"
+#include "importers/xyz.h"
 
 namespace roomtex {
 namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh (the content counts, not "
-    "the name)";
+    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh, or points as text (the "
+    "content counts, not the name)";
 
 bool BeginsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
@@ -122,13 +123,16 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   return file;
 }
 
+std::string NameOrFile(const Scan& scan) {
+  return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
+}
+
 void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
   std::optional<Scan> grid = GridFromCloud(*scan);
   if (!grid) return;
-  notes->push_back("the scan " + Quoted(scan->name) +
-                   " is a cloud without a grid; its angles from the station show one of " +
-                   std::to_string(grid->num_columns) + " columns x " +
-                   std::to_string(grid->num_rows) + " rows");
+  notes->push_back(
+      NameOrFile(*scan) + " is a cloud without a grid; its angles from the station show one of " +
+      std::to_string(grid->num_columns) + " columns x " + std::to_string(grid->num_rows) + " rows");
   *scan = std::move(*grid);
 }
 
@@ -206,6 +210,11 @@ ScanFile ReadScanFile(const std::string& given_path, const ScanReaderOptions& op
     file.format = "OBJ";
     file.byte_order = "text";
     file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
+  } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
+    file.format = "XYZ";
+    file.byte_order = "text";
+    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range}));
+    FindGridAgain(&file.scans[0], &file.notes);
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),
@@ -222,7 +231,7 @@ void RequireSurfaces(const ScanFile& file) {
   for (const Scan& scan : file.scans) {
     if (scan.kind() != Scan::Kind::kCloud) continue;
     throw InputError(scan.path, "",
-                     "the scan " + Quoted(scan.name) +
+                     NameOrFile(scan) +
                          " is a cloud of points without the scanner's grid, and its angles from "
                          "the station show none",
                      "Export it with its grid (structured E57, PTX), or name another scan behind "

@@ -32,7 +32,7 @@ struct ScanReaderOptions {
 // All scans of one file (a PTX or an E57 may hold several), and what the file is.
 struct ScanFile {
   std::vector<Scan> scans;         // at least one
-  std::string format;              // "RTPI", "PTX", "PCD", "PLY", "OBJ" or "E57"
+  std::string format;              // "RTPI", "PTX", "PCD", "PLY", "OBJ", "E57" or "XYZ"
   std::string byte_order;          // "little", "big" or "text"
   std::vector<std::string> notes;  // assumptions about the file that a user should know
   // RTPI: as it was read, "clockwise" or "counterclockwise"; and what there is to say about it, a
