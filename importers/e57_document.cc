@@ -16,7 +16,7 @@ namespace {
 constexpr int kDeepestPrototype = 8;  // structures in structures
 constexpr size_t kMostFields = 4096;  // of one record
 
-std::string_view Trimmed(std::string_view text) {
+std::string_view WithoutBlanks(std::string_view text) {
   const size_t first = text.find_first_not_of(" \t\r\n");
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
@@ -24,7 +24,7 @@ std::string_view Trimmed(std::string_view text) {
 
 // Whatever the locale says. "" is zero, as in E57.
 std::optional<double> ParseNumber(std::string_view text) {
-  text = Trimmed(text);
+  text = WithoutBlanks(text);
   if (text.empty()) return 0.0;
   if (text[0] == '+') text.remove_prefix(1);
   double number = 0;
@@ -37,7 +37,7 @@ std::optional<double> ParseNumber(std::string_view text) {
 }
 
 std::optional<int64_t> ParseInteger(std::string_view text) {
-  text = Trimmed(text);
+  text = WithoutBlanks(text);
   if (text.empty()) return 0;
   if (text[0] == '+') text.remove_prefix(1);
   int64_t number = 0;

@@ -20,9 +20,9 @@ namespace {
 constexpr int64_t kBlobHeaderSize = 16;  // bytes
 constexpr int64_t kCopyAtOnce = 1 << 20;
 constexpr size_t kLongestName = 100;  // bytes of a file name
-constexpr int kJpegQuality = 96;
+constexpr int kFaceQuality = 96;
 // A picture all around is twice as wide as high, but for this share.
-constexpr double kMaxShapeError = 0.01;
+constexpr double kMaxPanoramaError = 0.01;
 
 // COLMAP's camera (y down, looks along z) from the standard's (y up, looks along -z).
 const Eigen::Quaterniond kCamFromPinhole(0, 1, 0, 0);
@@ -167,7 +167,7 @@ class ImageExtractor {
     if (image.kind == E57Image::Kind::kPinhole) {
       return AddPinhole(image, file, camera_from_scan, width, height);
     }
-    if (!(std::abs(0.5 * width / height - 1) <= kMaxShapeError)) {
+    if (!(std::abs(0.5 * width / height - 1) <= kMaxPanoramaError)) {
       return "it is no panorama all around, twice as wide as high";
     }
     const Rigid cam_from_scan = Rigid{CamFromSphere(), Eigen::Vector3d::Zero()} * camera_from_scan;
@@ -221,7 +221,7 @@ class ImageExtractor {
       const std::string name = stem + "/face_" + std::to_string(++number) + ".jpg";
       std::vector<uchar> bytes;
       cv::imencode(".jpg", CutFace(picture, camera, rotation), bytes,
-                   {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+                   {cv::IMWRITE_JPEG_QUALITY, kFaceQuality});
       OutputFile output((fs::path(folder_) / name).string());
       output.stream().write(reinterpret_cast<const char*>(bytes.data()),
                             static_cast<std::streamsize>(bytes.size()));

@@ -7,11 +7,11 @@
 namespace roomtex {
 namespace {
 
-constexpr char kMagic[] = "ASTM-E57";
-constexpr int64_t kMagicSize = 8;
+constexpr char kE57Magic[] = "ASTM-E57";
+constexpr int64_t kE57MagicSize = 8;
 // The standard knows 1024 only.
 constexpr uint64_t kSmallestPage = 64, kLargestPage = 1 << 20;
-constexpr int64_t kBlockSize = 1 << 20;  // bytes that are read at once
+constexpr int64_t kReadAtOnce = 1 << 20;  // bytes that are read at once
 constexpr int64_t kLargestXml = 50 << 20;
 
 // Eight tables, so that eight bytes are taken at once ("slicing by 8", Kounavis and Berry 2005).
@@ -61,7 +61,7 @@ uint32_t Crc32c(std::string_view bytes) {
 }
 
 bool LooksLikeE57(std::string_view start) {
-  return start.substr(0, kMagicSize) == std::string_view(kMagic, kMagicSize);
+  return start.substr(0, kE57MagicSize) == std::string_view(kE57Magic, kE57MagicSize);
 }
 
 E57Pages::E57Pages(const std::string& path, bool check) : file_(path) {
@@ -115,7 +115,7 @@ void E57Pages::ReadHeader() {
 }
 
 void E57Pages::CheckPages() const {
-  const int64_t pages_at_once = std::max<int64_t>(1, kBlockSize / page_size_);
+  const int64_t pages_at_once = std::max<int64_t>(1, kReadAtOnce / page_size_);
   std::vector<char> bytes(static_cast<size_t>(std::min(pages_at_once, num_pages_) * page_size_));
   for (int64_t first = 0; first < num_pages_; first += pages_at_once) {
     const int64_t count = std::min(pages_at_once, num_pages_ - first);
@@ -154,7 +154,7 @@ std::string E57Pages::Position(int64_t offset) const {
 }
 
 void E57Pages::LoadBlock(int64_t first_page) const {
-  const int64_t pages_at_once = std::max<int64_t>(1, kBlockSize / page_size_);
+  const int64_t pages_at_once = std::max<int64_t>(1, kReadAtOnce / page_size_);
   const int64_t count = std::min(pages_at_once, num_pages_ - first_page);
   block_.resize(static_cast<size_t>(count * page_size_));
   file_.Read(first_page * page_size_, block_.data(), count * page_size_);

@@ -113,14 +113,20 @@ class Importer {
   }
 
  private:
-  // Before anything is written: a mesh without a grid has only one way to go.
+  // Before anything is written: what has no grid has only one way to go.
   void CheckGrid() const {
-    if (file_.scans.front().organised) return;
+    for (const Scan& scan : file_.scans) {
+      if (!scan.organised) RequirePlyOnly(scan);
+    }
+  }
+  void RequirePlyOnly(const Scan& scan) const {
     for (const std::string& path : options_.output_paths) {
       if (ScanWriterExtension(path) == ".ply") continue;
-      throw InputError(options_.input_path, "",
-                       "is a mesh without a grid, which cannot be written as " + path,
-                       "Write a .ply, or give the scan with its grid (RTPI, PTX or organised PCD)");
+      throw InputError(
+          options_.input_path, "",
+          std::string(scan.kind() == Scan::Kind::kCloud ? "is a cloud" : "is a mesh") +
+              " without a grid, which cannot be written as " + path,
+          "Write a .ply, or give the scan with its grid (RTPI, PTX, E57 or organised PCD)");
     }
   }
 

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "importers/cloud_grid.h"
 #include "importers/e57.h"
 #include "importers/e57_pages.h"
 #include "importers/file_reader.h"
@@ -20,14 +21,15 @@
 #include "importers/rtpi.h"
 #include "importers/scan_path.h"
 #include "importers/scan_poses.h"
+#include "importers/xyz.h"
 
 namespace roomtex {
 namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh (the content counts, not "
-    "the name)";
+    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh, or points as text (the "
+    "content counts, not the name)";
 
 bool BeginsWith(std::string_view text, std::string_view start) {
   return text.substr(0, start.size()) == start;
@@ -121,6 +123,19 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   return file;
 }
 
+std::string NameOrFile(const Scan& scan) {
+  return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
+}
+
+void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
+  std::optional<Scan> grid = GridFromCloud(*scan);
+  if (!grid) return;
+  notes->push_back(
+      NameOrFile(*scan) + " is a cloud without a grid; its angles from the station show one of " +
+      std::to_string(grid->num_columns) + " columns x " + std::to_string(grid->num_rows) + " rows");
+  *scan = std::move(*grid);
+}
+
 ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
   ScanFile file;
   file.format = "E57";
@@ -128,13 +143,8 @@ ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
   file.meters_per_unit = MetersPerUnitOr(options.units, 1);
   file.scans = ReadE57(path.file, path.part,
                        {file.meters_per_unit, options.max_range, options.e57_check}, &file.notes);
-  for (const Scan& scan : file.scans) {
-    if (scan.kind() != Scan::Kind::kCloud) continue;
-    throw InputError(
-        path.file, "",
-        "the scan " + Quoted(scan.name) + " is a cloud of points without the scanner's grid",
-        "Export it as a structured E57 (with rows and columns), or name another scan "
-        "behind #");
+  for (Scan& scan : file.scans) {
+    if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
   }
   return file;
 }
@@ -200,6 +210,11 @@ ScanFile ReadScanFile(const std::string& given_path, const ScanReaderOptions& op
     file.format = "OBJ";
     file.byte_order = "text";
     file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
+  } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
+    file.format = "XYZ";
+    file.byte_order = "text";
+    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range}));
+    FindGridAgain(&file.scans[0], &file.notes);
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),
@@ -212,8 +227,21 @@ ScanFile ReadScanFile(const std::string& given_path, const ScanReaderOptions& op
   return file;
 }
 
+void RequireSurfaces(const ScanFile& file) {
+  for (const Scan& scan : file.scans) {
+    if (scan.kind() != Scan::Kind::kCloud) continue;
+    throw InputError(scan.path, "",
+                     NameOrFile(scan) +
+                         " is a cloud of points without the scanner's grid, and its angles from "
+                         "the station show none",
+                     "Export it with its grid (structured E57, PTX), or name another scan behind "
+                     "#");
+  }
+}
+
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file = ReadScanFile(path, options);
+  RequireSurfaces(file);
   if (file.scans.size() > 1) {
     throw InputError(path, "",
                      "holds " + std::to_string(file.scans.size()) + " scans, expected one",
@@ -241,6 +269,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   std::vector<Missing> missing;
   for (const std::string& path : paths) {
     ScanFile file = ReadScanFile(path, options);
+    RequireSurfaces(file);
     const int count = static_cast<int>(file.scans.size());
     PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);

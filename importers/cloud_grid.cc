@@ -1,0 +1,225 @@
+#include "importers/cloud_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/core.hpp>
+
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kMostAngles = 200000;      // that the steps are found from
+constexpr int kBins = 1 << 18;           // of the histogram whose periods are looked at
+constexpr int kFewestLines = 8;          // slower changes are the room's
+constexpr double kSteepest = 1.2;        // radians; nearer to the poles azimuths say little
+constexpr double kCoherence = 0.6;       // share of the strongest period that is one, too
+constexpr double kNearLine = 0.3;        // of a step
+constexpr double kLeastNearLines = 0.9;  // share of the points
+constexpr double kMostDoubled = 0.1;     // share of the points that may share a cell
+constexpr double kMostCellsPerPoint = 64;
+constexpr double kFinestStep = 5e-6;  // radians; no scanner turns by less
+
+struct Angles {
+  double azimuth, elevation;
+};
+
+Angles AnglesOf(const Eigen::Vector3d& x_in_station) {
+  return {std::atan2(x_in_station.y(), x_in_station.x()),
+          std::atan2(x_in_station.z(), std::hypot(x_in_station.x(), x_in_station.y()))};
+}
+
+// Lines at first + k * step.
+struct Lines {
+  double first = 0, step = 0;
+
+  double Place(double value) const { return (value - first) / step; }
+};
+
+// The strongest period of the values' density, from its Fourier transform over twice their span (so
+// that periods between two frequencies are seen, too). None if there is none.
+std::optional<Lines> StrongestPeriod(const std::vector<double>& values, double low, double span) {
+  cv::Mat1f density(1, kBins, 0.0f);
+  const double bins_per_unit = kBins / (2 * span);
+  for (const double value : values) {
+    const int bin = static_cast<int>((value - low) * bins_per_unit);
+    density(0, std::clamp(bin, 0, kBins - 1)) += 1;
+  }
+  cv::Mat2f spectrum;
+  cv::dft(density, spectrum, cv::DFT_COMPLEX_OUTPUT);
+  const auto strength = [&](int k) { return std::hypot(spectrum(0, k)[0], spectrum(0, k)[1]); };
+  float strongest = 0;
+  for (int k = 2 * kFewestLines; k < kBins / 4; ++k) strongest = std::max(strongest, strength(k));
+  // Lines have harmonics as strong as they are: the first peak counts.
+  for (int k = 2 * kFewestLines; k < kBins / 4; ++k) {
+    if (strength(k) < kCoherence * strongest || strength(k) < strength(k + 1)) continue;
+    if (strength(k) < kCoherence * static_cast<double>(values.size())) return std::nullopt;
+    const double phase = std::atan2(-spectrum(0, k)[1], spectrum(0, k)[0]) / (2 * kPi);
+    const double step = 2 * span / k;
+    return Lines{low + phase * step + 0.5 / bins_per_unit, step};
+  }
+  return std::nullopt;
+}
+
+// Least squares over the values that lie near a line.
+Lines Refined(const std::vector<double>& values, Lines lines) {
+  for (int round = 0; round < 4; ++round) {
+    double n = 0, k1 = 0, k2 = 0, v1 = 0, kv = 0;
+    const double centre = std::round(lines.Place(values[values.size() / 2]));
+    for (const double value : values) {
+      const double place = lines.Place(value), line = std::round(place);
+      if (std::abs(place - line) > kNearLine) continue;
+      const double k = line - centre;
+      n += 1, k1 += k, k2 += k * k, v1 += value, kv += k * value;
+    }
+    const double spread = n * k2 - k1 * k1;
+    if (!(spread > 0)) return lines;
+    lines.step = (n * kv - k1 * v1) / spread;
+    lines.first = (v1 - lines.step * k1) / n - lines.step * centre;
+  }
+  return lines;
+}
+
+std::optional<Lines> FindLines(std::vector<double> values) {
+  if (values.size() < 4 * kFewestLines) return std::nullopt;
+  std::sort(values.begin(), values.end());
+  const double span = values.back() - values.front();
+  if (!(span > 0)) return std::nullopt;
+  const std::optional<Lines> lines = StrongestPeriod(values, values.front(), span);
+  if (!lines) return std::nullopt;
+  const Lines refined = Refined(values, *lines);
+  const bool is_same = refined.step > 0.5 * lines->step && refined.step < 2 * lines->step;
+  if (!is_same || !(refined.step > kFinestStep)) return std::nullopt;
+  return refined;
+}
+
+// Where the widest gap between azimuths ends: there the columns begin.
+double StartOfAzimuths(const std::vector<Angles>& angles) {
+  constexpr int kDirections = 3600;
+  std::vector<bool> is_seen(kDirections, false);
+  const auto direction = [](double azimuth) {
+    return std::clamp(static_cast<int>((azimuth + kPi) / (2 * kPi) * kDirections), 0,
+                      kDirections - 1);
+  };
+  for (const Angles& a : angles) is_seen[static_cast<size_t>(direction(a.azimuth))] = true;
+  int widest = 0, end = 0, gap = 0;
+  for (int i = 0; i < 2 * kDirections; ++i) {
+    gap = is_seen[static_cast<size_t>(i % kDirections)] ? 0 : gap + 1;
+    if (gap > widest) widest = gap, end = i + 1;
+  }
+  return end * 2 * kPi / kDirections - kPi;
+}
+
+class GridFinder {
+ public:
+  explicit GridFinder(const Scan& cloud)
+      : cloud_(cloud), station_from_scan_(cloud.scan_from_station.Inverse()) {}
+
+  std::optional<Scan> Find() {
+    if (!FindSteps() || !FindSize()) return std::nullopt;
+    return Fill();
+  }
+
+ private:
+  Angles AnglesAt(size_t i) const { return AnglesOf(station_from_scan_ * cloud_.points[i]); }
+  // From where the columns begin, 0 to a full turn.
+  double Turn(double azimuth) const {
+    const double turn = std::fmod(azimuth - start_, 2 * kPi);
+    return turn < 0 ? turn + 2 * kPi : turn;
+  }
+
+  bool FindSteps() {
+    std::vector<Angles> angles;
+    const size_t every = cloud_.points.size() / kMostAngles + 1;
+    for (size_t i = 0; i < cloud_.points.size(); i += every) {
+      const Angles a = AnglesAt(i);
+      if (std::abs(a.elevation) < kSteepest) angles.push_back(a);
+    }
+    start_ = StartOfAzimuths(angles);
+    std::vector<double> turns, elevations;
+    for (const Angles& a : angles) {
+      turns.push_back(Turn(a.azimuth));
+      elevations.push_back(a.elevation);
+    }
+    const std::optional<Lines> columns = FindLines(std::move(turns));
+    const std::optional<Lines> rows = FindLines(std::move(elevations));
+    if (!columns || !rows) return false;
+    columns_ = *columns;
+    rows_ = *rows;
+    return true;
+  }
+
+  // How many lines there are, and whether the points stand on them.
+  bool FindSize() {
+    const int per_turn = static_cast<int>(std::lround(2 * kPi / columns_.step));
+    double lowest = 1e300, highest = -1e300, first = 1e300, last = -1e300;
+    size_t num_near = 0, num_asked = 0;
+    for (size_t i = 0; i < cloud_.points.size(); ++i) {
+      const Angles a = AnglesAt(i);
+      const double row = rows_.Place(a.elevation), column = columns_.Place(Turn(a.azimuth));
+      lowest = std::min(lowest, std::round(row));
+      highest = std::max(highest, std::round(row));
+      first = std::min(first, std::round(column));
+      last = std::max(last, std::round(column));
+      if (std::abs(a.elevation) >= kSteepest) continue;
+      ++num_asked;
+      num_near += std::abs(row - std::round(row)) < kNearLine &&
+                  std::abs(column - std::round(column)) < kNearLine;
+    }
+    const double num_rows = highest - lowest + 1;
+    const double num_columns = std::min<double>(last - first + 1, per_turn);
+    if (!(num_rows * num_columns <=
+          std::min(kMostCellsPerPoint * static_cast<double>(cloud_.points.size()), 2e9))) {
+      return false;
+    }
+    top_ = highest;
+    first_column_ = first;
+    num_rows_ = static_cast<int>(num_rows);
+    num_columns_ = static_cast<int>(num_columns);
+    return static_cast<double>(num_near) >= kLeastNearLines * static_cast<double>(num_asked);
+  }
+
+  std::optional<Scan> Fill() const {
+    Scan scan = cloud_;
+    scan.organised = true;
+    scan.num_rows = num_rows_;
+    scan.num_columns = num_columns_;
+    const size_t cells = static_cast<size_t>(num_rows_) * static_cast<size_t>(num_columns_);
+    scan.points.assign(cells, Scan::MissingPoint());
+    scan.intensity.assign(cells, 0.0f);
+    size_t num_doubled = 0;
+    for (size_t i = 0; i < cloud_.points.size(); ++i) {
+      const Angles a = AnglesAt(i);
+      const int row = static_cast<int>(top_ - std::round(rows_.Place(a.elevation)));
+      const int column =
+          static_cast<int>(std::round(columns_.Place(Turn(a.azimuth))) - first_column_) %
+          num_columns_;
+      const int cell = scan.Index(column, row);
+      if (!scan.IsMissing(cell)) {
+        ++num_doubled;
+        continue;
+      }
+      scan.points[static_cast<size_t>(cell)] = cloud_.points[i];
+      scan.intensity[static_cast<size_t>(cell)] = cloud_.intensity[i];
+    }
+    if (static_cast<double>(num_doubled) >
+        kMostDoubled * static_cast<double>(cloud_.points.size())) {
+      return std::nullopt;
+    }
+    return scan;
+  }
+
+  const Scan& cloud_;
+  Rigid station_from_scan_;
+  double start_ = 0;  // azimuth
+  Lines rows_, columns_;
+  double top_ = 0, first_column_ = 0;
+  int num_rows_ = 0, num_columns_ = 0;
+};
+
+}  // namespace
+
+std::optional<Scan> GridFromCloud(const Scan& cloud) { return GridFinder(cloud).Find(); }
+
+}  // namespace roomtex

@@ -1,0 +1,27 @@
+#pragma once
+// XYZ, CSV and PTS: text files with a point a line.
+
+#include <string>
+#include <string_view>
+
+#include "core/scan.h"
+
+namespace roomtex {
+
+struct XyzOptions {
+  double meters_per_unit = 1;
+  double max_range = 0;  // metres from the origin; 0 = no limit
+};
+
+// Lines "x y z", "x y z intensity", "x y z r g b" or "x y z intensity r g b", all alike, between
+// blanks, tabs, commas or semicolons; further columns are passed over. PTS: the number of points
+// alone in the first line. A line of names (x, y, z, intensity, in any order and case) decides the
+// columns. Lines that begin with # or // are comments. The scan is a cloud (Scan::Kind), its
+// station the origin, z up; points that are no numbers (nan) are left out; where there is no
+// intensity, the grey of the colours is. Throws InputError with the line.
+Scan ReadXyz(const std::string& path, const XyzOptions& options);
+
+// The start of a file is that of such a text.
+bool LooksLikeXyz(std::string_view start);
+
+}  // namespace roomtex

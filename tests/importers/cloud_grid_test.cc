@@ -1,0 +1,163 @@
+#include "importers/cloud_grid.h"
+
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "importers/e57_writer.h"
+#include "importers/scan_reader.h"
+#include "tests/importers/e57_bytes.h"
+#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+// A box around a station, as a scanner of even steps sees it.
+struct BoxScanner {
+  Rigid pose{Eigen::Quaterniond(0.9, 0, 0, 0.43).normalized(), {100, -20, 3}};
+  double first_azimuth = 0.3, azimuth_step = 2 * kPi / 400, elevation_step = 0.0131;
+  int num_columns = 400, num_rows = 120;
+  double noise = 0;  // metres, of each coordinate
+
+  Scan Cloud(bool shuffled = true) const {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    std::vector<std::pair<Eigen::Vector3d, float>> points;
+    for (int column = 0; column < num_columns; ++column) {
+      for (int row = 0; row < num_rows; ++row) {
+        if (random() % 10 == 0) continue;  // no return
+        const double azimuth = first_azimuth + azimuth_step * column;
+        const double elevation = 0.9 - elevation_step * row;
+        const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
+                                        std::cos(elevation) * std::sin(azimuth),
+                                        std::sin(elevation));
+        const double range =
+            1 / (direction.cwiseAbs().cwiseQuotient(Eigen::Vector3d(4, 3, 1.5))).maxCoeff();
+        const Eigen::Vector3d error(normal(random), normal(random), normal(random));
+        points.emplace_back(pose * (range * direction + noise * error),
+                            static_cast<float>(column * 1000 + row));
+      }
+    }
+    if (shuffled) std::shuffle(points.begin(), points.end(), random);
+    Scan scan;
+    scan.organised = false;
+    scan.scan_from_station = pose;
+    scan.up = Eigen::Vector3d::UnitZ();
+    for (const auto& [point, intensity] : points) {
+      scan.points.push_back(point);
+      scan.intensity.push_back(intensity);
+    }
+    scan.num_columns = static_cast<int>(points.size());
+    scan.num_rows = 1;
+    return scan;
+  }
+};
+
+// Points must stand in their own cells; the first column may be any of a full turn.
+void ExpectItsGrid(const BoxScanner& scanner, const Scan& cloud, const std::optional<Scan>& grid) {
+  ASSERT_TRUE(grid.has_value());
+  ASSERT_EQ(grid->kind(), Scan::Kind::kGrid);
+  EXPECT_EQ(grid->num_columns, scanner.num_columns);
+  EXPECT_EQ(grid->num_rows, scanner.num_rows);
+  ASSERT_EQ(grid->points.size() - static_cast<size_t>(grid->NumMissing()), cloud.points.size());
+  std::set<int> shifts;
+  for (int row = 0; row < grid->num_rows; ++row) {
+    for (int column = 0; column < grid->num_columns; ++column) {
+      const int cell = grid->Index(column, row);
+      if (grid->IsMissing(cell)) continue;
+      const int mark = static_cast<int>(grid->intensity[static_cast<size_t>(cell)]);
+      ASSERT_EQ(mark % 1000, row);
+      shifts.insert((column - mark / 1000 + scanner.num_columns) % scanner.num_columns);
+    }
+  }
+  EXPECT_EQ(shifts.size(), 1u);
+}
+
+TEST(CloudGrid, IsFoundInAnyOrderOfThePoints) {
+  for (const bool shuffled : {false, true}) {
+    const BoxScanner scanner;
+    const Scan cloud = scanner.Cloud(shuffled);
+    ExpectItsGrid(scanner, cloud, GridFromCloud(cloud));
+  }
+}
+
+TEST(CloudGrid, IsFoundOverTheSeamAndInAPartOfATurn) {
+  BoxScanner scanner;
+  scanner.first_azimuth = 2.4;  // over 180 degrees
+  scanner.azimuth_step = 0.00917;
+  scanner.num_columns = 150;
+  const Scan cloud = scanner.Cloud();
+  ExpectItsGrid(scanner, cloud, GridFromCloud(cloud));
+}
+
+TEST(CloudGrid, ToleratesRoundedCoordinates) {
+  BoxScanner scanner;
+  scanner.noise = 0.001;  // a step is 16 mm at 1 m
+  const Scan cloud = scanner.Cloud();
+  const std::optional<Scan> grid = GridFromCloud(cloud);
+  ASSERT_TRUE(grid.has_value());
+  EXPECT_EQ(grid->num_columns, scanner.num_columns);
+  EXPECT_EQ(grid->num_rows, scanner.num_rows);
+  EXPECT_GT(grid->points.size() - static_cast<size_t>(grid->NumMissing()),
+            0.999 * static_cast<double>(cloud.points.size()));
+}
+
+TEST(CloudGrid, IsNotSeenWhereThereIsNone) {
+  const BoxScanner scanner;
+  Scan elsewhere = scanner.Cloud();
+  elsewhere.scan_from_station.translation.x() += 0.5;  // the scanner did not stand there
+  EXPECT_FALSE(GridFromCloud(elsewhere).has_value());
+  Scan random = elsewhere;
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> uniform(-3, 3);
+  for (Eigen::Vector3d& point : random.points) {
+    point = random.Station() +
+            Eigen::Vector3d(uniform(generator), uniform(generator), uniform(generator));
+  }
+  EXPECT_FALSE(GridFromCloud(random).has_value());
+  Scan two = scanner.Cloud();
+  BoxScanner other;
+  other.pose.translation = {101, -20, 3};
+  const Scan more = other.Cloud();
+  two.points.insert(two.points.end(), more.points.begin(), more.points.end());
+  two.intensity.insert(two.intensity.end(), more.intensity.begin(), more.intensity.end());
+  EXPECT_FALSE(GridFromCloud(two).has_value());
+  Scan few = scanner.Cloud();
+  few.points.resize(20);
+  few.intensity.resize(20);
+  EXPECT_FALSE(GridFromCloud(few).has_value());
+}
+
+TEST(CloudGrid, ACloudInAnE57GetsItsGridBack) {
+  const BoxScanner scanner;
+  const Scan cloud = scanner.Cloud();
+  const Rigid station_from_scan = cloud.scan_from_station.Inverse();
+  std::string streams[3];
+  for (const Eigen::Vector3d& point : cloud.points) {
+    const Eigen::Vector3f x = (station_from_scan * point).cast<float>();
+    for (int i = 0; i < 3; ++i) streams[i] += Bytes(x[i]);
+  }
+  E57Bytes file;
+  const uint64_t offset = file.AddPoints({streams[0], streams[1], streams[2]});
+  TempFolder folder;
+  WriteBytes(folder / "cloud.e57",
+             file.Finish(E57Xml(ScanXml(offset, cloud.points.size(), SinglesXml()))));
+  const ScanFile read = ReadScanFile(folder / "cloud.e57", {});
+  EXPECT_EQ(read.scans[0].num_columns, 400);
+  EXPECT_EQ(read.scans[0].num_rows, 120);
+  EXPECT_THAT(read.notes, testing::ElementsAre(testing::HasSubstr("400 columns x 120 rows")));
+  EXPECT_EQ(ReadScan(folder / "cloud.e57", {}).kind(), Scan::Kind::kGrid);
+  E57Bytes other;
+  const std::string one = StreamOf<float>({1, 2, 3});
+  const uint64_t at = other.AddPoints({one, one, one});
+  WriteBytes(folder / "other.e57", other.Finish(E57Xml(ScanXml(at, 3, SinglesXml()))));
+  EXPECT_EQ(ReadScanFile(folder / "other.e57", {}).scans[0].kind(), Scan::Kind::kCloud);
+  EXPECT_INPUT_ERROR(ReadScan(folder / "other.e57", {}), "is a cloud of points without");
+  EXPECT_INPUT_ERROR(ReadScans({folder / "other.e57"}, "", {}), "is a cloud of points without");
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,106 @@
+#include "importers/xyz.h"
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "core/frames.h"
+#include "importers/scan_reader.h"
+#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+using testing::ElementsAre;
+using testing::FloatEq;
+using testing::SizeIs;
+
+class Xyz : public testing::Test {
+ protected:
+  Scan Read(const std::string& text, const XyzOptions& options = {}) {
+    WriteBytes(folder_ / "points.txt", text);
+    EXPECT_TRUE(LooksLikeXyz(text)) << text;
+    return ReadXyz(folder_ / "points.txt", options);
+  }
+  void ExpectError(const std::string& text, const std::string& message) {
+    WriteBytes(folder_ / "points.txt", text);
+    EXPECT_INPUT_ERROR(ReadXyz(folder_ / "points.txt", {}), message);
+    EXPECT_INPUT_ERROR(ReadXyz(folder_ / "points.txt", {}), folder_ / "points.txt");
+  }
+  TempFolder folder_;
+};
+
+TEST_F(Xyz, TheNumberOfColumnsSaysWhatTheyAre) {
+  const Scan plain = Read("651234.123456 5412345.654321 123.5\n-1e0 +2 .5\n");
+  EXPECT_EQ(plain.kind(), Scan::Kind::kCloud);
+  ASSERT_THAT(plain.points, SizeIs(2));
+  EXPECT_THAT(plain.points[0],
+              IsNearMatrix(Eigen::Vector3d(651234.123456, 5412345.654321, 123.5), 0));
+  EXPECT_THAT(plain.points[1], IsNearMatrix(Eigen::Vector3d(-1, 2, 0.5), 0));
+  EXPECT_THAT(plain.intensity, ElementsAre(0, 0));
+  EXPECT_THAT(plain.up, IsNearMatrix(Eigen::Vector3d::UnitZ(), 0));
+  EXPECT_THAT(Read("1,2,3,0.5\r\n4;5;6;0.25\r\n").intensity, ElementsAre(0.5f, 0.25f));
+  EXPECT_THAT(Read("1 2 3 10 20 30\n").intensity,
+              ElementsAre(FloatEq(0.299f * 10 + 0.587f * 20 + 0.114f * 30)));
+  EXPECT_THAT(Read("1\t2\t3\t-900 10 20 30\n").intensity, ElementsAre(-900));
+}
+
+TEST_F(Xyz, NamesSayWhatTheColumnsAre) {
+  const Scan scan =
+      Read("# made by hand\n//X,Intensity,Z,other,Y\n1,7,3,text?,2\n\n4,8,6,more,5\n");
+  ASSERT_THAT(scan.points, SizeIs(2));
+  EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0));
+  EXPECT_THAT(scan.intensity, ElementsAre(7, 8));
+}
+
+TEST_F(Xyz, APtsSaysItsNumberOfPoints) {
+  EXPECT_THAT(Read("2\n1 2 3 -5 0 0 0\n4 5 6 -6 0 0 0\n").points, SizeIs(2));
+  ExpectError("3\n1 2 3 -5 0 0 0\n4 5 6 -6 0 0 0\n", "line 4: the file ends after 2 of 3 points");
+  ExpectError("1000000000000\n1 2 3\n", "line 1: is \"1000000000000\", expected the number");
+}
+
+TEST_F(Xyz, PointsThatAreNoneAreLeftOut) {
+  XyzOptions options;
+  options.meters_per_unit = 1e-3;
+  options.max_range = 5;
+  const Scan scan = Read("1000 2000 3000\nnan nan nan\n9000 0 0\n1e999 0 1e-999\n", options);
+  ASSERT_THAT(scan.points, SizeIs(1));
+  EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 1e-12));
+}
+
+TEST_F(Xyz, TellsTheLineOfWhatIsWrong) {
+  ExpectError("1 2 3\n1 2\n", "line 2: is \"1 2\", expected 3 columns");
+  ExpectError("1 2 3\n1 2 x\n", "line 2: is \"1 2 x\", expected numbers");
+  ExpectError("1 2 3\n# fine\n1,5 2,5 3,5\n", "line 3");
+  ExpectError("5 6\n", "line 1: is \"5 6\", expected x, y and z");
+  ExpectError("hello\n", "line 1: is \"hello\", expected numbers, or the names of columns");
+  ExpectError("# nothing\n", "holds no point");
+  ExpectError("nan nan nan\n", "holds no point");
+  for (const char* text : {"hello", "12\nhello\n", "# nothing\n", "1 2\n3 4\n", ""}) {
+    EXPECT_FALSE(LooksLikeXyz(text)) << text;
+  }
+}
+
+// A scan of a box, its points in any order.
+TEST_F(Xyz, AScanThatLostItsGridGetsItBack) {
+  std::string text;
+  for (int i = 0; i < 200 * 60; ++i) {
+    const int k = i * 7 % (200 * 60);
+    const double azimuth = 2 * kPi * (k / 60) / 200, elevation = 0.7 - 0.02 * (k % 60);
+    const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
+                                    std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+    const Eigen::Vector3d point = direction / (direction.cwiseAbs() / 3).maxCoeff();
+    for (int axis = 0; axis < 3; ++axis) text += std::to_string(point[axis]) + " ";
+    text += "0.5\n";
+  }
+  WriteBytes(folder_ / "box.ply", text);  // the content counts
+  const ScanFile file = ReadScanFile(folder_ / "box.ply", {});
+  EXPECT_EQ(file.format, "XYZ");
+  EXPECT_EQ(file.scans[0].kind(), Scan::Kind::kGrid);
+  EXPECT_EQ(file.scans[0].num_columns, 200);
+  EXPECT_EQ(file.scans[0].num_rows, 60);
+  WriteBytes(folder_ / "few.xyz", "1 2 3\n4 5 6\n");
+  EXPECT_INPUT_ERROR(ReadScan(folder_ / "few.xyz", {}), "is a cloud of points without");
+}
+
+}  // namespace
+}  // namespace roomtex
