@@ -1,4 +1,4 @@
-// roomtex-align: the sparse model into the scan, by picks.
+// roomtex-align: the sparse model into the scan, by picks or without.
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +11,13 @@
 
 #include "align/alignment.h"
 #include "align/alignment_report.h"
+#include "align/automatic_alignment.h"
 #include "align/geo/geo_output.h"
 #include "align/lens_report.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
 #include "align/plane_bundle_report.h"
+#include "align/search_report.h"
 #include "align/surface/scan_planes_report.h"
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
@@ -41,6 +43,7 @@ struct Arguments {
   std::string panoramas_path;
   std::string geo_origin;
   std::vector<std::string> scan_paths;
+  std::string near;
   ScanReaderOptions scan_reader;
   AlignmentOptions alignment;
   PhotoCameraOptions camera;
@@ -63,9 +66,14 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
                         "weight: 1 = ordinary, "
-                        "more = more exact, 0 = off); at least six, in one photo or spread "
-                        "over several; pixels of the photo as taken, metres in the scan frame.",
+                        "more = more exact, 0 = off); six or more, in one photo or spread "
+                        "over several; pixels of the photo as taken, metres in the scan frame. "
+                        "Without picks, or with one to five as a hint, the place is searched for, "
+                        "which needs --image_path.",
                         Command::Kind::kOptional);
+  command->AddString("near", &a->near,
+                     "PHOTO,X,Y,Z: a photo and a place of the scan that it shows (metres, scan "
+                     "frame), a hint for the search without picks.");
   command->AddOutputPath(
       "output_path", &a->output_path,
       "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
@@ -119,11 +127,11 @@ void AddOptions(Arguments* a, Command* command) {
 }
 
 void CheckArguments(const Arguments& a) {
-  if (a.picks_path.empty()) {
+  if (a.picks_path.empty() && (a.input_path.empty() || a.image_path.empty())) {
     throw UsageError(
-        "--picks_path is missing: aligning without picks is not available in this version. Make a "
-        "picks file, a CSV with the header image_name,x,y,scan_x,scan_y,scan_z and six or more "
-        "lines");
+        "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
+        "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
+        "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
   AppendProblems(a.alignment.Problems(), &problems);
@@ -288,6 +296,7 @@ struct Reading {
   std::unique_ptr<const SurveyedScans> surveyed;
   std::optional<GeoReference> geo;
   AlignmentAttempt attempt;
+  Json search;  // of an alignment without picks
 
   // Of the first RTPI scan; "" = there is none.
   std::string azimuth() const {
@@ -321,10 +330,38 @@ void TakeMirroredReading(MirroredReading found, Reading* reading, const Command:
   reading->attempt = std::move(found.attempt);
 }
 
+// What was searched for, from here on the attempt.
+void TakeAutomatic(AutomaticAlignment found, Reading* reading) {
+  reading->search = SearchToJson(found);
+  reading->attempt = std::move(found.attempt);
+}
+
+// Aligns without picks, or with few as a hint. A mirrored scan is read the other way, as below.
+void SearchScans(const AlignmentInput& input, const std::vector<NearHint>& near,
+                 const AlignmentOptions& options, bool may_turn, Reading* reading,
+                 const Command::Context& context) {
+  AutomaticAlignment found = AlignAutomatically(input, near, options, &context.progress);
+  const bool turns = found.attempt.says_mirrored && may_turn;
+  TakeAutomatic(std::move(found), reading);
+  if (!turns) return;
+  MirroredReading other;
+  other.scans = std::make_unique<const std::vector<Scan>>(MirrorScans(input.surveyed.scans()));
+  other.surveyed = std::make_unique<const SurveyedScans>(*other.scans, input.surveyed.options());
+  AlignmentInput turned{input.model,          *other.surveyed,  input.picks,
+                        input.picks_path,     input.azimuth,    input.photo_labels,
+                        input.lenses_refined, input.image_path, input.num_threads};
+  AutomaticAlignment again = AlignAutomatically(turned, near, options, &context.progress);
+  if (!again.attempt.alignment) return;
+  reading->search = SearchToJson(again);
+  other.attempt = std::move(again.attempt);
+  other.evidence = "without picks, only the other reading fits the photos";
+  TakeMirroredReading(std::move(other), reading, context);
+}
+
 // Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
 // how and there is no other format among the scans, or says so.
-void AlignScans(const Arguments& a, const AlignmentInput& input, Reading* reading,
-                const Command::Context& context) {
+void AlignScans(const Arguments& a, const AlignmentInput& input, const std::vector<NearHint>& near,
+                Reading* reading, const Command::Context& context) {
   const std::vector<PlacedScans::File>& files = reading->placed.files;
   const bool may_turn = a.scan_reader.azimuth == "auto" &&
                         std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
@@ -332,6 +369,9 @@ void AlignScans(const Arguments& a, const AlignmentInput& input, Reading* readin
                         });
   AlignmentOptions options = a.alignment;
   options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
+  if (AreHints(input.picks)) {
+    return SearchScans(input, near, options, may_turn, reading, context);
+  }
   AlignmentAttempt& attempt = reading->attempt;
   attempt = AttemptAlignment(input, options, &context.progress);
   if (attempt.says_mirrored && !may_turn) return;
@@ -417,6 +457,24 @@ LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) 
   return ReadLensLabels(names, image_path);
 }
 
+// Where the photos belong, besides the picks, which are checked: fewer than six are a hint where
+// there are photos to confirm what is found.
+std::vector<NearHint> ReadHints(const Arguments& a, const std::vector<Pick>& picks,
+                                const SparseModel& model) {
+  if (AreHints(picks) && !a.image_path.empty()) {
+    CheckPickNames(a.picks_path, picks, model);
+  } else {
+    CheckPicksAgainstModel(a.picks_path, picks, model);
+  }
+  if (a.near.empty()) return {};
+  const NearHint near = ParseNearHint(a.near);
+  if (!AreHints(picks)) throw UsageError("--near is a hint for a search, which six picks need not");
+  if (model.FindImage(near.image_name) == nullptr) {
+    throw UsageError("--near names " + near.image_name + ", which is not in the sparse model");
+  }
+  return {near};
+}
+
 void Align(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read model");
@@ -424,8 +482,9 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
-  const std::vector<Pick> picks = ReadPicks(a.picks_path);
-  CheckPicksAgainstModel(a.picks_path, picks, model);
+  const std::vector<Pick> picks =
+      a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  const std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
   Reading reading(a, context);
@@ -435,7 +494,8 @@ void Align(const Arguments& a, const Command::Context& context) {
              {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(),
               PhotoLabels(model, a.image_path), verdict.refined, a.image_path,
               context.options.num_threads},
-             &reading, context);
+             near, &reading, context);
+  context.report["search"] = reading.search;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
   if (!a.planes_path.empty()) {
     WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads);
@@ -510,7 +570,8 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
 int main(int argc, char** argv) {
   roomtex::Arguments arguments;
   roomtex::Command command(
-      "roomtex-align", "Brings COLMAP's sparse model into the frame of a range scan, by picks.",
+      "roomtex-align",
+      "Brings COLMAP's sparse model into the frame of a range scan, by picks or without.",
       "roomtex-align --input_path sparse/0 --scan_path room.rtpi --picks_path picks.csv "
       "--output_path aligned");
   roomtex::AddOptions(&arguments, &command);

@@ -11,13 +11,14 @@ declare -A allowed=(
   [colmap_ext]="core"
   [importers]="core"
 
-  [align]="$below align/geo align/trust align/fit align/clicks align/surface"
+  [align]="$below align/geo align/trust align/search align/fit align/clicks align/surface"
   [align/geo]="$below"
-  [align/trust]="$below align/fit align/clicks align/surface"
+  [align/trust]="$below align/search align/fit align/clicks align/surface"
+  [align/search]="$below align/fit align/clicks align/surface"
   [align/fit]="$below align/clicks align/surface"
   [align/clicks]="$below"
   [align/surface]="$below"
-  [align/pick]="$below align align/trust align/fit align/clicks align/surface"
+  [align/pick]="$below align align/trust align/search align/fit align/clicks align/surface"
 
   [texture]="$below texture/output texture/texels texture/tone texture/sampling"
   [texture/output]="$below texture/texels texture/sampling"

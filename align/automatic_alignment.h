@@ -1,0 +1,31 @@
+#pragma once
+// An alignment without picks, or with fewer than fix a pose: starts are searched for, judged, and
+// the best one is fitted and adjusted as after clicks.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "align/mirrored_reading.h"
+#include "align/start_search.h"
+#include "align/start_verdict.h"
+
+namespace roomtex {
+
+struct AutomaticAlignment {
+  StartSearch search;
+  StartVerdict verdict;
+  // Its reasons hold that of the verdict.
+  AlignmentAttempt attempt;
+};
+
+// Fewer picks than fix a pose, so that they can only be a hint.
+bool AreHints(const std::vector<Pick>& picks);
+
+// input.picks: hints, may be empty. near: names must be in the model.
+AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
+                                      const std::vector<NearHint>& near,
+                                      const AlignmentOptions& options, Progress* progress);
+
+}  // namespace roomtex

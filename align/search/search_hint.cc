@@ -1,0 +1,88 @@
+#include "align/search/search_hint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "core/camera_model.h"
+#include "core/error.h"
+#include "core/frames.h"
+
+namespace roomtex {
+namespace {
+
+const double kPickAngle = RadFromDeg(1.5);
+const double kAnyWhere = RadFromDeg(80.0);  // a photo that shows all around
+
+// Half of what the photo shows along its diagonal.
+double HalfView(const Camera& camera) {
+  if (camera.IsPanorama()) return kPi;
+  return std::atan(0.5 * std::hypot(camera.width, camera.height) / camera.MeanFocalLength());
+}
+
+}  // namespace
+
+NearHint ParseNearHint(const std::string& text) {
+  const auto fail = [&text]() -> UsageError {
+    return UsageError("--near is \"" + text +
+                      "\": expected PHOTO,X,Y,Z, a photo and a place of the scan that it shows "
+                      "(metres, scan frame)");
+  };
+  std::vector<size_t> commas;
+  for (size_t at = text.size(); at-- > 0 && commas.size() < 3;) {
+    if (text[at] == ',') commas.push_back(at);
+  }
+  if (commas.size() < 3 || commas[2] == 0) throw fail();
+  NearHint hint;
+  hint.image_name = text.substr(0, commas[2]);
+  for (int k = 0; k < 3; ++k) {
+    const size_t begin = commas[2 - k] + 1;
+    const size_t end = k < 2 ? commas[1 - k] : text.size();
+    const std::string number = text.substr(begin, end - begin);
+    char* rest = nullptr;
+    hint.x_in_scan[k] = std::strtod(number.c_str(), &rest);
+    if (number.empty() || *rest != '\0' || !std::isfinite(hint.x_in_scan[k])) throw fail();
+  }
+  return hint;
+}
+
+std::vector<HintRay> FindHintRays(const SparseModel& model, const std::vector<Pick>& picks,
+                                  const std::vector<NearHint>& near) {
+  std::vector<HintRay> rays;
+  const auto add = [&rays](const SparseImage& image, const Eigen::Vector3d& ray_in_cam,
+                           const Eigen::Vector3d& x_in_scan, double max_angle) {
+    const Rigid sparse_from_cam = image.cam_from_model.Inverse();
+    rays.push_back({sparse_from_cam.translation, sparse_from_cam.rotation * ray_in_cam.normalized(),
+                    x_in_scan, max_angle});
+  };
+  for (const Pick& pick : picks) {
+    if (!(pick.weight > 0)) continue;
+    const SparseImage& image = *model.FindImage(pick.image_name);
+    const auto ray = CameraProjection(model.cameras.at(image.camera_id)).RayFromImg(pick.x_in_img);
+    if (ray) add(image, *ray, pick.x_in_scan, kPickAngle);
+  }
+  for (const NearHint& hint : near) {
+    const SparseImage& image = *model.FindImage(hint.image_name);
+    add(image, Eigen::Vector3d::UnitZ(), hint.x_in_scan,
+        HalfView(model.cameras.at(image.camera_id)));
+  }
+  return rays;
+}
+
+bool Agrees(const HintRay& ray, const Eigen::Vector3d& centre_in_scan,
+            const Eigen::Vector3d& direction_in_scan, double slack) {
+  if (ray.max_angle > kAnyWhere) return true;
+  const Eigen::Vector3d offset = ray.x_in_scan - centre_in_scan;
+  const double along = offset.dot(direction_in_scan);
+  const double limit = std::max(along, 0.0) * std::tan(ray.max_angle) + slack;
+  return along > -slack && offset.squaredNorm() - along * along <= limit * limit;
+}
+
+bool Agrees(const std::vector<HintRay>& rays, const Similarity& scan_from_sparse, double slack) {
+  return std::all_of(rays.begin(), rays.end(), [&](const HintRay& ray) {
+    return Agrees(ray, scan_from_sparse * ray.centre, scan_from_sparse.rotation * ray.direction,
+                  slack);
+  });
+}
+
+}  // namespace roomtex

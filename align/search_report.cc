@@ -1,0 +1,88 @@
+#include "align/search_report.h"
+
+#include <cmath>
+
+namespace roomtex {
+namespace {
+
+Json SightsToJson(const SightAgreement& sights) {
+  Json json;
+  json["score"] = sights.Score();
+  json["agreeing_share"] = sights.Share();
+  json["through_share"] = sights.ThroughShare();
+  json["num_judged"] = sights.NumJudged();
+  json["num_unseen"] = sights.num_unseen;
+  return json;
+}
+
+const char* NameOf(StartVerdict::Kind kind) {
+  switch (kind) {
+    case StartVerdict::Kind::kTrusted:
+      return "trusted";
+    case StartVerdict::Kind::kNone:
+      return "none";
+    case StartVerdict::Kind::kWeak:
+      return "weak";
+    case StartVerdict::Kind::kOpen:
+      return "open";
+    case StartVerdict::Kind::kAmbiguous:
+      return "ambiguous";
+    case StartVerdict::Kind::kMirrored:
+      return "mirrored";
+    case StartVerdict::Kind::kByPhotos:
+      return "photos contradict";
+  }
+  return "";
+}
+
+Json PhotosToJson(const GradientAgreement& gradient) {
+  const GradientShifts& shifts = gradient.shifts;
+  Json json;
+  json["num_patches"] = shifts.at_pose.num;
+  json["share"] = shifts.at_pose.num > 0 ? Json(shifts.at_pose.Share()) : Json(nullptr);
+  json["chance"] = shifts.elsewhere.num > 0 ? Json(shifts.elsewhere.Share()) : Json(nullptr);
+  json["far_poses"] = shifts.far.num > 0 ? Json(shifts.far.Share()) : Json(nullptr);
+  json["supports"] = gradient.supports;
+  json["contradicts"] = gradient.contradicts;
+  return json;
+}
+
+Json StartToJson(const AutomaticAlignment& found, int index) {
+  const FittedStart& start = found.search.starts[index];
+  Json json;
+  json["scan_from_sparse"] = ToJson(start.scan_from_sparse);
+  json["settled"] = start.settled;
+  json["correlation"] = start.score;
+  json["num_on_surface"] = start.num_on_surface;
+  json["surface_rms_m"] = start.rms;
+  json["rays"] = SightsToJson(start.sights);
+  json["photos"] = nullptr;
+  for (const AskedStart& asked : found.verdict.asked) {
+    if (asked.start == index) json["photos"] = PhotosToJson(asked.gradient);
+  }
+  return json;
+}
+
+}  // namespace
+
+Json SearchToJson(const AutomaticAlignment& found) {
+  const StartVerdict& verdict = found.verdict;
+  Json json;
+  json["method"] = "geometry";
+  json["num_hypotheses"] = found.search.num_hypotheses;
+  json["up_known"] = found.search.up_known;
+  json["verdict"] = NameOf(verdict.kind);
+  json["best"] = verdict.best < 0 ? Json(nullptr) : StartToJson(found, verdict.best);
+  json["second"] = verdict.second < 0 ? Json(nullptr) : StartToJson(found, verdict.second);
+  json["ratio"] = verdict.ratio;
+  json["mirrored_score"] = verdict.mirrored_score;
+  json["agreement"] = verdict.photos_support;
+  json["chance_wrong"] = verdict.chance_wrong;
+  json["hypotheses"] = Json::array();
+  for (size_t i = 0; i < found.search.starts.size(); ++i) {
+    json["hypotheses"].push_back(StartToJson(found, static_cast<int>(i)));
+  }
+  return json;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,133 @@
+#include "align/start_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "align/search/up_directions.h"
+#include "core/parallel.h"
+#include "core/statistics.h"
+
+namespace roomtex {
+namespace {
+
+// Pixels per coordinate, as in alignment.cc.
+constexpr double kLeastKeypointNoise = 0.3;
+constexpr size_t kCloudPoints = 4000;                // that finalists are fitted with
+constexpr size_t kFirstPoints = 700;                 // that every hypothesis is fitted with
+constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
+// The turns and scales that were searched are this coarse.
+constexpr double kMaxScaleChange = 0.15;
+constexpr double kSightTolerance = 0.05;  // metres
+// Metres; starts that put half of the points nearer together are one.
+constexpr double kSameStart = 0.15;
+
+class Fitter {
+ public:
+  Fitter(const AlignmentInput& input, const AlignmentOptions& options,
+         const StartSearchOptions& search)
+      : input_(input), options_(options), search_(search) {}
+
+  std::vector<FittedStart> FitAll(const SearchCloud& cloud,
+                                  const std::vector<StartHypothesis>& hypotheses) const {
+    const SearchCloud few = Thinned(cloud, kFirstPoints);
+    std::vector<FittedStart> starts;
+    for (const StartHypothesis& one : hypotheses) {
+      starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}});
+    }
+    starts = Distinct(cloud, FitEach(few, kFirstGate, kMaxScaleChange, starts));
+    return Distinct(cloud, FitEach(cloud, kLastGate, options_.fit.max_scale_change, starts));
+  }
+
+ private:
+  std::vector<FittedStart> FitEach(const SearchCloud& cloud, double gate, double max_scale_change,
+                                   const std::vector<FittedStart>& starts) const {
+    SimilarityFitOptions fit_options = options_.fit;
+    fit_options.max_scale_change = max_scale_change;
+    // Picks belong to the model as it is.
+    static const std::vector<Pick> kNone;
+    const std::vector<Pick>& picks = cloud.is_mirrored ? kNone : input_.picks;
+    std::vector<bool> used;
+    for (const Pick& pick : picks) used.push_back(pick.weight > 0);
+    std::vector<FittedStart> fitted = starts;
+    ParallelFor(search_.num_threads, 0, static_cast<int>(starts.size()), [&](int i) {
+      const SimilarityFit fit =
+          FitToSurface(input_.model, cloud.points, input_.surveyed.patches(), picks, used,
+                       kPickSigma, gate, starts[i].scan_from_sparse, fit_options);
+      FittedStart& one = fitted[i];
+      one.settled = fit.converged;
+      one.num_on_surface = fit.num_points;
+      one.rms = fit.rms_after;
+      one.sights =
+          CheckSights(cloud, fit.scan_from_sparse, input_.surveyed.free_space(), kSightTolerance);
+      one.scan_from_sparse = fit.scan_from_sparse;
+    });
+    return fitted;
+  }
+
+  // Of several that the fit brought to one place the best, in the order of their scores.
+  std::vector<FittedStart> Distinct(const SearchCloud& cloud,
+                                    std::vector<FittedStart> starts) const {
+    std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) {
+      return a.sights.Score() > b.sights.Score();
+    });
+    std::vector<FittedStart> kept;
+    for (const FittedStart& one : starts) {
+      if (static_cast<int>(kept.size()) == search_.num_finalists) break;
+      const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const FittedStart& other) {
+        return DistanceBetween(cloud, one.scan_from_sparse, other.scan_from_sparse) < kSameStart;
+      });
+      if (is_new) kept.push_back(one);
+    }
+    return kept;
+  }
+
+  static constexpr double kPickSigma = 3;  // pixels; a hint may be hurried
+  const AlignmentInput& input_;
+  const AlignmentOptions& options_;
+  const StartSearchOptions& search_;
+};
+
+}  // namespace
+
+double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b) {
+  std::vector<double> distances;
+  for (const SurfacePoint& point : Thinned(cloud, 200).points) {
+    distances.push_back((a * point.x_in_sparse - b * point.x_in_sparse).norm());
+  }
+  return Median(&distances);
+}
+
+StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,
+                         const AlignmentOptions& options, const StartSearchOptions& search) {
+  StartSearch found;
+  SparseModel copy = input.model;
+  const double sigma_px =
+      std::max(kLeastKeypointNoise, UpdateReprojectionErrors(&copy).rms_px / std::sqrt(2.0));
+  found.cloud = MakeSearchCloud(input.model, sigma_px, kCloudPoints);
+  const SearchCloud mirror_image = Mirrored(found.cloud);
+  const UpDirections ups = FindModelUps(found.cloud);
+  const UpDirections scan_ups = FindScanUps(input.surveyed.scans(), input.surveyed.patches());
+  found.up_known = ups.known;
+  std::vector<Eigen::Vector3d> mirrored_ups;
+  for (const Eigen::Vector3d& up : ups.ups) mirrored_ups.emplace_back(-up.x(), up.y(), up.z());
+  const std::vector<HintRay> hints = FindHintRays(input.model, input.picks, near);
+  std::vector<StartHypothesis> as_is, mirrored;
+  for (const Eigen::Vector3d& scan_up : scan_ups.ups) {
+    const ScanVolume volume(input.surveyed.scans(), scan_up, search.geometry.volume);
+    const auto add = [&](const SearchCloud& cloud, const std::vector<Eigen::Vector3d>& cloud_ups,
+                         const std::vector<HintRay>& rays, std::vector<StartHypothesis>* all) {
+      const auto some =
+          SearchByGeometry(cloud, cloud_ups, volume, rays, search.geometry, search.num_threads);
+      all->insert(all->end(), some.begin(), some.end());
+    };
+    add(found.cloud, ups.ups, hints, &as_is);
+    add(mirror_image, mirrored_ups, {}, &mirrored);
+  }
+  found.num_hypotheses = static_cast<int>(as_is.size());
+  const Fitter fitter(input, options, search);
+  found.starts = fitter.FitAll(found.cloud, as_is);
+  found.mirrored = fitter.FitAll(mirror_image, mirrored);
+  return found;
+}
+
+}  // namespace roomtex

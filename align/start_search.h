@@ -1,0 +1,46 @@
+#pragma once
+// Starts without a click, fitted to the scan's surface and ranked by what the photos' rays say of
+// them: the search (align/search) finds where the model could be, this says where it fits.
+
+#include <vector>
+
+#include "align/alignment_input.h"
+#include "align/search/geometry_search.h"
+#include "align/search/search_cloud.h"
+#include "align/search/search_hint.h"
+#include "align/trust/sight_agreement.h"
+
+namespace roomtex {
+
+struct StartSearchOptions {
+  GeometrySearchOptions geometry;
+  int num_finalists = 10;  // that are fitted with all points
+  int num_threads = -1;    // changes nothing
+};
+
+struct FittedStart {
+  Similarity scan_from_sparse;  // on the surface; of a mirrored model: of its mirror image
+  double score = 0;             // StartHypothesis::score before the fit
+  bool settled = false;         // the fit came to rest
+  int num_on_surface = 0;       // sparse points
+  double rms = 0;               // metres, their distances
+  SightAgreement sights;
+};
+
+struct StartSearch {
+  int num_hypotheses = 0;
+  bool up_known = false;  // in the model, by the photos
+  SearchCloud cloud;
+  // Clearly different ones, those first that the photos' rays agree with most.
+  std::vector<FittedStart> starts;
+  // The same for the mirror image of the model, which is nowhere: how well a wrong start fits here.
+  std::vector<FittedStart> mirrored;
+};
+
+StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,
+                         const AlignmentOptions& options, const StartSearchOptions& search);
+
+// Metres: how far apart two starts put what the photos see, at the median over its points.
+double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b);
+
+}  // namespace roomtex

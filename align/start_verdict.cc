@@ -1,0 +1,210 @@
+#include "align/start_verdict.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/core.h>
+
+#include "align/trust/agreement.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+const char kRemedy[] =
+    " Say where the photos belong: --near PHOTO,X,Y,Z with a place of the scan that the photo "
+    "shows, one to five picks, or six for an alignment by picks (--picks_path, roomtex-pick).";
+
+// Share of the points on surfaces that face a way, below which nothing holds the model that way.
+constexpr double kLeastFacing = 0.02;
+// Patches in clear photos (gradient_shift.h): with so many, photos that do not support a start
+// speak against it.
+constexpr long kEnoughPatches = 100;
+
+// The photos at a start. Without photos, or where nothing can be compared, no patches.
+GradientAgreement AskPhotosAt(const AlignmentInput& input, const Similarity& scan_from_sparse) {
+  if (input.image_path.empty()) return {};
+  SparseModel aligned = input.model;
+  TransformModel(scan_from_sparse, &aligned);
+  std::vector<std::string> ignored;  // comes again when the result is compared
+  return MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(), AgreementOptions(),
+                          input.num_threads, &ignored)
+      .gradient;
+}
+
+// Photos of another room with the same walls and furniture agree at the edges of both, so that more
+// fits than by chance: 0.2 in simulated rooms, where the right room has 0.7 to 0.9. Where model and
+// scan differ by centimetres (0.1 in a real kitchen) as much cannot be asked for.
+bool Confirms(const FittedStart& start, const GradientAgreement& gradient,
+              const StartVerdictOptions& options) {
+  return gradient.supports && (start.rms > options.exact_rms ||
+                               gradient.shifts.at_pose.Share() >= options.min_photo_share);
+}
+
+const AskedStart* FindAsked(const StartVerdict& verdict, int start) {
+  for (const AskedStart& one : verdict.asked) {
+    if (one.start == start) return &one;
+  }
+  return nullptr;
+}
+
+// The best by its rays; of several that they agree with about as much, the only one that the photos
+// support.
+void Choose(const AlignmentInput& input, const StartSearch& search,
+            const StartVerdictOptions& options, StartVerdict* verdict) {
+  const double most = search.starts[0].sights.Score();
+  std::vector<int> supported;
+  for (int i = 0; i < static_cast<int>(search.starts.size()); ++i) {
+    if (i == options.max_rivals) break;
+    if (search.starts[i].sights.Score() < options.rival_share * most) break;
+    verdict->asked.push_back({i, AskPhotosAt(input, search.starts[i].scan_from_sparse)});
+    if (Confirms(search.starts[i], verdict->asked.back().gradient, options)) supported.push_back(i);
+  }
+  verdict->best = supported.size() == 1 ? supported[0] : 0;
+  verdict->photos_support = supported.size() == 1;
+  if (search.starts.size() > 1) verdict->second = verdict->best == 0 ? 1 : 0;
+}
+
+std::string Where(const StartSearch& search, int start) {
+  const Similarity& s = search.starts[start].scan_from_sparse;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& centre : search.cloud.centres) {
+    middle += s * centre / static_cast<double>(search.cloud.centres.size());
+  }
+  return fmt::format("photos about ({:.2f}, {:.2f}, {:.2f}), {:.0f} % of their rays agree",
+                     middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
+}
+
+// A logistic curve through what the benchmark counts: see docs/automatic.md.
+double ChanceWrong(double score, double ratio, bool photos_support) {
+  const double evidence =
+      12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) + (photos_support ? 4.0 : 0.0) - 3.5;
+  return 1 / (1 + std::exp(evidence));
+}
+
+// Directions that the surface leaves open: nothing that the points lie on faces that way.
+std::vector<Eigen::Vector3d> OpenSlides(const AlignmentInput& input, const StartSearch& search,
+                                        const Similarity& scan_from_sparse) {
+  const ScanPatches& surface = input.surveyed.patches();
+  Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();
+  int count = 0;
+  for (const SurfacePoint& point : search.cloud.points) {
+    const auto nearest =
+        surface.FindNearest(scan_from_sparse * point.x_in_sparse, surface.cell_size());
+    if (!nearest) continue;
+    const Eigen::Vector3d& normal = surface.patches()[nearest->patch].normal;
+    facing += normal * normal.transpose();
+    ++count;
+  }
+  std::vector<Eigen::Vector3d> open;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(facing);
+  for (int k = 0; k < 3; ++k) {
+    if (solver.eigenvalues()[k] < kLeastFacing * count) {
+      open.emplace_back(solver.eigenvectors().col(k));
+    }
+  }
+  return open;
+}
+
+std::string OpenReason(const std::vector<Eigen::Vector3d>& open) {
+  std::string directions;
+  for (const Eigen::Vector3d& d : open) {
+    directions += fmt::format("{}({:.2f}, {:.2f}, {:.2f})", directions.empty() ? "" : " and ",
+                              d.x(), d.y(), d.z());
+  }
+  return fmt::format(
+      "The surface that the sparse points lie on leaves the model open: it faces {}, so that "
+      "geometry alone cannot say where along {} the model lies, nor how it is turned{}.",
+      open.size() > 1 ? "one way only" : "two ways only", directions,
+      open.size() > 1 ? " about the surface's normal, nor how large it is" : "");
+}
+
+std::string UnconfirmedReason(const AskedStart& asked) {
+  const GradientShifts& shifts = asked.gradient.shifts;
+  return fmt::format(
+      "Photos and scan do not confirm the place that fits best: of {} corners of the scan's "
+      "intensity, {:.1f} % lie where the photos have them, and {:.1f} % do so by chance.",
+      shifts.clear.num, 100 * shifts.clear.Share(), 100 * shifts.elsewhere.Share());
+}
+
+std::string WeakReason(const FittedStart& best, const StartVerdictOptions& options) {
+  return fmt::format(
+      "No place was found where the sparse model fits the scan: at the best one {:.0f} % of the "
+      "photos' rays meet the surface where their points are, and {:.0f} % pass through it (at most "
+      "{:.0f} %). Check that scan and photos are of the same room.",
+      100 * best.sights.Share(), 100 * best.sights.ThroughShare(), 100 * options.max_through_share);
+}
+
+}  // namespace
+
+StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
+                         const StartVerdictOptions& options) {
+  using Kind = StartVerdict::Kind;
+  StartVerdict verdict;
+  if (search.starts.empty()) {
+    verdict.reason =
+        std::string("No place was found where the sparse model fits the scan.") + kRemedy;
+    return verdict;
+  }
+  Choose(input, search, options, &verdict);
+  const FittedStart& best = search.starts[verdict.best];
+  const double score = best.sights.Score();
+  if (!search.mirrored.empty()) verdict.mirrored_score = search.mirrored[0].sights.Score();
+  const double second = verdict.second < 0 ? 0 : search.starts[verdict.second].sights.Score();
+  const AskedStart* const second_asked = FindAsked(verdict, verdict.second);
+  // Of two that fit alike the photos may know better.
+  const bool photos_decide = verdict.photos_support && second_asked != nullptr;
+  const double rival =
+      std::max(photos_decide ? 0.0 : second, verdict.photos_support ? 0.0 : verdict.mirrored_score);
+  verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
+  verdict.chance_wrong = ChanceWrong(score, score / std::max(rival, 1e-6), verdict.photos_support);
+  const bool alone = !verdict.photos_support;
+  const double min_score = alone ? options.min_score_alone : options.min_score;
+  const double min_ratio = alone ? options.min_ratio_alone : options.min_ratio;
+  const AskedStart* const asked = FindAsked(verdict, verdict.best);
+  if (alone && verdict.mirrored_score >= min_score && verdict.mirrored_score >= min_ratio * score) {
+    verdict.kind = Kind::kMirrored;
+    verdict.reason = fmt::format(
+        "The scan is a mirror image of the room: reflected, {} of the photos' rays meet its "
+        "surface where their points are, as it is {}.",
+        Percent(search.mirrored[0].sights.Share()), Percent(best.sights.Share()));
+    return verdict;
+  }
+  const auto open = OpenSlides(input, search, best.scan_from_sparse);
+  if (!open.empty()) {
+    verdict.kind = Kind::kOpen;
+    verdict.reason = OpenReason(open) + kRemedy;
+    return verdict;
+  }
+  if (!best.settled || score < min_score ||
+      best.sights.ThroughShare() > options.max_through_share) {
+    verdict.kind = Kind::kWeak;
+    verdict.reason = WeakReason(best, options) + kRemedy;
+    return verdict;
+  }
+  if (score < min_ratio * rival) {
+    verdict.kind = Kind::kAmbiguous;
+    verdict.reason = score < min_ratio * second
+                         ? "The sparse model fits the scan in more than one place: " +
+                               Where(search, verdict.best) + "; or " +
+                               Where(search, verdict.second) + "."
+                         : fmt::format(
+                               "The sparse model fits the scan little better than its mirror image "
+                               "does ({:.0f} and {:.0f} % of the photos' rays agree).",
+                               100 * best.sights.Share(), 100 * search.mirrored[0].sights.Share());
+    verdict.reason += kRemedy;
+    return verdict;
+  }
+  if (alone && asked && asked->gradient.shifts.clear.num >= kEnoughPatches) {
+    verdict.kind = Kind::kByPhotos;
+    verdict.reason =
+        asked->gradient.contradicts ? asked->gradient.reason : UnconfirmedReason(*asked);
+    verdict.reason += kRemedy;
+    return verdict;
+  }
+  verdict.kind = Kind::kTrusted;
+  return verdict;
+}
+
+}  // namespace roomtex

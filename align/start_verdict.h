@@ -1,0 +1,61 @@
+#pragma once
+// Whether a start that was found without clicks is the right one, by evidence that the search did
+// not use: the next best start, the mirror image of the model (which is nowhere), and whether the
+// photos show the scan's intensity where it is.
+
+#include <string>
+#include <vector>
+
+#include "align/alignment_input.h"
+#include "align/start_search.h"
+#include "align/trust/gradient_shift.h"
+
+namespace roomtex {
+
+struct StartVerdictOptions {
+  // Of the photos' rays (SightAgreement::Score()): what the best start needs at least, and how many
+  // times as much as the next best and as the mirror image. Larger = stricter. Where the photos
+  // support the start, and where nothing but geometry speaks for it.
+  double min_score = 0.55, min_ratio = 1.2;
+  double min_score_alone = 0.7, min_ratio_alone = 1.3;
+  // Of the rays, those that may pass through the surface. Larger = more tolerant.
+  double max_through_share = 0.12;
+  // Of the corners of the scan's intensity, those that the photos must have where they should be,
+  // if sparse points and surface agree within exact_rms metres. Larger = stricter.
+  double min_photo_share = 0.35, exact_rms = 0.01;
+  // Starts that have at least this share of the best score are asked the photos about.
+  double rival_share = 0.75;
+  int max_rivals = 3;
+};
+
+// A start that the photos were asked about.
+struct AskedStart {
+  int start = 0;  // index into StartSearch::starts
+  GradientAgreement gradient;
+};
+
+struct StartVerdict {
+  enum class Kind {
+    kTrusted,
+    kNone,       // there is no start at all
+    kWeak,       // the best one fits too badly
+    kOpen,       // the surface does not hold the model in some direction
+    kAmbiguous,  // another one fits as well
+    kMirrored,   // the mirror image of the model fits better
+    kByPhotos,   // the photos contradict, or do not confirm what they could
+  };
+  Kind kind = Kind::kNone;
+  int best = -1, second = -1;  // indices into StartSearch::starts; -1 = there is none
+  std::vector<AskedStart> asked;
+  bool photos_support = false;
+  double ratio = 0;           // best score over the larger of second's and the mirror image's
+  double mirrored_score = 0;  // of the best start of the mirror image
+  // Of answers with evidence like this, how many were wrong (tests/benchmark/auto_align).
+  double chance_wrong = 1;
+  std::string reason;  // in sentences, with a remedy; empty if trusted
+};
+
+StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
+                         const StartVerdictOptions& options);
+
+}  // namespace roomtex

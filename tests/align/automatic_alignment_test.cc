@@ -1,0 +1,159 @@
+#include "align/automatic_alignment.h"
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/frames.h"
+#include "core/report.h"
+#include "tests/align/case_folder.h"
+#include "tests/align/simulated_alignment.h"
+
+namespace roomtex {
+namespace {
+
+using testing::HasSubstr;
+using Kind = StartVerdict::Kind;
+
+AutomaticAlignment Align(const SimulatedCase& one, const std::vector<Pick>& hints = {},
+                         int num_threads = -1) {
+  Progress progress(true);
+  AlignmentInput input{one.model, Survey(one.scans), hints, "picks.csv", one.azimuth};
+  input.num_threads = num_threads;
+  return AlignAutomatically(input, {}, AlignmentOptions(), &progress);
+}
+
+const AutomaticAlignment& AlignedWithoutClicks() {
+  static const AutomaticAlignment found = Align(MakeCase());
+  return found;
+}
+
+StartVerdict Judge(const SimulatedCase& one) {
+  const AlignmentOptions options;
+  const AlignmentInput input{one.model, Survey(one.scans), {}, "", one.azimuth};
+  return JudgeStarts(input, SearchStarts(input, {}, options, {}), {});
+}
+
+TEST(AutomaticAlignment, IsAsGoodAsWithClicks) {
+  const AutomaticAlignment& found = AlignedWithoutClicks();
+  ASSERT_TRUE(found.attempt.trusted()) << found.verdict.reason;
+  const SimulatedCase& one = MakeCase();
+  const PoseErrors errors =
+      WorstPoseErrors(*one.room, found.attempt.alignment->adjustment.bundle.model, Similarity());
+  EXPECT_LT(errors.position, 0.005);
+  EXPECT_LT(DegFromRad(errors.rotation), 0.1);
+  EXPECT_LT(found.verdict.chance_wrong, 0.01);
+  EXPECT_GT(found.verdict.ratio, 1.3);
+}
+
+TEST(AutomaticAlignment, IsTheSameForEveryNumberOfThreads) {
+  const AutomaticAlignment one = Align(MakeCase(), {}, 1);
+  ASSERT_TRUE(one.attempt.alignment && AlignedWithoutClicks().attempt.alignment);
+  EXPECT_EQ(one.attempt.alignment->scan_from_sparse.Matrix(),
+            AlignedWithoutClicks().attempt.alignment->scan_from_sparse.Matrix());
+}
+
+TEST(AutomaticAlignment, NamesAMirroredScan) {
+  SimulatedCase one = MakeCase();
+  one.scans = MirrorScans(one.scans);
+  const StartVerdict verdict = Judge(one);
+  EXPECT_EQ(verdict.kind, Kind::kMirrored);
+  EXPECT_THAT(verdict.reason, HasSubstr("mirror image"));
+}
+
+TEST(AutomaticAlignment, ARoomThatLooksTheSameFromBothEndsIsRefusedWithBothPlaces) {
+  SimulatedRoomOptions options = CaseOptions(3);
+  options.furnished = false;
+  options.missing_samples = false;
+  SimulatedCase one = MakeCase(options, 6);
+  const StartVerdict verdict = Judge(one);
+  EXPECT_NE(verdict.kind, Kind::kTrusted);
+  EXPECT_THAT(verdict.reason, HasSubstr("more than one place"));
+  EXPECT_GE(verdict.second, 0);
+}
+
+TEST(AutomaticAlignment, OnePickTellsTheEndsApart) {
+  SimulatedRoomOptions options = CaseOptions(3);
+  options.furnished = false;
+  options.missing_samples = false;
+  SimulatedCase one = MakeCase(options, 6);
+  const AutomaticAlignment found = Align(one, {one.picks[0]});
+  ASSERT_GE(found.verdict.best, 0);
+  const Similarity truth = one.room->ScanFromSparse();
+  EXPECT_LT(DistanceBetween(found.search.cloud, truth,
+                            found.search.starts[found.verdict.best].scan_from_sparse),
+            0.02);
+}
+
+// The command, with photos that must confirm what is found.
+struct FolderWithPhotos {
+  FolderWithPhotos() : one(MakeCase(SmallPhotos(0), 6)), files(one) {
+    std::filesystem::create_directories(image_path);
+    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+      cv::imwrite(image_path + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
+    }
+  }
+  static SimulatedRoomOptions SmallPhotos(int seed) {
+    SimulatedRoomOptions options = CaseOptions(seed);
+    options.photo_width = 960;
+    options.photo_height = 640;
+    return options;
+  }
+  static const FolderWithPhotos& Get() {
+    static const FolderWithPhotos folder;
+    return folder;
+  }
+
+  CommandResult Align(const std::string& more) const {
+    return RunCommandLine("roomtex-align --quiet --input_path " + files.input_path +
+                          " --image_path " + image_path + more);
+  }
+  Json Report() const { return Json::parse(ReadBytes(files.output_path + "/alignment.json")); }
+
+  const SimulatedCase one;
+  const CaseFolder files;
+  const std::string image_path = files.folder / "photos";
+};
+
+TEST(AutomaticAlignCommand, FindsThePlaceAndReportsTheEvidence) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  const CommandResult result = folder.Align(" --scan_path " + folder.files.scan_path +
+                                            " --output_path " + folder.files.output_path);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = folder.Report();
+  const Json& search = report.at("search");
+  EXPECT_EQ(search["method"], "geometry");
+  EXPECT_EQ(search["verdict"], "trusted");
+  EXPECT_EQ(search["agreement"], true);
+  EXPECT_EQ(search["best"]["photos"]["supports"], true);
+  EXPECT_GT(search["best"]["rays"]["score"], search["second"]["rays"]["score"]);
+  EXPECT_LT(search["chance_wrong"], 0.01);
+  EXPECT_EQ(report["picks"]["count"], 0);
+  const SparseModel aligned = ReadSparseModel(folder.files.output_path);
+  EXPECT_LT(WorstPoseErrors(*folder.one.room, aligned, Similarity()).position, 0.005);
+}
+
+// The same walls and much of the same furniture: only the photos know.
+TEST(AutomaticAlignCommand, RefusesTheScanOfASimilarRoom) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  const CaseFolder similar(MakeCase(FolderWithPhotos::SmallPhotos(7), 6));
+  const std::string output = folder.files.folder / "similar";
+  const CommandResult result =
+      folder.Align(" --scan_path " + similar.scan_path + " --output_path " + output);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const Json report = Json::parse(ReadBytes(output + "/alignment.json"));
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_THAT(report["reason"].get<std::string>(), HasSubstr("--near"));
+  EXPECT_NE(report["search"]["verdict"], "trusted");
+}
+
+TEST(AutomaticAlignCommand, TheNearHintIsChecked) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  const CommandResult unknown =
+      folder.Align(" --scan_path " + folder.files.scan_path +
+                   " --near nobody.jpg,1,2,3 --output_path " + folder.files.output_path);
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("not in the sparse model"));
+}
+
+}  // namespace
+}  // namespace roomtex
