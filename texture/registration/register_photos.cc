@@ -64,18 +64,25 @@ class Registrar {
     ParallelFor(num_threads, 0, num_photos(), [&](int i) { Load(i, gains[i]); });
   }
 
-  // Mean difference between what a photo shows and what the others say, in the finest pictures.
-  double Disagreement() {
+  // Mean difference between what a photo shows and what the others say, in the finest pictures: per
+  // photo, and last of all of them.
+  std::vector<double> Disagreement() {
     Look(0);
-    double sum = 0, count = 0;
+    std::vector<double> result;
+    double all = 0, all_count = 0;
     for (int i = 0; i < num_photos(); ++i) {
+      double sum = 0, count = 0;
       for (const Sighting& s : samples_.Of(i)) {
         if (!IsCompared(s)) continue;
         sum += std::abs(s.grey - samples_.OthersGrey(s));
         ++count;
       }
+      result.push_back(count > 0 ? sum / count : 0);
+      all += sum;
+      all_count += count;
     }
-    return count > 0 ? sum / count : 0;
+    result.push_back(all_count > 0 ? all / all_count : 0);
+    return result;
   }
 
   // Compares at one level; the shift is searched for within +- radius pixels of it. Sets the median
@@ -402,14 +409,24 @@ class Registrar {
   std::vector<double> median_px_;
 };
 
+// Whether photos agree better than before, by more than those of a bare room or of moved things do
+// by chance: all of them, or one by much and the others no worse for it.
+bool AgreeBetter(const std::vector<double>& before, const std::vector<double>& after) {
+  constexpr double kBetter = 0.95, kMuchBetter = 0.8;
+  if (after.back() < kBetter * before.back()) return true;
+  if (!(after.back() < before.back())) return false;
+  for (size_t i = 0; i + 1 < before.size(); ++i) {
+    if (after[i] < kMuchBetter * before[i]) return true;
+  }
+  return false;
+}
+
 // Coarse to fine, until the photos agree. False if they agree no better than before.
 bool BringTogether(bool with_warps, Registrar* registrar) {
   // Pixels of the level: the first search finds what is off by much, the others what it left.
   constexpr int kCoarseRadius = 3, kRadius = 2, kLastRadius = 1;
   constexpr int kFineRounds = 3;
-  // What photos of a bare room or of moved things lose by chance.
-  constexpr double kBetter = 0.95;
-  const double before = registrar->Disagreement();
+  const std::vector<double> before = registrar->Disagreement();
   for (int level = kNumLevels - 1; level >= 0; --level) {
     const int rounds = level > 0 ? 1 : kFineRounds;
     for (int i = 0; i < rounds; ++i) {
@@ -421,8 +438,7 @@ bool BringTogether(bool with_warps, Registrar* registrar) {
   }
   if (!registrar->is_free()) return true;
   registrar->Measure(0, kLastRadius);
-  const double after = registrar->Disagreement();
-  return after < kBetter * before;
+  return AgreeBetter(before, registrar->Disagreement());
 }
 
 }  // namespace

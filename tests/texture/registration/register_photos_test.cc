@@ -132,6 +132,19 @@ TEST_F(RegisterPhotosTest, PosesThatAreOffAreBroughtTogether) {
   EXPECT_LT(after, 0.3 * before);
 }
 
+TEST_F(RegisterPhotosTest, OnePhotoAmongManyIsPutRight) {
+  const double best = Psnr(Colorize(Photos(0, 0), "none"));
+  std::vector<PhotoView> photos = Photos(0, 0);
+  Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
+  step[1] = RadFromDeg(0.8);
+  photos[4].cam_from_scan = Moved(photos[4].cam_from_scan, step);
+  const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose");
+  EXPECT_LT(Psnr(without), best - 0.5);
+  EXPECT_GT(Psnr(with), best - 0.5 * (best - Psnr(without)));
+  EXPECT_NEAR(with.registration[4].turned_deg, 0.8, 0.2);
+  EXPECT_GT(with.registration[4].shift_before_px, 3 * with.registration[4].shift_after_px);
+}
+
 TEST_F(RegisterPhotosTest, AWarpSaysWhatTheCameraDoesNot) {
   const double best = Psnr(Colorize(Photos(0, 0), "none"));
   std::vector<PhotoView> photos = Photos(0, 0);
