@@ -20,9 +20,10 @@ declare -A allowed=(
   [align/surface]="$below"
   [align/pick]="$below align align/trust align/search align/fit align/clicks align/surface"
 
-  [texture]="$below texture/output texture/texels texture/tone texture/sampling"
+  [texture]="$below texture/output texture/texels texture/tone texture/registration texture/sampling"
   [texture/output]="$below texture/texels texture/sampling"
   [texture/texels]="$below texture/sampling"
+  [texture/registration]="$below texture/sampling"
   [texture/tone]="$below texture/sampling"
   [texture/sampling]="$below"
   [texture/render]="$below"

@@ -80,6 +80,7 @@ std::vector<std::string> ColorizeOptions::Problems() const {
   AppendProblems(surface.Problems(), &problems);
   AppendProblems(occlusion.Problems(), &problems);
   AppendProblems(exposure.Problems(), &problems);
+  AppendProblems(registration.Problems(), &problems);
   AppendProblems(blend.Problems(), &problems);
   AppendProblems(detail.Problems(), &problems);
   AppendProblems(ProblemsOf(*this), &problems);
@@ -195,13 +196,29 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   ObservationStore store(NumSlots(input), options.blend.max_views);
   result.samples_seen =
       ObservePhotos(input, photos, options.occlusion, options.blend, num_threads, progress, &store);
-  if (options.texture_scale == 1 && !has_atlas && options.debug_path.empty()) {
-    input.occluders.clear();
-  }
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
+
+  if (options.registration.mode != "none") {
+    progress->Stage("registration");
+    result.registration = RegisterPhotos(input, grids, store, result.exposure.gains,
+                                         options.registration, num_threads, &photos);
+    const bool corrected =
+        std::any_of(result.registration.begin(), result.registration.end(),
+                    [](const PhotoRegistration& photo) { return photo.corrected; });
+    if (corrected) {
+      store = ObservationStore(0, 1);  // before the next one takes its room
+      store = ObservationStore(NumSlots(input), options.blend.max_views);
+      result.samples_seen = ObservePhotos(input, photos, options.occlusion, options.blend,
+                                          num_threads, progress, &store);
+      result.disagreement.after = MeasureDisagreement(store, result.exposure.gains).after;
+    }
+  }
+  if (options.texture_scale == 1 && !has_atlas && options.debug_path.empty()) {
+    input.occluders.clear();
+  }
 
   progress->Stage("blend");
   for (size_t s = 0; s < scans.size(); ++s) {

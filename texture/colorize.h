@@ -8,6 +8,7 @@
 #include "core/progress.h"
 #include "core/scan.h"
 #include "core/scan_mesh.h"
+#include "texture/registration/register_photos.h"
 #include "texture/sampling/blend.h"
 #include "texture/sampling/detail.h"
 #include "texture/sampling/grid_colors.h"
@@ -27,6 +28,7 @@ struct ColorizeOptions {
   SmoothedScanOptions surface;
   OcclusionOptions occlusion;
   ExposureOptions exposure;
+  RegistrationOptions registration;
   BlendOptions blend;
   DetailOptions detail;
   // Colour of samples that no photo sees: "intensity" (grey) or "black".
@@ -50,7 +52,8 @@ struct ColorizeResult {
   double views_mean = 0;      // of the coloured ones
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
-  std::vector<size_t> samples_seen;  // per photo
+  std::vector<PhotoRegistration> registration;  // per photo; empty without
+  std::vector<size_t> samples_seen;             // per photo
   // Photo pixels per sample and direction, median over the samples; 0 = not known.
   double pixels_per_sample = 0;
   int texture_scale = 1;  // in effect

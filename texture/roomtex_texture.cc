@@ -111,6 +111,7 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
 void AddColorOptions(ColorizeOptions* o, Command* command) {
   command->Add(FieldsOf(o).Only({"Texture.unseen"}));
   command->Add(FieldsOf(&o->exposure));
+  command->Add(FieldsOf(&o->registration));
   command->Add(FieldsOf(&o->occlusion));
   command->Add(FieldsOf(&o->blend));
   command->Add(FieldsOf(&o->detail));
@@ -143,6 +144,37 @@ void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution
   }
   (*report)["corner_light"] = corners;
   if (exposure.exif_scatter) (*report)["exif_scatter_ev"] = *exposure.exif_scatter / std::log(2.0);
+}
+
+// How far each photo was off, and what was done about it.
+Json RegistrationReport(const std::vector<PhotoView>& photos,
+                        const std::vector<PhotoRegistration>& registration) {
+  const auto rounded = [](double value) { return std::round(1e3 * value) / 1e3; };
+  Json images = Json::array();
+  for (size_t i = 0; i < registration.size(); ++i) {
+    const PhotoRegistration& photo = registration[i];
+    Json map = Json::array();
+    for (int row = 0; row < PhotoRegistration::kMapRows; ++row) {
+      Json line = Json::array();
+      for (int column = 0; column < PhotoRegistration::kMapColumns; ++column) {
+        const double px = photo.map_px[row * PhotoRegistration::kMapColumns + column];
+        line.push_back(std::isnan(px) ? Json(nullptr) : Json(rounded(px)));
+      }
+      map.push_back(line);
+    }
+    images.push_back(
+        {{"name", photos[i].name},
+         {"shift_px",
+          {{"before", rounded(photo.shift_before_px)}, {"after", rounded(photo.shift_after_px)}}},
+         {"shift_before_mm", rounded(1000 * photo.shift_before)},
+         {"shift_map_px", map},
+         {"share_measured", rounded(photo.share_measured)},
+         {"corrected", photo.corrected},
+         {"turned_deg", rounded(photo.turned_deg)},
+         {"moved_mm", rounded(1000 * photo.moved)},
+         {"warp_px", rounded(photo.warp_px)}});
+  }
+  return images;
 }
 
 void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& options,
@@ -183,6 +215,9 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
   }
   report["samples_seen"] = seen;
   FillToneReport(photos, result.exposure, &report);
+  if (!result.registration.empty()) {
+    report["images"] = RegistrationReport(photos, result.registration);
+  }
   report["disagreement"] = {{"before", result.disagreement.before},
                             {"after", result.disagreement.after},
                             {"at_random", result.disagreement.at_random},

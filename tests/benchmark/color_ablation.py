@@ -18,7 +18,7 @@ import tempfile
 THESIS = (
     "--Occlusion.depth_tolerance 0.008 --Occlusion.shadows 0 --Blend.angle_weight 0 "
     "--Blend.resolution_weight 0 --Blend.outlier 0 --Blend.detail 1 "
-    "--Surface.reduce_range_noise 0 --Exposure.mode exif"
+    "--Surface.reduce_range_noise 0 --Exposure.mode exif --Registration.mode none"
 )
 
 ROWS = [
@@ -31,6 +31,7 @@ ROWS = [
     ("no depth-boundary band (boundary_px 0)", "--Occlusion.boundary_px 0"),
     ("wide band (boundary_px 4)", "--Occlusion.boundary_px 4"),
     ("boundary_jump 0.02", "--Occlusion.boundary_jump 0.02"),
+    ("poses as aligned", "--Registration.mode none"),
     ("no angle_weight", "--Blend.angle_weight 0"),
     ("no resolution_weight", "--Blend.resolution_weight 0"),
     ("no outlier rejection", "--Blend.outlier 0"),

@@ -17,10 +17,11 @@ TEST(TextureCommandOptions, AreListedAndChecked) {
   ColorizeOptions o;
   GlbOptions glb;
   ScanReaderOptions reader;
-  ExpectChecksItsOptions("roomtex-texture", kArguments,
-                         {FieldsOf(&reader), FieldsOf(&o), FieldsOf(&o.atlas), FieldsOf(&glb),
-                          FieldsOf(&o.exposure), FieldsOf(&o.occlusion), FieldsOf(&o.blend),
-                          FieldsOf(&o.detail), FieldsOf(&o.surface), FieldsOf(&o.mesh)});
+  ExpectChecksItsOptions(
+      "roomtex-texture", kArguments,
+      {FieldsOf(&reader), FieldsOf(&o), FieldsOf(&o.atlas), FieldsOf(&glb), FieldsOf(&o.exposure),
+       FieldsOf(&o.registration), FieldsOf(&o.occlusion), FieldsOf(&o.blend), FieldsOf(&o.detail),
+       FieldsOf(&o.surface), FieldsOf(&o.mesh)});
 }
 
 TEST(TextureCommandOptions, ScaleIsANumberOrAuto) {

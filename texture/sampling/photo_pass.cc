@@ -42,6 +42,7 @@ class PhotoObserver {
       : input_(input),
         blend_(blend),
         projector_(view),
+        warp_(view.warp),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
         image_(std::move(picture)) {
     if (view.camera.IsPanorama()) {
@@ -86,10 +87,13 @@ class PhotoObserver {
           scanner_known ? Eigen::Vector3f(tile.scanner - point) : Eigen::Vector3f(to_camera);
       const float spacing_px =
           static_cast<float>(input_.angular_spacing) * to_scanner.norm() * focal_length / depth;
-      const PhotoColor color =
-          blend_.footprint > 0
-              ? LookUpPhoto(image_, x + seam, y, static_cast<float>(blend_.footprint) * spacing_px)
-              : LookUpPhoto(image_, x + seam, y);
+      Eigen::Vector2f shown(x, y);
+      if (warp_) shown += warp_->At(x, y);
+      if (!(shown.minCoeff() >= 0 && shown.x() <= width && shown.y() <= height)) continue;
+      const PhotoColor color = blend_.footprint > 0
+                                   ? LookUpPhoto(image_, shown.x() + seam, shown.y(),
+                                                 static_cast<float>(blend_.footprint) * spacing_px)
+                                   : LookUpPhoto(image_, shown.x() + seam, shown.y());
       const Eigen::Vector3f& normal = tile.normals[i];
       const Eigen::Vector3f camera_direction = to_camera.normalized();
       // A panorama has no left and right border.
@@ -116,6 +120,7 @@ class PhotoObserver {
   const PhotoPassInput& input_;
   const BlendOptions& blend_;
   PhotoProjector projector_;
+  std::shared_ptr<const PhotoWarp> warp_;
   PhotoVisibility visibility_;
   cv::Mat image_;    // sRGB
   int seam_px_ = 0;  // columns that a panorama's image goes on for beyond both borders

@@ -12,6 +12,7 @@
 #include "core/photo.h"
 #include "core/similarity.h"
 #include "texture/sampling/photo_tone.h"
+#include "texture/sampling/photo_warp.h"
 
 namespace roomtex {
 
@@ -23,6 +24,7 @@ struct PhotoView {
   Camera camera;  // of the size of that picture
   Rigid cam_from_scan;
   std::shared_ptr<const PhotoTone> tone;  // how its bytes become light; none = sRGB
+  std::shared_ptr<const PhotoWarp> warp;  // what camera and pose do not say; none = nothing
 
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }
 };

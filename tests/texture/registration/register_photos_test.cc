@@ -1,0 +1,179 @@
+// A simulated room whose photos stand where they are said to stand, or not quite.
+
+#include "texture/registration/register_photos.h"
+
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "capture/simulation/capture_writer.h"
+#include "capture/simulation/simulated_room.h"
+#include "core/frames.h"
+#include "core/photo.h"
+#include "core/random_stream.h"
+#include "core/statistics.h"
+#include "core/twist.h"
+#include "tests/support/temp_folder.h"
+#include "texture/colorize.h"
+
+namespace roomtex {
+namespace {
+
+class RegisterPhotosTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    SimulatedRoomOptions options;
+    options.random_seed = 5;
+    options.num_photos = 12;
+    options.photo_width = 480;
+    options.photo_height = 320;
+    options.scan_columns = 800;
+    options.scan_rows = 300;
+    options.finest_detail = 0.006;
+    options.exposure_range_ev = 0.5;
+    room_ = std::make_unique<SimulatedRoom>(options);
+    folder_ = std::make_unique<TempFolder>();
+    Progress quiet(true);
+    WriteCapture(*room_, folder_->path(), &quiet);
+  }
+  static void TearDownTestSuite() {
+    room_.reset();
+    folder_.reset();
+  }
+
+  // Poses turned and moved at random.
+  static std::vector<PhotoView> Photos(double turn_deg, double move) {
+    std::vector<PhotoView> views;
+    for (int i = 0; i < room_->NumPhotos(); ++i) {
+      PhotoView view;
+      view.name = room_->PhotoName(i);
+      view.path = *folder_ / ("photos/" + view.name);
+      view.camera = room_->camera();
+      RandomStream random(MixBits(7, static_cast<uint64_t>(i)));
+      Eigen::Matrix<double, 6, 1> step;
+      for (int k = 0; k < 3; ++k) step[k] = RadFromDeg(turn_deg) * random.Gaussian();
+      for (int k = 3; k < 6; ++k) step[k] = move * random.Gaussian();
+      view.cam_from_scan = Moved(room_->CamFromScan(i), step);
+      views.push_back(view);
+    }
+    return views;
+  }
+
+  static ColorizeResult Colorize(const std::vector<PhotoView>& photos, const std::string& mode,
+                                 int num_threads = 2) {
+    ColorizeOptions options;
+    options.registration.mode = mode;
+    Progress quiet(true);
+    return ColorizeScans({room_->MakeScan()}, photos, options, num_threads, &quiet);
+  }
+
+  // Against the truth, after one gain.
+  static double Psnr(const ColorizeResult& result) {
+    const auto& linear = LinearFromSrgbByte();
+    const ColorGrid& grid = result.scans[0].samples;
+    const std::vector<Eigen::Vector3f> truth = room_->TrueColors();
+    std::vector<double> ratios;
+    for (size_t i = 0; i < truth.size(); ++i) {
+      if (grid.views[i] > 0 && grid.rgb[i][1] > 40) {
+        ratios.push_back(truth[i][1] / linear[grid.rgb[i][1]]);
+      }
+    }
+    const double gain = Median(&ratios);
+    double squares = 0, count = 0;
+    for (size_t i = 0; i < truth.size(); ++i) {
+      if (grid.views[i] == 0) continue;
+      for (int k = 0; k < 3; ++k) {
+        const double have = std::min(1.0, gain * linear[grid.rgb[i][k]]);
+        squares += std::pow(SrgbFromLinear(have) - SrgbFromLinear(truth[i][k]), 2);
+        ++count;
+      }
+    }
+    return -10 * std::log10(squares / count);
+  }
+
+  static std::unique_ptr<SimulatedRoom> room_;
+  static std::unique_ptr<TempFolder> folder_;
+};
+std::unique_ptr<SimulatedRoom> RegisterPhotosTest::room_;
+std::unique_ptr<TempFolder> RegisterPhotosTest::folder_;
+
+TEST_F(RegisterPhotosTest, PhotosThatAgreeStayAsTheyAre) {
+  const std::vector<PhotoView> photos = Photos(0, 0);
+  const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose");
+  EXPECT_EQ(with.scans[0].samples.rgb, without.scans[0].samples.rgb);
+  EXPECT_TRUE(without.registration.empty());
+  ASSERT_EQ(with.registration.size(), photos.size());
+  for (const PhotoRegistration& photo : with.registration) {
+    EXPECT_FALSE(photo.corrected);
+    EXPECT_LT(photo.shift_before_px, 0.5);
+    EXPECT_GT(photo.share_measured, 0.5);
+  }
+}
+
+TEST_F(RegisterPhotosTest, PosesThatAreOffAreBroughtTogether) {
+  const std::vector<PhotoView> photos = Photos(0.2, 0.01);
+  const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose"),
+                       measured = Colorize(photos, "measure");
+  const double best = Psnr(Colorize(Photos(0, 0), "none")), worst = Psnr(without);
+  EXPECT_GT(best, worst + 3);
+  EXPECT_GT(Psnr(with), worst + 0.6 * (best - worst));
+  EXPECT_LT(with.disagreement.after, 0.8 * without.disagreement.after);
+  // What is only measured changes no colour.
+  EXPECT_EQ(measured.scans[0].samples.rgb, without.scans[0].samples.rgb);
+  double before = 0, after = 0;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    EXPECT_TRUE(with.registration[i].corrected);
+    EXPECT_FALSE(measured.registration[i].corrected);
+    EXPECT_EQ(measured.registration[i].shift_before_px, with.registration[i].shift_before_px);
+    before += with.registration[i].shift_before_px;
+    after += with.registration[i].shift_after_px;
+  }
+  EXPECT_LT(after, 0.3 * before);
+}
+
+TEST_F(RegisterPhotosTest, OnePhotoAmongManyIsPutRight) {
+  const double best = Psnr(Colorize(Photos(0, 0), "none"));
+  std::vector<PhotoView> photos = Photos(0, 0);
+  Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
+  step[1] = RadFromDeg(0.8);
+  photos[4].cam_from_scan = Moved(photos[4].cam_from_scan, step);
+  const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose");
+  EXPECT_LT(Psnr(without), best - 0.5);
+  EXPECT_GT(Psnr(with), best - 0.5 * (best - Psnr(without)));
+  EXPECT_NEAR(with.registration[4].turned_deg, 0.8, 0.2);
+  EXPECT_GT(with.registration[4].shift_before_px, 3 * with.registration[4].shift_after_px);
+}
+
+TEST_F(RegisterPhotosTest, AWarpSaysWhatTheCameraDoesNot) {
+  const double best = Psnr(Colorize(Photos(0, 0), "none"));
+  std::vector<PhotoView> photos = Photos(0, 0);
+  for (PhotoView& photo : photos) photo.camera.params[2] += 4;  // principal point
+  EXPECT_LT(Psnr(Colorize(photos, "none")), best - 3);
+  PhotoWarp warp(photos[0].camera.width, photos[0].camera.height, 40);
+  for (int n = 0; n < warp.num_nodes(); ++n) warp.Shift(n) = {-4, 0};
+  for (PhotoView& photo : photos) photo.warp = std::make_shared<const PhotoWarp>(warp);
+  EXPECT_NEAR(Psnr(Colorize(photos, "none")), best, 0.2);
+}
+
+TEST_F(RegisterPhotosTest, ThreadsChangeNothing) {
+  const std::vector<PhotoView> photos = Photos(0.2, 0.01);
+  for (const char* mode : {"pose", "warp"}) {
+    EXPECT_EQ(Colorize(photos, mode, 1).scans[0].samples.rgb,
+              Colorize(photos, mode, 3).scans[0].samples.rgb)
+        << mode;
+  }
+}
+
+TEST_F(RegisterPhotosTest, OnePhotoOrNoneIsNoProblem) {
+  std::vector<PhotoView> photos = Photos(0, 0);
+  photos.resize(1);
+  const ColorizeResult alone = Colorize(photos, "pose");
+  ASSERT_EQ(alone.registration.size(), 1u);
+  EXPECT_FALSE(alone.registration[0].corrected);
+  EXPECT_EQ(alone.registration[0].share_measured, 0);
+  for (const double px : alone.registration[0].map_px) EXPECT_TRUE(std::isnan(px));
+}
+
+}  // namespace
+}  // namespace roomtex

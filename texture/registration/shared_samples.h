@@ -1,0 +1,70 @@
+#pragma once
+// Samples that several photos see, and what each of them shows there: what photos are compared by.
+
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "texture/sampling/grid_colors.h"
+#include "texture/sampling/observations.h"
+#include "texture/sampling/photo_pass.h"
+#include "texture/sampling/photo_view.h"
+
+namespace roomtex {
+
+// How one photo sees one sample.
+struct Sighting {
+  int sample = 0;
+  float weight = 0;  // as for blending
+  float grey = NAN;  // brought to one exposure; NaN = not in the photo
+  Eigen::Vector2f place = Eigen::Vector2f::Zero();  // `img`, by the camera model
+};
+
+class SharedSamples {
+ public:
+  // An even selection of the samples that two photos or more see without doubt, by what is kept of
+  // them in the store: memory is bounded, however fine the scan is.
+  SharedSamples(const PhotoPassInput& input, const std::vector<GridOfSamples>& grids,
+                const ObservationStore& store, int num_photos);
+
+  // Looks at all samples anew in the pictures of one level of detail, from where the photos stand
+  // now, and adds up what they say.
+  // pictures: per photo, 8-bit; scales: pixels of it per pixel of the photo; gains: of its greys.
+  void Look(const std::vector<PhotoView>& photos, const std::vector<cv::Mat1b>& pictures,
+            const std::vector<double>& scales, const std::vector<float>& gains, int num_threads);
+
+  int num_photos() const { return static_cast<int>(sightings_.size()); }
+  // Ordered by sample.
+  const std::vector<Sighting>& Of(int photo) const { return sightings_[photo]; }
+  // The weight that the other photos have, and their mean.
+  float OthersWeight(const Sighting& s) const { return weight_[s.sample] - s.weight; }
+  float OthersGrey(const Sighting& s) const {
+    return (sum_[s.sample] - s.weight * s.grey) / OthersWeight(s);
+  }
+  struct SightingOfPhoto {
+    int photo, number;  // Of(photo)[number]
+  };
+  // All sightings of a sample, by photo.
+  const SightingOfPhoto* Begin(int sample) const { return &of_sample_[first_of_sample_[sample]]; }
+  const SightingOfPhoto* End(int sample) const { return &of_sample_[first_of_sample_[sample + 1]]; }
+
+  Eigen::Vector3d Point(int sample) const;  // `scan` frame
+  const Eigen::Vector3f& Normal(int sample) const { return normals_[sample]; }
+
+ private:
+  void ListBySample();
+  void LookFrom(const PhotoView& photo, const cv::Mat1b& picture, double scale, float gain,
+                std::vector<Sighting>* sightings) const;
+
+  std::vector<PointBlock> blocks_;
+  std::vector<int> first_of_block_;  // sample; one more at the end
+  std::vector<Eigen::Vector3f> normals_;
+  std::vector<std::vector<Sighting>> sightings_;  // per photo
+  std::vector<SightingOfPhoto> of_sample_;
+  std::vector<int> first_of_sample_;
+  std::vector<float> weight_, sum_;  // per sample, over the photos
+};
+
+}  // namespace roomtex
