@@ -6,7 +6,7 @@
 
 #include "core/camera_model.h"
 #include "core/similarity.h"
-#include "tests/support/mesh_renderer.h"
+#include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
 
