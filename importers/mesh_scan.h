@@ -1,5 +1,5 @@
 #pragma once
-// What the readers of meshes (PLY, OBJ) have in common.
+// What the readers of meshes and clouds (PLY, OBJ, PCD) have in common.
 
 #include <string>
 
@@ -12,5 +12,9 @@ namespace roomtex {
 // them go. points and intensity have one value per vertex. Throws InputError if no triangle is
 // left.
 void FinishMesh(const std::string& path, double max_range, Scan* scan);
+
+// Makes the points that were read a cloud (Scan::Kind): those that are not finite or too far away
+// go. Throws InputError if none is left.
+void FinishCloud(const std::string& path, double max_range, Scan* scan);
 
 }  // namespace roomtex

@@ -21,6 +21,7 @@
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "importers/file_reader.h"
+#include "importers/mesh_scan.h"
 #include "importers/up_axis.h"
 
 namespace roomtex {
@@ -78,7 +79,8 @@ bool ParseReal(std::string_view word, double* number) {
 
 class PcdHeaderParser {
  public:
-  explicit PcdHeaderParser(const FileReader& file) : file_(file), lines_(file) {}
+  PcdHeaderParser(const FileReader& file, bool allow_clouds)
+      : file_(file), lines_(file), allow_clouds_(allow_clouds) {}
 
   PcdHeader Parse() {
     std::string_view line;
@@ -170,7 +172,7 @@ class PcdHeaderParser {
         throw Error("the field " + field.name + " has an impossible size");
       }
     }
-    if (header_.height <= 1) {
+    if (header_.height < 1 || (header_.height == 1 && !allow_clouds_)) {
       throw InputError(file_.path(), header_.size_line > 0 ? LinePosition(header_.size_line) : "",
                        "is a cloud without a grid (HEIGHT 1)",
                        "Export it organised (HEIGHT = number of rows), or as PTX");
@@ -216,6 +218,7 @@ class PcdHeaderParser {
 
   const FileReader& file_;
   LineReader lines_;
+  bool allow_clouds_;
   PcdHeader header_;
 };
 
@@ -360,7 +363,7 @@ void ReadCompressed(const FileReader& file, const PcdHeader& header, PcdFiller* 
 
 Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind) {
   const FileReader file(path);
-  const PcdHeader header = PcdHeaderParser(file).Parse();
+  const PcdHeader header = PcdHeaderParser(file, options.clouds).Parse();
   Scan scan;
   scan.path = path;
   PcdFiller filler(header, options, &scan);
@@ -375,6 +378,7 @@ Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* da
     throw InputError(path, "", "holds no measured sample",
                      options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
   }
+  if (header.height == 1) FinishCloud(path, options.max_range, &scan);
   scan.up = FindUpAxis(scan);
   if (data_kind != nullptr) *data_kind = header.data;
   return scan;

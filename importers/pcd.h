@@ -1,5 +1,6 @@
 #pragma once
-// PCD, the point cloud file of PCL: organised clouds only (height > 1), so that the grid is known.
+// PCD, the point cloud file of PCL: organised clouds (height > 1), so that the grid is known, and
+// on request others.
 
 #include <string>
 
@@ -10,12 +11,14 @@ namespace roomtex {
 struct PcdOptions {
   double meters_per_unit = 1;
   double max_range = 0;  // metres from the scanner; 0 = no limit
+  bool clouds = false;   // also those without a grid, which are refused otherwise
 };
 
 // Reads ascii, binary and binary_compressed (version 0.6 and 0.7) with fields x, y, z (float or
 // double) and, if there, intensity; other fields are skipped. Row 0 is the top row, NaN = missing,
 // points are in the scan frame and VIEWPOINT is scan_from_station. Throws InputError with line or
-// byte; a cloud without a grid is refused. data_kind: what the DATA line says, may be null.
+// byte; a cloud without a grid is refused, or one of Scan::Kind::kCloud. data_kind: what the DATA
+// line says, may be null.
 Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind = nullptr);
 
 // Binary x, y, z, intensity; x, y, z as double when a coordinate exceeds 10 000 (kLargeCoordinate).

@@ -197,11 +197,13 @@ class PlyParser {
       }
     }
     source_->EndFile();
-    FinishMesh(file_.path(), options_.max_range, &scan_);
+    (HasFaces() ? FinishMesh : FinishCloud)(file_.path(), options_.max_range, &scan_);
     return std::move(scan_);
   }
 
  private:
+  bool HasFaces() const { return face_ != nullptr && face_->count > 0; }
+
   void CheckElements() {
     for (const PlyElement& element : header_.elements) {
       const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
@@ -222,15 +224,15 @@ class PlyParser {
                          "the vertices have no property " + name, kDamaged);
       }
     }
-    if (face_ == nullptr || face_->count == 0) {
+    if (!HasFaces() && !options_.clouds) {
       throw InputError(
           file_.path(), "",
           "is a point cloud of " + std::to_string(vertex_->count) +
               " points without faces, expected a triangle mesh",
           "Triangulate it, or give the scan with its grid (RTPI, PTX or organised PCD)");
     }
-    list_ = face_->Find({"vertex_indices", "vertex_index"});
-    if (list_ < 0 || !face_->properties[list_].is_list) {
+    if (HasFaces()) list_ = face_->Find({"vertex_indices", "vertex_index"});
+    if (HasFaces() && (list_ < 0 || !face_->properties[list_].is_list)) {
       throw InputError(file_.path(), LinePosition(face_->line),
                        "the faces have no list vertex_indices", kDamaged);
     }

@@ -12,6 +12,8 @@ struct PlyOptions {
   double meters_per_unit = 1;
   // Metres from the origin, or from the station that our own files name; 0 = no limit.
   double max_range = 0;
+  // Also files without faces, which are refused otherwise.
+  bool clouds = false;
 };
 
 // Values of vertex properties that ReadPly itself has no use for, e.g. colours.
@@ -25,8 +27,8 @@ struct PlyVertexValues {
 // (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles. Other
 // elements and properties are skipped. The scan is not organised; `up` and station come from our
 // own files' comments, otherwise z and the origin. Throws InputError with line or byte; a cloud
-// without faces is refused. format: "ascii", "little" or "big" endian; may be null. values: what
-// else is wanted of the vertices; may be null.
+// without faces is refused, or one of Scan::Kind::kCloud. format: "ascii", "little" or "big"
+// endian; may be null. values: what else is wanted of the vertices; may be null.
 Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr,
              PlyVertexValues* values = nullptr);
 

@@ -28,7 +28,7 @@ namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an E57, an organised PCD, a PLY or an OBJ mesh, or points as text (the "
+    "Give an RTPI, a PTX, an E57, a PCD, a PLY, an OBJ mesh or points as text (the "
     "content counts, not the name)";
 
 bool BeginsWith(std::string_view text, std::string_view start) {
@@ -143,9 +143,59 @@ ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
   file.meters_per_unit = MetersPerUnitOr(options.units, 1);
   file.scans = ReadE57(path.file, path.part,
                        {file.meters_per_unit, options.max_range, options.e57_check}, &file.notes);
-  for (Scan& scan : file.scans) {
-    if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
+  return file;
+}
+
+// Clouds stay clouds.
+ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& options) {
+  ThrowIfProblems(options.Problems());
+  const ScanPath parts = SplitScanPath(given_path);
+  const std::string& path = parts.file;
+  std::string start;
+  {
+    const FileReader reader(path);
+    if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
+    start = reader.ReadSome(0, kLookAt);
   }
+  if (LooksLikeE57(start)) return ReadAsE57(parts, options);
+  if (!parts.part.empty()) {
+    throw InputError(path, "", "is no E57: a single scan of it cannot be named",
+                     "Leave out " + Quoted("#" + parts.part));
+  }
+  if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
+  const double meters_per_unit = MetersPerUnitOr(options.units, 1);
+  ScanFile file;
+  file.meters_per_unit = meters_per_unit;
+  if (BeginsWith(start, "ply\n") || BeginsWith(start, "ply\r")) {
+    file.format = "PLY";
+    file.scans.push_back(
+        ReadPly(path, {meters_per_unit, options.max_range, true}, &file.byte_order));
+  } else if (LooksLikePcd(start)) {
+    file.format = "PCD";
+    file.scans.push_back(
+        ReadPcd(path, {meters_per_unit, options.max_range, true}, &file.byte_order));
+    file.byte_order = file.byte_order == "ascii" ? "text" : "little";
+  } else if (LooksLikePtx(start)) {
+    file.format = "PTX";
+    file.byte_order = "text";
+    file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
+  } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
+    file.format = "OBJ";
+    file.byte_order = "text";
+    file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
+  } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
+    file.format = "XYZ";
+    file.byte_order = "text";
+    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range}));
+  } else {
+    const std::string foreign = ForeignFormat(start);
+    throw InputError(path, BytePosition(0),
+                     foreign.empty()
+                         ? "begins with " + Quoted(start, 16) + ", which is no scan format"
+                         : "is " + foreign + ", expected a range scan",
+                     kKnownFormats);
+  }
+  if (file.byte_order == "ascii") file.byte_order = "text";
   return file;
 }
 
@@ -176,54 +226,11 @@ void ScanReaderOptions::Declare(OptionFields* fields) {
 
 std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf(*this); }
 
-ScanFile ReadScanFile(const std::string& given_path, const ScanReaderOptions& options) {
-  ThrowIfProblems(options.Problems());
-  const ScanPath parts = SplitScanPath(given_path);
-  const std::string& path = parts.file;
-  std::string start;
-  {
-    const FileReader reader(path);
-    if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
-    start = reader.ReadSome(0, kLookAt);
+ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
+  ScanFile file = ReadAsItIs(path, options);
+  for (Scan& scan : file.scans) {
+    if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
   }
-  if (LooksLikeE57(start)) return ReadAsE57(parts, options);
-  if (!parts.part.empty()) {
-    throw InputError(path, "", "is no E57: a single scan of it cannot be named",
-                     "Leave out " + Quoted("#" + parts.part));
-  }
-  if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
-  const double meters_per_unit = MetersPerUnitOr(options.units, 1);
-  ScanFile file;
-  file.meters_per_unit = meters_per_unit;
-  if (BeginsWith(start, "ply\n") || BeginsWith(start, "ply\r")) {
-    file.format = "PLY";
-    file.scans.push_back(ReadPly(path, {meters_per_unit, options.max_range}, &file.byte_order));
-  } else if (LooksLikePcd(start)) {
-    file.format = "PCD";
-    file.scans.push_back(ReadPcd(path, {meters_per_unit, options.max_range}, &file.byte_order));
-    file.byte_order = file.byte_order == "ascii" ? "text" : "little";
-  } else if (LooksLikePtx(start)) {
-    file.format = "PTX";
-    file.byte_order = "text";
-    file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
-  } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
-    file.format = "OBJ";
-    file.byte_order = "text";
-    file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
-  } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
-    file.format = "XYZ";
-    file.byte_order = "text";
-    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range}));
-    FindGridAgain(&file.scans[0], &file.notes);
-  } else {
-    const std::string foreign = ForeignFormat(start);
-    throw InputError(path, BytePosition(0),
-                     foreign.empty()
-                         ? "begins with " + Quoted(start, 16) + ", which is no scan format"
-                         : "is " + foreign + ", expected a range scan",
-                     kKnownFormats);
-  }
-  if (file.byte_order == "ascii") file.byte_order = "text";
   return file;
 }
 
@@ -234,8 +241,10 @@ void RequireSurfaces(const ScanFile& file) {
                      NameOrFile(scan) +
                          " is a cloud of points without the scanner's grid, and its angles from "
                          "the station show none",
-                     "Export it with its grid (structured E57, PTX), or name another scan behind "
-                     "#");
+                     file.scans.size() > 1
+                         ? "Export it with its grid (structured E57, PTX), or name another scan "
+                           "behind #"
+                         : "Export it with its grid (structured E57, PTX, organised PCD)");
   }
 }
 

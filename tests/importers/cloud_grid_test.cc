@@ -159,5 +159,43 @@ TEST(CloudGrid, ACloudInAnE57GetsItsGridBack) {
   EXPECT_INPUT_ERROR(ReadScans({folder / "other.e57"}, "", {}), "is a cloud of points without");
 }
 
+// PCD says where the scanner stood, and so do the PLY files of roomtex.
+TEST(CloudGrid, CloudsInPcdAndPlyFilesGetTheirGridBack) {
+  BoxScanner scanner;
+  scanner.pose = {Eigen::Quaterniond::Identity(), {1, 2, 3}};
+  const Scan cloud = scanner.Cloud();
+  TempFolder folder;
+  const std::string count = std::to_string(cloud.points.size());
+  std::string pcd = "VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " +
+                    count + "\nHEIGHT 1\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS " + count +
+                    "\nDATA binary\n";
+  std::string ply =
+      "ply\nformat binary_little_endian 1.0\ncomment roomtex station 1 2 3\nelement vertex " +
+      count + "\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+  for (const Eigen::Vector3d& point : cloud.points) {
+    for (std::string* text : {&pcd, &ply}) {
+      for (int i = 0; i < 3; ++i) *text += Bytes(point[i]);
+    }
+  }
+  WriteBytes(folder / "cloud.pcd", pcd);
+  WriteBytes(folder / "cloud.ply", ply);
+  for (const char* name : {"cloud.pcd", "cloud.ply"}) {
+    const Scan grid = ReadScan(folder / name, {});
+    EXPECT_EQ(grid.num_columns, 400) << name;
+    EXPECT_EQ(grid.num_rows, 120) << name;
+    EXPECT_EQ(grid.points.size() - static_cast<size_t>(grid.NumMissing()), cloud.points.size());
+    ScanReaderOptions options;
+    options.max_range = 0.5;
+    EXPECT_INPUT_ERROR(ReadScan(folder / name, options), "holds no measured");
+  }
+  WriteBytes(folder / "three.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+             "property float z\nend_header\n1 2 3\nnan 5 6\n7 8 9\n");
+  const Scan three = ReadScanFile(folder / "three.ply", {}).scans[0];
+  EXPECT_EQ(three.kind(), Scan::Kind::kCloud);
+  EXPECT_EQ(three.points.size(), 2u);
+  EXPECT_INPUT_ERROR(ReadScan(folder / "three.ply", {}), "is a cloud of points without");
+}
+
 }  // namespace
 }  // namespace roomtex
