@@ -76,11 +76,11 @@ std::string Where(const StartSearch& search, int start) {
                      middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
 }
 
-// A logistic curve through what the benchmark counts: see docs/automatic.md.
+// A logistic curve: even odds where a start fits little better than any other.
 double ChanceWrong(double score, double ratio, bool photos_support) {
   const double evidence =
       12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) + (photos_support ? 4.0 : 0.0) - 3.5;
-  return 1 / (1 + std::exp(evidence));
+  return std::max(kLeastChance, 1 / (1 + std::exp(evidence)));
 }
 
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
@@ -138,7 +138,7 @@ std::string WeakReason(const FittedStart& best, const StartVerdictOptions& optio
 
 }  // namespace
 
-StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
+StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,
                          const StartVerdictOptions& options) {
   using Kind = StartVerdict::Kind;
   StartVerdict verdict;
@@ -201,6 +201,16 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.reason =
         asked->gradient.contradicts ? asked->gradient.reason : UnconfirmedReason(*asked);
     verdict.reason += kRemedy;
+    return verdict;
+  }
+  if (alone && !hinted) {
+    verdict.kind = Kind::kUnconfirmed;
+    verdict.reason =
+        std::string(
+            "Only geometry speaks for the place that was found, since the photos show too "
+            "little that the scan's intensity shows, too: a room of the same shape would "
+            "fit as well.") +
+        kRemedy;
     return verdict;
   }
   verdict.kind = Kind::kTrusted;
