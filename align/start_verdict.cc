@@ -22,6 +22,9 @@ constexpr double kLeastFacing = 0.02;
 // speak against it.
 constexpr long kEnoughPatches = 100;
 
+// What geometry alone is worth where photos do not confirm it.
+constexpr double kEvenOdds = 0.5;
+
 // The photos at a start. Without photos, or where nothing can be compared, no patches.
 GradientAgreement AskPhotosAt(const AlignmentInput& input, const Similarity& scan_from_sparse) {
   if (input.image_path.empty()) return {};
@@ -198,6 +201,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   if (alone && asked && asked->gradient.shifts.clear.num >= kEnoughPatches) {
     verdict.kind = Kind::kByPhotos;
+    verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
         asked->gradient.contradicts ? asked->gradient.reason : UnconfirmedReason(*asked);
     verdict.reason += kRemedy;
@@ -205,6 +209,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   if (alone && !hinted) {
     verdict.kind = Kind::kUnconfirmed;
+    verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
         std::string(
             "Only geometry speaks for the place that was found, since the photos show too "
