@@ -28,8 +28,8 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
 }
 
 bool IsWorthALook(StartVerdict::Kind kind) {
-  return kind == StartVerdict::Kind::kTrusted || kind == StartVerdict::Kind::kAmbiguous ||
-         kind == StartVerdict::Kind::kByPhotos;
+  return kind == StartVerdict::Kind::kTrusted || kind == StartVerdict::Kind::kUnconfirmed ||
+         kind == StartVerdict::Kind::kAmbiguous || kind == StartVerdict::Kind::kByPhotos;
 }
 
 }  // namespace
@@ -48,7 +48,8 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
   search.num_threads = input.num_threads;
   found.search = SearchStarts(input, near, options, search);
   progress->Stage("search verdict");
-  found.verdict = JudgeStarts(input, found.search, StartVerdictOptions());
+  const bool hinted = !near.empty() || !input.picks.empty();
+  found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
   if (!IsWorthALook(found.verdict.kind)) {
     found.attempt.refusal = found.verdict.reason;
     found.attempt.says_mirrored = found.verdict.kind == StartVerdict::Kind::kMirrored;

@@ -19,6 +19,8 @@ const char* NameOf(StartVerdict::Kind kind) {
   switch (kind) {
     case StartVerdict::Kind::kTrusted:
       return "trusted";
+    case StartVerdict::Kind::kUnconfirmed:
+      return "unconfirmed";
     case StartVerdict::Kind::kNone:
       return "none";
     case StartVerdict::Kind::kWeak:

@@ -18,6 +18,8 @@ constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
 // The turns and scales that were searched are this coarse.
 constexpr double kMaxScaleChange = 0.15;
 constexpr double kSightTolerance = 0.05;  // metres
+// Metres; what a fitted start may still be off where a hint has it.
+constexpr double kHintSlack = 0.25;
 // Metres; starts that put half of the points nearer together are one.
 constexpr double kSameStart = 0.15;
 
@@ -126,6 +128,11 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
   found.num_hypotheses = static_cast<int>(as_is.size());
   const Fitter fitter(input, options, search);
   found.starts = fitter.FitAll(found.cloud, as_is);
+  const auto contradicts = [&hints](const FittedStart& start) {
+    return !Agrees(hints, start.scan_from_sparse, kHintSlack);
+  };
+  found.starts.erase(std::remove_if(found.starts.begin(), found.starts.end(), contradicts),
+                     found.starts.end());
   found.mirrored = fitter.FitAll(mirror_image, mirrored);
   return found;
 }

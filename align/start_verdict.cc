@@ -22,6 +22,9 @@ constexpr double kLeastFacing = 0.02;
 // speak against it.
 constexpr long kEnoughPatches = 100;
 
+// What geometry alone is worth where photos do not confirm it.
+constexpr double kEvenOdds = 0.5;
+
 // The photos at a start. Without photos, or where nothing can be compared, no patches.
 GradientAgreement AskPhotosAt(const AlignmentInput& input, const Similarity& scan_from_sparse) {
   if (input.image_path.empty()) return {};
@@ -76,11 +79,11 @@ std::string Where(const StartSearch& search, int start) {
                      middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
 }
 
-// A logistic curve through what the benchmark counts: see docs/automatic.md.
+// A logistic curve: even odds where a start fits little better than any other.
 double ChanceWrong(double score, double ratio, bool photos_support) {
   const double evidence =
       12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) + (photos_support ? 4.0 : 0.0) - 3.5;
-  return 1 / (1 + std::exp(evidence));
+  return std::max(kLeastChance, 1 / (1 + std::exp(evidence)));
 }
 
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
@@ -138,7 +141,7 @@ std::string WeakReason(const FittedStart& best, const StartVerdictOptions& optio
 
 }  // namespace
 
-StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
+StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,
                          const StartVerdictOptions& options) {
   using Kind = StartVerdict::Kind;
   StartVerdict verdict;
@@ -198,9 +201,21 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   if (alone && asked && asked->gradient.shifts.clear.num >= kEnoughPatches) {
     verdict.kind = Kind::kByPhotos;
+    verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
         asked->gradient.contradicts ? asked->gradient.reason : UnconfirmedReason(*asked);
     verdict.reason += kRemedy;
+    return verdict;
+  }
+  if (alone && !hinted) {
+    verdict.kind = Kind::kUnconfirmed;
+    verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
+    verdict.reason =
+        std::string(
+            "Only geometry speaks for the place that was found, since the photos show too "
+            "little that the scan's intensity shows, too: a room of the same shape would "
+            "fit as well.") +
+        kRemedy;
     return verdict;
   }
   verdict.kind = Kind::kTrusted;

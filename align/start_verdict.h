@@ -28,6 +28,9 @@ struct StartVerdictOptions {
   int max_rivals = 3;
 };
 
+// So few rooms were counted that no smaller share of wrong answers can be claimed.
+inline constexpr double kLeastChance = 0.02;
+
 // A start that the photos were asked about.
 struct AskedStart {
   int start = 0;  // index into StartSearch::starts
@@ -37,12 +40,13 @@ struct AskedStart {
 struct StartVerdict {
   enum class Kind {
     kTrusted,
-    kNone,       // there is no start at all
-    kWeak,       // the best one fits too badly
-    kOpen,       // the surface does not hold the model in some direction
-    kAmbiguous,  // another one fits as well
-    kMirrored,   // the mirror image of the model fits better
-    kByPhotos,   // the photos contradict, or do not confirm what they could
+    kUnconfirmed,  // only geometry speaks for it: no photo could be asked, and no user said so
+    kNone,         // there is no start at all
+    kWeak,         // the best one fits too badly
+    kOpen,         // the surface does not hold the model in some direction
+    kAmbiguous,    // another one fits as well
+    kMirrored,     // the mirror image of the model fits better
+    kByPhotos,     // the photos contradict, or do not confirm what they could
   };
   Kind kind = Kind::kNone;
   int best = -1, second = -1;  // indices into StartSearch::starts; -1 = there is none
@@ -50,12 +54,14 @@ struct StartVerdict {
   bool photos_support = false;
   double ratio = 0;           // best score over the larger of second's and the mirror image's
   double mirrored_score = 0;  // of the best start of the mirror image
-  // Of answers with evidence like this, how many were wrong (tests/benchmark/auto_align).
+  // How many of 1000 answers with evidence like this are wrong, over 1000: a guess by a curve that
+  // was set on few simulated rooms, never less than kLeastChance.
   double chance_wrong = 1;
   std::string reason;  // in sentences, with a remedy; empty if trusted
 };
 
-StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
+// hinted: a user said where the photos belong, so that scan and photos are of one room.
+StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,
                          const StartVerdictOptions& options);
 
 }  // namespace roomtex

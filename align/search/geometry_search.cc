@@ -21,8 +21,8 @@ constexpr int kPlacesPerTurn = 3;           // per turn and scale
 constexpr double kCameraCost = 0.25;
 // Points farther out than this share of them do not count: they are far, few and inexact.
 constexpr double kInnerShare = 0.97;
-// Larger pictures (for scales at which the model is far larger than the scan) are not looked at.
-constexpr double kMaxPicture = 1.5e6;
+// Of a model that is larger than the scan by more, only the middle is laid over it.
+constexpr double kLargestModel = 1.3;
 // Starts that differ by less are one: the fit brings either to the same place.
 const double kSameTurn = RadFromDeg(9.0);
 constexpr double kSameScale = 0.08, kSamePlace = 0.4;  // of the logarithm; metres
@@ -93,17 +93,17 @@ std::vector<Eigen::Vector3d> Turned(const std::vector<Eigen::Vector3d>& points, 
 class OneScale {
  public:
   OneScale(const LevelCloud& cloud, const ScanVolume& volume, double scale)
-      : cloud_(cloud),
-        volume_(volume),
-        scale_(scale),
-        low_(-scale * cloud.radius, -scale * cloud.radius, scale * cloud.low) {
-    const double across = 2 * scale * cloud.radius, tall = scale * (cloud.high - cloud.low);
-    reach_ =
-        (Eigen::Vector3d(across, across, tall) / volume.cell_size()).array().floor().cast<int>() +
-        1;
+      : cloud_(cloud), volume_(volume), scale_(scale) {
+    const Eigen::Vector3d room = kLargestModel * volume.cell_size() * volume.size().cast<double>();
+    const double radius = std::min(scale * cloud.radius, 0.5 * std::max(room.x(), room.y()));
+    const double tall = std::min(scale * (cloud.high - cloud.low), room.z());
+    low_ = {-radius, -radius, 0.5 * (scale * (cloud.low + cloud.high) - tall)};
+    reach_ = (Eigen::Vector3d(2 * radius, 2 * radius, tall) / volume.cell_size())
+                 .array()
+                 .floor()
+                 .cast<int>() +
+             1;
   }
-
-  bool IsTooLarge() const { return (volume_.size() + reach_).cast<double>().prod() > kMaxPicture; }
 
   std::vector<StartHypothesis> Search(const std::vector<HintRay>& hints, double turn_step) const {
     const TranslationSearch search(volume_, reach_);
@@ -187,7 +187,7 @@ std::vector<StartHypothesis> SearchByGeometry(
     const double middle_scale = volume.Extent() / level.extent;
     const OneScale one(level, volume,
                        middle_scale * std::exp(options.scale_step * (i % num_scales - reach)));
-    if (!one.IsTooLarge()) found[i] = one.Search(hints, RadFromDeg(options.turn_step_deg));
+    found[i] = one.Search(hints, RadFromDeg(options.turn_step_deg));
   });
 
   std::vector<StartHypothesis> ranked;

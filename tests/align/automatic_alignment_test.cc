@@ -23,17 +23,17 @@ AutomaticAlignment Align(const SimulatedCase& one, const std::vector<Pick>& hint
 }
 
 const AutomaticAlignment& AlignedWithoutClicks() {
-  static const AutomaticAlignment found = Align(MakeCase());
+  static const AutomaticAlignment found = Align(MakeCase(), {MakeCase().picks[0]});
   return found;
 }
 
 StartVerdict Judge(const SimulatedCase& one) {
   const AlignmentOptions options;
   const AlignmentInput input{one.model, Survey(one.scans), {}, "", one.azimuth};
-  return JudgeStarts(input, SearchStarts(input, {}, options, {}), {});
+  return JudgeStarts(input, SearchStarts(input, {}, options, {}), false, {});
 }
 
-TEST(AutomaticAlignment, IsAsGoodAsWithClicks) {
+TEST(AutomaticAlignment, WithOnePickIsAsGoodAsWithSix) {
   const AutomaticAlignment& found = AlignedWithoutClicks();
   ASSERT_TRUE(found.attempt.trusted()) << found.verdict.reason;
   const SimulatedCase& one = MakeCase();
@@ -41,15 +41,21 @@ TEST(AutomaticAlignment, IsAsGoodAsWithClicks) {
       WorstPoseErrors(*one.room, found.attempt.alignment->adjustment.bundle.model, Similarity());
   EXPECT_LT(errors.position, 0.005);
   EXPECT_LT(DegFromRad(errors.rotation), 0.1);
-  EXPECT_LT(found.verdict.chance_wrong, 0.01);
+  EXPECT_EQ(found.verdict.chance_wrong, kLeastChance);
   EXPECT_GT(found.verdict.ratio, 1.3);
 }
 
 TEST(AutomaticAlignment, IsTheSameForEveryNumberOfThreads) {
-  const AutomaticAlignment one = Align(MakeCase(), {}, 1);
+  const AutomaticAlignment one = Align(MakeCase(), {MakeCase().picks[0]}, 1);
   ASSERT_TRUE(one.attempt.alignment && AlignedWithoutClicks().attempt.alignment);
   EXPECT_EQ(one.attempt.alignment->scan_from_sparse.Matrix(),
             AlignedWithoutClicks().attempt.alignment->scan_from_sparse.Matrix());
+}
+
+TEST(AutomaticAlignment, GeometryAloneIsNotTrustedUnlessAUserSaysThatItIsThisRoom) {
+  const StartVerdict verdict = Judge(MakeCase());
+  EXPECT_EQ(verdict.kind, Kind::kUnconfirmed);
+  EXPECT_THAT(verdict.reason, HasSubstr("--near"));
 }
 
 TEST(AutomaticAlignment, NamesAMirroredScan) {
@@ -126,7 +132,7 @@ TEST(AutomaticAlignCommand, FindsThePlaceAndReportsTheEvidence) {
   EXPECT_EQ(search["agreement"], true);
   EXPECT_EQ(search["best"]["photos"]["supports"], true);
   EXPECT_GT(search["best"]["rays"]["score"], search["second"]["rays"]["score"]);
-  EXPECT_LT(search["chance_wrong"], 0.01);
+  EXPECT_EQ(search["chance_wrong"], kLeastChance);
   EXPECT_EQ(report["picks"]["count"], 0);
   const SparseModel aligned = ReadSparseModel(folder.files.output_path);
   EXPECT_LT(WorstPoseErrors(*folder.one.room, aligned, Similarity()).position, 0.005);

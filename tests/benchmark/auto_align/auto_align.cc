@@ -4,8 +4,9 @@
 // seed).
 //   build/bin/auto_align --set tuning|check [--rooms N] [--first SEED] [--photos 1] [--whole 1]
 // A row for each room, then a table. --photos 1: photos are drawn, too, and asked (slow); without,
-// geometry is alone. --whole 1: fitted and adjusted as well, as the command does (slow).
-// The verdict was tuned on the set `tuning` only.
+// geometry is alone, and a user is taken to have said that scan and photos are of one room. --whole
+// 1: fitted and adjusted as well, as the command does (slow). The verdict was tuned on the set
+// `tuning` only.
 
 #include <cmath>
 #include <cstdio>
@@ -163,7 +164,7 @@ class Run {
       StartSearchOptions search;
       search.num_threads = 1;
       found.search = SearchStarts(input, {}, AlignmentOptions(), search);
-      found.verdict = JudgeStarts(input, found.search, StartVerdictOptions());
+      found.verdict = JudgeStarts(input, found.search, !settings_.photos, StartVerdictOptions());
     }
     const double seconds = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
     Judge(seed, room.kind, *room.one.room, room.one.model, found, seconds);

@@ -90,7 +90,9 @@ def align(case, args, out):
     command = [os.path.join(args.bin, "roomtex-align"), "--input_path", case["model"], "--output_path", out]
     for scan in case["scans"]:
         command += ["--scan_path", scan]
-    command += ["--picks_path", case["picks"], "--image_path", case["photos"], "--quiet", "1"]
+    if not args.without_picks:
+        command += ["--picks_path", case["picks"]]
+    command += ["--image_path", case["photos"], "--quiet", "1"]
     command += ["--num_threads", "1"] + case.get("options", []) + args.option
     for stale in ("alignment.json", "images.bin"):
         for folder in (out, out + ".untrusted"):
@@ -136,6 +138,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--bin", default="build/bin")
     parser.add_argument("--out", default="/tmp/trust_table")
+    parser.add_argument("--without_picks", action="store_true", help="align automatically")
     parser.add_argument("--option", action="append", default=[], help="passed on to roomtex-align")
     parser.add_argument("--photos", action="store_true", help="a line per photo as well")
     parser.add_argument("sets", help="folder of trust_sets.py")
