@@ -31,7 +31,7 @@ ROWS = [
     ("no depth-boundary band (boundary_px 0)", "--Occlusion.boundary_px 0"),
     ("wide band (boundary_px 4)", "--Occlusion.boundary_px 4"),
     ("boundary_jump 0.02", "--Occlusion.boundary_jump 0.02"),
-    ("poses as aligned", "--Registration.mode none"),
+    ("poses corrected", "--Registration.mode pose"),
     ("no angle_weight", "--Blend.angle_weight 0"),
     ("no resolution_weight", "--Blend.resolution_weight 0"),
     ("no outlier rejection", "--Blend.outlier 0"),

@@ -20,13 +20,13 @@ class OptionFields;
 struct RegistrationOptions {
   // "none": photos are taken as they are. "measure": how far they are off is found, but not
   // corrected. "pose": their poses are corrected. "warp": and what poses leave, by a smooth field
-  // of shifts per photo. Not the default: where photos are off by their poses alone it loses 1 dB
-  // on simulated rooms, and a real room gains nothing by it (docs/texture.md).
-  std::string mode = "pose";
+  // of shifts per photo. None is the default: photos come to agree, but on a real room all of them
+  // drift along the surface together, away from where the alignment has them (docs/texture.md).
+  std::string mode = "none";
   // How far poses may be off, one standard deviation of each axis: what the photos say of each
   // other counts against that. Larger = held less by the alignment.
-  double turn_deg = 0.3;
-  double move = 0.02;  // metres
+  double turn_deg = 0.03;
+  double move = 0.002;  // metres
   // The same of a warp, pixels of a picture whose longer side has 1280 (or as many as the photo, if
   // those are fewer): shifts, and how they change over 1/28 of that side. Larger = bent more.
   double warp_px = 2;
