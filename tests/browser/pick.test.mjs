@@ -203,9 +203,9 @@ test('the missing half is predicted near the truth, and taken by Enter', async (
     await page.redrawn();
     await screenshot(page.page, 'pick-half');
     await page.page.focus('#photo-pane');
-    await page.page.keyboard.press('Enter');
     // A prediction on a depth edge is refused, and the nearest place offered.
-    await until(
+    await page.pressUntil(
+        'Enter',
         async () => (await page.rows())[6].status !== 'half' ||
             await page.page.locator('#hint').isVisible(),
         'taken or refused');
@@ -221,8 +221,9 @@ test('the missing half is predicted near the truth, and taken by Enter', async (
     const inPhoto =
         await until(async () => (await page.session()).picks[7].predicted_img, 'a prediction');
     assert.ok(distance(inPhoto, places[7].img) < 5, `${inPhoto}: ${places[7].img}`);
-    await page.page.keyboard.press('Enter');
-    await page.rowIs(7, (row) => row.status === 'used', 'completed by the prediction');
+    await page.pressUntil(
+        'Enter', async () => (await page.rows())[7].status === 'used',
+        'completed by the prediction');
     await page.saved();
     assert.ok(distance(page.file()[7].img, places[7].img) < 5);
   }, {picksFile: fileOf(places.slice(0, 6))});
@@ -292,16 +293,8 @@ test('two scans: what is predicted in the other one is taken there', async () =>
     await page.redrawn();
     await screenshot(page.page, 'pick-two-scans');
     await page.page.focus('#scan-pane');
-    // Enter does nothing before the page has the prediction: as a user would, again.
-    let pressed = 0;
-    await until(async () => {
-      if (await select.inputValue() === String(ghost.id)) return true;
-      if (Date.now() - pressed > 500) {
-        await page.page.keyboard.press('Enter');
-        pressed = Date.now();
-      }
-      return false;
-    }, 'the other scan');
+    await page.pressUntil(
+        'Enter', async () => await select.inputValue() === String(ghost.id), 'the other scan');
     await until(
         async () => (await page.rows())[6].status !== 'half' ||
             await page.page.locator('#hint').isVisible(),
@@ -467,6 +460,17 @@ test('too few picks: Align says so without running', async () => {
     await page.page.click('#align-open');
     assert.match(await page.text('#align .body'), /needs 6 picks; there are 3/);
   }, {picksFile: fileOf(places.slice(0, 3))});
+});
+
+test('a few picks: the place is found by them', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(4);
+    await page.page.click('#align-open');
+    await page.page.locator('#align .body button', {hasText: 'Find it for me'}).click();
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    await screenshot(page.page, 'pick-found');
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+  }, {picksFile: fileOf(places.slice(0, 4))});
 });
 
 test('Align can be cancelled, and run again', async () => {

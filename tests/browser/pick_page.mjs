@@ -167,6 +167,20 @@ export class PickPage {
     }, `pick ${index + 1}: ${what}`);
   }
 
+  // Presses a key, again each second, until `probe` gives something true: a key that comes before the
+  // page has what it acts on does nothing.
+  async pressUntil(key, probe, what) {
+    let pressed = 0;
+    return until(async () => {
+      const result = await probe();
+      if (!result && Date.now() - pressed > 1000) {
+        await this.page.keyboard.press(key);
+        pressed = Date.now();
+      }
+      return result;
+    }, what);
+  }
+
   async saved() {
     await until(
         async () => await this.page.getAttribute('#save', 'data-state') === 'saved',

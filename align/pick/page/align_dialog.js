@@ -37,7 +37,8 @@ export class AlignDialog {
     const parts = this.#parts;
     parts.close = el('button', {type: 'button', onclick: () => this.dialog.close()}, 'Close');
     parts.again =
-        el('button', {type: 'button', class: 'main', onclick: () => this.#start()}, 'Run again');
+        el('button', {type: 'button', class: 'main', onclick: () => this.#start({hint: true})},
+           'Run again');
     parts.end = el('button', {type: 'button', onclick: () => this.#end()}, 'Cancel');
     parts.body =
         el('div',
@@ -61,13 +62,14 @@ export class AlignDialog {
     }
   }
 
-  async #start() {
+  // hint: fewer picks than an alignment needs say where to search.
+  async #start({hint = false} = {}) {
     const {body} = this.#parts;
     const {min_picks, has_model: hasModel} = this.facts;
     const counts = Object.values(this.picks.session.photos).map((one) => one.num_complete);
     const count =
         hasModel ? counts.reduce((sum, one) => sum + one, 0) : Math.max(0, ...counts);
-    if (count < min_picks) {
+    if (count < min_picks && !hint) {
       this.#status = null;
       this.#buttons(false);
       body.replaceChildren(
@@ -75,6 +77,7 @@ export class AlignDialog {
              `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
                  `there are ${count} so far.`),
           el('p', {}, this.picks.session.next));
+      if (hasModel && count > 0) body.append(this.#offerSearch());
       return;
     }
     this.#message('Saving the picks…');
@@ -96,6 +99,13 @@ export class AlignDialog {
     }
     this.#message('Starting roomtex-align…');
     await this.#poll();
+  }
+
+  #offerSearch() {
+    return el(
+        'p', {}, 'Or, by what there is: ',
+        el('button', {type: 'button', class: 'main', onclick: () => this.#start({hint: true})},
+           'Find it for me'));
   }
 
   async #end() {

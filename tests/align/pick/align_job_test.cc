@@ -89,16 +89,18 @@ TEST_F(AlignButton, ARefusalIsToldInItsOwnWords) {
   EXPECT_FALSE(state["sentences"].empty());
 }
 
-TEST_F(AlignButton, TooFewPicksFailWithTheMessage) {
+// They say where to search (align/search).
+TEST_F(AlignButton, FewerThanSixPicksAreAHint) {
   ASSERT_EQ(Put(1, ToJson(TruePicks(4))).status, 200);
-  // A report of an earlier run is not this one's.
-  std::filesystem::create_directories(folder_ / "aligned");
-  WriteBytes(folder_ / "aligned/alignment.json", "{\"expected_error\": {\"at_cameras_mm\": 1}}");
   const Json state = Align();
-  EXPECT_EQ(state["exit_code"], 3);
-  EXPECT_EQ(state["verdict"], "failed");
-  EXPECT_THAT(state["sentences"].dump(), HasSubstr("at least 6 are needed"));
-  EXPECT_THAT(state["facts"], IsEmpty());
+  EXPECT_EQ(state["exit_code"], 0) << state.dump(1);
+  EXPECT_EQ(state["verdict"], "trusted");
+  const Json report = Json::parse(ReadBytes(folder_ / "aligned/alignment.json"));
+  EXPECT_FALSE(report["search"].is_null());
+  EXPECT_LT(report["expected_error"]["at_cameras_mm"], 5);
+  for (const Json& pick : report["picks"]["per_pick"]) {
+    EXPECT_LT(pick["refined_residual_px"], 2) << pick;
+  }
 }
 
 // Programs in the place of roomtex-align.
@@ -174,6 +176,18 @@ TEST_F(FakeProgram, ABrokenReportIsNoCrash) {
     EXPECT_EQ(WaitFor("state", "done")["verdict"], "untrusted");
     EXPECT_EQ(Get("overlay?name=passwd").status, 404);
   }
+}
+
+TEST_F(FakeProgram, AReportOfAnEarlierRunIsNotThisOnes) {
+  std::filesystem::create_directories(folder_ / "aligned");
+  WriteBytes(folder_ / "aligned/alignment.json", "{\"expected_error\": {\"at_cameras_mm\": 1}}");
+  ServeWith("echo 'roomtex-align: too few picks' >&2\nexit 3\n");
+  ASSERT_EQ(Post("align").status, 200);
+  const Json state = WaitFor("state", "done");
+  EXPECT_EQ(state["exit_code"], 3);
+  EXPECT_EQ(state["verdict"], "failed");
+  EXPECT_THAT(state["sentences"].dump(), HasSubstr("too few picks"));
+  EXPECT_THAT(state["facts"], IsEmpty());
 }
 
 TEST_F(FakeProgram, OneThatIsNotThereIsSaid) {
