@@ -114,6 +114,9 @@ constexpr double kMaxFocalSigma = 0.03;
 // of one plane, or of a walk along a wall, they take a bent room for another lens.
 constexpr double kMaxFocalSigmaOfCalibrated = 0.004;
 constexpr double kSureDeviations = 15;  // LensFinding::deviations
+// Nor for a focal length that it has already and a little more distortion: a camera that turns on
+// the spot leaves that open by more than it seems.
+constexpr double kSameFocalDeviations = 3, kOtherLensDeviations = 40;
 
 constexpr int kMaxMoreMappings = 2;
 
@@ -190,9 +193,12 @@ void Mapping::KeepCalibrated(MappingPass* pass) const {
   for (LensFinding& lens : pass->lenses.lenses) {
     const Camera& told = pass->plan.cameras().at(lens.camera_ids[0]);
     if (refine_ != RefineIntrinsics::kAuto || !lens.used || lens.apart) continue;
-    if (!told.has_prior_focal_length || lens.deviations > kSureDeviations) continue;
+    if (!told.has_prior_focal_length) continue;
     const double sigma = lens.focal_sigma / told.MeanFocalLength();
-    if (sigma < kMaxFocalSigmaOfCalibrated) continue;
+    const bool vague = sigma >= kMaxFocalSigmaOfCalibrated && lens.deviations <= kSureDeviations;
+    const bool same =
+        lens.FocalDeviations() < kSameFocalDeviations && lens.deviations < kOtherLensDeviations;
+    if (!vague && !same) continue;
     lens.used = false;
     context_.Warn(fmt::format(
         "The photos would have a focal length of {:.1f} pixels instead of {:.1f}, but know it to "
