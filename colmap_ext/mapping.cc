@@ -140,17 +140,6 @@ MappingPass BetterOf(MappingPass first, MappingPass second) {
 
 }  // namespace
 
-ModelCheck CheckMapping(const Database& database, const MappingPass& pass,
-                        const MappingOptions& options, const Command::Context& context) {
-  MatchedImages images = ImagesOfModel(database, *pass.images, pass.model());
-  ModelCheckOptions check_options;
-  check_options.pair = PairOptions(options, context);
-  check_options.min_confidence = options.init.min_confidence;
-  const PairTrial& trial = pass.best[0].seed.trial;
-  return CheckModel(&images, pass.model(), {trial.image_id1, trial.image_id2}, check_options,
-                    context.options.num_threads);
-}
-
 Mapping::Mapping(const MappingOptions& options, const Command::Context& context,
                  const Database& database, const MatchedImages& images,
                  const ScratchFolder& scratch)
@@ -250,22 +239,30 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
 
 MappingPass Mapping::Run() {
   MappingPass pass = MapAsLensesAre();
-  for (int i = 0; i < kMaxLeavings && !pass.best.empty(); ++i) {
-    const size_t before = pass.model().images.size();
-    LeaveOutDoubtful(&pass);
-    if (pass.model().images.size() == before) break;
-  }
+  if (pass.best.empty()) return pass;
+  context_.progress.Stage("check model");
+  pass.check = Check(pass);
+  for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) pass.check = Check(pass);
   return pass;
 }
 
-void Mapping::LeaveOutDoubtful(MappingPass* pass) const {
-  context_.progress.Stage("check photos");
+ModelCheck Mapping::Check(const MappingPass& pass) const {
+  MatchedImages images = ImagesOfModel(database_, *pass.images, pass.model());
+  ModelCheckOptions check_options;
+  check_options.pair = PairOptions(options_, context_);
+  check_options.min_confidence = options_.init.min_confidence;
+  const PairTrial& trial = pass.best[0].seed.trial;
+  return CheckModel(&images, pass.model(), {trial.image_id1, trial.image_id2}, check_options,
+                    context_.options.num_threads);
+}
+
+bool Mapping::LeaveOutDoubtful(MappingPass* pass) const {
   MappingOutcome& outcome = pass->best[0];
-  const ModelCheck check = CheckMapping(database_, *pass, options_, context_);
+  const ModelCheck& check = pass->check;
   const auto num_photos = static_cast<double>(pass->model().images.size());
   if (check.doubtful.empty() ||
       static_cast<double>(check.doubtful.size()) > kMaxLeftOut * num_photos) {
-    return;
+    return false;
   }
   SparseModel poses;
   poses.cameras = pass->model().cameras;
@@ -274,7 +271,9 @@ void Mapping::LeaveOutDoubtful(MappingPass* pass) const {
   }
   for (const uint32_t image_id : check.doubtful) poses.images.erase(image_id);
   MapperResult adjusted = pass->mapper->Adjust(poses);
-  if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) return;
+  if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) {
+    return false;
+  }
   adjusted.grew = outcome.result.grew;
   outcome.result = std::move(adjusted);
   for (const uint32_t image_id : check.doubtful) {
@@ -284,6 +283,7 @@ void Mapping::LeaveOutDoubtful(MappingPass* pass) const {
                   " of its own matches obey the model. It may show a repeated pattern, another "
                   "room, or something that moved.");
   }
+  return true;
 }
 
 }  // namespace roomtex

@@ -46,6 +46,7 @@ struct MappingPass {
   std::unique_ptr<MapperRun> mapper;
   std::vector<MappingOutcome> best;  // at most one
   LensCheck lenses;
+  ModelCheck check;  // of the best model, once Mapping::Run() is done
   Json trials = Json::array();
 
   const SparseModel& model() const { return best[0].result.model; }
@@ -67,7 +68,9 @@ class Mapping {
   bool IsContradicted(const MappingPass& pass) const;
   MappingPass Map(const LensPlan& plan, bool refine);
   MappingPass MapAsLensesAre();
-  void LeaveOutDoubtful(MappingPass* pass) const;
+  // False: nothing was to be left out, or could be.
+  bool LeaveOutDoubtful(MappingPass* pass) const;
+  ModelCheck Check(const MappingPass& pass) const;
 
   const MappingOptions& options_;
   const Command::Context& context_;
@@ -81,9 +84,5 @@ class Mapping {
   LensLabels labels_;
   int num_passes_ = 0;
 };
-
-// CheckModel() of a pass's model.
-ModelCheck CheckMapping(const Database& database, const MappingPass& pass,
-                        const MappingOptions& options, const Command::Context& context);
 
 }  // namespace roomtex

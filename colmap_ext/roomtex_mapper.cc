@@ -148,11 +148,9 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
 }
 
 // The third-view test on pairs that the model was not started from.
-void CheckFinished(const Database& database, const MappingPass& pass, const MappingOptions& options,
-                   const Command::Context& context, Json* reasons) {
+void ReportCheck(const MappingPass& pass, const Command::Context& context, Json* reasons) {
   const MatchedImages& images = *pass.images;
-  context.progress.Stage("check model");
-  const ModelCheck check = CheckMapping(database, pass, options, context);
+  const ModelCheck& check = pass.check;
   Json& json = context.report["check"];
   json["num_pairs"] = check.num_pairs;
   json["contradicting"] = Json::array();
@@ -278,7 +276,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   }
   Json reasons = Json::array();
   JudgeTrust(outcome, *pass.images, context, &reasons);
-  CheckFinished(database, pass, options, context, &reasons);
+  ReportCheck(pass, context, &reasons);
   CheckLens(pass.mapper.get(), outcome, pass.refine, context, &reasons);
   context.report["reasons"] = reasons;
 

@@ -265,10 +265,10 @@ ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& setti
 std::string CommandText(const std::vector<std::string>& arguments) {
   std::string line;
   for (const std::string& argument : arguments) {
-    const bool plain =
-        !argument.empty() && std::all_of(argument.begin(), argument.end(), [](unsigned char c) {
-          return std::isalnum(c) || std::strchr("-_./=+,:@%#", c) != nullptr;
-        });
+    const bool plain = !argument.empty() && argument[0] != '#' &&
+                       std::all_of(argument.begin(), argument.end(), [](unsigned char c) {
+                         return std::isalnum(c) || std::strchr("-_./=+,:@%#", c) != nullptr;
+                       });
     if (!line.empty()) line += ' ';
     if (plain) {
       line += argument;

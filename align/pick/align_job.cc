@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/child_program.h"
 #include "core/error.h"
 
 extern char** environ;
@@ -236,7 +237,9 @@ Json AlignJob::State() {
   for (const auto& [name, value] : verdict_.facts) {
     json["facts"].push_back({{"name", name}, {"value", value}});
   }
-  json["command"] = ShellLine("roomtex-align", arguments_);
+  std::vector<std::string> line = {"roomtex-align"};
+  line.insert(line.end(), arguments_.begin(), arguments_.end());
+  json["command"] = CommandText(line);
   json["overlays"] = overlays_;
   return json;
 }
@@ -245,32 +248,6 @@ std::string AlignJob::OverlayPath(const std::string& name) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool known = std::find(overlays_.begin(), overlays_.end(), name) != overlays_.end();
   return known ? written_path_ + "/overlays/" + name : "";
-}
-
-std::string FindAlignProgram() {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::string beside = (self.parent_path() / "roomtex-align").string();
-  return !error && access(beside.c_str(), X_OK) == 0 ? beside : "roomtex-align";
-}
-
-std::string ShellLine(const std::string& program, const std::vector<std::string>& arguments) {
-  std::string line = program;
-  for (const std::string& argument : arguments) {
-    const bool plain =
-        !argument.empty() && std::all_of(argument.begin(), argument.end(), [](unsigned char c) {
-          return std::isalnum(c) || std::strchr("-_./=+,:@%", c) != nullptr;
-        });
-    line += ' ';
-    if (plain) {
-      line += argument;
-      continue;
-    }
-    line += '\'';
-    for (const char c : argument) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    line += '\'';
-  }
-  return line;
 }
 
 }  // namespace roomtex

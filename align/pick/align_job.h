@@ -64,11 +64,4 @@ class AlignJob {
   std::string written_path_;  // of the last run: the folder asked for, or the one beside it
 };
 
-// roomtex-align of the folder that this program lies in; its bare name (found by PATH) if there is
-// none.
-std::string FindAlignProgram();
-
-// A line for a shell.
-std::string ShellLine(const std::string& program, const std::vector<std::string>& arguments);
-
 }  // namespace roomtex

@@ -11,6 +11,7 @@
 #include "align/pick/photo_sights.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_session.h"
+#include "core/child_program.h"
 #include "core/image_tiles.h"
 #include "core/local_server.h"
 #include "core/page.h"
@@ -23,7 +24,7 @@ class PickServer {
     LocalServerOptions server;
     std::string image_name;    // the photo to begin with; "" = choose
     std::string aligned_path;  // where roomtex-align writes
-    std::string align_program = FindAlignProgram();
+    std::string align_program = BesideThisProgram("roomtex-align");
   };
 
   // scene and session must outlive it.

@@ -109,7 +109,7 @@ void ServePicking(Arguments a, const Command::Context& context) {
   PickSession session(scene, a.output_path);
   scene.Prepare();
   PickServer server(scene, &session, kPickPage,
-                    {a.server, a.image_name, a.aligned_path, FindAlignProgram()});
+                    {a.server, a.image_name, a.aligned_path, BesideThisProgram("roomtex-align")});
   server.Start(true);
   if (a.server.port != 0 && server.server().port() != a.server.port) {
     context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +

@@ -58,8 +58,8 @@ TEST(FindProgram, LooksOnThePathAndSaysWhatIsWrong) {
 }
 
 TEST(CommandText, QuotesWhatAShellWouldTakeApart) {
-  EXPECT_EQ(CommandText({"a", "--b", "c d", "it's", "", "$(rm x)", "e.f/g#2"}),
-            "a --b 'c d' 'it'\\''s' '' '$(rm x)' e.f/g#2");
+  EXPECT_EQ(CommandText({"a", "--b", "c d", "it's", "", "$(rm x)", "e.f/g#2", "#2"}),
+            "a --b 'c d' 'it'\\''s' '' '$(rm x)' e.f/g#2 '#2'");
 }
 
 }  // namespace

@@ -217,10 +217,5 @@ TEST(AlignVerdict, SaysWhatTheExitCodeMeans) {
   EXPECT_THAT(untrusted.sentences, Contains("Few points lie on the surface."));
 }
 
-TEST(ShellLine, QuotesWhatAShellWouldTakeApart) {
-  EXPECT_EQ(ShellLine("a", {"--b", "c d", "it's", "", "$(rm x)", "e.f/g"}),
-            "a --b 'c d' 'it'\\''s' '' '$(rm x)' e.f/g");
-}
-
 }  // namespace
 }  // namespace roomtex
