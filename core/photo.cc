@@ -178,6 +178,19 @@ cv::Mat1b ReadGreyPhoto(const std::string& path, int shrink) {
   }
 }
 
+cv::Mat ReadShrunkPhoto(const std::string& path, int shrink) {
+  switch (shrink) {
+    case 8:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_COLOR_8);
+    case 4:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_COLOR_4);
+    case 2:
+      return DecodePhoto(path, cv::IMREAD_REDUCED_COLOR_2);
+    default:
+      return DecodePhoto(path, cv::IMREAD_COLOR);
+  }
+}
+
 std::array<int, 2> ReadPhotoSize(const std::string& path) {
   SilenceExiv2();
   try {

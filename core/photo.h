@@ -36,6 +36,8 @@ bool ExifExchangesSides(const std::string& path);
 // The same in grey, made smaller while it is decoded: shrink is 1, 2, 4 or 8. For a JPEG this takes
 // a part of the time and memory.
 cv::Mat1b ReadGreyPhoto(const std::string& path, int shrink);
+// 8-bit BGR, likewise.
+cv::Mat ReadShrunkPhoto(const std::string& path, int shrink);
 
 // Width and height without decoding the pixels, from the file's header; {0, 0} if that cannot be
 // told.

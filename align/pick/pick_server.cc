@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "align/pick/photo_corner.h"
 #include "align/pick/pick_json.h"
 #include "align/pick/reduced_photo.h"
 #include "align/pick/scan_picture.h"
@@ -104,6 +105,7 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
   server_.AddContent("/tile", [this](const Query& query) { return Tile(query); });
   server_.AddContent("/thumbnail", [this](const Query& query) { return Thumbnail(query); });
   server_.AddJson("/scan_point", [this](const Query& query) { return ScanPoint(query); });
+  server_.AddJson("/corner", [this](const Query& query) { return Corner(query); });
   server_.AddPut("/picks", [this](const Json& json) {
     PutPicks put = ParsePutPicks(json, scene_);
     return SessionToJson(*session_->Put(put.revision, std::move(put.picks)), scene_);
@@ -149,6 +151,7 @@ void PickServer::AddPictures() {
   for (int scan = 0; scan < scene_.num_scans(); ++scan) {
     const ScanPlaces& places = scene_.places(scan);
     pictures_.push_back(ScanPicturesOf(places.scan()));
+    content_.push_back(places.Content());
     for (const std::string& name : pictures_.back()) {
       tiles_.Add(ScanPicture(scan, name), places.width(), places.height(),
                  ImageTiles::Format::kJpeg,
@@ -198,6 +201,7 @@ Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
 }
 
 Json PickServer::State() {
+  session_->SaveAgain();  // a disk that was full may have space again
   const auto snapshot = session_->Refresh();
   Json json;
   json["version"] = Version();
@@ -219,6 +223,7 @@ Json PickServer::State() {
     one["tile_size"] = pyramid.tile_size;
     one["num_levels"] = pyramid.num_levels;
     one["aspect"] = places.aspect();
+    one["content"] = content_[scan];
     one["pictures"] = pictures_[scan];
     json["scans"].push_back(one);
   }
@@ -319,6 +324,27 @@ std::optional<LocalServer::Content> PickServer::Thumbnail(const Query& query) {
   }
   if (!kept) return std::nullopt;
   return Content{kept, "image/jpeg", "", true};
+}
+
+Json PickServer::Corner(const Query& query) {
+  const auto id = WholeOf(query, "photo");
+  const bool exists = id && *id >= 0 && *id < static_cast<int>(scene_.photos().size());
+  if (!exists || scene_.photos()[*id].missing) throw UsageError("There is no such photo.");
+  const PickPhoto& photo = scene_.photos()[*id];
+  const Eigen::Vector2d place(NumberOf(query, "x"), NumberOf(query, "y"));
+  const std::lock_guard<std::mutex> lock(corner_mutex_);
+  if (corner_photo_id_ != *id) {
+    const Camera& camera = photo.projection->camera();
+    cv::cvtColor(ReadFittedPhoto(photo.path, photo.fit, camera.width, camera.height), corner_photo_,
+                 cv::COLOR_BGR2GRAY);
+    corner_photo_id_ = *id;
+  }
+  Json json;
+  json["img"] = nullptr;
+  if (const auto corner = FindCorner(corner_photo_, place, NumberOf(query, "reach"))) {
+    json["img"] = {corner->x(), corner->y()};
+  }
+  return json;
 }
 
 Json PickServer::ScanPoint(const Query& query) const {

@@ -1,6 +1,7 @@
 #pragma once
 // Serves the page of roomtex-pick: the paths of align/pick/README.md.
 
+#include <array>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -52,15 +53,21 @@ class PickServer {
   std::shared_ptr<const PickSession::Snapshot> SolvedRevision(const PickPhoto& photo, int revision);
   std::optional<Content> Thumbnail(const Query& query);
   Json ScanPoint(const Query& query) const;
+  Json Corner(const Query& query);
   int SelectedPhoto() const;
 
   const PickScene& scene_;
   PickSession* const session_;
   const Setup setup_;
   std::vector<std::vector<std::string>> pictures_;  // of each scan
+  std::vector<std::array<int, 4>> content_;         // of each scan's picture
   ImageTiles tiles_;
   std::mutex thumbnails_mutex_;  // one is made at a time: tiles are more urgent
   std::map<int, std::shared_ptr<const std::string>> thumbnails_;
+  // The photo in which a corner was looked for last, grey.
+  std::mutex corner_mutex_;
+  int corner_photo_id_ = -1;
+  cv::Mat1b corner_photo_;
   BackProjections back_projections_;
   PhotoSights sights_;
   AlignJob align_;

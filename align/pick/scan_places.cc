@@ -13,10 +13,11 @@ namespace {
 
 // A place counts as at a sample when it is this near to it, in samples.
 constexpr double kAtSample = 1e-6;
-constexpr int kMaxSnap = 60;              // samples; farther away nothing is offered
-constexpr int kThinSamples = 20000;       // that the search for a direction starts from
-constexpr double kMaxOffGrid = 3;         // steps between samples that a direction may be off
-constexpr double kSlack = 1e-6;           // share of a cell that its solution may be outside
+constexpr int kMaxSnap = 60;         // samples; farther away nothing is offered
+constexpr int kThinSamples = 20000;  // that the search for a direction starts from
+constexpr double kMaxOffGrid = 3;    // steps between samples that a direction may be off
+constexpr double kSlack = 1e-6;      // share of a cell that its solution may be outside
+constexpr double kSparse = 0.05;     // rows and columns at the rim with fewer samples are cut off
 constexpr double kMaxRowsMissing = 0.02;  // of all: rows with fewer neighbours do not tell steps
 
 // What the neighbours in the grid say about how it lies before the viewer.
@@ -124,6 +125,30 @@ int ScanPlaces::WrappedColumn(int column) const {
 
 Eigen::Vector3d ScanPlaces::DirectionOf(int sample) const {
   return (scan_.points[sample] - scan_.Station()).normalized();
+}
+
+std::array<int, 4> ScanPlaces::Content() const {
+  std::vector<int> in_column(width(), 0), in_row(height(), 0);
+  for (int row = 0; row < height(); ++row) {
+    for (int column = 0; column < width(); ++column) {
+      if (scan_.IsMissing(SampleAt(column, row))) continue;
+      ++in_column[column];
+      ++in_row[row];
+    }
+  }
+  // of: how many a full one has.
+  const auto between = [](const std::vector<int>& counts, int of) {
+    const auto holds_some = [&](int count) { return count >= kSparse * of; };
+    const auto first = std::find_if(counts.begin(), counts.end(), holds_some);
+    const auto last = std::find_if(counts.rbegin(), counts.rend(), holds_some).base();
+    const bool any = first < last;
+    return std::array<int, 2>{
+        any ? static_cast<int>(first - counts.begin()) : 0,
+        static_cast<int>(any ? last - counts.begin() : counts.end() - counts.begin())};
+  };
+  const auto [left, right] = between(in_column, height());
+  const auto [top, bottom] = between(in_row, width());
+  return {left, top, right, bottom};
 }
 
 ScanPlaces::Found ScanPlaces::PointAt(const Eigen::Vector2d& place) const {

@@ -6,6 +6,7 @@
 // against the viewer's right, the picture is the grid turned the other way round.
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -36,6 +37,9 @@ class ScanPlaces {
   int SampleAt(int column, int row) const {
     return scan_.Index(flipped_ ? scan_.num_columns - 1 - column : column, row);
   }
+  // What of the picture to look at first, {left, top, right, bottom}: without the rows and columns
+  // at its rim that hold next to no samples.
+  std::array<int, 4> Content() const;
   // Measured, and its neighbours continue its surface (FindSmoothSamples).
   bool IsSmooth(int sample) const { return smooth_[sample] != 0; }
 

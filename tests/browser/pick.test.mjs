@@ -243,6 +243,18 @@ test('reloading the page goes on with the picks, and so does a new server', asyn
     assert.deepEqual(
         (await page.rows()).map(({photo, px, status}) => [photo, px, status]), earlier);
     assert.deepEqual(page.file(), file);
+    // What was done before the page was loaded anew can still be undone, and done again.
+    await page.page.keyboard.press('Control+z');
+    await page.rowIs(6, (row) => row.status === 'half', 'its second half is undone');
+    await page.page.keyboard.press('Control+z');
+    await page.rowsAre(6);
+    await page.page.keyboard.press('Control+y');
+    await page.page.keyboard.press('Control+y');
+    await page.rowIs(6, (row) => row.px !== null, 'is back');
+    await page.saved();
+    assert.deepEqual(page.file(), file);
+    await page.page.keyboard.press('c');
+    await until(async () => /corner/.test(await page.text('#toast')), 'a corner, or that there is none');
     const second = await servePicks(picksPath);
     const again = await PickPage.open(browser, second, picksPath);
     await again.rowsAre(7);

@@ -45,6 +45,7 @@ function send(method, path, body) {
 export const api = {
   state: () => ask('state'),
   scanPoint: (scan, x, y) => ask(`scan_point?scan=${scan}&x=${x}&y=${y}`),
+  corner: (photo, [x, y], reach) => ask(`corner?photo=${photo}&x=${x}&y=${y}&reach=${reach}`),
   putPicks: (revision, picks) => send('PUT', 'picks', {revision, picks}),
   edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, {signal}),
   startAlign: () => send('POST', 'align', {}),

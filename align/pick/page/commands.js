@@ -160,6 +160,12 @@ export const kKeys = [
       {keys: arrowKeys('ArrowDown'), run: arrows(0, 1)},
       {mouse: 'Shift + arrows', does: 'the same by a tenth'},
       {
+        keys: ['C'],
+        shown: 'C',
+        does: 'moves the selected point of the photo onto the corner beside it',
+        run: () => app.editor.toCorner(app.panes.photo.view),
+      },
+      {
         keys: ['W'],
         shown: 'W',
         does: 'goes to the other picture, as Tab does',

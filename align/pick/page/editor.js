@@ -7,6 +7,7 @@
 import {api, ServerError} from './api.js';
 import {clamp, say} from './dom.js';
 
+const kCornerReach = 8;    // CSS pixels: how far from a corner somebody clicks
 const kLiveInterval = 80;  // milliseconds between two places tried while a marker is dragged
 
 export class Editor {
@@ -305,6 +306,36 @@ export class Editor {
   // The crosshair begins where the missing half is expected, else in the middle of what is shown.
   crossOf(side, view) {
     return this.cross[side] ?? this.ghostOf(this.half, side) ?? [...view.centre];
+  }
+
+  // The selected point of the photo, or the one that is being clicked, onto the corner within reach.
+  async toCorner(view) {
+    const pick = this.picks.find(this.selected);
+    const {photo} = this;
+    if (!pick?.img || pick.image_name !== photo?.name) {
+      say('Select a point in the photo: it is moved onto the corner that it was meant for');
+      return;
+    }
+    const reach = clamp(kCornerReach / view.scale, 3, 25);
+    let answer;
+    try {
+      answer = await api.corner(photo.id, pick.img, reach);
+    } catch (error) {
+      if (!(error instanceof ServerError)) throw error;
+      say(error.message, {urgent: true});
+      return;
+    }
+    // Moved or removed meanwhile.
+    if (this.picks.find(pick.uid)?.img !== pick.img) return;
+    const number = this.picks.numberOf(pick.uid);
+    if (!answer.img) {
+      say(`There is no corner within ${reach.toFixed(0)} pixels of pick ${number}`);
+      return;
+    }
+    this.picks.set(`pick ${number} moved onto the corner`, pick.uid, {img: answer.img});
+    const distance = Math.hypot(answer.img[0] - pick.img[0], answer.img[1] - pick.img[1]);
+    say(`Pick ${number} moved onto the corner, by ${distance.toFixed(1)} pixels`);
+    this.on.changed();
   }
 
   dragStart(side, uid) {

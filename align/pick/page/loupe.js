@@ -58,15 +58,15 @@ export class Loupe {
     this.#avoidCursor();
   }
 
-  // Down unless the cursor is near, then up.
+  // Down unless that covers the cursor, or the place that is looked at; then up.
   #avoidCursor() {
     const {cursor, view} = this.pane;
-    if (!cursor) return;
+    const [x, y] = cursor ?? view.toScreen(this.place);
     const {offsetLeft: left, offsetWidth: width, offsetHeight: height, classList} = this.element;
-    const beside = cursor[0] > left - 40 && cursor[0] < left + width + 40;
+    const beside = x > left - 40 && x < left + width + 40;
     const up = classList.contains('up');
-    if (beside && !up && cursor[1] > view.height - height - 50) classList.add('up');
-    if (up && (!beside || cursor[1] < height + 50)) classList.remove('up');
+    if (beside && !up && y > view.height - height - 50) classList.add('up');
+    if (up && (!beside || y < height + 50)) classList.remove('up');
   }
 }
 

@@ -79,11 +79,17 @@ function choosePhoto(id) {
   });
   if (views.has(id)) [view.scale, view.centre, view.fitted] = views.get(id);
   setText(byId('photo-name'), photo.name);
-  byId('photo-notice').hidden = !photo.missing;
-  setText(byId('photo-notice'), photo.problem || `There is no ${photo.name} in the photo folder.`);
+  showNotice();
   byId('photo-name').title = `${photo.name}, ${photo.width} x ${photo.height} pixels`;
   app.refresh();
   follow();
+}
+
+// Why the photo cannot be shown.
+function showNotice() {
+  const {name, missing, problem} = app.editor.photo;
+  byId('photo-notice').hidden = !missing && !problem;
+  setText(byId('photo-notice'), problem || `There is no ${name} in the photo folder.`);
 }
 
 // Also after another picture of the same scan was chosen.
@@ -107,6 +113,7 @@ function chooseScan(id) {
     width: scan.width,
     height: scan.height,
     aspect: scan.aspect,
+    content: scan.content,
     tile_size: scan.tile_size,
     num_levels: scan.num_levels,
     url: api.scanTile(id, select.value),
@@ -186,6 +193,14 @@ function listen() {
     showSync();
     follow();
   });
+  // A file that is cut off is noticed when it is first read.
+  app.store.onRefused((url, sentence) => {
+    const id = Number(/^tile\?photo=(\d+)&/.exec(url)?.[1] ?? NaN);
+    const photo = app.server.photos.find((one) => one.id === id);
+    if (!photo) return;
+    photo.problem = sentence;
+    showNotice();
+  });
   picks.addEventListener('refused', (event) => say(event.detail, {seconds: 9, urgent: true}));
   addEventListener('focus', () => picks.check());
   setInterval(heartbeat, kHeartbeat);
@@ -197,6 +212,10 @@ function listen() {
 // The shortest question there is; the answer does not matter.
 async function heartbeat() {
   if (document.hidden || app.picks.state === 'gone' || app.picks.state === 'restarted') return;
+  if (app.picks.state === 'unsaved') {
+    app.picks.check();  // which has the server try again
+    return;
+  }
   try {
     await api.align();
   } catch {
@@ -279,6 +298,7 @@ async function start() {
   build();
   app.strip = new Strip(server.photos, (id) => choosePhoto(id));
   app.picks.adopt(server.session);
+  app.picks.keepHistory(server.picks_path);
   byId('scan-choice').hidden = server.scans.length < 2;
   byId('scan-select')
       .append(...server.scans.map((scan) => el('option', {value: scan.id}, scan.name)));

@@ -41,7 +41,9 @@ export class Pane {
   setPicture(picture) {
     const same = this.picture && picture && this.picture.key === picture.key;
     this.picture = picture;
-    if (picture && !same) this.view.setPicture(picture.width, picture.height, picture.aspect ?? 1);
+    if (picture && !same) {
+      this.view.setPicture(picture.width, picture.height, picture.aspect ?? 1, picture.content);
+    }
     this.redraw();
   }
 

@@ -10,6 +10,7 @@ import {api, ServerError} from './api.js';
 const kMinInterval = 80;   // milliseconds between two requests while something is dragged
 const kRetryAfter = 1500;  // milliseconds
 const kHistory = 500;      // changes that can be undone
+const kKeptHistory = 50;   // of these after a reload
 
 const sentFields = ({image_name, img, scan, point, weight}) =>
     ({image_name, img, scan, point, weight});
@@ -44,6 +45,7 @@ export class Picks extends EventTarget {
   #timer = 0;
   #retry = 0;     // timer of the next question to a server that is gone
   #other = null;  // session of the faster tab
+  #kept = '';     // where the history is kept
 
   // Takes the server's picks as they are; nothing to undo from here.
   adopt(session) {
@@ -53,6 +55,35 @@ export class Picks extends EventTarget {
     this.#draft = null;
     this.#accepted = ++this.#version;
     this.#take(session, this.list);
+  }
+
+  // Keeps list and history over a reload of this page, and takes what it had before if the picks
+  // are still the same. `name`: what the history belongs to.
+  keepHistory(name) {
+    this.#kept = `picks of ${name}`;
+    try {
+      const {list, undo, redo} = JSON.parse(sessionStorage.getItem(this.#kept) ?? '{}');
+      if (!list || !samePicks(list, this.list)) return;
+      // The pieces of the history share picks with the list by number, no longer as objects.
+      this.#nextUid = 1 + Math.max(
+          0, ...[list, ...[...undo, ...redo].flatMap(({before, after}) => [before, after])]
+                 .flat().map(({uid}) => uid));
+      this.list = list;
+      this.#undo = undo;
+      this.#redo = redo;
+      this.#take(this.session, this.list);
+    } catch {
+      // No storage, or of another version: there is nothing to undo.
+    }
+  }
+  #keepHistory() {
+    if (!this.#kept) return;
+    const [undo, redo] = [this.#undo, this.#redo].map((steps) => steps.slice(-kKeptHistory));
+    try {
+      sessionStorage.setItem(this.#kept, JSON.stringify({list: this.list, undo, redo}));
+    } catch {
+      sessionStorage.removeItem(this.#kept);
+    }
   }
 
   // The same picks with more numbers.
@@ -239,6 +270,7 @@ export class Picks extends EventTarget {
     } else {
       this.#setState('unsaved', session.save_error);
     }
+    if (!this.pending) this.#keepHistory();
     this.dispatchEvent(new Event('change'));
   }
 
@@ -304,7 +336,9 @@ export class Picks extends EventTarget {
       this.#differs(now, this.list);
       return;
     }
-    if (this.state === 'gone' || this.state === 'restarted') {
+    if (this.state === 'unsaved' && now.saved && !this.pending) {
+      this.#take(now, this.list);
+    } else if (this.state === 'gone' || this.state === 'restarted') {
       this.#setState(
           this.pending           ? 'saving' :
               this.session.saved ? 'saved' :

@@ -19,10 +19,16 @@ export class TileStore {
   #running = new Map();  // url -> AbortController
   #failed = new Map();   // url -> when to ask again, milliseconds; Infinity = never
   #listeners = new Set();
+  #onRefused = () => {};
 
   // Called when a tile has come.
   onTile(listener) {
     this.#listeners.add(listener);
+  }
+
+  // listener(url, sentence): the server has no such picture, or its file is broken.
+  onRefused(listener) {
+    this.#onRefused = listener;
   }
 
   get bytes() {
@@ -98,7 +104,11 @@ export class TileStore {
     this.#running.set(url, controller);
     try {
       const response = await fetch(url, {signal: controller.signal});
-      if (!response.ok) throw new Error(String(response.status));
+      if (!response.ok) {
+        const {error = ''} = await response.json().catch(() => ({}));
+        if (response.status < 500 && error) this.#onRefused(url, error);
+        throw new Error(String(response.status));
+      }
       const bitmap = await createImageBitmap(await response.blob(), {colorSpaceConversion: 'none'});
       const bytes = bitmap.width * bitmap.height * 4;
       this.#tiles.set(url, {bitmap, toned: null, tone: '', bytes});

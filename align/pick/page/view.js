@@ -12,6 +12,7 @@ const kMaxScale = 64;
 export class View {
   constructor() {
     this.pictureWidth = this.pictureHeight = 1;
+    this.content = [0, 0, 1, 1];  // img
     this.aspect = 1;
     this.width = this.height = 1;  // of the pane, CSS pixels
     this.scale = 1;
@@ -19,10 +20,12 @@ export class View {
     this.fitted = true;        // follows the pane's size until the user zooms or pans
   }
 
-  setPicture(width, height, aspect) {
+  // content: [left, top, right, bottom] of what is to be seen, without an empty border; null = all.
+  setPicture(width, height, aspect, content = null) {
     this.pictureWidth = width;
     this.pictureHeight = height;
     this.aspect = aspect;
+    this.content = content ?? [0, 0, width, height];
     this.fit();
   }
 
@@ -35,16 +38,18 @@ export class View {
 
   get fitScale() {
     const margin = 24;
+    const [left, top, right, bottom] = this.content;
     return Math.max(
         1e-4,
         Math.min(
-            (this.width - margin) / this.pictureWidth,
-            (this.height - margin) / (this.pictureHeight * this.aspect)));
+            (this.width - margin) / (right - left),
+            (this.height - margin) / ((bottom - top) * this.aspect)));
   }
 
   fit() {
+    const [left, top, right, bottom] = this.content;
     this.scale = this.fitScale;
-    this.centre = [this.pictureWidth / 2, this.pictureHeight / 2];
+    this.centre = [(left + right) / 2, (top + bottom) / 2];
     this.fitted = true;
   }
 

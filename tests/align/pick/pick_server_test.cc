@@ -93,6 +93,20 @@ TEST_F(PickPage, TilesShowPhotoAndScan) {
   EXPECT_EQ(Decode(thumbnail.body).rows, 160);
 }
 
+TEST_F(PickPage, APhotoThatIsCutOffIsSaidAndNotShownInHalf) {
+  const int photo = ThePickRoom().other_photo();
+  const std::string path = ThePickRoom().photo_path(photo), whole = ReadBytes(path);
+  WriteBytes(path, whole.substr(0, whole.size() / 2));
+  for (const std::string picture :
+       {"tile?level=0&x=0&y=0&photo=", "thumbnail?photo=", "corner?x=300&y=200&reach=8&photo="}) {
+    const Answer answer = Get(picture + std::to_string(photo));
+    EXPECT_EQ(answer.status, 422) << picture;
+    EXPECT_THAT(answer.json()["error"].get<std::string>(),
+                HasSubstr("the file ends before the picture does"));
+  }
+  WriteBytes(path, whole);
+}
+
 TEST_F(PickPage, WhatIsNotThereIsNotFound) {
   for (const char* path : {"tile",
                            "tile?photo=2",
@@ -361,6 +375,8 @@ TEST_F(PickPage, PicksThatCannotBeSavedAreSaidAndNotLost) {
   EXPECT_EQ(session["picks"].size(), 4u);
   EXPECT_EQ(Post("align").status, 422);  // would run on other picks
   std::filesystem::remove_all(picks_path_);
+  EXPECT_EQ(Get("state").json()["session"]["saved"], true) << "tried again";
+  EXPECT_EQ(ReadPicks(picks_path_).size(), 4u);
   const Json saved = Put(2, ToJson(TruePicks(5))).json();
   EXPECT_EQ(saved["saved"], true);
   EXPECT_EQ(saved["save_error"], "");

@@ -191,6 +191,21 @@ TEST(ScanPlaces, AnEmptyScanHasNoPlaces) {
   }
 }
 
+TEST_P(BothSenses, TheContentIsWhereTheSamplesAre) {
+  EXPECT_THAT(places_.Content(), testing::ElementsAre(0, 0, kColumns, kRows));
+  Scan part = scan_;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const bool measured = row >= 40 && row < 200 && column >= 100 && column < 400;
+      const bool stray = row == 5 && column < 20;
+      if (!measured && !stray) part.points[part.Index(column, row)] = Scan::MissingPoint();
+    }
+  }
+  const ScanPlaces places(part);
+  const int left = places.flipped() ? kColumns - 400 : 100;
+  EXPECT_THAT(places.Content(), testing::ElementsAre(left, 40, left + 300, 200));
+}
+
 TEST_P(BothSenses, PicturesShowTheSameRoom) {
   const Scan other = BoxScan(!GetParam());
   const ScanPlaces other_places(other);
