@@ -283,6 +283,56 @@ test('the picture is downloaded in the size asked for', async () => {
   await page.close();
 });
 
+test('a plan is true to scale and says where it lies; lengths also in feet', async () => {
+  const {page, errors} = await openView();
+  await page.selectOption('#plan-step', '10');
+  const downloads = [];
+  page.on('download', (download) => downloads.push(download));
+  await page.click('#save-plan');
+  await page.waitForFunction(() => /plan is saved/.test(document.querySelector('#hint').textContent));
+  const named = (ending) => downloads.find((one) => one.suggestedFilename() === `textured${ending}`);
+  for (let i = 0; i < 100 && !(named('-plan.png') && named('-plan.pgw')); ++i) await page.waitForTimeout(50);
+  await named('-plan.png').saveAs(`${process.env.ROOMTEX_SCREENSHOTS}/view-plan.png`);
+  const png = readPng(readFileSync(await named('-plan.png').path()));
+  // The room is 5 m wide and 4 m deep, its window 12 cm more; 5 cm of margin on each side.
+  assert.ok(Math.abs(png.width - 510) <= 3, `${png.width} pixels wide`);
+  assert.ok(Math.abs(png.height - 422) <= 3, `${png.height} pixels high`);
+  assert.deepEqual(png.at(1, 1), [255, 255, 255], 'nothing beside the room');
+  const seen = new Set();
+  for (let x = 20; x < 490; x += 9) seen.add(String(png.at(x, 200)));
+  assert.ok(seen.size > 20, 'the plan is empty');
+  const world = readFileSync(await named('-plan.pgw').path(), 'utf8').trim().split('\n').map(Number);
+  assert.equal(world.length, 6);
+  // The room's own axes lie obliquely in the scan's: a pixel is 1 cm in any case.
+  const [a, d, b, e] = world;
+  assert.ok(Math.abs(Math.hypot(a, d) - 0.01) < 1e-9 && Math.abs(Math.hypot(b, e) - 0.01) < 1e-9);
+  assert.ok(Math.abs(a + e) < 1e-9 && Math.abs(d - b) < 1e-9, `${world}`);
+  assert.ok(a > 0.0099 * Math.SQRT1_2);
+
+  // From above there is one scale: the bar is as long as it says.
+  await page.keyboard.press('t');
+  await settle(page);
+  const bar = () => page.evaluate(() => {
+    const {camera, height} = roomtexView.navigation;
+    const {text, px} = {
+      text: document.querySelector('#scale-bar').innerText,
+      px: document.querySelector('#scale-bar').getBoundingClientRect().width
+    };
+    return {text, metres: px * (camera.top - camera.bottom) / camera.zoom / height};
+  });
+  const metric = await bar();
+  assert.match(metric.text, /^[125]\d* m$|^0\.[125] m$/);
+  assert.ok(Math.abs(metric.metres - Number.parseFloat(metric.text)) < 0.01);
+  await page.click('label:has(input[name="unit"][value="ft"])');
+  await settle(page);
+  const feet = await bar();
+  assert.match(feet.text, / ft$/);
+  assert.ok(Math.abs(feet.metres / 0.3048 - Number.parseFloat(feet.text)) < 0.03);
+  await screenshot(page, 'view-from-above-feet');
+  assert.deepEqual(errors(), []);
+  await page.close();
+});
+
 // Inside the room, in front of a wall.
 const insideRoom = () => server.url + lookAlong(folder.path('room'), [2.5, 2.0, 1.6], [1, 0, 0]);
 

@@ -222,8 +222,9 @@ Json ViewServer::Impl::CastRay(const LocalServer::Query& query) {
   if (!(direction.norm() > 1e-12)) throw UsageError("The ray has no direction.");
   direction.normalize();
   const bool front_only = query.count("front") > 0 && IntOf(query, "front") != 0;
-  const double top =
-      query.count("top") > 0 ? DoubleOf(query, "top") : std::numeric_limits<double>::infinity();
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double top = query.count("top") > 0 ? DoubleOf(query, "top") : infinity;
+  const double bottom = query.count("bottom") > 0 ? DoubleOf(query, "bottom") : -infinity;
   const ViewModel& model = content.model;
   // Bounded: a ray along a surface may touch many triangles that do not count.
   double nearest = 0;
@@ -231,8 +232,9 @@ Json ViewServer::Impl::CastRay(const LocalServer::Query& query) {
     const auto hit = rays->Cast(from, direction, nearest);
     if (!hit) break;
     const Triangle& t = model.triangles[hit->triangle];
+    const double height = hit->point.dot(model.up);
     const bool counts = (!front_only || ShowsFront(model, hit->triangle, direction)) &&
-                        hit->point.dot(model.up) <= top;
+                        height <= top && height >= bottom;
     if (counts) {
       return {{"hit", true},
               {"point", ToArray(hit->point)},

@@ -11,12 +11,14 @@ import {drawLegend} from './legend.js';
 import {Measures} from './measure.js';
 import {Navigation} from './navigation.js';
 import {Panel, showFailure} from './panel.js';
+import {scaleBar} from './plan.js';
 import {Room} from './room.js';
 
 const kSlowFrame = 60;      // milliseconds of the graphics card: coarse while moving
 const kLongestFrame = 800;  // milliseconds: coarser at rest, too, up to kMaxTolerance
 const kShortFrame = 150;    // milliseconds: as fine as it should be again
 const kMaxTolerance = 4;
+const kScaleBarPx = 180;     // at most
 const kFragmentPause = 300;  // milliseconds between two changes of the address
 const kBackgrounds = {
   dark: 0x1b1e24,
@@ -192,6 +194,7 @@ class Viewer {
     this.measures.update(camera);
     this.renderer.render(this.world, camera);
     this.#placeLabels();
+    this.#showScale();
     const gl = this.renderer.getContext();
     if (this.fence) gl.deleteSync(this.fence.sync);
     this.fence = {sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), started};
@@ -258,6 +261,35 @@ class Viewer {
     });
   }
 
+  // Only a view from above has one scale: {px, text} of a bar, or null.
+  #scale() {
+    const {camera, height, mode} = this.navigation;
+    if (mode !== 'top') return null;
+    return scaleBar((camera.top - camera.bottom) / camera.zoom / height, kScaleBarPx);
+  }
+  #showScale() {
+    const scale = this.#scale(), bar = document.getElementById('scale-bar');
+    bar.hidden = scale === null;
+    if (!scale) return;
+    bar.style.width = `${scale.px}px`;
+    bar.firstElementChild.textContent = scale.text;
+  }
+  #drawScale(context, scale) {
+    const bar = this.#scale();
+    if (!bar) return;
+    const {width, height} = this.navigation;
+    const left = width - bar.px - 24, y = height - 24;
+    context.save();
+    context.scale(scale, scale);
+    context.fillStyle = 'rgba(16, 18, 23, 0.9)';
+    context.fillRect(left - 8, y - 22, bar.px + 16, 32);
+    context.fillStyle = '#fff';
+    context.fillRect(left, y, bar.px, 3);
+    context.font = '600 12px system-ui, sans-serif';
+    context.fillText(bar.text, left, y - 6);
+    context.restore();
+  }
+
   // What is seen as a PNG of `scale` pixels per CSS pixel, with labels and legend.
   async picture(scale) {
     const {width, height} = this.navigation;
@@ -290,6 +322,7 @@ class Viewer {
     context.textAlign = 'left';
     context.textBaseline = 'alphabetic';
     if (this.mode !== 'colour') drawLegend(context, this.mode, this.evidence, scale);
+    this.#drawScale(context, scale);
     this.measures.setHover(hover);
     this.draw();
     return new Promise((done) => canvas.toBlob(done, 'image/png'));

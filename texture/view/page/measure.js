@@ -65,7 +65,7 @@ export class Measures extends EventTarget {
   }
 
   // The point of the surface along a ray of the page, scan frame; null without.
-  async pick(ray, {frontOnly, top}) {
+  async pick(ray, {frontOnly, bottom, top}) {
     const from = this.frames.toScan(ray.origin), along = this.frames.turnToScan(ray.direction);
     const query = new URLSearchParams({
       x: from.x,
@@ -76,7 +76,9 @@ export class Measures extends EventTarget {
       dz: along.z,
       front: frontOnly ? 1 : 0,
     });
-    if (top < 1e8) query.set('top', top + this.frames.origin.dot(this.up));
+    const floor = this.frames.origin.dot(this.up);
+    if (top < 1e8) query.set('top', top + floor);
+    if (bottom > -1e8) query.set('bottom', bottom + floor);
     const answer = await getJson(`cast?${query}`);
     return answer.hit ? new THREE.Vector3(...answer.point) : null;
   }

@@ -1,7 +1,8 @@
 // Everything on the page that is not the picture: buttons, lists, keys, sentences.
 
-import {coordinates, count, length} from './format.js';
+import {coordinates, count, length, setUnit, unit} from './format.js';
 import {showLegend} from './legend.js';
+import {makePlan} from './plan.js';
 import {kModes} from './surface.js';
 
 const $ = (id) => document.getElementById(id);
@@ -9,6 +10,15 @@ const radios = (name) => [...document.querySelectorAll(`input[name="${name}"]`)]
 const check = (name, value) => {
   for (const radio of radios(name)) radio.checked = radio.value === value;
 };
+
+const kUnitKey = 'roomtex-view unit';
+function keptUnit() {
+  try {
+    return localStorage.getItem(kUnitKey) ?? 'm';
+  } catch {
+    return 'm';
+  }
+}
 
 function make(tag, {text, className, ...properties} = {}, ...children) {
   const element = document.createElement(tag);
@@ -82,7 +92,11 @@ export class Panel {
     const onInput = (id, set) => $(id).addEventListener('input', (event) => set(event.target));
     onInput('both-sides', ({checked}) => viewer.room.setBothSides(checked));
     onInput('opacity', ({value}) => viewer.cameras.setOpacity(Number(value)));
-    onInput('top', () => this.#setTop());
+    onInput('top', () => this.#setHeights());
+    onInput('bottom', () => this.#setHeights());
+    onRadio('unit', (name) => this.#setUnit(name));
+    onClick('save-plan', () => this.savePlan());
+    this.#setUnit(keptUnit());
     onInput('eye', ({value}) => {
       viewer.navigation.setEyeHeight(Number(value));
       this.showEye();
@@ -118,26 +132,64 @@ export class Panel {
     this.viewer.cameras.setSize(size);
     $('camera-size-value').textContent = `${Math.round(100 * size)} cm`;
   }
-  // The slider runs from floor to ceiling.
-  #setTop() {
-    const {viewer} = this, share = Number($('top').value);
+  // The sliders run from floor to ceiling.
+  #setHeights() {
+    const {viewer} = this;
     const {min, max} = viewer.navigation.bounds;
     const floor = viewer.floorHeight();
-    const height = share >= 1 ? 1e9 : min.y + share * (max.y - min.y);
-    $('top-value').textContent = share >= 1 ? 'off' : `${(height - floor).toFixed(2)} m`;
-    viewer.room.setTop(height);
+    const read = (id, off, beyond) => {
+      const share = Number($(id).value);
+      const height = share === off ? beyond : min.y + share * (max.y - min.y);
+      const above = (height - floor) / unit().metres;
+      $(`${id}-value`).textContent =
+          share === off ? 'off' : `${above.toFixed(2)} ${unit().name}`;
+      return height;
+    };
+    viewer.room.setHeights(read('bottom', 0, -1e9), read('top', 1, 1e9));
+  }
+  #setUnit(name) {
+    setUnit(name);
+    check('unit', unit().name);
+    try {
+      localStorage.setItem(kUnitKey, unit().name);
+    } catch {
+      // Not kept, then.
+    }
+    if (!this.viewer.measures) return;  // not built yet
+    this.#setHeights();
+    this.showMeasures();
+    this.viewer.invalidate();
+  }
+  async savePlan() {
+    const {viewer} = this, button = $('save-plan');
+    button.disabled = true;
+    try {
+      const {blob, world, width, height} =
+          await makePlan(viewer, Number($('plan-step').value) / 1000, (share) => {
+            this.hint(`Drawing the plan, ${Math.round(100 * share)} %`);
+          });
+      this.#download(blob, '-plan.png');
+      this.#download(new Blob([world], {type: 'text/plain'}), '-plan.pgw');
+      this.hint(`The plan is saved, ${width} x ${height} pixels.`);
+    } catch (error) {
+      this.fail(error.message);
+    }
+    button.disabled = false;
+  }
+  #download(blob, ending) {
+    const link = make('a', {
+      href: URL.createObjectURL(blob),
+      download: `${this.viewer.data.name.replace(/\.[^.]*$/, '')}${ending}`
+    });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
   async savePicture() {
     const {viewer} = this;
     const scale = Number(radios('scale').find((radio) => radio.checked).value);
     const blob = await viewer.picture(scale);
     if (!blob) return this.fail('The picture is too large for this browser.');
-    const link = make('a', {
-      href: URL.createObjectURL(blob),
-      download: `${viewer.data.name.replace(/\.[^.]*$/, '')}-view.png`
-    });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    this.#download(blob, '-view.png');
     this.hint('The picture is saved.');
   }
 

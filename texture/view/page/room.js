@@ -160,6 +160,7 @@ export class Room {
     this.materials = new Map();
     this.mode = 'colour';
     this.frontOnly = true;
+    this.bottom = -1e9;  // of what is shown
     this.top = 1e9;
     this.coarseOnly = false;
     this.queue = new Queue(4);
@@ -269,9 +270,10 @@ export class Room {
     this.look.setMode(mode, evidence);
     this.invalidate();
   }
-  setTop(height) {
-    this.top = height;
-    this.look.setTop(height);
+  setHeights(bottom, top) {
+    this.bottom = bottom;
+    this.top = top;
+    this.look.setHeights(bottom, top);
     this.invalidate();
   }
   setBothSides(both) {
@@ -407,7 +409,8 @@ export class Room {
         const distance = meet(local.origin, local.direction, positions, a, b, c);
         if (distance >= best) continue;
         if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
-        if (ray.origin.y + distance * ray.direction.y > this.top) continue;
+        const height = ray.origin.y + distance * ray.direction.y;
+        if (height > this.top || height < this.bottom) continue;
         best = distance;
       }
     }

@@ -102,6 +102,7 @@ uniform bool textured;
 uniform sampler2D page;
 uniform sampler2D ramp;
 uniform float top;
+uniform float bottom;
 uniform float high;
 uniform vec3 unknown;
 in vec2 v_uv;
@@ -114,7 +115,7 @@ vec3 mapped(float t) {
   return texture(ramp, vec2((clamp(t, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5)).rgb;
 }
 void main() {
-  if (v_place.x > top || v_facing > ${kFrontMargin}) discard;
+  if (v_place.x > top || v_place.x < bottom || v_facing > ${kFrontMargin}) discard;
   vec3 shown;
   if (mode == 0) {
     shown = textured ? texture(page, v_uv).rgb : v_color;
@@ -139,6 +140,7 @@ export class SurfaceLook {
     mode: {value: 0},
     ramp: {value: this.#ramps.views},
     top: {value: 1e9},
+    bottom: {value: -1e9},
     front_only: {value: true},
     high: {value: 1},
     unknown: {value: new THREE.Vector3(...kUnknownColor).divideScalar(255)},
@@ -168,8 +170,10 @@ export class SurfaceLook {
     }
     this.#shared.ramp.value = this.#ramps[mode] ?? this.#ramps.views;
   }
-  setTop(height) {
-    this.#shared.top.value = height;
+  // What lies between is shown.
+  setHeights(bottom, top) {
+    this.#shared.bottom.value = bottom;
+    this.#shared.top.value = top;
   }
   setBothSides(both) {
     this.#shared.front_only.value = !both;
