@@ -25,12 +25,15 @@
 #include "align/trust/station_check.h"
 #include "colmap_ext/lens_labels.h"
 #include "colmap_ext/mapper_verdict.h"
+#include "colmap_ext/model_output.h"
 #include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/photo_fit.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -161,21 +164,25 @@ void CheckArguments(const Arguments& a) {
         "--output_path is the same folder as --input_path: the input model is never "
         "overwritten");
   }
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "alignment.json",
+                           "scan_from_sparse.txt", "scan_from_sparse_matrix.txt"}) {
+    RequireReplaceable(a.output_path + "/" + name);
+  }
   if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");
   if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
 }
 
 // The model on the Earth, with --geo_origin; the report's `geo`.
 void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans& placed,
-              const std::optional<GeoReference>& geo, const std::string& output_path,
+              const std::optional<GeoReference>& geo, const OutputSet& outputs,
               const Command::Context& context) {
-  const std::string folder = output_path + "/geo";
+  const std::string folder = outputs.folder() + "/geo";
   context.report["geo"] = nullptr;
   if (a.geo_origin.empty() && std::filesystem::exists(folder + "/geo.json")) {
     context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
   }
   if (!geo) return;
-  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, folder);
+  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, outputs.aside() + "/geo");
   const GpsCheck gps = CheckGps(aligned, *geo, a.image_path);
   context.report["geo"] = GeoToJson(*geo, placed, gps);
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
@@ -235,15 +242,15 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
 // The report's `overlays`.
 void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
                           const SurveyedScans& surveyed, const std::set<std::string>& told,
-                          const std::string& output_path, const Command::Context& context) {
+                          const OutputSet& outputs, const Command::Context& context) {
   context.report["overlays"] = Json::array();
   if (a.overlays == 0) return;
   context.progress.Stage("overlays");
   std::vector<std::string> warnings;
   for (const std::string& path :
-       WriteOverlays(aligned, a.image_path, output_path + "/overlays", surveyed.viewer(),
+       WriteOverlays(aligned, a.image_path, outputs.aside() + "/overlays", surveyed.viewer(),
                      a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
-    context.report["overlays"].push_back(path);
+    context.report["overlays"].push_back(outputs.folder() + path.substr(outputs.aside().size()));
   }
   WarnOfPhotos(a, warnings, "Overlay: ", told, context);
 }
@@ -418,22 +425,23 @@ void WriteAligned(const Arguments& a, const SparseModel& model,
                   const std::set<std::string>& told, const Command::Context& context) {
   context.progress.Stage("write");
   const std::string output_path = ChooseOutput(a, context);
-  const std::string transform_path = output_path + "/scan_from_sparse.txt";
-  const std::string matrix_path = output_path + "/scan_from_sparse_matrix.txt";
-  WriteSparseModel(model, output_path);
+  const char transform_name[] = "scan_from_sparse.txt",
+             matrix_name[] = "scan_from_sparse_matrix.txt";
+  RequireNoRigs(output_path);
+  const auto outputs = std::make_shared<OutputSet>(output_path);
+  WriteSparseModel(model, outputs->aside());
   if (scan_from_sparse) {
-    WriteSimilarity(transform_path, *scan_from_sparse);
-    WriteSimilarityMatrix(matrix_path, *scan_from_sparse);
+    WriteSimilarity(outputs->Path(transform_name), *scan_from_sparse);
+    WriteSimilarityMatrix(outputs->Path(matrix_name), *scan_from_sparse);
   } else {
     // One of an earlier run would contradict.
-    std::error_code ignored;
-    std::filesystem::remove(transform_path, ignored);
-    std::filesystem::remove(matrix_path, ignored);
+    outputs->Remove(transform_name);
+    outputs->Remove(matrix_name);
   }
-  WriteGeo(a, model, reading.placed, reading.geo, output_path, context);
+  WriteGeo(a, model, reading.placed, reading.geo, *outputs, context);
   context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
-  context.report.AddCopy(output_path + "/alignment.json");
-  WriteOverlayPictures(a, model, *reading.surveyed, told, output_path, context);
+  WriteOverlayPictures(a, model, *reading.surveyed, told, *outputs, context);
+  CommitWithReport("alignment.json", outputs);
 }
 
 // What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one

@@ -7,15 +7,16 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <system_error>
 #include <tuple>
 
-#include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/partial_path.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -72,34 +73,72 @@ std::string SqliteUri(const std::string& path, const std::string& query) {
 // A copy of the database and its WAL in a folder of its own, removed at the end.
 class TemporaryCopy {
  public:
-  explicit TemporaryCopy(const std::string& path) {
-    std::string pattern = (fs::temp_directory_path() / "roomtex-database-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw InputError(path, "", "has a WAL file beside it that needs a copy, but none can be made",
-                       "Set TMPDIR to a folder that may be written");
-    }
-    folder_ = pattern;
+  explicit TemporaryCopy(const std::string& path) try
+      : folder_(fs::temp_directory_path().string()) {
     std::error_code error;
     fs::copy_file(path, database(), error);
     if (!error) fs::copy_file(path + "-wal", database() + "-wal", error);
     if (!error) return;
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
     throw InputError(path, "", "cannot be copied with its WAL file (" + error.message() + ")",
                      "Set TMPDIR to a folder with space for the database");
+  } catch (const std::system_error&) {
+    throw InputError(path, "", "has a WAL file beside it that needs a copy, but none can be made",
+                     "Set TMPDIR to a folder that may be written");
   }
-  ~TemporaryCopy() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  TemporaryCopy(const TemporaryCopy&) = delete;
-  TemporaryCopy& operator=(const TemporaryCopy&) = delete;
 
-  std::string database() const { return (fs::path(folder_) / "database.db").string(); }
+  std::string database() const { return folder_ / "database.db"; }
 
  private:
-  std::string folder_;
+  PartialFolder folder_;
 };
+
+// All tables that COLMAP has had since 3.7.
+const std::set<std::string>& KnownTables() {
+  static const std::set<std::string> tables = {
+      "cameras",     "images",      "keypoints", "descriptors", "matches", "two_view_geometries",
+      "pose_priors", "rig_sensors", "rigs",      "frame_data",  "frames"};
+  return tables;
+}
+
+// A database of somebody else's is data: its schema may hold expressions, views and triggers, and
+// none of them is run. What we ask reads stored columns of COLMAP's tables and counts rows.
+int Authorize(void*, int action, const char* first, const char* second, const char*, const char*) {
+  const std::string what = first == nullptr ? "" : first;
+  switch (action) {
+    case SQLITE_SELECT:
+      return SQLITE_OK;
+    case SQLITE_READ:
+      return KnownTables().count(what) > 0 || what == "sqlite_master" || what == "sqlite_schema"
+                 ? SQLITE_OK
+                 : SQLITE_DENY;
+    case SQLITE_FUNCTION:
+      return second != nullptr && std::strcmp(second, "count") == 0 ? SQLITE_OK : SQLITE_DENY;
+    case SQLITE_PRAGMA:
+      return what == "table_info" || (what == "user_version" && second == nullptr) ? SQLITE_OK
+                                                                                   : SQLITE_DENY;
+    default:
+      return SQLITE_DENY;
+  }
+}
+
+// Steps of SQLite's machine from one row to the next; a row of a table takes some dozens.
+constexpr int64_t kMaxStepsPerRow = 500'000'000;
+constexpr int kStepsPerLook = 100'000;
+
+int LookAtWork(void* steps) {
+  auto* const count = static_cast<int64_t*>(steps);
+  *count += kStepsPerLook;
+  return *count > kMaxStepsPerRow ? 1 : 0;
+}
+
+void Distrust(sqlite3* handle, int64_t* steps) {
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_set_authorizer(handle, Authorize, nullptr);
+  sqlite3_progress_handler(handle, kStepsPerLook, LookAtWork, steps);
+}
 
 // What SQLite's result code means to the user.
 InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& error) {
@@ -122,11 +161,42 @@ InputError ErrorFromSqlite(const std::string& path, const SQLite::Exception& err
       return InputError(path, "", "cannot be read" + said, "Check the rights of file and folder");
     case SQLITE_FULL:
       return InputError(path, "", "cannot be copied: the disk is full", "Make space");
+    case SQLITE_AUTH:
+    case SQLITE_INTERRUPT:
+      return InputError(path, "",
+                        "holds programs (a view, a trigger or an expression) where COLMAP has "
+                        "plain tables" +
+                            said,
+                        kDatabaseRemedy);
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     default:
       return InputError(path, "", "cannot be read as COLMAP's database" + said, kDatabaseRemedy);
   }
+}
+
+// An ordinary table, neither a view nor the table of a module.
+bool HasTable(const SQLite::Database& sqlite, const std::string& table) {
+  SQLite::Statement statement(
+      sqlite, "SELECT rootpage FROM sqlite_master WHERE type = 'table' AND name = ?");
+  statement.bind(1, table);
+  return statement.executeStep() && statement.getColumn(0).getInt() > 0;
+}
+
+struct TableColumn {
+  std::string name, type;
+  bool not_null = false;
+  int key = 0;  // place in the primary key, from 1; 0 = no part of it
+};
+
+std::vector<TableColumn> ColumnsOf(const SQLite::Database& sqlite, const std::string& table) {
+  std::vector<TableColumn> columns;
+  SQLite::Statement statement(sqlite, "PRAGMA table_info(\"" + table + "\")");
+  while (statement.executeStep()) {
+    columns.push_back({statement.getColumn(1).getString(), statement.getColumn(2).getString(),
+                       statement.getColumn(3).getInt() != 0, statement.getColumn(5).getInt()});
+  }
+  return columns;
 }
 
 // Values of the current row of a statement; an InputError that names the row where they are not
@@ -203,6 +273,7 @@ struct Database::Impl {
   std::string path;
   std::unique_ptr<TemporaryCopy> copy;
   std::unique_ptr<SQLite::Database> sqlite;
+  mutable int64_t steps = 0;  // of SQLite's machine, since the last row
 
   // Runs `read` with SQLite's errors told as InputErrors.
   template <typename Read>
@@ -222,7 +293,11 @@ struct Database::Impl {
       SQLite::Statement statement(*sqlite, query);
       if (statement.getBindParameterCount() > 0) statement.bind(1, parameter);
       const Row row(path, table, statement);
-      while (statement.executeStep()) use(row);
+      steps = 0;
+      while (statement.executeStep()) {
+        use(row);
+        steps = 0;
+      }
     });
   }
 
@@ -252,8 +327,8 @@ void Database::Impl::Open() {
   const auto open = [&](const std::string& file, const char* query) {
     sqlite = std::make_unique<SQLite::Database>(
         SqliteUri(file, query), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyMilliseconds);
-    sqlite->exec("PRAGMA trusted_schema = OFF");
     sqlite->exec("PRAGMA cell_size_check = ON");
+    Distrust(sqlite->getHandle(), &steps);
     sqlite->execAndGet("SELECT COUNT(*) FROM sqlite_master");
   };
   Guarded([&] {
@@ -269,22 +344,19 @@ void Database::Impl::Open() {
 
 void Database::Impl::RequireColumns(const char* table,
                                     const std::vector<std::string>& columns) const {
-  const std::string quoted = std::string("'") + table + "'";
-  std::set<std::string> present;
+  std::vector<TableColumn> present;
   Guarded([&] {
-    SQLite::Statement tables(
-        *sqlite, "SELECT name FROM sqlite_master WHERE type = 'table' AND name = " + quoted);
-    if (!tables.executeStep()) {
+    if (!HasTable(*sqlite, table)) {
       throw InputError(
           path, "",
           std::string("is an SQLite database, but not COLMAP's: it has no table ") + table,
           kDatabaseRemedy);
     }
-    SQLite::Statement statement(*sqlite, "SELECT name FROM pragma_table_info(" + quoted + ")");
-    while (statement.executeStep()) present.insert(statement.getColumn(0).getString());
+    present = ColumnsOf(*sqlite, table);
   });
   for (const std::string& column : columns) {
-    if (present.count(column) > 0) continue;
+    const auto has_name = [&](const TableColumn& other) { return other.name == column; };
+    if (std::any_of(present.begin(), present.end(), has_name)) continue;
     throw InputError(path, std::string("table ") + table,
                      "is not COLMAP's: it has no column " + column, kDatabaseRemedy);
   }
@@ -443,21 +515,44 @@ constexpr const char* kTables39[] = {
     "cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB, qvec BLOB, "
     "tvec BLOB)"};
 
-std::vector<std::string> Columns(const SQLite::Database& sqlite, const std::string& table) {
-  std::vector<std::string> names;
-  SQLite::Statement statement(sqlite, "SELECT name FROM pragma_table_info('" + table + "')");
-  while (statement.executeStep()) names.push_back(statement.getColumn(0).getString());
-  return names;
+std::string QuotedName(const std::string& name) {
+  std::string quoted = "\"";
+  for (const char c : name) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
 }
 
-// Copies the columns that both tables have.
-void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const std::string& table) {
-  const std::vector<std::string> known = Columns(to, table);
+// Makes a table with these columns and nothing else: no default, check, trigger or index of the
+// other one. COLMAP adds its own indices when it opens a database.
+void MakeTable(const std::string& table, const std::vector<TableColumn>& columns,
+               SQLite::Database* to) {
+  static const std::set<std::string> types = {"INTEGER", "REAL", "BLOB", "TEXT"};
+  std::string definition, keys;
+  const auto num_keys =
+      std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c.key > 0; });
+  for (const TableColumn& column : columns) {
+    definition += (definition.empty() ? "" : ", ") + QuotedName(column.name);
+    if (types.count(column.type) > 0) definition += " " + column.type;
+    if (num_keys == 1 && column.key > 0) definition += " PRIMARY KEY";
+    if (column.not_null) definition += " NOT NULL";
+    if (num_keys > 1 && column.key > 0) {
+      keys += (keys.empty() ? ", PRIMARY KEY (" : ", ") + QuotedName(column.name);
+    }
+  }
+  if (!keys.empty()) keys += ")";
+  to->exec("CREATE TABLE " + QuotedName(table) + " (" + definition + keys + ")");
+}
+
+// Copies the columns that both tables have; `steps` is what LookAtWork counts.
+void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const std::string& table,
+              int64_t* steps) {
+  const std::vector<TableColumn> known = ColumnsOf(to, table);
   std::string names, places;
   int num_columns = 0;
-  for (const std::string& column : Columns(from, table)) {
-    if (std::find(known.begin(), known.end(), column) == known.end()) continue;
-    names += (num_columns == 0 ? "\"" : ", \"") + column + "\"";
+  if (!HasTable(from, table)) return;
+  for (const TableColumn& column : ColumnsOf(from, table)) {
+    const auto has_name = [&](const TableColumn& other) { return other.name == column.name; };
+    if (std::none_of(known.begin(), known.end(), has_name)) continue;
+    names += (num_columns == 0 ? "" : ", ") + QuotedName(column.name);
     places += num_columns == 0 ? "?" : ", ?";
     ++num_columns;
   }
@@ -465,7 +560,9 @@ void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const st
   SQLite::Statement read(from, "SELECT " + names + " FROM \"" + table + "\"");
   SQLite::Statement insert(to,
                            "INSERT INTO \"" + table + "\" (" + names + ") VALUES (" + places + ")");
+  *steps = 0;
   while (read.executeStep()) {
+    *steps = 0;
     for (int i = 0; i < num_columns; ++i) {
       const SQLite::Column value = read.getColumn(i);
       if (value.isNull()) {
@@ -485,12 +582,18 @@ void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const st
   }
 }
 
-// Makes the tables and indices of `from` in `to`.
-void CopySchema(const SQLite::Database& from, SQLite::Database* to) {
-  SQLite::Statement objects(from,
-                            "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL AND name NOT LIKE "
-                            "'sqlite_%' AND type IN ('table', 'index') ORDER BY type = 'index'");
-  while (objects.executeStep()) to->exec(objects.getColumn(0).getString());
+// COLMAP's tables of `from` in `to`, with their rows where `with_rows` says so.
+template <typename WithRows>
+void CopyTables(const SQLite::Database& from, SQLite::Database* to, int64_t* steps,
+                const WithRows& with_rows) {
+  SQLite::Statement version(from, "PRAGMA user_version");
+  version.executeStep();
+  to->exec("PRAGMA user_version = " + std::to_string(version.getColumn(0).getInt()));
+  for (const std::string& table : KnownTables()) {
+    if (!HasTable(from, table)) continue;
+    MakeTable(table, ColumnsOf(from, table), to);
+    if (with_rows(table)) CopyRows(from, *to, table, steps);
+  }
 }
 
 }  // namespace
@@ -504,18 +607,14 @@ void Database::CopyForMapper(const std::string& path, Schema schema) const {
     SQLite::Transaction transaction(copy);
     if (schema == Schema::kColmap39) {
       for (const char* table : kTables39) copy.exec(table);
+      for (const char* table : {"cameras", "images", "keypoints", "two_view_geometries"}) {
+        CopyRows(from, copy, table, &impl_->steps);
+      }
     } else {
-      CopySchema(from, &copy);
-      SQLite::Statement version(from, "PRAGMA user_version");
-      version.executeStep();
-      copy.exec("PRAGMA user_version = " + version.getColumn(0).getString());
+      CopyTables(from, &copy, &impl_->steps, [](const std::string& table) {
+        return table != "descriptors" && table != "matches";
+      });
     }
-    std::vector<std::string> tables;
-    SQLite::Statement statement(copy,
-                                "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT "
-                                "LIKE 'sqlite_%' AND name NOT IN ('descriptors', 'matches')");
-    while (statement.executeStep()) tables.push_back(statement.getColumn(0).getString());
-    for (const std::string& table : tables) CopyRows(from, copy, table);
     transaction.commit();
   });
 }
@@ -532,10 +631,9 @@ void Database::CopyWithCameras(const std::string& path,
                                const std::map<uint32_t, Camera>& cameras) const {
   impl_->Guarded([&] {
     SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    SQLite::Backup(copy, *impl_->sqlite).executeStep(-1);
-    copy.exec("PRAGMA journal_mode = DELETE");  // out of WAL, which the copy took over
     copy.exec("PRAGMA journal_mode = MEMORY");  // no file beside it
     SQLite::Transaction transaction(copy);
+    CopyTables(*impl_->sqlite, &copy, &impl_->steps, [](const std::string&) { return true; });
     SQLite::Statement update(copy,
                              "UPDATE cameras SET model = ?, width = ?, height = ?, params = ?, "
                              "prior_focal_length = ? WHERE camera_id = ?");

@@ -1,11 +1,8 @@
 #include "colmap_ext/model_output.h"
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <set>
-
-#include <stdlib.h>
+#include <system_error>
 
 #include "colmap_ext/mapper_verdict.h"
 #include "core/error.h"
@@ -13,19 +10,10 @@
 namespace roomtex {
 namespace fs = std::filesystem;
 
-ScratchFolder::ScratchFolder(const std::string& parent) {
-  std::string pattern = (fs::path(parent) / ".roomtex-mapper-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    throw InputError(parent, "",
-                     std::string("cannot be written into (") + std::strerror(errno) + ")",
-                     "Check the rights of this folder and the space on the disk");
-  }
-  path_ = pattern;
-}
-
-ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
+ScratchFolder::ScratchFolder(const std::string& parent) try : folder_(parent) {
+} catch (const std::system_error& error) {
+  throw InputError(parent, "", "cannot be written into (" + error.code().message() + ")",
+                   "Check the rights of this folder and the space on the disk");
 }
 
 void RequireReplaceableModel(const std::string& folder) {
@@ -48,18 +36,14 @@ void RequireReplaceableModel(const std::string& folder) {
   }
 }
 
-void ReplaceFolder(const std::string& finished, const std::string& target,
-                   const std::string& scratch) {
-  const fs::path old = fs::path(scratch) / ("replaced_" + fs::path(target).filename().string());
-  std::error_code error;
-  const bool had_old = fs::exists(target, error);
-  if (had_old) fs::rename(target, old, error);
-  if (!error) fs::rename(finished, target, error);
-  if (!error) return;
-  std::error_code ignored;
-  if (had_old && !fs::exists(target, ignored)) fs::rename(old, target, ignored);
-  throw InputError(target, "", "cannot be replaced (" + error.message() + ")",
-                   "Check the rights of this folder");
+void RequireNoRigs(const std::string& folder) {
+  for (const char* file : {"rigs.bin", "frames.bin"}) {
+    const std::string path = (fs::path(folder) / file).string();
+    std::error_code error;
+    if (!fs::exists(path, error)) continue;
+    throw InputError(path, "", "belongs to a COLMAP 4 model, which the new one would contradict",
+                     "Give an empty --output_path");
+  }
 }
 
 }  // namespace roomtex

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "core/partial_path.h"
+
 namespace roomtex {
 
 // A folder of its own inside `parent` (so that renaming out of it is atomic), removed at the end
@@ -11,24 +13,20 @@ class ScratchFolder {
  public:
   // Throws InputError if it cannot be made.
   explicit ScratchFolder(const std::string& parent);
-  ~ScratchFolder();
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
 
-  const std::string& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  const std::string& path() const { return folder_.path(); }
+  std::string operator/(const std::string& name) const { return folder_ / name; }
 
  private:
-  std::string path_;
+  PartialFolder folder_;
 };
 
 // Throws InputError if `folder` exists and is something else than a COLMAP model (or empty):
 // replacing it would destroy what is not ours.
 void RequireReplaceableModel(const std::string& folder);
 
-// Puts `finished` in the place of `target`; what stood there goes into `scratch` as a whole. Same
-// file system.
-void ReplaceFolder(const std::string& finished, const std::string& target,
-                   const std::string& scratch);
+// Throws InputError if `folder` holds rigs.bin or frames.bin of a 4.x model, which another model
+// put there would contradict.
+void RequireNoRigs(const std::string& folder);
 
 }  // namespace roomtex

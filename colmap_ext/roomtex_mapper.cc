@@ -23,6 +23,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -218,11 +219,11 @@ void CheckLens(MapperRun* mapper, const MappingOutcome& outcome, bool refined,
       context, reasons);
 }
 
-// Models with the cameras of the user's database.
+// Models with the cameras of the user's database, which appear with the report.
 void WriteModels(const MappingOptions& options, const MappingPass& pass,
                  const ScratchFolder& scratch) {
   const MappingOutcome& outcome = pass.best[0];
-  const std::string init_scratch = scratch / "init";
+  const auto outputs = std::make_shared<OutputSet>(options.output_path);
   SparseModel pair_model = outcome.seed.pair_model;
   std::string folder = outcome.result.folder;
   if (!pass.plan.IsAsInDatabase()) {
@@ -232,10 +233,17 @@ void WriteModels(const MappingOptions& options, const MappingPass& pass,
     folder = scratch / "restored";
     WriteSparseModel(model, folder);
   }
-  WriteSparseModel(pair_model, init_scratch);
+  WriteSparseModel(pair_model, outputs->aside() + "/init");
+  std::error_code error;
+  std::filesystem::copy(folder, outputs->aside() + "/0", error);
+  if (error) {
+    throw InputError(options.output_path, "", "cannot be written into (" + error.message() + ")",
+                     "Check the rights of this folder and the space on the disk");
+  }
+  outputs->ReplaceFolder("init");
+  outputs->ReplaceFolder("0");
   ThrowIfInterrupted();
-  ReplaceFolder(init_scratch, options.output_path + "/init", scratch.path());
-  ReplaceFolder(folder, options.output_path + "/0", scratch.path());
+  CommitWithReport(std::string("0/") + kMapperReportName, outputs);
 }
 
 void MapPhotos(const MappingOptions& options, const Command::Context& context) {
@@ -282,7 +290,6 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
 
   context.progress.Stage("write model");
   WriteModels(options, pass, scratch);
-  context.report.AddCopy(model_path + "/" + kMapperReportName);
   std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
               model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
               outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);
@@ -300,11 +307,6 @@ int main(int argc, char** argv) {
       "before walls, where two photos alone have two solutions.",
       "roomtex-mapper --database_path database.db --image_path photos --output_path sparse");
   AddOptions(&options, &command);
-  return command.Run(argc, argv, [&](const Command::Context& context) {
-    try {
-      MapPhotos(options, context);
-    } catch (const Interrupted& interrupted) {
-      DieBySignal(interrupted.signal);  // everything on the way is tidied up by now
-    }
-  });
+  return command.Run(argc, argv,
+                     [&](const Command::Context& context) { MapPhotos(options, context); });
 }

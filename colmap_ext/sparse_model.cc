@@ -11,6 +11,7 @@
 
 #include "colmap_ext/sparse_model_files.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -61,6 +62,7 @@ const SparseModelFormat& FindFormat(const std::string& folder) {
 
 std::string ReadAll(const std::string& path) {
   RequireFile(path, "Write the model again with COLMAP");
+  NoteInput(path);
   std::ifstream stream(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : -1;
   std::string bytes;

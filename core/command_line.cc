@@ -3,15 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <iostream>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include <sys/resource.h>
 
+#include "core/child_program.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/option_list.h"
+#include "core/output_file.h"
+#include "core/output_set.h"
+#include "core/signal_tidy.h"
 #include "core/version.h"
 
 namespace roomtex {
@@ -22,20 +29,53 @@ std::string NumberText(double value) {
   return Json(value).dump();
 }
 
+// Whether `path`, which has been written, holds this report anyway.
+bool HoldsReport(const std::string& path, const std::vector<SetWithReport>& sets) {
+  return std::any_of(sets.begin(), sets.end(), [&](const SetWithReport& one) {
+    return path == (std::filesystem::path(one.set->folder()) / one.report_name).string();
+  });
+}
+
+// How a piece of work ended.
+struct Outcome {
+  int exit_code = kExitDone;
+  std::string failure;
+  int signal = 0;  // that stopped it
+};
+
+Outcome RunBody(const std::function<void()>& body) {
+  try {
+    body();
+    return {};
+  } catch (const UsageError& error) {
+    return {kExitUsage, error.what()};
+  } catch (const InputError& error) {
+    return {kExitInput, error.what()};
+  } catch (const Interrupted& interrupted) {
+    return {kExitInternalError, "", interrupted.signal};
+  } catch (const std::bad_alloc&) {
+    return {kExitInternalError, "out of memory"};
+  } catch (const std::exception& error) {
+    return {kExitInternalError, std::string("internal error: ") + error.what()};
+  } catch (...) {
+    return {kExitInternalError, "internal error of an unknown kind"};
+  }
+}
+
 }  // namespace
 
 const char* Version() { return ROOMTEX_VERSION; }
 
 struct Command::Impl {
-  struct Input {
+  struct PathOption {
     std::string name;
-    std::function<std::vector<std::string>()> paths;
+    std::function<std::vector<std::string>()> paths;  // none if it is not given
   };
 
   std::string name, summary, example;
   OptionList options;
   CommonOptions common;
-  std::vector<Input> inputs;
+  std::vector<PathOption> inputs, outputs;
 
   explicit Impl(const std::string& command) : name(command), options(command) {}
 
@@ -72,12 +112,21 @@ struct Command::Impl {
     options.Add(std::move(option));
   }
 
+  static PathOption OnePath(const std::string& option_name, const std::string* value) {
+    return {option_name, [value] {
+              return value->empty() ? std::vector<std::string>() : std::vector<std::string>{*value};
+            }};
+  }
+
+  GuardedPaths PathsToGuard() const;
   void AddField(const OptionField& field, Command* command);
   void AddCommonOptions(Command* command);
   // What --help and --version print; "" when neither is asked for.
   std::string Answer(const std::vector<std::string>& arguments) const;
   void Parse(const std::vector<std::string>& arguments) const;
   Json MakeReport(const Report& report, const Progress& progress) const;
+  // Puts the sets and copies of a command that ran to its end in their places, and --report_path.
+  void WriteReports(int exit_code, const Report& report, const Progress& progress) const;
 };
 
 Command::Command(const std::string& name, const std::string& summary, const std::string& example)
@@ -148,10 +197,7 @@ void Command::AddChoice(const std::string& name, std::string* value,
 void Command::AddInputPath(const std::string& name, std::string* value, const std::string& help,
                            Kind kind) {
   impl_->AddText(name, value, help, "PATH", kind);
-  impl_->inputs.push_back({name, [value] {
-                             return value->empty() ? std::vector<std::string>()
-                                                   : std::vector<std::string>{*value};
-                           }});
+  impl_->inputs.push_back(Impl::OnePath(name, value));
 }
 
 void Command::AddInputPaths(const std::string& name, std::vector<std::string>* values,
@@ -163,11 +209,13 @@ void Command::AddInputPaths(const std::string& name, std::vector<std::string>* v
 void Command::AddOutputPath(const std::string& name, std::string* value, const std::string& help,
                             Kind kind) {
   impl_->AddText(name, value, help, "PATH", kind);
+  impl_->outputs.push_back(Impl::OnePath(name, value));
 }
 
 void Command::AddOutputPaths(const std::string& name, std::vector<std::string>* values,
                              const std::string& help, Kind kind) {
   impl_->AddTexts(name, values, help, kind);
+  impl_->outputs.push_back({name, [values] { return *values; }});
 }
 
 void Command::Add(const OptionFields& fields) {
@@ -222,6 +270,25 @@ void Command::Impl::AddCommonOptions(Command* command) {
           Kind::kOptional);
 }
 
+GuardedPaths Command::Impl::PathsToGuard() const {
+  GuardedPaths guarded;
+  const auto collect = [](const std::vector<PathOption>& from,
+                          std::vector<GuardedPaths::OptionPath>* to) {
+    for (const PathOption& option : from) {
+      for (const std::string& path : option.paths()) to->emplace_back(option.name, path);
+    }
+  };
+  collect(inputs, &guarded.inputs);
+  if (!common.project_path.empty()) {
+    guarded.inputs.emplace_back("project_path", common.project_path);
+  }
+  collect(outputs, &guarded.outputs);
+  if (!common.report_path.empty()) {
+    guarded.outputs.emplace_back("report_path", common.report_path);
+  }
+  return guarded;
+}
+
 std::string Command::Impl::Answer(const std::vector<std::string>& arguments) const {
   for (const std::string& argument : arguments) {
     if (argument == "--help" || argument == "-h") {
@@ -246,7 +313,7 @@ Json Command::Impl::MakeReport(const Report& report, const Progress& progress) c
   json["version"] = Version();
   json["options"] = options.Effective();
   json["inputs"] = Json::object();
-  for (const Input& input : inputs) {
+  for (const PathOption& input : inputs) {
     const std::vector<std::string> paths = input.paths();
     if (!paths.empty())
       json["inputs"][input.name] = paths.size() == 1 ? Json(paths[0]) : Json(paths);
@@ -266,6 +333,33 @@ Json Command::Impl::MakeReport(const Report& report, const Progress& progress) c
   return json;
 }
 
+void Command::Impl::WriteReports(int exit_code, const Report& report,
+                                 const Progress& progress) const {
+  const bool ran = exit_code == kExitDone || exit_code == kExitUntrusted;
+  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
+  if (!common.report_path.empty()) paths.push_back(common.report_path);
+  std::vector<SetWithReport> sets = TakeSetsWithReport();
+  if (!ran) sets.clear();
+  if (paths.empty() && sets.empty()) return;
+  const Json json = MakeReport(report, progress);
+  for (const SetWithReport& one : sets) {
+    WriteJson(one.set->Path(one.report_name), json);
+    one.set->Commit();
+  }
+  const std::vector<std::string> written = OutputsSoFar();
+  for (const std::string& path : paths) {
+    std::error_code error;
+    for (const std::string& other : written) {
+      if (path != common.report_path || HoldsReport(other, sets)) continue;
+      if (!std::filesystem::equivalent(path, other, error) || error) continue;
+      throw UsageError("--report_path " + path +
+                       " is a result of this command, which is kept. "
+                       "Give another --report_path");
+    }
+    WriteJson(path, json);
+  }
+}
+
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
   CommonOptions& common = impl_->common;
   impl_->AddCommonOptions(this);
@@ -276,8 +370,10 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     return kExitDone;
   }
   Report report;
+  std::optional<InputGuard> guard;
   try {
     impl_->Parse(arguments);
+    guard.emplace(impl_->PathsToGuard());
   } catch (const UsageError& error) {
     std::cerr << impl_->name << ": " << error.what() << "\nSee " << impl_->name << " --help\n";
     return kExitUsage;
@@ -287,47 +383,27 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   }
 
   Progress progress(common.quiet);
-  int exit_code = kExitDone;
-  std::string failure;
-  try {
+  const SignalTidy tidy(impl_->name);
+  const Outcome outcome = RunBody([&] {
     body({common, progress, report});
     progress.Finish();
-    if (!report.trusted()) {
-      exit_code = kExitUntrusted;
-      failure = "the result is not to be trusted: " + report.reason();
-    }
-  } catch (const UsageError& error) {
-    exit_code = kExitUsage;
-    failure = error.what();
-  } catch (const InputError& error) {
-    exit_code = kExitInput;
-    failure = error.what();
-  } catch (const std::bad_alloc&) {
-    exit_code = kExitInternalError;
-    failure = "out of memory";
-  } catch (const std::exception& error) {
-    exit_code = kExitInternalError;
-    failure = std::string("internal error: ") + error.what();
-  } catch (...) {
-    exit_code = kExitInternalError;
-    failure = "internal error of an unknown kind";
+  });
+  int exit_code = outcome.exit_code;
+  std::string failure = outcome.failure;
+  if (outcome.signal != 0) StopBySignal(impl_->name, outcome.signal);
+  if (exit_code == kExitDone && !report.trusted()) {
+    exit_code = kExitUntrusted;
+    failure = "the result is not to be trusted: " + report.reason();
   }
   progress.Finish();
   if (exit_code != kExitDone) {
     std::cerr << impl_->name << ": " << failure << "\n";
     if (report.trusted()) report.SetUntrusted(failure);
   }
-  const bool ran = exit_code == kExitDone || exit_code == kExitUntrusted;
-  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
-  if (!common.report_path.empty()) paths.push_back(common.report_path);
-  if (!paths.empty()) {
-    try {
-      const Json json = impl_->MakeReport(report, progress);
-      for (const std::string& path : paths) WriteJson(path, json);
-    } catch (const std::exception& error) {
-      std::cerr << impl_->name << ": " << error.what() << "\n";
-      if (exit_code == kExitDone) exit_code = kExitInput;
-    }
+  const Outcome written = RunBody([&] { impl_->WriteReports(exit_code, report, progress); });
+  if (written.exit_code != kExitDone) {
+    std::cerr << impl_->name << ": " << written.failure << "\n";
+    if (exit_code == kExitDone || exit_code == kExitUntrusted) exit_code = written.exit_code;
   }
   return exit_code;
 }

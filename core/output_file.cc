@@ -1,65 +1,151 @@
 #include "core/output_file.h"
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <system_error>
+#include <thread>
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/input_guard.h"
+#include "core/partial_path.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
+namespace {
 
-OutputFile::OutputFile(const std::string& path) : path_(path) {
-  std::error_code error;
-  fs::path target(path);
-  if (fs::is_symlink(target, error)) {
-    const fs::path end_of_link = fs::canonical(target, error);
-    if (!error) target = end_of_link;
+constexpr int kReaderPatienceMs = 3000;  // for a pipe to be read by somebody
+constexpr int kReaderPollMs = 20;
+
+InputError NotWritable(const std::string& path, int error) {
+  return {path, "", std::string("cannot be written (") + std::strerror(error) + ")",
+          "Check that the folder exists and that you may write in it"};
+}
+
+// A link that stands for something that is already open, such as /dev/stdout, or a file that is no
+// regular one: never replaced.
+bool IsDevice(const std::string& path) {
+  struct stat there {};
+  if (stat(path.c_str(), &there) == 0 && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode)) {
+    return true;
   }
-  if (fs::is_directory(target, error)) {
-    throw InputError(path, "", "is a folder, expected a file to write",
-                     "Give the path of a file that may be written");
+  const std::string place = fs::absolute(path).lexically_normal().string();
+  return place.rfind("/dev/", 0) == 0 || place.rfind("/proc/", 0) == 0;
+}
+
+// The new file is as readable as the old one was.
+void TakeOverRights(const std::string& old_path, int descriptor) {
+  struct stat old {};
+  if (lstat(old_path.c_str(), &old) != 0 || !S_ISREG(old.st_mode)) return;
+  (void)!fchown(descriptor, old.st_uid, old.st_gid);  // root writes for others
+  (void)!fchmod(descriptor, old.st_mode & 07777);
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) close(number_);
   }
-  fs::path partial = target.parent_path();
-  partial /=
-      target.stem().string() + ".partial-" + std::to_string(getpid()) + target.extension().string();
-  direct_ = fs::exists(target, error) && !fs::is_regular_file(target, error);
-  target_ = target.string();
-  partial_path_ = direct_ ? target_ : partial.string();
-  stream_.open(partial_path_, std::ios::binary | std::ios::trunc);
-  if (!stream_) {
-    throw InputError(path, "", std::string("cannot be written (") + std::strerror(errno) + ")",
-                     "Check that the folder exists and that you may write in it");
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+// A pipe without a reader would be waited for without end.
+int OpenDevice(const std::string& path) {
+  for (int waited = 0;; waited += kReaderPollMs) {
+    const int device = open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (device >= 0) {
+      fcntl(device, F_SETFL, fcntl(device, F_GETFL) & ~O_NONBLOCK);
+      return device;
+    }
+    if (errno != ENXIO) throw NotWritable(path, errno);
+    if (waited >= kReaderPatienceMs) {
+      throw InputError(path, "", "is a pipe or socket that nobody reads from",
+                       "Start the reader first, or give the path of a file");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(kReaderPollMs));
   }
 }
 
+void CopyToDevice(const std::string& from, const std::string& path) {
+  const Descriptor device(OpenDevice(path));
+  std::ifstream stream(from, std::ios::binary);
+  char block[1 << 16];
+  while (stream.read(block, sizeof(block)), stream.gcount() > 0) {
+    for (std::streamsize done = 0; done < stream.gcount();) {
+      const ssize_t count =
+          write(device.number(), block + done, static_cast<size_t>(stream.gcount() - done));
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) {
+        throw InputError(
+            path, "", std::string("could not be written to its end (") + std::strerror(errno) + ")",
+            "Check the space on the disk, or the program that reads it");
+      }
+      done += count;
+    }
+  }
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path) : path_(path) {
+  RequireReplaceable(path);
+  direct_ = IsDevice(path);
+  std::error_code error;
+  target_ = fs::absolute(path, error).string();
+  const fs::path parent = direct_ ? fs::temp_directory_path(error) : fs::path(path).parent_path();
+  try {
+    partial_path_ =
+        MakePartial(parent.string(), PartialKind::kFile, fs::path(path).extension().string());
+  } catch (const std::system_error& failure) {
+    throw NotWritable(path, failure.code().value());
+  }
+  stream_.open(partial_path_, std::ios::binary | std::ios::trunc);
+  if (!stream_) throw NotWritable(path, errno);
+}
+
 OutputFile::~OutputFile() {
-  if (partial_path_.empty()) return;
   stream_.close();
-  if (direct_) return;
-  std::error_code ignored;
-  fs::remove(partial_path_, ignored);
+  RemovePartial(partial_path_);
 }
 
 std::ostream& OutputFile::stream() { return stream_; }
 
 void OutputFile::Commit() {
   stream_.flush();
-  const bool whole = stream_.good();
+  bool whole = stream_.good();
   stream_.close();
-  if (!whole) {
+  // Writers that go by the path may have made the file anew.
+  const Descriptor written(open(partial_path_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+  if (written.number() >= 0 && !direct_) {
+    whole &= fdatasync(written.number()) == 0 || errno == EINVAL || errno == EROFS;
+    TakeOverRights(target_, written.number());
+  }
+  if (!whole || written.number() < 0) {
     throw InputError(path_, "", "could not be written to its end", "Check the space on the disk");
   }
-  if (direct_) return;
+  if (direct_) return CopyToDevice(partial_path_, path_);
+  const CommitLock lock;
+  RefuseToReplaceInput(path_);
   std::error_code error;
   fs::rename(partial_path_, target_, error);
   if (error) {
     throw InputError(path_, "", "cannot be replaced (" + error.message() + ")",
                      "Check that you may write this file");
   }
+  ReleasePartial(partial_path_);
   partial_path_.clear();
+  NoteOutput(path_);
 }
 
 void MakeFolder(const std::string& path) {

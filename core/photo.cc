@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -130,6 +131,7 @@ void Turn(int orientation, cv::Mat* photo) {
 // flags: cv::IMREAD_*.
 cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
+  NoteInput(path);
   const std::vector<unsigned char> bytes = ReadBytes(path);
   const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
   if (is_jpeg && !IsWholeJpeg(bytes)) {
@@ -192,6 +194,7 @@ cv::Mat ReadShrunkPhoto(const std::string& path, int shrink) {
 }
 
 std::array<int, 2> ReadPhotoSize(const std::string& path) {
+  NoteInput(path);
   SilenceExiv2();
   try {
     auto image = Exiv2::ImageFactory::open(path);

@@ -33,30 +33,15 @@ struct ImportOptions {
   FaceOptions faces;  // of panoramas
 };
 
-bool IsSameFile(const std::string& a, const std::string& b) {
-  std::error_code error;
-  if (fs::equivalent(a, b, error) && !error) return true;
-  return fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error) && !error;
-}
-
 void CheckOutputs(const ImportOptions& options) {
   std::vector<std::string> problems;
   std::string known;
   for (const std::string& extension : ScanWriterExtensions()) {
     known += (known.empty() ? "" : ", ") + extension;
   }
-  for (size_t i = 0; i < options.output_paths.size(); ++i) {
-    const std::string& path = options.output_paths[i];
+  for (const std::string& path : options.output_paths) {
     if (ScanWriterExtension(path).empty()) {
       problems.push_back("--output_path " + path + ": unknown extension, expected one of " + known);
-    }
-    if (IsSameFile(path, SplitScanPath(options.input_path).file)) {
-      problems.push_back("--output_path " + path + " is the input: give another path");
-    }
-    for (size_t k = 0; k < i; ++k) {
-      if (IsSameFile(path, options.output_paths[k])) {
-        problems.push_back("--output_path " + path + " is given twice");
-      }
     }
   }
   AppendProblems(options.reader.Problems(), &problems);
@@ -219,7 +204,8 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   }
   const std::string& folder = options.output_paths[0];
   const fs::path input = options.input_path;
-  if (IsSameFile(folder, fs::is_directory(input) ? input.string() : input.parent_path().string())) {
+  std::error_code none_yet;
+  if (fs::equivalent(folder, fs::is_directory(input) ? input : input.parent_path(), none_yet)) {
     throw UsageError("--output_path " + folder +
                      " is the folder of the panoramas: give another one for their faces.");
   }

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "importers/cloud_grid.h"
 #include "importers/e57.h"
@@ -228,6 +229,7 @@ std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf
 
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file = ReadAsItIs(path, options);
+  for (const Scan& scan : file.scans) NoteInput(scan.path, "the scan");
   for (Scan& scan : file.scans) {
     if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
   }

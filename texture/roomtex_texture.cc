@@ -3,19 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
 
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "texture/colorize.h"
 #include "texture/output/evidence.h"
-#include "texture/output/output_set.h"
 #include "texture/output/write_e57.h"
 #include "texture/output/write_glb.h"
 #include "texture/output/write_obj.h"
@@ -297,22 +299,18 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
   WriteColoredRtpi(scan.path, colors, path);
 }
 
-// Inputs are never written over: a scan must not be one of the files that are to be written.
-void ProtectInputs(const TextureOptions& options, const PlacedScans& placed) {
-  namespace fs = std::filesystem;
-  for (const PlacedScans::File& file : placed.files) {
-    const std::string& scan = file.path;
-    const fs::path path(scan);
-    std::error_code error;
-    const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
-    const std::string stem = path.stem().string();
-    const bool like_ours = stem.rfind("model", 0) == 0 || stem.rfind("texture", 0) == 0;
-    if (like_ours && fs::equivalent(parent, options.output_path, error)) {
-      throw UsageError("--scan_path " + scan +
-                       " lies in the output folder and might be written over. Give another "
-                       "--output_path");
-    }
+// The names that WriteAll may write, before the work that leads to them.
+void ProtectInputs(const TextureOptions& options, const std::vector<Scan>& scans) {
+  std::vector<std::string> names = {"model.ply", "model.glb", "report.json", "response.txt"};
+  if (options.output_evidence) names.emplace_back("evidence.ply");
+  if (options.output_obj) names.insert(names.end(), {"model.obj", "model.mtl"});
+  if (options.output_e57 || options.e57_images) names.emplace_back("model.e57");
+  for (size_t s = 0; s < scans.size(); ++s) {
+    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
+    if (scans[s].organised) names.push_back("texture" + number + ".png");
+    if (scans[s].is_rtpi) names.push_back("model" + number + ".rtpi");
   }
+  for (const std::string& name : names) RequireReplaceable(options.output_path + "/" + name);
 }
 
 // Files of an earlier run that this one does not write would be taken for its own.
@@ -342,14 +340,13 @@ void FillScansReport(const PlacedScans& placed, Report* report) {
   (*report)["scans"] = scans;
 }
 
-// The files appear together, or none of them.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const std::vector<PhotoView>& photos, const TextureOptions& options,
-              const Command::Context& context) {
+              OutputSet* outputs, const Command::Context& context) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
-  OutputSet set(options.output_path);
+  OutputSet& set = *outputs;
   WriteColoredPly(scans, colored, set.Path("model.ply"));
   WriteColoredGlb(scans, colored, set.Path("model.glb"), glb);
   if (options.output_evidence) WriteEvidence(scans, colored, set.Path("evidence.ply"));
@@ -373,7 +370,6 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   }
   context.report["files"] = set.names();
   WarnOfOlderFiles(set.names(), options.output_path, context);
-  set.Commit();
 }
 
 // A file may look like a photo and be broken further down: then all is done again without it.
@@ -431,9 +427,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   for (const std::string& note : placed.notes) context.Warn(note);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);
-  ProtectInputs(options, placed);
-  MakeFolder(options.output_path);
-  context.report.AddCopy(options.output_path + "/report.json");
+  // The files appear together, or none of them.
+  const auto outputs = std::make_shared<OutputSet>(options.output_path);
+  ProtectInputs(options, scans);
   FillScansReport(placed, &context.report);
 
   const ColorizeResult result = ColorizeWithReadable(scans, colorize, options, &list, context);
@@ -448,11 +444,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
                  "Decimate or smooth the mesh.");
   }
   if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
-    result.exposure.tones[0]->response.Write(options.output_path + "/response.txt");
+    result.exposure.tones[0]->response.Write(outputs->Path("response.txt"));
   }
 
   context.progress.Stage("write");
-  WriteAll(scans, result.scans, list.photos, options, context);
+  WriteAll(scans, result.scans, list.photos, options, outputs.get(), context);
+  CommitWithReport("report.json", outputs);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
   context.report["cpu_seconds"] = cpu;

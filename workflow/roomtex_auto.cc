@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/partial_path.h"
 #include "workflow/auto_options.h"
 #include "workflow/report_data.h"
 #include "workflow/report_page.h"
@@ -105,18 +106,10 @@ class FolderLock {
 };
 
 // What commands that were killed have left of files that they had not finished.
-void RemoveLeftovers(const std::string& output_path) {
-  std::error_code ignored;
+void TidyUp(const std::string& output_path) {
   for (const char* folder :
        {"", "/sparse", "/aligned", "/textured", "/pictures", "/log", "/faces"}) {
-    std::vector<fs::path> leftovers;
-    for (const auto& entry : fs::directory_iterator(output_path + folder, ignored)) {
-      const std::string name = entry.path().filename().string();
-      const bool is_ours =
-          name.rfind(".roomtex-", 0) == 0 || name.find(".partial-") != std::string::npos;
-      if (is_ours) leftovers.push_back(entry.path());
-    }
-    for (const fs::path& path : leftovers) fs::remove_all(path, ignored);
+    RemoveLeftovers(output_path + folder);
   }
 }
 
@@ -176,7 +169,7 @@ void RunAll(AutoOptions options, const Command::Context& context) {
   MakeFolder(options.output_path);
   MakeFolder(options.output_path + "/log");
   const FolderLock lock(options.output_path);
-  RemoveLeftovers(options.output_path);
+  TidyUp(options.output_path);
   const RunResult result = RunSteps(&chain, context);
   WriteReport(&chain, result, context);
   if (result.stop.stopped) TellStop(result.stop, context);

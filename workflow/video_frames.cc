@@ -12,6 +12,8 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
+#include "core/partial_path.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -67,9 +69,8 @@ void WriteSharpFrames(const std::string& video, const std::string& folder, int w
   if (!capture.isOpened() || count < 3) {
     throw InputError(video, "", "cannot be read as a video", kVideoRemedy);
   }
-  const std::string partial = folder + ".partial";
-  fs::remove_all(partial);
-  MakeFolder(partial);
+  const PartialFolder aside(fs::path(folder).parent_path().string());
+  const std::string& partial = aside.path();
   const double stretch = std::max(1.0, static_cast<double>(count) / wanted);
   const double margin = stretch < 3 ? 0 : (1 - kMiddle) / 2 * stretch;
   cv::Mat picture, best;
@@ -99,6 +100,7 @@ void WriteSharpFrames(const std::string& video, const std::string& folder, int w
   if (fs::is_empty(partial)) {
     throw InputError(video, "", "holds no picture that can be decoded", kVideoRemedy);
   }
+  if (ChangePlaces(partial, folder)) return;
   fs::remove_all(folder);
   fs::rename(partial, folder);
 }

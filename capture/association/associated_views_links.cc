@@ -5,10 +5,9 @@
 #include <set>
 #include <system_error>
 
-#include <unistd.h>
-
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 
 namespace roomtex {
 namespace {
@@ -17,12 +16,12 @@ namespace fs = std::filesystem;
 
 const char* const kFolders[] = {"patterned", "plain"};
 
-fs::path ListOf(const fs::path& folder) { return folder / "links.txt"; }
+constexpr char kListName[] = "links.txt";
 
 // What earlier runs wrote: paths below the folder.
 std::set<std::string> ReadList(const fs::path& folder) {
   std::set<std::string> list;
-  std::ifstream stream(ListOf(folder));
+  std::ifstream stream(folder / kListName);
   for (std::string line; std::getline(stream, line);) list.insert(line);
   return list;
 }
@@ -56,9 +55,15 @@ void Link(const fs::path& photo, const fs::path& link) {
   if (error) fs::copy_file(photo, link);
 }
 
-void Write(const fs::path& folder, const fs::path& image_path,
-           const std::vector<AssociatedPair>& pairs, const fs::path& aside) {
+void Write(const std::string& folder, const fs::path& image_path,
+           const std::vector<AssociatedPair>& pairs) {
+  OutputSet outputs(folder);
+  const fs::path aside = outputs.aside();
   std::string list;
+  for (const char* name : kFolders) {
+    fs::create_directories(aside / name);
+    outputs.ReplaceFolder(name);
+  }
   for (const AssociatedPair& pair : pairs) {
     if (pair.is_spare) continue;
     const std::string photos[] = {pair.patterned_image, pair.plain_image};
@@ -67,22 +72,10 @@ void Write(const fs::path& folder, const fs::path& image_path,
       list += std::string(kFolders[k]) + "/" + pair.patterned_image + "\n";
     }
   }
-  // The list first, with what is there still: a run that dies here can be repeated.
-  std::string all = list;
-  for (const std::string& old : ReadList(folder)) all += old + "\n";
-  const auto write_list = [&](const std::string& text) {
-    OutputFile file(ListOf(folder).string());
-    file.stream() << text;
-    file.Commit();
-  };
-  write_list(all);
-  for (const char* name : kFolders) {
-    if (fs::exists(fs::symlink_status(folder / name))) {
-      fs::rename(folder / name, aside / ("old_" + std::string(name)));
-    }
-    fs::rename(aside / name, folder / name);
-  }
-  write_list(list);
+  OutputFile file(outputs.Path(kListName));
+  file.stream() << list;
+  file.Commit();
+  outputs.Commit();
 }
 
 }  // namespace
@@ -90,23 +83,14 @@ void Write(const fs::path& folder, const fs::path& image_path,
 int WriteLinks(const std::string& folder, const std::string& image_path,
                const std::vector<AssociatedPair>& pairs) {
   MakeFolder(folder);
-  const fs::path aside = fs::path(folder) / (".links." + std::to_string(getpid()));
   int count = 0;
   for (const AssociatedPair& pair : pairs) count += pair.is_spare ? 0 : 1;
   try {
     CheckFolders(folder);
-    for (const char* name : kFolders) fs::create_directories(aside / name);
-    Write(folder, image_path, pairs, aside);
-    fs::remove_all(aside);
+    Write(folder, image_path, pairs);
   } catch (const fs::filesystem_error& error) {
-    std::error_code ignored;
-    fs::remove_all(aside, ignored);
     throw InputError(folder, "", "cannot be filled: " + error.code().message(),
                      "Check that the folder may be written");
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(aside, ignored);
-    throw;
   }
   return count;
 }

@@ -68,10 +68,6 @@ void CheckArguments(Arguments* a) {
     a->database_output_path =
         (database.parent_path() / (database.stem().string() + "_calibrated.db")).string();
   }
-  std::error_code ignored;
-  if (std::filesystem::equivalent(database, a->database_output_path, ignored)) {
-    throw UsageError("--apply_output is the database itself: it is never overwritten");
-  }
 }
 
 void WritePicture(const std::string& path, const cv::Mat& picture) {

@@ -87,15 +87,87 @@ TEST(OutputFile, TwoOfOneNameWithDifferentExtensionsDoNotMeet) {
   EXPECT_EQ(ReadBytes(folder / "model.glb"), "glb");
 }
 
-TEST(OutputFile, LinkStaysALink) {
+TEST(OutputFile, ReplacesALinkAndNotWhatItLeadsTo) {
   const TempFolder folder;
   WriteBytes(folder / "target", "old");
   fs::create_symlink(folder / "target", folder / "link");
   OutputFile file(folder / "link");
   file.stream() << "new";
   file.Commit();
-  EXPECT_TRUE(fs::is_symlink(folder / "link"));
-  EXPECT_EQ(ReadBytes(folder / "target"), "new");
+  EXPECT_FALSE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(ReadBytes(folder / "link"), "new");
+  EXPECT_EQ(ReadBytes(folder / "target"), "old");
+}
+
+TEST(OutputFile, KeepsTheRightsOfTheOldFile) {
+  const TempFolder folder;
+  const std::string path = folder / "out.ply";
+  WriteBytes(path, "old");
+  fs::permissions(path, static_cast<fs::perms>(0640));
+  OutputFile file(path);
+  file.stream() << "new";
+  file.Commit();
+  EXPECT_EQ(fs::status(path).permissions(), static_cast<fs::perms>(0640));
+  OutputFile fresh(folder / "fresh.ply");
+  fresh.Commit();
+  const mode_t mask = umask(0);
+  umask(mask);
+  EXPECT_EQ(fs::status(folder / "fresh.ply").permissions(), static_cast<fs::perms>(0666 & ~mask));
+}
+
+TEST(OutputFile, TakesTheLongestNameThereIs) {
+  const TempFolder folder;
+  for (const std::string& name : {std::string(251, 'n') + ".ply", "n." + std::string(253, 'e')}) {
+    OutputFile file(folder / name);
+    file.stream() << "x";
+    file.Commit();
+    EXPECT_EQ(ReadBytes(folder / name), "x");
+  }
+}
+
+TEST(OutputFile, NamesNobodyCanForesee) {
+  const TempFolder folder;
+  const OutputFile one(folder / "a"), other(folder / "a");
+  EXPECT_NE(one.partial_path(), other.partial_path());
+}
+
+TEST(OutputFile, RemovesWhatAKilledWriterLeftAndNothingOfTheLiving) {
+  const TempFolder folder;
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  std::string left;
+  const auto write_half = [&](bool dies) {
+    const pid_t child = fork();
+    if (child == 0) {
+      OutputFile file(folder / "out.ply");
+      const std::string partial = file.partial_path();
+      (void)!write(ends[1], partial.c_str(), partial.size());
+      if (dies) raise(SIGKILL);
+      pause();
+    }
+    left.resize(4096);
+    left.resize(static_cast<size_t>(read(ends[0], left.data(), left.size())));
+    return child;
+  };
+  int status = 0;
+  waitpid(write_half(true), &status, 0);
+  const std::string dead = left;
+  ASSERT_TRUE(fs::exists(dead));
+  const pid_t living = write_half(false);
+  EXPECT_FALSE(fs::exists(dead));
+  RemoveLeftovers(folder.path());
+  EXPECT_TRUE(fs::exists(left));
+  kill(living, SIGKILL);
+  waitpid(living, &status, 0);
+  RemoveLeftovers(folder.path());
+  EXPECT_EQ(NumFiles(folder.path()), 0u);
+}
+
+TEST(OutputFile, PipeThatNobodyReadsIsSaid) {
+  const TempFolder folder;
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  OutputFile file(folder / "pipe");
+  EXPECT_INPUT_ERROR(file.Commit(), "nobody reads from");
 }
 
 TEST(OutputFile, DevicesAndPipesStayWhatTheyAre) {

@@ -242,7 +242,7 @@ TEST_F(ApplyToDatabaseTest, NeverOverwritesTheDatabase) {
     const CommandResult result =
         Run("--apply " + (folder_ / "database.db") + " --apply_output " + (folder_ / name));
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_NE(result.err.find("never overwritten"), std::string::npos);
+    EXPECT_NE(result.err.find("inputs are never changed"), std::string::npos);
   }
   EXPECT_EQ(ReadBytes(folder_ / "database.db"), before);
 }

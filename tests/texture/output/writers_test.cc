@@ -1,4 +1,3 @@
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -6,16 +5,13 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
-#include <sys/wait.h>
 #include <tiny_gltf.h>
-#include <unistd.h>
 
 #include "core/error.h"
 #include "importers/obj.h"
 #include "importers/ply.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/sampling/two_walls.h"
-#include "texture/output/output_set.h"
 #include "texture/output/textured_parts.h"
 #include "texture/output/write_glb.h"
 #include "texture/output/write_obj.h"
@@ -343,63 +339,6 @@ TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
   EXPECT_NE(obj.find("f 1 2 3\n"), std::string::npos);
   EXPECT_NE(obj.find("f 4 5 6\n"), std::string::npos);  // the second scan
   EXPECT_EQ(obj.find("usemtl"), std::string::npos);
-}
-
-TEST(OutputSet, FilesAppearTogetherOrNotAtAll) {
-  const TempFolder folder;
-  WriteBytes(folder / "a", "old");
-  {
-    OutputSet set(folder.path());
-    WriteBytes(set.Path("a"), "new");
-    WriteBytes(set.Path("b"), "new");
-    EXPECT_EQ(ReadBytes(folder / "a"), "old");
-    EXPECT_FALSE(std::filesystem::exists(folder / "b"));
-  }  // given up
-  EXPECT_EQ(ReadBytes(folder / "a"), "old");
-  EXPECT_FALSE(std::filesystem::exists(folder / "b"));
-  OutputSet set(folder.path());
-  WriteBytes(set.Path("a"), "new");
-  WriteBytes(set.Path("b"), "new");
-  set.Commit();
-  EXPECT_EQ(ReadBytes(folder / "a") + ReadBytes(folder / "b"), "newnew");
-}
-
-TEST(OutputSet, RemovesWhatAKilledRunLeft) {
-  const TempFolder folder;
-  const pid_t child = fork();
-  if (child == 0) {
-    OutputSet set(folder.path());
-    WriteBytes(set.Path("a"), "half");
-    raise(SIGKILL);
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFSIGNALED(status));
-  const auto count = [&] {
-    return std::distance(std::filesystem::directory_iterator(folder.path()), {});
-  };
-  EXPECT_EQ(count(), 1);
-  { OutputSet set(folder.path()); }
-  EXPECT_EQ(count(), 0);
-}
-
-TEST(OutputSet, KeepsLinksAndRefusesFolders) {
-  const TempFolder folder;
-  WriteBytes(folder / "real", "old");
-  std::filesystem::create_symlink("real", folder / "link");
-  std::filesystem::create_directory(folder / "dir");
-  {
-    OutputSet set(folder.path());
-    WriteBytes(set.Path("link"), "new");
-    set.Commit();
-  }
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
-  EXPECT_EQ(ReadBytes(folder / "real"), "new");
-  OutputSet set(folder.path());
-  WriteBytes(set.Path("real"), "newer");
-  WriteBytes(set.Path("dir"), "x");
-  EXPECT_INPUT_ERROR(set.Commit(), "is a folder");
-  EXPECT_EQ(ReadBytes(folder / "real"), "new");
 }
 
 TEST(PaintGutters, TakesTheNearestKnownColor) {

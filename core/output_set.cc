@@ -1,0 +1,221 @@
+#include "core/output_set.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/xattr.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/input_guard.h"
+#include "core/output_file.h"
+#include "core/set_journal.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+namespace {
+
+InputError CannotBeFilled(const std::string& folder, const std::string& reason) {
+  return {folder, "", "cannot be written into (" + reason + ")",
+          "Check the rights of this folder and the space on the disk"};
+}
+
+// A folder that changes places must be an ordinary one: where somebody works in it, where another
+// disk begins or where access lists hang on it, it stays.
+bool MayChangePlaces(const fs::path& folder) {
+  struct stat here {
+  }, above{};
+  if (stat(folder.c_str(), &here) != 0 || stat(folder.parent_path().c_str(), &above) != 0) {
+    return false;
+  }
+  std::error_code error;
+  const std::string work = fs::current_path(error).string() + "/";
+  const bool works_here = error || work.rfind(folder.string() + "/", 0) == 0;
+  const bool has_lists = getxattr(folder.c_str(), "system.posix_acl_default", nullptr, 0) > 0 ||
+                         getxattr(folder.c_str(), "system.posix_acl_access", nullptr, 0) > 0;
+  return here.st_dev == above.st_dev && !works_here && !has_lists &&
+         ::access(folder.parent_path().c_str(), W_OK | X_OK) == 0;
+}
+
+void SyncFolder(const fs::path& folder) {
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  fsync(descriptor);
+  close(descriptor);
+}
+
+// Paths below the folder of all that is no folder.
+std::vector<std::string> FilesBelow(const fs::path& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  fs::recursive_directory_iterator entry(folder, error), end;
+  for (; !error && entry != end; entry.increment(error)) {
+    if (entry->is_directory(error) && !entry->is_symlink(error)) continue;
+    files.push_back(entry->path().lexically_relative(folder).generic_string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Gives the new folder what only the old one has: a second name of the same file, not a copy.
+// False where that is not possible.
+class Keeping {
+ public:
+  Keeping(fs::path from, fs::path to, const std::set<std::string>& replaced,
+          const std::set<std::string>& removed)
+      : from_(std::move(from)), to_(std::move(to)), replaced_(replaced), removed_(removed) {}
+
+  bool Link(const fs::path& below = {}) const {
+    std::error_code error;
+    fs::directory_iterator entry(from_ / below, error), end;
+    for (; !error && entry != end; entry.increment(error)) {
+      const fs::path path = below / entry->path().filename();
+      const std::string name = path.generic_string();
+      if (removed_.count(name) > 0 || replaced_.count(name) > 0) continue;
+      if (!LinkOne(path, entry->symlink_status(error).type())) return false;
+    }
+    return !error;
+  }
+
+ private:
+  bool LinkOne(const fs::path& path, fs::file_type type) const {
+    std::error_code error;
+    const fs::file_status there = fs::symlink_status(to_ / path, error);
+    if (type == fs::file_type::directory) {
+      // Something of another command is being made in it.
+      if (path.filename().string().rfind(kPartialPrefix, 0) == 0) return false;
+      if (fs::exists(there)) return !fs::is_directory(there) || Link(path);
+      fs::create_directory(to_ / path, from_ / path, error);
+      return !error && Link(path);
+    }
+    if (fs::exists(there)) return true;
+    if (type == fs::file_type::symlink) {
+      fs::copy_symlink(from_ / path, to_ / path, error);
+    } else if (type == fs::file_type::regular) {
+      fs::create_hard_link(from_ / path, to_ / path, error);
+    } else {
+      return false;
+    }
+    return !error;
+  }
+
+  fs::path from_, to_;
+  const std::set<std::string>&replaced_, &removed_;
+};
+
+std::vector<SetWithReport>& SetsWithReport() {
+  static std::vector<SetWithReport> sets;
+  return sets;
+}
+
+}  // namespace
+
+void CommitWithReport(const std::string& report_name, std::shared_ptr<OutputSet> set) {
+  SetsWithReport().push_back({report_name, std::move(set)});
+}
+
+std::vector<SetWithReport> TakeSetsWithReport() { return std::exchange(SetsWithReport(), {}); }
+
+bool ChangePlaces(const std::string& finished, const std::string& target) {
+  if (renameat2(AT_FDCWD, finished.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+    return true;
+  }
+  return errno == ENOENT && std::rename(finished.c_str(), target.c_str()) == 0;
+}
+
+OutputSet::OutputSet(const std::string& folder) : folder_(folder) {
+  MakeFolder(folder);
+  try {
+    place_ = fs::canonical(folder).string();
+    const std::string beside =
+        MayChangePlaces(place_) ? fs::path(place_).parent_path().string() : place_;
+    RemoveLeftovers(place_);
+    aside_ = std::make_unique<PartialFolder>(beside);
+  } catch (const std::system_error& error) {
+    throw CannotBeFilled(folder, error.code().message());
+  }
+}
+
+OutputSet::~OutputSet() = default;
+
+std::string OutputSet::Path(const std::string& name) {
+  RequireReplaceable((fs::path(folder_) / name).string());
+  const fs::path path = fs::path(aside()) / name;
+  std::error_code error;
+  fs::create_directories(path.parent_path(), error);
+  if (error) throw CannotBeFilled(folder_, error.message());
+  names_.push_back(name);
+  return path.string();
+}
+
+std::vector<std::string> OutputSet::Check() const {
+  std::vector<std::string> files = FilesBelow(aside());
+  for (const std::string& name : files) RequireReplaceable((fs::path(folder_) / name).string());
+  for (const std::string& name : removed_) {
+    RefuseToReplaceInput((fs::path(folder_) / name).string());
+  }
+  for (const std::string& name : replaced_) {
+    for (const std::string& file : FilesBelow(fs::path(folder_) / name)) {
+      RefuseToReplaceInput((fs::path(folder_) / name / file).string());
+    }
+  }
+  return files;
+}
+
+bool OutputSet::Exchange() {
+  if (!MayChangePlaces(place_)) return false;
+  if (!Keeping(place_, aside(), replaced_, removed_).Link()) return false;
+  struct stat old {};
+  if (stat(place_.c_str(), &old) != 0) return false;
+  (void)!chown(aside().c_str(), old.st_uid, old.st_gid);
+  if (chmod(aside().c_str(), old.st_mode & 07777) != 0) return false;
+  SyncFolder(aside());
+  if (renameat2(AT_FDCWD, aside().c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) != 0) {
+    return false;
+  }
+  SyncFolder(fs::path(place_).parent_path());
+  // What came into the old folder in the last moment.
+  (void)Keeping(aside(), place_, replaced_, removed_).Link();
+  return true;
+}
+
+void OutputSet::MoveOneByOne(const std::vector<std::string>& files) {
+  SetJournal journal;
+  journal.moves = files;
+  journal.removes.assign(removed_.begin(), removed_.end());
+  for (const std::string& name : replaced_) {
+    for (const std::string& file : FilesBelow(fs::path(place_) / name)) {
+      const std::string path = name + "/" + file;
+      if (!std::binary_search(files.begin(), files.end(), path)) journal.removes.push_back(path);
+    }
+  }
+  int failure = 0;
+  try {
+    // What could not be linked to its end is no part of the set.
+    if (fs::path(aside()).parent_path() != fs::path(place_)) aside_->MoveInto(place_);
+    WriteSetJournal(journal, aside());
+    failure = FinishMovedSet(aside());
+  } catch (const std::system_error& error) {
+    failure = error.code().value();
+  }
+  if (failure != 0) throw CannotBeFilled(folder_, std::strerror(failure));
+}
+
+void OutputSet::Commit() {
+  const std::vector<std::string> files = Check();
+  {
+    const CommitLock lock;
+    if (!Exchange()) MoveOneByOne(files);
+  }
+  for (const std::string& name : files) NoteOutput((fs::path(folder_) / name).string());
+  aside_.reset();
+}
+
+}  // namespace roomtex

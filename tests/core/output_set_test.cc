@@ -1,0 +1,142 @@
+#include "core/output_set.h"
+
+#include <csignal>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "core/set_journal.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+namespace fs = std::filesystem;
+
+size_t NumEntries(const std::string& folder) {
+  return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+}
+
+// A set in folder/set, so that what lies beside it is the test's own.
+struct OutputSetTest : testing::Test {
+  TempFolder folder;
+  std::string place = folder / "set";
+  std::string In(const std::string& name) const { return place + "/" + name; }
+};
+
+TEST_F(OutputSetTest, FilesAppearTogetherOrNotAtAll) {
+  fs::create_directory(place);
+  WriteBytes(In("a"), "old");
+  {
+    OutputSet set(place);
+    WriteBytes(set.Path("a"), "new");
+    WriteBytes(set.Path("b"), "new");
+    EXPECT_EQ(ReadBytes(In("a")), "old");
+    EXPECT_FALSE(fs::exists(In("b")));
+  }  // given up
+  EXPECT_EQ(ReadBytes(In("a")), "old");
+  EXPECT_FALSE(fs::exists(In("b")));
+  OutputSet set(place);
+  WriteBytes(set.Path("a"), "new");
+  WriteBytes(set.Path("below/b"), "new");
+  set.Commit();
+  EXPECT_EQ(ReadBytes(In("a")) + ReadBytes(In("below/b")), "newnew");
+  EXPECT_EQ(NumEntries(folder.path()), 1u);
+}
+
+TEST_F(OutputSetTest, KeepsWhatIsNotOfTheSet) {
+  fs::create_directories(In("notes/deep"));
+  fs::permissions(place, static_cast<fs::perms>(0750));
+  WriteBytes(In("mine.txt"), "mine");
+  WriteBytes(In("notes/deep/mine"), "mine");
+  WriteBytes(In("stale"), "old");
+  fs::create_directory(In("0"));
+  WriteBytes(In("0/rigs.bin"), "old");
+  fs::create_symlink("mine.txt", In("link"));
+  fs::create_symlink("mine.txt", In("linked_output"));
+  OutputSet set(place);
+  WriteBytes(set.Path("notes/new"), "new");
+  WriteBytes(set.Path("0/cameras.bin"), "new");
+  WriteBytes(set.Path("linked_output"), "new");
+  set.ReplaceFolder("0");
+  set.Remove("stale");
+  set.Commit();
+  EXPECT_EQ(ReadBytes(In("mine.txt")) + ReadBytes(In("notes/deep/mine")), "minemine");
+  EXPECT_EQ(fs::read_symlink(In("link")), "mine.txt");
+  EXPECT_FALSE(fs::is_symlink(In("linked_output")));
+  EXPECT_EQ(NumEntries(In("0")), 1u);
+  EXPECT_FALSE(fs::exists(In("stale")));
+  EXPECT_EQ(fs::status(place).permissions(), static_cast<fs::perms>(0750));
+}
+
+TEST_F(OutputSetTest, FillsTheFolderThatOneWorksIn) {
+  fs::create_directory(place);
+  const fs::path before = fs::current_path();
+  fs::current_path(place);
+  {
+    OutputSet set(".");
+    WriteBytes(set.Path("a"), "new");
+    WriteBytes(set.Path("below/b"), "new");
+    set.Commit();
+  }
+  EXPECT_EQ(ReadBytes("a") + ReadBytes("below/b"), "newnew");
+  EXPECT_EQ(NumEntries("."), 2u);
+  fs::current_path(before);
+}
+
+TEST_F(OutputSetTest, GoesToTheEndOfALinkToAFolder) {
+  fs::create_directory(folder / "real");
+  fs::create_directory_symlink("real", place);
+  OutputSet set(place);
+  WriteBytes(set.Path("a"), "new");
+  set.Commit();
+  EXPECT_TRUE(fs::is_symlink(place));
+  EXPECT_EQ(ReadBytes(folder / "real/a"), "new");
+}
+
+TEST_F(OutputSetTest, RemovesWhatAKilledRunLeft) {
+  const pid_t child = fork();
+  if (child == 0) {
+    OutputSet set(place);
+    WriteBytes(set.Path("a"), "half");
+    raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(NumEntries(folder.path()), 2u);
+  RemoveLeftovers(folder.path());
+  EXPECT_EQ(NumEntries(folder.path()), 1u);
+}
+
+TEST_F(OutputSetTest, FinishesWhatAKilledRunWasMoving) {
+  fs::create_directory(place);
+  WriteBytes(In("a"), "new");  // moved already
+  WriteBytes(In("b"), "old");
+  WriteBytes(In("stale"), "old");
+  const std::string set = In(std::string(kPartialPrefix) + "0");
+  fs::create_directories(set + "/below");
+  WriteBytes(set + "/b", "new");
+  WriteBytes(set + "/below/c", "new");
+  WriteSetJournal({{"a", "b", "below/c"}, {"stale"}}, set);
+  RemoveLeftovers(place);
+  EXPECT_EQ(ReadBytes(In("a")) + ReadBytes(In("b")) + ReadBytes(In("below/c")), "newnewnew");
+  EXPECT_FALSE(fs::exists(In("stale")));
+  EXPECT_EQ(NumEntries(place), 3u);
+}
+
+TEST_F(OutputSetTest, RefusesFoldersInTheWay) {
+  fs::create_directories(In("dir"));
+  WriteBytes(In("real"), "old");
+  OutputSet set(place);
+  WriteBytes(set.Path("real"), "newer");
+  EXPECT_INPUT_ERROR(set.Path("dir"), "is a folder");
+  WriteBytes(set.aside() + "/dir", "x");
+  EXPECT_INPUT_ERROR(set.Commit(), "is a folder");
+  EXPECT_EQ(ReadBytes(In("real")), "old");
+}
+
+}  // namespace
+}  // namespace roomtex

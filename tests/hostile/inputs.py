@@ -1,0 +1,126 @@
+"""Inputs are never changed: outputs that are inputs, by every road that leads there."""
+
+import os
+
+import scene as s
+
+
+def cases():
+    # title, command line, what is prepared before (a function of the folder)
+    nothing = lambda root: None
+
+    def link(name, target):
+        def prepare(root):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            os.symlink(os.path.relpath(root / target, (root / name).parent), root / name)
+        return prepare
+
+    def copy(name, source):
+        def prepare(root):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes((root / source).read_bytes())
+        return prepare
+
+    align = s.ALIGN + " --output_path aligned"
+    texture = s.TEXTURE + " --output_path textured"
+    for path in ("scan.rtpi", "picks.csv", "sparse/images.txt", "./photos/../scan.rtpi"):
+        yield f"align --report_path {path}", f"{align} --report_path {path}", nothing
+    yield ("align --report_path of the ini file",
+           f"{align} --project_path project.ini --report_path project.ini", nothing)
+    yield ("align --report_path through a link", f"{align} --report_path out.json",
+           link("out.json", "scan.rtpi"))
+    yield ("align --report_path through a linked folder", f"{align} --report_path there/scan.rtpi",
+           lambda root: os.symlink(".", root / "there"))
+    yield "align --Plane.output_path", f"{align} --Plane.output_path scan.rtpi", nothing
+    yield ("align --report_path of a photo",
+           f"{align} --image_path photos --report_path photos/photo_000.jpg", nothing)
+    yield ("align with alignment.json as picks",
+           align.replace("--picks_path picks.csv", "--picks_path aligned/alignment.json"),
+           copy("aligned/alignment.json", "picks.csv"))
+    yield ("align with the scan named as an output",
+           align.replace("scan.rtpi", "aligned/points3D.bin"),
+           copy("aligned/points3D.bin", "scan.rtpi"))
+    yield f"texture --report_path of the database", f"{texture} --report_path database.db", nothing
+    for name, source in (("evidence.ply", "scan.rtpi"), ("model.rtpi", "scan.rtpi"),
+                         ("report.json", "scan.rtpi"), ("texture.png", "scan.rtpi")):
+        yield (f"texture with a scan {name} in the output folder",
+               texture.replace("scan.rtpi", f"textured/{name}"), copy(f"textured/{name}", source))
+    yield ("texture with a link model.rtpi to the scan in the output folder", texture,
+           link("textured/model.rtpi", "scan.rtpi"))
+    yield ("texture into the folder of a photo texture.png",
+           s.TEXTURE.replace("--image_path photos", "--image_path .")
+           .replace("--input_path sparse", "--input_path with_texture_png")
+           .replace("--database_path database.db ", "") + " --output_path .",
+           with_texture_png)
+    yield "import over its input", "roomtex-import --input_path scan.rtpi --output_path scan.rtpi", nothing
+    yield ("import over its input by another name",
+           "roomtex-import --input_path scan.rtpi --output_path sub/out.rtpi",
+           link("sub/out.rtpi", "scan.rtpi"))
+    yield ("import: report is the output",
+           "roomtex-import --input_path scan.rtpi --output_path out.ply --report_path out.ply",
+           nothing)
+    yield ("import: report is the input",
+           "roomtex-import --input_path scan.rtpi --output_path out.ply --report_path scan.rtpi",
+           nothing)
+    for path in ("database.db", "photos/photo_001.jpg"):
+        yield (f"associate --output_path {path}",
+               "roomtex-associate --quiet --database_path database.db --image_path photos "
+               f"--output_path {path}", nothing)
+    yield ("calibrate --output_path database",
+           "roomtex-calibrate --image_path photos --board 9x6 --square 0.025 --apply database.db "
+           "--output_path database.db", nothing)
+    yield ("calibrate --apply_output database",
+           "roomtex-calibrate --image_path photos --board 9x6 --square 0.025 --apply database.db "
+           "--output_path camera.txt --apply_output ./database.db", nothing)
+    yield ("calibrate --coverage_path photo",
+           "roomtex-calibrate --image_path photos --board 9x6 --square 0.025 "
+           "--output_path camera.txt --coverage_path photos/photo_002.jpg", nothing)
+    yield ("pattern --output_path photo",
+           "roomtex-pattern --output_path photos/photo_000.jpg --input_path photos/photo_000.jpg",
+           nothing)
+    yield ("pattern --report_path photo",
+           "roomtex-pattern --output_path p.png --input_path photos/photo_000.jpg "
+           "--report_path photos/photo_000.jpg", nothing)
+    yield ("evaluate --report_path truth",
+           "roomtex-evaluate --capture_path . --aligned_path sparse --report_path scan.rtpi",
+           nothing)
+    yield ("mapper --report_path database",
+           "roomtex-mapper --database_path database.db --image_path photos --output_path mapped "
+           "--report_path database.db", nothing)
+    yield ("render --output_path photo",
+           "roomtex-render --ply_path truth/true_colors.ply --input_path sparse "
+           "--image_path photos --output_path photos/photo_000.jpg", nothing)
+    yield ("auto --report_path scan",
+           "roomtex-auto --image_path photos --scan_path scan.rtpi --output_path result "
+           "--report_path scan.rtpi", nothing)
+
+
+def with_texture_png(root):
+    """The first photo of the model is called texture.png, and lies where the texture will."""
+    folder = root / "with_texture_png"
+    folder.mkdir()
+    for name in ("cameras.txt", "images.txt", "points3D.txt"):
+        text = (root / "sparse" / name).read_text()
+        text = text.replace("photo_000.jpg", "texture.png")
+        (folder / name).write_text(text)
+    for photo in (root / "photos").iterdir():
+        name = "texture.png" if photo.name == "photo_000.jpg" else photo.name
+        (root / name).write_bytes(photo.read_bytes())
+
+
+def run(base):
+    for title, line, prepare in cases():
+        here = base.copy()
+        prepare(here.root)
+        before = here.state()
+        answer = here.run(line)
+        after = here.state()
+        changed = [name for name in before if after.get(name) != before[name]]
+        problem = answer.problem({2})
+        if changed:
+            problem = f"changed {changed}; " + problem
+        yield title, problem
+
+
+if __name__ == "__main__":
+    s.main({"inputs": run})

@@ -1,0 +1,133 @@
+"""A command that ends at any rename, by a signal or at a full disk leaves old files or new ones."""
+
+import os
+import resource
+import signal
+import subprocess
+import time
+
+import scene as s
+
+LIBRARY = os.environ.get("ROOMTEX_DIE_AT_RENAME", "")
+
+
+def commands():
+    # title, command line, the folder (or files) that appears as a set
+    yield "align", s.ALIGN + " --output_path aligned", "aligned"
+    yield "align in the folder that one works in", s.ALIGN + " --output_path .", None
+    yield "texture", s.TEXTURE + " --output_path textured", "textured"
+    yield "import", ("roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"), None
+    yield "simulate", ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
+                       "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0"), None
+    yield "associate", ("roomtex-associate --quiet --database_path database.db --image_path photos "
+                        "--output_path pairs.csv --links_path links"), "links"
+
+
+VOLATILE = {"aligned/alignment.json", "textured/report.json", "alignment.json"}  # hold times
+
+
+def below(state, folder):
+    return {name: content for name, content in state.items() if name.startswith(folder + "/")}
+
+
+def steady(files):
+    return {name: content for name, content in files.items() if name not in VOLATILE}
+
+
+def at_every_rename(base):
+    """First over nothing, then over the results of another run."""
+    for title, line, folder in commands():
+        for old in (False, True):
+            here = base.copy()
+            inputs = here.state()
+            if old:
+                here.run(line + " --random_seed 7")
+                if folder:
+                    (here.root / folder / "mine.txt").write_text("mine")
+            before = here.state()
+            expected = here.copy()
+            answer = expected.run(line)
+            problem = answer.problem({0, 4})
+            after = expected.state()
+            number = 0
+            while not problem and number < 60:
+                number += 1
+                killed = here.copy()
+                how = "DIE_AT" if number % 2 else "DIE_AFTER"
+                answer = killed.run(line, environment={"LD_PRELOAD": LIBRARY,
+                                                       how: str((number + 1) // 2)})
+                if answer.code in (0, 4):
+                    break
+                now = {name: content for name, content in killed.state().items()
+                       if ".roomtex-partial-" not in name}
+                if answer.code != -signal.SIGKILL:
+                    problem = f"{how} {number}: exit {answer.code}: {answer.err[-200:]}"
+                elif any(now.get(name) != content for name, content in inputs.items()):
+                    problem = f"{how} {number}: inputs changed"
+                elif folder and steady(below(now, folder)) not in (
+                        steady(below(before, folder)), steady(below(after, folder))):
+                    problem = f"{how} {number}: neither old nor new"
+                elif any(content not in (before.get(name), after.get(name))
+                         for name, content in steady(now).items()):
+                    problem = f"{how} {number}: a file is neither old nor new"
+                else:
+                    killed.run(line)
+                    if killed.leftovers():
+                        problem = f"{how} {number}: the next run leaves {killed.leftovers()}"
+                    elif steady(killed.state()) != steady(after):
+                        problem = f"{how} {number}: the next run does not mend it"
+            yield f"{title}, {'over old results' if old else 'over nothing'}, {number} kills", problem
+
+
+def by_signals(base):
+    slow = "roomtex-simulate --quiet --output_path new --num_photos 40"
+    cases = [("simulate", slow, 0.7), ("texture", s.TEXTURE + " --output_path textured", 0.3)]
+    for title, line, seconds in cases:
+        for what in (signal.SIGINT, signal.SIGTERM):
+            here = base.copy()
+            before = here.state()
+            arguments = line.split()
+            arguments[0] = str(here.programs / arguments[0])
+            process = subprocess.Popen(arguments, cwd=here.root, stderr=subprocess.PIPE,
+                                       stdout=subprocess.DEVNULL, start_new_session=True)
+            time.sleep(seconds)
+            process.send_signal(what)
+            try:
+                err = process.communicate(timeout=20)[1].decode()
+            except subprocess.TimeoutExpired:
+                process.kill()
+                yield f"{title} gets {what.name}", "does not end"
+                continue
+            after = here.state()
+            problem = ""
+            if process.returncode not in (-what, 0):
+                problem = f"exit {process.returncode}: {err[-200:]}"
+            elif process.returncode == -what and "stopped by " + what.name not in err:
+                problem = f"does not say so: {err[-200:]}"
+            elif here.leftovers():
+                problem = f"leaves {here.leftovers()}"
+            elif any(after.get(name) != content for name, content in before.items()):
+                problem = "inputs changed"
+            yield f"{title} gets {what.name}", problem
+
+
+def full_disk(base):
+    """A limit of the size of files stands for the full disk: writing fails in the same places."""
+    for title, line, folder in commands():
+        for limit in (0, 2000, 20000):
+            here = base.copy()
+            before = here.state()
+            answer = here.run(line, limits=[(resource.RLIMIT_FSIZE, limit)])
+            after = here.state()
+            problem = answer.problem({0, 3, 4})
+            if answer.code in (0, 4) and limit < 2000:
+                problem = "ends well with nothing written"
+            if here.leftovers():
+                problem = f"leaves {here.leftovers()}"
+            if any(after.get(name) != content for name, content in before.items()):
+                problem = "inputs changed"
+            yield f"{title} with files of at most {limit} bytes", problem
+
+
+if __name__ == "__main__":
+    s.main({"renames": at_every_rename, "signals": by_signals, "full_disk": full_disk})

@@ -1,0 +1,203 @@
+"""A small simulated room with everything that the commands read, and what every answer must keep."""
+
+import hashlib
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+
+KEEP_SENTENCES = ("terminate called", "std::", "Assertion", "AddressSanitizer", "runtime error:",
+                  "Traceback", "internal error", "vector::", "basic_string")
+SECONDS = 120
+
+
+class Answer:
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    def problem(self, codes):
+        """Why this is not how a command ends, or ""."""
+        if self.code not in codes:
+            return f"exit {self.code}, expected {sorted(codes)}: {self.err.strip()[-300:]}"
+        for word in KEEP_SENTENCES:
+            if word in self.err:
+                return f"says \"{word}\": {self.err.strip()[-300:]}"
+        if self.code not in (0, 4) and not self.err.strip():
+            return "says nothing"
+        return ""
+
+
+class Scene:
+    """A folder with a capture; commands run in it with relative paths."""
+
+    def __init__(self, programs, folder=None):
+        self.programs = pathlib.Path(programs).resolve()
+        self.temporary = tempfile.TemporaryDirectory(prefix="roomtex-hostile-")
+        self.root = pathlib.Path(folder or self.temporary.name)
+
+    def make(self):
+        answer = self.run("roomtex-simulate --output_path . --num_photos 6 --photo_width 240 "
+                          "--photo_height 160 --scan_columns 160 --scan_rows 80 --furnished 0 "
+                          "--distortion 0")
+        assert answer.code == 0, answer.err
+        write_sparse_model(self.root)
+        write_database(self.root / "database.db", self.root)
+        (self.root / "project.ini").write_text("num_threads=2\n")
+        return self
+
+    def copy(self):
+        scene = Scene(self.programs)
+        shutil.copytree(self.root, scene.root, dirs_exist_ok=True, symlinks=True)
+        return scene
+
+    def run(self, line, limits=(), environment=None, seconds=SECONDS, stdin=None):
+        arguments = line.split() if isinstance(line, str) else list(line)
+        arguments[0] = str(self.programs / arguments[0])
+
+        def limit():
+            for what, value in limits:
+                resource.setrlimit(what, (value, value))
+
+        process = subprocess.Popen(
+            arguments, cwd=self.root, stdin=stdin or subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, preexec_fn=limit, start_new_session=True,
+            env={**os.environ, **(environment or {})})
+        try:
+            out, err = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            return Answer("timeout", "", f"still running after {seconds} s")
+        return Answer(process.returncode, out.decode(errors="replace"),
+                      err.decode(errors="replace"))
+
+    def state(self, skip=()):
+        """Path to content of everything below the folder; links by where they lead."""
+        files = {}
+        for path in sorted(self.root.rglob("*")):
+            name = path.relative_to(self.root).as_posix()
+            if any(name == s or name.startswith(s + "/") for s in skip):
+                continue
+            if path.is_symlink():
+                files[name] = "link " + os.readlink(path)
+            elif path.is_file():
+                files[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+        return files
+
+    def leftovers(self):
+        return [p.name for p in self.root.rglob(".roomtex-partial-*")]
+
+
+def rotated(quaternion, point):
+    w, x, y, z = quaternion
+    a, b, c = point
+    u, v, t = y * c - z * b, z * a - x * c, x * b - y * a
+    return (a + 2 * (w * u + y * t - z * v), b + 2 * (w * v + z * u - x * t),
+            c + 2 * (w * t + x * v - y * u))
+
+
+def write_sparse_model(root):
+    """The true poses, with points of the scan: the room is empty, so every photo sees all that lies
+    before it."""
+    (root / "sparse").mkdir()
+    shutil.copy(root / "truth/cameras.txt", root / "sparse")
+    camera = [line.split() for line in (root / "truth/cameras.txt").read_text().splitlines()
+              if line and line[0] != "#"][0]
+    width, height, fx, fy, cx, cy = (float(value) for value in camera[2:8])
+    data = (root / "truth/true_colors.ply").read_bytes()
+    end = data.index(b"end_header\n") + 11
+    header = data[:end].decode().split("\n")
+    count = next(int(line.split()[2]) for line in header if line.startswith("element vertex"))
+    stride = (len(data) - end) // count
+    points = [struct.unpack_from("<3f", data, end + stride * i) for i in range(0, count, 17)]
+    lines = [line for line in (root / "truth/images.txt").read_text().split("\n")
+             if line and line[0] != "#"]
+    tracks, images = [[] for _ in points], []
+    for line in (line for line in lines if len(line.split()) == 10):
+        fields = line.split()
+        quaternion, shift = [float(v) for v in fields[1:5]], [float(v) for v in fields[5:8]]
+        seen = []
+        for i, point in enumerate(points):
+            x, y, z = (r + t for r, t in zip(rotated(quaternion, point), shift))
+            if z < 0.1:
+                continue
+            u, v = fx * x / z + cx, fy * y / z + cy
+            if 0 < u < width and 0 < v < height:
+                tracks[i].append((fields[0], len(seen)))
+                seen.append(f"{u} {v} {i + 1}")
+        images.append((fields, seen))
+    good = {i + 1 for i, track in enumerate(tracks) if len(track) > 1}
+    text = ""
+    for fields, seen in images:
+        seen = [s if int(s.split()[2]) in good else " ".join(s.split()[:2]) + " -1" for s in seen]
+        text += " ".join(fields) + "\n" + " ".join(seen) + "\n"
+    (root / "sparse/images.txt").write_text(text)
+    picks = "image_name,x,y,scan_x,scan_y,scan_z\n"
+    for fields, seen in images[:2]:
+        for entry in seen[:: max(1, len(seen) // 8)]:
+            u, v, i = entry.split()
+            picks += ",".join([fields[9], u, v] + [str(c) for c in points[int(i) - 1]]) + "\n"
+    (root / "picks.csv").write_text(picks)
+    (root / "sparse/points3D.txt").write_text("".join(
+        f"{i + 1} {p[0]} {p[1]} {p[2]} 90 90 90 0.5 " +
+        " ".join(f"{image} {index}" for image, index in tracks[i]) + "\n"
+        for i, p in enumerate(points) if i + 1 in good))
+
+
+def write_database(path, root):
+    """COLMAP 3.8's tables with the cameras and images of the scene, without features."""
+    camera = [line.split() for line in (root / "cameras.txt").read_text().splitlines()
+              if line and line[0] != "#"][0]
+    models = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4}
+    import array
+    params = array.array("d", [float(value) for value in camera[4:]]).tobytes()
+    database = sqlite3.connect(path)
+    database.executescript("""
+        CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER
+          NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, params BLOB,
+          prior_focal_length INTEGER NOT NULL);
+        CREATE TABLE images (image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, name TEXT NOT NULL
+          UNIQUE, camera_id INTEGER NOT NULL, prior_qw REAL, prior_qx REAL, prior_qy REAL,
+          prior_qz REAL, prior_tx REAL, prior_ty REAL, prior_tz REAL);
+        CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols
+          INTEGER NOT NULL, data BLOB);
+        CREATE TABLE descriptors (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols
+          INTEGER NOT NULL, data BLOB);
+        CREATE TABLE matches (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols
+          INTEGER NOT NULL, data BLOB);
+        CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT
+          NULL, cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB,
+          qvec BLOB, tvec BLOB);""")
+    database.execute("INSERT INTO cameras VALUES (1, ?, ?, ?, ?, 1)",
+                     (models[camera[1]], int(camera[2]), int(camera[3]), params))
+    for i, photo in enumerate(sorted((root / "photos").iterdir())):
+        database.execute("INSERT INTO images (image_id, name, camera_id) VALUES (?, ?, 1)",
+                         (i + 1, photo.name))
+    database.commit()
+    database.close()
+
+
+ALIGN = "roomtex-align --quiet --input_path sparse --scan_path scan.rtpi --picks_path picks.csv"
+TEXTURE = ("roomtex-texture --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
+           "--database_path database.db --Texture.scale 1")
+
+
+def main(tables):
+    """Runs the tables named on the command line: PROGRAMS TABLE...; the exit code is for ctest."""
+    programs, names = sys.argv[1], sys.argv[2:]
+    failures = []
+    with_scene = Scene(programs).make()
+    for name in names or tables:
+        for title, problem in tables[name](with_scene):
+            print(("FAILED " if problem else "ok     ") + name + ": " + title, flush=True)
+            if problem:
+                print("       " + problem, flush=True)
+                failures.append(title)
+    print(f"{len(failures)} failed")
+    sys.exit(1 if failures else 0)
