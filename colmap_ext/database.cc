@@ -370,8 +370,8 @@ std::map<uint32_t, size_t> Database::CountKeypoints() const {
 }
 
 void Database::Impl::ForEachKeypoint(
-    uint32_t image_id, const std::function<void(const float* values, int64_t num_columns)>& use)
-    const {
+    uint32_t image_id,
+    const std::function<void(const float* values, int64_t num_columns)>& use) const {
   ForEachRow(
       "keypoints", "SELECT image_id, rows, cols, data FROM keypoints WHERE image_id = ?",
       [&](const Row& row) {
@@ -405,10 +405,10 @@ namespace {
 
 // COLMAP's columns: x, y; then scale and orientation, or an affine shape by rows.
 float KeypointScale(const float* values, int64_t num_columns) {
-  const float scale = num_columns == 4 ? values[2]
-                      : num_columns == 6
-                          ? (std::hypot(values[2], values[4]) + std::hypot(values[3], values[5])) / 2
-                          : 1.0f;
+  const float scale =
+      num_columns == 4   ? values[2]
+      : num_columns == 6 ? (std::hypot(values[2], values[4]) + std::hypot(values[3], values[5])) / 2
+                         : 1.0f;
   return std::isfinite(scale) ? scale : 0.0f;
 }
 
@@ -424,10 +424,9 @@ DatabaseFeatures Database::ReadLargestFeatures(uint32_t image_id, int max_featur
   std::vector<size_t> order(scales.size());
   std::iota(order.begin(), order.end(), size_t{0});
   const size_t count = std::min(order.size(), static_cast<size_t>(std::max(0, max_features)));
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-                    [&](size_t a, size_t b) {
-                      return scales[a] != scales[b] ? scales[a] > scales[b] : a < b;
-                    });
+  std::partial_sort(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+      [&](size_t a, size_t b) { return scales[a] != scales[b] ? scales[a] > scales[b] : a < b; });
   DatabaseFeatures features;
   bool has_row = false;
   impl_->RequireColumns("descriptors", {"image_id", "rows", "cols", "data"});
@@ -464,13 +463,13 @@ DatabaseFeatures Database::ReadLargestFeatures(uint32_t image_id, int max_featur
 std::map<std::pair<uint32_t, uint32_t>, size_t> Database::CountMatches() const {
   const std::map<uint32_t, DatabaseImage> images = ReadImages();
   std::map<std::pair<uint32_t, uint32_t>, size_t> counts;
-  impl_->ForEachRow(
-      "two_view_geometries", "SELECT pair_id, rows FROM two_view_geometries ORDER BY pair_id",
-      [&](const Row& row) {
-        const auto pair = PairOfRow(row);
-        if (images.count(pair.first) == 0 || images.count(pair.second) == 0) return;
-        counts[pair] = static_cast<size_t>(row.Integer(1, 0, INT32_MAX));
-      });
+  impl_->ForEachRow("two_view_geometries",
+                    "SELECT pair_id, rows FROM two_view_geometries ORDER BY pair_id",
+                    [&](const Row& row) {
+                      const auto pair = PairOfRow(row);
+                      if (images.count(pair.first) == 0 || images.count(pair.second) == 0) return;
+                      counts[pair] = static_cast<size_t>(row.Integer(1, 0, INT32_MAX));
+                    });
   return counts;
 }
 

@@ -57,8 +57,8 @@ class Database {
   std::map<uint32_t, size_t> CountKeypoints() const;
   // Positions in `img`, one per keypoint row; empty if the image has none. (2, 4 or 6 columns.)
   std::vector<Eigen::Vector2d> ReadKeypoints(uint32_t image_id) const;
-  // The max_features keypoints of the largest scale, largest first (equal ones by their row). Throws
-  // InputError for descriptors that are not SIFT's or do not belong to the keypoints.
+  // The max_features keypoints of the largest scale, largest first (equal ones by their row).
+  // Throws InputError for descriptors that are not SIFT's or do not belong to the keypoints.
   DatabaseFeatures ReadLargestFeatures(uint32_t image_id, int max_features) const;
   // Pairs with at least min_matches verified matches, ordered by pair id. All matches lie within
   // the keypoints of their images, or this is an InputError. Pairs of images that the database no

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace roomtex {
 namespace {
@@ -58,6 +59,14 @@ void FindNearest(const std::vector<int16_t>& left, const std::vector<int16_t>& r
   }
 }
 
+int NumInHull(const std::vector<cv::Point2f>& corners, const std::vector<Eigen::Vector2f>& x) {
+  std::vector<cv::Point2f> hull;
+  cv::convexHull(corners, hull);
+  return static_cast<int>(std::count_if(x.begin(), x.end(), [&](const Eigen::Vector2f& point) {
+    return cv::pointPolygonTest(hull, {point.x(), point.y()}, false) >= 0;
+  }));
+}
+
 float AngleOf(float cosine) { return std::acos(std::clamp(cosine, -1.0f, 1.0f)); }
 
 }  // namespace
@@ -97,12 +106,18 @@ PairCheck CheckPair(const ComparedFeatures& left, const ComparedFeatures& right,
   constexpr double kConfidence = 0.999;
   constexpr int kMaxSamples = 2000;
   std::vector<uint8_t> is_inlier;
-  const cv::Mat fundamental =
-      cv::findFundamentalMat(x_left, x_right, cv::USAC_DEFAULT, options.max_error_px, kConfidence,
-                             kMaxSamples, is_inlier);
+  const cv::Mat fundamental = cv::findFundamentalMat(
+      x_left, x_right, cv::USAC_DEFAULT, options.max_error_px, kConfidence, kMaxSamples, is_inlier);
   if (fundamental.empty()) return check;
-  check.num_inliers = static_cast<int>(
-      std::count_if(is_inlier.begin(), is_inlier.end(), [](uint8_t is) { return is != 0; }));
+  std::vector<cv::Point2f> left_inliers, right_inliers;
+  for (size_t i = 0; i < is_inlier.size(); ++i) {
+    if (is_inlier[i] == 0) continue;
+    left_inliers.push_back(x_left[i]);
+    right_inliers.push_back(x_right[i]);
+  }
+  check.num_inliers = static_cast<int>(left_inliers.size());
+  if (left_inliers.empty()) return check;
+  check.num_in_hull = std::min(NumInHull(left_inliers, left.x), NumInHull(right_inliers, right.x));
   return check;
 }
 

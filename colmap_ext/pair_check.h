@@ -21,14 +21,16 @@ struct ComparedFeatures {
 ComparedFeatures UndistortFeatures(const DatabaseFeatures& features, const Camera& camera);
 
 struct PairCheckOptions {
-  double max_ratio = 0.8;     // of the angles to the nearest and the next; larger = more tolerant
-  double max_error_px = 4;     // from the epipolar line; larger = more tolerant
-  int min_num_matches = 8;     // fewer are not looked at further
+  double max_ratio = 0.8;   // of the angles to the nearest and the next; larger = more tolerant
+  double max_error_px = 4;  // from the epipolar line; larger = more tolerant
+  int min_num_matches = 8;  // fewer are not looked at further
 };
 
 struct PairCheck {
   int num_matches = 0;  // mutual, ratio test passed
   int num_inliers = 0;  // of one fundamental matrix
+  // Compared features inside the inliers' convex hull, of the photo that has fewer there.
+  int num_in_hull = 0;
 };
 // The same for either order of threads and calls.
 PairCheck CheckPair(const ComparedFeatures& left, const ComparedFeatures& right,

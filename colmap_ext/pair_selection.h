@@ -1,8 +1,10 @@
 #pragma once
 // Which photos of a database can show the same? Candidates by signature (photo_signature.h), by the
-// order of the photos and by what EXIF says; each looked at with few features (pair_check.h);
-// neighbours of neighbours; then what still stands apart, with more features. Checks per photo are
-// bounded, so that the cost grows with the number of photos. docs/pairs.md.
+// order of the photos and by what EXIF says; each looked at with few features (pair_check.h); then
+// neighbours of neighbours. A spanning forest of the best pairs is looked at with many features:
+// rooms with the same furniture agree on large things, not on the small ones between them, and stay
+// apart. Checks per photo are bounded, so that the cost grows with the number of photos.
+// docs/pairs.md.
 
 #include <array>
 #include <cstdint>
@@ -29,6 +31,7 @@ struct PairOptions {
   int min_num_inliers = 12;
   PairCheckOptions check;
   bool only_new = false;
+  bool join_lookalikes = false;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
@@ -64,12 +67,19 @@ struct PairPhoto {
   int num_pairs = 0;        // listed
 };
 
+// Two groups with pairs that agree on large things only: the same furniture in two rooms, perhaps.
+struct GroupLookalike {
+  int group1 = 0, group2 = 0;
+  int num_pairs = 0;
+};
+
 struct PairSelection {
-  std::vector<PairPhoto> photos;  // by image id
-  std::vector<PairEdge> edges;    // that agree or are listed; by photo1, photo2
+  std::vector<PairPhoto> photos;         // by image id
+  std::vector<PairEdge> edges;           // that agree or are listed; by photo1, photo2
   std::vector<std::vector<int>> groups;  // the largest first
-  int num_checked = 0;                   // pairs looked at
-  int num_in_database = 0;               // pairs that were matched before
+  std::vector<GroupLookalike> lookalikes;
+  int num_checked = 0;      // pairs looked at
+  int num_in_database = 0;  // pairs that were matched before
 };
 
 // hints: one per image in the order of their ids, or none at all. Features are read photo by photo;

@@ -137,6 +137,18 @@ void ReportGroups(const PairSelection& selection, const Command::Context& contex
     context.Warn(std::to_string(isolated.size()) +
                  " photos stand alone, nothing agrees with them: " + names);
   }
+  Json& lookalikes = context.report["lookalikes"] = Json::array();
+  int num_lookalikes = 0;
+  for (const GroupLookalike& one : selection.lookalikes) {
+    lookalikes.push_back({{"groups", {one.group1, one.group2}}, {"num_pairs", one.num_pairs}});
+    num_lookalikes += one.num_pairs;
+  }
+  if (num_lookalikes > 0) {
+    context.Warn(std::to_string(num_lookalikes) +
+                 " pairs of different groups agree on large things and not on the small ones "
+                 "between them, as the same furniture in two rooms does: left out. If it is one "
+                 "room, take photos between the groups, or give --Pairs.join_lookalikes");
+  }
   if (groups.size() > 1) {
     context.Warn("the photos fall into " + std::to_string(groups.size()) +
                  " groups that nothing connects (report, groups): other rooms, or photos between "
@@ -172,8 +184,7 @@ void FindPairs(const PairsCommandOptions& options, const Command::Context& conte
   context.report["num_in_database"] = selection.num_in_database;
   ReportGroups(selection, context);
   std::printf("%s: %zu of %zu pairs, %zu photos in %zu groups\n", options.output_path.c_str(),
-              num_listed, num_images * (num_images - 1) / 2, num_images,
-              selection.groups.size());
+              num_listed, num_images * (num_images - 1) / 2, num_images, selection.groups.size());
 }
 
 }  // namespace
@@ -199,7 +210,6 @@ int main(int argc, char** argv) {
                         "found and what they agree on.",
                         Command::Kind::kOptional);
   command.Add(FieldsOf(&options.pairs));
-  return command.Run(argc, argv, [&](const Command::Context& context) {
-    FindPairs(options, context);
-  });
+  return command.Run(argc, argv,
+                     [&](const Command::Context& context) { FindPairs(options, context); });
 }

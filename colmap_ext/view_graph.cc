@@ -7,31 +7,6 @@
 namespace roomtex {
 namespace {
 
-class DisjointSets {
- public:
-  explicit DisjointSets(int count) : parent_(static_cast<size_t>(count)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int Find(int node) {
-    while (parent_[static_cast<size_t>(node)] != node) {
-      int& parent = parent_[static_cast<size_t>(node)];
-      parent = parent_[static_cast<size_t>(parent)];
-      node = parent;
-    }
-    return node;
-  }
-  // False if they were joined before.
-  bool Join(int a, int b) {
-    a = Find(a);
-    b = Find(b);
-    parent_[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
-    return a != b;
-  }
-
- private:
-  std::vector<int> parent_;
-};
-
 // Positions of the edges, the strongest first.
 std::vector<int> ByWeight(const std::vector<GraphEdge>& edges) {
   std::vector<int> order(edges.size());
@@ -44,12 +19,35 @@ std::vector<int> ByWeight(const std::vector<GraphEdge>& edges) {
 
 }  // namespace
 
-std::vector<std::vector<int>> ConnectedGroups(int num_nodes, const std::vector<GraphEdge>& edges) {
-  DisjointSets sets(num_nodes);
-  for (const GraphEdge& edge : edges) sets.Join(edge.node1, edge.node2);
-  std::vector<std::vector<int>> of_root(static_cast<size_t>(num_nodes)), groups;
-  for (int node = 0; node < num_nodes; ++node) {
-    of_root[static_cast<size_t>(sets.Find(node))].push_back(node);
+DisjointSets::DisjointSets(int num_nodes)
+    : parent_(static_cast<size_t>(num_nodes)), size_(static_cast<size_t>(num_nodes), 1) {
+  std::iota(parent_.begin(), parent_.end(), 0);
+}
+
+int DisjointSets::Find(int node) {
+  while (parent_[static_cast<size_t>(node)] != node) {
+    int& parent = parent_[static_cast<size_t>(node)];
+    parent = parent_[static_cast<size_t>(parent)];
+    node = parent;
+  }
+  return node;
+}
+
+int DisjointSets::SizeOf(int node) const { return size_[static_cast<size_t>(node)]; }
+
+bool DisjointSets::Join(int node1, int node2) {
+  const int root1 = Find(node1), root2 = Find(node2);
+  if (root1 == root2) return false;
+  const int root = std::min(root1, root2), other = std::max(root1, root2);
+  parent_[static_cast<size_t>(other)] = root;
+  size_[static_cast<size_t>(root)] += size_[static_cast<size_t>(other)];
+  return true;
+}
+
+std::vector<std::vector<int>> DisjointSets::Groups() {
+  std::vector<std::vector<int>> of_root(parent_.size()), groups;
+  for (int node = 0; node < static_cast<int>(parent_.size()); ++node) {
+    of_root[static_cast<size_t>(Find(node))].push_back(node);
   }
   for (std::vector<int>& group : of_root) {
     if (!group.empty()) groups.push_back(std::move(group));

@@ -10,9 +10,19 @@ struct GraphEdge {
   double weight = 0;  // larger = stronger
 };
 
-// Nodes that edges connect, each group ascending; the largest group first, equal ones by their
-// first node.
-std::vector<std::vector<int>> ConnectedGroups(int num_nodes, const std::vector<GraphEdge>& edges);
+// Sets of nodes that grow together.
+class DisjointSets {
+ public:
+  explicit DisjointSets(int num_nodes);
+  int Find(int node);               // the set's smallest node
+  int SizeOf(int node) const;       // of the set whose smallest node this is
+  bool Join(int node1, int node2);  // false if they were joined before
+  // Each ascending; the largest first, equal ones by their first node.
+  std::vector<std::vector<int>> Groups();
+
+ private:
+  std::vector<int> parent_, size_;
+};
 
 // Positions in `edges`, ascending, of those to keep: per node its strongest ones and, for as many
 // again, an even choice of the weaker ones (other views of the same, which close loops and have
