@@ -6,6 +6,8 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <numeric>
 #include <set>
 #include <system_error>
 #include <tuple>
@@ -258,6 +260,16 @@ class Row {
   SQLite::Statement& statement_;
 };
 
+// The images of a row whose first column is a pair id.
+std::pair<uint32_t, uint32_t> PairOfRow(const Row& row) {
+  const auto pair_id = static_cast<uint64_t>(row.Integer(0, 0, INT64_MAX));
+  const std::pair<uint32_t, uint32_t> pair = ImagesFromPairId(pair_id);
+  if (pair_id / kMaxNumImages >= kMaxNumImages || pair.first >= pair.second) {
+    row.Fail("is not the id of a pair of two images");
+  }
+  return pair;
+}
+
 }  // namespace
 
 uint64_t PairIdFromImages(uint32_t image_id1, uint32_t image_id2) {
@@ -301,6 +313,9 @@ struct Database::Impl {
     });
   }
 
+  // Calls use(values, num_columns) for every keypoint of an image.
+  void ForEachKeypoint(uint32_t image_id,
+                       const std::function<void(const float*, int64_t)>& use) const;
   void Open();
   void RequireColumns(const char* table, const std::vector<std::string>& columns) const;
 };
@@ -426,9 +441,10 @@ std::map<uint32_t, size_t> Database::CountKeypoints() const {
   return counts;
 }
 
-std::vector<Eigen::Vector2d> Database::ReadKeypoints(uint32_t image_id) const {
-  std::vector<Eigen::Vector2d> keypoints;
-  impl_->ForEachRow(
+void Database::Impl::ForEachKeypoint(
+    uint32_t image_id,
+    const std::function<void(const float* values, int64_t num_columns)>& use) const {
+  ForEachRow(
       "keypoints", "SELECT image_id, rows, cols, data FROM keypoints WHERE image_id = ?",
       [&](const Row& row) {
         const int64_t num_rows = row.Integer(1, 0, INT32_MAX);
@@ -437,19 +453,96 @@ std::vector<Eigen::Vector2d> Database::ReadKeypoints(uint32_t image_id) const {
           row.Fail("keypoints have " + std::to_string(num_columns) +
                    " columns, expected 2, 4 or 6");
         }
-        // COLMAP: x, y in pixels; then scale and orientation, or an affine shape.
         const std::vector<float> values = row.Blob<float>(3, num_rows, num_columns);
-        keypoints.reserve(static_cast<size_t>(num_rows));
         for (int64_t i = 0; i < num_rows; ++i) {
-          const Eigen::Vector2d x_in_img(values[i * num_columns], values[i * num_columns + 1]);
-          if (!x_in_img.allFinite()) {
+          const float* keypoint = values.data() + i * num_columns;
+          if (!std::isfinite(keypoint[0]) || !std::isfinite(keypoint[1])) {
             row.Fail("keypoint " + std::to_string(i) + " is not a finite position");
           }
-          keypoints.push_back(x_in_img);
+          use(keypoint, num_columns);
         }
       },
       image_id);
+}
+
+std::vector<Eigen::Vector2d> Database::ReadKeypoints(uint32_t image_id) const {
+  std::vector<Eigen::Vector2d> keypoints;
+  impl_->ForEachKeypoint(image_id, [&](const float* values, int64_t) {
+    keypoints.emplace_back(values[0], values[1]);
+  });
   return keypoints;
+}
+
+namespace {
+
+// COLMAP's columns: x, y; then scale and orientation, or an affine shape by rows.
+float KeypointScale(const float* values, int64_t num_columns) {
+  const float scale =
+      num_columns == 4   ? values[2]
+      : num_columns == 6 ? (std::hypot(values[2], values[4]) + std::hypot(values[3], values[5])) / 2
+                         : 1.0f;
+  return std::isfinite(scale) ? scale : 0.0f;
+}
+
+}  // namespace
+
+DatabaseFeatures Database::ReadLargestFeatures(uint32_t image_id, int max_features) const {
+  std::vector<Eigen::Vector2d> x_in_img;
+  std::vector<float> scales;
+  impl_->ForEachKeypoint(image_id, [&](const float* values, int64_t num_columns) {
+    x_in_img.emplace_back(values[0], values[1]);
+    scales.push_back(KeypointScale(values, num_columns));
+  });
+  std::vector<size_t> order(scales.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const size_t count = std::min(order.size(), static_cast<size_t>(std::max(0, max_features)));
+  std::partial_sort(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+      [&](size_t a, size_t b) { return scales[a] != scales[b] ? scales[a] > scales[b] : a < b; });
+  DatabaseFeatures features;
+  bool has_row = false;
+  impl_->RequireColumns("descriptors", {"image_id", "rows", "cols", "data"});
+  impl_->ForEachRow(
+      "descriptors", "SELECT image_id, rows, cols, data FROM descriptors WHERE image_id = ?",
+      [&](const Row& row) {
+        has_row = true;
+        const int64_t num_rows = row.Integer(1, 0, INT32_MAX);
+        const int64_t num_columns = row.Integer(2, 0, INT32_MAX);
+        if (num_rows > 0 && num_columns != kSiftSize) {
+          row.Fail("descriptors have " + std::to_string(num_columns) +
+                   " bytes, expected the 128 of SIFT");
+        }
+        if (num_rows != static_cast<int64_t>(scales.size())) {
+          row.Fail("has " + std::to_string(num_rows) + " descriptors for " +
+                   std::to_string(scales.size()) + " keypoints");
+        }
+        const std::vector<uint8_t> bytes = row.Blob<uint8_t>(3, num_rows, num_columns);
+        features.descriptors.reserve(count * kSiftSize);
+        for (size_t i = 0; i < count; ++i) {
+          const uint8_t* first = bytes.data() + order[i] * kSiftSize;
+          features.descriptors.insert(features.descriptors.end(), first, first + kSiftSize);
+          features.x_in_img.push_back(x_in_img[order[i]]);
+        }
+      },
+      image_id);
+  if (!has_row && !scales.empty()) {
+    throw InputError(path(), "table descriptors, image_id " + std::to_string(image_id),
+                     "is missing, but the image has keypoints", kDatabaseRemedy);
+  }
+  return features;
+}
+
+std::map<std::pair<uint32_t, uint32_t>, size_t> Database::CountMatches() const {
+  const std::map<uint32_t, DatabaseImage> images = ReadImages();
+  std::map<std::pair<uint32_t, uint32_t>, size_t> counts;
+  impl_->ForEachRow("two_view_geometries",
+                    "SELECT pair_id, rows FROM two_view_geometries ORDER BY pair_id",
+                    [&](const Row& row) {
+                      const auto pair = PairOfRow(row);
+                      if (images.count(pair.first) == 0 || images.count(pair.second) == 0) return;
+                      counts[pair] = static_cast<size_t>(row.Integer(1, 0, INT32_MAX));
+                    });
+  return counts;
 }
 
 std::vector<DatabasePair> Database::ReadPairs(int min_matches) const {
@@ -465,12 +558,8 @@ std::vector<DatabasePair> Database::ReadPairs(int min_matches) const {
       "SELECT pair_id, rows, cols, data, config FROM two_view_geometries WHERE rows >= ? "
       "ORDER BY pair_id",
       [&](const Row& row) {
-        const auto pair_id = static_cast<uint64_t>(row.Integer(0, 0, INT64_MAX));
         DatabasePair pair;
-        std::tie(pair.image_id1, pair.image_id2) = ImagesFromPairId(pair_id);
-        if (pair_id / kMaxNumImages >= kMaxNumImages || pair.image_id1 >= pair.image_id2) {
-          row.Fail("is not the id of a pair of two images");
-        }
+        std::tie(pair.image_id1, pair.image_id2) = PairOfRow(row);
         if (images.count(pair.image_id1) == 0 || images.count(pair.image_id2) == 0) return;
         const int64_t num_rows = row.Integer(1, 0, INT32_MAX);
         const int64_t num_columns = row.Integer(2, 0, INT32_MAX);

@@ -28,6 +28,13 @@ struct DatabasePair {
   std::vector<Eigen::Vector2i> matches;  // keypoint rows in image 1 and image 2
 };
 
+// Keypoints with their SIFT descriptors.
+struct DatabaseFeatures {
+  std::vector<Eigen::Vector2d> x_in_img;
+  std::vector<uint8_t> descriptors;  // kSiftSize bytes per feature
+};
+inline constexpr int kSiftSize = 128;
+
 // COLMAP's number of a pair of images, in either order, and back to {smaller id, larger id}.
 uint64_t PairIdFromImages(uint32_t image_id1, uint32_t image_id2);
 std::pair<uint32_t, uint32_t> ImagesFromPairId(uint64_t pair_id);
@@ -50,12 +57,18 @@ class Database {
   std::map<uint32_t, size_t> CountKeypoints() const;
   // Positions in `img`, one per keypoint row; empty if the image has none. (2, 4 or 6 columns.)
   std::vector<Eigen::Vector2d> ReadKeypoints(uint32_t image_id) const;
+  // The max_features keypoints of the largest scale, largest first (equal ones by their row).
+  // Throws InputError for descriptors that are not SIFT's or do not belong to the keypoints.
+  DatabaseFeatures ReadLargestFeatures(uint32_t image_id, int max_features) const;
   // Pairs with at least min_matches verified matches, ordered by pair id. All matches lie within
   // the keypoints of their images, or this is an InputError. Pairs of images that the database no
   // longer holds are left out, as COLMAP does.
   std::vector<DatabasePair> ReadPairs(int min_matches) const;
   // Number of pairs with a verified match, without reading them.
   size_t CountPairs() const;
+  // Number of verified matches of every pair that was ever matched, 0 if none was verified, without
+  // reading the matches; smaller id first. Pairs of images that are gone are left out.
+  std::map<std::pair<uint32_t, uint32_t>, size_t> CountMatches() const;
 
   // Writes at `path` (which must not exist) a database with everything that COLMAP's mapper reads,
   // i.e. without the rows of descriptors and raw matches, most of the bytes. COLMAP opens databases
