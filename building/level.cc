@@ -1,0 +1,140 @@
+// Up, and the ground.
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "building/outline_proposal.h"
+#include "core/frames.h"
+#include "core/statistics.h"
+
+namespace roomtex {
+namespace {
+
+double WeightOf(const PlaneSegment& segment) { return std::sqrt(segment.area); }
+
+// Share of the surface that stands upright or lies level for this up.
+double LevelShare(const std::vector<PlaneSegment>& segments, const Eigen::Vector3d& up) {
+  const double sine = std::sin(RadFromDeg(10));
+  double sum = 0, fitting = 0;
+  for (const PlaneSegment& segment : segments) {
+    const double along = std::abs(segment.plane.normal.dot(up));
+    sum += WeightOf(segment);
+    if (along < sine || along > std::cos(RadFromDeg(10))) fitting += WeightOf(segment);
+  }
+  return sum > 0 ? fitting / sum : 0;
+}
+
+// Without anything that says so: the plane that the rest stands on, and the rest is above it.
+Eigen::Vector3d UpByPlanes(const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments) {
+  double best = -1;
+  Eigen::Vector3d up = cloud.up;
+  for (const PlaneSegment& segment : segments) {
+    double above = 0, below = 0;
+    const double margin = 3 * PlaneTolerance(cloud);
+    for (size_t i = 0; i < cloud.points.size(); i += 7) {
+      const double d = segment.plane.SignedDistance(cloud.points[i]);
+      (d > margin ? above : below) += std::abs(d) > margin ? 1 : 0;
+    }
+    const double one_sided = std::abs(above - below) / std::max(1.0, above + below);
+    const double score =
+        LevelShare(segments, segment.plane.normal) * one_sided * one_sided * std::sqrt(segment.area);
+    if (score <= best) continue;
+    best = score;
+    up = above > below ? segment.plane.normal : Eigen::Vector3d(-segment.plane.normal);
+  }
+  return up;
+}
+
+}  // namespace
+
+UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
+  using UpSource = OutlineCloud::UpSource;
+  static const char* const kNames[] = {"given", "geographic", "cameras", "file"};
+  UpFinding finding;
+  finding.source = kNames[static_cast<int>(cloud->up_source)];
+  Eigen::Vector3d up = cloud->up.normalized();
+  const bool fixed =
+      cloud->up_source == UpSource::kGiven || cloud->up_source == UpSource::kEarth;
+  constexpr double kEnough = 0.5;
+  if (cloud->up_source == UpSource::kFile && LevelShare(*segments, up) < kEnough) {
+    up = UpByPlanes(*cloud, *segments);
+    finding.source = "planes";
+  }
+  const Eigen::Vector3d start = up;
+  double sum_weights = 0, sum_squares = 0;
+  for (int round = 0; round < 12; ++round) {
+    // Walls are upright, floors and ground nearly level; the start holds what both leave open.
+    const double scale = RadFromDeg(round < 4 ? 8 : 2);
+    Eigen::Matrix3d sum =
+        1e-4 * (Eigen::Matrix3d::Identity() - start * start.transpose());
+    finding.num_walls = 0;
+    sum_weights = sum_squares = 0;
+    for (const PlaneSegment& segment : *segments) {
+      const Eigen::Vector3d& n = segment.plane.normal;
+      const double along = n.dot(up);
+      if (std::abs(along) < std::sin(RadFromDeg(15))) {
+        const double weight = WeightOf(segment) / (1 + (along / scale) * (along / scale));
+        sum += weight * n * n.transpose();
+        if (std::abs(along) < scale) {
+          ++finding.num_walls;
+          sum_weights += WeightOf(segment);
+          sum_squares += WeightOf(segment) * along * along;
+        }
+      } else if (std::abs(along) > std::cos(RadFromDeg(15))) {
+        sum += 0.02 * WeightOf(segment) * (Eigen::Matrix3d::Identity() - n * n.transpose());
+      }
+    }
+    if (fixed) break;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
+    const Eigen::Vector3d next = solver.eigenvectors().col(0);
+    up = next.dot(start) < 0 ? Eigen::Vector3d(-next) : next;
+  }
+  finding.spread_deg = sum_weights > 0 ? DegFromRad(std::sqrt(sum_squares / sum_weights)) : 0;
+  finding.trusted = fixed || (finding.source != "planes" && LevelShare(*segments, up) >= kEnough);
+
+  const Similarity level{1, Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()),
+                         Eigen::Vector3d::Zero()};
+  cloud->up = up;
+  cloud->MoveTo(level);
+  finding.up_in_input =
+      cloud->frame.outline_from_input.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  for (PlaneSegment& segment : *segments) {
+    segment.plane.centre = level * segment.plane.centre;
+    segment.plane.normal = level.rotation * segment.plane.normal;
+  }
+  return finding;
+}
+
+GroundPlane FindGround(const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments) {
+  GroundPlane ground;
+  double best = 0;
+  const double margin = std::max(3 * PlaneTolerance(cloud), cloud.step / 4);
+  for (const PlaneSegment& segment : segments) {
+    const Eigen::Vector3d& n = segment.plane.normal;
+    if (std::abs(n.z()) < std::cos(RadFromDeg(15))) continue;
+    GroundPlane plane;
+    plane.gradient = -n.head<2>() / n.z();
+    plane.height =
+        segment.plane.centre.z() - plane.gradient.dot(segment.plane.centre.head<2>());
+    double on = 0, below = 0, above = 0;
+    for (size_t i = 0; i < cloud.points.size(); i += 3) {
+      const double d = cloud.points[i].z() - plane.HeightAt(cloud.points[i].head<2>());
+      (std::abs(d) <= margin ? on : d < 0 ? below : above) += 1;
+    }
+    // Something lies on it, nearly nothing below.
+    const double score = on + 0.2 * above - 3 * below;
+    if (score <= best) continue;
+    best = score;
+    plane.found = true;
+    ground = plane;
+  }
+  if (ground.found) return ground;
+  std::vector<double> heights;
+  for (const Eigen::Vector3d& point : cloud.points) heights.push_back(point.z());
+  ground.height = Quantile(&heights, 0.02);
+  return ground;
+}
+
+}  // namespace roomtex
