@@ -7,6 +7,7 @@
 
 #include "building/outline_proposal.h"
 #include "core/frames.h"
+#include "core/robust_kernel.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -63,27 +64,42 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
     finding.source = "planes";
   }
   const Eigen::Vector3d start = up;
+  // How well each segment tells the direction of its normal: by its points across its height, and no
+  // better than walls are built.
+  const double built = RadFromDeg(0.1), ground = RadFromDeg(1.5), start_sigma = RadFromDeg(5);
+  std::vector<double> sigmas;
+  for (const PlaneSegment& segment : *segments) {
+    double spread = 0;
+    const double n = static_cast<double>(segment.points.size());
+    for (const int i : segment.points) {
+      const double d = start.dot(cloud->points[static_cast<size_t>(i)] - segment.plane.centre);
+      spread += d * d / n;
+    }
+    const double tilt = segment.plane.rms / std::sqrt(std::max(1e-300, n / 6 * spread));
+    sigmas.push_back(std::hypot(tilt, built));
+  }
   double sum_weights = 0, sum_squares = 0;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < 20; ++round) {
     // Walls are upright, floors and ground nearly level; the start holds what both leave open.
-    const double scale = RadFromDeg(round < 4 ? 8 : 2);
-    Eigen::Matrix3d sum =
-        1e-4 * (Eigen::Matrix3d::Identity() - start * start.transpose());
+    const double gate = RadFromDeg(round < 5 ? 8 : 3);
+    Eigen::Matrix3d sum = (Eigen::Matrix3d::Identity() - start * start.transpose()) /
+                          (start_sigma * start_sigma);
     finding.num_walls = 0;
     sum_weights = sum_squares = 0;
-    for (const PlaneSegment& segment : *segments) {
-      const Eigen::Vector3d& n = segment.plane.normal;
+    for (size_t s = 0; s < segments->size(); ++s) {
+      const Eigen::Vector3d& n = (*segments)[s].plane.normal;
       const double along = n.dot(up);
       if (std::abs(along) < std::sin(RadFromDeg(15))) {
-        const double weight = WeightOf(segment) / (1 + (along / scale) * (along / scale));
-        sum += weight * n * n.transpose();
-        if (std::abs(along) < scale) {
+        if (std::abs(along) < gate) {
           ++finding.num_walls;
-          sum_weights += WeightOf(segment);
-          sum_squares += WeightOf(segment) * along * along;
+          sum_weights += 1 / (sigmas[s] * sigmas[s]);
+          sum_squares += along * along / (sigmas[s] * sigmas[s]);
         }
+        const double weight = CauchyWeight(along / (3 * sigmas[s]), 1 / (sigmas[s] * sigmas[s]));
+        sum += weight * n * n.transpose();
       } else if (std::abs(along) > std::cos(RadFromDeg(15))) {
-        sum += 0.02 * WeightOf(segment) * (Eigen::Matrix3d::Identity() - n * n.transpose());
+        const double area = std::min(1.0, (*segments)[s].area / (100 * cloud->step * cloud->step));
+        sum += area / (ground * ground) * (Eigen::Matrix3d::Identity() - n * n.transpose());
       }
     }
     if (fixed) break;

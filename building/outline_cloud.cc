@@ -51,42 +51,55 @@ std::optional<GeoPosition> GivenOrigin(const std::string& text) {
   return GeoPosition{numbers[0], numbers[1], numbers[2]};
 }
 
-// Gravity by the cameras: people hold them level, wide or high, whatever they tilt (Szeliski 2006,
-// "Image alignment and stitching", 2.5: the x axes lie in the horizontal plane).
+// Gravity by the cameras: people hold them level, wide or high, whatever they tilt, so that one axis
+// of the picture is horizontal (Szeliski 2006, "Image alignment and stitching", 2.5).
 std::optional<Eigen::Vector3d> UpOfCameras(const SparseModel& model) {
-  std::vector<std::array<Eigen::Vector3d, 4>> rolls;  // what could be up in each photo
+  struct Axes {
+    Eigen::Vector3d x, y;  // right and down
+  };
+  std::vector<Axes> cameras;
   for (const auto& [id, image] : model.images) {
     const Eigen::Matrix3d model_from_cam =
         image.cam_from_model.rotation.conjugate().toRotationMatrix();
-    const Eigen::Vector3d x = model_from_cam.col(0), y = model_from_cam.col(1);
-    rolls.push_back({-y, x, -x, y});
+    cameras.push_back({model_from_cam.col(0), model_from_cam.col(1)});
   }
-  if (rolls.size() < 2) return std::nullopt;
-  // Most photos are not upside down: -y counts as it is, the other rolls a little less.
-  constexpr double kLikely[4] = {1, 0.9, 0.9, 0.7};
-  double best_score = 0;
+  if (cameras.size() < 2) return std::nullopt;
+  constexpr size_t kMostCameras = 100;
+  const size_t every = (cameras.size() + kMostCameras - 1) / kMostCameras;
+  const auto score_of = [&](const Eigen::Vector3d& up) {
+    // Most photos are wide, few are upside down.
+    constexpr double kHigh = 0.9, kUpsideDown = 0.7, kLevel = 0.2;
+    const auto level = [](double sine) { return std::exp(-sine * sine / (kLevel * kLevel)); };
+    double score = 0;
+    for (size_t i = 0; i < cameras.size(); i += every) {
+      const double x = cameras[i].x.dot(up), y = cameras[i].y.dot(up);
+      score += std::max((y < 0 ? 1 : kUpsideDown) * level(x), kHigh * level(y));
+    }
+    return score;
+  };
+  double best_score = -1;
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
-  const size_t every = std::max<size_t>(1, rolls.size() / 200);
-  for (size_t i = 0; i < rolls.size(); i += every) {
-    for (const Eigen::Vector3d& guess : rolls[i]) {
-      double score = 0;
-      for (size_t j = 0; j < rolls.size(); j += every) {
-        double most = 0;
-        for (int k = 0; k < 4; ++k) {
-          const double cosine = std::max(0.0, guess.dot(rolls[j][k]));
-          most = std::max(most, kLikely[k] * cosine * cosine * cosine * cosine);
-        }
-        score += most;
-      }
+  for (size_t i = 0; i < cameras.size(); i += every) {
+    std::vector<Eigen::Vector3d> guesses = {-cameras[i].y, cameras[i].x, -cameras[i].x};
+    for (size_t j = i + every; j < cameras.size(); j += 7 * every) {
+      // Square to the horizontal axes of two photos, and rather up than down in them.
+      Eigen::Vector3d guess = cameras[i].x.cross(cameras[j].x);
+      if (guess.norm() < 0.2) continue;
+      guess.normalize();
+      guesses.push_back(guess.dot(cameras[i].y + cameras[j].y) > 0 ? Eigen::Vector3d(-guess)
+                                                                    : guess);
+    }
+    for (const Eigen::Vector3d& guess : guesses) {
+      const double score = score_of(guess);
       if (score > best_score) best_score = score, up = guess;
     }
   }
   for (int round = 0; round < 10; ++round) {
-    Eigen::Matrix3d sum = 1e-3 * static_cast<double>(rolls.size()) *
+    Eigen::Matrix3d sum = 1e-3 * static_cast<double>(cameras.size()) *
                           (Eigen::Matrix3d::Identity() - up * up.transpose());
-    for (const auto& axes : rolls) {
-      const bool wide = std::abs(axes[0].dot(up)) >= std::abs(axes[1].dot(up));
-      const Eigen::Vector3d level = wide ? axes[1] : axes[0];
+    for (const Axes& axes : cameras) {
+      const bool wide = std::abs(axes.x.dot(up)) <= std::abs(axes.y.dot(up));
+      const Eigen::Vector3d level = wide ? axes.x : axes.y;
       const double sine = level.dot(up) / 0.1;
       const double weight = 1 / (1 + sine * sine);
       sum += weight * level * level.transpose();

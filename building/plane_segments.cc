@@ -17,7 +17,7 @@ constexpr int kNeighboursForNormal = 14;
 constexpr int kSeedsPerRound = 256;
 constexpr int kGrownPerRound = 6;
 constexpr size_t kMaxSegments = 400;
-constexpr int kMaxBarren = 3;  // rounds without a find
+constexpr int kMaxBarren = 12;  // rounds without a find
 constexpr size_t kFewestOnPlane = 12;
 const double kMinNormalCosine = std::cos(RadFromDeg(40));
 
@@ -33,13 +33,17 @@ class SegmentFinder {
         random_(MixBits(seed, 0x0071)),
         num_threads_(num_threads),
         tolerance_(PlaneTolerance(cloud)),
-        cell_(std::max(2.5 * cloud.spacing, cloud.step / 2)),
-        taken_(cloud.points.size(), false) {
+        taken_(cloud.points.size(), false),
+        tried_(cloud.points.size(), false) {
     local_.resize(cloud.points.size());
+    reaches_.resize(cloud.points.size());
     ParallelFor(num_threads, 0, static_cast<int>(cloud.points.size()), [&](int i) {
       const auto near = neighbours_.Nearest(cloud_.points[static_cast<size_t>(i)],
                                             kNeighboursForNormal);
       local_[static_cast<size_t>(i)] = FitPlane(cloud_.points, near);
+      reaches_[static_cast<size_t>(i)] = (cloud_.points[static_cast<size_t>(near.back())] -
+                                          cloud_.points[static_cast<size_t>(i)])
+                                             .norm();
     });
   }
 
@@ -47,8 +51,12 @@ class SegmentFinder {
     std::vector<PlaneSegment> segments;
     for (int barren = 0; barren < kMaxBarren && segments.size() < kMaxSegments;) {
       const std::vector<int> free = FreePoints();
-      if (free.size() < kFewestOnPlane) break;
-      std::vector<PlaneSegment> found = SearchRound(free);
+      std::vector<int> untried;
+      for (const int i : free) {
+        if (!tried_[static_cast<size_t>(i)]) untried.push_back(i);
+      }
+      if (untried.empty()) break;
+      std::vector<PlaneSegment> found = SearchRound(free, untried);
       bool any = false;
       for (PlaneSegment& segment : found) {
         const bool clashes = std::any_of(segment.points.begin(), segment.points.end(),
@@ -77,14 +85,15 @@ class SegmentFinder {
   }
 
   // The best planes of this round, largest first; they may share points.
-  std::vector<PlaneSegment> SearchRound(const std::vector<int>& free) {
+  std::vector<PlaneSegment> SearchRound(const std::vector<int>& free,
+                                        const std::vector<int>& untried) {
     struct Seed {
       int point = 0;
       double score = 0;
     };
     std::vector<Seed> seeds(kSeedsPerRound);
     for (Seed& seed : seeds) {
-      seed.point = free[static_cast<size_t>(random_.Index(static_cast<int>(free.size())))];
+      seed.point = untried[static_cast<size_t>(random_.Index(static_cast<int>(untried.size())))];
     }
     ParallelFor(num_threads_, 0, kSeedsPerRound, [&](int k) {
       Seed& seed = seeds[static_cast<size_t>(k)];
@@ -96,8 +105,18 @@ class SegmentFinder {
     ParallelFor(num_threads_, 0, kGrownPerRound, [&](int k) {
       grown[static_cast<size_t>(k)] = Grow(seeds[static_cast<size_t>(k)].point, free);
     });
+    // What grows nothing is not tried again, nor what lies close by.
+    for (size_t k = 0; k < grown.size(); ++k) {
+      tried_[static_cast<size_t>(seeds[k].point)] = true;
+      if (IsSurface(grown[k], free)) continue;
+      grown[k].points.clear();
+      const Eigen::Vector3d& x = cloud_.points[static_cast<size_t>(seeds[k].point)];
+      for (const int i : neighbours_.Nearest(x, kNeighboursForNormal)) {
+        tried_[static_cast<size_t>(i)] = true;
+      }
+    }
     grown.erase(std::remove_if(grown.begin(), grown.end(),
-                               [&](const PlaneSegment& s) { return !IsSurface(s, free); }),
+                               [](const PlaneSegment& s) { return s.points.empty(); }),
                 grown.end());
     std::stable_sort(grown.begin(), grown.end(), [](const PlaneSegment& a, const PlaneSegment& b) {
       return a.points.size() > b.points.size();
@@ -113,10 +132,21 @@ class SegmentFinder {
     return std::abs(plane.normal.dot(local_[static_cast<size_t>(i)].normal)) >= kMinNormalCosine;
   }
 
+  // Half the side of the cube that a plane begins in.
+  double ReachOf(int seed) const {
+    return std::max(cloud_.step, 1.2 * reaches_[static_cast<size_t>(seed)]);
+  }
+  // Side of the cells that say what hangs together: each holds a few points.
+  double CellAt(int seed) const {
+    return std::clamp(0.75 * reaches_[static_cast<size_t>(seed)], cloud_.step / 2,
+                      2 * cloud_.step);
+  }
+
   double LocalScore(int seed) const {
     const FittedPlane& plane = local_[static_cast<size_t>(seed)];
     double on = 0, beside = 0;
-    for (const int i : neighbours_.InCube(cloud_.points[static_cast<size_t>(seed)], cloud_.step)) {
+    for (const int i :
+         neighbours_.InCube(cloud_.points[static_cast<size_t>(seed)], ReachOf(seed))) {
       if (taken_[static_cast<size_t>(i)]) continue;
       if (Fits(plane, i, tolerance_)) {
         on += FitsNormal(plane, i) ? 1 : 0.3;
@@ -131,10 +161,11 @@ class SegmentFinder {
   PlaneSegment Grow(int seed, const std::vector<int>& free) const {
     PlaneSegment segment;
     segment.plane = local_[static_cast<size_t>(seed)];
+    segment.cell = CellAt(seed);
     const Eigen::Vector3d& x = cloud_.points[static_cast<size_t>(seed)];
     for (const double reach : {1.0, 2.0, 4.0}) {
       std::vector<int> on;
-      for (const int i : neighbours_.InCube(x, reach * cloud_.step)) {
+      for (const int i : neighbours_.InCube(x, reach * ReachOf(seed))) {
         if (!taken_[static_cast<size_t>(i)] && Fits(segment.plane, i, tolerance_) &&
             FitsNormal(segment.plane, i)) {
           on.push_back(i);
@@ -148,7 +179,7 @@ class SegmentFinder {
       for (const int i : free) {
         if (Fits(segment.plane, i, tolerance_) && FitsNormal(segment.plane, i)) on.push_back(i);
       }
-      segment.points = ConnectedTo(x, segment.plane, on, &segment.area);
+      segment.points = ConnectedTo(x, segment.plane, on, segment.cell, &segment.area);
       if (segment.points.size() < kFewestOnPlane) return {};
       segment.plane = FitPlane(cloud_.points, segment.points);
     }
@@ -157,11 +188,11 @@ class SegmentFinder {
 
   // The points in cells of the plane that hang together with that of x.
   std::vector<int> ConnectedTo(const Eigen::Vector3d& x, const FittedPlane& plane,
-                               const std::vector<int>& on, double* area) const {
+                               const std::vector<int>& on, double cell, double* area) const {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
     const auto place = [&](const Eigen::Vector3d& y) {
-      return std::make_pair(static_cast<int64_t>(std::floor(u.dot(y - x) / cell_)),
-                            static_cast<int64_t>(std::floor(v.dot(y - x) / cell_)));
+      return std::make_pair(static_cast<int64_t>(std::floor(u.dot(y - x) / cell)),
+                            static_cast<int64_t>(std::floor(v.dot(y - x) / cell)));
     };
     std::unordered_map<uint64_t, std::vector<int>> cells;
     for (const int i : on) {
@@ -186,7 +217,7 @@ class SegmentFinder {
       }
     }
     std::sort(connected.begin(), connected.end());
-    *area = num_cells * cell_ * cell_;
+    *area = num_cells * cell * cell;
     return connected;
   }
 
@@ -206,8 +237,8 @@ class SegmentFinder {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
     const auto key = [&](int i) {
       const Eigen::Vector3d d = cloud_.points[static_cast<size_t>(i)] - plane.centre;
-      return CellKey(static_cast<int64_t>(std::floor(u.dot(d) / cell_)),
-                     static_cast<int64_t>(std::floor(v.dot(d) / cell_)));
+      return CellKey(static_cast<int64_t>(std::floor(u.dot(d) / segment.cell)),
+                     static_cast<int64_t>(std::floor(v.dot(d) / segment.cell)));
     };
     for (const int i : segment.points) cells.insert(key(i));
     const auto num_beside = std::count_if(beside.begin(), beside.end(),
@@ -230,8 +261,9 @@ class SegmentFinder {
   const Neighbours neighbours_;
   RandomStream random_;
   const int num_threads_;
-  const double tolerance_, cell_;
-  std::vector<bool> taken_;
+  const double tolerance_;
+  std::vector<bool> taken_, tried_;
+  std::vector<double> reaches_;  // to the farthest of the neighbours that told the normal
   std::vector<FittedPlane> local_;
 };
 

@@ -12,6 +12,7 @@ struct PlaneSegment {
   FittedPlane plane;         // the normal towards those who saw it, where that is known
   bool oriented = false;
   std::vector<int> points;   // indices into the cloud
+  double cell = 0;           // side of the cells of the plane that say what hangs together
   double area = 0;           // of the cells of the plane that hold points
 };
 

@@ -34,6 +34,10 @@ void Measure(const std::string& name, StreetOptions options, const std::string& 
                street.model.points.size(), proposal.outline.buildings.size(), errors.missed,
                doubtful, errors.corner, errors.ground, errors.eaves, errors.ridge);
     std::fflush(stdout);
+    if (seed == 1) {
+      WriteOutline(folder + "/" + name + ".json", proposal.outline, true);
+      WriteSparseModel(street.model, folder + "/" + name);
+    }
   }
 }
 

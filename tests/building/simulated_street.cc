@@ -167,9 +167,9 @@ std::vector<Rigid> Cameras(const StreetOptions& options) {
     const Eigen::Vector3d eye =
         middle + size * Eigen::Vector3d(46 * c, 24 * s,
                                         options.mock_up ? (above ? 30 : 12) : (above ? 15 : -1.3));
-    // Half way to the middle, along the street.
+    // Across the street, in turn a little to the left and to the right.
     const Eigen::Vector3d target =
-        middle + size * Eigen::Vector3d(32 * c, 2 * s, above ? -2.0 : 0.6);
+        middle + size * Eigen::Vector3d(36 * c + (i % 2 == 0 ? 12 : -12), 2 * s, above ? -2.0 : 0.6);
     const Eigen::Vector3d z = (target - eye).normalized();
     const Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
     Eigen::Matrix3d model_from_cam;
