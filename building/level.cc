@@ -48,6 +48,18 @@ Eigen::Vector3d UpByPlanes(const OutlineCloud& cloud, const std::vector<PlaneSeg
   return up;
 }
 
+void MoveBoth(const Similarity& target_from_here, OutlineCloud* cloud,
+              std::vector<PlaneSegment>* segments) {
+  cloud->MoveTo(target_from_here);
+  for (PlaneSegment& segment : *segments) {
+    segment.plane.centre = target_from_here * segment.plane.centre;
+    segment.plane.normal = target_from_here.rotation * segment.plane.normal;
+    segment.plane.rms *= target_from_here.scale;
+    segment.cell *= target_from_here.scale;
+    segment.area *= target_from_here.scale * target_from_here.scale;
+  }
+}
+
 }  // namespace
 
 UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
@@ -110,17 +122,19 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
   finding.spread_deg = sum_weights > 0 ? DegFromRad(std::sqrt(sum_squares / sum_weights)) : 0;
   finding.trusted = fixed || (finding.source != "planes" && LevelShare(*segments, up) >= kEnough);
 
-  const Similarity level{1, Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()),
-                         Eigen::Vector3d::Zero()};
   cloud->up = up;
-  cloud->MoveTo(level);
+  MoveBoth({1, Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()),
+            Eigen::Vector3d::Zero()},
+           cloud, segments);
   finding.up_in_input =
       cloud->frame.outline_from_input.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-  for (PlaneSegment& segment : *segments) {
-    segment.plane.centre = level * segment.plane.centre;
-    segment.plane.normal = level.rotation * segment.plane.normal;
-  }
   return finding;
+}
+
+void AdoptFrame(const Outline& outline, OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
+  MoveBoth(outline.outline_from_input * cloud->frame.outline_from_input.Inverse(), cloud, segments);
+  cloud->frame = outline;
+  cloud->frame.buildings.clear();
 }
 
 GroundPlane FindGround(const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments) {

@@ -189,6 +189,19 @@ OutlineProposal JudgeOutline(const OutlineCloud& cloud, const std::vector<PlaneS
   return judged;
 }
 
+std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> WallStretches(
+    const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments) {
+  const GroundPlane ground = FindGround(cloud, segments);
+  std::vector<int> all(segments.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> ends;
+  for (const WallLine& wall : FindWallLines(cloud, ground, segments, all, false)) {
+    const Eigen::Vector2d foot = wall.line.normal * wall.line.offset, u = wall.line.Direction();
+    for (const auto& [low, high] : wall.stretches) ends.emplace_back(foot + low * u, foot + high * u);
+  }
+  return ends;
+}
+
 std::optional<OutlineBuilding> HeightsFromPoints(const OutlineCloud& cloud,
                                                  const std::vector<PlaneSegment>& segments,
                                                  const OutlineBuilding& building) {

@@ -37,6 +37,9 @@ struct UpFinding {
 // Earth) and turns cloud and segments so that it is z.
 UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments);
 
+// Turns, moves and scales cloud and segments into the frame that an outline's buildings are in.
+void AdoptFrame(const Outline& outline, OutlineCloud* cloud, std::vector<PlaneSegment>* segments);
+
 // What the points say of one building; lengths in units of the outline.
 struct BuildingEvidence {
   struct Wall {
@@ -68,8 +71,8 @@ struct OutlineProposal {
 OutlineProposal ProposeOutline(const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments,
                                const ProposalOptions& options);
 
-// The same measures for buildings that a person drew or changed. Throws InputError if they lie in
-// another frame than the cloud.
+// The same measures for buildings that a person drew or changed, in the frame of the cloud
+// (AdoptFrame).
 OutlineProposal JudgeOutline(const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments,
                              const Outline& outline);
 
@@ -78,6 +81,10 @@ OutlineProposal JudgeOutline(const OutlineCloud& cloud, const std::vector<PlaneS
 std::optional<OutlineBuilding> HeightsFromPoints(const OutlineCloud& cloud,
                                                  const std::vector<PlaneSegment>& segments,
                                                  const OutlineBuilding& building);
+
+// The lines that walls draw in the top view, for contours to snap to: ends of each stretch.
+std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> WallStretches(
+    const OutlineCloud& cloud, const std::vector<PlaneSegment>& segments);
 
 // The ground: a plane for all, and how far points lie from it.
 struct GroundPlane {

@@ -16,6 +16,7 @@
 #ifdef ROOMTEX_PAGES
 #include "building/window/outline_window.h"
 #include "core/local_server.h"
+#include "outline_page.h"
 #endif
 
 namespace roomtex {
@@ -232,13 +233,11 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   }
 #ifdef ROOMTEX_PAGES
   if (a.window) {
-    OutlineWindowInput window{cloud, segments, a.proposal, a.server, a.output_path, a.outline_path,
-                              a.model_paths};
-    const Outline outline = RunOutlineWindow(window, context);
-    WriteModels(a, outline);
-    OutlineProposal drawn;
-    drawn.outline = outline;
-    ReportOutline(drawn, false, context);
+    const OutlineWindowInput window{a.proposal,     a.server,      kOutlinePage,
+                                    a.outline_path, a.output_path, a.model_paths};
+    const OutlineProposal drawn = RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
+    WriteModels(a, drawn.outline);
+    ReportOutline(drawn, true, context);
     return;
   }
 #endif
@@ -248,7 +247,9 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
     proposal = ProposeOutline(cloud, segments, a.proposal);
   } else {
     context.progress.Stage("compare with points");
-    proposal = JudgeOutline(cloud, segments, ReadOutline(a.outline_path));
+    const Outline outline = ReadOutline(a.outline_path);
+    AdoptFrame(outline, &cloud, &segments);
+    proposal = JudgeOutline(cloud, segments, outline);
   }
   context.progress.Finish();
   ReportOutline(proposal, true, context);
