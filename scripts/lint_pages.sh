@@ -15,5 +15,5 @@ fi
 # Beside the packages, where the imports of the rules find them.
 cp scripts/lint/eslint.config.mjs "$packages"
 "$packages/node_modules/.bin/eslint" --config "$packages/eslint.config.mjs" --max-warnings 0 "$@" \
-  align/pick/page texture/view/page tests/browser scripts/lint
+  align/pick/page texture/view/page building/window/page tests/browser scripts/lint
 echo "the pages' scripts are in order"

@@ -1,0 +1,46 @@
+#include "building/window/outline_window.h"
+
+#include <iostream>
+#include <optional>
+
+#include "building/window/outline_session.h"
+#include "core/open_browser.h"
+
+namespace roomtex {
+
+OutlineProposal RunOutlineWindow(const OutlineWindowInput& input, OutlineCloud cloud,
+                                 std::vector<PlaneSegment> segments,
+                                 const Command::Context& context) {
+  context.progress.Stage("prepare");
+  OutlineSession session(input, std::move(cloud), std::move(segments));
+  using Query = LocalServer::Query;
+  LocalServer server(input.server);
+  AddPage(input.page, &server);
+  server.AddJson("/state", [&](const Query&) { return session.State(); });
+  server.AddContent("/points", [&](const Query&) {
+    return LocalServer::Content{std::make_shared<const std::string>(session.Points()),
+                                "application/octet-stream", "", false};
+  });
+  server.AddPut("/buildings", [&](const Json& json) { return session.Put(json); });
+  server.AddPost("/propose", [&](const Json& json) { return session.Propose(json); });
+  server.AddPost("/heights", [&](const Json& json) { return session.Heights(json); });
+  server.AddPost("/up", [&](const Json& json) { return session.SetUp(json); });
+  server.AddPost("/models", [&](const Json&) { return session.WriteModels(); });
+  server.Start(true);
+  context.progress.Finish();
+  if (input.server.port != 0 && server.port() != input.server.port) {
+    context.progress.Note("port " + std::to_string(input.server.port) + " is taken: using " +
+                          std::to_string(server.port()));
+  }
+  std::cout << server.Url() << "\n" << server.SshLine() << std::endl;
+  std::optional<OpenBrowser> browser;
+  if (input.server.open) {
+    browser.emplace(server.Url());
+    if (!browser->problem().empty()) context.Warn(browser->problem());
+  }
+  context.progress.Note("Ctrl-C ends");
+  server.Wait();
+  return session.Judged();
+}
+
+}  // namespace roomtex
