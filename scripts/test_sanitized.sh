@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
-corpora=(e57 picks scan_reader sparse_model)
+corpora=(associations database e57 photo picks scan_reader sparse_model)
 cmake --preset asan >/dev/null
 cmake --build --preset asan --target "${tests[@]}" "${corpora[@]/%/_replay}" roomtex-import
 # Readers must refuse what does not fit into memory: an allocation that fails is theirs to handle.
