@@ -35,6 +35,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/photo_fit.h"
+#include "core/resource_limits.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 
@@ -64,7 +65,8 @@ void AddOptions(Arguments* a, Command* command) {
                         Command::Kind::kOptional);
   command->AddInputPaths("scan_path", &a->scan_paths,
                          "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh. Not needed for "
-                         "an --input_path that was aligned before: it remembers its scans.",
+                         "an --input_path that was aligned before: it remembers its scans. " +
+                             BytesPerSampleHelp(kAlignBytesPerSample),
                          Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
@@ -289,6 +291,11 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
 struct Reading {
   Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
     for (const std::string& note : placed.notes) context.Warn(note);
+    for (const Scan& scan : placed.scans) {
+      RequireMemory(scan.path, "aligning to its " + std::to_string(scan.points.size()) + " samples",
+                    kAlignBytesPerSample * static_cast<double>(scan.points.size()),
+                    "Give a machine with more memory, or a scan with fewer samples");
+    }
     CompareStations(a, &placed, context);
     geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
     SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};

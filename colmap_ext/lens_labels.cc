@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/photo.h"
+#include "core/photo_fit.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -20,6 +21,7 @@ LensLabels ReadLensLabels(const std::map<uint32_t, std::string>& names,
   if (image_path.empty()) return labels;
   std::map<std::string, std::vector<std::pair<double, uint32_t>>> of_camera;
   for (const auto& [id, name] : names) {
+    if (!StaysInside(name)) continue;
     const LensData data = ReadLensData(image_path + "/" + name);
     if (data.camera.empty() && !data.focal_length_mm) continue;
     of_camera[data.camera].emplace_back(data.focal_length_mm.value_or(0), id);

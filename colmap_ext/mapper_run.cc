@@ -157,7 +157,7 @@ MapperResult MapperRun::Run(const Seed& seed, int num_images,
   MapperResult result;
   const bool only_seed = static_cast<int>(seed.poses.images.size()) >= num_images;
   const std::string start = Folder("seed"), seeded = Folder("seeded"), mapped = Folder("mapped");
-  WriteSparseModelText(seed.poses, start);
+  WriteSparseModel(seed.poses, start);
   result.problem = Call("point_triangulator", TriangulatorOptions(start, seeded, true), nullptr);
   if (!result.problem.empty()) return result;
   if (!only_seed) {
@@ -179,7 +179,7 @@ MapperResult MapperRun::Run(const Seed& seed, int num_images,
 MapperResult MapperRun::Adjust(const SparseModel& poses) {
   ++num_runs_;
   const std::string start = Folder("chained");
-  WriteSparseModelText(poses, start);
+  WriteSparseModel(poses, start);
   return Close(start, true);
 }
 

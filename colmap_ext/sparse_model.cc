@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -67,6 +68,7 @@ std::string ReadAll(const std::string& path) {
   const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : -1;
   std::string bytes;
   if (size >= 0) {
+    RequireMemory(path, "reading it", static_cast<double>(size), "Check that this is the model");
     bytes.resize(static_cast<size_t>(size));
     stream.seekg(0);
     stream.read(bytes.data(), size);

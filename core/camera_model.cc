@@ -7,6 +7,7 @@
 
 #include "core/camera_formulas.h"
 #include "core/frames.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -148,6 +149,10 @@ void Camera::Resize(int new_width, int new_height) {
   height = new_height;
 }
 
+// Shares of the longer side of the image. The narrowest lens there is sees about 0.1 degrees; work
+// grows with what lies beyond.
+constexpr double kMinFocalShare = 0.001, kMaxFocalShare = 1000, kMaxPrincipalShare = 100;
+
 std::vector<std::string> Camera::Problems() const {
   const std::string who = "camera " + std::to_string(camera_id);
   std::vector<std::string> problems;
@@ -171,6 +176,23 @@ std::vector<std::string> Camera::Problems() const {
   if (!(params[0] > 0) || (!one_focal_length && !(params[1] > 0))) {
     problems.push_back(who + (IsPanorama() ? " has a width or height that is not positive"
                                            : " has a focal length that is not positive"));
+  }
+  if (problems.empty() && !IsPanorama()) {
+    const double side = std::max(width, height);
+    const auto is_sound = [side](double f) {
+      return f >= kMinFocalShare * side && f <= kMaxFocalShare * side;
+    };
+    if (!is_sound(params[0]) || (!one_focal_length && !is_sound(params[1]))) {
+      problems.push_back(who + " has a focal length of " + Significant(params[0], 3) +
+                         " pixels, expected 0.001 to 1000 times the longer side of the image");
+    }
+    const size_t centre = one_focal_length ? 1 : 2;
+    if (std::max(std::abs(params[centre]), std::abs(params[centre + 1])) >
+        kMaxPrincipalShare * side) {
+      problems.push_back(who + " has its principal point at " + Significant(params[centre], 3) +
+                         ", " + Significant(params[centre + 1], 3) +
+                         ", expected within 100 times the longer side of the image");
+    }
   }
   if (model == CameraModel::kEucm && !(params[4] >= 0 && params[4] <= 1 && params[5] > 0)) {
     problems.push_back(who + " (EUCM) has alpha " + std::to_string(params[4]) + " and beta " +

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kNumLastLines = 12;
+constexpr size_t kMaxLineBytes = 4096;
 constexpr int kWaitMs = 200;
 constexpr double kPatienceSeconds = 5;  // between the first signal and SIGKILL
 
@@ -142,7 +143,7 @@ void ReadLines(int input, const std::function<void(const std::string&)>& on_line
     if (count <= 0) break;
     for (ssize_t i = 0; i < count; ++i) {
       if (buffer[i] != '\n' && buffer[i] != '\r') {
-        line += buffer[i];
+        if (line.size() < kMaxLineBytes) line += buffer[i];  // what goes on without end is cut
         continue;
       }
       on_line(line);

@@ -2,13 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <new>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
+#include <opencv2/core.hpp>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 
 #include "core/child_program.h"
@@ -18,6 +23,8 @@
 #include "core/option_list.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/parallel.h"
+#include "core/resource_limits.h"
 #include "core/signal_tidy.h"
 #include "core/version.h"
 
@@ -34,6 +41,21 @@ bool HoldsReport(const std::string& path, const std::vector<SetWithReport>& sets
   return std::any_of(sets.begin(), sets.end(), [&](const SetWithReport& one) {
     return path == (std::filesystem::path(one.set->folder()) / one.report_name).string();
   });
+}
+
+constexpr char kOutOfMemory[] = "out of memory";
+
+// Who ran out of it, at what, and what to do.
+std::string TellMemory(const Progress& progress) {
+  const std::vector<std::pair<std::string, double>>& stages = progress.stage_seconds();
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return std::string(kOutOfMemory) +
+         (stages.empty() ? "" : " in the stage \"" + stages.back().first + "\"") + ": " +
+         std::to_string(usage.ru_maxrss / 1024) + " MB were in use, and " +
+         std::to_string(AvailableMemory() / 1000000) +
+         " MB are free. Give it more memory, a scan with fewer samples or smaller photos, or "
+         "fewer threads (--num_threads)";
 }
 
 // How a piece of work ended.
@@ -54,7 +76,12 @@ Outcome RunBody(const std::function<void()>& body) {
   } catch (const Interrupted& interrupted) {
     return {kExitInternalError, "", interrupted.signal};
   } catch (const std::bad_alloc&) {
-    return {kExitInternalError, "out of memory"};
+    return {kExitInput, kOutOfMemory};
+  } catch (const std::length_error&) {
+    return {kExitInput, kOutOfMemory};
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) return {kExitInput, kOutOfMemory};
+    return {kExitInternalError, "internal error: " + error.err};
   } catch (const std::exception& error) {
     return {kExitInternalError, std::string("internal error: ") + error.what()};
   } catch (...) {
@@ -363,6 +390,8 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
   CommonOptions& common = impl_->common;
   impl_->AddCommonOptions(this);
+  // Who started us for its own sake may be killed, and asks nothing then.
+  if (std::getenv(kEndsWithParent) != nullptr) prctl(PR_SET_PDEATHSIG, SIGTERM);
   const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   const std::string answer = impl_->Answer(arguments);
   if (!answer.empty()) {
@@ -382,9 +411,11 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     return kExitInput;
   }
 
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not the end
   Progress progress(common.quiet);
   const SignalTidy tidy(impl_->name);
   const Outcome outcome = RunBody([&] {
+    ProbeThreads(EffectiveThreads(common.num_threads));
     body({common, progress, report});
     progress.Finish();
   });
@@ -396,6 +427,12 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     failure = "the result is not to be trusted: " + report.reason();
   }
   progress.Finish();
+  if (failure == kOutOfMemory) failure = TellMemory(progress);
+  if (ThreadsNotStarted() > 0) {
+    Context{common, progress, report}.Warn(
+        "the system did not give all threads that were asked for: it took longer with fewer "
+        "(ulimit -u, or the container's limit)");
+  }
   if (exit_code != kExitDone) {
     std::cerr << impl_->name << ": " << failure << "\n";
     if (report.trusted()) report.SetUntrusted(failure);

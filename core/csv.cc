@@ -9,6 +9,7 @@ namespace roomtex {
 namespace {
 
 constexpr size_t kMaxLineLength = 64 * 1024;  // bytes; a longer line is none of a table
+constexpr int kMaxLinesOfField = 8;
 constexpr char kByteOrderMark[] = "\xef\xbb\xbf";
 
 std::string Field(const std::string& text) {
@@ -28,15 +29,41 @@ CsvReader::CsvReader(const std::string& path, const std::string& remedy,
   if (!stream_) throw InputError(path, "", "cannot be opened", "Check that you may read it");
 }
 
+bool CsvReader::NextLine(std::string* line) {
+  if (!ahead_.empty()) {
+    *line = ahead_.front();
+    ahead_.pop_front();
+    return true;
+  }
+  if (!std::getline(stream_, *line)) return false;
+  ++lines_read_;
+  if (lines_read_ == 1 && line->rfind(kByteOrderMark, 0) == 0) line->erase(0, 3);
+  if (line->size() > kMaxLineLength || line->find('\0') != std::string::npos) {
+    line_number_ = lines_read_;
+    throw Error("is not a line of a text file", expected_);
+  }
+  return true;
+}
+
 bool CsvReader::Next() {
-  while (std::getline(stream_, line_)) {
-    ++line_number_;
-    if (line_number_ == 1 && line_.rfind(kByteOrderMark, 0) == 0) line_.erase(0, 3);
-    if (line_.size() > kMaxLineLength || line_.find('\0') != std::string::npos) {
-      throw Error("is not a line of a text file", expected_);
-    }
+  while (NextLine(&line_)) {
+    line_number_ = lines_read_ - static_cast<long>(ahead_.size());
+    std::string record = line_;
     line_ = Trimmed(line_);
-    if (!line_.empty() && line_[0] != '#') return true;
+    if (line_.empty() || line_[0] == '#') continue;
+    if (Fields()) return true;
+    // A quote that is still open: the field may end some lines below, or it is a mistake here.
+    const std::string first = line_;
+    std::vector<std::string> more;
+    for (std::string line; static_cast<int>(more.size()) < kMaxLinesOfField && NextLine(&line);) {
+      more.push_back(line);
+      record += "\n" + line;
+      line_ = Trimmed(record);
+      if (Fields()) return true;
+    }
+    ahead_.insert(ahead_.begin(), more.begin(), more.end());
+    line_ = first;
+    return true;
   }
   if (stream_.bad()) {
     throw InputError(path_, "", "could not be read to its end", "Check the disk");

@@ -1,9 +1,10 @@
 #pragma once
-// Tables with commas between their fields (CSV): RFC 4180 with a record per line, so that every
-// error has its line. A field that holds a comma stands in double quotes, a quote in it is written
-// twice; blanks around fields mean nothing. Blank lines and those that start with `#` are comments.
-// UTF-8, with or without a byte order mark; lines end with LF or CR LF.
+// Tables with commas between their fields (CSV, RFC 4180). A field that holds a comma or a line end
+// stands in double quotes, a quote in it is written twice; blanks around fields mean nothing. Blank
+// lines and those that start with `#` are comments. UTF-8, with or without a byte order mark; lines
+// end with LF or CR LF.
 
+#include <deque>
 #include <fstream>
 #include <optional>
 #include <string>
@@ -19,11 +20,12 @@ class CsvReader {
   // the remedy for a file that is no text, "Expected a CSV file with ...".
   CsvReader(const std::string& path, const std::string& remedy, const std::string& expected);
 
-  // Goes to the next line that is no comment; false behind the last one. Throws InputError for what
+  // Goes to the next record that is no comment: a line, or several where a quoted field goes over
+  // their ends; false behind the last one. Throws InputError for what
   // is not a line of text, and when the file cannot be read on.
   bool Next();
 
-  long line_number() const { return line_number_; }        // from 1
+  long line_number() const { return line_number_; }        // its first line, from 1
   const std::string& line() const { return line_; }        // without blanks at its ends
   std::optional<std::vector<std::string>> Fields() const;  // none if a quote is not closed
 
@@ -33,12 +35,15 @@ class CsvReader {
  private:
   std::string path_, expected_;
   std::ifstream stream_;
+  bool NextLine(std::string* line);
+
   std::string line_;
-  long line_number_ = 0;
+  long line_number_ = 0, lines_read_ = 0;
+  std::deque<std::string> ahead_;  // read already, but not part of this record
 };
 
-// A line of a table: fields between commas, in quotes where a reader needs them, and a line feed.
-// Read back, the fields are the same as long as none holds a line end.
+// A record of a table: fields between commas, in quotes where a reader needs them, and a line feed.
+// Read back, the fields are the same.
 std::string CsvLine(const std::vector<std::string>& fields);
 
 }  // namespace roomtex

@@ -1,7 +1,6 @@
 #include "core/local_server.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
@@ -9,10 +8,13 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <list>
+#include <mutex>
 #include <new>
 #include <set>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -20,7 +22,6 @@
 #include <poll.h>
 #include <pwd.h>
 #include <sys/eventfd.h>
-#include <sys/random.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -28,31 +29,17 @@
 #include "core/local_server_address.h"
 #include "core/local_server_connection.h"
 #include "core/local_server_http.h"
+#include "core/local_server_key.h"
 #include "core/option_fields.h"
 
 namespace roomtex {
 namespace {
 
-constexpr int kMaxConnections = 128;  // open at a time
+constexpr int kMaxConnections = 128;  // open at a time, each with a thread
+constexpr int kMaxPerAddress = 48;    // of another computer
+constexpr int kFewConnections = 32;   // with more, each gets one answer
 constexpr int kMaxJsonDepth = 64;     // deeper nesting would use up the stack
 constexpr size_t kBlockBytes = size_t{1} << 16;
-
-std::string MakeToken() {
-  std::array<unsigned char, 20> bytes;
-  size_t size = 0;
-  while (size < bytes.size()) {
-    const ssize_t got = getrandom(bytes.data() + size, bytes.size() - size, 0);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw std::runtime_error("the operating system gives no random numbers");
-    size += static_cast<size_t>(got);
-  }
-  std::string token;
-  for (const unsigned char byte : bytes) {
-    token += "0123456789abcdef"[byte >> 4];
-    token += "0123456789abcdef"[byte & 15];
-  }
-  return token;
-}
 
 // The time does not tell how much is right.
 bool EqualSecrets(const std::string& a, const std::string& b) {
@@ -92,8 +79,10 @@ struct LocalServer::Impl {
   void Bind();
   void AllowHosts();
   void CatchSignals();
+  void StartPool();
   void Accept();
-  void Serve(int socket);
+  struct Visitor;
+  void Serve(int socket, Visitor* visitor);
   // Answers what may not be asked and what is not there; else it is left to the route.
   httplib::Server::HandlerResponse Check(const httplib::Request& request,
                                          httplib::Response& response) const;
@@ -104,7 +93,7 @@ struct LocalServer::Impl {
   void Join();
 
   const LocalServerOptions options;
-  const std::string token = MakeToken();
+  const std::string token = options.token.empty() ? MakeToken() : options.token;
   int listen_fd = -1, stop_fd = -1, port = 0;
   LocalAddress address;
   std::vector<std::string> hosts;                       // "name:port", lower case
@@ -113,6 +102,18 @@ struct LocalServer::Impl {
   std::unique_ptr<httplib::ThreadPool> pool;
   std::thread acceptor;
   std::atomic<int> num_connections{0};
+
+  // Who is connected, the longest first. Known: has asked with the token. When there is no more
+  // room, strangers go, the longest waiting first, so that no number of slow ones keeps a person
+  // out.
+  struct Visitor {
+    int socket = -1;
+    std::string address;
+    bool known = false;
+  };
+  bool MakeRoom(const std::string& from_where);
+  std::mutex visitors_mutex;
+  std::list<Visitor> visitors;
   bool catches_signals = false;
   struct sigaction old_interrupt {
   }, old_terminate{};
@@ -367,7 +368,10 @@ void LocalServer::Impl::Accept() {
     if (poll(fds, 2, -1) < 0 && errno != EINTR) break;
     if (fds[1].revents != 0) break;
     if (fds[0].revents == 0) continue;
-    const int socket = accept4(listen_fd, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    sockaddr_storage from{};
+    socklen_t size = sizeof from;
+    const int socket =
+        accept4(listen_fd, reinterpret_cast<sockaddr*>(&from), &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (socket < 0) {
       // Out of descriptors: the connection stays in line, some of ours will end.
       if (errno != EINTR && errno != EAGAIN) IsReadable(stop_fd, 50);
@@ -375,33 +379,85 @@ void LocalServer::Impl::Accept() {
     }
     const int yes = 1;
     setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    if (num_connections >= kMaxConnections) {
+    LocalAddress visitor;
+    visitor.storage = from;
+    visitor.size = size;
+    const std::string from_where = visitor.IsLoopback() ? "" : visitor.Text();
+    if (!MakeRoom(from_where)) {
       close(socket);
       continue;
     }
     ++num_connections;
-    pool->enqueue([this, socket] {
-      Serve(socket);
+    const auto place = [&] {
+      const std::lock_guard<std::mutex> lock(visitors_mutex);
+      return visitors.insert(visitors.end(), {socket, from_where, false});
+    }();
+    pool->enqueue([this, socket, place] {
+      Serve(socket, &*place);
       --num_connections;
+      const std::lock_guard<std::mutex> lock(visitors_mutex);
+      visitors.erase(place);
     });
   }
   close(std::exchange(listen_fd, -1));
 }
 
-void LocalServer::Impl::Serve(int socket) {
+// A thread for each connection, or as many as the system gives.
+void LocalServer::Impl::StartPool() {
+  for (size_t count = kMaxConnections;; count /= 2) {
+    try {
+      pool = std::make_unique<httplib::ThreadPool>(count);
+      return;
+    } catch (const std::system_error&) {
+      if (count <= 4) throw;
+    }
+  }
+}
+
+// False if there is none: all are known.
+bool LocalServer::Impl::MakeRoom(const std::string& from_where) {
+  const std::lock_guard<std::mutex> lock(visitors_mutex);
+  const auto is_of_address = [&](const Visitor& one) { return one.address == from_where; };
+  const bool crowds = !from_where.empty() && std::count_if(visitors.begin(), visitors.end(),
+                                                           is_of_address) >= kMaxPerAddress;
+  if (!crowds && visitors.size() < kMaxConnections) return true;
+  for (Visitor& one : visitors) {
+    if (one.known || one.socket < 0 || (crowds && !is_of_address(one))) continue;
+    shutdown(one.socket, SHUT_RDWR);  // its thread sees the end
+    one.socket = -1;
+    return true;
+  }
+  return false;
+}
+
+void LocalServer::Impl::Serve(int socket, Visitor* visitor) {
   LocalConnection connection(socket, stop_fd, options);
+  const auto meet = [&](const LocalRequest& request) {
+    const size_t path = request.head.find(" /") + 2;
+    if (!EqualSecrets(request.head.substr(path, token.size()), token)) return;
+    const std::lock_guard<std::mutex> lock(visitors_mutex);
+    visitor->known = true;
+  };
+  // Before the descriptor is closed, and may be another's.
+  const auto leave = [&] {
+    const std::lock_guard<std::mutex> lock(visitors_mutex);
+    visitor->socket = -1;
+  };
   try {
     for (int count = 1; count <= kMaxRequests; ++count) {
       const std::optional<LocalRequest> request = connection.NextRequest();
-      if (!request) return;
+      if (!request) return leave();
+      meet(*request);
       // Nobody waits for a thread while this one waits for a browser's next wish.
       const bool is_last = count == kMaxRequests || request->wants_close || IsReadable(stop_fd) ||
-                           num_connections > options.num_threads;
+                           num_connections > kFewConnections;
       const LocalSocket to_http = http.Connect();
-      if (to_http.get() < 0) return;
-      if (!connection.Relay(*request, is_last, to_http) || is_last) return;
+      if (to_http.get() < 0) return leave();
+      if (!connection.Relay(*request, is_last, to_http) || is_last) return leave();
     }
+    leave();
   } catch (const std::exception&) {
+    leave();
     // Out of memory while reading or answering: this connection ends, the server does not.
   }
 }
@@ -524,7 +580,7 @@ void LocalServer::Start(bool stop_on_signals) {
   impl_->AllowHosts();
   if (stop_on_signals) impl_->CatchSignals();
   impl_->http.Start(impl_->options.num_threads);
-  impl_->pool = std::make_unique<httplib::ThreadPool>(impl_->options.num_threads);
+  impl_->StartPool();
   impl_->acceptor = std::thread([this] { impl_->Accept(); });
 }
 

@@ -31,6 +31,7 @@ struct LocalServerOptions {
   bool port_may_differ = false;    // any free one when the port is taken; LetPortDiffer()
   bool allow_remote = false;       // a host that other computers reach needs this
   bool open = false;               // the command opens the URL in the browser
+  std::string token;  // KeptToken(), for addresses that outlive the server; "" = a new one
   // Names, "name" or "name:port", that a Host header may have beside the bound address.
   std::vector<std::string> allowed_hosts;
 
@@ -45,6 +46,12 @@ struct LocalServerOptions {
   // Also finds out whether the host is of this machine and whether others reach it.
   std::vector<std::string> Problems() const;
 };
+
+// What commands say with --allow_remote.
+inline constexpr char kNotEncrypted[] =
+    "other computers are let in, and nothing is encrypted: who listens on the network sees the "
+    "photos and the address with its token, and may use it. Prefer ssh -L, as the line below "
+    "the address says";
 
 // Two commands with pages stand side by side: a port that the user did not ask for, neither on the
 // command line nor in a file, gives way when it is taken.

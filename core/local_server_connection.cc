@@ -18,6 +18,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxFields = 100;         // header lines of a request
 constexpr double kFarewellSeconds = 2;  // for the last bytes when stopping or refusing
+constexpr double kHeaderSeconds = 5;    // from its first byte; browsers send it at once
 constexpr size_t kReadBytes = size_t{1} << 16;
 const char kHeadEnd[] = "\r\n\r\n";
 const std::array<const char*, 6> kUsedFields = {"host",          "origin",          "content-type",
@@ -121,12 +122,14 @@ bool LocalConnection::Receive(Clock::time_point deadline) {
 std::optional<LocalRequest> LocalConnection::NextRequest() {
   if (received_.empty() && !Receive(After(options_.idle_seconds))) return std::nullopt;
   const Clock::time_point deadline = After(options_.request_seconds);
+  const Clock::time_point head_deadline = After(std::min(options_.request_seconds, kHeaderSeconds));
   const auto late = [&] { return Clock::now() >= deadline; };
+  const auto head_late = [&] { return Clock::now() >= head_deadline; };
   const size_t max_head = static_cast<size_t>(options_.max_header_bytes);
   size_t end = received_.find(kHeadEnd);
   for (; end == std::string::npos; end = received_.find(kHeadEnd)) {
     if (received_.size() > max_head) return Refuse(431);
-    if (late() || !Receive(deadline)) return late() ? Refuse(408) : std::nullopt;
+    if (head_late() || !Receive(head_deadline)) return head_late() ? Refuse(408) : std::nullopt;
   }
   if (end > max_head) return Refuse(431);
   const std::string head = received_.substr(0, end + 2);

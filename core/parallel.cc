@@ -4,14 +4,25 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
+#include "core/resource_limits.h"
+
 namespace roomtex {
 
+namespace {
+
+// More do not help, and each takes memory of its own.
+constexpr int kMaxThreadsPerProcessor = 8;
+
+}  // namespace
+
 int EffectiveThreads(int num_threads) {
-  if (num_threads > 0) return num_threads;
-  return std::max(1u, std::thread::hardware_concurrency());
+  const int processors = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  if (num_threads > 0) return std::min(num_threads, kMaxThreadsPerProcessor * processors);
+  return processors;
 }
 
 void ParallelFor(int num_threads, int begin, int end, const std::function<void(int)>& body) {
@@ -35,7 +46,11 @@ void ParallelFor(int num_threads, int begin, int end, const std::function<void(i
     }
   };
   std::vector<std::thread> threads;
-  for (int t = 1; t < count; ++t) threads.emplace_back(work);
+  try {
+    for (int t = 1; t < count; ++t) threads.emplace_back(work);
+  } catch (const std::system_error&) {
+    NoteThreadNotStarted();  // those that there are do it all
+  }
   work();
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);

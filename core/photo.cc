@@ -16,6 +16,8 @@
 namespace roomtex {
 namespace {
 
+constexpr std::streamoff kMaxPhotoBytes = std::streamoff{1} << 31;
+
 std::optional<double> PositiveNumber(const Exiv2::ExifData& exif, const char* key) {
   const auto found = exif.findKey(Exiv2::ExifKey(key));
   if (found == exif.end() || found->count() == 0) return std::nullopt;
@@ -67,6 +69,10 @@ bool IsWholeJpeg(const std::vector<unsigned char>& bytes) {
 std::vector<unsigned char> ReadBytes(const std::string& path) {
   std::ifstream stream(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : -1;
+  if (size > kMaxPhotoBytes) {
+    throw InputError(path, "", "has " + std::to_string(size) + " bytes, more than any photo",
+                     "Take it out of the photos");
+  }
   std::vector<unsigned char> bytes(size > 0 ? static_cast<size_t>(size) : 0);
   stream.seekg(0);
   stream.read(reinterpret_cast<char*>(bytes.data()), size);

@@ -24,6 +24,10 @@ bool IsScaled(int width, int height, int camera_width, int camera_height) {
 }
 
 std::string MissingFile(const std::string& path, const std::string& name) {
+  if (!StaysInside(name)) {
+    return "The name of the photo " + name +
+           " leads out of --image_path. Names are those of files in this folder or below it.";
+  }
   std::error_code error;
   if (std::filesystem::is_regular_file(path, error)) return "";
   return "There is no photo " + path + ", but the model names " + name +
@@ -59,6 +63,12 @@ std::string ShapeProblem(const std::string& name, int width, int height, int cam
 }
 
 }  // namespace
+
+bool StaysInside(const std::string& name) {
+  const std::filesystem::path path(name);
+  return !path.is_absolute() &&
+         std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
+}
 
 PhotoFit FitPhotoToCamera(const std::string& path, const std::string& name, int camera_width,
                           int camera_height) {

@@ -23,7 +23,11 @@ struct PhotoFit {
 
   bool usable() const { return problem.empty(); }
 };
-// name: of the photo, for the sentences. camera_width, camera_height: of the model's camera.
+// Photos lie in --image_path: a name that a file gives must not be a road out of it.
+bool StaysInside(const std::string& name);
+
+// name: of the photo below --image_path, for the sentences and for StaysInside(). camera_width,
+// camera_height: of the model's camera.
 PhotoFit FitPhotoToCamera(const std::string& path, const std::string& name, int camera_width,
                           int camera_height);
 

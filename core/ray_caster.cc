@@ -4,7 +4,17 @@
 
 #include <embree3/rtcore.h>
 
+#include "core/resource_limits.h"
+
 namespace roomtex {
+namespace {
+
+// Metres. Embree squares in float and ends at its limits; no scan reaches that far.
+constexpr double kFarthest = 1e12;
+
+bool IsNear(const Eigen::Vector3d& point) { return point.cwiseAbs().maxCoeff() <= kFarthest; }
+
+}  // namespace
 
 struct RayCaster::Scene {
   RTCDevice device = nullptr;
@@ -22,13 +32,13 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
     : scene_(std::make_unique<Scene>()) {
   Bounds bounds;
   for (const Eigen::Vector3d& point : points) {
-    if (!(point.x() == point.x())) continue;
+    if (!IsNear(point)) continue;
     bounds.min = bounds.min.cwiseMin(point);
     bounds.max = bounds.max.cwiseMax(point);
   }
   if (bounds.min.x() <= bounds.max.x()) scene_->centre = 0.5 * (bounds.min + bounds.max);
 
-  scene_->device = rtcNewDevice(nullptr);
+  scene_->device = rtcNewDevice(ThreadsNotStarted() > 0 ? "threads=1,set_affinity=0" : nullptr);
   if (scene_->device == nullptr) throw std::runtime_error("Embree: no ray tracing device");
   scene_->scene = rtcNewScene(scene_->device);
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);
@@ -43,11 +53,15 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
     for (size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d p = points[i] - scene_->centre;
       for (int k = 0; k < 3; ++k) {
-        vertices[3 * i + k] = p[k] == p[k] ? static_cast<float>(p[k]) : 0.0f;
+        vertices[3 * i + k] = IsNear(points[i]) ? static_cast<float>(p[k]) : 0.0f;
       }
     }
     for (size_t i = 0; i < triangles.size(); ++i) {
-      for (int k = 0; k < 3; ++k) corners[3 * i + k] = static_cast<unsigned>(triangles[i][k]);
+      const bool near = IsNear(points[triangles[i][0]]) && IsNear(points[triangles[i][1]]) &&
+                        IsNear(points[triangles[i][2]]);
+      for (int k = 0; k < 3; ++k) {
+        corners[3 * i + k] = static_cast<unsigned>(triangles[i][near ? k : 0]);
+      }
     }
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_->scene, geometry);
@@ -64,6 +78,7 @@ std::optional<RayHit> RayCaster::Cast(const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double min_distance,
                                       double max_distance) const {
   const Eigen::Vector3d start = origin - scene_->centre;
+  if (!IsNear(start) || !IsNear(direction)) return std::nullopt;
   RTCRayHit query{};
   query.ray.org_x = static_cast<float>(start.x());
   query.ray.org_y = static_cast<float>(start.y());
@@ -94,6 +109,7 @@ bool RayCaster::IsOccluded(const Eigen::Vector3d& from, const Eigen::Vector3d& t
   if (!(length > 2 * margin)) return false;
   const Eigen::Vector3d direction = offset / length;
   const Eigen::Vector3d start = from - scene_->centre;
+  if (!IsNear(start) || !(length <= kFarthest)) return false;
   RTCRay ray{};
   ray.org_x = static_cast<float>(start.x());
   ray.org_y = static_cast<float>(start.y());

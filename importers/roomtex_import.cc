@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 #include "core/scan_mesh.h"
 #include "importers/e57_images.h"
 #include "importers/e57_writer.h"
@@ -83,6 +84,11 @@ class Importer {
     context_.progress.Stage("read scan");
     file_ = ReadScanFile(options_.input_path, options_.reader);
     for (const std::string& note : file_.notes) context_.Warn(note);
+    for (const Scan& scan : file_.scans) {
+      RequireMemory(scan.path, "converting its " + std::to_string(scan.points.size()) + " samples",
+                    kImportBytesPerSample * static_cast<double>(scan.points.size()),
+                    "Give a machine with more memory, or a scan with fewer samples");
+    }
     CheckGrid();
     context_.progress.Stage("triangulate");
     for (const Scan& scan : file_.scans) meshes_.push_back(BuildScanMesh(scan, options_.mesh));
@@ -273,7 +279,8 @@ int main(int argc, char** argv) {
       "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
-      "cut into faces for COLMAP up to 4.0, which knows no panoramas.");
+      "cut into faces for COLMAP up to 4.0, which knows no panoramas. " +
+          roomtex::BytesPerSampleHelp(roomtex::kImportBytesPerSample));
   command.AddOutputPaths(
       "output_path", &options.output_paths,
       "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "

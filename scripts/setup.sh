@@ -17,6 +17,7 @@ packages=(
 # will do.
 command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
+command -v python3 >/dev/null || packages+=(python3)  # tests/hostile
 
 missing=()
 for package in "${packages[@]}"; do

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
-corpora=(e57 picks scan_reader sparse_model)
+corpora=(database e57 photo picks scan_reader sparse_model)
 # Repeated over and over for a statistic, half a minute each here; what they call is called by others, too.
 too_long='ModelCheck.TrustsTheTruth:ModelCheck.DoesNotTrustTheSecondSolutionOfAWall'
 too_long+=':ModelCheck.NamesThePhotoThatStandsInTheWrongPlace:LensCheck.ALensThatIsToldRightStays'

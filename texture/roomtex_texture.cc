@@ -13,6 +13,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/resource_limits.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -54,7 +55,8 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "scan_path", &o->scan_paths,
       "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh, .ply or .obj. Not "
       "needed for a model of roomtex-align, which remembers its scans and how "
-      "they were read.",
+      "they were read. " +
+          BytesPerSampleHelp(kTextureBytesPerSample),
       Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
@@ -427,6 +429,11 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   for (const std::string& note : placed.notes) context.Warn(note);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);
+  for (const Scan& scan : scans) {
+    RequireMemory(scan.path, "colouring its " + std::to_string(scan.points.size()) + " samples",
+                  kTextureBytesPerSample * static_cast<double>(scan.points.size()),
+                  "Give a machine with more memory, or a scan with fewer samples");
+  }
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   ProtectInputs(options, scans);

@@ -14,6 +14,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/partial_path.h"
+#include "core/picture_file.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -43,9 +44,7 @@ long CountFrames(const std::string& video) {
 void WriteFrame(const std::string& folder, long number, const cv::Mat& picture) {
   char name[32];
   std::snprintf(name, sizeof name, "/frame_%06ld.jpg", number);
-  if (!cv::imwrite(folder + name, picture, {cv::IMWRITE_JPEG_QUALITY, 95})) {
-    throw InputError(folder, "", "cannot be written into", "Check the space on the disk");
-  }
+  WritePictureFile(folder + name, picture, {cv::IMWRITE_JPEG_QUALITY, 95});
 }
 
 }  // namespace

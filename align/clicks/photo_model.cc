@@ -13,6 +13,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/photo_fit.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -34,11 +35,6 @@ bool IsPhotoName(const fs::path& path) {
 }
 
 // A name must not lead out of the folder of the photos.
-bool StaysInside(const fs::path& path) {
-  return !path.is_absolute() &&
-         std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
-}
-
 // Parameters that were found for another photo size have their principal point elsewhere.
 bool IsOfThisSize(const Camera& camera, Eigen::Vector2d* principal) {
   const auto x = CameraProjection(camera).ImgFromCam({0, 0, 1});

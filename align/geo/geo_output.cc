@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/photo_fit.h"
 #include "core/statistics.h"
 #include "core/text.h"
 
@@ -213,6 +214,7 @@ GpsCheck CheckGps(const SparseModel& aligned, const GeoReference& geo,
   if (image_path.empty()) return check;
   std::vector<double> distances, over_allowed;
   for (const auto& [id, image] : aligned.images) {
+    if (!StaysInside(image.name)) continue;
     const std::optional<GpsData> gps = ReadGpsData(image_path + "/" + image.name);
     if (!gps) continue;
     if (!IsWgs84(gps->datum)) {

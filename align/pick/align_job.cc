@@ -15,6 +15,7 @@
 
 #include "core/child_program.h"
 #include "core/error.h"
+#include "core/signal_tidy.h"
 
 extern char** environ;
 
@@ -110,9 +111,13 @@ void AlignJob::Start() {
     argv.push_back(const_cast<char*>(argument.c_str()));
   }
   argv.push_back(nullptr);
+  std::string ends_with_us = std::string(kEndsWithParent) + "=1";  // also when we are killed
+  std::vector<char*> environment = {ends_with_us.data()};
+  for (char** entry = environ; *entry != nullptr; ++entry) environment.push_back(*entry);
+  environment.push_back(nullptr);
   pid_t child = 0;
-  const int failed =
-      posix_spawnp(&child, program_.c_str(), &actions, &attributes, argv.data(), environ);
+  const int failed = posix_spawnp(&child, program_.c_str(), &actions, &attributes, argv.data(),
+                                  environment.data());
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   close(ends[1]);

@@ -17,18 +17,6 @@ namespace {
 
 constexpr int kRankCells = 8;  // a photo has this many cells across and down
 
-// A name of the model must not lead out of the folder of the photos.
-bool StaysInside(const std::string& name) {
-  const std::filesystem::path path(name);
-  if (path.is_absolute()) return false;
-  return std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
-}
-
-std::string ProblemOf(const PickPhoto& photo) {
-  if (!StaysInside(photo.name())) return "The name of this photo leads out of --image_path.";
-  return photo.fit.problem;
-}
-
 // Share of the cells of a photo in which it has sparse points.
 double Coverage(const SparseImage& image, const Camera& camera) {
   std::set<int> cells;
@@ -134,7 +122,7 @@ void PickScene::AddPhotos() {
     photo.path = input_.image_path + "/" + image.name;
     const Camera& camera = photo.projection->camera();
     photo.fit = FitPhotoToCamera(photo.path, image.name, camera.width, camera.height);
-    photo.problem = ProblemOf(photo);
+    photo.problem = photo.fit.problem;
     if (photo.problem.empty() && !photo.fit.note.empty()) notes.push_back(photo.fit.note);
     photo.missing = !photo.problem.empty();
     photo.num_points = static_cast<int>(

@@ -115,6 +115,7 @@ void ServePicking(Arguments a, const Command::Context& context) {
     context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +
                           std::to_string(server.server().port()));
   }
+  if (a.server.allow_remote) context.Warn(kNotEncrypted);
   std::cout << server.server().Url() << "\n" << server.server().SshLine() << std::endl;
   std::optional<OpenBrowser> browser;
   if (a.server.open) browser.emplace(server.server().Url());

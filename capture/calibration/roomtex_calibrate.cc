@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/picture_file.h"
 
 namespace roomtex {
 namespace {
@@ -70,14 +71,6 @@ void CheckArguments(Arguments* a) {
   }
 }
 
-void WritePicture(const std::string& path, const cv::Mat& picture) {
-  OutputFile file(path);
-  if (!cv::imwrite(file.partial_path(), picture)) {
-    throw InputError(path, "", "could not be written", "Check the space on the disk");
-  }
-  file.Commit();
-}
-
 void Apply(const Arguments& a, const Camera& camera, const Command::Context& context) {
   if (a.database_path.empty()) return;
   context.progress.Stage("apply");
@@ -121,7 +114,7 @@ void Run(Arguments* a, const Command::Context& context) {
 
   context.progress.Stage("write");
   WriteCamerasText(a->output_path, calibration.camera);
-  if (!a->coverage_path.empty()) WritePicture(a->coverage_path, DrawCalibration(calibration));
+  if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
   std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
 }

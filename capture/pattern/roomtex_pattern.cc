@@ -16,7 +16,9 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/parallel.h"
 #include "core/photo.h"
+#include "core/resource_limits.h"
 
 namespace roomtex {
 namespace {
@@ -134,7 +136,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   if (extension != ".png")
     problems.push_back("--output_path must end in .png: that is what is written");
   ThrowIfProblems(problems);
-  cv::setNumThreads(num_threads > 0 ? num_threads : -1);
+  if (ThreadsNotStarted() == 0) cv::setNumThreads(EffectiveThreads(num_threads));
 
   context.progress.Stage("pattern");
   const cv::Mat photo =

@@ -374,7 +374,7 @@ TEST_F(CommandReport, IsWrittenWithTheExitCodeOfEveryKindOfFailure) {
        "in.rtpi: byte 7: is odd. Make it even."},
       {[] { throw std::runtime_error("surprise"); }, kExitInternalError,
        "internal error: surprise"},
-      {[] { throw std::bad_alloc(); }, kExitInternalError, "out of memory"},
+      {[] { throw std::bad_alloc(); }, kExitInput, "out of memory"},
       {[] { throw 42; }, kExitInternalError, "internal error"},
   };
   for (const Case& c : cases) {

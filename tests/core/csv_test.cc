@@ -57,6 +57,30 @@ TEST(Csv, PlainFieldsStandWithoutQuotes) {
   EXPECT_EQ(CsvLine({"a b.jpg", "1.5", "", "-2e-05"}), "a b.jpg,1.5,,-2e-05\n");
 }
 
+TEST(Csv, FieldsInQuotesGoOverLineEnds) {
+  const std::vector<std::string> fields = {"a\nb, \"c\"\n\nd.jpg", "1"};
+  const auto rows = ReadTable("x\n" + CsvLine(fields) + "last,\"\"\n");
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[1].fields, fields);
+  EXPECT_EQ(rows[1].line, 2);
+  EXPECT_EQ(rows[2].line, 6);
+}
+
+TEST(Csv, OpenQuoteHidesNoLineBelow) {
+  const TempFolder folder;
+  WriteBytes(folder / "table.csv", "\"b,c\nd,e\nf,g\n");
+  CsvReader table(folder / "table.csv", "Make it", "Expected a table");
+  ASSERT_TRUE(table.Next());
+  EXPECT_FALSE(table.Fields());
+  EXPECT_EQ(table.line_number(), 1);
+  for (const long line : {2, 3}) {
+    ASSERT_TRUE(table.Next());
+    EXPECT_EQ(table.line_number(), line);
+    EXPECT_TRUE(table.Fields());
+  }
+  EXPECT_FALSE(table.Next());
+}
+
 TEST(Csv, RefusesOpenQuotesWithTheirLine) {
   EXPECT_INPUT_ERROR(ReadTable("a\n\"b,c\n"), "line 2: a quote is open");
   EXPECT_INPUT_ERROR(ReadTable("\"b\" c,d\n"), "line 1: a quote is open");

@@ -150,13 +150,64 @@ def write_sparse_model(root):
         for i, p in enumerate(points) if i + 1 in good))
 
 
+def text_model(folder):
+    """Cameras, images (fields and keypoints) and points of a COLMAP text model."""
+    lines = {name: [line for line in (folder / name).read_text().split("\n")
+                    if not line.startswith("#")]
+             for name in ("cameras.txt", "images.txt", "points3D.txt")}
+    cameras = [line.split() for line in lines["cameras.txt"] if line]
+    images = [(lines["images.txt"][i].split(), lines["images.txt"][i + 1].split())
+              for i in range(0, len(lines["images.txt"]) - 1, 2)]
+    points = [line.split() for line in lines["points3D.txt"] if line]
+    return cameras, images, points
+
+
+MODELS = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4}
+
+
+def write_binary_model(folder, names, params=None):
+    """The text model of the folder as .bin instead; names: old name to new one; params: of the
+    camera, instead of its own."""
+    cameras, images, points = text_model(folder)
+    out = struct.pack("<Q", len(cameras))
+    for camera in cameras:
+        values = params or [float(value) for value in camera[4:]]
+        out += struct.pack("<IiQQ", int(camera[0]), MODELS[camera[1]], int(camera[2]),
+                           int(camera[3])) + struct.pack(f"<{len(values)}d", *values)
+    (folder / "cameras.bin").write_bytes(out)
+    out = struct.pack("<Q", len(images))
+    for fields, seen in images:
+        out += struct.pack("<I7dI", int(fields[0]), *(float(v) for v in fields[1:8]),
+                           int(fields[8]))
+        out += names.get(fields[9], fields[9]).encode() + b"\0"
+        out += struct.pack("<Q", len(seen) // 3)
+        for i in range(0, len(seen), 3):
+            out += struct.pack("<2dq", float(seen[i]), float(seen[i + 1]), int(seen[i + 2]))
+    (folder / "images.bin").write_bytes(out)
+    out = struct.pack("<Q", len(points))
+    for point in points:
+        track = [int(value) for value in point[8:]]
+        out += struct.pack("<Q3d3BdQ", int(point[0]), *(float(v) for v in point[1:4]),
+                           *(int(v) for v in point[4:7]), float(point[7]), len(track) // 2)
+        out += struct.pack(f"<{len(track)}I", *track)
+    (folder / "points3D.bin").write_bytes(out)
+    for name in ("cameras.txt", "images.txt", "points3D.txt"):
+        (folder / name).unlink()
+
+
+def rename_in_database(path, old, new):
+    database = sqlite3.connect(path)
+    database.execute("UPDATE images SET name = ? WHERE name = ?", (new, old))
+    database.commit()
+    database.close()
+
+
 def write_database(path, root):
     """COLMAP 3.8's tables with the cameras and images of the scene, without features."""
     camera = [line.split() for line in (root / "cameras.txt").read_text().splitlines()
               if line and line[0] != "#"][0]
-    models = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4}
-    import array
-    params = array.array("d", [float(value) for value in camera[4:]]).tobytes()
+    values = [float(value) for value in camera[4:]]
+    params = struct.pack(f"<{len(values)}d", *values)
     database = sqlite3.connect(path)
     database.executescript("""
         CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER
@@ -175,7 +226,7 @@ def write_database(path, root):
           NULL, cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB,
           qvec BLOB, tvec BLOB);""")
     database.execute("INSERT INTO cameras VALUES (1, ?, ?, ?, ?, 1)",
-                     (models[camera[1]], int(camera[2]), int(camera[3]), params))
+                     (MODELS[camera[1]], int(camera[2]), int(camera[3]), params))
     for i, photo in enumerate(sorted((root / "photos").iterdir())):
         database.execute("INSERT INTO images (image_id, name, camera_id) VALUES (?, ?, 1)",
                          (i + 1, photo.name))

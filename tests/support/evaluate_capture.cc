@@ -29,7 +29,15 @@ double Max(const std::vector<double>& values) {
 }
 
 // fit: moves the model by the best similarity first, for a model that is not aligned.
-Json ComparePoses(const SparseModel& truth, SparseModel model, bool fit) {
+Json ComparePoses(const SparseModel& truth, SparseModel model, const std::string& input_path,
+                  bool fit) {
+  const bool meet = std::any_of(model.images.begin(), model.images.end(), [&](const auto& image) {
+    return truth.FindImage(image.second.name) != nullptr;
+  });
+  if (!meet) {
+    throw InputError(input_path, "", "has no photo of the truth, so nothing can be compared",
+                     "Give the model and the truth of one capture");
+  }
   if (fit) {
     std::vector<Eigen::Vector3d> from, to;
     for (const auto& [id, image] : model.images) {
@@ -104,7 +112,8 @@ int main(int argc, char** argv) {
   return command.Run(argc, argv, [&](const Command::Context& context) {
     Json answer = Json::object();
     if (!input_path.empty()) {
-      answer["poses"] = ComparePoses(ReadSparseModel(truth_path), ReadSparseModel(input_path), fit);
+      answer["poses"] =
+          ComparePoses(ReadSparseModel(truth_path), ReadSparseModel(input_path), input_path, fit);
     }
     if (!ply_path.empty()) {
       const PlyVertices truth = ReadPlyVertices(truth_path + "/true_colors.ply");

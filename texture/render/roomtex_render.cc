@@ -17,6 +17,8 @@
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/photo_fit.h"
+#include "core/picture_file.h"
 #include "core/statistics.h"
 #include "texture/render/mesh_renderer.h"
 
@@ -30,17 +32,12 @@ struct RenderOptions {
   int num_photos = 4, num_ring = 4;
 };
 
-void WritePicture(const std::string& path, const cv::Mat& picture) {
-  OutputFile file(path);
-  if (!cv::imwrite(file.partial_path(), picture)) {
-    throw InputError(path, "", "cannot be written", "Give a .png or .jpg");
-  }
-  file.Commit();
-}
-
 // The photo to the left of the picture.
-cv::Mat Beside(const std::string& photo_path, const cv::Mat& picture) {
-  cv::Mat photo = ReadPhoto(photo_path), both;
+cv::Mat Beside(const std::string& image_path, const std::string& name, const cv::Mat& picture) {
+  if (!StaysInside(name)) {
+    throw InputError(name, "", "leads out of --image_path", "Correct the model");
+  }
+  cv::Mat photo = ReadPhoto(image_path + "/" + name), both;
   cv::resize(photo, photo, picture.size(), 0, 0, cv::INTER_AREA);
   cv::hconcat(photo, picture, both);
   return both;
@@ -63,9 +60,9 @@ void RenderOne(const RenderOptions& options, const SparseModel& model, const Col
   cv::Mat picture = MeshRenderer(mesh).Render(model.cameras.at(image->camera_id),
                                               new_from_cam * image->cam_from_model, settings);
   if (!options.image_path.empty()) {
-    picture = Beside(options.image_path + "/" + image->name, picture);
+    picture = Beside(options.image_path, image->name, picture);
   }
-  WritePicture(options.output_path, picture);
+  WritePictureFile(options.output_path, picture);
 }
 
 // The axis of the scan frame that is up, from the way photos are held.
@@ -119,7 +116,7 @@ class PictureSet {
       cv::Mat picture =
           renderer.Render(model.cameras.at(image.camera_id), image.cam_from_model, settings_);
       if (!options_.image_path.empty()) {
-        const cv::Mat both = Beside(options_.image_path + "/" + image.name, picture);
+        const cv::Mat both = Beside(options_.image_path, image.name, picture);
         pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
         Write("photo_" + std::to_string(i + 1), image.name, both);
         pictures_.emplace_back("the scan from there", picture);
@@ -223,7 +220,7 @@ class PictureSet {
     }
     cv::Mat sheet;
     cv::vconcat(rows, sheet);
-    WritePicture(options_.folder_path + "/contact_sheet.png", sheet);
+    WritePictureFile(options_.folder_path + "/contact_sheet.png", sheet);
   }
 
  private:
@@ -235,7 +232,7 @@ class PictureSet {
     pictures_.emplace_back(caption, picture);
   }
   void Write(const std::string& file, const std::string& caption, const cv::Mat& picture) {
-    WritePicture(FileOf(file), picture);
+    WritePictureFile(FileOf(file), picture);
     context_.report["pictures"].push_back({{"file", file + ".png"}, {"shows", caption}});
     context_.progress.Tick();
   }

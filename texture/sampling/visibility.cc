@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <opencv2/imgproc.hpp>
 
@@ -15,6 +16,9 @@ namespace {
 // A triangle with a corner that has no image is split until the parts have one or are too small to
 // matter.
 constexpr int kMaxSplits = 16;
+// All splits of one photo together: one per pixel of its raster and some per triangle. Ordinary
+// rooms need a hundredth; without it a mesh of needles through the camera would take 2^16 each.
+constexpr int64_t kSplitsPerTriangle = 8;
 constexpr double kMinSize = 0.02;  // radians
 // Half the widest gap that counts as a crack in the scan and not as a hole, sample spacings.
 constexpr double kGapSpacings = 1.5;
@@ -37,8 +41,9 @@ cv::Mat Square(int radius) {
 class TriangleSplitter {
  public:
   TriangleSplitter(const PhotoProjector& projector, float scale_x, float scale_y, float max_edge_px,
-                   cv::Mat1f* out)
-      : projector_(projector),
+                   int64_t* splits_left, cv::Mat1f* out)
+      : splits_left_(splits_left),
+        projector_(projector),
         scale_x_(scale_x),
         scale_y_(scale_y),
         max_edge_px_(max_edge_px),
@@ -84,14 +89,15 @@ class TriangleSplitter {
           low_y - margin > out_->rows) {
         return;
       }
-      if (margin <= max_edge_px_ || depth >= kMaxSplits) {
+      if (margin <= max_edge_px_ || depth >= kMaxSplits || *splits_left_ <= 0) {
         DrawTriangle(drawn[0], drawn[1], drawn[2], out_);
         return;
       }
-    } else if (depth >= kMaxSplits || size < kMinSize * centre.norm() ||
+    } else if (depth >= kMaxSplits || *splits_left_ <= 0 || size < kMinSize * centre.norm() ||
                !projector_.MaySeeInCam(centre, size)) {
       return;
     }
+    --*splits_left_;
     SplitLongestEdge(a, b, c, depth);
   }
 
@@ -109,6 +115,7 @@ class TriangleSplitter {
     }
   }
 
+  int64_t* splits_left_;
   const PhotoProjector& projector_;
   float scale_x_, scale_y_, max_edge_px_;
   cv::Mat1f* out_;
@@ -305,7 +312,12 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
   const auto width = static_cast<float>(inverse_depth_.cols);
   const auto height = static_cast<float>(inverse_depth_.rows);
   const bool panorama = projector.camera().camera().IsPanorama();
-  const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &inverse_depth_);
+  int64_t splits_left = static_cast<int64_t>(inverse_depth_.total());
+  for (const MeshTile& tile : tiles) {
+    splits_left += kSplitsPerTriangle * static_cast<int64_t>(tile.triangles.size());
+  }
+  const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &splits_left,
+                                  &inverse_depth_);
   const PanoramaSplitter panorama_splitter(projector, scale_x_, scale_y_, max_edge_px,
                                            &inverse_depth_);
   // A triangle of a panorama that is small in the raster does not meet the seam; nor, away from

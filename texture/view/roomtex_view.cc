@@ -10,6 +10,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/local_server.h"
+#include "core/local_server_key.h"
 #include "core/open_browser.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -142,7 +143,9 @@ void View(const ViewOptions& options, const Command::Context& context) {
   context.report["num_triangles"] = content.model.triangles.size();
   context.report["num_cameras"] = content.cameras.size();
   context.report["num_photos"] = content.cameras.num_photos();
-  LocalServer server(options.server);
+  LocalServerOptions server_options = options.server;
+  server_options.token = KeptToken(options.input_path);  // links to views stay good
+  LocalServer server(server_options);
   const ViewServer view(std::move(content), &server, context.options.num_threads);
   server.Start(true);
   if (options.server.port != 0 && server.port() != options.server.port) {
@@ -156,6 +159,7 @@ void View(const ViewOptions& options, const Command::Context& context) {
     browser.emplace(server.Url());
     if (!browser->problem().empty()) context.Warn(browser->problem());
   }
+  if (options.server.allow_remote) context.Warn(kNotEncrypted);
   context.progress.Note("Ctrl-C ends");
   server.Wait();
 }

@@ -1,0 +1,32 @@
+#pragma once
+// What the machine does not give: memory and threads.
+
+#include <cstdint>
+#include <string>
+
+namespace roomtex {
+
+// Bytes that may still be allocated: the least of what the machine has free, of the limit of this
+// process (ulimit -v) and of that of its container. A guess, for refusing what cannot fit.
+int64_t AvailableMemory();
+
+// Throws InputError if the work on `path` takes more than is available, in time: "room.e57: reading
+// 80 million samples takes 17.4 GB, and 6.1 GB are free. ..." what: "reading 80 million samples".
+void RequireMemory(const std::string& path, const std::string& what, double num_bytes,
+                   const std::string& remedy);
+
+// Bytes of memory that commands take per sample of a scan (docs/reliability.md says how measured).
+inline constexpr double kImportBytesPerSample = 86, kAlignBytesPerSample = 47,
+                        kTextureBytesPerSample = 228;
+// The same as a clause for --help: "about 86 bytes of memory a sample".
+std::string BytesPerSampleHelp(double bytes);
+
+// Threads that could not be started since the start of the process (ulimit -u, a container's
+// limit): the work was done by fewer.
+int ThreadsNotStarted();
+void NoteThreadNotStarted();
+// Tries whether so many threads can run side by side. Libraries that have threads of their own end
+// with the first that is missing: they are told to do without.
+void ProbeThreads(int count);
+
+}  // namespace roomtex

@@ -1,0 +1,166 @@
+"""Too little memory, too few threads, numbers at the ends of their range, files without end."""
+
+import os
+import random
+import resource
+import struct
+import time
+
+import scene as s
+
+FEW_THREADS = os.environ.get("ROOMTEX_FEW_THREADS", "")
+
+
+def commands():
+    yield "import", "roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"
+    yield "align", s.ALIGN + " --image_path photos --output_path aligned"
+    yield "texture", s.TEXTURE + " --output_path textured"
+    yield "associate", ("roomtex-associate --quiet --database_path database.db --image_path photos "
+                        "--output_path pairs.csv")
+    yield "calibrate", ("roomtex-calibrate --quiet --image_path photos --board 9x6 --square 0.025 "
+                        "--output_path camera.txt")
+    yield "pattern", "roomtex-pattern --quiet --output_path pattern.png"
+    yield "mapper", ("roomtex-mapper --quiet --database_path database.db --image_path photos "
+                     "--output_path mapped")
+    yield "simulate", ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
+                       "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0")
+
+
+def memory(base):
+    for title, line in commands():
+        problem, refused = "", 0
+        for megabytes in (150, 200, 250, 300, 350, 400, 500, 600, 800, 1200):
+            limits = [(resource.RLIMIT_AS, megabytes << 20)]
+            program = line.split()[0]
+            if base.run(program + " --version", limits=limits).code != 0:
+                continue  # not even loaded
+            here = base.copy()
+            before = here.state()
+            answer = here.run(line, limits=limits)
+            refused += answer.code == 3
+            problem = answer.problem({0, 3, 4})
+            if any(here.state().get(name) != content for name, content in before.items()):
+                problem = "inputs changed"
+            if here.leftovers():
+                problem = f"leaves {here.leftovers()}"
+            if problem:
+                problem = f"{megabytes} MB: {problem}"
+                break
+        yield f"{title} with little memory, {refused} times refused", problem
+
+
+def threads(base):
+    for title, line in commands():
+        expected = base.copy()
+        code = expected.run(line).code
+        for at_most in (0, 1, 3):
+            here = base.copy()
+            answer = here.run(line + " --num_threads 8", environment={
+                "LD_PRELOAD": FEW_THREADS, "THREADS_AT_MOST": str(at_most)})
+            yield f"{title} with {at_most} threads more", answer.problem({code})
+        here = base.copy()
+        yield f"{title} --num_threads 100000", here.run(line + " --num_threads 100000").problem(
+            {code})
+
+
+def cameras(base):
+    count = len([line for line in (base.root / "sparse/cameras.txt").read_text().splitlines()
+                 if line and line[0] != "#"][0].split()) - 4
+    for value in (1e6, 1e9, 1e30, 1e300, 1e-300, -1e300, 5e4, 2e4):
+        for place in range(4):
+            params = [200.0, 200.0, 120.0, 80.0] + [0.0] * (count - 4)
+            params[place] = value
+            here = base.copy()
+            s.write_binary_model(here.root / "sparse", {}, params)
+            for title, line in (
+                    ("align", s.ALIGN + " --image_path photos --output_path aligned"),
+                    ("texture", s.TEXTURE.replace("--database_path database.db ", "")
+                     + " --output_path textured")):
+                started = time.time()
+                answer = here.run(line, limits=[(resource.RLIMIT_AS, 3 << 30)], seconds=60)
+                yield (f"{title}, camera parameter {place} is {value:g}, "
+                       f"{time.time() - started:.1f} s", answer.problem({0, 3, 4}))
+
+
+def poses(base):
+    for value in ("1e18", "1e25", "1e38", "1e200", "-1e300"):
+        here = base.copy()
+        lines = (here.root / "sparse/images.txt").read_text().split("\n")
+        for i, line in enumerate(lines):
+            fields = line.split()
+            if len(fields) == 10 and fields[0] in ("1", "2"):
+                fields[5 + int(fields[0])] = value
+                lines[i] = " ".join(fields)
+        (here.root / "sparse/images.txt").write_text("\n".join(lines))
+        for title, line in (("align", s.ALIGN + " --image_path photos --output_path aligned"),
+                            ("texture", s.TEXTURE + " --output_path textured")):
+            yield f"{title}, photos {value} m away", here.run(line, seconds=60).problem({0, 3, 4})
+
+
+def geometry(base):
+    """Meshes of random triangles of the room's size cost about what ordinary ones do."""
+    generator = random.Random(1)
+    count = 4000
+
+    def mesh(reach):
+        vertices, faces = b"", b""
+        for i in range(count):
+            corner = [generator.uniform(-3, 3) for _ in range(3)]
+            for _ in range(3):
+                vertices += struct.pack("<3f", *(c + generator.uniform(-reach, reach)
+                                                 for c in corner))
+            faces += struct.pack("<B3i", 3, 3 * i, 3 * i + 1, 3 * i + 2)
+        return (f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * count}\n"
+                "property float x\nproperty float y\nproperty float z\n"
+                f"element face {count}\nproperty list uchar int vertex_indices\nend_header\n"
+                ).encode() + vertices + faces
+
+    seconds = []
+    for reach in (0.05, 5):
+        here = base.copy()
+        (here.root / "mesh.ply").write_bytes(mesh(reach))
+        started = time.time()
+        answer = here.run("roomtex-texture --quiet --input_path sparse --image_path photos "
+                          "--scan_path mesh.ply --output_path textured", seconds=120)
+        seconds.append(time.time() - started)
+        problem = answer.problem({0, 3, 4})
+    if not problem and seconds[1] > 15 * seconds[0] + 2:
+        problem = f"{seconds[1]:.1f} s instead of {seconds[0]:.1f}"
+    yield f"texture on random triangles, {seconds[0]:.1f} and {seconds[1]:.1f} s", problem
+
+
+def endless(base):
+    """Files of 200 GB (without a byte on the disk), pipes and devices in the place of each input."""
+    align = s.ALIGN + " --image_path photos --output_path aligned"
+    lines = {
+        "scan.rtpi": (align, s.TEXTURE + " --output_path textured",
+                      "roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"),
+        "picks.csv": (align,),
+        "database.db": (s.TEXTURE + " --output_path textured",
+                        "roomtex-mapper --quiet --database_path database.db --image_path photos "
+                        "--output_path mapped"),
+        "sparse/images.txt": (align, s.TEXTURE + " --output_path textured"),
+        "photos/photo_000.jpg": (align, s.TEXTURE + " --output_path textured"),
+        "project.ini": (align + " --project_path project.ini",),
+    }
+    for name, using in lines.items():
+        for kind in ("200 GB of nothing", "a pipe", "/dev/zero"):
+            for line in using:
+                here = base.copy()
+                path = here.root / name
+                path.unlink()
+                if kind == "a pipe":
+                    os.mkfifo(path)
+                elif kind == "/dev/zero":
+                    path.symlink_to("/dev/zero")
+                else:
+                    path.touch()
+                    os.truncate(path, 200 << 30)
+                answer = here.run(line, limits=[(resource.RLIMIT_AS, 3 << 30)], seconds=60)
+                good = {0, 3, 4} if name.startswith("photos") else {3}
+                yield f"{name} is {kind}: {line.split()[0]}", answer.problem(good)
+
+
+if __name__ == "__main__":
+    s.main({"memory": memory, "threads": threads, "cameras": cameras, "poses": poses,
+            "geometry": geometry, "endless": endless})
