@@ -35,6 +35,10 @@ void AutoOptions::Declare(OptionFields* fields) {
   fields->Choice("sequence", &sequence, kAutoWords,
                  "The photos follow each other, as those of a video: only neighbours are matched; "
                  "auto = of a video with more than 150 pictures.");
+  fields->Choice(
+      "pairs", &pairs, kAutoWords,
+      "Of loose photos, match the pairs that roomtex-pairs finds; auto = of more than 60 "
+      "photos; 0 = every photo with every other.");
   fields
       ->Int("video_frames", &video_frames,
             "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")

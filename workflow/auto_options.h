@@ -10,7 +10,7 @@ class OptionFields;
 
 // Options that are handed on to the command of one step: {"--Mapper.x", "1", ...}.
 struct PassedOptions {
-  std::vector<std::string> features, matches, mapper, align, texture;
+  std::vector<std::string> features, pairs, matches, mapper, align, texture;
 };
 
 struct AutoOptions {
@@ -21,6 +21,7 @@ struct AutoOptions {
   std::string output_path, picks_path;
   std::string camera_model, camera_params, cameras_path;
   std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";
+  std::string pairs = "auto";
   int video_frames = 0;
   std::string from, until, only;
   bool accept_untrusted = false, dry_run = false;

@@ -67,6 +67,7 @@ void AddOptions(AutoOptions* o, Command* command) {
   for (const char* prefix : {"--ImageReader.", "--SiftExtraction.", "--FeatureExtraction."}) {
     command->PassThrough(prefix, &passed.features, "Handed on to colmap feature_extractor.");
   }
+  command->PassThrough("--Pairs.", &passed.pairs, "Handed on to roomtex-pairs.");
   for (const char* prefix : {"--SiftMatching.", "--FeatureMatching.", "--TwoViewGeometry.",
                              "--ExhaustiveMatching.", "--SequentialMatching."}) {
     command->PassThrough(prefix, &passed.matches, "Handed on to COLMAP's matcher.");

@@ -249,40 +249,86 @@ Step MakeFeatures(Chain* chain) {
 // ---- matches
 
 constexpr size_t kManyFrames = 150;
+// Of 36 photos of a kitchen two thirds of the pairs are worth matching, of 100 photos of four rooms
+// an eighth (docs/pairs.md).
+constexpr size_t kManyPhotos = 60;
+
+bool HasBlank(const PhotoFacts& photo) {
+  return photo.name.find_first_of(" \t") != std::string::npos;
+}
+
+// Which of COLMAP's matchers, and why.
+std::string ChooseMatcher(Chain* chain, std::vector<std::string>* notes) {
+  const AutoOptions& options = chain->options();
+  const std::vector<PhotoFacts>& photos = chain->Photos(chain->ColmapFolder());
+  if (options.sequence == "1" ||
+      (options.sequence == "auto" && HasVideo(chain) && photos.size() > kManyFrames)) {
+    notes->push_back("photos in a row: neighbours are matched");
+    return "sequential_matcher";
+  }
+  const std::string number = std::to_string(photos.size()) + " loose photos: ";
+  const bool may_choose = std::none_of(
+      options.passed.matches.begin(), options.passed.matches.end(),
+      [](const std::string& word) { return word.rfind("--ExhaustiveMatching.", 0) == 0; });
+  if (options.pairs == "1" ||
+      (options.pairs == "auto" && may_choose && photos.size() > kManyPhotos)) {
+    if (std::none_of(photos.begin(), photos.end(), HasBlank)) {
+      notes->push_back(number + "the pairs that roomtex-pairs finds are matched");
+      return "matches_importer";
+    }
+    notes->push_back(number +
+                     "every one is matched with every other, since COLMAP's list of pairs cannot "
+                     "hold names with blanks");
+    return "exhaustive_matcher";
+  }
+  notes->push_back(number + "every one is matched with every other");
+  return "exhaustive_matcher";
+}
+
+CommandLine PairsLine(Chain* chain) {
+  CommandLine line = {
+      "roomtex-pairs",        "--database_path",       chain->At(kPartialDatabase),
+      "--image_path",         chain->ColmapFolder(),   "--output_path",
+      chain->At("pairs.txt"), "--graph_path",          chain->At("log/pairs_graph.json"),
+      "--report_path",        chain->ReportOf("pairs")};
+  AddCommon(chain->options(), &line);
+  AddPassed(chain->options().passed.pairs, &line);
+  return line;
+}
 
 Step MakeMatches(Chain* chain) {
   const AutoOptions& options = chain->options();
   Step step;
-  const size_t num_photos = chain->Photos(chain->ColmapFolder()).size();
-  const bool is_sequence = options.sequence == "1" || (options.sequence == "auto" &&
-                                                       HasVideo(chain) && num_photos > kManyFrames);
-  const std::string matcher = is_sequence ? "sequential_matcher" : "exhaustive_matcher";
-  const std::set<std::string>& known = chain->ColmapOptions(matcher);
-  CommandLine line = {options.colmap, matcher, "--database_path", chain->At(kPartialDatabase)};
   const bool uses_gpu = UsesGpu(chain, &step.notes);
   step.notes.clear();  // said with the features
+  const std::string matcher = ChooseMatcher(chain, &step.notes);
+  const std::set<std::string>& known = chain->ColmapOptions(matcher);
+  CommandLine line = {options.colmap, matcher, "--database_path", chain->At(kPartialDatabase)};
   AddSpelled(known, {"FeatureMatching.use_gpu", "SiftMatching.use_gpu"}, uses_gpu ? "1" : "0",
              &line);
   if (QualityOf(options).guided_matching) {
     AddSpelled(known, {"FeatureMatching.guided_matching", "SiftMatching.guided_matching"}, "1",
                &line);
   }
-  if (is_sequence) {
+  if (matcher == "sequential_matcher") {
     AddOption("--SequentialMatching.overlap", "12", &line);
-  } else {
+  } else if (matcher == "exhaustive_matcher") {
     // Several blocks, so that COLMAP's log says how far it is.
+    const size_t num_photos = chain->Photos(chain->ColmapFolder()).size();
     const size_t block = std::clamp<size_t>(num_photos / 6, 5, 50);
     AddOption("--ExhaustiveMatching.block_size", std::to_string(block), &line);
+  } else {
+    step.commands = {PairsLine(chain)};
+    AddOption("--match_list_path", chain->At("pairs.txt"), &line);
+    AddOption("--match_type", "pairs", &line);
   }
   if (options.num_threads >= 0) {
     AddSpelled(known, {"FeatureMatching.num_threads", "SiftMatching.num_threads"},
                std::to_string(options.num_threads), &line);
   }
   AddPassed(options.passed.matches, &line);
-  step.commands = {line, {"mv", chain->At(kPartialDatabase), chain->At("database.db")}};
-  step.notes.push_back(is_sequence ? "photos in a row: neighbours are matched"
-                                   : std::to_string(num_photos) +
-                                         " loose photos: every one is matched with every other");
+  step.commands.push_back(line);
+  step.commands.push_back({"mv", chain->At(kPartialDatabase), chain->At("database.db")});
   step.outputs = {chain->At("database.db")};
   return step;
 }

@@ -80,6 +80,14 @@ class DatabaseMaker {
            "");
   }
 
+  // num_columns bytes per feature, 128 of SIFT.
+  void AddDescriptors(uint32_t image_id, const std::vector<uint8_t>& bytes, int num_columns = 128) {
+    Run("CREATE TABLE IF NOT EXISTS descriptors (image_id INTEGER PRIMARY KEY NOT NULL, rows "
+        "INTEGER NOT NULL, cols INTEGER NOT NULL, data BLOB)");
+    AddRow("descriptors (image_id, rows, cols, data)", image_id,
+           bytes.size() / static_cast<size_t>(num_columns), num_columns, bytes, "");
+  }
+
   void AddPair(uint32_t image_id1, uint32_t image_id2, const std::vector<uint32_t>& matches,
                int config = 2) {
     AddRow("two_view_geometries (pair_id, rows, cols, data, config)",

@@ -166,6 +166,27 @@ TEST_F(StepTableTest, LoosePhotosAreAllMatchedThoseInARowWithNeighbours) {
   EXPECT_THAT(Line("matches"), HasSubstr("sequential_matcher"));
 }
 
+TEST_F(StepTableTest, OfManyPhotosThePairsWorthMatchingAreMatched) {
+  AddPhotos("a", 4, 60);
+  options_.pairs = "1";
+  options_.passed.pairs = {"--Pairs.max_neighbors", "7"};
+  EXPECT_THAT(Line("matches"), HasSubstr("roomtex-pairs"));
+  EXPECT_THAT(Line("matches"), HasSubstr("--Pairs.max_neighbors 7"));
+  EXPECT_THAT(Line("matches", 1), HasSubstr("matches_importer"));
+  EXPECT_THAT(Line("matches", 1), HasSubstr("--match_type pairs"));
+  AddPhotos("blank ", 1, 60);
+  EXPECT_THAT(Line("matches"), HasSubstr("exhaustive_matcher"));
+  EXPECT_THAT(Make("matches").notes[0], HasSubstr("names with blanks"));
+
+  fs::remove(folder_ / "photos/blank 100.jpg");
+  options_.pairs = "auto";
+  EXPECT_THAT(Line("matches"), HasSubstr("exhaustive_matcher"));
+  AddPhotos("b", 60, 60);
+  EXPECT_THAT(Line("matches"), HasSubstr("roomtex-pairs"));
+  options_.passed.matches = {"--ExhaustiveMatching.block_size", "9"};
+  EXPECT_THAT(Line("matches"), HasSubstr("exhaustive_matcher"));
+}
+
 TEST_F(StepTableTest, ThePicksThatAreThereAreUsed) {
   fs::create_directories(folder_ / "result");
   EXPECT_THAT(Line("align"), Not(HasSubstr("picks_path")));

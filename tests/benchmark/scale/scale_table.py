@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""What every step costs against the number of photos and of samples: CPU seconds and peak memory of the programs, as
+Markdown tables (docs/scale.md), with the slope between neighbouring columns and over all (1 = linear, 2 = square).
+
+  tests/benchmark/scale/scale_table.py --bin build/bin FOLDER --photos 20 40 80 --samples 1 4 10
+
+One simulated room; the sets of photos are every n-th photo of the largest set, under their own names. Steps that were
+measured before (FOLDER/measured.json) are not run again.
+"""
+
+import argparse
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+
+class Bench:
+    def __init__(self, arguments):
+        self.arguments = arguments
+        self.folder = os.path.abspath(arguments.folder)
+        os.makedirs(self.folder, exist_ok=True)
+        self.path = os.path.join(self.folder, "measured.json")
+        self.measured = json.load(open(self.path)) if os.path.exists(self.path) else {}
+
+    def at(self, *names):
+        return os.path.join(self.folder, *names)
+
+    def program(self, name):
+        return name if name == "colmap" else os.path.join(self.arguments.bin, name)
+
+    def run(self, curve, step, size, line, fine=(0,)):
+        """Runs a program unless it was measured; its CPU seconds and peak memory, with those of what it starts."""
+        key = f"{curve} {step} {size}"
+        if key in self.measured:
+            return
+        print(f"{curve} {size}: {step}", file=sys.stderr, flush=True)
+        with open(self.at("log.txt"), "a") as log:
+            log.write(" ".join(line) + "\n")
+            log.flush()
+            process = subprocess.Popen([self.program(line[0])] + line[1:], stdout=log, stderr=log)
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode not in fine:
+            sys.exit(f"{' '.join(line)}: exit code {process.returncode}, see {self.at('log.txt')}")
+        self.measured[key] = {"cpu": usage.ru_utime + usage.ru_stime, "peak": usage.ru_maxrss / 1024}
+        with open(self.path + ".new", "w") as stream:
+            json.dump(self.measured, stream, indent=1)
+        os.replace(self.path + ".new", self.path)
+
+    def simulate(self, name, photos, samples):
+        a = self.arguments
+        rows = round(1000 * math.sqrt(samples / 2))
+        if not os.path.exists(self.at(name, "README.txt")):
+            subprocess.run([self.program("roomtex-simulate"), "--quiet", "--seed", "7", "--output_path", self.at(name),
+                            "--num_photos", str(photos), "--photo_width", str(a.width), "--photo_height",
+                            str(a.width * 2 // 3), "--scan_columns", str(2 * rows), "--scan_rows", str(rows)],
+                           check=True, stdout=subprocess.DEVNULL)
+
+    def photo_curve(self):
+        a = self.arguments
+        most = max(a.photos)
+        self.simulate("capture", most, 2)
+        names = sorted(os.listdir(self.at("capture", "photos")))
+        camera = open(self.at("capture", "camera_options.txt")).read().split()
+        for count in a.photos:
+            place = lambda *parts: self.at(f"photos_{count}", *parts)
+            os.makedirs(place("photos"), exist_ok=True)
+            for i in range(count):
+                name = names[i * most // count]
+                if not os.path.exists(place("photos", name)):
+                    os.link(self.at("capture", "photos", name), place("photos", name))
+            threads = ["--SiftMatching.num_threads", "2", "--SiftMatching.use_gpu", "0"]
+            self.run("photos", "features", count, [
+                "colmap", "feature_extractor", "--database_path", place("database.db"), "--image_path", place("photos"),
+                "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features", str(a.features)] + camera)
+            self.run("photos", "pairs", count, [
+                "roomtex-pairs", "--quiet", "--database_path", place("database.db"), "--output_path",
+                place("pairs.txt")])
+            if count <= a.exhaustive:
+                if not os.path.exists(place("all.db")):
+                    shutil.copy(place("database.db"), place("all.db"))
+                self.run("photos", "all pairs instead", count, [
+                    "colmap", "exhaustive_matcher", "--database_path", place("all.db")] + threads)
+            self.run("photos", "matches of the pairs", count, [
+                "colmap", "matches_importer", "--database_path", place("database.db"), "--match_list_path",
+                place("pairs.txt"), "--match_type", "pairs"] + threads)
+            self.run("photos", "mapper", count, [
+                "roomtex-mapper", "--quiet", "--database_path", place("database.db"), "--image_path", place("photos"),
+                "--output_path", place("sparse"), "--report_path", place("mapper.json")], (0, 4))
+            self.run("photos", "align", count, [
+                "roomtex-align", "--quiet", "--input_path", place("sparse", "0"), "--scan_path",
+                self.at("capture", "scan.rtpi"), "--picks_path", self.at("capture", "picks.csv"), "--image_path",
+                self.at("capture", "photos"), "--output_path", place("aligned")], (0, 4))
+            self.run("photos", "texture", count, [
+                "roomtex-texture", "--quiet", "--input_path", place("aligned"), "--image_path", place("photos"),
+                "--accept_untrusted", "1", "--Texture.scale", "1", "--output_path", place("textured")], (0, 4))
+
+    def sample_curve(self):
+        for millions in self.arguments.samples:
+            name = f"samples_{millions}"
+            self.simulate(name, 10, millions)
+            place = lambda *parts: self.at(name, *parts)
+            self.run("samples", "import", millions, [
+                "roomtex-import", "--quiet", "--input_path", place("scan.rtpi"), "--output_path", place("scan.ply")])
+            self.run("samples", "texture", millions, [
+                "roomtex-texture", "--quiet", "--input_path", place("truth"), "--image_path", place("photos"),
+                "--scan_path", place("scan.rtpi"), "--Texture.scale", "1", "--output_path", place("textured")], (0, 4))
+            model = self.at(f"photos_{min(self.arguments.photos)}", "sparse", "0")
+            if not os.path.exists(model):
+                continue
+            self.run("samples", "align", millions, [
+                "roomtex-align", "--quiet", "--input_path", model, "--scan_path", place("scan.rtpi"), "--picks_path",
+                self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
+                place("aligned")], (0, 4))
+
+    def table(self, curve, sizes, unit, key, digits):
+        steps = []
+        for name in self.measured:
+            kind, rest = name.split(" ", 1)
+            step = rest.rsplit(" ", 1)[0]
+            if kind == curve and step not in steps:
+                steps.append(step)
+        print(f"| {unit} | " + " | ".join(str(size) for size in sizes) + " | slope |")
+        print("|---" * (len(sizes) + 2) + "|")
+        for step in steps:
+            found = [(size, self.measured[f"{curve} {step} {size}"][key]) for size in sizes
+                     if f"{curve} {step} {size}" in self.measured]
+            values = dict(found)
+            slope = "" if len(found) < 2 else "%.1f" % (
+                math.log(found[-1][1] / found[0][1]) / math.log(found[-1][0] / found[0][0]))
+            print(f"| {step} | " + " | ".join(f"{values[s]:.{digits}f}" if s in values else "" for s in sizes) +
+                  f" | {slope} |")
+        print()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("--bin", default="build/bin")
+    parser.add_argument("--photos", type=int, nargs="*", default=[20, 40, 80, 160], help="numbers of photos")
+    parser.add_argument("--samples", type=float, nargs="*", default=[1, 4, 10], help="millions of samples")
+    parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
+    parser.add_argument("--features", type=int, default=2048, help="per photo, for COLMAP")
+    parser.add_argument("--exhaustive", type=int, default=40, help="all pairs are matched, too, up to so many photos")
+    arguments = parser.parse_args()
+    arguments.samples = [int(s) if s == int(s) else s for s in arguments.samples]
+    bench = Bench(arguments)
+    if arguments.photos:
+        bench.photo_curve()
+    if arguments.samples:
+        bench.sample_curve()
+    for curve, sizes, unit in (("photos", arguments.photos, "photos"), ("samples", arguments.samples, "M samples")):
+        bench.table(curve, sizes, unit + ": CPU s", "cpu", 1)
+        bench.table(curve, sizes, unit + ": peak MB", "peak", 0)
+
+
+if __name__ == "__main__":
+    main()

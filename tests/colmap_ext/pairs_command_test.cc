@@ -1,0 +1,217 @@
+// roomtex-pairs as users call it, on databases of made-up rooms.
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "colmap_ext/pair_selection.h"
+#include "colmap_ext/view_graph.h"
+#include "core/random_stream.h"
+#include "core/report.h"
+#include "tests/colmap_ext/database_maker.h"
+#include "tests/colmap_ext/simulated_views.h"
+#include "tests/support/option_check.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+using Schema = DatabaseMaker::Schema;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using NamePair = std::pair<std::string, std::string>;
+
+constexpr int kViewsPerRoom = 8, kPointsPerRoom = 300;
+
+// What a point of a room looks like; the first `num_shared` points of all rooms look alike, as the
+// same furniture does.
+std::vector<uint8_t> DescriptorOf(uint64_t room, int point, int num_shared, uint64_t view) {
+  RandomStream look(MixBits(point < num_shared ? 0 : room + 1, static_cast<uint64_t>(point)));
+  RandomStream noise(MixBits(view, static_cast<uint64_t>(point), 7));
+  std::vector<uint8_t> descriptor(kSiftSize);
+  for (uint8_t& byte : descriptor) {
+    const double value = 45 * std::abs(look.Gaussian()) + 5 * noise.Gaussian();
+    byte = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
+  }
+  return descriptor;
+}
+
+class PairsCommand : public testing::Test {
+ protected:
+  // Photos "a0.jpg", "a1.jpg" ... of every room, a camera for all.
+  void WriteRooms(const std::string& rooms, int num_shared = 0, Schema schema = Schema::k38) {
+    DatabaseMaker maker(database_, schema);
+    maker.Run("BEGIN");
+    uint32_t image_id = 0;
+    for (size_t room = 0; room < rooms.size(); ++room) {
+      SimulatedViewsOptions options;
+      options.num_points = kPointsPerRoom;
+      options.num_views = kViewsPerRoom;
+      options.baseline = 0.1;
+      const SimulatedViews views = SimulateViews(options);
+      if (room == 0) maker.AddCamera(views.cameras.begin()->second);
+      for (const auto& [id, image] : views.images) {
+        std::vector<uint8_t> bytes;
+        for (const int point : views.point_of_keypoint.at(id)) {
+          const auto one = DescriptorOf(room, point, num_shared, 100 * room + id);
+          bytes.insert(bytes.end(), one.begin(), one.end());
+        }
+        maker.AddImage(++image_id, rooms[room] + std::to_string(id - 1) + ".jpg",
+                       views.cameras.begin()->first);
+        maker.AddKeypoints(image_id, views.keypoints.at(id), 6);
+        maker.AddDescriptors(image_id, bytes);
+      }
+    }
+    maker.Run("COMMIT");
+  }
+  // The database, changed.
+  void Change(const std::string& sql) {
+    SQLite::Database(database_, SQLite::OPEN_READWRITE).exec(sql);
+  }
+
+  CommandResult Run(const std::string& more = "") {
+    return RunCommandLine("roomtex-pairs --database_path " + database_ + " --output_path " +
+                          output_ + " --report_path " + report_path_ + " " + more);
+  }
+  std::set<NamePair> Pairs() const {
+    std::ifstream stream(output_);
+    std::set<NamePair> pairs;
+    NamePair pair;
+    while (stream >> pair.first >> pair.second) pairs.insert(pair);
+    return pairs;
+  }
+  Json Report() const { return Json::parse(std::ifstream(report_path_)); }
+
+  TempFolder folder_;
+  const std::string database_ = folder_ / "database.db", output_ = folder_ / "pairs.txt",
+                    report_path_ = folder_ / "report.json";
+};
+
+TEST_F(PairsCommand, FindsThePairsOfARoomAndNoneAcrossRooms) {
+  for (const Schema schema : {Schema::k38, Schema::k41}) {
+    std::filesystem::remove(database_);
+    WriteRooms("ab", 0, schema);
+    const CommandResult result = Run("--graph_path " + (folder_ / "graph.json"));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const std::set<NamePair> pairs = Pairs();
+    EXPECT_THAT(pairs, SizeIs(2 * kViewsPerRoom * (kViewsPerRoom - 1) / 2));
+    for (const auto& [name1, name2] : pairs) EXPECT_EQ(name1[0], name2[0]);
+    EXPECT_THAT(Report()["groups"], SizeIs(2));
+    EXPECT_THAT(Report()["isolated"], IsEmpty());
+    const Json graph = Json::parse(std::ifstream(folder_ / "graph.json"));
+    EXPECT_THAT(graph["nodes"], SizeIs(2 * kViewsPerRoom));
+    EXPECT_THAT(graph["edges"], SizeIs(pairs.size()));
+  }
+}
+
+TEST_F(PairsCommand, RoomsWithTheSameFurnitureStayApart) {
+  WriteRooms("ab", 25);
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const auto& [name1, name2] : Pairs()) EXPECT_EQ(name1[0], name2[0]);
+  EXPECT_THAT(Report()["groups"], SizeIs(2));
+  EXPECT_GT(Report()["lookalikes"][0]["num_pairs"], kViewsPerRoom);
+  EXPECT_THAT(result.err, HasSubstr("the same furniture in two rooms"));
+  EXPECT_EQ(Run("--Pairs.join_lookalikes 1").exit_code, 0);
+  EXPECT_THAT(Report()["groups"], SizeIs(1));
+}
+
+TEST_F(PairsCommand, ThreadsChangeNothingAndFewNeighborsConnectAll) {
+  WriteRooms("abc");
+  ASSERT_EQ(Run("--Pairs.max_neighbors 2 --num_threads 1").exit_code, 0);
+  const std::set<NamePair> pairs = Pairs();
+  EXPECT_LT(pairs.size(), 2u * 3 * kViewsPerRoom);
+  EXPECT_THAT(Report()["groups"], SizeIs(3));
+  ASSERT_EQ(Run("--Pairs.max_neighbors 2 --num_threads 3").exit_code, 0);
+  EXPECT_EQ(Pairs(), pairs);
+}
+
+TEST_F(PairsCommand, NewPhotosAreAddedToWhatWasMatched) {
+  WriteRooms("a");
+  const auto pair_id = [](uint32_t a, uint32_t b) {
+    return std::to_string(PairIdFromImages(a, b));
+  };
+  // 1 and 2 were matched, 1 and 3 in vain.
+  Change("INSERT INTO two_view_geometries (pair_id, rows, cols, data, config) VALUES (" +
+         pair_id(1, 2) + ", 1, 2, x'0000000000000000', 2), (" + pair_id(1, 3) + ", 0, 2, NULL, 1)");
+  ASSERT_EQ(Run().exit_code, 0);
+  EXPECT_EQ(Pairs().count({"a0.jpg", "a1.jpg"}), 1u);
+  EXPECT_EQ(Pairs().count({"a0.jpg", "a2.jpg"}), 0u);
+  EXPECT_EQ(Pairs().count({"a0.jpg", "a3.jpg"}), 1u);
+  EXPECT_EQ(Report()["num_in_database"], 2);
+  ASSERT_EQ(Run("--Pairs.only_new").exit_code, 0);
+  EXPECT_EQ(Pairs().count({"a0.jpg", "a1.jpg"}), 0u);
+  EXPECT_EQ(Pairs().count({"a0.jpg", "a3.jpg"}), 1u);
+}
+
+TEST_F(PairsCommand, NamesWhatStandsAlone) {
+  WriteRooms("a");
+  Change("UPDATE keypoints SET rows = 0, data = NULL WHERE image_id = 3");
+  Change("UPDATE descriptors SET rows = 0, data = NULL WHERE image_id = 3");
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Report()["isolated"][0]["name"], "a2.jpg");
+  EXPECT_EQ(Report()["isolated"][0]["reason"], "has no features");
+  EXPECT_THAT(result.err, HasSubstr("stand alone, nothing agrees with them: a2.jpg"));
+}
+
+TEST_F(PairsCommand, WhatCannotBeUsedGetsASentence) {
+  const std::map<std::string, std::string> sentence_of_change = {
+      {"UPDATE images SET name = 'a b.jpg' WHERE image_id = 2", "blank in its name"},
+      {"UPDATE descriptors SET cols = 64 WHERE image_id = 2", "have 64 bytes, expected the 128"},
+      {"UPDATE descriptors SET rows = 5 WHERE image_id = 2", "has 5 descriptors for"},
+      {"UPDATE descriptors SET data = x'00' WHERE image_id = 2", "holds 1 bytes, expected"},
+      {"DELETE FROM descriptors WHERE image_id = 2", "is missing, but the image has keypoints"},
+      {"DROP TABLE descriptors", "no table descriptors"},
+      {"DELETE FROM images WHERE image_id > 1", "1 of 1 photos has features, and a pair takes two"},
+      {"DELETE FROM images", "holds no images"},
+      {"DELETE FROM keypoints", "0 of 8 photos has features"}};
+  for (const auto& [change, sentence] : sentence_of_change) {
+    std::filesystem::remove(database_);
+    WriteRooms("a");
+    Change(change);
+    const CommandResult result = Run();
+    EXPECT_EQ(result.exit_code, 3) << change;
+    EXPECT_THAT(result.err, HasSubstr(sentence));
+    EXPECT_FALSE(std::filesystem::exists(output_)) << change;
+  }
+}
+
+TEST(PairsCommandOptions, AreListedAndChecked) {
+  PairOptions options;
+  ExpectChecksItsOptions("roomtex-pairs", "--database_path none --output_path none",
+                         {FieldsOf(&options)});
+}
+
+TEST(ViewGraph, KeepsTheStrongestSomeWeakOnesAndNothingFallsApart) {
+  // Twenty photos in which each agrees with all others, less the farther, and a weak one at the
+  // end.
+  std::vector<GraphEdge> edges;
+  for (int i = 0; i < 20; ++i) {
+    for (int j = i + 1; j < 20; ++j) edges.push_back({i, j, 100.0 - (j - i)});
+  }
+  edges.push_back({3, 20, 1});
+  const std::vector<int> kept = SparseEdges(21, edges, 6);
+  EXPECT_LT(kept.size(), 21u * 6);
+  DisjointSets sets(21);
+  int num_neighbors = 0, num_far = 0;
+  for (const int edge : kept) {
+    const GraphEdge& one = edges[static_cast<size_t>(edge)];
+    sets.Join(one.node1, one.node2);
+    num_neighbors += one.node2 - one.node1 == 1;
+    num_far += one.node2 - one.node1 > 6 && one.node2 < 20;
+  }
+  EXPECT_THAT(sets.Groups(), SizeIs(1));
+  EXPECT_EQ(num_neighbors, 19);
+  EXPECT_GT(num_far, 10);
+}
+
+}  // namespace
+}  // namespace roomtex
