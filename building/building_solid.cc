@@ -55,8 +55,8 @@ class SolidBuilder {
         if (gradient.norm() < 1e-9) continue;
         Line2 line;
         line.normal = gradient.normalized();
-        line.offset =
-            line.normal.dot(box.min()) + (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
+        line.offset = line.normal.dot(box.min()) +
+                      (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
         lines.push_back(line);
       }
     }
@@ -106,8 +106,8 @@ class SolidBuilder {
   }
 
   int VertexAt(int vertex, bool on_roof) {
-    const auto [at, is_new] = index_.emplace(std::make_pair(vertex, on_roof),
-                                             static_cast<int>(solid_.vertices.size()));
+    const auto [at, is_new] =
+        index_.emplace(std::make_pair(vertex, on_roof), static_cast<int>(solid_.vertices.size()));
     if (is_new) {
       const Eigen::Vector2d& x = cells_.vertices[vertex];
       const double z = on_roof ? building_.RoofHeightAt(x) : building_.ground;

@@ -113,8 +113,8 @@ class FootprintFinder {
     std::vector<Eigen::Vector2d> families;
     for (const Eigen::Vector2d& normal : normals) {
       for (const Eigen::Vector2d& n : {normal, Eigen::Vector2d(-normal.y(), normal.x())}) {
-        const bool known = std::any_of(
-            families.begin(), families.end(), [&](const Eigen::Vector2d& other) {
+        const bool known =
+            std::any_of(families.begin(), families.end(), [&](const Eigen::Vector2d& other) {
               return std::abs(other.dot(n)) > std::cos(RadFromDeg(10));
             });
         if (!known) families.push_back(n);
@@ -329,9 +329,9 @@ class FootprintFinder {
       int below = 0;
       for (const int i : points) {
         const Eigen::Vector3d& x = cloud_.points[static_cast<size_t>(i)];
-        const double z = plane.centre.z() -
-                         plane.normal.head<2>().dot(x.head<2>() - plane.centre.head<2>()) /
-                             plane.normal.z();
+        const double z =
+            plane.centre.z() -
+            plane.normal.head<2>().dot(x.head<2>() - plane.centre.head<2>()) / plane.normal.z();
         below += x.z() <= z + 2 * PlaneTolerance(cloud_);
       }
       return static_cast<double>(below) > 0.85 * static_cast<double>(points.size());
@@ -401,10 +401,10 @@ class FootprintFinder {
       }
       for (size_t c = 0; c < votes.size(); ++c) {
         if (votes[c].empty()) continue;
-        parts[c] = std::max_element(votes[c].begin(), votes[c].end(), [](const auto& a,
-                                                                         const auto& b) {
-                     return a.second < b.second;
-                   })->first;
+        parts[c] =
+            std::max_element(votes[c].begin(), votes[c].end(), [](const auto& a, const auto& b) {
+              return a.second < b.second;
+            })->first;
         changed = true;
       }
     }
@@ -455,8 +455,8 @@ class FootprintFinder {
   CellArrangement cells_;
   std::vector<std::vector<Eigen::Vector2d>> polygons_;
   std::unique_ptr<SightGrid> grid_;
-  std::vector<double> inside_, outside_;        // what speaks for either, units of length
-  std::vector<std::map<int, int>> by_roof_;     // of each cell: squares of each roof segment
+  std::vector<double> inside_, outside_;     // what speaks for either, units of length
+  std::vector<std::map<int, int>> by_roof_;  // of each cell: squares of each roof segment
   std::vector<int> labels_;
 };
 

@@ -184,8 +184,8 @@ void PrintOutline(const OutlineProposal& proposal, bool judged) {
     const OutlineBuilding& building = proposal.outline.buildings[i];
     const Json json = BuildingToJson(building, judged ? &proposal.evidence[i] : nullptr);
     std::cout << building.name << ": " << building.footprint.size() << " corners, "
-              << building.RoofShape() << " roof, ground " << Number(building.ground, 2) << ", eaves "
-              << Number(json["eaves"].get<double>(), 2) << ", ridge "
+              << building.RoofShape() << " roof, ground " << Number(building.ground, 2)
+              << ", eaves " << Number(json["eaves"].get<double>(), 2) << ", ridge "
               << Number(json["ridge"].get<double>(), 2)
               << (judged && !proposal.evidence[i].doubts.empty() ? ", doubtful" : "") << "\n";
   }
@@ -235,7 +235,8 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   if (a.window) {
     const OutlineWindowInput window{a.proposal,     a.server,      kOutlinePage,
                                     a.outline_path, a.output_path, a.model_paths};
-    const OutlineProposal drawn = RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
+    const OutlineProposal drawn =
+        RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
     WriteModels(a, drawn.outline);
     ReportOutline(drawn, true, context);
     return;

@@ -1,5 +1,6 @@
-// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, what roomtex-outline's
-// library makes of them. With FOLDER the first street's model and a dense cloud of it are written there.
+// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, what
+// roomtex-outline's library makes of them. With FOLDER the first street's model and a dense cloud
+// of it are written there.
 
 #include <cstdio>
 #include <string>
@@ -43,8 +44,9 @@ void Measure(const std::string& name, StreetOptions options, const std::string& 
 
 int Main(const std::string& folder) {
   MakeFolder(folder);
-  fmt::print("| street | points | buildings | missed | doubtful | corner | ground | eaves | ridge |\n"
-             "|---|---|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| street | points | buildings | missed | doubtful | corner | ground | eaves | ridge |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
   StreetOptions options;
   Measure("as it is", options, folder);
   options.features_per_m2 = 2;
@@ -73,6 +75,4 @@ int Main(const std::string& folder) {
 }  // namespace
 }  // namespace roomtex
 
-int main(int argc, char** argv) {
-  return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy");
-}
+int main(int argc, char** argv) { return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy"); }

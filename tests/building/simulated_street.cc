@@ -57,8 +57,8 @@ std::vector<OutlineBuilding> Houses(const StreetOptions& options) {
   houses.push_back(House("1", 0, Placed(Rectangle(10, 8), {0, 0}, 0), {Level(ground(5) + 6)}));
   const auto two = Placed(Rectangle(9, 11), {15, 0.5}, 3);
   const double eaves = ground(20) + 5;
-  houses.push_back(House("2", 0, two,
-                         {RisingFrom(two, 1, eaves, 3 / 4.5), RisingFrom(two, 3, eaves, 3 / 4.5)}));
+  houses.push_back(
+      House("2", 0, two, {RisingFrom(two, 1, eaves, 3 / 4.5), RisingFrom(two, 3, eaves, 3 / 4.5)}));
   const auto three = Placed(Rectangle(8, 9), {29, 1.5}, -7);
   houses.push_back(House("3", 0, three, {RisingFrom(three, 0, ground(33) + 3.6, 2.0 / 9)}));
   const auto four = Placed({{0, 0}, {12, 0}, {12, 10}, {7, 10}, {7, 6}, {0, 6}}, {43, -1}, 5);
@@ -119,7 +119,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
       bool bare = false;
       if (is_wall) {
         // The wall that begins at this corner of the footprint.
-        const Eigen::Vector2d begin = solid.vertices[static_cast<size_t>(face.corners[0])].head<2>();
+        const Eigen::Vector2d begin =
+            solid.vertices[static_cast<size_t>(face.corners[0])].head<2>();
         for (size_t i = 0; i < houses[h].footprint.size(); ++i) {
           if ((houses[h].footprint[i] - begin).norm() < 1e-6) wall = static_cast<int>(i);
         }
@@ -145,7 +146,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
   for (const double x : {12.5, 26.5, 40.5}) {
     // Trees between and before the houses, all leaves.
     const Eigen::Vector3d at(x, x > 20 && x < 30 ? -4.5 : 3, ground(x) + 2);
-    surface.AddBox(at + Eigen::Vector3d(-1.2, -1.2, 0), at + Eigen::Vector3d(1.2, 1.2, 2.6), 20, 0.5);
+    surface.AddBox(at + Eigen::Vector3d(-1.2, -1.2, 0), at + Eigen::Vector3d(1.2, 1.2, 2.6), 20,
+                   0.5);
   }
   for (const double x : {4.0, 19.0, 33.0, 50.0}) {
     const Eigen::Vector3d at(x, -6.5, ground(x));
@@ -157,8 +159,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
 std::vector<Rigid> Cameras(const StreetOptions& options) {
   std::vector<Rigid> cameras;
   const double size = options.mock_up ? 0.02 : 1;  // of the street's 55 metres
-  const Eigen::Vector3d middle = options.mock_up ? Eigen::Vector3d(0.42, 0.2, 0.05)
-                                                 : Eigen::Vector3d(27, 4, 3);
+  const Eigen::Vector3d middle =
+      options.mock_up ? Eigen::Vector3d(0.42, 0.2, 0.05) : Eigen::Vector3d(27, 4, 3);
   for (int i = 0; i < 60; ++i) {
     // Once around, 20 m from the walls; every third from a pole or a drone.
     const double angle = 2 * kPi * i / 60;
@@ -168,8 +170,8 @@ std::vector<Rigid> Cameras(const StreetOptions& options) {
         middle + size * Eigen::Vector3d(46 * c, 24 * s,
                                         options.mock_up ? (above ? 30 : 12) : (above ? 15 : -1.3));
     // Across the street, in turn a little to the left and to the right.
-    const Eigen::Vector3d target =
-        middle + size * Eigen::Vector3d(36 * c + (i % 2 == 0 ? 12 : -12), 2 * s, above ? -2.0 : 0.6);
+    const Eigen::Vector3d target = middle + size * Eigen::Vector3d(36 * c + (i % 2 == 0 ? 12 : -12),
+                                                                   2 * s, above ? -2.0 : 0.6);
     const Eigen::Vector3d z = (target - eye).normalized();
     const Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
     Eigen::Matrix3d model_from_cam;
@@ -202,7 +204,7 @@ Eigen::Vector3d AnyPointOn(const StreetSurface& surface, size_t t, RandomStream*
 
 double AreaOf(const StreetSurface& surface, size_t t) {
   const Triangle& triangle = surface.triangles[t];
-  const Eigen::Vector3d &a = surface.vertices[static_cast<size_t>(triangle[0])];
+  const Eigen::Vector3d& a = surface.vertices[static_cast<size_t>(triangle[0])];
   return 0.5 * (surface.vertices[static_cast<size_t>(triangle[1])] - a)
                    .cross(surface.vertices[static_cast<size_t>(triangle[2])] - a)
                    .norm();
@@ -275,9 +277,11 @@ SimulatedStreet MakeStreet(const StreetOptions& options) {
       add(AnyPointOn(surface, t, &random), false);
     }
   }
-  const int num_outliers = static_cast<int>(options.outliers * static_cast<double>(street.model.points.size()));
+  const int num_outliers =
+      static_cast<int>(options.outliers * static_cast<double>(street.model.points.size()));
   for (int k = 0; k < num_outliers; ++k) {
-    add(size * Eigen::Vector3d(random.Uniform(-15, 70), random.Uniform(-20, 30), random.Uniform(-3, 15)),
+    add(size * Eigen::Vector3d(random.Uniform(-15, 70), random.Uniform(-20, 30),
+                               random.Uniform(-3, 15)),
         true);
   }
   return street;
