@@ -1,6 +1,6 @@
-// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, what
-// roomtex-outline's library makes of them. With FOLDER the first street's model and a dense cloud
-// of it are written there.
+// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, and what the library
+// of roomtex-outline makes of them; models and a dense cloud stay in FOLDER.
+// outline_accuracy --street FOLDER: the model of one street alone, for tests.
 
 #include <cstdio>
 #include <string>
@@ -67,7 +67,6 @@ int Main(const std::string& folder) {
   options.mock_up = true;
   Measure("mock-up", options, folder);
   options = {};
-  WriteSparseModel(MakeStreet(options).model, folder + "/street");
   WriteCloud(MakeDenseStreet(options, 3000000), folder + "/dense.ply");
   return 0;
 }
@@ -75,4 +74,11 @@ int Main(const std::string& folder) {
 }  // namespace
 }  // namespace roomtex
 
-int main(int argc, char** argv) { return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy"); }
+int main(int argc, char** argv) {
+  if (argc == 3 && std::string(argv[1]) == "--street") {
+    roomtex::MakeFolder(argv[2]);
+    roomtex::WriteSparseModel(roomtex::MakeStreet({}).model, std::string(argv[2]) + "/street");
+    return 0;
+  }
+  return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy");
+}
