@@ -67,6 +67,9 @@ int Main(const std::string& folder) {
   options.mock_up = true;
   Measure("mock-up", options, folder);
   options = {};
+  const SparseModel model = MakeStreet(options).model;
+  WriteSparseModel(model, folder + "/street");
+  WriteStreetPhotos(options, model, folder + "/photos", -1);
   WriteCloud(MakeDenseStreet(options, 3000000), folder + "/dense.ply");
   return 0;
 }

@@ -4,9 +4,13 @@
 #include <cmath>
 #include <fstream>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "building/building_solid.h"
 #include "building/cell_arrangement.h"
 #include "core/frames.h"
+#include "core/output_file.h"
+#include "core/parallel.h"
 #include "core/random_stream.h"
 #include "core/ray_caster.h"
 
@@ -285,6 +289,43 @@ SimulatedStreet MakeStreet(const StreetOptions& options) {
         true);
   }
   return street;
+}
+
+void WriteStreetPhotos(const StreetOptions& options, const SparseModel& model,
+                       const std::string& folder, int num_threads) {
+  const StreetSurface surface = SurfaceOf(options, Houses(options));
+  const RayCaster caster(surface.vertices, surface.triangles);
+  constexpr int kReduced = 8;
+  MakeFolder(folder);
+  for (const auto& [id, image] : model.images) {
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const CameraProjection projection(camera);
+    const Eigen::Vector3d eye = image.cam_from_model.TargetOriginInSource();
+    cv::Mat photo(camera.height / kReduced, camera.width / kReduced, CV_8UC3);
+    ParallelFor(num_threads, 0, photo.rows, [&](int row) {
+      for (int column = 0; column < photo.cols; ++column) {
+        const Eigen::Vector3d ray =
+            *projection.RayFromImg(kReduced * Eigen::Vector2d(column + 0.5, row + 0.5));
+        const Eigen::Vector3d direction =
+            (image.cam_from_model.rotation.conjugate() * ray).normalized();
+        const auto hit = caster.Cast(eye, direction);
+        cv::Vec3b color(235, 206, 170);  // the sky
+        if (hit) {
+          // Squares of a metre, each face in colours of its own.
+          const Eigen::Vector3d at =
+              (hit->point * 1.0 + Eigen::Vector3d(0.01, 0.02, 0.03)).array().floor();
+          const auto square = static_cast<uint64_t>(static_cast<int64_t>(at.x()) * 31 +
+                                                    static_cast<int64_t>(at.y()) * 57 +
+                                                    static_cast<int64_t>(at.z()) * 101 + 100000);
+          const uint64_t bits =
+              MixBits(square, surface.wall[static_cast<size_t>(hit->triangle)] ? 1 : 2);
+          for (int c = 0; c < 3; ++c) color[c] = static_cast<uchar>(70 + (bits >> (8 * c)) % 150);
+        }
+        photo.at<cv::Vec3b>(row, column) = color;
+      }
+    });
+    cv::imwrite(folder + "/" + image.name, photo);
+  }
 }
 
 std::vector<Eigen::Vector3d> MakeDenseStreet(const StreetOptions& options, size_t count) {

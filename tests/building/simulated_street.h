@@ -32,6 +32,11 @@ struct SimulatedStreet {
 
 SimulatedStreet MakeStreet(const StreetOptions& options);
 
+// The photos of the model at an eighth of their size, walls and roofs in coloured squares, as JPEG
+// into `folder` under the names of the model.
+void WriteStreetPhotos(const StreetOptions& options, const SparseModel& model,
+                       const std::string& folder, int num_threads);
+
 // Points on everything, as a dense reconstruction has them: `count`, without tracks.
 std::vector<Eigen::Vector3d> MakeDenseStreet(const StreetOptions& options, size_t count);
 // Binary PLY, x y z float.
