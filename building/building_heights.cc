@@ -13,8 +13,6 @@
 namespace roomtex {
 namespace {
 
-constexpr double kPointsPerIndependent = 6;  // as in wall_lines.cc
-
 // z = height + gradient . (x - centre), robustly.
 struct HeightFit {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero(), gradient = Eigen::Vector2d::Zero();

@@ -33,31 +33,14 @@ const char* SurfaceName(FaceKind kind) {
   }
 }
 
-struct Heights {
-  double eaves = std::numeric_limits<double>::infinity();   // the roof's lowest point
-  double ridge = -std::numeric_limits<double>::infinity();  // its highest
-};
-
-Heights HeightsOf(const BuildingSolid& solid) {
-  Heights heights;
-  for (const SolidFace& face : solid.faces) {
-    if (face.kind != FaceKind::kRoof) continue;
-    for (const Eigen::Vector3d& corner : solid.CornersOf(face)) {
-      heights.eaves = std::min(heights.eaves, corner.z());
-      heights.ridge = std::max(heights.ridge, corner.z());
-    }
-  }
-  return heights;
-}
-
 // What GIS programs show of a building.
 Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid) {
-  const Heights heights = HeightsOf(solid);
+  const auto [eaves, ridge] = solid.RoofHeights();
   Json json;
   json["ground_height"] = building.ground;
-  json["eaves_height"] = heights.eaves;
-  json["ridge_height"] = heights.ridge;
-  json["measured_height"] = heights.ridge - building.ground;
+  json["eaves_height"] = eaves;
+  json["ridge_height"] = ridge;
+  json["measured_height"] = ridge - building.ground;
   json["roof"] = building.RoofShape();
   json["footprint_area"] = PolygonArea(building.footprint);
   json["volume"] = solid.Volume();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -179,6 +180,18 @@ double BuildingSolid::Volume() const {
     volume += NewellNormal(corners).dot(corners[0] - vertices[0]) / 6;
   }
   return volume;
+}
+
+std::pair<double, double> BuildingSolid::RoofHeights() const {
+  double eaves = std::numeric_limits<double>::infinity(), ridge = -eaves;
+  for (const SolidFace& face : faces) {
+    if (face.kind != SolidFace::Kind::kRoof) continue;
+    for (const int v : face.corners) {
+      eaves = std::min(eaves, vertices[v].z());
+      ridge = std::max(ridge, vertices[v].z());
+    }
+  }
+  return {eaves, ridge};
 }
 
 std::vector<Eigen::Vector3d> BuildingSolid::CornersOf(const SolidFace& face) const {

@@ -22,8 +22,8 @@ class SightGrid {
  public:
   SightGrid(const Eigen::AlignedBox2d& box, double side) : low_(box.min()), side_(side) {
     const Eigen::Vector2d size = box.sizes() / side;
-    columns_ = static_cast<int>(std::min(2000.0, std::ceil(size.x()))) + 1;
-    rows_ = static_cast<int>(std::min(2000.0, std::ceil(size.y()))) + 1;
+    columns_ = static_cast<int>(std::ceil(size.x())) + 1;
+    rows_ = static_cast<int>(std::ceil(size.y())) + 1;
     squares_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
   }
   struct Square {
@@ -36,13 +36,20 @@ class SightGrid {
     return &squares_[static_cast<size_t>(at.y()) * static_cast<size_t>(columns_) +
                      static_cast<size_t>(at.x())];
   }
+  // The squares whose centres lie in a convex polygon.
   template <typename Visit>
-  void ForEach(const Visit& visit) const {
-    for (int row = 0; row < rows_; ++row) {
-      for (int column = 0; column < columns_; ++column) {
+  void ForEachIn(const std::vector<Eigen::Vector2d>& polygon, const Visit& visit) const {
+    Eigen::AlignedBox2d box;
+    for (const Eigen::Vector2d& corner : polygon) box.extend(corner);
+    const Eigen::Vector2d low = (box.min() - low_) / side_, high = (box.max() - low_) / side_;
+    const int last_column = std::min(columns_ - 1, static_cast<int>(high.x()));
+    const int last_row = std::min(rows_ - 1, static_cast<int>(high.y()));
+    for (int row = std::max(0, static_cast<int>(low.y())); row <= last_row; ++row) {
+      for (int column = std::max(0, static_cast<int>(low.x())); column <= last_column; ++column) {
         const Eigen::Vector2d centre = low_ + side_ * Eigen::Vector2d(column + 0.5, row + 0.5);
-        visit(centre, squares_[static_cast<size_t>(row) * static_cast<size_t>(columns_) +
-                               static_cast<size_t>(column)]);
+        if (!IsInside(polygon, centre)) continue;
+        visit(squares_[static_cast<size_t>(row) * static_cast<size_t>(columns_) +
+                       static_cast<size_t>(column)]);
       }
     }
   }
@@ -186,7 +193,9 @@ class FootprintFinder {
   }
 
   void FillGrid() {
-    const double side = std::max(1.2 * cloud_.spacing, cloud_.step / 4);
+    constexpr double kMostSquares = 1500;  // along a side
+    const double side =
+        std::max({1.2 * cloud_.spacing, cloud_.step / 4, box_.sizes().maxCoeff() / kMostSquares});
     grid_ = std::make_unique<SightGrid>(box_, side);
     for (const int s : roofs_) {
       for (const int i : segments_[static_cast<size_t>(s)].points) {
@@ -234,32 +243,24 @@ class FootprintFinder {
     }
   }
 
-  int CellAt(const Eigen::Vector2d& x) const {
-    for (size_t i = 0; i < polygons_.size(); ++i) {
-      if (IsInside(polygons_[i], x)) return static_cast<int>(i);
-    }
-    return -1;
-  }
-
   void CountEvidence() {
     const size_t n = cells_.cells.size();
     inside_.assign(n, 0), outside_.assign(n, 0);
     by_roof_.assign(n, {});
     const double per_square = grid_->side() * grid_->side() / cloud_.step;
     constexpr double kUnknown = 0.04;  // what nobody sees into is rather a building
-    grid_->ForEach([&](const Eigen::Vector2d& centre, const SightGrid::Square& square) {
-      const int cell = CellAt(centre);
-      if (cell < 0) return;
-      const size_t c = static_cast<size_t>(cell);
-      for (const auto& [s, count] : square.by_roof) by_roof_[c][s] += 1;
-      if (square.roof > 0) {
-        inside_[c] += per_square;
-      } else if (square.ground > 0 || square.free > 2) {
-        outside_[c] += per_square;
-      } else {
-        inside_[c] += kUnknown * per_square;
-      }
-    });
+    for (size_t c = 0; c < n; ++c) {
+      grid_->ForEachIn(polygons_[c], [&](const SightGrid::Square& square) {
+        for (const auto& [s, count] : square.by_roof) by_roof_[c][s] += 1;
+        if (square.roof > 0) {
+          inside_[c] += per_square;
+        } else if (square.ground > 0 || square.free > 2) {
+          outside_[c] += per_square;
+        } else {
+          inside_[c] += kUnknown * per_square;
+        }
+      });
+    }
   }
 
   // --- the cut

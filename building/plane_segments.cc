@@ -16,7 +16,7 @@ namespace {
 constexpr int kNeighboursForNormal = 14;
 constexpr int kSeedsPerRound = 256;
 constexpr int kGrownPerRound = 6;
-constexpr size_t kMaxSegments = 400;
+constexpr size_t kMaxSegments = 1500;
 constexpr int kMaxBarren = 12;  // rounds without a find
 constexpr size_t kFewestOnPlane = 12;
 const double kMinNormalCosine = std::cos(RadFromDeg(40));

@@ -10,9 +10,6 @@
 namespace roomtex {
 namespace {
 
-// Points of a wall are not independent: features sit on sills and frames. One in so many counts.
-constexpr double kPointsPerIndependent = 6;
-
 void FindStretches(const OutlineCloud& cloud, WallLine* wall) {
   std::vector<double> along;
   for (const Eigen::Vector2d& x : wall->points) along.push_back(wall->line.Direction().dot(x));

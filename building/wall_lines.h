@@ -8,6 +8,10 @@
 
 namespace roomtex {
 
+// Points of a wall or a roof are not independent: features sit on sills and frames, poses err. One
+// in so many counts.
+inline constexpr double kPointsPerIndependent = 6;
+
 enum class SegmentRole { kWall, kRoof, kOther };
 SegmentRole RoleOf(const OutlineCloud& cloud, const GroundPlane& ground,
                    const PlaneSegment& segment);

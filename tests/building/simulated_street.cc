@@ -366,18 +366,6 @@ StreetErrors CompareStreet(const Outline& truth, const Outline& found,
     return found_from_truth * Eigen::Vector3d(x.x(), x.y(), z);
   };
   const double scale = found_from_truth.scale;
-  const auto heights = [](const OutlineBuilding& building) {
-    const BuildingSolid solid = ExtrudeBuilding(building);
-    std::pair<double, double> range(std::numeric_limits<double>::infinity(), -1e300);
-    for (const SolidFace& face : solid.faces) {
-      if (face.kind != SolidFace::Kind::kRoof) continue;
-      for (const Eigen::Vector3d& corner : solid.CornersOf(face)) {
-        range.first = std::min(range.first, corner.z());
-        range.second = std::max(range.second, corner.z());
-      }
-    }
-    return range;
-  };
   for (const OutlineBuilding& house : truth.buildings) {
     const OutlineBuilding* best = nullptr;
     double best_error = std::numeric_limits<double>::infinity();
@@ -398,8 +386,8 @@ StreetErrors CompareStreet(const Outline& truth, const Outline& found,
       ++errors.missed;
       continue;
     }
-    const auto [true_eaves, true_ridge] = heights(house);
-    const auto [eaves, ridge] = heights(*best);
+    const auto [true_eaves, true_ridge] = ExtrudeBuilding(house).RoofHeights();
+    const auto [eaves, ridge] = ExtrudeBuilding(*best).RoofHeights();
     const auto z_of = [&](double z) { return moved(house.footprint[0], z).z(); };
     errors.corner = std::max(errors.corner, best_error / scale);
     errors.ground = std::max(errors.ground, std::abs(best->ground - z_of(house.ground)) / scale);
