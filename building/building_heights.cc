@@ -13,8 +13,6 @@
 namespace roomtex {
 namespace {
 
-constexpr double kPointsPerIndependent = 6;  // as in wall_lines.cc
-
 // z = height + gradient . (x - centre), robustly.
 struct HeightFit {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero(), gradient = Eigen::Vector2d::Zero();
@@ -65,8 +63,8 @@ HeightFit FitHeights(const std::vector<Eigen::Vector3d>& points, const Eigen::Ma
     Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(3, 1 + free);
     spread(0, 0) = 1;
     spread.bottomRightCorner(2, free) = directions;
-    fit.covariance = fit.rms * fit.rms * kPointsPerIndependent * spread * inverse *
-                     spread.transpose();
+    fit.covariance =
+        fit.rms * fit.rms * kPointsPerIndependent * spread * inverse * spread.transpose();
   }
   return fit;
 }
@@ -75,8 +73,7 @@ double DistanceToEdges(const std::vector<Eigen::Vector2d>& polygon, const Eigen:
   double nearest = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double share =
-        std::clamp((x - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+    const double share = std::clamp((x - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
     nearest = std::min(nearest, (x - a - share * (b - a)).norm());
   }
   return nearest;
@@ -133,8 +130,7 @@ HeightFit FitRoofPlane(const std::vector<Eigen::Vector3d>& points,
                        const std::vector<Eigen::Vector2d>& footprint, double floor_rms) {
   const HeightFit fit = FitHeights(points, Eigen::Matrix2d::Identity(), floor_rms);
   const double slope = fit.gradient.norm();
-  const double sigma =
-      std::sqrt(std::max(fit.covariance(1, 1), fit.covariance(2, 2)));
+  const double sigma = std::sqrt(std::max(fit.covariance(1, 1), fit.covariance(2, 2)));
   if (slope < std::max(3 * sigma, std::tan(RadFromDeg(0.7)))) {
     return FitHeights(points, Eigen::Matrix2Xd(2, 0), floor_rms);
   }
@@ -142,7 +138,8 @@ HeightFit FitRoofPlane(const std::vector<Eigen::Vector3d>& points,
   double best = allowed;
   Eigen::Vector2d direction = Eigen::Vector2d::Zero();
   for (size_t i = 0; i < footprint.size(); ++i) {
-    const Eigen::Vector2d along = (footprint[(i + 1) % footprint.size()] - footprint[i]).normalized();
+    const Eigen::Vector2d along =
+        (footprint[(i + 1) % footprint.size()] - footprint[i]).normalized();
     const Eigen::Vector2d across(along.y(), -along.x());
     const double angle = std::acos(std::min(1.0, std::abs(across.dot(fit.gradient)) / slope));
     if (angle < best) best = angle, direction = across;
@@ -221,8 +218,8 @@ bool FindHeights(const OutlineCloud& cloud, const GroundPlane& ground,
   double sum_squares = 0;
   int count = 0;
   for (const auto& [fit, points] : fits) {
-    building->roof.push_back(RoofPlane::FromGradient(
-        {fit.centre.x(), fit.centre.y(), fit.height}, fit.gradient));
+    building->roof.push_back(
+        RoofPlane::FromGradient({fit.centre.x(), fit.centre.y(), fit.height}, fit.gradient));
     sum_squares += fit.rms * fit.rms * fit.num_points;
     count += fit.num_points;
   }
@@ -240,14 +237,14 @@ bool FindHeights(const OutlineCloud& cloud, const GroundPlane& ground,
   std::vector<std::pair<int, int>> squares;
   for (const auto& [fit, points] : fits) {
     for (const Eigen::Vector3d& x : points) {
-      squares.emplace_back(static_cast<int>(std::floor((x.x() - building->footprint[0].x()) / side)),
-                           static_cast<int>(std::floor((x.y() - building->footprint[0].y()) / side)));
+      squares.emplace_back(
+          static_cast<int>(std::floor((x.x() - building->footprint[0].x()) / side)),
+          static_cast<int>(std::floor((x.y() - building->footprint[0].y()) / side)));
     }
   }
   std::sort(squares.begin(), squares.end());
   squares.erase(std::unique(squares.begin(), squares.end()), squares.end());
-  evidence->roof_covered =
-      std::min(1.0, static_cast<double>(squares.size()) * side * side / area);
+  evidence->roof_covered = std::min(1.0, static_cast<double>(squares.size()) * side * side / area);
   return true;
 }
 
@@ -304,8 +301,7 @@ void AddWallEvidence(const OutlineCloud& cloud, const GroundPlane& ground,
     if (!lines.empty() && !inferred && lines[i].points.size() > 0) {
       wall.sigma_offset = lines[i].sigma_offset;
       wall.sigma_angle = lines[i].sigma_angle;
-      wall.middle = lines[i].middle -
-                    lines[i].line.Direction().dot(building.footprint[i]);
+      wall.middle = lines[i].middle - lines[i].line.Direction().dot(building.footprint[i]);
       // The line may run the other way.
       const Eigen::Vector2d d = building.footprint[(i + 1) % n] - building.footprint[i];
       if (lines[i].line.Direction().dot(d) < 0) wall.middle = -wall.middle;

@@ -33,31 +33,14 @@ const char* SurfaceName(FaceKind kind) {
   }
 }
 
-struct Heights {
-  double eaves = std::numeric_limits<double>::infinity();   // the roof's lowest point
-  double ridge = -std::numeric_limits<double>::infinity();  // its highest
-};
-
-Heights HeightsOf(const BuildingSolid& solid) {
-  Heights heights;
-  for (const SolidFace& face : solid.faces) {
-    if (face.kind != FaceKind::kRoof) continue;
-    for (const Eigen::Vector3d& corner : solid.CornersOf(face)) {
-      heights.eaves = std::min(heights.eaves, corner.z());
-      heights.ridge = std::max(heights.ridge, corner.z());
-    }
-  }
-  return heights;
-}
-
 // What GIS programs show of a building.
 Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid) {
-  const Heights heights = HeightsOf(solid);
+  const auto [eaves, ridge] = solid.RoofHeights();
   Json json;
   json["ground_height"] = building.ground;
-  json["eaves_height"] = heights.eaves;
-  json["ridge_height"] = heights.ridge;
-  json["measured_height"] = heights.ridge - building.ground;
+  json["eaves_height"] = eaves;
+  json["ridge_height"] = ridge;
+  json["measured_height"] = ridge - building.ground;
   json["roof"] = building.RoofShape();
   json["footprint_area"] = PolygonArea(building.footprint);
   json["volume"] = solid.Volume();
@@ -110,7 +93,8 @@ void WriteBuildingsObj(const std::string& path, const Outline& outline) {
     FaceKind last = FaceKind::kGround;
     bool any = false;
     for (const SolidFace& face : solid.faces) {
-      if (!any || face.kind != last) stream << "g " << SurfaceName(face.kind) << "_" << name << "\n";
+      if (!any || face.kind != last)
+        stream << "g " << SurfaceName(face.kind) << "_" << name << "\n";
       any = true;
       last = face.kind;
       for (const Triangle& t : TrianglesOf(solid, face)) {
@@ -162,7 +146,8 @@ class BuildingGlb {
       std::vector<float> positions, normals;
       for (const SolidFace& face : solid.faces) {
         if (face.kind != kind) continue;
-        for (const Triangle& t : TrianglesOf(solid, face)) AddTriangle(solid, t, centre, &positions, &normals);
+        for (const Triangle& t : TrianglesOf(solid, face))
+          AddTriangle(solid, t, centre, &positions, &normals);
       }
       if (positions.empty()) continue;
       tinygltf::Primitive primitive;
@@ -194,7 +179,9 @@ class BuildingGlb {
   static void AddTriangle(const BuildingSolid& solid, const Triangle& t,
                           const Eigen::Vector3d& centre, std::vector<float>* positions,
                           std::vector<float>* normals) {
-    const auto at = [&](int k) { return solid.vertices[static_cast<size_t>(t[static_cast<size_t>(k)])]; };
+    const auto at = [&](int k) {
+      return solid.vertices[static_cast<size_t>(t[static_cast<size_t>(k)])];
+    };
     const Eigen::Vector3d normal = (at(1) - at(0)).cross(at(2) - at(0)).normalized();
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d x = at(k) - centre;
@@ -363,8 +350,8 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
     pugi::xml_node node = city.append_child("core:cityObjectMember").append_child("bldg:Building");
     node.append_attribute("gml:id") = id.c_str();
     node.append_child("gml:name").text() = building.name.c_str();
-    for (const char* name : {"ground_height", "eaves_height", "ridge_height", "footprint_area",
-                             "volume"}) {
+    for (const char* name :
+         {"ground_height", "eaves_height", "ridge_height", "footprint_area", "volume"}) {
       AddMeasure(&node, name, attributes[name].get<double>());
     }
     pugi::xml_node measured = node.append_child("bldg:measuredHeight");
@@ -379,12 +366,13 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
       const std::string face_id = id + "_" + std::to_string(++face_number);
       composite.append_child("gml:surfaceMember").append_attribute("xlink:href") =
           ("#" + face_id).c_str();
-      pugi::xml_node polygon = node.append_child("bldg:boundedBy")
-                                   .append_child((std::string("bldg:") + SurfaceName(face.kind)).c_str())
-                                   .append_child("bldg:lod2MultiSurface")
-                                   .append_child("gml:MultiSurface")
-                                   .append_child("gml:surfaceMember")
-                                   .append_child("gml:Polygon");
+      pugi::xml_node polygon =
+          node.append_child("bldg:boundedBy")
+              .append_child((std::string("bldg:") + SurfaceName(face.kind)).c_str())
+              .append_child("bldg:lod2MultiSurface")
+              .append_child("gml:MultiSurface")
+              .append_child("gml:surfaceMember")
+              .append_child("gml:Polygon");
       polygon.append_attribute("gml:id") = face_id.c_str();
       pugi::xml_node positions = polygon.append_child("gml:exterior")
                                      .append_child("gml:LinearRing")
@@ -474,8 +462,8 @@ void WriteBuildingsGlb(const std::string& path, const Outline& outline) {
 
 BuildingWriter WriterOf(const std::string& path) {
   static const std::pair<const char*, BuildingWriter> kWriters[] = {
-      {".obj", WriteBuildingsObj},     {".glb", WriteBuildingsGlb}, {".city.json", WriteCityJson},
-      {".cityjson", WriteCityJson},    {".gml", WriteCityGml},      {".citygml", WriteCityGml},
+      {".obj", WriteBuildingsObj},  {".glb", WriteBuildingsGlb}, {".city.json", WriteCityJson},
+      {".cityjson", WriteCityJson}, {".gml", WriteCityGml},      {".citygml", WriteCityGml},
       {".geojson", WriteGeoJson},
   };
   for (const auto& [extension, writer] : kWriters) {

@@ -20,8 +20,8 @@ bool IsBuildingPath(const std::string& path);
 //   .gml         CityGML 2.0, the same (also .citygml)
 //   .geojson     footprints with heights; WGS84 longitude and latitude (RFC 7946) where the outline
 //                lies on the Earth, else its own coordinates, with a sentence that says so
-// CityJSON and CityGML are in UTM (WGS84; heights above the ellipsoid) where the outline lies on the
-// Earth, else in its own coordinates. Written aside and renamed. Throws InputError.
+// CityJSON and CityGML are in UTM (WGS84; heights above the ellipsoid) where the outline lies on
+// the Earth, else in its own coordinates. Written aside and renamed. Throws InputError.
 void WriteBuildings(const std::string& path, const Outline& outline);
 
 }  // namespace roomtex

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -55,8 +56,8 @@ class SolidBuilder {
         if (gradient.norm() < 1e-9) continue;
         Line2 line;
         line.normal = gradient.normalized();
-        line.offset =
-            line.normal.dot(box.min()) + (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
+        line.offset = line.normal.dot(box.min()) +
+                      (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
         lines.push_back(line);
       }
     }
@@ -106,8 +107,8 @@ class SolidBuilder {
   }
 
   int VertexAt(int vertex, bool on_roof) {
-    const auto [at, is_new] = index_.emplace(std::make_pair(vertex, on_roof),
-                                             static_cast<int>(solid_.vertices.size()));
+    const auto [at, is_new] =
+        index_.emplace(std::make_pair(vertex, on_roof), static_cast<int>(solid_.vertices.size()));
     if (is_new) {
       const Eigen::Vector2d& x = cells_.vertices[vertex];
       const double z = on_roof ? building_.RoofHeightAt(x) : building_.ground;
@@ -179,6 +180,18 @@ double BuildingSolid::Volume() const {
     volume += NewellNormal(corners).dot(corners[0] - vertices[0]) / 6;
   }
   return volume;
+}
+
+std::pair<double, double> BuildingSolid::RoofHeights() const {
+  double eaves = std::numeric_limits<double>::infinity(), ridge = -eaves;
+  for (const SolidFace& face : faces) {
+    if (face.kind != SolidFace::Kind::kRoof) continue;
+    for (const int v : face.corners) {
+      eaves = std::min(eaves, vertices[v].z());
+      ridge = std::max(ridge, vertices[v].z());
+    }
+  }
+  return {eaves, ridge};
 }
 
 std::vector<Eigen::Vector3d> BuildingSolid::CornersOf(const SolidFace& face) const {

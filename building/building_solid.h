@@ -2,7 +2,7 @@
 // Buildings as closed solids: footprints extruded to their roofs (thesis 9.3, steps 5 and 6), with
 // the semantic surfaces of CityGML at level of detail 2.
 
-#include <array>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -24,6 +24,8 @@ struct BuildingSolid {
   std::vector<SolidFace> faces;
 
   double Volume() const;
+  // Of the roof's lowest and highest corner: eaves and ridge.
+  std::pair<double, double> RoofHeights() const;
   std::vector<Eigen::Vector3d> CornersOf(const SolidFace& face) const;
 };
 

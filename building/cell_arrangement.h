@@ -1,6 +1,6 @@
 #pragma once
-// The plane cut into convex cells by straight lines, and the outlines of unions of cells. Footprints
-// and roofs are unions of cells, so that what touches shares its corners exactly.
+// The plane cut into convex cells by straight lines, and the outlines of unions of cells.
+// Footprints and roofs are unions of cells, so that what touches shares its corners exactly.
 
 #include <map>
 #include <utility>

@@ -22,8 +22,8 @@ class SightGrid {
  public:
   SightGrid(const Eigen::AlignedBox2d& box, double side) : low_(box.min()), side_(side) {
     const Eigen::Vector2d size = box.sizes() / side;
-    columns_ = static_cast<int>(std::min(2000.0, std::ceil(size.x()))) + 1;
-    rows_ = static_cast<int>(std::min(2000.0, std::ceil(size.y()))) + 1;
+    columns_ = static_cast<int>(std::ceil(size.x())) + 1;
+    rows_ = static_cast<int>(std::ceil(size.y())) + 1;
     squares_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
   }
   struct Square {
@@ -36,13 +36,20 @@ class SightGrid {
     return &squares_[static_cast<size_t>(at.y()) * static_cast<size_t>(columns_) +
                      static_cast<size_t>(at.x())];
   }
+  // The squares whose centres lie in a convex polygon.
   template <typename Visit>
-  void ForEach(const Visit& visit) const {
-    for (int row = 0; row < rows_; ++row) {
-      for (int column = 0; column < columns_; ++column) {
+  void ForEachIn(const std::vector<Eigen::Vector2d>& polygon, const Visit& visit) const {
+    Eigen::AlignedBox2d box;
+    for (const Eigen::Vector2d& corner : polygon) box.extend(corner);
+    const Eigen::Vector2d low = (box.min() - low_) / side_, high = (box.max() - low_) / side_;
+    const int last_column = std::min(columns_ - 1, static_cast<int>(high.x()));
+    const int last_row = std::min(rows_ - 1, static_cast<int>(high.y()));
+    for (int row = std::max(0, static_cast<int>(low.y())); row <= last_row; ++row) {
+      for (int column = std::max(0, static_cast<int>(low.x())); column <= last_column; ++column) {
         const Eigen::Vector2d centre = low_ + side_ * Eigen::Vector2d(column + 0.5, row + 0.5);
-        visit(centre, squares_[static_cast<size_t>(row) * static_cast<size_t>(columns_) +
-                               static_cast<size_t>(column)]);
+        if (!IsInside(polygon, centre)) continue;
+        visit(squares_[static_cast<size_t>(row) * static_cast<size_t>(columns_) +
+                       static_cast<size_t>(column)]);
       }
     }
   }
@@ -113,8 +120,8 @@ class FootprintFinder {
     std::vector<Eigen::Vector2d> families;
     for (const Eigen::Vector2d& normal : normals) {
       for (const Eigen::Vector2d& n : {normal, Eigen::Vector2d(-normal.y(), normal.x())}) {
-        const bool known = std::any_of(
-            families.begin(), families.end(), [&](const Eigen::Vector2d& other) {
+        const bool known =
+            std::any_of(families.begin(), families.end(), [&](const Eigen::Vector2d& other) {
               return std::abs(other.dot(n)) > std::cos(RadFromDeg(10));
             });
         if (!known) families.push_back(n);
@@ -186,7 +193,9 @@ class FootprintFinder {
   }
 
   void FillGrid() {
-    const double side = std::max(1.2 * cloud_.spacing, cloud_.step / 4);
+    constexpr double kMostSquares = 1500;  // along a side
+    const double side =
+        std::max({1.2 * cloud_.spacing, cloud_.step / 4, box_.sizes().maxCoeff() / kMostSquares});
     grid_ = std::make_unique<SightGrid>(box_, side);
     for (const int s : roofs_) {
       for (const int i : segments_[static_cast<size_t>(s)].points) {
@@ -234,32 +243,24 @@ class FootprintFinder {
     }
   }
 
-  int CellAt(const Eigen::Vector2d& x) const {
-    for (size_t i = 0; i < polygons_.size(); ++i) {
-      if (IsInside(polygons_[i], x)) return static_cast<int>(i);
-    }
-    return -1;
-  }
-
   void CountEvidence() {
     const size_t n = cells_.cells.size();
     inside_.assign(n, 0), outside_.assign(n, 0);
     by_roof_.assign(n, {});
     const double per_square = grid_->side() * grid_->side() / cloud_.step;
     constexpr double kUnknown = 0.04;  // what nobody sees into is rather a building
-    grid_->ForEach([&](const Eigen::Vector2d& centre, const SightGrid::Square& square) {
-      const int cell = CellAt(centre);
-      if (cell < 0) return;
-      const size_t c = static_cast<size_t>(cell);
-      for (const auto& [s, count] : square.by_roof) by_roof_[c][s] += 1;
-      if (square.roof > 0) {
-        inside_[c] += per_square;
-      } else if (square.ground > 0 || square.free > 2) {
-        outside_[c] += per_square;
-      } else {
-        inside_[c] += kUnknown * per_square;
-      }
-    });
+    for (size_t c = 0; c < n; ++c) {
+      grid_->ForEachIn(polygons_[c], [&](const SightGrid::Square& square) {
+        for (const auto& [s, count] : square.by_roof) by_roof_[c][s] += 1;
+        if (square.roof > 0) {
+          inside_[c] += per_square;
+        } else if (square.ground > 0 || square.free > 2) {
+          outside_[c] += per_square;
+        } else {
+          inside_[c] += kUnknown * per_square;
+        }
+      });
+    }
   }
 
   // --- the cut
@@ -329,9 +330,9 @@ class FootprintFinder {
       int below = 0;
       for (const int i : points) {
         const Eigen::Vector3d& x = cloud_.points[static_cast<size_t>(i)];
-        const double z = plane.centre.z() -
-                         plane.normal.head<2>().dot(x.head<2>() - plane.centre.head<2>()) /
-                             plane.normal.z();
+        const double z =
+            plane.centre.z() -
+            plane.normal.head<2>().dot(x.head<2>() - plane.centre.head<2>()) / plane.normal.z();
         below += x.z() <= z + 2 * PlaneTolerance(cloud_);
       }
       return static_cast<double>(below) > 0.85 * static_cast<double>(points.size());
@@ -401,10 +402,10 @@ class FootprintFinder {
       }
       for (size_t c = 0; c < votes.size(); ++c) {
         if (votes[c].empty()) continue;
-        parts[c] = std::max_element(votes[c].begin(), votes[c].end(), [](const auto& a,
-                                                                         const auto& b) {
-                     return a.second < b.second;
-                   })->first;
+        parts[c] =
+            std::max_element(votes[c].begin(), votes[c].end(), [](const auto& a, const auto& b) {
+              return a.second < b.second;
+            })->first;
         changed = true;
       }
     }
@@ -455,8 +456,8 @@ class FootprintFinder {
   CellArrangement cells_;
   std::vector<std::vector<Eigen::Vector2d>> polygons_;
   std::unique_ptr<SightGrid> grid_;
-  std::vector<double> inside_, outside_;        // what speaks for either, units of length
-  std::vector<std::map<int, int>> by_roof_;     // of each cell: squares of each roof segment
+  std::vector<double> inside_, outside_;     // what speaks for either, units of length
+  std::vector<std::map<int, int>> by_roof_;  // of each cell: squares of each roof segment
   std::vector<int> labels_;
 };
 

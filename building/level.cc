@@ -39,8 +39,8 @@ Eigen::Vector3d UpByPlanes(const OutlineCloud& cloud, const std::vector<PlaneSeg
       (d > margin ? above : below) += std::abs(d) > margin ? 1 : 0;
     }
     const double one_sided = std::abs(above - below) / std::max(1.0, above + below);
-    const double score =
-        LevelShare(segments, segment.plane.normal) * one_sided * one_sided * std::sqrt(segment.area);
+    const double score = LevelShare(segments, segment.plane.normal) * one_sided * one_sided *
+                         std::sqrt(segment.area);
     if (score <= best) continue;
     best = score;
     up = above > below ? segment.plane.normal : Eigen::Vector3d(-segment.plane.normal);
@@ -68,16 +68,15 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
   UpFinding finding;
   finding.source = kNames[static_cast<int>(cloud->up_source)];
   Eigen::Vector3d up = cloud->up.normalized();
-  const bool fixed =
-      cloud->up_source == UpSource::kGiven || cloud->up_source == UpSource::kEarth;
+  const bool fixed = cloud->up_source == UpSource::kGiven || cloud->up_source == UpSource::kEarth;
   constexpr double kEnough = 0.5;
   if (cloud->up_source == UpSource::kFile && LevelShare(*segments, up) < kEnough) {
     up = UpByPlanes(*cloud, *segments);
     finding.source = "planes";
   }
   const Eigen::Vector3d start = up;
-  // How well each segment tells the direction of its normal: by its points across its height, and no
-  // better than walls are built.
+  // How well each segment tells the direction of its normal: by its points across its height, and
+  // no better than walls are built.
   const double built = RadFromDeg(0.1), ground = RadFromDeg(1.5), start_sigma = RadFromDeg(5);
   std::vector<double> sigmas;
   for (const PlaneSegment& segment : *segments) {
@@ -94,8 +93,8 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
   for (int round = 0; round < 20; ++round) {
     // Walls are upright, floors and ground nearly level; the start holds what both leave open.
     const double gate = RadFromDeg(round < 5 ? 8 : 3);
-    Eigen::Matrix3d sum = (Eigen::Matrix3d::Identity() - start * start.transpose()) /
-                          (start_sigma * start_sigma);
+    Eigen::Matrix3d sum =
+        (Eigen::Matrix3d::Identity() - start * start.transpose()) / (start_sigma * start_sigma);
     finding.num_walls = 0;
     sum_weights = sum_squares = 0;
     for (size_t s = 0; s < segments->size(); ++s) {
@@ -146,8 +145,7 @@ GroundPlane FindGround(const OutlineCloud& cloud, const std::vector<PlaneSegment
     if (std::abs(n.z()) < std::cos(RadFromDeg(15))) continue;
     GroundPlane plane;
     plane.gradient = -n.head<2>() / n.z();
-    plane.height =
-        segment.plane.centre.z() - plane.gradient.dot(segment.plane.centre.head<2>());
+    plane.height = segment.plane.centre.z() - plane.gradient.dot(segment.plane.centre.head<2>());
     double on = 0, below = 0, above = 0;
     for (size_t i = 0; i < cloud.points.size(); i += 3) {
       const double d = cloud.points[i].z() - plane.HeightAt(cloud.points[i].head<2>());

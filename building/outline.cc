@@ -120,7 +120,8 @@ OutlineBuilding ParseBuilding(const OutlineParser& parser, const Json& json, siz
   for (size_t i = 0; i < roof.size(); ++i) {
     const std::string plane_where = where + " roof plane " + std::to_string(i + 1);
     RoofPlane plane;
-    plane.point = parser.Vector<3>(parser.At(roof[i], "point", plane_where), plane_where + " point");
+    plane.point =
+        parser.Vector<3>(parser.At(roof[i], "point", plane_where), plane_where + " point");
     plane.slope_deg = parser.Number(roof[i], "slope_deg", plane_where);
     plane.downhill_deg = parser.Number(roof[i], "downhill_deg", plane_where);
     building.roof.push_back(plane);
@@ -154,7 +155,8 @@ RoofPlane RoofPlane::FromGradient(const Eigen::Vector3d& point, const Eigen::Vec
   RoofPlane plane;
   plane.point = point;
   plane.slope_deg = DegFromRad(std::atan(gradient.norm()));
-  if (gradient.norm() > 0) plane.downhill_deg = DegFromRad(std::atan2(-gradient.y(), -gradient.x()));
+  if (gradient.norm() > 0)
+    plane.downhill_deg = DegFromRad(std::atan2(-gradient.y(), -gradient.x()));
   return plane;
 }
 
@@ -186,14 +188,15 @@ std::vector<std::string> OutlineBuilding::Problems() const {
   if (!problems.empty()) return problems;
   if (CrossesItself(footprint)) problems.push_back("the footprint crosses or touches itself");
   double size = 0;
-  for (const Eigen::Vector2d& corner : footprint) size = std::max(size, (corner - footprint[0]).norm());
+  for (const Eigen::Vector2d& corner : footprint)
+    size = std::max(size, (corner - footprint[0]).norm());
   if (!(PolygonArea(footprint) > 1e-9 * size * size)) {
     problems.push_back("the footprint has no area");
   }
   for (const Eigen::Vector2d& corner : footprint) {
     if (RoofHeightAt(corner) > ground) continue;
-    problems.push_back("the roof does not lie above the ground at corner " + Significant(corner.x(), 6) +
-                       ", " + Significant(corner.y(), 6));
+    problems.push_back("the roof does not lie above the ground at corner " +
+                       Significant(corner.x(), 6) + ", " + Significant(corner.y(), 6));
     break;
   }
   return problems;

@@ -45,8 +45,8 @@ struct OutlineBuilding {
 struct Outline {
   // Frame of the buildings. `input` is the frame of the points (a model's: `sparse` or `scan`).
   Similarity outline_from_input;
-  bool metric = false;               // lengths are metres, else units of the input
-  std::optional<GeoFrame> geo;       // the frame is `enu` about this place
+  bool metric = false;          // lengths are metres, else units of the input
+  std::optional<GeoFrame> geo;  // the frame is `enu` about this place
   std::vector<OutlineBuilding> buildings;
 
   const char* Unit() const { return metric ? "metres" : "units of the input"; }

@@ -51,8 +51,8 @@ std::optional<GeoPosition> GivenOrigin(const std::string& text) {
   return GeoPosition{numbers[0], numbers[1], numbers[2]};
 }
 
-// Gravity by the cameras: people hold them level, wide or high, whatever they tilt, so that one axis
-// of the picture is horizontal (Szeliski 2006, "Image alignment and stitching", 2.5).
+// Gravity by the cameras: people hold them level, wide or high, whatever they tilt, so that one
+// axis of the picture is horizontal (Szeliski 2006, "Image alignment and stitching", 2.5).
 std::optional<Eigen::Vector3d> UpOfCameras(const SparseModel& model) {
   struct Axes {
     Eigen::Vector3d x, y;  // right and down
@@ -87,7 +87,7 @@ std::optional<Eigen::Vector3d> UpOfCameras(const SparseModel& model) {
       if (guess.norm() < 0.2) continue;
       guess.normalize();
       guesses.push_back(guess.dot(cameras[i].y + cameras[j].y) > 0 ? Eigen::Vector3d(-guess)
-                                                                    : guess);
+                                                                   : guess);
     }
     for (const Eigen::Vector3d& guess : guesses) {
       const double score = score_of(guess);
@@ -159,7 +159,7 @@ ModelPlace PlaceOfModel(const std::string& folder) {
   return place;
 }
 
-// The frame of COLMAP's model_aligner --alignment_type ecef: everything as far from the origin as
+// The frame of COLMAP's model_aligner, ecef: everything as far from the origin as
 // the ground is from the middle of the Earth.
 bool LooksEarthCentred(const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> norms;
@@ -206,10 +206,9 @@ void ThinOut(double side, const Eigen::Vector3d& origin, OutlineCloud* cloud) {
   index.reserve(2 * kMaxOutlinePoints);
   for (size_t i = 0; i < cloud->points.size(); ++i) {
     const Eigen::Vector3d at = (cloud->points[i] - origin) / side;
-    const uint64_t key =
-        MixBits(static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.x()))),
-                static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.y()))),
-                static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.z()))));
+    const uint64_t key = MixBits(static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.x()))),
+                                 static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.y()))),
+                                 static_cast<uint64_t>(static_cast<int64_t>(std::floor(at.z()))));
     const auto [found, is_new] = index.emplace(key, cubes.size());
     if (is_new) cubes.push_back({Eigen::Vector3d::Zero(), 0, i});
     Cube& cube = cubes[found->second];
@@ -268,12 +267,11 @@ void OutlineInputOptions::Declare(OptionFields* fields) {
                     "For a scan file as --input_path: the COLMAP model in the same frame (a dense "
                     "cloud's own model). Its cameras tell what is up, roomtex-align's "
                     "alignment.json beside it scale and place on the Earth.");
-  fields
-      ->Text("up", &up,
-             "x,y,z: what points up in the frame of the input; empty = by the cameras or the "
-             "file, refined by walls and ground.")
-      .Also(up.empty() || GivenUp(up).has_value())
-      .SaysSentence("--up must be three numbers x,y,z that are not all 0");
+  fields->Text("up", &up,
+               "x,y,z: what points up in the frame of the input; empty = by the cameras or the "
+               "file, refined by walls and ground.");
+  fields->Require(up.empty() || GivenUp(up).has_value(),
+                  "--up must be three numbers x,y,z that are not all 0");
   fields
       ->Number("scale", &scale,
                "Metres per unit of the input; 0 = 1 for scan files and models of roomtex-align, "
@@ -282,16 +280,15 @@ void OutlineInputOptions::Declare(OptionFields* fields) {
       .Finite();
   const bool fine = geo_origin.empty() || (GivenOrigin(geo_origin).has_value() &&
                                            GivenOrigin(geo_origin)->Problems().empty());
-  fields
-      ->Text("geo_origin", &geo_origin,
-             "LATITUDE,LONGITUDE,HEIGHT (degrees WGS84, metres above the ellipsoid): the input's "
-             "frame is east-north-up about this place, in metres. Not needed for models that "
-             "roomtex-align placed on the Earth, nor for Earth-centred ones (COLMAP's "
-             "model_aligner --alignment_type ecef).")
-      .Also(fine)
-      .SaysSentence(
-          "--geo_origin must be LATITUDE,LONGITUDE,HEIGHT in degrees (-90 to 90, -180 to 360) and "
-          "metres");
+  fields->Text("geo_origin", &geo_origin,
+               "LATITUDE,LONGITUDE,HEIGHT (degrees WGS84, metres above the ellipsoid): the input's "
+               "frame is east-north-up about this place, in metres. Not needed for models that "
+               "roomtex-align placed on the Earth, nor for Earth-centred ones (COLMAP's "
+               "model_aligner, ecef).");
+  fields->Require(
+      fine,
+      "--geo_origin must be LATITUDE,LONGITUDE,HEIGHT in degrees (-90 to 90, -180 to 360) and "
+      "metres");
   reader.Declare(fields);
 }
 std::vector<std::string> OutlineInputOptions::Problems() const {
@@ -365,8 +362,10 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
   cloud.num_read = static_cast<double>(cloud.points.size());
   if (cloud.points.size() < kFewestPoints) {
     throw InputError(options.input_path, "",
-                     "holds " + std::to_string(cloud.points.size()) + " points, too few for a "
-                     "building (at least " + std::to_string(kFewestPoints) + ")",
+                     "holds " + std::to_string(cloud.points.size()) +
+                         " points, too few for a "
+                         "building (at least " +
+                         std::to_string(kFewestPoints) + ")",
                      "Give a model or cloud with more points");
   }
   // A model beside a cloud is that of its points; alone, a cloud is in metres as all scans are.

@@ -1,6 +1,6 @@
 #pragma once
-// The points that buildings are found in: those of a sparse model, or of a scan file (a dense cloud),
-// with what is known of up, of scale and of the place on the Earth.
+// The points that buildings are found in: those of a sparse model, or of a scan file (a dense
+// cloud), with what is known of up, of scale and of the place on the Earth.
 
 #include <array>
 #include <optional>
@@ -35,7 +35,7 @@ struct OutlineCloud {
   std::vector<Eigen::Vector3d> eyes;    // of each point: from where it was seen; NaN = not known
   std::vector<Color> colors;            // of each point; empty = none
   std::vector<Eigen::Vector3d> cameras;
-  double num_read = 0;                  // points of the input, before they were thinned out
+  double num_read = 0;  // points of the input, before they were thinned out
 
   double spacing = 0;  // median distance from a point to its sixth neighbour
   double noise = 0;    // of a point across the surface it lies on: a low quantile over the cloud

@@ -29,7 +29,8 @@ class SegmentGroups {
     for (const int s : members) {
       for (const int i : segments[static_cast<size_t>(s)].points) {
         const Eigen::Vector3d& x = cloud.points[static_cast<size_t>(i)];
-        cells[{static_cast<int>(std::floor(x.x() / cell)), static_cast<int>(std::floor(x.y() / cell))}]
+        cells[{static_cast<int>(std::floor(x.x() / cell)),
+               static_cast<int>(std::floor(x.y() / cell))}]
             .insert(s);
       }
     }
@@ -86,7 +87,8 @@ std::vector<int> RoofSegments(const OutlineCloud& cloud, const GroundPlane& grou
                               const std::vector<PlaneSegment>& segments) {
   std::vector<int> roof;
   for (size_t s = 0; s < segments.size(); ++s) {
-    if (RoleOf(cloud, ground, segments[s]) == SegmentRole::kRoof) roof.push_back(static_cast<int>(s));
+    if (RoleOf(cloud, ground, segments[s]) == SegmentRole::kRoof)
+      roof.push_back(static_cast<int>(s));
   }
   return roof;
 }
@@ -94,12 +96,11 @@ std::vector<int> RoofSegments(const OutlineCloud& cloud, const GroundPlane& grou
 }  // namespace
 
 void ProposalOptions::Declare(OptionFields* fields) {
-  fields
-      ->Text("area", &area,
-             "x0,y0,x1,y1 of the outline's frame: buildings are proposed only from the points "
-             "inside this rectangle; empty = everywhere.")
-      .Also(area.empty() || Area().has_value())
-      .SaysSentence("--area must be four numbers x0,y0,x1,y1, with x0 < x1 and y0 < y1");
+  fields->Text("area", &area,
+               "x0,y0,x1,y1 of the outline's frame: buildings are proposed only from the points "
+               "inside this rectangle; empty = everywhere.");
+  fields->Require(area.empty() || Area().has_value(),
+                  "--area must be four numbers x0,y0,x1,y1, with x0 < x1 and y0 < y1");
   fields
       ->Number("min_area", &min_area,
                "Smallest footprint that is proposed, square metres (units of the input, where it "
@@ -146,11 +147,19 @@ OutlineProposal ProposeOutline(const OutlineCloud& cloud, const std::vector<Plan
       if (PolygonArea(region.polygon) >= min_area) regions.push_back(std::move(region));
     }
   }
-  // From the south west, so that names do not hang on the order of the points.
+  // From west to east, each from its south-western corner: names do not hang on chance.
+  for (FootprintRegion& region : regions) {
+    const auto first = std::min_element(region.polygon.begin(), region.polygon.end(),
+                                        [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+                                          return a.x() + a.y() < b.x() + b.y();
+                                        }) -
+                       region.polygon.begin();
+    std::rotate(region.polygon.begin(), region.polygon.begin() + first, region.polygon.end());
+    std::rotate(region.walls.begin(), region.walls.begin() + first, region.walls.end());
+  }
   std::stable_sort(regions.begin(), regions.end(),
                    [](const FootprintRegion& a, const FootprintRegion& b) {
-                     return a.polygon[0].x() + a.polygon[0].y() <
-                            b.polygon[0].x() + b.polygon[0].y();
+                     return a.polygon[0].x() < b.polygon[0].x();
                    });
   for (const FootprintRegion& region : regions) {
     OutlineBuilding building;
@@ -197,7 +206,8 @@ std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> WallStretches(
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> ends;
   for (const WallLine& wall : FindWallLines(cloud, ground, segments, all, false)) {
     const Eigen::Vector2d foot = wall.line.normal * wall.line.offset, u = wall.line.Direction();
-    for (const auto& [low, high] : wall.stretches) ends.emplace_back(foot + low * u, foot + high * u);
+    for (const auto& [low, high] : wall.stretches)
+      ends.emplace_back(foot + low * u, foot + high * u);
   }
   return ends;
 }

@@ -15,8 +15,8 @@ namespace roomtex {
 class OptionFields;
 
 struct ProposalOptions {
-  std::string area;         // "x0,y0,x1,y1" of the outline frame: points outside are left out
-  double min_area = 0;      // of a footprint; 0 = 4 steps^2 (9 square metres)
+  std::string area;          // "x0,y0,x1,y1" of the outline frame: points outside are left out
+  double min_area = 0;       // of a footprint; 0 = 4 steps^2 (9 square metres)
   bool right_angles = true;  // walls that may be parallel or at right angles are
 
   void Declare(OptionFields* fields);
@@ -27,9 +27,9 @@ struct ProposalOptions {
 // How the cloud came to stand upright.
 struct UpFinding {
   Eigen::Vector3d up_in_input = Eigen::Vector3d::UnitZ();
-  std::string source;      // "given", "geographic", "cameras", "file" or "planes"
-  double spread_deg = 0;   // of the walls found from the vertical, root mean square
-  int num_walls = 0;       // that say so
+  std::string source;     // "given", "geographic", "cameras", "file" or "planes"
+  double spread_deg = 0;  // of the walls found from the vertical, root mean square
+  int num_walls = 0;      // that say so
   bool trusted = true;
 };
 
@@ -46,25 +46,25 @@ struct BuildingEvidence {
     double length = 0;
     double covered = 0;  // share of the length that points lie on
     int num_points = 0;
-    double rms = 0;      // of the points across the wall
+    double rms = 0;                            // of the points across the wall
     double sigma_offset = 0, sigma_angle = 0;  // standard deviations; offset at `middle`
     double middle = 0;                         // of the points, from the first corner
   };
-  std::vector<Wall> walls;            // wall i goes from corner i to the next
-  std::vector<double> corner_sigma;   // standard deviation of each corner's position
+  std::vector<Wall> walls;                  // wall i goes from corner i to the next
+  std::vector<double> corner_sigma;         // standard deviation of each corner's position
   double ground_sigma = 0, roof_sigma = 0;  // of the heights
   int num_ground_points = 0, num_roof_points = 0;
   double roof_rms = 0;
-  double roof_covered = 0;            // share of the footprint with points of the roof
-  double explained = 0;               // share of the points within and above that lie on the solid
-  int num_points = 0;                 // within the footprint and above the ground
-  std::vector<std::string> doubts;    // empty: to be trusted
+  double roof_covered = 0;          // share of the footprint with points of the roof
+  double explained = 0;             // share of the points within and above that lie on the solid
+  int num_points = 0;               // within the footprint and above the ground
+  std::vector<std::string> doubts;  // empty: to be trusted
 };
 
 struct OutlineProposal {
   Outline outline;
   std::vector<BuildingEvidence> evidence;  // one per building
-  double explained = 0;   // share of the points above the ground that lie on a building
+  double explained = 0;  // share of the points above the ground that lie on a building
 };
 
 // cloud: level (z up). segments: of it.

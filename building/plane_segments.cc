@@ -16,7 +16,7 @@ namespace {
 constexpr int kNeighboursForNormal = 14;
 constexpr int kSeedsPerRound = 256;
 constexpr int kGrownPerRound = 6;
-constexpr size_t kMaxSegments = 400;
+constexpr size_t kMaxSegments = 1500;
 constexpr int kMaxBarren = 12;  // rounds without a find
 constexpr size_t kFewestOnPlane = 12;
 const double kMinNormalCosine = std::cos(RadFromDeg(40));
@@ -38,12 +38,12 @@ class SegmentFinder {
     local_.resize(cloud.points.size());
     reaches_.resize(cloud.points.size());
     ParallelFor(num_threads, 0, static_cast<int>(cloud.points.size()), [&](int i) {
-      const auto near = neighbours_.Nearest(cloud_.points[static_cast<size_t>(i)],
-                                            kNeighboursForNormal);
+      const auto near =
+          neighbours_.Nearest(cloud_.points[static_cast<size_t>(i)], kNeighboursForNormal);
       local_[static_cast<size_t>(i)] = FitPlane(cloud_.points, near);
-      reaches_[static_cast<size_t>(i)] = (cloud_.points[static_cast<size_t>(near.back())] -
-                                          cloud_.points[static_cast<size_t>(i)])
-                                             .norm();
+      reaches_[static_cast<size_t>(i)] =
+          (cloud_.points[static_cast<size_t>(near.back())] - cloud_.points[static_cast<size_t>(i)])
+              .norm();
     });
   }
 
@@ -69,9 +69,8 @@ class SegmentFinder {
       barren = any ? 0 : barren + 1;
     }
     for (PlaneSegment& segment : segments) Orient(&segment);
-    std::stable_sort(
-        segments.begin(), segments.end(),
-        [](const PlaneSegment& a, const PlaneSegment& b) { return a.area > b.area; });
+    std::stable_sort(segments.begin(), segments.end(),
+                     [](const PlaneSegment& a, const PlaneSegment& b) { return a.area > b.area; });
     return segments;
   }
 
@@ -138,8 +137,7 @@ class SegmentFinder {
   }
   // Side of the cells that say what hangs together: each holds a few points.
   double CellAt(int seed) const {
-    return std::clamp(0.75 * reaches_[static_cast<size_t>(seed)], cloud_.step / 2,
-                      2 * cloud_.step);
+    return std::clamp(0.75 * reaches_[static_cast<size_t>(seed)], cloud_.step / 2, 2 * cloud_.step);
   }
 
   double LocalScore(int seed) const {
@@ -241,8 +239,8 @@ class SegmentFinder {
                      static_cast<int64_t>(std::floor(v.dot(d) / segment.cell)));
     };
     for (const int i : segment.points) cells.insert(key(i));
-    const auto num_beside = std::count_if(beside.begin(), beside.end(),
-                                          [&](int i) { return cells.count(key(i)) > 0; });
+    const auto num_beside =
+        std::count_if(beside.begin(), beside.end(), [&](int i) { return cells.count(key(i)) > 0; });
     return static_cast<double>(num_beside) < 0.8 * static_cast<double>(segment.points.size());
   }
 

@@ -9,16 +9,16 @@
 namespace roomtex {
 
 struct PlaneSegment {
-  FittedPlane plane;         // the normal towards those who saw it, where that is known
+  FittedPlane plane;  // the normal towards those who saw it, where that is known
   bool oriented = false;
-  std::vector<int> points;   // indices into the cloud
-  double cell = 0;           // side of the cells of the plane that say what hangs together
-  double area = 0;           // of the cells of the plane that hold points
+  std::vector<int> points;  // indices into the cloud
+  double cell = 0;          // side of the cells of the plane that say what hangs together
+  double area = 0;          // of the cells of the plane that hold points
 };
 
 // RANSAC (Fischler and Bolles 1981) by the planes of small neighbourhoods, as Schnabel et al. 2007
-// draw their samples nearby; a plane is grown and fitted until it stays, its largest connected piece
-// is taken, what remains is searched again. The largest come first.
+// draw their samples nearby; a plane is grown and fitted until it stays, its largest connected
+// piece is taken, what remains is searched again. The largest come first.
 std::vector<PlaneSegment> FindPlaneSegments(const OutlineCloud& cloud, uint64_t seed,
                                             int num_threads);
 

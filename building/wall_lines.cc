@@ -10,9 +10,6 @@
 namespace roomtex {
 namespace {
 
-// Points of a wall are not independent: features sit on sills and frames. One in so many counts.
-constexpr double kPointsPerIndependent = 6;
-
 void FindStretches(const OutlineCloud& cloud, WallLine* wall) {
   std::vector<double> along;
   for (const Eigen::Vector2d& x : wall->points) along.push_back(wall->line.Direction().dot(x));
@@ -62,7 +59,8 @@ void MakeRightAngles(const OutlineCloud& cloud, std::vector<WallLine>* walls) {
     size_t longest = walls->size();
     for (size_t i = 0; i < walls->size(); ++i) {
       if (done[i]) continue;
-      if (longest == walls->size() || LengthOf((*walls)[i]) > LengthOf((*walls)[longest])) longest = i;
+      if (longest == walls->size() || LengthOf((*walls)[i]) > LengthOf((*walls)[longest]))
+        longest = i;
     }
     if (longest == walls->size()) return;
     double angle = AngleOf((*walls)[longest]);
@@ -74,8 +72,7 @@ void MakeRightAngles(const OutlineCloud& cloud, std::vector<WallLine>* walls) {
         if (done[i]) continue;
         const WallLine& wall = (*walls)[i];
         const double d = QuarterTurnDifference(AngleOf(wall), angle);
-        const double allowed =
-            std::clamp(3 * wall.sigma_angle, RadFromDeg(0.4), RadFromDeg(3));
+        const double allowed = std::clamp(3 * wall.sigma_angle, RadFromDeg(0.4), RadFromDeg(3));
         if (std::abs(d) > allowed && i != longest) continue;
         family.push_back(i);
         const double weight = 1 / std::max(wall.sigma_angle * wall.sigma_angle, 1e-10);
@@ -189,14 +186,15 @@ void FitWallLine(const OutlineCloud& cloud, bool fixed_direction, WallLine* wall
     wall->middle = u.dot(centre);
     std::vector<double> residuals;
     for (const Eigen::Vector2d& x : wall->points) residuals.push_back(wall->line.SignedDistance(x));
-    const double scale = std::max(floor_rms, kSigmaPerMad * MedianAbsoluteDeviation(residuals, 0.0));
+    const double scale =
+        std::max(floor_rms, kSigmaPerMad * MedianAbsoluteDeviation(residuals, 0.0));
     for (size_t i = 0; i < residuals.size(); ++i) {
       const double root = TukeyRootWeight(residuals[i], 3 * scale);
       weights[i] = std::max(1e-6, root * root);
     }
     const double independent = std::max(2.0, sum / kPointsPerIndependent);
-    const double spread =
-        std::sqrt(std::max(1e-12, (u.x() * u.x() * xx + 2 * u.x() * u.y() * xy + u.y() * u.y() * yy) / sum));
+    const double spread = std::sqrt(
+        std::max(1e-12, (u.x() * u.x() * xx + 2 * u.x() * u.y() * xy + u.y() * u.y() * yy) / sum));
     wall->rms = scale;
     wall->sigma_offset = scale / std::sqrt(independent);
     wall->sigma_angle = wall->sigma_offset / spread;
@@ -222,9 +220,8 @@ std::vector<WallLine> FindWallLines(const OutlineCloud& cloud, const GroundPlane
     walls.push_back(std::move(wall));
   }
   // The longest first takes in what lies along it.
-  std::stable_sort(walls.begin(), walls.end(), [](const WallLine& a, const WallLine& b) {
-    return LengthOf(a) > LengthOf(b);
-  });
+  std::stable_sort(walls.begin(), walls.end(),
+                   [](const WallLine& a, const WallLine& b) { return LengthOf(a) > LengthOf(b); });
   for (size_t i = 0; i < walls.size(); ++i) {
     for (size_t j = i + 1; j < walls.size();) {
       if (!SameLine(cloud, walls[i], walls[j])) {

@@ -8,17 +8,21 @@
 
 namespace roomtex {
 
+// Points of a wall or a roof are not independent: features sit on sills and frames, poses err. One
+// in so many counts.
+inline constexpr double kPointsPerIndependent = 6;
+
 enum class SegmentRole { kWall, kRoof, kOther };
 SegmentRole RoleOf(const OutlineCloud& cloud, const GroundPlane& ground,
                    const PlaneSegment& segment);
 
 // One line, of one wall or of several that lie in it.
 struct WallLine {
-  Line2 line;                // the normal outwards, where that is known
+  Line2 line;  // the normal outwards, where that is known
   bool oriented = false;
   std::vector<Eigen::Vector2d> points;  // in the top view
   double rms = 0, sigma_offset = 0, sigma_angle = 0;
-  double middle = 0;         // of the points, along line.Direction()
+  double middle = 0;  // of the points, along line.Direction()
   // Stretches along line.Direction() that hold points, bridged where the gap is small.
   std::vector<std::pair<double, double>> stretches;
   // No points draw it: it closes what they leave open.

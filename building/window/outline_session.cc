@@ -79,7 +79,8 @@ Json OutlineSession::State() {
   json["unit"] = outline_.metric ? "m" : "units";
   json["on_earth"] = outline_.geo.has_value();
   const GroundPlane ground = FindGround(cloud_, segments_);
-  json["ground"] = {{"height", ground.height}, {"gradient", {ground.gradient.x(), ground.gradient.y()}}};
+  json["ground"] = {{"height", ground.height},
+                    {"gradient", {ground.gradient.x(), ground.gradient.y()}}};
   json["step"] = cloud_.step;
   Eigen::AlignedBox3d box;
   for (const PlaneSegment& segment : segments_) {
@@ -166,8 +167,8 @@ OutlineBuilding OutlineSession::BuildingOf(const Json& json) const {
 
 Json OutlineSession::Heights(const Json& request) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const OutlineBuilding building =
-      BuildingOf(request.is_object() && request.contains("building") ? request["building"] : Json());
+  const OutlineBuilding building = BuildingOf(
+      request.is_object() && request.contains("building") ? request["building"] : Json());
   const auto measured = HeightsFromPoints(cloud_, segments_, building);
   if (!measured || !measured->Problems().empty()) {
     throw UsageError("The points tell no height here: type it in.");

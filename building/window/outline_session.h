@@ -23,13 +23,13 @@ class OutlineSession {
   std::string Points();
 
   // Takes these buildings instead of those of the revision, and saves.
-  Json Put(const Json& request);     // {revision, buildings}
+  Json Put(const Json& request);  // {revision, buildings}
   // Proposals, not taken yet. request: {area: [x0, y0, x1, y1]} or {}.
   Json Propose(const Json& request);
   // The building with floor and roof by the points.
   Json Heights(const Json& request);  // {building}
   // Turns everything so that this direction of the frame is up.
-  Json SetUp(const Json& request);    // {revision, up: [x, y, z]}
+  Json SetUp(const Json& request);  // {revision, up: [x, y, z]}
   Json WriteModels();
 
   OutlineProposal Judged();

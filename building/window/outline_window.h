@@ -1,6 +1,6 @@
 #pragma once
-// The page of roomtex-outline: contours drawn and changed over the points, in a browser (thesis 9.3,
-// steps 1 to 5). The paths that it serves: building/README.md.
+// The page of roomtex-outline: contours drawn and changed over the points, in a browser
+// (thesis 9.3, steps 1 to 5). The paths that it serves: building/README.md.
 
 #include <string>
 #include <vector>

@@ -103,14 +103,7 @@ Json NumberOrNull(bool known, double value) { return known ? Json(value) : Json(
 
 Json BuildingToJson(const OutlineBuilding& building, const BuildingEvidence* evidence) {
   const BuildingSolid solid = ExtrudeBuilding(building);
-  double eaves = std::numeric_limits<double>::infinity(), ridge = -eaves;
-  for (const SolidFace& face : solid.faces) {
-    if (face.kind != SolidFace::Kind::kRoof) continue;
-    for (const Eigen::Vector3d& corner : solid.CornersOf(face)) {
-      eaves = std::min(eaves, corner.z());
-      ridge = std::max(ridge, corner.z());
-    }
-  }
+  const auto [eaves, ridge] = solid.RoofHeights();
   Json json;
   json["name"] = building.name;
   json["roof"] = building.RoofShape();
@@ -165,16 +158,16 @@ void SayDoubts(const OutlineProposal& proposal, const UpFinding& up,
   if (!up.trusted) {
     context.report.SetUntrusted(
         "what points up is a guess: say it with --up, or give the model of a cloud as "
-        "--sparse_path");
+        "--sparse_path.");
   }
   if (buildings.empty()) {
     context.report.SetUntrusted(
         "no building was found in the points: draw them with --window, or give more points of "
-        "walls and roofs");
+        "walls and roofs.");
   }
   for (size_t i = 0; i < buildings.size(); ++i) {
     for (const std::string& doubt : proposal.evidence[i].doubts) {
-      context.report.SetUntrusted("building " + buildings[i].name + ": " + doubt);
+      context.report.SetUntrusted("building " + buildings[i].name + ": " + doubt + ".");
     }
   }
 }
@@ -184,8 +177,8 @@ void PrintOutline(const OutlineProposal& proposal, bool judged) {
     const OutlineBuilding& building = proposal.outline.buildings[i];
     const Json json = BuildingToJson(building, judged ? &proposal.evidence[i] : nullptr);
     std::cout << building.name << ": " << building.footprint.size() << " corners, "
-              << building.RoofShape() << " roof, ground " << Number(building.ground, 2) << ", eaves "
-              << Number(json["eaves"].get<double>(), 2) << ", ridge "
+              << building.RoofShape() << " roof, ground " << Number(building.ground, 2)
+              << ", eaves " << Number(json["eaves"].get<double>(), 2) << ", ridge "
               << Number(json["ridge"].get<double>(), 2)
               << (judged && !proposal.evidence[i].doubts.empty() ? ", doubtful" : "") << "\n";
   }
@@ -235,7 +228,8 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   if (a.window) {
     const OutlineWindowInput window{a.proposal,     a.server,      kOutlinePage,
                                     a.outline_path, a.output_path, a.model_paths};
-    const OutlineProposal drawn = RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
+    const OutlineProposal drawn =
+        RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
     WriteModels(a, drawn.outline);
     ReportOutline(drawn, true, context);
     return;

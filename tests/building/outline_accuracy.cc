@@ -1,5 +1,6 @@
-// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, what roomtex-outline's
-// library makes of them. With FOLDER the first street's model and a dense cloud of it are written there.
+// outline_accuracy [FOLDER]: the table of docs/outline.md: simulated streets, and what the library
+// of roomtex-outline makes of them; models and a dense cloud stay in FOLDER.
+// outline_accuracy --street FOLDER: the model of one street alone, for tests.
 
 #include <cstdio>
 #include <string>
@@ -43,8 +44,9 @@ void Measure(const std::string& name, StreetOptions options, const std::string& 
 
 int Main(const std::string& folder) {
   MakeFolder(folder);
-  fmt::print("| street | points | buildings | missed | doubtful | corner | ground | eaves | ridge |\n"
-             "|---|---|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| street | points | buildings | missed | doubtful | corner | ground | eaves | ridge |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
   StreetOptions options;
   Measure("as it is", options, folder);
   options.features_per_m2 = 2;
@@ -65,7 +67,9 @@ int Main(const std::string& folder) {
   options.mock_up = true;
   Measure("mock-up", options, folder);
   options = {};
-  WriteSparseModel(MakeStreet(options).model, folder + "/street");
+  const SparseModel model = MakeStreet(options).model;
+  WriteSparseModel(model, folder + "/street");
+  WriteStreetPhotos(options, model, folder + "/photos", -1);
   WriteCloud(MakeDenseStreet(options, 3000000), folder + "/dense.ply");
   return 0;
 }
@@ -74,5 +78,10 @@ int Main(const std::string& folder) {
 }  // namespace roomtex
 
 int main(int argc, char** argv) {
+  if (argc == 3 && std::string(argv[1]) == "--street") {
+    roomtex::MakeFolder(argv[2]);
+    roomtex::WriteSparseModel(roomtex::MakeStreet({}).model, std::string(argv[2]) + "/street");
+    return 0;
+  }
   return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy");
 }

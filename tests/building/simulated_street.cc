@@ -4,9 +4,13 @@
 #include <cmath>
 #include <fstream>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "building/building_solid.h"
 #include "building/cell_arrangement.h"
 #include "core/frames.h"
+#include "core/output_file.h"
+#include "core/parallel.h"
 #include "core/random_stream.h"
 #include "core/ray_caster.h"
 
@@ -57,8 +61,8 @@ std::vector<OutlineBuilding> Houses(const StreetOptions& options) {
   houses.push_back(House("1", 0, Placed(Rectangle(10, 8), {0, 0}, 0), {Level(ground(5) + 6)}));
   const auto two = Placed(Rectangle(9, 11), {15, 0.5}, 3);
   const double eaves = ground(20) + 5;
-  houses.push_back(House("2", 0, two,
-                         {RisingFrom(two, 1, eaves, 3 / 4.5), RisingFrom(two, 3, eaves, 3 / 4.5)}));
+  houses.push_back(
+      House("2", 0, two, {RisingFrom(two, 1, eaves, 3 / 4.5), RisingFrom(two, 3, eaves, 3 / 4.5)}));
   const auto three = Placed(Rectangle(8, 9), {29, 1.5}, -7);
   houses.push_back(House("3", 0, three, {RisingFrom(three, 0, ground(33) + 3.6, 2.0 / 9)}));
   const auto four = Placed({{0, 0}, {12, 0}, {12, 10}, {7, 10}, {7, 6}, {0, 6}}, {43, -1}, 5);
@@ -119,7 +123,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
       bool bare = false;
       if (is_wall) {
         // The wall that begins at this corner of the footprint.
-        const Eigen::Vector2d begin = solid.vertices[static_cast<size_t>(face.corners[0])].head<2>();
+        const Eigen::Vector2d begin =
+            solid.vertices[static_cast<size_t>(face.corners[0])].head<2>();
         for (size_t i = 0; i < houses[h].footprint.size(); ++i) {
           if ((houses[h].footprint[i] - begin).norm() < 1e-6) wall = static_cast<int>(i);
         }
@@ -145,7 +150,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
   for (const double x : {12.5, 26.5, 40.5}) {
     // Trees between and before the houses, all leaves.
     const Eigen::Vector3d at(x, x > 20 && x < 30 ? -4.5 : 3, ground(x) + 2);
-    surface.AddBox(at + Eigen::Vector3d(-1.2, -1.2, 0), at + Eigen::Vector3d(1.2, 1.2, 2.6), 20, 0.5);
+    surface.AddBox(at + Eigen::Vector3d(-1.2, -1.2, 0), at + Eigen::Vector3d(1.2, 1.2, 2.6), 20,
+                   0.5);
   }
   for (const double x : {4.0, 19.0, 33.0, 50.0}) {
     const Eigen::Vector3d at(x, -6.5, ground(x));
@@ -157,8 +163,8 @@ StreetSurface SurfaceOf(const StreetOptions& options, const std::vector<OutlineB
 std::vector<Rigid> Cameras(const StreetOptions& options) {
   std::vector<Rigid> cameras;
   const double size = options.mock_up ? 0.02 : 1;  // of the street's 55 metres
-  const Eigen::Vector3d middle = options.mock_up ? Eigen::Vector3d(0.42, 0.2, 0.05)
-                                                 : Eigen::Vector3d(27, 4, 3);
+  const Eigen::Vector3d middle =
+      options.mock_up ? Eigen::Vector3d(0.42, 0.2, 0.05) : Eigen::Vector3d(27, 4, 3);
   for (int i = 0; i < 60; ++i) {
     // Once around, 20 m from the walls; every third from a pole or a drone.
     const double angle = 2 * kPi * i / 60;
@@ -168,8 +174,8 @@ std::vector<Rigid> Cameras(const StreetOptions& options) {
         middle + size * Eigen::Vector3d(46 * c, 24 * s,
                                         options.mock_up ? (above ? 30 : 12) : (above ? 15 : -1.3));
     // Across the street, in turn a little to the left and to the right.
-    const Eigen::Vector3d target =
-        middle + size * Eigen::Vector3d(36 * c + (i % 2 == 0 ? 12 : -12), 2 * s, above ? -2.0 : 0.6);
+    const Eigen::Vector3d target = middle + size * Eigen::Vector3d(36 * c + (i % 2 == 0 ? 12 : -12),
+                                                                   2 * s, above ? -2.0 : 0.6);
     const Eigen::Vector3d z = (target - eye).normalized();
     const Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
     Eigen::Matrix3d model_from_cam;
@@ -202,7 +208,7 @@ Eigen::Vector3d AnyPointOn(const StreetSurface& surface, size_t t, RandomStream*
 
 double AreaOf(const StreetSurface& surface, size_t t) {
   const Triangle& triangle = surface.triangles[t];
-  const Eigen::Vector3d &a = surface.vertices[static_cast<size_t>(triangle[0])];
+  const Eigen::Vector3d& a = surface.vertices[static_cast<size_t>(triangle[0])];
   return 0.5 * (surface.vertices[static_cast<size_t>(triangle[1])] - a)
                    .cross(surface.vertices[static_cast<size_t>(triangle[2])] - a)
                    .norm();
@@ -275,12 +281,51 @@ SimulatedStreet MakeStreet(const StreetOptions& options) {
       add(AnyPointOn(surface, t, &random), false);
     }
   }
-  const int num_outliers = static_cast<int>(options.outliers * static_cast<double>(street.model.points.size()));
+  const int num_outliers =
+      static_cast<int>(options.outliers * static_cast<double>(street.model.points.size()));
   for (int k = 0; k < num_outliers; ++k) {
-    add(size * Eigen::Vector3d(random.Uniform(-15, 70), random.Uniform(-20, 30), random.Uniform(-3, 15)),
+    add(size * Eigen::Vector3d(random.Uniform(-15, 70), random.Uniform(-20, 30),
+                               random.Uniform(-3, 15)),
         true);
   }
   return street;
+}
+
+void WriteStreetPhotos(const StreetOptions& options, const SparseModel& model,
+                       const std::string& folder, int num_threads) {
+  const StreetSurface surface = SurfaceOf(options, Houses(options));
+  const RayCaster caster(surface.vertices, surface.triangles);
+  constexpr int kReduced = 8;
+  MakeFolder(folder);
+  for (const auto& [id, image] : model.images) {
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const CameraProjection projection(camera);
+    const Eigen::Vector3d eye = image.cam_from_model.TargetOriginInSource();
+    cv::Mat photo(camera.height / kReduced, camera.width / kReduced, CV_8UC3);
+    ParallelFor(num_threads, 0, photo.rows, [&](int row) {
+      for (int column = 0; column < photo.cols; ++column) {
+        const Eigen::Vector3d ray =
+            *projection.RayFromImg(kReduced * Eigen::Vector2d(column + 0.5, row + 0.5));
+        const Eigen::Vector3d direction =
+            (image.cam_from_model.rotation.conjugate() * ray).normalized();
+        const auto hit = caster.Cast(eye, direction);
+        cv::Vec3b color(235, 206, 170);  // the sky
+        if (hit) {
+          // Squares of a metre, each face in colours of its own.
+          const Eigen::Vector3d at =
+              (hit->point * 1.0 + Eigen::Vector3d(0.01, 0.02, 0.03)).array().floor();
+          const auto square = static_cast<uint64_t>(static_cast<int64_t>(at.x()) * 31 +
+                                                    static_cast<int64_t>(at.y()) * 57 +
+                                                    static_cast<int64_t>(at.z()) * 101 + 100000);
+          const uint64_t bits =
+              MixBits(square, surface.wall[static_cast<size_t>(hit->triangle)] ? 1 : 2);
+          for (int c = 0; c < 3; ++c) color[c] = static_cast<uchar>(70 + (bits >> (8 * c)) % 150);
+        }
+        photo.at<cv::Vec3b>(row, column) = color;
+      }
+    });
+    cv::imwrite(folder + "/" + image.name, photo);
+  }
 }
 
 std::vector<Eigen::Vector3d> MakeDenseStreet(const StreetOptions& options, size_t count) {
@@ -321,18 +366,6 @@ StreetErrors CompareStreet(const Outline& truth, const Outline& found,
     return found_from_truth * Eigen::Vector3d(x.x(), x.y(), z);
   };
   const double scale = found_from_truth.scale;
-  const auto heights = [](const OutlineBuilding& building) {
-    const BuildingSolid solid = ExtrudeBuilding(building);
-    std::pair<double, double> range(std::numeric_limits<double>::infinity(), -1e300);
-    for (const SolidFace& face : solid.faces) {
-      if (face.kind != SolidFace::Kind::kRoof) continue;
-      for (const Eigen::Vector3d& corner : solid.CornersOf(face)) {
-        range.first = std::min(range.first, corner.z());
-        range.second = std::max(range.second, corner.z());
-      }
-    }
-    return range;
-  };
   for (const OutlineBuilding& house : truth.buildings) {
     const OutlineBuilding* best = nullptr;
     double best_error = std::numeric_limits<double>::infinity();
@@ -353,8 +386,8 @@ StreetErrors CompareStreet(const Outline& truth, const Outline& found,
       ++errors.missed;
       continue;
     }
-    const auto [true_eaves, true_ridge] = heights(house);
-    const auto [eaves, ridge] = heights(*best);
+    const auto [true_eaves, true_ridge] = ExtrudeBuilding(house).RoofHeights();
+    const auto [eaves, ridge] = ExtrudeBuilding(*best).RoofHeights();
     const auto z_of = [&](double z) { return moved(house.footprint[0], z).z(); };
     errors.corner = std::max(errors.corner, best_error / scale);
     errors.ground = std::max(errors.ground, std::abs(best->ground - z_of(house.ground)) / scale);

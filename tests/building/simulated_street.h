@@ -1,7 +1,7 @@
 #pragma once
 // A street of four houses as 60 photos would leave it in a sparse model, with known truth: features
-// on walls, roofs and ground that photos see, errors that grow with the distance, trees, cars, gross
-// outliers. And the thesis' mock-up: a box and books on a table.
+// on walls, roofs and ground that photos see, errors that grow with the distance, trees, cars,
+// gross outliers. And the thesis' mock-up: a box and books on a table.
 
 #include <string>
 #include <vector>
@@ -14,15 +14,15 @@ namespace roomtex {
 
 struct StreetOptions {
   int seed = 1;
-  double features_per_m2 = 8;   // on houses; a quarter of it on the ground
-  double depth_error = 0.002;   // along the ray, per metre of distance: 4 cm at 20 m
-  double outliers = 0.03;       // share of points that lie anywhere
-  bool clutter = true;          // trees and cars
+  double features_per_m2 = 8;  // on houses; a quarter of it on the ground
+  double depth_error = 0.002;  // along the ray, per metre of distance: 4 cm at 20 m
+  double outliers = 0.03;      // share of points that lie anywhere
+  bool clutter = true;         // trees and cars
   // House `bare_house` has no features on its wall `bare_wall` (rear), as a plain white one has.
   int bare_house = -1, bare_wall = 2;
-  double ground_slope = 0;      // rise per metre along the street
+  double ground_slope = 0;        // rise per metre along the street
   bool photos_from_above = true;  // a third of them, from 14 m; else no roof is seen
-  bool mock_up = false;         // the thesis' boxes on a table instead, in metres
+  bool mock_up = false;           // the thesis' boxes on a table instead, in metres
 };
 
 struct SimulatedStreet {
@@ -31,6 +31,11 @@ struct SimulatedStreet {
 };
 
 SimulatedStreet MakeStreet(const StreetOptions& options);
+
+// The photos of the model at an eighth of their size, walls and roofs in coloured squares, as JPEG
+// into `folder` under the names of the model.
+void WriteStreetPhotos(const StreetOptions& options, const SparseModel& model,
+                       const std::string& folder, int num_threads);
 
 // Points on everything, as a dense reconstruction has them: `count`, without tracks.
 std::vector<Eigen::Vector3d> MakeDenseStreet(const StreetOptions& options, size_t count);

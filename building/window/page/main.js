@@ -62,7 +62,7 @@ function change(buildings, before = copyOf(app.buildings)) {
     try {
       take(await api.put(app.state.revision, buildings.map(plain)));
       app.done.push(before);
-      app.undone = [];
+      app.undone.length = 0;
     } catch (error) {
       // Not taken: as it was.
       const kept = app.buildings;
@@ -573,8 +573,8 @@ function turnUpright(from, to) {
   const direction = right.map((value, i) => (dx * value + dy * up[i]) / Math.hypot(dx, dy));
   trying(async () => {
     await api.up(app.state.revision, direction);
-    app.done = [];  // what was done lies in another frame
-    app.undone = [];
+    app.done.length = 0;  // what was done lies in another frame
+    app.undone.length = 0;
     await load();
     say('Turned.');
   });

@@ -23,6 +23,19 @@ function lineOf(a, b) {
   return size > 0 ? [a, [d[0] / size, d[1] / size]] : null;
 }
 
+// The walls of the points that pass by here, also a little beyond where their points end.
+function wallsAt(place, lines, reach) {
+  return lines.flatMap(([ax, ay, bx, by]) => {
+    const line = lineOf([ax, ay], [bx, by]);
+    if (!line || length(sub(onLine(place, line), place)) > reach) return [];
+    const [point, direction] = line;
+    const d = sub(place, point);
+    const t = d[0] * direction[0] + d[1] * direction[1];
+    const beyond = 2 * reach;
+    return t > -beyond && t < length(sub([bx, by], [ax, ay])) + beyond ? [line] : [];
+  });
+}
+
 // place: x, y; reach: how far it may move. corners: places to meet. lines: [ax, ay, bx, by] of walls
 // in the points. before: the corners that came before it, the nearest last; after: one that follows.
 // Gives {place, kind} or null.
@@ -35,8 +48,7 @@ export function snap(place, reach, {corners, lines, before = [], after = null}) 
   const corner = nearest(corners.map((c) => ({place: c, kind: 'corner'})));
   if (corner) return corner;
 
-  const walls = lines.map(([ax, ay, bx, by]) => lineOf([ax, ay], [bx, by]))
-                    .filter((line) => line && near(onLine(place, line)));
+  const walls = wallsAt(place, lines, reach);
   const square = [];
   const last = before[before.length - 1];
   if (last && before.length > 1) {
@@ -44,10 +56,7 @@ export function snap(place, reach, {corners, lines, before = [], after = null}) 
     if (wall) square.push([last, [-wall[1][1], wall[1][0]]], [last, wall[1]]);
   } else if (last) {
     // The first wall may run as the walls of the points do.
-    for (const [ax, ay, bx, by] of lines) {
-      const wall = lineOf([ax, ay], [bx, by]);
-      if (wall) square.push([last, wall[1]]);
-    }
+    for (const [, direction] of wallsAt(last, lines, reach)) square.push([last, direction]);
   }
   if (after && last) {
     const wall = before.length > 1 ? lineOf(before[before.length - 2], last) : null;

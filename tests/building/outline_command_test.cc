@@ -1,0 +1,313 @@
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include <gtest/gtest.h>
+#include <pugixml.hpp>
+
+#include "building/building_output.h"
+#include "building/building_solid.h"
+#include "building/cell_arrangement.h"
+#include "building/outline_cloud.h"
+#include "building/outline_proposal.h"
+#include "core/error.h"
+#include "tests/building/simulated_street.h"
+#include "tests/support/option_check.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+#ifdef ROOMTEX_PAGES
+#include "core/local_server.h"
+#endif
+
+namespace roomtex {
+namespace {
+
+Json ReadJson(const std::string& path) { return Json::parse(ReadBytes(path)); }
+
+double TrueVolume(const Outline& outline) {
+  double volume = 0;
+  for (const OutlineBuilding& building : outline.buildings) {
+    volume += ExtrudeBuilding(building).Volume();
+  }
+  return volume;
+}
+
+// Six times the volume below a face, seen from any point.
+double SixVolumes(const std::vector<Eigen::Vector3d>& ring, const Eigen::Vector3d& from) {
+  double sum = 0;
+  for (size_t i = 1; i + 1 < ring.size(); ++i) {
+    sum += (ring[0] - from).dot((ring[i] - from).cross(ring[i + 1] - from));
+  }
+  return sum;
+}
+
+TEST(OutlineCommand, WritesTheStreetInEveryFormat) {
+  const TempFolder folder;
+  const SimulatedStreet street = MakeStreet({});
+  WriteSparseModel(street.model, folder / "model");
+  std::string models;
+  for (const char* name : {"b.glb", "b.obj", "b.city.json", "b.gml", "b.geojson"}) {
+    models += " --model_path " + (folder / name);
+  }
+  const std::string line = "roomtex-outline --input_path " + (folder / "model") +
+                           " --scale 1 --output_path " + (folder / "outline.json") +
+                           " --report_path " + (folder / "report.json") + models;
+  const CommandResult result = RunCommandLine(line);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("gable"), std::string::npos);
+  const Outline outline = ReadOutline(folder / "outline.json");
+  ASSERT_EQ(outline.buildings.size(), 4u);
+  const double volume = TrueVolume(outline);
+  EXPECT_NEAR(volume, TrueVolume(street.truth), 0.01 * volume);
+  const Json report = ReadJson(folder / "report.json");
+  EXPECT_EQ(report["trusted"], true);
+  EXPECT_EQ(report["num_buildings"], 4);
+  EXPECT_EQ(report["buildings"][3]["corners"].size(), 6u);
+  EXPECT_LT(report["up"]["spread_deg"], 2);
+
+  // CityJSON: whole numbers, closed shells, rings that look outwards.
+  const Json city = ReadJson(folder / "b.city.json");
+  EXPECT_EQ(city["type"], "CityJSON");
+  EXPECT_EQ(city["version"], "2.0");
+  const auto vertex = [&](const Json& index) {
+    Eigen::Vector3d x;
+    for (size_t i = 0; i < 3; ++i) {
+      EXPECT_TRUE(city["vertices"][index.get<size_t>()][i].is_number_integer());
+      x[static_cast<int>(i)] = city["vertices"][index.get<size_t>()][i].get<double>() *
+                                   city["transform"]["scale"][i].get<double>() +
+                               city["transform"]["translate"][i].get<double>();
+    }
+    return x;
+  };
+  double city_volume = 0;
+  for (const auto& [name, object] : city["CityObjects"].items()) {
+    const Json& solid = object["geometry"][0];
+    EXPECT_EQ(solid["type"], "Solid");
+    EXPECT_EQ(solid["lod"], "2");
+    EXPECT_EQ(solid["semantics"]["values"][0].size(), solid["boundaries"][0].size());
+    std::set<std::pair<int, int>> edges;
+    for (const Json& face : solid["boundaries"][0]) {
+      std::vector<Eigen::Vector3d> ring;
+      for (size_t i = 0; i < face[0].size(); ++i) {
+        ring.push_back(vertex(face[0][i]));
+        EXPECT_TRUE(edges.emplace(face[0][i], face[0][(i + 1) % face[0].size()]).second);
+      }
+      city_volume += SixVolumes(ring, {20, 0, 0}) / 6;
+    }
+    for (const auto& [a, b] : edges) EXPECT_EQ(edges.count({b, a}), 1u) << name;
+  }
+  EXPECT_NEAR(city_volume, volume, 0.01 * volume);
+
+  // CityGML: every surface of a solid is there, rings are closed.
+  pugi::xml_document gml;
+  ASSERT_TRUE(gml.load_file((folder / "b.gml").c_str()));
+  std::set<std::string> ids;
+  double gml_volume = 0;
+  for (const auto& found : gml.select_nodes("//gml:Polygon")) {
+    ids.insert(found.node().attribute("gml:id").value());
+    std::istringstream numbers(found.node()
+                                   .child("gml:exterior")
+                                   .child("gml:LinearRing")
+                                   .child("gml:posList")
+                                   .text()
+                                   .get());
+    std::vector<Eigen::Vector3d> ring;
+    for (Eigen::Vector3d x; numbers >> x.x() >> x.y() >> x.z();) ring.push_back(x);
+    ASSERT_GE(ring.size(), 4u);
+    EXPECT_EQ(ring.front(), ring.back());
+    gml_volume += SixVolumes(ring, {20, 0, 0}) / 6;
+  }
+  EXPECT_NEAR(gml_volume, volume, 0.001 * volume);
+  const auto members = gml.select_nodes("//gml:surfaceMember[@xlink:href]");
+  EXPECT_EQ(members.size(), ids.size());
+  for (const auto& member : members) {
+    EXPECT_EQ(ids.count(std::string(member.node().attribute("xlink:href").value()).substr(1)), 1u);
+  }
+  EXPECT_EQ(gml.select_nodes("//bldg:GroundSurface").size(), 4u);
+
+  // OBJ: in the frame of the model, read by our own reader.
+  ScanReaderOptions reader;
+  const Scan mesh = ReadScan(folder / "b.obj", reader);
+  double obj_volume = 0;
+  for (const Triangle& t : mesh.triangles) {
+    obj_volume +=
+        SixVolumes({mesh.points[static_cast<size_t>(t[0])], mesh.points[static_cast<size_t>(t[1])],
+                    mesh.points[static_cast<size_t>(t[2])]},
+                   {20, 0, 0}) /
+        6;
+  }
+  EXPECT_NEAR(obj_volume, volume, 0.001 * volume);
+  EXPECT_GT(mesh.up.z(), 0.999);
+  EXPECT_EQ(ReadBytes(folder / "b.glb").substr(0, 4), "glTF");
+  // No place on the Earth: said.
+  EXPECT_TRUE(ReadJson(folder / "b.geojson").contains("note"));
+
+  // The same again: an unchanged proposal is replaced by the same one ...
+  const std::string before = ReadBytes(folder / "outline.json");
+  EXPECT_EQ(RunCommandLine(line).exit_code, 0);
+  EXPECT_EQ(ReadBytes(folder / "outline.json"), before);
+  // ... but what a hand has changed is not.
+  Json edited = ReadJson(folder / "outline.json");
+  edited["buildings"][0]["footprint"][0][0] = -1.5;
+  WriteBytes(folder / "outline.json", edited.dump(1));
+  const CommandResult refused = RunCommandLine(line);
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.err.find("was edited"), std::string::npos) << refused.err;
+  EXPECT_EQ(ReadBytes(folder / "outline.json"), edited.dump(1));
+
+  // It is extruded as it stands, with the points and without; the wall that was moved off them is
+  // noticed.
+  const CommandResult judged =
+      RunCommandLine(line + " --outline_path " + (folder / "outline.json"));
+  EXPECT_EQ(ReadBytes(folder / "outline.json"), edited.dump(1)) << judged.err;
+  const Json again = ReadJson(folder / "report.json");
+  EXPECT_EQ(again["buildings"][0]["corners"][0]["x"], -1.5);
+  const CommandResult alone = RunCommandLine(
+      "roomtex-outline --outline_path " + (folder / "outline.json") + " --output_path " +
+      (folder / "copy.json") + " --model_path " + (folder / "alone.city.json"));
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  EXPECT_EQ(OutlineToJson(ReadOutline(folder / "copy.json")),
+            OutlineToJson(ReadOutline(folder / "outline.json")));
+  EXPECT_TRUE(std::filesystem::exists(folder / "alone.city.json"));
+}
+
+TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
+  const TempFolder folder;
+  const SimulatedStreet street = MakeStreet({});
+  WriteSparseModel(street.model, folder / "model");
+  const std::string common = " --output_path " + (folder / "outline.json") + " --model_path " +
+                             (folder / "b.geojson") + " --model_path " + (folder / "b.city.json");
+  const auto check = [&] {
+    const GeoFrame frame({48.1, 11.6, 560});
+    const Json features = ReadJson(folder / "b.geojson");
+    EXPECT_FALSE(features.contains("note"));
+    ASSERT_EQ(features["features"].size(), 4u);
+    const Json& house = features["features"][0];
+    EXPECT_NEAR(house["properties"]["ridge_height"].get<double>(), 566, 0.05);
+    const Json& ring = house["geometry"]["coordinates"][0];
+    ASSERT_EQ(ring.size(), 5u);
+    EXPECT_EQ(ring[0], ring[4]);
+    std::vector<Eigen::Vector2d> polygon;
+    for (size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector3d x =
+          frame.EnuFromGeo({ring[i][1].get<double>(), ring[i][0].get<double>(), 560});
+      polygon.emplace_back(x.head<2>());
+      double nearest = 100;
+      for (const Eigen::Vector2d& corner : street.truth.buildings[0].footprint) {
+        nearest = std::min(nearest, (x.head<2>() - corner).norm());
+      }
+      EXPECT_LT(nearest, 0.1);
+    }
+    EXPECT_GT(PolygonArea(polygon), 0);  // RFC 7946: counter-clockwise
+    const Json city = ReadJson(folder / "b.city.json");
+    EXPECT_EQ(city["metadata"]["referenceSystem"], "https://www.opengis.net/def/crs/EPSG/0/32632");
+    EXPECT_NEAR(city["transform"]["translate"][0].get<double>(), 693400, 1000);
+    EXPECT_NEAR(city["transform"]["translate"][1].get<double>(), 5330500, 1000);
+    std::filesystem::remove(folder / "outline.json");
+  };
+  CommandResult result = RunCommandLine("roomtex-outline --input_path " + (folder / "model") +
+                                        " --geo_origin 48.1,11.6,560" + common);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  check();
+
+  // As roomtex-align says it: the scan frame lies turned about the place.
+  const Rigid enu_from_scan{Eigen::Quaterniond(0.6, 0.1, -0.3, 0.7).normalized(), {100, -50, 7}};
+  SparseModel aligned = street.model;
+  const Rigid scan_from_enu = enu_from_scan.Inverse();
+  TransformModel({1, scan_from_enu.rotation, scan_from_enu.translation}, &aligned);
+  WriteSparseModel(aligned, folder / "aligned");
+  Json alignment;
+  alignment["trusted"] = true;
+  alignment["reason"] = "";
+  alignment["geo"] = {
+      {"origin", {{"latitude", 48.1}, {"longitude", 11.6}, {"height", 560.0}}},
+      {"enu_from_scan", ToJson(Similarity{1, enu_from_scan.rotation, enu_from_scan.translation})}};
+  WriteBytes(folder / "aligned/alignment.json", alignment.dump());
+  result = RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + common);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  check();
+
+  // As COLMAP's model_aligner makes it: about the middle of the Earth.
+  SparseModel earth = street.model;
+  const Rigid ecef = GeoFrame({48.1, 11.6, 560}).EcefFromEnu();
+  TransformModel({1, ecef.rotation, ecef.translation}, &earth);
+  WriteSparseModel(earth, folder / "ecef");
+  result = RunCommandLine("roomtex-outline --input_path " + (folder / "ecef") + common);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  check();
+
+  // What stands on an alignment that is not trusted is not trusted.
+  alignment["trusted"] = false;
+  alignment["reason"] = "six picks contradict each other";
+  WriteBytes(folder / "aligned/alignment.json", alignment.dump());
+  result = RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + common);
+  EXPECT_EQ(result.exit_code, 4);
+}
+
+TEST(OutlineCommand, SaysWhatIsWrong) {
+  const TempFolder folder;
+  const auto expect = [&](const std::string& arguments, int exit_code, const std::string& text) {
+    const CommandResult result = RunCommandLine("roomtex-outline " + arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << arguments << "\n" << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << arguments << "\n" << result.err;
+    EXPECT_EQ(result.out, "");
+  };
+  const std::string out = " --output_path " + (folder / "o.json");
+  expect(out, 2, "--input_path");
+  expect("--input_path none" + out, 3, "none");
+  expect("--input_path none --model_path b.dae" + out, 2, "b.dae must end with");
+  expect("--input_path none --up 0,0" + out, 2, "--up must be three numbers");
+  expect("--input_path none --area 3,0,1,1" + out, 2, "--area must be");
+  expect("--input_path none --geo_origin 100,0,0" + out, 2, "--geo_origin must be");
+  WriteBytes(folder / "cloud.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+  expect("--input_path " + (folder / "cloud.xyz") + out, 3, "too few");
+  EXPECT_FALSE(std::filesystem::exists(folder / "o.json"));
+  // Points without any building: an answer, but none to trust.
+  std::ostringstream noise;
+  for (int i = 0; i < 400; ++i)
+    noise << (i * 37 % 101) << " " << (i * 53 % 97) << " " << (i * 71 % 89) << "\n";
+  WriteBytes(folder / "noise.xyz", noise.str());
+  const CommandResult nothing =
+      RunCommandLine("roomtex-outline --input_path " + (folder / "noise.xyz") + out);
+  EXPECT_EQ(nothing.exit_code, 4) << nothing.err;
+  EXPECT_NE(nothing.err.find("no building was found"), std::string::npos) << nothing.err;
+
+  // Files that hands have broken.
+  Outline outline = MakeStreet({}).truth;
+  const std::string broken = folder / "broken.json";
+  const auto expect_broken = [&](const std::string& text, const std::string& finding) {
+    WriteBytes(broken, text);
+    expect("--outline_path " + broken + " --output_path " + (folder / "p.json"), 3, finding);
+  };
+  const Json good = OutlineToJson(outline);
+  expect_broken("{\"format\":", "is no JSON");
+  expect_broken("{}", "is no outline");
+  Json bad = good;
+  bad["buildings"][1]["footprint"][2] = {10.0, 5.0};
+  expect_broken(bad.dump(), "building 2 (\"2\"): the footprint crosses or touches itself");
+  bad = good;
+  bad["buildings"][0]["roof"][0]["point"][2] = -3.0;
+  expect_broken(bad.dump(), "the roof does not lie above the ground");
+  bad = good;
+  bad["buildings"][0]["roof"][0]["slope_deg"] = "steep";
+  expect_broken(bad.dump(), "roof plane 1 slope_deg: must be a number");
+  bad = good;
+  bad["buildings"][2]["name"] = "1";
+  expect_broken(bad.dump(), "has the name of another one");
+}
+
+TEST(OutlineCommand, ListsAndChecksItsOptions) {
+  OutlineInputOptions input;
+  ProposalOptions proposal;
+  std::vector<OptionFields> fields = {FieldsOf(&input), FieldsOf(&proposal)};
+#ifdef ROOMTEX_PAGES
+  LocalServerOptions server;
+  fields.push_back(FieldsOf(&server));
+#endif
+  ExpectChecksItsOptions("roomtex-outline", "--input_path none --output_path none/none", fields);
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,152 @@
+#include "building/outline_proposal.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/building/simulated_street.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+struct Result {
+  OutlineProposal proposal;
+  UpFinding up;
+  StreetErrors errors;
+};
+
+Result ProposeFor(const SimulatedStreet& street, OutlineInputOptions input,
+                  const Similarity& input_from_truth = {}, int num_threads = -1) {
+  const TempFolder folder;
+  SparseModel model = street.model;
+  TransformModel(input_from_truth, &model);
+  WriteSparseModel(model, folder / "model");
+  input.input_path = folder / "model";
+  OutlineCloud cloud = ReadOutlineCloud(input, num_threads);
+  std::vector<PlaneSegment> segments = FindPlaneSegments(cloud, 0, num_threads);
+  Result result;
+  result.up = Level(&cloud, &segments);
+  result.proposal = ProposeOutline(cloud, segments, {});
+  result.errors = CompareStreet(street.truth, result.proposal.outline,
+                                cloud.frame.outline_from_input * input_from_truth);
+  return result;
+}
+
+OutlineInputOptions Metres() {
+  OutlineInputOptions input;
+  input.scale = 1;
+  return input;
+}
+
+void ExpectExact(const Result& result, double corner, double height) {
+  EXPECT_EQ(result.errors.missed, 0);
+  EXPECT_LT(result.errors.corner, corner);
+  EXPECT_LT(result.errors.ground, height);
+  EXPECT_LT(result.errors.eaves, height);
+  EXPECT_LT(result.errors.ridge, height);
+  EXPECT_LT(result.errors.volume_share, 0.02);
+}
+
+// From 20 m, where points are 4 cm off: footprints and heights within 10 cm, in fact within 5.
+TEST(OutlineProposal, FindsFourHousesOfAStreet) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    StreetOptions options;
+    options.seed = seed;
+    const Result result = ProposeFor(MakeStreet(options), Metres());
+    EXPECT_EQ(result.proposal.outline.buildings.size(), 4u);
+    ExpectExact(result, 0.05, 0.05);
+    EXPECT_GT(result.proposal.explained, 0.7);
+    for (size_t i = 0; i < 4; ++i) {
+      EXPECT_TRUE(result.proposal.evidence[i].doubts.empty());
+      for (const double sigma : result.proposal.evidence[i].corner_sigma) EXPECT_LT(sigma, 0.05);
+    }
+    const std::vector<OutlineBuilding>& found = result.proposal.outline.buildings;
+    EXPECT_EQ(found[0].RoofShape(), "flat");
+    EXPECT_EQ(found[1].RoofShape(), "gable");
+    EXPECT_EQ(found[2].RoofShape(), "shed");
+    EXPECT_EQ(found[3].footprint.size(), 6u);
+  }
+}
+
+TEST(OutlineProposal, FindsTheMockUpOfBoxes) {
+  StreetOptions options;
+  options.mock_up = true;
+  const Result result = ProposeFor(MakeStreet(options), Metres());
+  EXPECT_EQ(result.proposal.outline.buildings.size(), 2u);
+  ExpectExact(result, 0.002, 0.002);
+}
+
+// COLMAP's frame: any origin, rotation and scale.
+TEST(OutlineProposal, DoesNotHangOnTheFrameOfTheModel) {
+  const SimulatedStreet street = MakeStreet({});
+  const Similarity input_from_truth{
+      0.137, Eigen::Quaterniond(0.4, -0.5, 0.7, 0.2).normalized(), {12, -3, 40}};
+  const Result result = ProposeFor(street, {}, input_from_truth);
+  EXPECT_FALSE(result.proposal.outline.metric);
+  EXPECT_TRUE(result.up.trusted);
+  EXPECT_EQ(result.up.source, "cameras");
+  EXPECT_EQ(result.proposal.outline.buildings.size(), 4u);
+  ExpectExact(result, 0.06, 0.06);
+}
+
+TEST(OutlineProposal, SaysWhatItDidNotSee) {
+  StreetOptions options;
+  options.bare_house = 1;  // the rear wall
+  Result result = ProposeFor(MakeStreet(options), Metres());
+  EXPECT_EQ(result.errors.missed, 0);
+  ASSERT_EQ(result.proposal.evidence.size(), 4u);
+  EXPECT_FALSE(result.proposal.evidence[1].doubts.empty());
+  EXPECT_TRUE(result.proposal.evidence[0].doubts.empty());
+
+  options = {};
+  options.photos_from_above = false;
+  result = ProposeFor(MakeStreet(options), Metres());
+  for (size_t i = 0; i < result.proposal.evidence.size(); ++i) {
+    const BuildingEvidence& evidence = result.proposal.evidence[i];
+    EXPECT_EQ(evidence.num_roof_points == 0, !evidence.doubts.empty());
+  }
+}
+
+TEST(OutlineProposal, IsTheSameForAnyNumberOfThreads) {
+  const SimulatedStreet street = MakeStreet({});
+  EXPECT_EQ(OutlineToJson(ProposeFor(street, Metres(), {}, 1).proposal.outline),
+            OutlineToJson(ProposeFor(street, Metres(), {}, 4).proposal.outline));
+}
+
+TEST(OutlineProposal, KeepsToTheArea) {
+  const TempFolder folder;
+  WriteSparseModel(MakeStreet({}).model, folder / "model");
+  OutlineInputOptions input = Metres();
+  input.input_path = folder / "model";
+  input.up = "0,0,1";
+  OutlineCloud cloud = ReadOutlineCloud(input, -1);
+  std::vector<PlaneSegment> segments = FindPlaneSegments(cloud, 0, -1);
+  Level(&cloud, &segments);
+  ProposalOptions options;
+  options.area = "-3,-4,12.5,12";
+  const OutlineProposal proposal = ProposeOutline(cloud, segments, options);
+  ASSERT_EQ(proposal.outline.buildings.size(), 1u);
+  EXPECT_NEAR(PolygonArea(proposal.outline.buildings[0].footprint), 80, 1);
+}
+
+// A dense cloud without cameras, in metres and upright as clouds are.
+TEST(OutlineProposal, FindsTheStreetInADenseCloud) {
+  const TempFolder folder;
+  StreetOptions options;
+  WriteCloud(MakeDenseStreet(options, 300000), folder / "dense.ply");
+  OutlineInputOptions input;
+  input.input_path = folder / "dense.ply";
+  OutlineCloud cloud = ReadOutlineCloud(input, -1);
+  EXPECT_LE(cloud.points.size(), kMaxOutlinePoints);
+  std::vector<PlaneSegment> segments = FindPlaneSegments(cloud, 0, -1);
+  const UpFinding up = Level(&cloud, &segments);
+  EXPECT_EQ(up.source, "file");
+  Result result;
+  result.proposal = ProposeOutline(cloud, segments, {});
+  result.errors = CompareStreet(MakeStreet(options).truth, result.proposal.outline,
+                                cloud.frame.outline_from_input);
+  EXPECT_EQ(result.proposal.outline.buildings.size(), 4u);
+  ExpectExact(result, 0.05, 0.05);
+}
+
+}  // namespace
+}  // namespace roomtex
