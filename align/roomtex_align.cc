@@ -14,6 +14,7 @@
 #include "align/automatic_alignment.h"
 #include "align/geo/geo_output.h"
 #include "align/lens_report.h"
+#include "align/local_origin.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
 #include "align/plane_bundle_report.h"
@@ -32,6 +33,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo_fit.h"
+#include "core/surfels.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 
@@ -60,7 +62,7 @@ void AddOptions(Arguments* a, Command* command) {
                         "--image_path that have six picks are placed each by its own.",
                         Command::Kind::kOptional);
   command->AddInputPaths("scan_path", &a->scan_paths,
-                         "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh. Not needed for "
+                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
                          "an --input_path that was aligned before: it remembers its scans.",
                          Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
@@ -282,8 +284,11 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
 struct Reading {
   Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
     for (const std::string& note : placed.notes) context.Warn(note);
+    ReplaceClouds(&placed.scans, context.options.num_threads);
     CompareStations(a, &placed, context);
     geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
+    origin = LocalOrigin(placed.scans);
+    origin.MoveToLocal(&placed.scans);
     SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
     options.num_threads = context.options.num_threads;
     surveyed = std::make_unique<const SurveyedScans>(placed.scans, options);
@@ -291,7 +296,8 @@ struct Reading {
   Reading(const Reading&) = delete;  // the survey is one of these scans
   Reading& operator=(const Reading&) = delete;
 
-  PlacedScans placed;
+  PlacedScans placed;  // about the origin, until WriteAligned()
+  LocalOrigin origin{{}};
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
   std::optional<GeoReference> geo;
@@ -413,27 +419,31 @@ void WriteRefusal(const Arguments& a, const std::string& refusal, const Command:
 }
 
 // The aligned model and what belongs to it; without scan_from_sparse there was no sparse model.
-void WriteAligned(const Arguments& a, const SparseModel& model,
-                  const std::optional<Similarity>& scan_from_sparse, const Reading& reading,
+void WriteAligned(const Arguments& a, SparseModel model,
+                  const std::optional<Similarity>& local_from_sparse, Reading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
-  context.progress.Stage("write");
   const std::string output_path = ChooseOutput(a, context);
+  WriteOverlayPictures(a, model, *reading->surveyed, told, output_path, context);
+  context.progress.Stage("write");
+  reading->origin.MoveBack(&model);
+  reading->origin.MoveBack(&reading->placed.scans);
+  reading->origin.MoveBack(&context.report.keys());
   const std::string transform_path = output_path + "/scan_from_sparse.txt";
   const std::string matrix_path = output_path + "/scan_from_sparse_matrix.txt";
   WriteSparseModel(model, output_path);
-  if (scan_from_sparse) {
-    WriteSimilarity(transform_path, *scan_from_sparse);
-    WriteSimilarityMatrix(matrix_path, *scan_from_sparse);
+  if (local_from_sparse) {
+    const Similarity scan_from_sparse = reading->origin.MovedBack(*local_from_sparse);
+    WriteSimilarity(transform_path, scan_from_sparse);
+    WriteSimilarityMatrix(matrix_path, scan_from_sparse);
   } else {
     // One of an earlier run would contradict.
     std::error_code ignored;
     std::filesystem::remove(transform_path, ignored);
     std::filesystem::remove(matrix_path, ignored);
   }
-  WriteGeo(a, model, reading.placed, reading.geo, output_path, context);
-  context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
+  WriteGeo(a, model, reading->placed, reading->geo, output_path, context);
+  context.report["scans"] = ToJson(RecordScans(reading->placed, a.scan_reader, output_path));
   context.report.AddCopy(output_path + "/alignment.json");
-  WriteOverlayPictures(a, model, *reading.surveyed, told, output_path, context);
 }
 
 // What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
@@ -482,12 +492,13 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
-  const std::vector<Pick> picks =
-      a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
-  const std::vector<NearHint> near = ReadHints(a, picks, model);
+  std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
   Reading reading(a, context);
+  reading.origin.MoveToLocal(&picks);
+  reading.origin.MoveToLocal(&near);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
@@ -498,7 +509,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["search"] = reading.search;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
   if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads);
+    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads,
+                    reading.origin.offset());
   }
   if (!reading.attempt.alignment) return WriteRefusal(a, reading.attempt.refusal, context);
   const Alignment& alignment = *reading.attempt.alignment;
@@ -519,7 +531,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   CompareWithPhotos(a, model, *reading.surveyed, told, context);
-  WriteAligned(a, model, alignment.scan_from_sparse, reading, told, context);
+  WriteAligned(a, model, alignment.scan_from_sparse, &reading, told, context);
 }
 
 // None if the files contradict each other; `refusal` then says why.
@@ -539,12 +551,13 @@ std::optional<PhotoAlignment> FindPhotoAlignment(const Arguments& a, const Align
 void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read photos");
-  const std::vector<Pick> picks = ReadPicks(a.picks_path);
+  std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
   CheckPickNames(a.picks_path, picks, photos.model);
   const std::set<std::string> told = LookForPhotos(a, photos.model, context);
   context.progress.Stage("read scan");
   Reading reading(a, context);
+  reading.origin.MoveToLocal(&picks);
   const AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path,
                              reading.azimuth()};
   std::string refusal;
@@ -561,7 +574,7 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   context.report["images"] = PhotosToJson(found->alignment, found->model);
   AddLenses(*found, &context.report["images"]);
   CompareWithPhotos(a, found->model, *reading.surveyed, told, context);
-  WriteAligned(a, found->model, std::nullopt, reading, told, context);
+  WriteAligned(a, found->model, std::nullopt, &reading, told, context);
 }
 
 }  // namespace

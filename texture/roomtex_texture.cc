@@ -50,7 +50,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                         "Folder of the photos, as COLMAP was given it.");
   command->AddInputPaths(
       "scan_path", &o->scan_paths,
-      "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh, .ply or .obj. Not "
+      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not "
       "needed for a model of roomtex-align, which remembers its scans and how "
       "they were read.",
       Command::Kind::kOptional);
@@ -441,7 +441,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {
-    if (scans[i].organised || colorize.atlas.mode != "1" || !result.scans[i].atlas.empty())
+    if (scans[i].kind() != Scan::Kind::kMesh || colorize.atlas.mode != "1" ||
+        !result.scans[i].atlas.empty())
       continue;
     context.Warn(scans[i].path +
                  " got no atlas: no photo looks at it, or it falls into too many small charts. "

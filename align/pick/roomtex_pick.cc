@@ -34,7 +34,7 @@ void AddOptions(Arguments* a, Command* command) {
                         Command::Kind::kOptional);
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
   command->AddInputPaths("scan_path", &a->scene.scan_paths,
-                         "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh. Not needed for "
+                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
                          "a model of roomtex-align, which remembers its scans and how they were "
                          "read.",
                          Command::Kind::kOptional);
