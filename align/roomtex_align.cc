@@ -14,6 +14,7 @@
 #include "align/automatic_alignment.h"
 #include "align/geo/geo_output.h"
 #include "align/lens_report.h"
+#include "align/local_origin.h"
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
 #include "align/plane_bundle_report.h"
@@ -36,6 +37,7 @@
 #include "core/output_set.h"
 #include "core/photo_fit.h"
 #include "core/resource_limits.h"
+#include "core/surfels.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 
@@ -63,11 +65,12 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
                         "--image_path that have six picks are placed each by its own.",
                         Command::Kind::kOptional);
-  command->AddInputPaths("scan_path", &a->scan_paths,
-                         "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh. Not needed for "
-                         "an --input_path that was aligned before: it remembers its scans. " +
-                             BytesPerSampleHelp(kAlignBytesPerSample),
-                         Command::Kind::kOptional);
+  command->AddInputPaths(
+      "scan_path", &a->scan_paths,
+      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
+      "an --input_path that was aligned before: it remembers its scans. " +
+          BytesPerSampleHelp(kAlignBytesPerSample),
+      Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
                         "weight: 1 = ordinary, "
@@ -296,8 +299,11 @@ struct Reading {
                     kAlignBytesPerSample * static_cast<double>(scan.points.size()),
                     "Give a machine with more memory, or a scan with fewer samples");
     }
+    ReplaceClouds(&placed.scans, context.options.num_threads);
     CompareStations(a, &placed, context);
     geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
+    origin = LocalOrigin(placed.scans);
+    origin.MoveToLocal(&placed.scans);
     SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
     options.num_threads = context.options.num_threads;
     surveyed = std::make_unique<const SurveyedScans>(placed.scans, options);
@@ -305,7 +311,8 @@ struct Reading {
   Reading(const Reading&) = delete;  // the survey is one of these scans
   Reading& operator=(const Reading&) = delete;
 
-  PlacedScans placed;
+  PlacedScans placed;  // about the origin, until WriteAligned()
+  LocalOrigin origin{{}};
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
   std::optional<GeoReference> geo;
@@ -427,27 +434,31 @@ void WriteRefusal(const Arguments& a, const std::string& refusal, const Command:
 }
 
 // The aligned model and what belongs to it; without scan_from_sparse there was no sparse model.
-void WriteAligned(const Arguments& a, const SparseModel& model,
-                  const std::optional<Similarity>& scan_from_sparse, const Reading& reading,
+void WriteAligned(const Arguments& a, SparseModel model,
+                  const std::optional<Similarity>& local_from_sparse, Reading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
-  context.progress.Stage("write");
   const std::string output_path = ChooseOutput(a, context);
   const char transform_name[] = "scan_from_sparse.txt",
              matrix_name[] = "scan_from_sparse_matrix.txt";
   RequireNoRigs(output_path);
   const auto outputs = std::make_shared<OutputSet>(output_path);
+  WriteOverlayPictures(a, model, *reading->surveyed, told, *outputs, context);
+  context.progress.Stage("write");
+  reading->origin.MoveBack(&model);
+  reading->origin.MoveBack(&reading->placed.scans);
+  reading->origin.MoveBack(&context.report.keys());
   WriteSparseModel(model, outputs->aside());
-  if (scan_from_sparse) {
-    WriteSimilarity(outputs->Path(transform_name), *scan_from_sparse);
-    WriteSimilarityMatrix(outputs->Path(matrix_name), *scan_from_sparse);
+  if (local_from_sparse) {
+    const Similarity scan_from_sparse = reading->origin.MovedBack(*local_from_sparse);
+    WriteSimilarity(outputs->Path(transform_name), scan_from_sparse);
+    WriteSimilarityMatrix(outputs->Path(matrix_name), scan_from_sparse);
   } else {
     // One of an earlier run would contradict.
     outputs->Remove(transform_name);
     outputs->Remove(matrix_name);
   }
-  WriteGeo(a, model, reading.placed, reading.geo, *outputs, context);
-  context.report["scans"] = ToJson(RecordScans(reading.placed, a.scan_reader, output_path));
-  WriteOverlayPictures(a, model, *reading.surveyed, told, *outputs, context);
+  WriteGeo(a, model, reading->placed, reading->geo, *outputs, context);
+  context.report["scans"] = ToJson(RecordScans(reading->placed, a.scan_reader, output_path));
   CommitWithReport("alignment.json", outputs);
 }
 
@@ -497,12 +508,13 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
-  const std::vector<Pick> picks =
-      a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
-  const std::vector<NearHint> near = ReadHints(a, picks, model);
+  std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");
   Reading reading(a, context);
+  reading.origin.MoveToLocal(&picks);
+  reading.origin.MoveToLocal(&near);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
@@ -513,7 +525,8 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["search"] = reading.search;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
   if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads);
+    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads,
+                    reading.origin.offset());
   }
   if (!reading.attempt.alignment) return WriteRefusal(a, reading.attempt.refusal, context);
   const Alignment& alignment = *reading.attempt.alignment;
@@ -534,7 +547,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   CompareWithPhotos(a, model, *reading.surveyed, told, context);
-  WriteAligned(a, model, alignment.scan_from_sparse, reading, told, context);
+  WriteAligned(a, model, alignment.scan_from_sparse, &reading, told, context);
 }
 
 // None if the files contradict each other; `refusal` then says why.
@@ -554,12 +567,13 @@ std::optional<PhotoAlignment> FindPhotoAlignment(const Arguments& a, const Align
 void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   CheckArguments(a);
   context.progress.Stage("read photos");
-  const std::vector<Pick> picks = ReadPicks(a.picks_path);
+  std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
   CheckPickNames(a.picks_path, picks, photos.model);
   const std::set<std::string> told = LookForPhotos(a, photos.model, context);
   context.progress.Stage("read scan");
   Reading reading(a, context);
+  reading.origin.MoveToLocal(&picks);
   const AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path,
                              reading.azimuth()};
   std::string refusal;
@@ -576,7 +590,7 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
   context.report["images"] = PhotosToJson(found->alignment, found->model);
   AddLenses(*found, &context.report["images"]);
   CompareWithPhotos(a, found->model, *reading.surveyed, told, context);
-  WriteAligned(a, found->model, std::nullopt, reading, told, context);
+  WriteAligned(a, found->model, std::nullopt, &reading, told, context);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ class Report {
   // A key of the command's own, e.g. report["num_vertices"] = 12.
   Json& operator[](const std::string& key) { return keys_[key]; }
   const Json& keys() const { return keys_; }
+  Json& keys() { return keys_; }
 
   void AddInput(const std::string& option, const std::string& path) {
     inputs_[option].push_back(path);

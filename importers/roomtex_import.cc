@@ -11,6 +11,7 @@
 #include "core/scan_mesh.h"
 #include "importers/e57_images.h"
 #include "importers/e57_writer.h"
+#include "importers/las.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
 #include "importers/ply.h"
@@ -104,20 +105,21 @@ class Importer {
   }
 
  private:
-  // Before anything is written: what has no grid has only one way to go.
+  // Before anything is written: what has no grid can become points or a mesh.
   void CheckGrid() const {
     for (const Scan& scan : file_.scans) {
-      if (!scan.organised) RequirePlyOnly(scan);
+      if (!scan.organised) RequireGridless(scan);
     }
   }
-  void RequirePlyOnly(const Scan& scan) const {
+  void RequireGridless(const Scan& scan) const {
     for (const std::string& path : options_.output_paths) {
-      if (ScanWriterExtension(path) == ".ply") continue;
+      const std::string extension = ScanWriterExtension(path);
+      if (extension == ".ply" || extension == ".las") continue;
       throw InputError(
           options_.input_path, "",
           std::string(scan.kind() == Scan::Kind::kCloud ? "is a cloud" : "is a mesh") +
               " without a grid, which cannot be written as " + path,
-          "Write a .ply, or give the scan with its grid (RTPI, PTX, E57 or organised PCD)");
+          "Write a .ply or .las, or give the scan with its grid (RTPI, PTX, E57 or organised PCD)");
     }
   }
 
@@ -133,6 +135,10 @@ class Importer {
       WritePtx(file_.scans, path);
     } else if (extension == ".e57") {
       WriteE57(file_.scans, path);
+    } else if (extension == ".las") {
+      std::vector<const Scan*> scans;
+      for (const Scan& scan : file_.scans) scans.push_back(&scan);
+      WriteLas(scans, path);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
@@ -182,7 +188,7 @@ class Importer {
     if (each.size() > 1) {
       context_.progress.Note(
           std::to_string(each.size()) +
-          " scans: .ply, .ptx and .e57 hold all of them, other outputs are numbered");
+          " scans: .ply, .ptx, .e57 and .las hold all of them, other outputs are numbered");
     }
   }
 
@@ -269,13 +275,13 @@ int main(int argc, char** argv) {
   options.reader.azimuth = "clockwise";  // conversions do not depend on what a header says
   Command command(
       "roomtex-import",
-      "Reads a range scan (RTPI, PTX, E57, organised PCD; meshes) and writes it as mesh, "
+      "Reads a range scan (RTPI, PTX, E57, PCD, PLY, LAS, text; meshes) and writes it as mesh, "
       "cloud, intensity image or scan. The content of the input decides its format, "
       "the extension of an output its own.",
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
   command.AddInputPath(
       "input_path", &options.input_path,
-      "The scan. A PTX or E57 may hold several: .ply, .ptx and .e57 outputs then hold "
+      "The scan. A PTX or E57 may hold several: .ply, .ptx, .e57 and .las outputs then hold "
       "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
@@ -284,7 +290,7 @@ int main(int argc, char** argv) {
   command.AddOutputPaths(
       "output_path", &options.output_paths,
       "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
-      "image, .rtpi (RTPI 3.0), .ptx or .e57. Of panoramas: the folder for their "
+      "image, .rtpi (RTPI 3.0), .ptx, .e57 or .las (points). Of panoramas: the folder for their "
       "faces, panoramas.json (which face is which part of which panorama) and "
       "camera_options.txt (for colmap feature_extractor).",
       Command::Kind::kOptional);

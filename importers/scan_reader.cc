@@ -14,6 +14,7 @@
 #include "importers/e57.h"
 #include "importers/e57_pages.h"
 #include "importers/file_reader.h"
+#include "importers/las.h"
 #include "importers/length_unit.h"
 #include "importers/obj.h"
 #include "importers/pcd.h"
@@ -29,7 +30,7 @@ namespace {
 
 constexpr int64_t kLookAt = 1 << 16;  // bytes from the start that decide the format
 const char kKnownFormats[] =
-    "Give an RTPI, a PTX, an E57, a PCD, a PLY, an OBJ mesh or points as text (the "
+    "Give an RTPI, a PTX, an E57, a PCD, a PLY, a LAS, an OBJ mesh or points as text (the "
     "content counts, not the name)";
 
 bool BeginsWith(std::string_view text, std::string_view start) {
@@ -81,11 +82,9 @@ bool LooksLikePtx(std::string_view bytes) {
 // The name of a format that users may take for a scan, "" if it is none of these.
 std::string ForeignFormat(std::string_view bytes) {
   static const std::pair<std::string_view, const char*> kMagics[] = {
-      {"LASF", "a LAS or LAZ file"},  {"PK\x03\x04", "a zip archive"},
-      {"\x1f\x8b", "a gzip file"},    {"\x89PNG", "a PNG image"},
-      {"\xff\xd8", "a JPEG photo"},   {"glTF", "a glTF model"},
-      {"OFF", "an OFF mesh"},         {"solid ", "an STL mesh"},
-      {"SQLite format", "a database"}};
+      {"PK\x03\x04", "a zip archive"}, {"\x1f\x8b", "a gzip file"},    {"\x89PNG", "a PNG image"},
+      {"\xff\xd8", "a JPEG photo"},    {"glTF", "a glTF model"},       {"OFF", "an OFF mesh"},
+      {"solid ", "an STL mesh"},       {"SQLite format", "a database"}};
   for (const auto& [magic, name] : kMagics) {
     if (BeginsWith(bytes, magic)) return name;
   }
@@ -180,6 +179,10 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
     file.format = "PTX";
     file.byte_order = "text";
     file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
+  } else if (LooksLikeLas(start)) {
+    file.format = "LAS";
+    file.byte_order = "little";
+    file.scans.push_back(ReadLas(path, {meters_per_unit, options.max_range}));
   } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
     file.format = "OBJ";
     file.byte_order = "text";
@@ -236,23 +239,8 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
   return file;
 }
 
-void RequireSurfaces(const ScanFile& file) {
-  for (const Scan& scan : file.scans) {
-    if (scan.kind() != Scan::Kind::kCloud) continue;
-    throw InputError(scan.path, "",
-                     NameOrFile(scan) +
-                         " is a cloud of points without the scanner's grid, and its angles from "
-                         "the station show none",
-                     file.scans.size() > 1
-                         ? "Export it with its grid (structured E57, PTX), or name another scan "
-                           "behind #"
-                         : "Export it with its grid (structured E57, PTX, organised PCD)");
-  }
-}
-
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file = ReadScanFile(path, options);
-  RequireSurfaces(file);
   if (file.scans.size() > 1) {
     throw InputError(path, "",
                      "holds " + std::to_string(file.scans.size()) + " scans, expected one",
@@ -280,7 +268,6 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   std::vector<Missing> missing;
   for (const std::string& path : paths) {
     ScanFile file = ReadScanFile(path, options);
-    RequireSurfaces(file);
     const int count = static_cast<int>(file.scans.size());
     PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);

@@ -32,7 +32,7 @@ struct ScanReaderOptions {
 // All scans of one file (a PTX or an E57 may hold several), and what the file is.
 struct ScanFile {
   std::vector<Scan> scans;         // at least one
-  std::string format;              // "RTPI", "PTX", "PCD", "PLY", "OBJ", "E57" or "XYZ"
+  std::string format;              // "RTPI", "PTX", "PCD", "PLY", "OBJ", "E57", "LAS" or "XYZ"
   std::string byte_order;          // "little", "big" or "text"
   std::vector<std::string> notes;  // assumptions about the file that a user should know
   // RTPI: as it was read, "clockwise" or "counterclockwise"; and what there is to say about it, a
@@ -47,15 +47,11 @@ struct ScanFile {
 // ...).
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options);
 
-// Throws InputError if one of the scans is a cloud (Scan::Kind): nothing here runs on points alone
-// yet.
-void RequireSurfaces(const ScanFile& file);
-
-// The only scan of the file, a grid or a mesh. Throws InputError as above, and for a file with
+// The only scan of the file, of any kind. Throws InputError as above, and for a file with
 // several.
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options);
 
-// Several scans in one scan frame, all scans of all files, grids and meshes. poses_path ("" = none)
+// Several scans in one scan frame, all scans of all files. poses_path ("" = none)
 // gives scan_from_station per scan, one line each:
 //   NAME m00 ... m33                          4x4, row by row, metres
 //   NAME qw qx qy qz tx ty tz                 metres

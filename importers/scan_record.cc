@@ -310,7 +310,6 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
   PlacedScans placed;
   for (const Found& one : found) {
     ScanFile file = ReadScanFile(one.path, OptionsOf(*one.record, request.options));
-    RequireSurfaces(file);
     const std::vector<ScanRecord::Pose>& poses = one.record->poses;
     if (file.scans.size() != poses.size()) {
       throw InputError(alignment.path, "",

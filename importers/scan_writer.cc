@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/e57_writer.h"
+#include "importers/las.h"
 #include "importers/pcd.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
@@ -34,8 +35,8 @@ void WriteIntensityImage(const Scan& scan, const std::string& path) {
 }  // namespace
 
 const std::vector<std::string>& ScanWriterExtensions() {
-  static const std::vector<std::string> kExtensions = {".ply",  ".pcd", ".png",
-                                                       ".rtpi", ".ptx", ".e57"};
+  static const std::vector<std::string> kExtensions = {".ply", ".pcd", ".png", ".rtpi",
+                                                       ".ptx", ".e57", ".las"};
   return kExtensions;
 }
 
@@ -52,12 +53,12 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension.empty()) {
     throw UsageError(path +
                      ": the extension names no known format (.ply, .pcd, .png, .rtpi, .ptx, "
-                     ".e57)");
+                     ".e57, .las)");
   }
-  if (!scan.organised && extension != ".ply") {
-    throw InputError(scan.path, "",
-                     "is a mesh without a grid, which cannot be written as " + extension,
-                     "Write a .ply, or give the scan with its grid (RTPI, PTX or organised PCD)");
+  if (!scan.organised && extension != ".ply" && extension != ".las") {
+    throw InputError(
+        scan.path, "", "is without a grid, so that it cannot be written as " + extension,
+        "Write a .ply or .las, or give the scan with its grid (RTPI, PTX or organised PCD)");
   }
   if (extension == ".ply") WritePly({{&scan, &triangles}}, path);
   if (extension == ".pcd") WritePcd(scan, path);
@@ -65,6 +66,7 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension == ".rtpi") WriteRtpi(RtpiFromScan(scan, options.counterclockwise), path);
   if (extension == ".ptx") WritePtx({scan}, path);
   if (extension == ".e57") WriteE57({scan}, path);
+  if (extension == ".las") WriteLas({&scan}, path);
 }
 
 }  // namespace roomtex

@@ -26,7 +26,8 @@ struct ScanWriterOptions {
 //   .rtpi  RTPI 3.0 (RtpiFromScan says how intensities are scaled)
 //   .ptx   PTX (ptx.h), intensity 0..1
 //   .e57   structured E57 (e57_writer.h)
-// A mesh without a grid can become a .ply only; for the others it is an InputError. Throws
+//   .las   points (las.h)
+// What has no grid can become a .ply or .las only; for the others it is an InputError. Throws
 // UsageError for another extension.
 void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,
                const ScanWriterOptions& options = {});

@@ -6,9 +6,12 @@
 
 #include "core/cpu_stages.h"
 #include "core/error.h"
+#include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/statistics.h"
+#include "core/surfels.h"
 #include "texture/debug_images.h"
 #include "texture/sampling/photo_pass.h"
 #include "texture/sampling/single_holes.h"
@@ -19,18 +22,79 @@
 namespace roomtex {
 namespace {
 
-PhotoPassInput MakeInput(const std::vector<Scan>& scans, std::vector<SmoothedScan>* surfaces,
-                         const ColorizeOptions& options, int num_threads,
-                         std::vector<GridOfSamples>* grids) {
+// Radians between neighbouring points of a cloud as the photos have them before them: what the
+// scanner's steps are to a grid, that depth maps are fine enough and their cracks are closed.
+double SpacingInPhotos(const CloudSurface& cloud, const std::vector<PhotoView>& photos) {
+  constexpr size_t kAsked = 1000;
+  std::vector<double> angles;
+  for (size_t i = 0; i < cloud.points.size(); i += cloud.points.size() / kAsked + 1) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const PhotoView& photo : photos) {
+      nearest = std::min(nearest, (photo.Centre() - cloud.points[i]).norm());
+    }
+    if (nearest > 0 && std::isfinite(nearest)) angles.push_back(cloud.spacing / nearest);
+  }
+  return Median(&angles);
+}
+
+// What the scanner could not see from its station, as a grid around that shows it.
+void AddShadows(const Scan& cloud, double angular_spacing, const ColorizeOptions& options,
+                int num_threads, OccluderTiles* occluder) {
+  constexpr double kStep = 1.5;     // spacings; finer leaves cells empty
+  constexpr double kFinest = 2e-3;  // radians; shadows need not be exact
+  const double step = std::max(kFinest, kStep * angular_spacing);
+  const Scan grid = GridAroundStation(cloud, static_cast<int>(std::lround(kPi / step)) + 1);
+  OccluderTiles tiles =
+      MakeOccluderTiles(grid, MakeSmoothedScan(grid, options.mesh, options.surface, num_threads));
+  occluder->shadows = std::move(tiles.shadows);
+  occluder->fringes = std::move(tiles.fringes);
+}
+
+// The samples are the points of the cloud, what hides them are its surfels.
+SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& photos,
+                            const ColorizeOptions& options, int num_threads,
+                            OccluderTiles* occluder) {
+  CloudSurface cloud = FindCloudSurface(scan, num_threads);
+  SmoothedScan surface;
+  surface.range_noise = cloud.noise;
+  surface.station_is_known = cloud.angular_spacing > 0;
+  surface.angular_spacing =
+      surface.station_is_known ? cloud.angular_spacing : SpacingInPhotos(cloud, photos);
+  surface.points = std::move(cloud.patches.points);
+  surface.triangles = std::move(cloud.patches.triangles);
+  *occluder = MakeOccluderTiles(cloud.patches, surface);
+  if (surface.station_is_known)
+    AddShadows(scan, cloud.angular_spacing, options, num_threads, occluder);
+  surface.points = std::move(cloud.points);
+  surface.normals = std::move(cloud.normals);
+  surface.triangles = {};
+  surface.links = FindGridLinks(scan, {});
+  return surface;
+}
+
+PhotoPassInput MakeInput(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
+                         std::vector<SmoothedScan>* surfaces, const ColorizeOptions& options,
+                         int num_threads, std::vector<GridOfSamples>* grids) {
   const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
   PhotoPassInput input;
   for (const Scan& scan : scans) {
-    SmoothedScan surface = MakeSmoothedScan(scan, options.mesh, options.surface, num_threads);
-    input.occluders.push_back(MakeOccluderTiles(scan, surface));
+    const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
+    SmoothedScan surface;
+    input.occluders.emplace_back();
+    if (is_cloud) {
+      surface = SurfaceOfCloud(scan, photos, options, num_threads, &input.occluders.back());
+      if (!options.surface.reduce_range_noise) surface.points = scan.points;
+    } else {
+      surface = MakeSmoothedScan(scan, options.mesh, options.surface, num_threads);
+      input.occluders.back() = MakeOccluderTiles(scan, surface);
+    }
     const Eigen::Vector3d station =
-        scan.organised ? scan.Station() : Eigen::Vector3d(Scan::MissingPoint());
+        surface.station_is_known ? scan.Station() : Eigen::Vector3d(Scan::MissingPoint());
     grids->push_back(
         AddGrid(scan.num_columns, scan.num_rows, surface.points, surface.normals, station, &input));
+    for (size_t t = grids->back().first_tile; t < grids->back().end_tile; ++t) {
+      input.samples[t].is_two_sided = is_cloud && !surface.station_is_known;
+    }
     if (surface.angular_spacing > 0 &&
         (!(input.angular_spacing > 0) || surface.angular_spacing < input.angular_spacing)) {
       input.angular_spacing = surface.angular_spacing;
@@ -136,7 +200,7 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
                kMaxAutoBands * 1e6 * options.texture_memory_mb / BytesPerTexel(options.blend));
   std::vector<MeshAtlas> atlases(scans.size());
   for (size_t s = 0; s < scans.size(); ++s) {
-    if (scans[s].organised || options.atlas.mode == "0") continue;
+    if (scans[s].kind() != Scan::Kind::kMesh || options.atlas.mode == "0") continue;
     const std::vector<Triangle>& triangles = surfaces[s].triangles;
     const SurfaceProbes probes = SpreadProbes(scans[s].points, triangles, kNumProbes);
     atlases[s] = LayOutAtlas(scans[s].points, triangles, PixelOnSurface(probes, photos), max_texels,
@@ -186,7 +250,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   progress->Stage("mesh");
   std::vector<SmoothedScan> surfaces;
   std::vector<GridOfSamples> grids;
-  PhotoPassInput input = MakeInput(scans, &surfaces, options, num_threads, &grids);
+  PhotoPassInput input = MakeInput(scans, photos, &surfaces, options, num_threads, &grids);
   std::vector<MeshAtlas> atlases = PlanAtlases(scans, photos, surfaces, options, &input);
   const bool has_atlas = std::any_of(atlases.begin(), atlases.end(),
                                      [](const MeshAtlas& atlas) { return !atlas.empty(); });

@@ -134,7 +134,7 @@ cv::Mat3b SightImage(const DebugInput& input, const GridOfSamples& grid,
       if (!(depth > 0) || !(x >= 0 && y >= 0 && x <= width && y <= height)) continue;
       const Eigen::Vector3f point(tile.points.x[i], tile.points.y[i], tile.points.z[i]);
       cv::Vec3b color(40, 40, 40);  // turned away
-      if (FacesCamera(camera - point, tile.normals[i])) {
+      if (FacesCamera(camera - point, tile.NormalTowards(camera - point, i))) {
         const Sight sight = visibility.Look(x, y, depth);
         color = ColorOfSight(sight);
         if (sight == Sight::kClear) {

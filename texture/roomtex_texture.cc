@@ -51,13 +51,12 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
   command->AddInputPath("image_path", &o->sources.image_path,
                         "Folder of the photos, as COLMAP was given it.");
-  command->AddInputPaths(
-      "scan_path", &o->scan_paths,
-      "Range scan: .rtpi, .ptx, .e57, organised .pcd, or a mesh, .ply or .obj. Not "
-      "needed for a model of roomtex-align, which remembers its scans and how "
-      "they were read. " +
-          BytesPerSampleHelp(kTextureBytesPerSample),
-      Command::Kind::kOptional);
+  command->AddInputPaths("scan_path", &o->scan_paths,
+                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not "
+                         "needed for a model of roomtex-align, which remembers its scans and how "
+                         "they were read. " +
+                             BytesPerSampleHelp(kTextureBytesPerSample),
+                         Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
@@ -444,7 +443,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {
-    if (scans[i].organised || colorize.atlas.mode != "1" || !result.scans[i].atlas.empty())
+    if (scans[i].kind() != Scan::Kind::kMesh || colorize.atlas.mode != "1" ||
+        !result.scans[i].atlas.empty())
       continue;
     context.Warn(scans[i].path +
                  " got no atlas: no photo looks at it, or it falls into too many small charts. "

@@ -10,6 +10,7 @@
 #include "colmap_ext/panorama_model.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/surfels.h"
 #include "importers/scan_record.h"
 
 namespace roomtex {
@@ -84,6 +85,7 @@ void PickScene::ReadScans() {
   PlacedScans placed =
       ReadScansOfModel(record, {input_.scan_paths, input_.scan_poses, input_.scan_reader});
   scans_ = std::move(placed.scans);
+  ReplaceClouds(&scans_, input_.num_threads);
   notes_.insert(notes_.end(), placed.notes.begin(), placed.notes.end());
   input_.scan_paths.clear();
   for (const PlacedScans::File& file : placed.files) {

@@ -69,8 +69,10 @@ std::vector<ScanPlane> FindScanPlanes(const std::vector<Scan>& scans,
 // Binary PLY point cloud of all measured samples (grid order; a mesh: its vertices): x y z, red
 // green blue (a colour per plane, grey = none), nx ny nz (of the plane, 0 = none) and `plane`, the
 // index into planes (int, -1 = none). Coordinates too large for float are written relative to the
-// middle of the first scan; a comment in the header says so. Throws InputError (cannot be written).
+// middle of the first scan; a comment in the header says so, as it does if the scans are given
+// about another origin than their own. Throws InputError (cannot be written).
 void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
-                     const std::vector<ScanPlane>& planes, int num_threads);
+                     const std::vector<ScanPlane>& planes, int num_threads,
+                     const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
 }  // namespace roomtex

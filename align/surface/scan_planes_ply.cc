@@ -77,7 +77,8 @@ std::string RowBytes(const Scan& scan, int row, const Eigen::Vector3d& shift,
 }  // namespace
 
 void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
-                     const std::vector<ScanPlane>& planes, int num_threads) {
+                     const std::vector<ScanPlane>& planes, int num_threads,
+                     const Eigen::Vector3d& origin) {
   std::vector<std::vector<std::string>> rows;
   size_t count = 0;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
@@ -97,9 +98,10 @@ void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
   header << "ply\nformat binary_little_endian 1.0\n"
          << "comment planes of the scan by roomtex-align; plane = index in alignment.json, -1 = "
             "none\n";
-  if (!shift.isZero()) {
-    header << "comment add " << Significant(shift.x(), 12) << " " << Significant(shift.y(), 12)
-           << " " << Significant(shift.z(), 12) << " for the scan frame\n";
+  const Eigen::Vector3d add = shift + origin;
+  if (!add.isZero()) {
+    header << "comment add " << Significant(add.x(), 12) << " " << Significant(add.y(), 12) << " "
+           << Significant(add.z(), 12) << " for the scan frame\n";
   }
   header << "element vertex " << count << "\n";
   for (const char* name : {"x", "y", "z"}) header << "property float " << name << "\n";

@@ -5,6 +5,7 @@
 #include "core/frames.h"
 #include "core/report.h"
 #include "importers/content_hash.h"
+#include "importers/ply.h"
 #include "tests/align/case_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -89,6 +90,33 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   }
   EXPECT_LT(WorstPoseErrors(*one.room, aligned, Similarity()).position, 0.003);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
+}
+
+// Points alone, in UTM: aligned as the grid is, and the answer is in UTM.
+TEST(AlignCommand, ACloudFarFromItsOriginIsAlignedLikeTheGrid) {
+  const SimulatedCase& one = MakeCase();
+  CaseFolder files(one);
+  const Eigen::Vector3d utm(412345.5, 5654321.25, 120);
+  std::vector<Pick> picks = one.picks;
+  for (Pick& pick : picks) pick.x_in_scan += utm;
+  WritePicks(files.picks_path, picks);
+  Scan cloud = one.scans[0];
+  for (Eigen::Vector3d& point : cloud.points) point += utm;
+  cloud.scan_from_station.translation.setZero();
+  files.scan_path = files.folder / "cloud.ply";
+  const std::vector<Triangle> no_mesh;
+  WritePly({{&cloud, &no_mesh}}, files.scan_path);
+  const CommandResult result = files.Align();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_GE(report["planes"].size(), 5u);
+  EXPECT_NEAR(report["planes"][0]["point"][1].get<double>(), utm.y(), 10);
+  EXPECT_NEAR(report["scan_from_sparse"]["translation"][0].get<double>(), utm.x(), 20);
+  SparseModel aligned = ReadSparseModel(files.folder / "aligned");
+  Similarity back;
+  back.translation = -utm;
+  TransformModel(back, &aligned);
+  EXPECT_LT(WorstPoseErrors(*one.room, aligned, Similarity()).position, 0.004);
 }
 
 TEST(AlignCommand, WithoutTheAdjustmentTheModelIsMovedByTheSimilarity) {

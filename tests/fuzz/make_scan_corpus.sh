@@ -11,7 +11,7 @@ mkdir -p "$folder"
     for z in -0.1 0.0 0.1 0.2; do echo "$column 2 $z 0.5"; done
   done
 } > "$folder/scan.ptx"
-for extension in rtpi pcd ply e57; do
+for extension in rtpi pcd ply e57 las; do
   "$import" --quiet --input_path "$folder/scan.ptx" --output_path "$folder/scan.$extension" > /dev/null
 done
 sed 's/binary/ascii/; s/HEIGHT.*/HEIGHT 2/; s/WIDTH.*/WIDTH 2/; s/POINTS.*/POINTS 4/; /^DATA/q' \

@@ -94,7 +94,7 @@ TEST_F(ScanReader, SaysWhatAFileIsThatIsNoScan) {
   ExpectError(Write("a", "hello"), "begins with \"hello\"");
   ExpectError(Write("a", std::string("\0\1\2\3", 4)), "byte 0: begins with \"????\"");
   ExpectError(Write("a", "ASTM-E57xxxx"), "byte 12: the file ends in its header");
-  ExpectError(Write("a", "LASFxxxx"), "a LAS or LAZ file");
+  ExpectError(Write("a", "LASFxxxx"), "ends within the header");
   ExpectError(Write("a", "\xff\xd8\xff\xe0"), "a JPEG photo");
   ExpectError(Write("a", "12\nhello\n"), "no scan format");
   ExpectError(Write("a", "P9 4 3\n"), "version 1");

@@ -281,6 +281,34 @@ TEST_F(TextureCommand, ColouredRtpiHoldsTheSameScan) {
   }
 }
 
+// The same points without their grid; the second time without the station, too.
+TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
+  const double psnr_of_grid = Psnr(ReadPly(Path("textured/model.ply")), truth);
+  Scan scan = ReadCaptureScan();
+  const std::vector<Triangle> no_mesh;
+  for (const double loss : {1.5, 2.5}) {
+    WritePly({{&scan, &no_mesh}}, Path("cloud.ply"));
+    const CommandResult result = Texture("cloud", "", Path("cloud.ply"));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const PlyVertices model = ReadPly(Path("cloud/model.ply"));
+    ASSERT_EQ(model.points.size(), truth.points.size());
+    EXPECT_GT(Psnr(model, truth), psnr_of_grid - loss);
+    EXPECT_GT(ReadJson(Path("cloud/report.json"))["coverage"],
+              0.95 * ReadJson(Path("textured/report.json"))["coverage"].get<double>());
+    scan.scan_from_station.translation = {50, 0, 0};
+  }
+  EXPECT_FALSE(fs::exists(Path("cloud/texture.png")));
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("cloud/model.glb")));
+  const tinygltf::Primitive& primitive = model.meshes.at(0).primitives.at(0);
+  EXPECT_EQ(primitive.mode, TINYGLTF_MODE_POINTS);
+  EXPECT_EQ(model.accessors.at(primitive.attributes.at("COLOR_0")).count, truth.points.size());
+}
+
 TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const Scan scan = ReadCaptureScan();
   WriteScan(scan, BuildScanMesh(scan, ScanMeshOptions()), Path("room.ply"));

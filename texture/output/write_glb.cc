@@ -41,7 +41,8 @@ class GlbBuilder {
   }
 
   void AddScan(const Scan& scan, const ColoredScan& colored) {
-    if (colored.triangles.empty()) return;  // glTF knows no empty mesh
+    const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
+    if (colored.triangles.empty() && !is_cloud) return;  // glTF knows no empty mesh
     const Bounds bounds = FindBounds(scan);
     centre_ = 0.5 * (bounds.min + bounds.max);
     tinygltf::Mesh mesh;
@@ -49,7 +50,11 @@ class GlbBuilder {
     for (const TexturedPart& part : MakeTexturedParts(scan, colored, options_.max_texture_size)) {
       mesh.primitives.push_back(TexturedPrimitive(scan, colored, part));
     }
-    if (!textured) mesh.primitives.push_back(VertexColorPrimitive(scan, colored));
+    if (is_cloud) {
+      mesh.primitives.push_back(PointPrimitive(scan, colored));
+    } else if (!textured) {
+      mesh.primitives.push_back(VertexColorPrimitive(scan, colored));
+    }
     if (mesh.primitives.empty()) return;  // triangles without an area
     tinygltf::Node node;
     node.name = "scan " + std::to_string(model_.meshes.size());
@@ -77,6 +82,7 @@ class GlbBuilder {
   tinygltf::Primitive TexturedPrimitive(const Scan& scan, const ColoredScan& colored,
                                         const TexturedPart& part);
   tinygltf::Primitive VertexColorPrimitive(const Scan& scan, const ColoredScan& colored);
+  tinygltf::Primitive PointPrimitive(const Scan& scan, const ColoredScan& colored);
 
   // Appends bytes to the buffer, aligned to 4; gives the number of the new view.
   int AddView(const void* data, size_t size, int target) {
@@ -125,6 +131,15 @@ class GlbBuilder {
     model_.accessors[accessor].minValues = {low.x(), low.y(), low.z()};
     model_.accessors[accessor].maxValues = {high.x(), high.y(), high.z()};
     return accessor;
+  }
+
+  int AddColors(const ColoredScan& colored, const std::vector<int>& vertices) {
+    std::vector<float> colors;
+    colors.reserve(3 * vertices.size());
+    for (int v : vertices) {
+      for (uint8_t value : colored.samples.rgb[v]) colors.push_back(LinearFromSrgbByte()[value]);
+    }
+    return AddFloats(colors, TINYGLTF_TYPE_VEC3, 3);
   }
 
   int AddIndices(const std::vector<uint32_t>& corners) {
@@ -194,15 +209,24 @@ tinygltf::Primitive GlbBuilder::VertexColorPrimitive(const Scan& scan, const Col
       corners.push_back(static_cast<uint32_t>(number[corner]));
     }
   }
-  std::vector<float> colors;
-  for (int v : vertices) {
-    for (uint8_t value : colored.samples.rgb[v]) colors.push_back(LinearFromSrgbByte()[value]);
-  }
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.attributes["POSITION"] = AddPositions(scan, vertices);
-  primitive.attributes["COLOR_0"] = AddFloats(colors, TINYGLTF_TYPE_VEC3, 3);
+  primitive.attributes["COLOR_0"] = AddColors(colored, vertices);
   primitive.indices = AddIndices(corners);
+  primitive.material = AddMaterial(-1);
+  return primitive;
+}
+
+tinygltf::Primitive GlbBuilder::PointPrimitive(const Scan& scan, const ColoredScan& colored) {
+  std::vector<int> vertices;
+  for (int i = 0; i < static_cast<int>(scan.points.size()); ++i) {
+    if (!scan.IsMissing(i)) vertices.push_back(i);
+  }
+  tinygltf::Primitive primitive;
+  primitive.mode = TINYGLTF_MODE_POINTS;
+  primitive.attributes["POSITION"] = AddPositions(scan, vertices);
+  primitive.attributes["COLOR_0"] = AddColors(colored, vertices);
   primitive.material = AddMaterial(-1);
   return primitive;
 }

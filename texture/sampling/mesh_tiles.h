@@ -36,8 +36,15 @@ struct SampleTile {
   PointBlock points;
   std::vector<Eigen::Vector3f> normals;  // unit or zero
   std::vector<int> index;
+  // The normals point to either side of the surface, which is seen from both (of a cloud).
+  bool is_two_sided = false;
   Eigen::Vector3f scanner;  // where the scanner stood, relative to points.origin; NaN = not known
   int first_slot = 0;       // samples are numbered tile by tile
+
+  // The normal of sample i as a camera in this direction from it has it before it.
+  Eigen::Vector3f NormalTowards(const Eigen::Vector3f& camera_from_sample, int i) const {
+    return is_two_sided && camera_from_sample.dot(normals[i]) < 0 ? -normals[i] : normals[i];
+  }
 };
 // columns x rows points (row by row; NaN = none) with their normals. Without a grid: rows = 1.
 // station: where the scanner stood, `scan` frame; NaN = not known.

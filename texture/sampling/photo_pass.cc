@@ -78,11 +78,12 @@ class PhotoObserver {
       if (!(depth > 0) || !(x >= 0 && y >= 0 && x <= width && y <= height)) continue;
       const Eigen::Vector3f point(tile.points.x[i], tile.points.y[i], tile.points.z[i]);
       const Eigen::Vector3f to_camera = camera - point;
-      if (!FacesCamera(to_camera, tile.normals[i])) continue;
+      const Eigen::Vector3f normal = tile.NormalTowards(to_camera, i);
+      if (!FacesCamera(to_camera, normal)) continue;
       Sight sight = visibility_.Look(x, y, depth);
       if (sight == Sight::kHidden) continue;
       // A sample without a triangle is a stray one at a depth jump.
-      if (tile.normals[i].isZero()) sight = std::min(sight, Sight::kBoundary);
+      if (normal.isZero()) sight = std::min(sight, Sight::kBoundary);
       const Eigen::Vector3f to_scanner =
           scanner_known ? Eigen::Vector3f(tile.scanner - point) : Eigen::Vector3f(to_camera);
       const float spacing_px =
@@ -94,7 +95,6 @@ class PhotoObserver {
                                    ? LookUpPhoto(image_, shown.x() + seam, shown.y(),
                                                  static_cast<float>(blend_.footprint) * spacing_px)
                                    : LookUpPhoto(image_, shown.x() + seam, shown.y());
-      const Eigen::Vector3f& normal = tile.normals[i];
       const Eigen::Vector3f camera_direction = to_camera.normalized();
       // A panorama has no left and right border.
       const float from_side = seam_px_ > 0 ? 0.5f * width : x;

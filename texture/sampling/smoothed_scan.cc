@@ -46,6 +46,7 @@ SmoothedScan MakeSmoothedScan(const Scan& scan, const ScanMeshOptions& mesh_opti
     surface.normals = VertexNormals(scan, surface.triangles);
     return surface;
   }
+  surface.station_is_known = true;
   surface.angular_spacing = MedianAngularSpacing(scan, surface.links);
   RangeSmoother smoother(scan, surface.links, options.smoothing_radius, num_threads);
   surface.range_noise = smoother.noise();

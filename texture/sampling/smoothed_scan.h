@@ -35,8 +35,9 @@ struct SmoothedScan {
   GridLinks links;
   std::vector<Eigen::Vector3d> points;   // `scan` frame, range noise reduced; NaN = missing
   std::vector<Eigen::Vector3f> normals;  // unit, towards the scanner; zero where no triangle is
-  double range_noise = 0;      // metres, robust estimate of one sample's standard deviation
-  double angular_spacing = 0;  // radians between neighbouring samples, median; 0 = no grid
+  double range_noise = 0;         // metres, robust estimate of one sample's standard deviation
+  double angular_spacing = 0;     // radians between neighbouring samples, median; 0 = not known
+  bool station_is_known = false;  // the scanner stood at Scan::Station()
 };
 
 // The result keeps no reference to `scan`.

@@ -139,8 +139,10 @@ void View(const ViewOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("prepare");
-  context.report["num_vertices"] = content.model.points.size();
-  context.report["num_triangles"] = content.model.triangles.size();
+  const bool is_cloud = content.model.is_cloud;
+  const size_t num_triangles = content.model.triangles.size();
+  context.report["num_vertices"] = is_cloud ? num_triangles : content.model.points.size();
+  context.report["num_triangles"] = is_cloud ? 0 : num_triangles;
   context.report["num_cameras"] = content.cameras.size();
   context.report["num_photos"] = content.cameras.num_photos();
   LocalServerOptions server_options = options.server;

@@ -189,6 +189,19 @@ ViewChunks::Geometry ViewChunks::MakeFull(const ViewChunk& chunk) const {
   return Arrange(numbers.points, corners);
 }
 
+ViewChunks::Geometry ViewChunks::Thin(const ViewChunk& chunk, double share) const {
+  const auto every = static_cast<size_t>(std::lround(1 / share));
+  Geometry geometry;
+  for (size_t i = chunk.first; i < chunk.end; i += every) {
+    for (const int corner : model_.triangles[order_[i]]) {
+      geometry.corners.push_back(static_cast<uint16_t>(geometry.points.size()));
+      geometry.points.push_back(static_cast<uint32_t>(corner));
+    }
+  }
+  geometry.disc_size = static_cast<float>(std::sqrt(1 / share));
+  return geometry;
+}
+
 ViewChunks::Geometry ViewChunks::Simplify(const ViewChunk& chunk, double share,
                                           double tolerance) const {
   double largest_error = 0;
@@ -236,6 +249,10 @@ ViewChunks::Geometry ViewChunks::Simplify(const ViewChunk& chunk, double share,
 
 std::shared_ptr<const ViewChunks::Geometry> ViewChunks::Make(int chunk, Level level) const {
   if (level == kFull) return std::make_shared<const Geometry>(MakeFull(chunks_.at(chunk)));
+  if (model_.is_cloud) {
+    return std::make_shared<const Geometry>(
+        Thin(chunks_.at(chunk), level == kCoarse ? options_.coarse_share : options_.middle_share));
+  }
   std::shared_ptr<const Geometry>& made = made_[level].at(chunk);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -257,7 +274,14 @@ std::string ViewChunks::Encode(int chunk, Level level) const {
   std::string bytes;
   bytes.reserve(sizeof header + 20 * geometry->points.size() + 2 * geometry->corners.size());
   Append(header, 4, &bytes);
-  for (const uint32_t point : geometry->points) Append(model_.points[point].data(), 3, &bytes);
+  for (const uint32_t point : geometry->points) {
+    Eigen::Vector3f place = model_.points[point];
+    if (geometry->disc_size > 1) {
+      const Eigen::Vector3f middle = model_.Shown(point);
+      place = middle + geometry->disc_size * (place - middle);
+    }
+    Append(place.data(), 3, &bytes);
+  }
   for (const uint32_t point : geometry->points) {
     if (textured) {
       const uint16_t uv[2] = {Fraction(model_.uv[point].x()), Fraction(model_.uv[point].y())};

@@ -56,6 +56,7 @@ class ViewChunks {
     std::vector<uint32_t> points;   // indices into ViewModel::points, in the order of their use
     std::vector<uint16_t> corners;  // three per triangle, into points
     double error = 0;               // metres, as in the options
+    float disc_size = 1;            // of a cloud: times that of its discs, where some are left out
   };
   std::shared_ptr<const Geometry> Make(int chunk, Level level) const;
 
@@ -68,6 +69,8 @@ class ViewChunks {
  private:
   Geometry Simplify(const ViewChunk& chunk, double share, double tolerance) const;
   Geometry MakeFull(const ViewChunk& chunk) const;
+  // Of a cloud: every second, third ... disc, as much larger.
+  Geometry Thin(const ViewChunk& chunk, double share) const;
 
   const ViewModel& model_;
   const ViewChunkOptions options_;

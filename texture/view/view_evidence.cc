@@ -93,7 +93,7 @@ ViewEvidence::ViewEvidence(const ViewModel& model, const Evidence& evidence) {
   codes_.reserve(model.points.size());
   size_t num_found = 0;
   for (size_t i = 0; i < model.points.size(); ++i) {
-    const int found = nearest.Find(model.InScan(i));
+    const int found = nearest.Find(model.origin + model.Shown(i).cast<double>());
     if (found < 0) {
       codes_.push_back({0, 0, 255, 255});
       continue;

@@ -8,8 +8,12 @@
 #include <Eigen/Geometry>
 
 #include "core/error.h"
+#include "core/frames.h"
 #include "core/output_file.h"
+#include "core/surfels.h"
+#include "importers/file_reader.h"
 #include "importers/ply.h"
+#include "importers/ply_header.h"
 
 namespace roomtex {
 namespace {
@@ -83,12 +87,57 @@ bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& dir
   return sum.normalized().dot(direction.cast<float>()) < kFrontMargin;
 }
 
+namespace {
+
+// A triangle on the surface around each point, as large as its share of it: in place of the points.
+void ShowAsDiscs(const Scan& scan, ViewModel* model) {
+  constexpr double kRadius =
+      1.4;  // of the corners, in spacings: the circle inside reaches half way
+  const CloudSurface cloud = FindCloudSurface(scan, -1);
+  const size_t every = scan.points.size() / kMostDiscs + 1;
+  const std::vector<std::array<uint8_t, 3>> colors = std::move(model->colors);
+  model->is_cloud = true;
+  model->points = {};
+  model->colors = {};
+  for (size_t i = 0; i < scan.points.size(); i += every) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    const double spacing = cloud.spacings[i] > 0 ? cloud.spacings[i] : cloud.spacing;
+    const double radius = kRadius * std::sqrt(static_cast<double>(every)) * spacing;
+    const Eigen::Vector3d normal =
+        cloud.normals[i].isZero() ? scan.up : Eigen::Vector3d(cloud.normals[i].cast<double>());
+    const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+    const int first = static_cast<int>(model->points.size());
+    for (int k = 0; k < 3; ++k) {
+      const double angle = 2 * kPi * k / 3;
+      model->points.push_back(
+          (scan.points[i] + radius * (std::cos(angle) * u + std::sin(angle) * v) - model->origin)
+              .cast<float>());
+      model->colors.push_back(colors[i]);
+      // Both sides are shown where nobody knows the front.
+      model->normals.push_back(cloud.angular_spacing > 0 ? cloud.normals[i]
+                                                         : Eigen::Vector3f(0, 0, 0));
+    }
+    model->triangles.push_back({first, first + 1, first + 2});
+  }
+  model->page_of_triangle.assign(model->triangles.size(), -1);
+}
+
+bool IsCloud(const std::string& ply_path) {
+  const PlyHeader header = ReadPlyHeader(FileReader(ply_path));
+  return std::none_of(header.elements.begin(), header.elements.end(),
+                      [](const PlyElement& e) { return e.name == "face" && e.count > 0; });
+}
+
+}  // namespace
+
 ViewModel ReadViewPly(const std::string& path) {
   PlyVertexValues color{{"red", "green", "blue"}, {}};
-  const Scan scan = ReadPly(path, {}, nullptr, &color);
+  PlyOptions options;
+  options.clouds = true;
+  const Scan scan = ReadPly(path, options, nullptr, &color);
   const Bounds bounds = FindBounds(scan);
-  if (scan.triangles.empty() || !(bounds.min.x() <= bounds.max.x())) {
-    throw InputError(path, "", "has no triangles", "Give what roomtex-texture wrote");
+  if (!(bounds.min.x() <= bounds.max.x())) {
+    throw InputError(path, "", "holds no point", "Give what roomtex-texture wrote");
   }
   ViewModel model;
   model.path = path;
@@ -109,6 +158,7 @@ ViewModel ReadViewPly(const std::string& path) {
       model.colors[i][k] = static_cast<uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f);
     }
   }
+  if (scan.kind() == Scan::Kind::kCloud) ShowAsDiscs(scan, &model);
   return model;
 }
 
@@ -120,7 +170,8 @@ ViewModel ReadViewModel(const std::string& path) {
   std::string file = path;
   if (fs::is_directory(path, error)) {
     file = (fs::path(path) / "model.glb").string();
-    if (!fs::exists(file, error)) file = (fs::path(path) / "model.ply").string();
+    const std::string ply = (fs::path(path) / "model.ply").string();
+    if (!fs::exists(file, error) || (fs::exists(ply, error) && IsCloud(ply))) file = ply;
     if (!fs::exists(file, error)) {
       throw InputError(path, "", "holds neither model.glb nor model.ply",
                        "Give the folder that roomtex-texture wrote");
@@ -132,7 +183,7 @@ ViewModel ReadViewModel(const std::string& path) {
   RequireFile(file, "Give what roomtex-texture wrote");
   if (extension == ".glb" || extension == ".ply") {
     ViewModel model = extension == ".glb" ? ReadViewGlb(file) : ReadViewPly(file);
-    model.normals = SmoothNormals(model);
+    if (!model.is_cloud) model.normals = SmoothNormals(model);
     return model;
   }
   throw InputError(path, "", "is neither a folder nor a .glb or .ply file",

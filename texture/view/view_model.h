@@ -36,8 +36,16 @@ struct ViewModel {
   std::vector<Triangle> triangles;
   std::vector<int> page_of_triangle;  // index into images; -1 = colours of the points
   std::vector<ViewImage> images;
+  // Of a cloud: every triangle is a disc by itself, around one of the cloud's points.
+  bool is_cloud = false;
 
   Eigen::Vector3d InScan(size_t point) const { return origin + points[point].cast<double>(); }
+  // What the point shows: itself, or the middle of its disc. Relative to the origin.
+  Eigen::Vector3f Shown(size_t point) const {
+    if (!is_cloud) return points[point];
+    const size_t first = point / 3 * 3;
+    return (points[first] + points[first + 1] + points[first + 2]) / 3;
+  }
 };
 
 // Front = the side that the scanner saw. A single triangle does not say it: where the scanner
@@ -49,16 +57,18 @@ std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes = 
 bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& direction);
 inline constexpr float kFrontMargin = 0.05f;  // cosine
 
-// A folder that roomtex-texture wrote (model.glb, or model.ply if there is no GLB), a .glb or a
-// .ply. Throws InputError: nothing there, damaged, no triangles, things of glTF that we do not
-// read.
+// A folder that roomtex-texture wrote (model.glb; model.ply if there is no GLB, or the model is a
+// cloud), a .glb or a .ply. Throws InputError: nothing there, damaged, no triangles, things of glTF
+// that we do not read.
 ViewModel ReadViewModel(const std::string& path);
 
 // Binary glTF 2.0: triangles with one texture image or vertex colours each; nodes with their
 // transforms. The scan frame is that below the root node of roomtex-texture's files, and glTF's own
 // for any other file. Numbers are checked against the bytes that are there.
 ViewModel ReadViewGlb(const std::string& path);
-// A triangle mesh; colours by red, green, blue if it has them, otherwise light grey.
+// A triangle mesh or a cloud of points; colours by red, green, blue if it has them, otherwise light
+// grey. Of a cloud of more than kMostDiscs points every second, third ... is shown, larger.
+inline constexpr size_t kMostDiscs = 8000000;
 ViewModel ReadViewPly(const std::string& path);
 
 // Width and height of a PNG or JPEG by its header; {0, 0} for anything else.

@@ -64,6 +64,30 @@ TEST(ViewModel, PlyComesBackWithItsColours) {
   EXPECT_EQ(model.page_of_triangle[0], -1);
 }
 
+// Its points keep their order and colours, one disc each, and lie amid them.
+TEST(ViewModel, ACloudIsShownAsDiscs) {
+  const TempFolder folder;
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 2500\nproperty double x\nproperty double y\n"
+      "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "end_header\n";
+  for (int i = 0; i < 2500; ++i) {
+    text += std::to_string(500000 + 0.01 * (i % 50)) + " " + std::to_string(0.01 * (i / 50)) +
+            " 0 " + std::to_string(i % 256) + " 7 9\n";
+  }
+  WriteBytes(folder / "model.ply", text);
+  const ViewModel model = ReadViewModel(folder.path());
+  EXPECT_TRUE(model.is_cloud);
+  ASSERT_EQ(model.triangles.size(), 2500u);
+  ASSERT_EQ(model.points.size(), 7500u);
+  for (size_t i = 0; i < 2500; i += 99) {
+    const Eigen::Vector3d place(500000 + 0.01 * (i % 50), 0.01 * (i / 50), 0);
+    EXPECT_LT((model.origin + model.Shown(3 * i).cast<double>() - place).norm(), 1e-5);
+    EXPECT_LT((model.InScan(3 * i) - place).norm(), 0.02);
+    EXPECT_EQ(model.colors[3 * i + 2][0], i % 256);
+  }
+}
+
 TEST(ViewModel, NormalsLookAtTheScannerInSpiteOfNoise) {
   TwoWalls scene;
   scene.board_half = 0;

@@ -200,7 +200,8 @@ export class Panel {
     document.title = `${data.name} – roomtex-view`;
     $('name').textContent = data.name;
     $('facts').textContent =
-        `${count(data.num_vertices)} points, ${count(data.num_triangles)} triangles` +
+        `${count(data.num_vertices)} points` +
+        (data.num_triangles > 0 ? `, ${count(data.num_triangles)} triangles` : '') +
         (data.num_cameras ? `, ${data.num_cameras} cameras` : '');
     for (const warning of data.warnings) $('warnings').append(make('p', {text: warning}));
   }

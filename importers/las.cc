@@ -1,0 +1,243 @@
+#include "importers/las.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "core/error.h"
+#include "core/output_file.h"
+#include "importers/file_reader.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int64_t kLeastHeader = 227, kHeader14 = 375;
+constexpr char kLasDamaged[] = "The file is damaged: export it again";
+constexpr int64_t kLasBlock = 1 << 20;  // bytes read at once, about
+
+struct LasPointFormat {
+  int size;    // bytes, at least
+  int colors;  // where red, green, blue begin; -1 = none
+};
+constexpr LasPointFormat kPointFormats[] = {{20, -1}, {28, -1}, {26, 20}, {34, 28},
+                                            {57, -1}, {63, 28}, {30, -1}, {36, 30},
+                                            {38, 30}, {59, -1}, {67, 30}};
+constexpr int kFirstOfLas14 = 6;  // from here on flags have a byte of their own
+
+template <typename T>
+T ValueAt(const char* bytes) {  // little-endian, as this machine
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
+struct LasHeader {
+  int format = 0;
+  int64_t record_size = 0, offset = 0, count = 0;
+  Eigen::Vector3d scale, shift, middle;
+};
+
+LasHeader ReadLasHeader(const FileReader& file) {
+  const auto fail = [&file](int64_t at, const std::string& finding,
+                            const std::string& remedy = kLasDamaged) {
+    throw InputError(file.path(), BytePosition(at), finding, remedy);
+  };
+  std::string bytes = file.ReadSome(0, kHeader14);
+  if (static_cast<int64_t>(bytes.size()) < kLeastHeader) {
+    fail(file.size(), "the file ends within the header", "The file is cut off: copy it again");
+  }
+  bytes.resize(kHeader14, '\0');
+  const auto byte = [&bytes](size_t at) { return static_cast<uint8_t>(bytes[at]); };
+  const int major = byte(24), minor = byte(25);
+  if (major != 1 || minor > 4) {
+    fail(24,
+         "is LAS " + std::to_string(major) + "." + std::to_string(minor) + ", expected 1.0 to 1.4",
+         "Export it as LAS 1.4 or 1.2");
+  }
+  LasHeader header;
+  if ((byte(104) & 0xc0) != 0) {
+    throw InputError(file.path(), "", "is compressed (LAZ)",
+                     "Decompress it: laszip, pdal translate IN.laz OUT.las, or open it in "
+                     "CloudCompare and save it as .las");
+  }
+  header.format = byte(104);
+  if (header.format > 10) {
+    fail(104, "the points are of format " + std::to_string(header.format) + ", expected 0 to 10",
+         "Export it as LAS 1.4 or 1.2");
+  }
+  header.record_size = ValueAt<uint16_t>(&bytes[105]);
+  const int least = kPointFormats[header.format].size;
+  if (header.record_size < least) {
+    fail(105, "a point has " + std::to_string(header.record_size) + " bytes, expected at least " +
+                  std::to_string(least) + " of format " + std::to_string(header.format));
+  }
+  header.offset = ValueAt<uint32_t>(&bytes[96]);
+  if (header.offset < kLeastHeader || header.offset > file.size()) {
+    fail(96, "the points begin at byte " + std::to_string(header.offset) + " of " +
+                 std::to_string(file.size()));
+  }
+  uint64_t count = ValueAt<uint32_t>(&bytes[107]);
+  if (minor == 4 && ValueAt<uint16_t>(&bytes[94]) >= kHeader14) {
+    const auto long_count = ValueAt<uint64_t>(&bytes[247]);
+    if (long_count > 0) count = long_count;
+  }
+  const auto fitting = static_cast<uint64_t>((file.size() - header.offset) / header.record_size);
+  if (count > fitting) {
+    fail(107,
+         "says " + std::to_string(count) + " points, the rest of the file holds " +
+             std::to_string(fitting),
+         "The file is cut off: copy it again");
+  }
+  if (count > static_cast<uint64_t>(std::numeric_limits<int>::max())) {
+    fail(107, "says " + std::to_string(count) + " points",
+         "More than 2147483647 are not read: thin it out");
+  }
+  header.count = static_cast<int64_t>(count);
+  for (int k = 0; k < 3; ++k) {
+    header.scale[k] = ValueAt<double>(&bytes[131 + 8 * static_cast<size_t>(k)]);
+    header.shift[k] = ValueAt<double>(&bytes[155 + 8 * static_cast<size_t>(k)]);
+    const double high = ValueAt<double>(&bytes[179 + 16 * static_cast<size_t>(k)]);
+    const double low = ValueAt<double>(&bytes[187 + 16 * static_cast<size_t>(k)]);
+    header.middle[k] = 0.5 * (low + high);
+    if (!(header.scale[k] > 0) || !(header.scale[k] < 1e6)) {
+      fail(131 + 8 * k, "the scale is no positive number");
+    }
+    if (!(std::abs(header.shift[k]) < 1e12)) fail(155 + 8 * k, "the offset is no number");
+  }
+  return header;
+}
+
+uint16_t LasIntensity(float value, float largest) {
+  const float factor = largest <= 1 ? 65535.0f : largest > 65535 ? 65535 / largest : 1.0f;
+  if (!(value > 0)) return 0;  // also NaN
+  return static_cast<uint16_t>(std::lround(std::min(65535.0f, factor * value)));
+}
+
+template <typename T>
+void PutAt(size_t at, T value, std::string* bytes) {
+  std::memcpy(bytes->data() + at, &value, sizeof value);
+}
+
+}  // namespace
+
+bool LooksLikeLas(std::string_view start) { return start.substr(0, 4) == "LASF"; }
+
+Scan ReadLas(const std::string& path, const LasOptions& options) {
+  const FileReader file(path);
+  const LasHeader header = ReadLasHeader(file);
+  Scan scan;
+  scan.path = path;
+  scan.organised = false;
+  scan.up = Eigen::Vector3d::UnitZ();
+  scan.points.reserve(static_cast<size_t>(header.count));
+  scan.intensity.reserve(static_cast<size_t>(header.count));
+  std::vector<float> greys;
+  const int colors = kPointFormats[header.format].colors;
+  const char withheld = static_cast<char>(header.format < kFirstOfLas14 ? 0x80 : 0x04);
+  const int64_t per_block = std::max<int64_t>(1, kLasBlock / header.record_size);
+  std::string block;
+  bool has_intensity = false;
+  for (int64_t first = 0; first < header.count; first += per_block) {
+    const int64_t count = std::min(per_block, header.count - first);
+    block.resize(static_cast<size_t>(count * header.record_size));
+    file.Read(header.offset + first * header.record_size, block.data(),
+              static_cast<int64_t>(block.size()));
+    for (int64_t i = 0; i < count; ++i) {
+      const char* const record = block.data() + i * header.record_size;
+      if ((record[15] & withheld) != 0) continue;
+      Eigen::Vector3d point;
+      for (int k = 0; k < 3; ++k) {
+        point[k] = header.shift[k] + header.scale[k] * ValueAt<int32_t>(record + 4 * k);
+      }
+      if (options.max_range > 0 &&
+          !(options.meters_per_unit * (point - header.middle).norm() <= options.max_range)) {
+        continue;
+      }
+      scan.points.push_back(options.meters_per_unit * point);
+      const auto intensity = ValueAt<uint16_t>(record + 12);
+      has_intensity = has_intensity || intensity > 0;
+      scan.intensity.push_back(intensity);
+      if (colors < 0 || has_intensity) continue;
+      const char* const color = record + colors;
+      greys.resize(scan.points.size() - 1, 0.0f);
+      greys.push_back(0.299f * ValueAt<uint16_t>(color) + 0.587f * ValueAt<uint16_t>(color + 2) +
+                      0.114f * ValueAt<uint16_t>(color + 4));  // Rec. ITU-R BT.601
+    }
+  }
+  if (scan.points.empty()) {
+    throw InputError(path, "", "holds no point",
+                     options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
+  }
+  if (!has_intensity && greys.size() == scan.points.size()) scan.intensity = std::move(greys);
+  scan.num_columns = static_cast<int>(scan.points.size());
+  scan.num_rows = 1;
+  return scan;
+}
+
+void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
+  constexpr double kFinest = 1e-4;
+  uint64_t count = 0;
+  Bounds all;
+  float largest = 0;
+  for (const Scan* scan : scans) {
+    count += scan->points.size() - static_cast<size_t>(scan->NumMissing());
+    const Bounds bounds = FindBounds(*scan);
+    all.min = all.min.cwiseMin(bounds.min);
+    all.max = all.max.cwiseMax(bounds.max);
+    for (const float value : scan->intensity) {
+      if (std::isfinite(value)) largest = std::max(largest, value);
+    }
+  }
+  if (count > std::numeric_limits<uint32_t>::max()) {
+    throw InputError(path, "", "would hold more than 4294967295 points", "Write .e57 or .ply");
+  }
+  if (count == 0) all.min = all.max = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d shift = (0.5 * (all.min + all.max)).array().round();
+  double scale = kFinest;
+  while ((all.max - all.min).maxCoeff() / scale > 4e9) scale *= 10;
+
+  std::string header(kLeastHeader, '\0');
+  std::memcpy(header.data(), "LASF", 4);
+  header[24] = 1;
+  header[25] = 2;
+  std::memcpy(header.data() + 58, "roomtex", 7);
+  PutAt<uint16_t>(94, kLeastHeader, &header);
+  PutAt<uint32_t>(96, kLeastHeader, &header);
+  PutAt<uint16_t>(105, 20, &header);
+  PutAt(107, static_cast<uint32_t>(count), &header);
+  PutAt(111, static_cast<uint32_t>(count), &header);  // all are first returns
+  for (size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    PutAt(131 + 8 * k, scale, &header);
+    PutAt(155 + 8 * k, shift[axis], &header);
+    PutAt(179 + 16 * k, all.max[axis], &header);
+    PutAt(187 + 16 * k, all.min[axis], &header);
+  }
+  OutputFile output(path);
+  output.stream() << header;
+  std::string block;
+  for (const Scan* scan : scans) {
+    for (size_t i = 0; i < scan->points.size(); ++i) {
+      if (scan->IsMissing(static_cast<int>(i))) continue;
+      std::string record(20, '\0');
+      for (size_t k = 0; k < 3; ++k) {
+        const auto axis = static_cast<Eigen::Index>(k);
+        PutAt(4 * k,
+              static_cast<int32_t>(std::lround((scan->points[i][axis] - shift[axis]) / scale)),
+              &record);
+      }
+      PutAt(12, LasIntensity(scan->intensity[i], largest), &record);
+      record[14] = 9;  // return 1 of 1
+      block += record;
+      if (static_cast<int64_t>(block.size()) < kLasBlock) continue;
+      output.stream() << block;
+      block.clear();
+    }
+  }
+  output.stream() << block;
+  output.Commit();
+}
+
+}  // namespace roomtex
