@@ -3,8 +3,10 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <set>
 
+#include <nlohmann/json.hpp>
 #include <stdlib.h>
 
 #include "colmap_ext/mapper_verdict.h"
@@ -14,7 +16,7 @@ namespace roomtex {
 namespace fs = std::filesystem;
 
 ScratchFolder::ScratchFolder(const std::string& parent) {
-  std::string pattern = (fs::path(parent) / ".roomtex-mapper-XXXXXX").string();
+  std::string pattern = (fs::path(parent) / ".roomtex-partial-XXXXXX").string();
   if (mkdtemp(pattern.data()) == nullptr) {
     throw InputError(parent, "",
                      std::string("cannot be written into (") + std::strerror(errno) + ")",
@@ -46,6 +48,20 @@ void RequireReplaceableModel(const std::string& folder) {
     throw InputError(folder, "", "holds " + name + ", which is no part of a COLMAP model",
                      "This folder would be replaced: move it away or give another --output_path");
   }
+}
+
+void RequireReplaceableOutput(const std::string& folder, const std::string& command) {
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(folder, error))) return;
+  const char* const remedy = "Move it away or give another --output_path";
+  if (!fs::is_directory(folder, error)) {
+    throw InputError(folder, "", "is not a folder, and one is to be written there", remedy);
+  }
+  if (fs::is_empty(folder, error)) return;
+  std::ifstream stream(folder + "/report.json");
+  const auto report = nlohmann::json::parse(stream, nullptr, false);
+  if (report.is_object() && report.value("command", "") == command) return;
+  throw InputError(folder, "", "holds files that " + command + " did not write", remedy);
 }
 
 void ReplaceFolder(const std::string& finished, const std::string& target,

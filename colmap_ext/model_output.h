@@ -26,6 +26,10 @@ class ScratchFolder {
 // replacing it would destroy what is not ours.
 void RequireReplaceableModel(const std::string& folder);
 
+// Throws InputError unless `folder` does not exist, is empty, or holds what this command left there:
+// its report.json names it.
+void RequireReplaceableOutput(const std::string& folder, const std::string& command);
+
 // Puts `finished` in the place of `target`; what stood there goes into `scratch` as a whole. Same
 // file system.
 void ReplaceFolder(const std::string& finished, const std::string& target,

@@ -26,6 +26,7 @@ declare -A allowed=(
   [texture/registration]="$below texture/sampling"
   [texture/tone]="$below texture/sampling"
   [texture/sampling]="$below"
+  [texture/export]="$below texture texture/output texture/texels texture/tone texture/registration texture/sampling"
   [texture/render]="$below"
   [texture/view]="$below texture/output texture/texels texture/sampling"
 

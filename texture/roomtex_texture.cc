@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
@@ -376,28 +375,6 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   set.Commit();
 }
 
-// A file may look like a photo and be broken further down: then all is done again without it.
-ColorizeResult ColorizeWithReadable(const std::vector<Scan>& scans, const ColorizeOptions& colorize,
-                                    const TextureOptions& options, PhotoList* list,
-                                    const Command::Context& context) {
-  while (true) {
-    try {
-      return ColorizeScans(scans, list->photos, colorize, context.options.num_threads,
-                           &context.progress);
-    } catch (const UnreadablePhotos& unreadable) {
-      if (options.strict) throw;
-      std::set<std::string> names;
-      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
-      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
-      std::vector<PhotoView>& photos = list->photos;
-      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
-      if (photos.empty()) throw;
-      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
-                            unreadable.photos().end());
-    }
-  }
-}
-
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
@@ -436,7 +413,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   context.report.AddCopy(options.output_path + "/report.json");
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result = ColorizeWithReadable(scans, colorize, options, &list, context);
+  const ColorizeResult result = 
+      ColorizeReadable(scans, colorize, options.strict, context.options.num_threads,
+                       &context.progress, &list);
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
   Judge(list.photos, result, context);
