@@ -15,8 +15,8 @@ struct ColorPair {
   Rgb photo, agreed;
 };
 
-// 255 = to be used, 0 = something that moved. Where in a cell of cell_px pixels most samples
-// contradict the agreed colour, after one gain per channel for the whole photo, and its neighbours
+// 255 = to be used, 0 = something that moved: where the mean colour in a cell of cell_px pixels
+// contradicts what was agreed, after one gain per channel for the whole photo, and its neighbours'
 // do as well. Where the scan has nothing, nothing is known: 255.
 cv::Mat1b MaskOfMovingThings(const std::vector<ColorPair>& pairs, int width, int height,
                              int cell_px);
