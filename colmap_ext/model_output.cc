@@ -11,6 +11,7 @@
 
 #include "colmap_ext/mapper_verdict.h"
 #include "core/error.h"
+#include "core/output_file.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -64,8 +65,24 @@ void RequireReplaceableOutput(const std::string& folder, const std::string& comm
   throw InputError(folder, "", "holds files that " + command + " did not write", remedy);
 }
 
-void ReplaceFolder(const std::string& finished, const std::string& target,
+namespace {
+
+std::string WithoutSlash(const std::string& folder) {
+  const fs::path path = fs::absolute(folder).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).string();
+}
+
+}  // namespace
+
+std::string ParentFolder(const std::string& folder) {
+  const std::string parent = fs::path(WithoutSlash(folder)).parent_path().string();
+  MakeFolder(parent);
+  return parent;
+}
+
+void ReplaceFolder(const std::string& finished, const std::string& given_target,
                    const std::string& scratch) {
+  const std::string target = WithoutSlash(given_target);
   const fs::path old = fs::path(scratch) / ("replaced_" + fs::path(target).filename().string());
   std::error_code error;
   const bool had_old = fs::exists(target, error);

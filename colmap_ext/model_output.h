@@ -30,8 +30,11 @@ void RequireReplaceableModel(const std::string& folder);
 // its report.json names it.
 void RequireReplaceableOutput(const std::string& folder, const std::string& command);
 
+// The folder that holds `folder`, made if it is missing; a slash at the end means nothing.
+std::string ParentFolder(const std::string& folder);
+
 // Puts `finished` in the place of `target`; what stood there goes into `scratch` as a whole. Same
-// file system.
+// file system. A slash at the end of target means nothing.
 void ReplaceFolder(const std::string& finished, const std::string& target,
                    const std::string& scratch);
 

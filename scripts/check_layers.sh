@@ -30,6 +30,8 @@ declare -A allowed=(
   [texture/render]="$below"
   [texture/view]="$below texture/output texture/texels texture/sampling"
 
+  [dense]="$below"
+
   [workflow]="core"
 
   [capture]="$below capture/pattern capture/simulation"
@@ -54,10 +56,10 @@ while IFS=: read -r file line include; do
     *" $target "*) ;;
     *) echo "$file:$line: $room/ must not include $target/"; status=1 ;;
   esac
-done < <(grep -nE '^#include "[a-z_]+/' -r core colmap_ext importers align texture capture workflow --include='*.h' --include='*.cc')
+done < <(grep -nE '^#include "[a-z_]+/' -r core colmap_ext importers align texture capture dense workflow --include='*.h' --include='*.cc')
 
 # No two headers include each other, over any number of steps.
-circles=$(grep -E '^#include "[a-z_]+/' -r core colmap_ext importers align texture capture workflow --include='*.h' |
+circles=$(grep -E '^#include "[a-z_]+/' -r core colmap_ext importers align texture capture dense workflow --include='*.h' |
   sed -E 's/:#include "/ /; s/".*//' | tsort 2>&1 >/dev/null | sed -nE 's/^tsort: ([^-].*\.h)$/  \1/p' || true)
 if [ -n "$circles" ]; then
   printf 'These headers include each other in a circle:\n%s\n' "$circles"

@@ -1,7 +1,6 @@
 // roomtex-export: aligned photos and scan for programs that go on from there.
 
 #include <cstdio>
-#include <filesystem>
 
 #include "colmap_ext/model_output.h"
 #include "core/command_line.h"
@@ -174,10 +173,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   }
 
   // Everything appears together, in the place of an earlier export.
-  const std::filesystem::path target = std::filesystem::absolute(options.output_path + "/.")
-                                           .lexically_normal().parent_path();
-  MakeFolder(target.parent_path().string());
-  const ScratchFolder scratch(target.parent_path().string());
+  const ScratchFolder scratch(ParentFolder(options.output_path));
   const std::string folder = scratch / "export";
   MakeFolder(folder);
   const ScanColors colors = ColorsOf(placed.scans, options, &list, context);
@@ -187,8 +183,8 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
     WritePhotosAndModel(placed.scans, colors, options, folder, &list, context);
   }
   ReportPhotosLeftOut(list.left_out, context);
-  ReplaceFolder(folder, target.string(), scratch.path());
-  context.report.AddCopy(target.string() + "/report.json");
+  ReplaceFolder(folder, options.output_path, scratch.path());
+  context.report.AddCopy(options.output_path + "/report.json");
   std::printf("%s\n", options.output_path.c_str());
 }
 
