@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
 constexpr int kMaxNeighbours = 8;  // photos that may confirm a depth
+constexpr int kPointColumns = 48;  // of the raster of a photo's points
 
 class DenseRun {
  public:
@@ -159,7 +160,7 @@ class DenseRun {
     return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
   }
 
-  double Confirm(int i, const ScanSpace& space, SupplementBuilder* builder) const {
+  double Confirm(int i, const ScanSpace& space, SupplementBuilder* builder) {
     const StereoView& view = views_[i];
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".estimate"));
     const cv::Mat1f depth = ReadDenseArray(Aside(i, ".depth"))[0];
@@ -174,6 +175,7 @@ class DenseRun {
     }
     const ConfirmedDepth confirmed =
         ConfirmDepth(view, estimate, scan_only, others, space, options_.fusion, num_threads_);
+    AddPoints(i, confirmed.depth, others);
     WriteDenseArray({confirmed.depth}, workspace_.DepthMapPath(view.name, "geometric"));
     WriteDenseArray(NormalsOfDepth(confirmed.depth, view.camera.params, 3),
                     workspace_.NormalMapPath(view.name, "geometric"));
@@ -184,22 +186,57 @@ class DenseRun {
            static_cast<double>(confirmed.is_new.total());
   }
 
-  // Poses and cameras, for COLMAP's steps; the points are the scan's business.
-  void WriteModel() const {
-    SparseModel model;
+  // A few places that several photos see: by these COLMAP's steps know which photos overlap.
+  void AddPoints(int i, const cv::Mat1f& depth, const std::vector<DepthOfView>& others) {
+    const StereoView& view = views_[i];
+    const CameraProjection projection(view.camera);
+    const Rigid scan_from_cam = view.cam_from_scan.Inverse();
+    const int step = std::max(1, depth.cols / kPointColumns);
+    for (int y = step / 2; y < depth.rows; y += step) {
+      for (int x = step / 2; x < depth.cols; x += step) {
+        if (!(depth(y, x) > 0)) continue;
+        SparsePoint point;
+        point.x_in_model = scan_from_cam * (*projection.RayFromImg({x + 0.5, y + 0.5}) *
+                                            static_cast<double>(depth(y, x)));
+        std::vector<std::pair<int, Eigen::Vector2d>> sights = {{i, {x + 0.5, y + 0.5}}};
+        for (const DepthOfView& other : others) {
+          const CameraProjection other_projection(other.view->camera);
+          const Eigen::Vector3d in_cam = other.view->cam_from_scan * point.x_in_model;
+          const auto at = other_projection.ImgFromCam(in_cam);
+          if (!at || !other_projection.InImage(*at)) continue;
+          const double seen = other.depth(std::min(static_cast<int>(at->y()), other.depth.rows - 1),
+                                          std::min(static_cast<int>(at->x()), other.depth.cols - 1));
+          if (std::abs(seen - in_cam.z()) > options_.fusion.max_depth_difference * in_cam.z()) continue;
+          sights.emplace_back(static_cast<int>(other.view - views_.data()), *at);
+        }
+        if (sights.size() < 2) continue;
+        const uint64_t id = model_.points.size() + 1;
+        for (const auto& [number, at] : sights) {
+          SparseImage& image = model_.images[static_cast<uint32_t>(number + 1)];
+          point.track.push_back({static_cast<uint32_t>(number + 1),
+                                 static_cast<uint32_t>(image.points2d.size())});
+          image.points2d.push_back(at);
+          image.point3d_ids.push_back(id);
+        }
+        model_.points[id] = std::move(point);
+      }
+    }
+  }
+
+  void WriteModel() {
     std::vector<std::string> names;
     for (const StereoView& view : views_) {
       const auto id = static_cast<uint32_t>(names.size() + 1);
       names.push_back(view.name);
-      model.cameras[id] = view.camera;
-      model.cameras[id].camera_id = id;
-      SparseImage image;
+      model_.cameras[id] = view.camera;
+      model_.cameras[id].camera_id = id;
+      SparseImage& image = model_.images[id];
       image.image_id = image.camera_id = id;
       image.name = view.name;
       image.cam_from_model = view.cam_from_scan;
-      model.images[id] = image;
     }
-    WriteSparseModel(model, workspace_.folder + "/sparse");
+    UpdateReprojectionErrors(&model_);
+    WriteSparseModel(model_, workspace_.folder + "/sparse");
     WriteStereoConfiguration(names, workspace_);
   }
 
@@ -210,6 +247,7 @@ class DenseRun {
   int num_threads_;
   Progress* progress_;
   std::vector<StereoView> views_;
+  SparseModel model_;  // image k + 1 is view k
 };
 
 }  // namespace

@@ -203,7 +203,7 @@ class Level {
         const int pixel = y * grey_.cols + x;
         // An odd number of pixels away: of the other colour, which stays as it is meanwhile.
         for (const int distance : {1, 5, 15}) {
-          if (!far && distance > 5) break;
+          if (!far && distance > 1) break;
           for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
             const int ox = x + dx * distance, oy = y + dy * distance;
             if (ox < 0 || oy < 0 || ox >= grey_.cols || oy >= grey_.rows) continue;
@@ -436,7 +436,9 @@ OpenSpace::OpenSpace(const ScanSpace& space, const StereoPicture& picture, doubl
         const double depth = 1 / (first_ + (last_ - first_) * (bin + 0.5) / kBins);
         if (depth > scan) continue;
         const Eigen::Vector3d place = scan_from_cam * (ray * depth);
-        if (space.IsInRoom(place, kBeyondRoom) && !space.IsSeenEmpty(place, margin)) {
+        // A ray that nears a wall passes through what no scanner could see empty: nothing is there.
+        if (space.IsInRoom(place, kBeyondRoom) && !space.IsSeenEmpty(place, margin) &&
+            !space.surface().DistanceTo(place, 2 * margin)) {
           bins |= uint64_t{1} << bin;
         }
       }

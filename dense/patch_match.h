@@ -40,7 +40,8 @@ struct StereoPicture {
 // Where along the rays of a photo something may be that the scan does not have.
 class OpenSpace {
  public:
-  // margin: metres that it must be away from the scan's surface, and from what was seen empty.
+  // margin: metres that it must be away from the scan's surface, and from what was seen empty;
+  // gaps that are less than four times as wide are not searched.
   OpenSpace(const ScanSpace& space, const StereoPicture& picture, double margin, int num_threads);
 
   // Metres along the optical axis, 0 = none; and its normals (colmap_ext/dense_workspace.h).

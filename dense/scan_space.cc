@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kNearDepth = 0.05;  // metres: no photo and no scanner sees nearer
 constexpr int kMinColumns = 720, kMaxColumns = 3000;
+constexpr int kAround = 1;  // cells of the raster of directions
 
 RayCaster MakeSurface(const std::vector<Scan>& scans) {
   std::vector<Eigen::Vector3d> points;
@@ -57,9 +58,15 @@ ScanSpace::ScanSpace(const std::vector<Scan>& scans, int num_threads)
         if (hit) range(row, column) = static_cast<float>(hit->distance);
       }
     });
-    cv::copyMakeBorder(range, range, 0, 0, 1, 1, cv::BORDER_WRAP);
-    cv::erode(range, range, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
-    station.range = range.colRange(1, range.cols - 1).clone();
+    // Seen empty is what all directions around say; where one has no echo (a missing sample, the
+    // crack beside a depth jump), the others do. Nothing is known where none has.
+    constexpr float kNoEcho = 1e9f;
+    range.setTo(kNoEcho, range == 0);
+    cv::copyMakeBorder(range, range, 0, 0, kAround, kAround, cv::BORDER_WRAP);
+    cv::erode(range, range,
+              cv::getStructuringElement(cv::MORPH_RECT, {2 * kAround + 1, 2 * kAround + 1}));
+    station.range = range.colRange(kAround, range.cols - kAround).clone();
+    station.range.setTo(0, station.range == kNoEcho);
     stations_.push_back(std::move(station));
   }
 }

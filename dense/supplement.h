@@ -23,7 +23,7 @@ struct SupplementOptions {
   // Larger = stricter.
   double min_correlation = 0.6;
   // Photos that a place must be found from, the one itself included. Larger = stricter.
-  int min_support = 4;
+  int min_support = 3;
   // Depths of two photos agree within this share of the depth, and within two pixels. Larger = more
   // tolerant.
   double max_depth_difference = 0.01;

@@ -29,7 +29,7 @@ namespace roomtex {
 namespace {
 
 struct TextureOptions {
-  std::string input_path, output_path, scan_poses;
+  std::string input_path, output_path, scan_poses, supplement_path;
   std::vector<std::string> scan_paths;
   PhotoSources sources;
   ScanReaderOptions scan_reader;
@@ -53,6 +53,10 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "needed for a model of roomtex-align, which remembers its scans and how "
       "they were read.",
       Command::Kind::kOptional);
+  command->AddInputPath("supplement_path", &o->supplement_path,
+                        "supplement.ply of roomtex-dense: what the photos saw and the scan did not "
+                        "is coloured as one more mesh, behind the scans.",
+                        Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
@@ -375,6 +379,29 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   set.Commit();
 }
 
+// Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of model.glb.
+void AddSupplement(const std::string& path, PlacedScans* placed) {
+  Scan supplement = ReadScan(path, {});
+  if (supplement.kind() != Scan::Kind::kMesh) {
+    throw InputError(path, "", "is no triangle mesh",
+                     "Give the supplement.ply that roomtex-dense wrote");
+  }
+  placed->scans.push_back(std::move(supplement));
+}
+
+Json SupplementReport(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+                      const std::string& path) {
+  size_t first = 0;
+  for (size_t s = 0; s + 1 < scans.size(); ++s) {
+    first += scans[s].points.size() - scans[s].NumMissing();
+  }
+  const std::vector<uint8_t>& views = colored.back().samples.views;
+  return {{"path", path},
+          {"first_vertex", first},
+          {"num_vertices", scans.back().points.size()},
+          {"num_colored", views.size() - std::count(views.begin(), views.end(), 0)}};
+}
+
 void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
@@ -403,9 +430,10 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  const PlacedScans placed =
+  PlacedScans placed =
       ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
   for (const std::string& note : placed.notes) context.Warn(note);
+  if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);
   ProtectInputs(options, placed);
@@ -418,6 +446,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
                        &context.progress, &list);
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
+  if (!options.supplement_path.empty()) {
+    context.report["supplement"] = SupplementReport(scans, result.scans, options.supplement_path);
+  }
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {
     if (scans[i].organised || colorize.atlas.mode != "1" || !result.scans[i].atlas.empty())
