@@ -6,6 +6,7 @@
 
 #include "colmap_ext/mapper_verdict.h"
 #include "core/error.h"
+#include "core/output_file.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;

@@ -164,6 +164,17 @@ void MakeFolder(const std::string& path) {
   }
 }
 
+std::string PathInside(const std::string& folder, const std::string& name) {
+  const fs::path inside = fs::path(name).lexically_normal();
+  if (name.empty() || inside.is_absolute() || *inside.begin() == "..") {
+    throw InputError(folder + "/" + name, "", "leads out of the folder to write into",
+                     "Rename the image in the model");
+  }
+  const fs::path path = fs::path(folder) / inside;
+  MakeFolder(path.parent_path().string());
+  return path.string();
+}
+
 void RequireFile(const std::string& path, const std::string& remedy) {
   std::error_code error;
   if (fs::is_directory(path, error)) {

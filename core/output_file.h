@@ -36,6 +36,10 @@ class OutputFile {
 // way.
 void MakeFolder(const std::string& path);
 
+// folder/name, the folders to it made. name may hold folders, but must not lead out of `folder`
+// (names come from models): throws InputError.
+std::string PathInside(const std::string& folder, const std::string& name);
+
 // Throws InputError with `remedy` unless the path is that of a regular, readable file.
 void RequireFile(const std::string& path, const std::string& remedy);
 // The same for a folder.

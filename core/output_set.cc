@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <system_error>
 #include <utility>
 
 #include <fcntl.h>
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <sys/xattr.h>
 #include <unistd.h>
@@ -116,6 +118,24 @@ std::vector<SetWithReport>& SetsWithReport() {
 }
 
 }  // namespace
+
+void OutputSet::ReplaceAllOf(const std::string& command) {
+  std::error_code error;
+  if (fs::exists(folder_, error) && !fs::is_empty(folder_, error)) {
+    std::ifstream stream(folder_ + "/report.json");
+    const auto report = nlohmann::json::parse(stream, nullptr, false);
+    const auto named = report.is_object() ? report.find("command") : report.end();
+    if (!report.is_object() || named == report.end() || *named != command) {
+      throw InputError(folder_, "", "holds files that " + command + " did not write",
+                       "Move it away or give another --output_path");
+    }
+  }
+  fs::directory_iterator entry(folder_, error), end;
+  for (; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    (entry->is_directory(error) ? replaced_ : removed_).insert(name);
+  }
+}
 
 void CommitWithReport(const std::string& report_name, std::shared_ptr<OutputSet> set) {
   SetsWithReport().push_back({report_name, std::move(set)});

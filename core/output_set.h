@@ -32,6 +32,9 @@ class OutputSet {
   void ReplaceFolder(const std::string& name) { replaced_.insert(name); }
   // The old file `name` is not kept.
   void Remove(const std::string& name) { removed_.insert(name); }
+  // Nothing of the old folder is kept. Throws InputError unless it is missing, empty, or what this
+  // command left there (its report.json names the command): what is not ours stays.
+  void ReplaceAllOf(const std::string& command);
 
   // In the order of the calls of Path().
   const std::vector<std::string>& names() const { return names_; }

@@ -102,6 +102,68 @@ std::optional<RayHit> RayCaster::Cast(const Eigen::Vector3d& origin,
   return hit;
 }
 
+namespace {
+
+// Ericson 2005, "Real-Time Collision Detection", 5.1.5: by the region of the triangle's plane that
+// the point lies over.
+Eigen::Vector3f NearestOnTriangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                  const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
+  const Eigen::Vector3f ab = b - a, ac = c - a;
+  const float d1 = ab.dot(p - a), d2 = ac.dot(p - a);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const float d3 = ab.dot(p - b), d4 = ac.dot(p - b);
+  if (d3 >= 0 && d4 <= d3) return b;
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  const float d5 = ab.dot(p - c), d6 = ac.dot(p - c);
+  if (d6 >= 0 && d5 <= d6) return c;
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  }
+  const float sum = va + vb + vc;
+  return sum > 0 ? Eigen::Vector3f(a + vb / sum * ab + vc / sum * ac) : a;
+}
+
+bool NarrowToTriangle(RTCPointQueryFunctionArguments* arguments) {
+  const auto scene = static_cast<RTCScene>(arguments->userPtr);
+  const RTCGeometry geometry = rtcGetGeometry(scene, arguments->geomID);
+  const auto* vertices =
+      static_cast<const float*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0));
+  const auto* corners =
+      static_cast<const unsigned*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0));
+  const auto corner = [&](int k) {
+    return Eigen::Vector3f(Eigen::Map<const Eigen::Vector3f>(
+        vertices +
+        3 * static_cast<size_t>(corners[3 * static_cast<size_t>(arguments->primID) + k])));
+  };
+  const Eigen::Vector3f point(arguments->query->x, arguments->query->y, arguments->query->z);
+  const float distance = (NearestOnTriangle(point, corner(0), corner(1), corner(2)) - point).norm();
+  if (distance >= arguments->query->radius) return false;
+  arguments->query->radius = distance;
+  return true;
+}
+
+}  // namespace
+
+std::optional<double> RayCaster::DistanceTo(const Eigen::Vector3d& point,
+                                            double max_distance) const {
+  const Eigen::Vector3f place = (point - scene_->centre).cast<float>();
+  RTCPointQuery query{};
+  query.x = place.x();
+  query.y = place.y();
+  query.z = place.z();
+  query.radius = static_cast<float>(max_distance);
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  if (!rtcPointQuery(scene_->scene, &query, &context, NarrowToTriangle, scene_->scene)) {
+    return std::nullopt;
+  }
+  return query.radius;
+}
+
 bool RayCaster::IsOccluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                            double margin) const {
   const Eigen::Vector3d offset = to - from;

@@ -34,6 +34,9 @@ class RayCaster {
                              double min_distance = 0,
                              double max_distance = std::numeric_limits<double>::infinity()) const;
 
+  // Metres from the point to the nearest place on the mesh, if that is nearer than max_distance.
+  std::optional<double> DistanceTo(const Eigen::Vector3d& point, double max_distance) const;
+
   // Something lies strictly between the two points, `margin` metres away from both ends.
   bool IsOccluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double margin) const;
 

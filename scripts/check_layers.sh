@@ -26,11 +26,13 @@ declare -A allowed=(
   [texture/registration]="$below texture/sampling"
   [texture/tone]="$below texture/sampling"
   [texture/sampling]="$below"
+  [texture/export]="$below texture texture/output texture/texels texture/tone texture/registration texture/sampling"
   [texture/render]="$below"
   [texture/view]="$below texture/output texture/texels texture/sampling"
 
   [building]="$below"
   [building/window]="$below building"
+  [dense]="$below"
 
   [workflow]="core"
 
@@ -56,10 +58,10 @@ while IFS=: read -r file line include; do
     *" $target "*) ;;
     *) echo "$file:$line: $room/ must not include $target/"; status=1 ;;
   esac
-done < <(grep -nE '^#include "[a-z_]+/' -r core colmap_ext importers align texture building capture workflow --include='*.h' --include='*.cc')
+done < <(grep -nE '^#include "[a-z_]+/' -r core colmap_ext importers align texture building capture dense workflow --include='*.h' --include='*.cc')
 
 # No two headers include each other, over any number of steps.
-circles=$(grep -E '^#include "[a-z_]+/' -r core colmap_ext importers align texture building capture workflow --include='*.h' |
+circles=$(grep -E '^#include "[a-z_]+/' -r core colmap_ext importers align texture building capture dense workflow --include='*.h' |
   sed -E 's/:#include "/ /; s/".*//' | tsort 2>&1 >/dev/null | sed -nE 's/^tsort: ([^-].*\.h)$/  \1/p' || true)
 if [ -n "$circles" ]; then
   printf 'These headers include each other in a circle:\n%s\n' "$circles"

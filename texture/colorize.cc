@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "core/cpu_stages.h"
 #include "core/error.h"
@@ -318,6 +319,25 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     ColorizeTextures(scans, photos, options, num_threads, &surfaces, &input, progress, &result);
   }
   return result;
+}
+
+ColorizeResult ColorizeReadable(const std::vector<Scan>& scans, const ColorizeOptions& options,
+                                bool strict, int num_threads, Progress* progress, PhotoList* list) {
+  while (true) {
+    try {
+      return ColorizeScans(scans, list->photos, options, num_threads, progress);
+    } catch (const UnreadablePhotos& unreadable) {
+      if (strict) throw;
+      std::set<std::string> names;
+      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
+      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
+      std::vector<PhotoView>& photos = list->photos;
+      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
+      if (photos.empty()) throw;
+      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
+                            unreadable.photos().end());
+    }
+  }
 }
 
 }  // namespace roomtex

@@ -12,6 +12,7 @@
 #include "texture/sampling/blend.h"
 #include "texture/sampling/detail.h"
 #include "texture/sampling/grid_colors.h"
+#include "texture/sampling/photo_list.h"
 #include "texture/sampling/photo_view.h"
 #include "texture/sampling/smoothed_scan.h"
 #include "texture/sampling/visibility.h"
@@ -63,5 +64,10 @@ struct ColorizeResult {
 // num_threads. Throws UnreadablePhotos (photo_pass.h).
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress);
+
+// The same for a file that looked like a photo and is broken further down: it goes from
+// list->photos to list->left_out, and all is done again without it. strict, or none left: throws.
+ColorizeResult ColorizeReadable(const std::vector<Scan>& scans, const ColorizeOptions& options,
+                                bool strict, int num_threads, Progress* progress, PhotoList* list);
 
 }  // namespace roomtex

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <set>
 
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
@@ -33,7 +32,7 @@ namespace roomtex {
 namespace {
 
 struct TextureOptions {
-  std::string input_path, output_path, scan_poses;
+  std::string input_path, output_path, scan_poses, supplement_path;
   std::vector<std::string> scan_paths;
   PhotoSources sources;
   ScanReaderOptions scan_reader;
@@ -57,6 +56,10 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                          "they were read. " +
                              BytesPerSampleHelp(kTextureBytesPerSample),
                          Command::Kind::kOptional);
+  command->AddInputPath("supplement_path", &o->supplement_path,
+                        "supplement.ply of roomtex-dense: what the photos saw and the scan did not "
+                        "is coloured as one more mesh, behind the scans.",
+                        Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
@@ -373,26 +376,28 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   WarnOfOlderFiles(set.names(), options.output_path, context);
 }
 
-// A file may look like a photo and be broken further down: then all is done again without it.
-ColorizeResult ColorizeWithReadable(const std::vector<Scan>& scans, const ColorizeOptions& colorize,
-                                    const TextureOptions& options, PhotoList* list,
-                                    const Command::Context& context) {
-  while (true) {
-    try {
-      return ColorizeScans(scans, list->photos, colorize, context.options.num_threads,
-                           &context.progress);
-    } catch (const UnreadablePhotos& unreadable) {
-      if (options.strict) throw;
-      std::set<std::string> names;
-      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
-      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
-      std::vector<PhotoView>& photos = list->photos;
-      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
-      if (photos.empty()) throw;
-      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
-                            unreadable.photos().end());
-    }
+// Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of
+// model.glb.
+void AddSupplement(const std::string& path, PlacedScans* placed) {
+  Scan supplement = ReadScan(path, {});
+  if (supplement.kind() != Scan::Kind::kMesh) {
+    throw InputError(path, "", "is no triangle mesh",
+                     "Give the supplement.ply that roomtex-dense wrote");
   }
+  placed->scans.push_back(std::move(supplement));
+}
+
+Json SupplementReport(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+                      const std::string& path) {
+  size_t first = 0;
+  for (size_t s = 0; s + 1 < scans.size(); ++s) {
+    first += scans[s].points.size() - scans[s].NumMissing();
+  }
+  const std::vector<uint8_t>& views = colored.back().samples.views;
+  return {{"path", path},
+          {"first_vertex", first},
+          {"num_vertices", scans.back().points.size()},
+          {"num_colored", views.size() - std::count(views.begin(), views.end(), 0)}};
 }
 
 void Texture(const TextureOptions& options, const Command::Context& context) {
@@ -423,9 +428,10 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  const PlacedScans placed =
+  PlacedScans placed =
       ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
   for (const std::string& note : placed.notes) context.Warn(note);
+  if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);
   for (const Scan& scan : scans) {
@@ -438,9 +444,13 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   ProtectInputs(options, scans);
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result = ColorizeWithReadable(scans, colorize, options, &list, context);
+  const ColorizeResult result = ColorizeReadable(
+      scans, colorize, options.strict, context.options.num_threads, &context.progress, &list);
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
+  if (!options.supplement_path.empty()) {
+    context.report["supplement"] = SupplementReport(scans, result.scans, options.supplement_path);
+  }
   Judge(list.photos, result, context);
   for (size_t i = 0; i < scans.size(); ++i) {
     if (scans[i].kind() != Scan::Kind::kMesh || colorize.atlas.mode != "1" ||

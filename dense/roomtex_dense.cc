@@ -1,0 +1,169 @@
+// roomtex-dense: surfaces from photos where the scan has none.
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "colmap_ext/sparse_model.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/option_fields.h"
+#include "core/output_set.h"
+#include "dense/dense.h"
+#include "importers/scan_reader.h"
+#include "importers/scan_record.h"
+
+namespace roomtex {
+namespace {
+
+struct DenseCommandOptions {
+  std::string input_path, image_path, output_path, scan_poses;
+  std::vector<std::string> scan_paths;
+  ScanReaderOptions scan_reader;
+  bool accept_untrusted = false, strict = false;
+  DenseOptions dense;
+};
+
+void AddOptions(DenseCommandOptions* o, Command* command) {
+  command->AddInputPath(
+      "input_path", &o->input_path,
+      "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
+  command->AddInputPath("image_path", &o->image_path,
+                        "Folder of the photos, as COLMAP was given it. Photos of a projected "
+                        "pattern are the best: bare walls become dense.");
+  command->AddInputPaths("scan_path", &o->scan_paths,
+                         "Range scan. Not needed for a model of roomtex-align, which remembers its "
+                         "scans and how they were read.",
+                         Command::Kind::kOptional);
+  command->AddOutputPath("output_path", &o->output_path,
+                         "Folder to write supplement.ply and COLMAP's dense workspace into: new, "
+                         "empty, or of an earlier run, which is replaced as a whole.");
+  command->Add(FieldsOf(&o->dense));
+  command->Add(FieldsOf(&o->dense.patch_match));
+  command->Add(FieldsOf(&o->dense.fusion));
+  command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool("strict", &o->strict, kStrictHelp);
+  command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
+  command->Add(FieldsOf(&o->scan_reader));
+}
+
+std::vector<DensePhoto> ListDensePhotos(const SparseModel& model, const std::string& image_path,
+                                        std::vector<PhotoLeftOut>* left_out,
+                                        const Command::Context& context) {
+  RequireFolder(image_path, "Check --image_path: it is the folder that COLMAP was given");
+  std::vector<DensePhoto> photos;
+  std::vector<std::string> notes;
+  for (const auto& [id, image] : model.images) {
+    DensePhoto photo{image.name, image_path + "/" + image.name, PhotoPixels::kAsStored,
+                     model.cameras.at(image.camera_id), image.cam_from_model};
+    const PhotoFit fit =
+        FitPhotoToCamera(photo.path, photo.name, photo.camera.width, photo.camera.height);
+    if (!fit.usable()) {
+      left_out->push_back({photo.name, fit.problem});
+      continue;
+    }
+    if (!fit.note.empty()) notes.push_back(fit.note);
+    photo.pixels = fit.pixels;
+    if (fit.scaled) photo.camera.Resize(fit.width, fit.height);
+    photos.push_back(std::move(photo));
+  }
+  std::sort(photos.begin(), photos.end(),
+            [](const DensePhoto& a, const DensePhoto& b) { return a.name < b.name; });
+  for (const std::string& note : FirstNotes(notes)) context.Warn(note);
+  return photos;
+}
+
+double AreaOf(const Supplement& supplement) {
+  double area = 0;
+  for (const auto& [a, b, c] : supplement.triangles) {
+    const Eigen::Vector3d& corner = supplement.vertices[a].x_in_scan;
+    area += 0.5 * (supplement.vertices[b].x_in_scan - corner)
+                      .cross(supplement.vertices[c].x_in_scan - corner)
+                      .norm();
+  }
+  return area;
+}
+
+void FillReport(const DenseResult& result, const Command::Context& context) {
+  Report& report = context.report;
+  report["num_images"] = result.photos.size();
+  report["num_vertices"] = result.supplement.vertices.size();
+  report["num_triangles"] = result.supplement.triangles.size();
+  report["area_m2"] = AreaOf(result.supplement);
+  Json images = Json::array();
+  int without = 0;
+  for (const DenseResult::Photo& photo : result.photos) {
+    without += photo.num_neighbours < 2;
+    images.push_back({{"name", photo.name},
+                      {"num_neighbours", photo.num_neighbours},
+                      {"open", photo.share_open},
+                      {"new", photo.share_new}});
+  }
+  report["images"] = images;
+  if (without > 0) {
+    context.Warn(std::to_string(without) + " of " + std::to_string(result.photos.size()) +
+                 " photos share too little of the scan with others from beside: no depth there");
+  }
+}
+
+void Dense(const DenseCommandOptions& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.scan_reader.Problems();
+  AppendProblems(options.dense.Problems(), &problems);
+  ThrowIfProblems(problems);
+  RequireScans(options.scan_paths, options.input_path);
+  // Everything appears together, in the place of an earlier output.
+  const auto outputs = std::make_shared<OutputSet>(options.output_path);
+  outputs->ReplaceAllOf("roomtex-dense");
+
+  context.progress.Stage("read model");
+  const SparseModel model = ReadSparseModel(options.input_path);
+  const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  std::vector<PhotoLeftOut> left_out;
+  const std::vector<DensePhoto> photos =
+      ListDensePhotos(model, options.image_path, &left_out, context);
+  if (options.strict) ThrowIfAnyLeftOut(left_out, options.image_path);
+  if (photos.empty()) {
+    throw InputError(options.input_path, "",
+                     left_out.empty()
+                         ? "holds no registered photo"
+                         : "holds no photo that can be used. " + AsClause(left_out[0].reason),
+                     "");
+  }
+  TakeOverTrust(alignment, options.accept_untrusted, context);
+
+  context.progress.Stage("read scan");
+  const PlacedScans placed =
+      ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
+  for (const std::string& note : placed.notes) context.Warn(note);
+  for (const Scan& scan : placed.scans) {
+    if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
+      throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
+    }
+  }
+
+  const std::string& folder = outputs->aside();
+  const DenseResult result = MakeDense(placed.scans, photos, options.dense, folder,
+                                       static_cast<uint64_t>(context.options.random_seed),
+                                       context.options.num_threads, &context.progress, &left_out);
+  if (options.strict) ThrowIfAnyLeftOut(left_out, options.image_path);
+  ReportPhotosLeftOut(left_out, context);
+  FillReport(result, context);
+  CommitWithReport("report.json", outputs);
+  std::printf("%s\n", (options.output_path + "/supplement.ply").c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::DenseCommandOptions options;
+  roomtex::Command command(
+      "roomtex-dense",
+      "Surfaces from photos where the scan has none: PatchMatch stereo, bounded by the scan.",
+      "roomtex-dense --input_path aligned --image_path images --scan_path room.rtpi "
+      "--output_path dense");
+  roomtex::AddOptions(&options, &command);
+  return command.Run(argc, argv, [&options](const roomtex::Command::Context& context) {
+    roomtex::Dense(options, context);
+  });
+}

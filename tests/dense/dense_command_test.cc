@@ -1,0 +1,121 @@
+// roomtex-dense as a user calls it, on a room that knows every surface.
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "capture/simulation/capture_writer.h"
+#include "colmap_ext/dense_workspace.h"
+#include "core/option_fields.h"
+#include "dense/dense.h"
+#include "importers/scan_reader.h"
+#include "tests/dense/dense_truth.h"
+#include "tests/support/option_check.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+class DenseCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TempFolder;
+    SimulatedRoomOptions options;
+    options.random_seed = 5;
+    options.num_photos = 16;
+    options.photo_width = 480;
+    options.photo_height = 320;
+    options.scan_columns = 900;
+    options.scan_rows = 340;
+    room_ = new SimulatedRoom(options);
+    Progress progress(true);
+    WriteCapture(*room_, *folder_ / "capture", &progress);
+    result_ = Dense("dense", "");
+  }
+  static void TearDownTestSuite() {
+    delete room_;
+    delete folder_;
+    folder_ = nullptr;
+  }
+  static CommandResult Dense(const std::string& output, const std::string& more) {
+    const std::string capture = *folder_ / "capture";
+    return RunCommandLine("roomtex-dense --quiet --input_path " + capture + "/truth --image_path " +
+                          capture + "/photos --scan_path " + capture + "/scan.rtpi --output_path " +
+                          (*folder_ / output) + " " + more);
+  }
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+
+  static TempFolder* folder_;
+  static SimulatedRoom* room_;
+  static CommandResult result_;
+};
+
+TempFolder* DenseCommand::folder_ = nullptr;
+SimulatedRoom* DenseCommand::room_ = nullptr;
+CommandResult DenseCommand::result_;
+
+TEST_F(DenseCommand, AddsWhatTheStationMissedAndLittleElse) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const Scan supplement = ReadScan(Path("dense/supplement.ply"), {});
+  EXPECT_EQ(supplement.kind(), Scan::Kind::kMesh);
+  const DenseScore score = DenseTruth(*room_, 8).Score(supplement.points);
+  RecordProperty("accurate_20mm", std::to_string(score.accurate_20mm));
+  RecordProperty("complete_20mm", std::to_string(score.complete_20mm));
+  EXPECT_GT(score.num_points, 3000);
+  EXPECT_GT(score.accurate_20mm, 0.95);
+  EXPECT_GT(score.complete_20mm, 0.15);
+}
+
+TEST_F(DenseCommand, WritesTheWorkspaceOfColmap) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  const DenseWorkspace workspace{Path("dense")};
+  const auto depth = ReadDenseArray(workspace.DepthMapPath("photo_000.jpg", "geometric"));
+  const auto normals = ReadDenseArray(workspace.NormalMapPath("photo_000.jpg", "geometric"));
+  EXPECT_EQ(depth.size(), 1u);
+  EXPECT_EQ(normals.size(), 3u);
+  EXPECT_EQ(depth[0].size(), normals[0].size());
+  for (const char* name : {"sparse/images.bin", "stereo/fusion.cfg", "stereo/patch-match.cfg",
+                           "images/photo_000.jpg", "report.json"}) {
+    EXPECT_TRUE(fs::exists(Path("dense/") + name)) << name;
+  }
+  EXPECT_FALSE(fs::exists(Path("dense/aside")));
+}
+
+TEST_F(DenseCommand, TheSupplementIsColouredBehindTheScan) {
+  const CommandResult result = RunCommandLine(
+      "roomtex-texture --quiet --Texture.scale 1 --input_path " + Path("capture/truth") +
+      " --image_path " + Path("capture/photos") + " --scan_path " + Path("capture/scan.rtpi") +
+      " --supplement_path " + Path("dense/supplement.ply") + " --output_path " + Path("textured"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = json::parse(ReadBytes(Path("textured/report.json")));
+  const json& supplement = report["supplement"];
+  EXPECT_EQ(supplement["first_vertex"].get<size_t>() + supplement["num_vertices"].get<size_t>(),
+            report["num_vertices"].get<size_t>());
+  EXPECT_GT(supplement["num_colored"], 0.8 * supplement["num_vertices"].get<double>());
+}
+
+TEST_F(DenseCommand, SameBytesForAnyNumberOfThreads) {
+  const std::string coarse = "--max_image_size 160 --Fusion.min_support 2 --num_threads ";
+  ASSERT_EQ(Dense("one", coarse + "1").exit_code, 0);
+  ASSERT_EQ(Dense("three", coarse + "3").exit_code, 0);
+  EXPECT_EQ(ReadBytes(Path("one/supplement.ply")), ReadBytes(Path("three/supplement.ply")));
+}
+
+TEST_F(DenseCommand, RefusesAForeignFolderAndChecksItsOptions) {
+  fs::create_directory(Path("precious"));
+  WriteBytes(Path("precious/thesis.txt"), "years of work");
+  EXPECT_EQ(Dense("precious", "").exit_code, 3);
+  EXPECT_TRUE(fs::exists(Path("precious/thesis.txt")));
+  DenseOptions options;
+  ExpectChecksItsOptions(
+      "roomtex-dense", "--input_path none --image_path none --output_path none",
+      {FieldsOf(&options), FieldsOf(&options.patch_match), FieldsOf(&options.fusion)});
+}
+
+}  // namespace
+}  // namespace roomtex

@@ -1,0 +1,167 @@
+// roomtex-export as a user calls it; what it writes is read by an independent reader
+// (reproject.py).
+
+#include <filesystem>
+#include <sstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "capture/simulation/capture_writer.h"
+#include "capture/simulation/simulated_room.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/option_fields.h"
+#include "importers/scan_reader.h"
+#include "tests/support/option_check.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+#include "texture/export/export_photos.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+class ExportCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TempFolder;
+    SimulatedRoomOptions options;
+    options.random_seed = 5;
+    options.num_photos = 12;
+    options.photo_width = 480;
+    options.photo_height = 320;
+    options.scan_columns = 700;
+    options.scan_rows = 260;
+    options.strangers = 0.2;
+    Progress progress(true);
+    WriteCapture(SimulatedRoom(options), Capture(), &progress);
+    options.camera_model = "OPENCV_FISHEYE";
+    options.field_of_view_deg = 150;
+    options.num_photos = 4;
+    WriteCapture(SimulatedRoom(options), Path("fisheye"), &progress);
+    // A folder in a name is a folder of the output, too.
+    SparseModel model = ReadSparseModel(Capture() + "/truth");
+    fs::create_directory(Capture() + "/photos/west");
+    fs::rename(Capture() + "/photos/photo_000.jpg", Capture() + "/photos/west/photo_000.jpg");
+    for (auto& [id, image] : model.images) {
+      if (image.name == "photo_000.jpg") image.name = "west/photo_000.jpg";
+    }
+    WriteSparseModel(model, Path("model"));
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+  static std::string Capture() { return Path("capture"); }
+  static CommandResult Export(const std::string& output, const std::string& more,
+                              const std::string& model = "model") {
+    return RunCommandLine("roomtex-export --quiet --input_path " + Path(model) + " --image_path " +
+                          Capture() + "/photos --scan_path " + Capture() +
+                          "/scan.rtpi --output_path " + Path(output) + " " + more);
+  }
+  struct Errors {
+    double max_px, mean_px, num_px, median_m, num_m;
+  };
+  static Errors Reproject(const std::string& format, const std::string& output) {
+    const CommandResult result =
+        RunProgram("python3 " ROOMTEX_REPROJECT " " + format + " " + Path(output));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Errors errors{};
+    std::istringstream(result.out) >> errors.max_px >> errors.mean_px >> errors.num_px >>
+        errors.median_m >> errors.num_m;
+    return errors;
+  }
+
+  static TempFolder* folder_;
+};
+
+TempFolder* ExportCommand::folder_ = nullptr;
+
+TEST_F(ExportCommand, WorkspaceOfColmapReprojects) {
+  const CommandResult result = Export("workspace", "--max_points 5000");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Errors errors = Reproject("colmap", "workspace");
+  EXPECT_LT(errors.max_px, 0.01);
+  EXPECT_GT(errors.num_px, 4000);
+  EXPECT_LT(errors.median_m, 0.002);
+  EXPECT_GT(errors.num_m, 0.97 * errors.num_px);
+  const json report = json::parse(ReadBytes(Path("workspace/report.json")));
+  EXPECT_LE(report["num_points"], 5000);
+  EXPECT_GT(report["num_points"], 2500);
+  EXPECT_TRUE(fs::exists(Path("workspace/images/west/photo_000.jpg")));
+  EXPECT_TRUE(fs::exists(Path("workspace/masks/west/photo_000.jpg.png")));
+  // Written again it is replaced, at another size.
+  ASSERT_EQ(Export("workspace", "--max_points 5000 --max_image_size 240 --masks 0").exit_code, 0);
+  EXPECT_LT(Reproject("colmap", "workspace").max_px, 0.01);
+  EXPECT_EQ(cv::imread(Path("workspace/images/photo_001.jpg")).cols, 240);
+  EXPECT_FALSE(fs::exists(Path("workspace/masks")));
+}
+
+TEST_F(ExportCommand, TransformsOfNerfstudioReproject) {
+  const CommandResult result = Export("nerf", "--format nerfstudio --max_points 5000");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Errors errors = Reproject("nerfstudio", "nerf");
+  EXPECT_LT(errors.median_m, 0.003);
+  EXPECT_GT(errors.num_m, 1000);
+}
+
+TEST_F(ExportCommand, SomebodyWhoWalkedThroughAPhotoIsMasked) {
+  ASSERT_EQ(Export("masked", "--format nerfstudio").exit_code, 0);
+  const json report = json::parse(ReadBytes(Path("masked/report.json")));
+  int with_somebody = 0;
+  for (const json& image : report["images"]) with_somebody += image["moving"] > 0.05;
+  EXPECT_GE(with_somebody, 1);
+  EXPECT_LE(with_somebody, 4);
+}
+
+TEST_F(ExportCommand, FisheyesBecomePinholePictures) {
+  const CommandResult result =
+      RunCommandLine("roomtex-export --quiet --input_path " + Path("fisheye") +
+                     "/truth --image_path " + Path("fisheye") + "/photos --scan_path " +
+                     Path("fisheye") + "/scan.rtpi --output_path " + Path("pinholes"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Errors errors = Reproject("colmap", "pinholes");
+  EXPECT_LT(errors.max_px, 0.01);
+  EXPECT_LT(errors.median_m, 0.005);
+}
+
+TEST_F(ExportCommand, ScansAndPhotosBecomeOneE57) {
+  const CommandResult result = Export("e57", "--format e57");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ScanFile file = ReadScanFile(Path("e57/scan.e57"), {});
+  EXPECT_EQ(file.scans.at(0).num_columns, 700);
+}
+
+TEST_F(ExportCommand, RefusesWhatItMustNotTouch) {
+  fs::create_directory(Path("precious"));
+  WriteBytes(Path("precious/thesis.txt"), "years of work");
+  const CommandResult refused = Export("precious", "");
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.err.find("did not write"), std::string::npos) << refused.err;
+  EXPECT_TRUE(fs::exists(Path("precious/thesis.txt")));
+
+  SparseModel model = ReadSparseModel(Path("model"));
+  for (auto& [id, image] : model.images) {
+    if (image.name == "photo_001.jpg") image.name = "../photos/photo_001.jpg";
+  }
+  WriteSparseModel(model, Path("climbing"));
+  const CommandResult climbing = Export("climbed", "", "climbing");
+  EXPECT_EQ(climbing.exit_code, 3);
+  EXPECT_NE(climbing.err.find("leads out of the folder"), std::string::npos) << climbing.err;
+  EXPECT_FALSE(fs::exists(Path("climbed")));
+}
+
+TEST_F(ExportCommand, ChecksItsOptions) {
+  ExportOptions options;
+  ScanReaderOptions reader;
+  ExpectChecksItsOptions("roomtex-export", "--input_path none --image_path none --output_path none",
+                         {FieldsOf(&options), FieldsOf(&options.occlusion), FieldsOf(&reader)});
+}
+
+}  // namespace
+}  // namespace roomtex

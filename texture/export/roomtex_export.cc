@@ -1,0 +1,206 @@
+// roomtex-export: aligned photos and scan for programs that go on from there.
+
+#include <cstdio>
+#include <memory>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/option_fields.h"
+#include "core/output_set.h"
+#include "importers/scan_reader.h"
+#include "importers/scan_record.h"
+#include "texture/colorize.h"
+#include "texture/export/export_photos.h"
+#include "texture/export/export_scene.h"
+#include "texture/output/write_e57.h"
+#include "texture/sampling/photo_list.h"
+
+namespace roomtex {
+namespace {
+
+struct ExportCommandOptions {
+  std::string input_path, output_path, scan_poses, colors_path;
+  std::vector<std::string> scan_paths;
+  std::string format = "colmap";
+  PhotoSources sources;
+  ScanReaderOptions scan_reader;
+  bool accept_untrusted = false, strict = false;
+  ExportOptions exporting;
+};
+
+void AddOptions(ExportCommandOptions* o, Command* command) {
+  command->AddInputPath(
+      "input_path", &o->input_path,
+      "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
+  command->AddInputPath("image_path", &o->sources.image_path,
+                        "Folder of the photos, as COLMAP was given it.");
+  command->AddInputPaths("scan_path", &o->scan_paths,
+                         "Range scan. Not needed for a model of roomtex-align, which remembers its "
+                         "scans and how they were read.",
+                         Command::Kind::kOptional);
+  command->AddChoice(
+      "format", &o->format, {"colmap", "nerfstudio", "e57"},
+      "colmap: workspace of undistorted photos, sparse model with points of the scan and their "
+      "tracks, depth and normal maps of the scan, for splatting trainers and stereo_fusion. "
+      "nerfstudio: transforms.json with depth images and a point cloud. e57: the coloured scans "
+      "and the photos in one file, scan.e57.");
+  command->AddOutputPath("output_path", &o->output_path,
+                         "Folder to write into: new, empty, or an earlier export, which is "
+                         "replaced as a whole.");
+  command->AddInputPath("colors_path", &o->colors_path,
+                        "The model.ply that roomtex-texture wrote for these scans: its colours are "
+                        "taken. Without it the scans are coloured here.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("associations_path", &o->sources.associations_path,
+                        "CSV patterned_image,plain_image: the plain twin of every registered "
+                        "patterned photo takes its place.",
+                        Command::Kind::kOptional);
+  command->Add(FieldsOf(&o->exporting));
+  command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool("strict", &o->strict, kStrictHelp);
+  command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
+  command->Add(FieldsOf(&o->scan_reader));
+  command->Add(FieldsOf(&o->exporting.occlusion));
+}
+
+ScanColors ColorsOf(const std::vector<Scan>& scans, const ExportCommandOptions& options,
+                    PhotoList* list, const Command::Context& context) {
+  if (!options.colors_path.empty()) {
+    context.progress.Stage("read colours");
+    return ReadScanColors(scans, options.colors_path);
+  }
+  ColorizeOptions colorize;
+  colorize.atlas.mode = "0";
+  colorize.occlusion = options.exporting.occlusion;
+  ColorizeResult colored = ColorizeReadable(scans, colorize, options.strict,
+                                            context.options.num_threads, &context.progress, list);
+  ScanColors colors;
+  for (ColoredScan& scan : colored.scans) colors.push_back(std::move(scan.samples));
+  return colors;
+}
+
+void WriteE57(const std::vector<Scan>& scans, ScanColors colors, const PhotoList& list,
+              const std::string& folder, const Command::Context& context) {
+  context.progress.Stage("write");
+  std::vector<ColoredScan> colored(scans.size());
+  for (size_t s = 0; s < scans.size(); ++s) colored[s].samples = std::move(colors[s]);
+  WriteColoredE57(scans, colored, &list.photos, folder + "/scan.e57");
+  context.report["num_images"] = list.photos.size();
+}
+
+void WritePhotosAndModel(const std::vector<Scan>& scans, const ScanColors& colors,
+                         const ExportCommandOptions& options, const std::string& folder,
+                         PhotoList* list, const Command::Context& context) {
+  context.progress.Stage("points");
+  const int num_threads = context.options.num_threads;
+  const ExportScene scene =
+      MakeExportScene(scans, colors, options.exporting.max_points, num_threads);
+  context.progress.Stage("photos", static_cast<int>(list->photos.size()));
+  const bool colmap = options.format == "colmap";
+  const std::vector<ExportedPhoto> photos =
+      ExportPhotos(scene, list->photos, colmap ? ExportFormat::kColmap : ExportFormat::kNerfstudio,
+                   options.exporting, folder, num_threads, &context.progress, &list->left_out);
+  if (options.strict) ThrowIfAnyLeftOut(list->left_out, options.sources.image_path);
+  if (photos.empty()) {
+    throw InputError(
+        options.input_path, "",
+        "holds no photo that can be exported. " + AsClause(list->left_out.at(0).reason), "");
+  }
+  context.progress.Stage("write");
+  size_t num_points = scene.points.size();
+  if (colmap) {
+    num_points = WriteColmapModel(scene, photos, folder);
+  } else {
+    WriteNerfstudioModel(scene, photos, scans[0].up, options.exporting.masks, folder);
+  }
+  size_t num_observations = 0;
+  Json images = Json::array();
+  for (const ExportedPhoto& photo : photos) {
+    num_observations += photo.sights.size();
+    Json image = {{"name", photo.name},
+                  {"width", photo.camera.width},
+                  {"height", photo.camera.height},
+                  {"num_points", photo.sights.size()},
+                  {"unscanned", photo.share_unscanned}};
+    if (options.exporting.masks) image["moving"] = photo.share_moving;
+    images.push_back(image);
+  }
+  context.report["num_images"] = photos.size();
+  context.report["num_points"] = num_points;
+  context.report["num_observations"] = num_observations;
+  context.report["images"] = images;
+  if (num_points == 0) {
+    context.report.SetUntrusted(
+        "no point of the scan is clearly seen by two photos. Is the model "
+        "aligned? Run roomtex-align.");
+  }
+}
+
+void Export(const ExportCommandOptions& options, const Command::Context& context) {
+  std::vector<std::string> problems = options.scan_reader.Problems();
+  AppendProblems(options.exporting.Problems(), &problems);
+  ThrowIfProblems(problems);
+  RequireScans(options.scan_paths, options.input_path);
+  // Everything appears together, in the place of an earlier output.
+  const auto outputs = std::make_shared<OutputSet>(options.output_path);
+  outputs->ReplaceAllOf("roomtex-export");
+
+  context.progress.Stage("read model");
+  const SparseModel model = ReadSparseModel(options.input_path);
+  const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  PhotoSources sources = options.sources;
+  sources.aligned_model = alignment.found;
+  PhotoList list = ListPhotos(model, sources);
+  if (options.strict) ThrowIfAnyLeftOut(list.left_out, options.sources.image_path);
+  for (const std::string& warning : list.warnings) context.Warn(warning);
+  if (list.photos.empty()) {
+    throw InputError(options.input_path, "", "holds no registered photo",
+                     "Give the folder that roomtex-align wrote");
+  }
+  if (list.photos.size() >= kMaxPhotos) {
+    throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
+  }
+  TakeOverTrust(alignment, options.accept_untrusted, context);
+
+  context.progress.Stage("read scan");
+  const PlacedScans placed =
+      ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
+  for (const std::string& note : placed.notes) context.Warn(note);
+  for (const Scan& scan : placed.scans) {
+    if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
+      throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
+    }
+    if (options.format == "e57" && !scan.organised) {
+      throw InputError(scan.path, "", "has no grid, which an E57 needs here",
+                       "Export it as colmap or nerfstudio");
+    }
+  }
+
+  const std::string& folder = outputs->aside();
+  const ScanColors colors = ColorsOf(placed.scans, options, &list, context);
+  if (options.format == "e57") {
+    WriteE57(placed.scans, colors, list, folder, context);
+  } else {
+    WritePhotosAndModel(placed.scans, colors, options, folder, &list, context);
+  }
+  ReportPhotosLeftOut(list.left_out, context);
+  CommitWithReport("report.json", outputs);
+  std::printf("%s\n", options.output_path.c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  roomtex::ExportCommandOptions options;
+  roomtex::Command command(
+      "roomtex-export",
+      "Aligned photos and scan for Gaussian splatting, nerfstudio, COLMAP's dense steps, or as "
+      "E57.",
+      "roomtex-export --input_path aligned --image_path images --scan_path room.rtpi "
+      "--format colmap --output_path exported");
+  roomtex::AddOptions(&options, &command);
+  return command.Run(argc, argv, [&options](const roomtex::Command::Context& context) {
+    roomtex::Export(options, context);
+  });
+}
