@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_set.h"
+#include "core/surfels.h"
 #include "dense/dense.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -132,9 +133,10 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  const PlacedScans placed =
+  PlacedScans placed =
       ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
   for (const std::string& note : placed.notes) context.Warn(note);
+  ReplaceClouds(&placed.scans, context.options.num_threads);
   for (const Scan& scan : placed.scans) {
     if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
       throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");

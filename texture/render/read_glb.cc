@@ -1,6 +1,7 @@
 // A model.glb of roomtex-texture as a mesh with texture images, in the scan frame.
 
 #include <cstring>
+#include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
 #include <tiny_gltf.h>
@@ -13,12 +14,27 @@
 namespace roomtex {
 namespace {
 
+InputError NotOurs(const std::string& path) {
+  return {path, "", "is laid out in a way that roomtex-texture does not write",
+          "Give a model.glb of roomtex-texture; roomtex-view shows others"};
+}
+
+template <typename T>
+constexpr int kComponentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
+template <>
+constexpr int kComponentType<uint32_t> = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+
 // The elements of an accessor, tightly packed as the writer packs them; checks the bounds.
 template <typename T>
 const T* Elements(const tinygltf::Model& model, int number, int components, size_t* count,
                   const std::string& path) {
   const tinygltf::Accessor& accessor = model.accessors.at(number);
+  if (accessor.componentType != kComponentType<T> ||
+      tinygltf::GetNumComponentsInType(accessor.type) != components) {
+    throw NotOurs(path);
+  }
   const tinygltf::BufferView& view = model.bufferViews.at(accessor.bufferView);
+  if (view.byteStride != 0 && view.byteStride != components * sizeof(T)) throw NotOurs(path);
   const std::vector<unsigned char>& bytes = model.buffers.at(view.buffer).data;
   *count = accessor.count;
   const size_t begin = view.byteOffset + accessor.byteOffset;
@@ -63,6 +79,12 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
     for (size_t i = 0; i < 3 * count; ++i) {
       mesh->colors[first + i / 3][i % 3] = SrgbByteFromLinear(light[i]);
     }
+  } else if (primitive.material >= 0) {
+    const std::vector<double>& light =
+        model.materials.at(primitive.material).pbrMetallicRoughness.baseColorFactor;
+    for (size_t i = 0; i < 3 * count; ++i) {
+      mesh->colors[first + i / 3][i % 3] = SrgbByteFromLinear(static_cast<float>(light.at(i % 3)));
+    }
   }
   const uint32_t* corners = Elements<uint32_t>(model, primitive.indices, 1, &num_corners, path);
   for (size_t i = 0; i + 2 < num_corners; i += 3) {
@@ -90,14 +112,18 @@ ColoredMesh ReadTexturedMesh(const std::string& path) {
   }
   ColoredMesh mesh;
   for (const tinygltf::Image& image : model.images) mesh.textures.push_back(ImageOf(image, path));
-  for (const tinygltf::Node& node : model.nodes) {
-    if (node.mesh < 0) continue;
-    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-    if (node.translation.size() == 3)
-      translation = Eigen::Map<const Eigen::Vector3d>(node.translation.data());
-    for (const tinygltf::Primitive& primitive : model.meshes.at(node.mesh).primitives) {
-      AddPrimitive(model, primitive, translation, path, &mesh);
+  try {
+    for (const tinygltf::Node& node : model.nodes) {
+      if (node.mesh < 0) continue;
+      Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+      if (node.translation.size() == 3)
+        translation = Eigen::Map<const Eigen::Vector3d>(node.translation.data());
+      for (const tinygltf::Primitive& primitive : model.meshes.at(node.mesh).primitives) {
+        AddPrimitive(model, primitive, translation, path, &mesh);
+      }
     }
+  } catch (const std::out_of_range&) {  // a number that names nothing
+    throw NotOurs(path);
   }
   if (mesh.triangles.empty()) throw InputError(path, "", "has no faces", "");
   return mesh;
