@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include <Eigen/LU>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc/detail/gcgraph.hpp>
 
@@ -113,31 +114,17 @@ class FootprintFinder {
 
   void AddInferredLines() {
     const size_t num_seen = walls_.size();
-    std::vector<Eigen::Vector2d> normals;
-    for (const WallLine& wall : walls_) normals.push_back(wall.line.normal);
-    if (normals.empty()) normals = RoofDirections();
-    // Where roofs end, along the directions of the walls.
-    std::vector<Eigen::Vector2d> families;
-    for (const Eigen::Vector2d& normal : normals) {
-      for (const Eigen::Vector2d& n : {normal, Eigen::Vector2d(-normal.y(), normal.x())}) {
-        const bool known =
-            std::any_of(families.begin(), families.end(), [&](const Eigen::Vector2d& other) {
-              return std::abs(other.dot(n)) > std::cos(RadFromDeg(10));
-            });
-        if (!known) families.push_back(n);
-      }
-    }
-    if (families.size() > 6) families.resize(6);
+    // Where roofs end, along the directions of the walls below them.
     for (const int s : roofs_) {
       const PlaneSegment& roof = segments_[static_cast<size_t>(s)];
       const Eigen::Vector2d centre = roof.plane.centre.head<2>();
-      for (const Eigen::Vector2d& n : families) {
+      for (const Eigen::Vector2d& n : DirectionsFor(roof, num_seen)) {
         std::vector<double> along;
         for (const int i : roof.points) {
           along.push_back(n.dot(cloud_.points[static_cast<size_t>(i)].head<2>() - centre));
         }
-        AddInferred(n, centre + n * Quantile(&along, 0.005));
-        AddInferred(n, centre + n * Quantile(&along, 0.995));
+        AddInferred(n, centre + n * Quantile(&along, 0.001));
+        AddInferred(n, centre + n * Quantile(&along, 0.999));
       }
     }
     // Where walls end.
@@ -152,12 +139,39 @@ class FootprintFinder {
     if (walls_.size() > kMaxLines) walls_.resize(kMaxLines);
   }
 
-  // Without walls: the main direction of the largest roof.
-  std::vector<Eigen::Vector2d> RoofDirections() const {
-    const PlaneSegment& roof = segments_[static_cast<size_t>(roofs_[0])];
+  // Normals of the walls below a roof, and square to them.
+  std::vector<Eigen::Vector2d> DirectionsFor(const PlaneSegment& roof, size_t num_seen) const {
+    Eigen::AlignedBox2d box;
+    for (const int i : roof.points) {
+      box.extend(Eigen::Vector2d(cloud_.points[static_cast<size_t>(i)].head<2>()));
+    }
+    std::vector<Eigen::Vector2d> normals;
+    for (size_t i = 0; i < num_seen; ++i) {
+      const WallLine& wall = walls_[i];
+      const auto below = std::count_if(wall.points.begin(), wall.points.end(), [&](const auto& x) {
+        return box.exteriorDistance(x) < cloud_.step;
+      });
+      if (2 * static_cast<size_t>(below) > wall.points.size()) normals.push_back(wall.line.normal);
+    }
+    if (normals.empty()) normals = RoofDirections(roof);
+    constexpr size_t kMostDirections = 6;
+    std::vector<Eigen::Vector2d> directions;
+    for (const Eigen::Vector2d& normal : normals) {
+      for (const Eigen::Vector2d& n : {normal, Eigen::Vector2d(-normal.y(), normal.x())}) {
+        const bool known =
+            std::any_of(directions.begin(), directions.end(), [&](const Eigen::Vector2d& other) {
+              return std::abs(other.dot(n)) > std::cos(RadFromDeg(10));
+            });
+        if (!known && directions.size() < kMostDirections) directions.push_back(n);
+      }
+    }
+    return directions;
+  }
+
+  // Without walls: the direction that a roof falls in, or that its points take the least room in.
+  std::vector<Eigen::Vector2d> RoofDirections(const PlaneSegment& roof) const {
     const Eigen::Vector2d slope = roof.plane.normal.head<2>();
     if (slope.norm() > 0.1) return {slope.normalized()};
-    // The direction in which its points take the least room.
     double best = std::numeric_limits<double>::infinity();
     Eigen::Vector2d best_normal = Eigen::Vector2d::UnitX();
     for (int deg = 0; deg < 90; ++deg) {
@@ -283,7 +297,7 @@ class FootprintFinder {
     // Sources are inside, sinks outside.
     cv::detail::GCGraph<double> graph(static_cast<unsigned>(n), static_cast<unsigned>(4 * n));
     for (size_t c = 0; c < n; ++c) graph.addVtx();
-    constexpr double kForced = 1e6, kAnyEdge = 0.08, kFacing = 0.6;
+    constexpr double kForced = 1e6, kAnyEdge = 0.08, kFacing = 0.6, kInferred = 1.3;
     for (const auto& [key, edge] : edges) {
       const Eigen::Vector2d &a = cells_.vertices[static_cast<size_t>(key.first)],
                             &b = cells_.vertices[static_cast<size_t>(key.second)];
@@ -293,10 +307,11 @@ class FootprintFinder {
       }
       const auto line = cells_.edge_lines.find(key);
       const double length = (b - a).norm();
-      double covered = 0;
+      double covered = 0, weight = 1;
       if (line != cells_.edge_lines.end() && line->second >= 0) {
         const WallLine& wall = walls_[static_cast<size_t>(line->second)];
         covered = wall.CoveredShare(a, b);
+        weight = wall.inferred ? kInferred : 1;
         if (wall.oriented) {
           // The wall was seen from the side its normal points to.
           const size_t left = static_cast<size_t>(edge.left),
@@ -307,7 +322,7 @@ class FootprintFinder {
           outside_[faces_right ? right : left] += kFacing * covered * length;
         }
       }
-      const double cost = length * (kAnyEdge + (1 - covered));
+      const double cost = weight * length * (kAnyEdge + (1 - covered));
       graph.addEdges(edge.left, edge.right, cost, cost);
     }
     for (size_t c = 0; c < n; ++c) {
@@ -443,7 +458,33 @@ class FootprintFinder {
       const int line = line_after(i);
       region.walls.push_back(line < 0 ? WallLine() : walls_[static_cast<size_t>(line)]);
     }
+    MendCorners(&region);
     return region;
+  }
+
+  // A short wall that no points draw, between two that meet nearby, is their corner cut off.
+  void MendCorners(FootprintRegion* region) const {
+    for (size_t i = 0; i < region->walls.size() && region->walls.size() > 3;) {
+      const size_t n = region->walls.size(), before = (i + n - 1) % n, after = (i + 1) % n;
+      const Eigen::Vector2d a = region->polygon[i], b = region->polygon[after];
+      const Line2 &one = region->walls[before].line, &two = region->walls[after].line;
+      Eigen::Matrix2d normals;
+      normals << one.normal.transpose(), two.normal.transpose();
+      const bool is_short = region->walls[i].inferred && (b - a).norm() < 0.7 * cloud_.step &&
+                            std::abs(normals.determinant()) > std::sin(RadFromDeg(20));
+      if (!is_short) {
+        ++i;
+        continue;
+      }
+      const Eigen::Vector2d corner = normals.inverse() * Eigen::Vector2d(one.offset, two.offset);
+      if ((corner - a).norm() > cloud_.step) {
+        ++i;
+        continue;
+      }
+      region->polygon[after] = corner;
+      region->polygon.erase(region->polygon.begin() + static_cast<std::ptrdiff_t>(i));
+      region->walls.erase(region->walls.begin() + static_cast<std::ptrdiff_t>(i));
+    }
   }
 
   const OutlineCloud& cloud_;

@@ -337,6 +337,10 @@ void MeasureCloud(bool metric, int num_threads, OutlineCloud* cloud) {
 
 OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_threads) {
   OutlineCloud cloud;
+  if (!std::filesystem::exists(options.input_path)) {
+    throw InputError(options.input_path, "", "does not exist",
+                     "Give the folder of a COLMAP model, or a scan file");
+  }
   const bool is_model = std::filesystem::is_directory(options.input_path);
   const std::string model_folder = is_model ? options.input_path : options.sparse_path;
   if (is_model && !options.sparse_path.empty()) {
@@ -380,7 +384,6 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
     cloud.MoveTo({1, place.enu_from_model.rotation, place.enu_from_model.translation});
   } else if (LooksEarthCentred(cloud.points)) {
     const GeoFrame earth({0, 0, 0});
-    std::vector<Eigen::Vector3d> few;
     Eigen::Vector3d middle;
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<double> values;

@@ -24,6 +24,11 @@ void FindStretches(const OutlineCloud& cloud, WallLine* wall) {
     }
     wall->stretches.back().second = along[i];
   }
+  // Points do not reach the very corner.
+  for (auto& [low, high] : wall->stretches) {
+    low -= std::min(cloud.spacing, 0.2 * cloud.step);
+    high += std::min(cloud.spacing, 0.2 * cloud.step);
+  }
 }
 
 // The angle between two lines, -45..45 degrees after quarter turns.

@@ -31,14 +31,13 @@ void Measure(const std::string& name, StreetOptions options, const std::string& 
         CompareStreet(street.truth, proposal.outline, cloud.frame.outline_from_input);
     size_t doubtful = 0;
     for (const BuildingEvidence& evidence : proposal.evidence) doubtful += !evidence.doubts.empty();
-    fmt::print("| {} {} | {} | {} | {} | {} | {:.3f} | {:.3f} | {:.3f} | {:.3f} |\n", name, seed,
+    fmt::print("| {} {} | {} | {} | {} | {} | {:.4f} | {:.4f} | {:.4f} | {:.4f} |\n", name, seed,
                street.model.points.size(), proposal.outline.buildings.size(), errors.missed,
                doubtful, errors.corner, errors.ground, errors.eaves, errors.ridge);
     std::fflush(stdout);
-    if (seed == 1) {
-      WriteOutline(folder + "/" + name + ".json", proposal.outline, true);
-      WriteSparseModel(street.model, folder + "/" + name);
-    }
+    const std::string kept = folder + "/" + name + " " + std::to_string(seed);
+    WriteOutline(kept + ".json", proposal.outline, true);
+    WriteSparseModel(street.model, kept);
   }
 }
 
