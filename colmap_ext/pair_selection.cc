@@ -86,6 +86,10 @@ class PairSearch {
  private:
   int NumPhotos() const { return static_cast<int>(photos_.size()); }
 
+  size_t MaxPhotosInMemory() const {
+    return static_cast<size_t>(kMaxFeaturesInMemory / num_features_);
+  }
+
   void ReadPhotos();
   void Load(const std::set<int>& photos);
   void MakeSignatures();
@@ -187,8 +191,7 @@ void PairSearch::ReadPhotos() {
 
 // Features of these photos into memory; others make room.
 void PairSearch::Load(const std::set<int>& photos) {
-  const auto max_photos = static_cast<size_t>(kMaxFeaturesInMemory / num_features_);
-  if (features_.size() + photos.size() > max_photos) {
+  if (features_.size() + photos.size() > MaxPhotosInMemory()) {
     for (auto it = features_.begin(); it != features_.end();) {
       it = photos.count(it->first) > 0 ? std::next(it) : features_.erase(it);
     }
@@ -331,12 +334,13 @@ void PairSearch::ProposeNeighbors() {
 
 std::vector<PairCheck> PairSearch::CheckAll(const std::vector<PhotoPairKey>& pairs) {
   std::vector<PairCheck> checks(pairs.size());
-  for (size_t first = 0; first < pairs.size(); first += kPairsAtATime) {
-    const size_t count = std::min<size_t>(kPairsAtATime, pairs.size() - first);
+  size_t count = 0;
+  for (size_t first = 0; first < pairs.size(); first += count) {
     std::set<int> photos;
-    for (size_t i = first; i < first + count; ++i) {
-      photos.insert(pairs[i].first);
-      photos.insert(pairs[i].second);
+    for (count = 0; first + count < pairs.size() && count < kPairsAtATime; ++count) {
+      if (photos.size() + 2 > MaxPhotosInMemory() && count > 0) break;
+      photos.insert(pairs[first + count].first);
+      photos.insert(pairs[first + count].second);
     }
     Load(photos);
     ParallelFor(num_threads_, 0, static_cast<int>(count), [&](int i) {
@@ -368,6 +372,7 @@ void PairSearch::CheckProposed() {
 
 // The database counts matches of all features, a check those of the few that it compares.
 double PairSearch::WeightOf(const PairEdge& edge) const {
+  if (edge.source == PairSource::kBridge) return edge.num_inliers / double{kThoroughFeatures};
   if (edge.source != PairSource::kDatabase) return edge.num_inliers;
   const size_t num_features =
       std::max<size_t>(1, std::min(photos_[static_cast<size_t>(edge.photo1)].num_features,
@@ -415,7 +420,7 @@ void PairSearch::JoinIfCertain(const PhotoPairKey& key, const PairCheck& check) 
 void PairSearch::JoinCertain() {
   sets_ = DisjointSets(NumPhotos());
   const std::vector<PhotoPairKey> strongest = Strongest();
-  progress_.Stage("look thoroughly", static_cast<int>(strongest.size()));
+  progress_.Stage("look thoroughly");
   std::vector<PhotoPairKey> pairs;
   const auto look = [&] {
     const std::vector<PairCheck> checks = CheckAll(pairs);
@@ -436,8 +441,15 @@ void PairSearch::JoinCertain() {
     if (pairs.size() == kThoroughAtATime) look();
   }
   look();
-  // Sets that all that was found speaks for, be it one pair.
+  // Sets that most of what was found speaks for, be it one pair. What was found when they were
+  // smaller counts.
+  std::map<PhotoPairKey, Evidence> all;
   for (const auto& [sets, evidence] : evidence_) {
+    Evidence& sum = all[KeyOf(sets_.Find(sets.first), sets_.Find(sets.second))];
+    sum.num_certain += evidence.num_certain;
+    sum.num_failed += evidence.num_failed;
+  }
+  for (const auto& [sets, evidence] : all) {
     if (evidence.num_certain > evidence.num_failed) sets_.Join(sets.first, sets.second);
   }
 }
@@ -470,9 +482,10 @@ std::vector<PhotoPairKey> PairSearch::BridgesOf(const std::vector<int>& group,
       if (edge != edges_.end() && edge->second.agrees) continue;
       found.emplace_back(-similarities[other], KeyOf(photo, other));
     }
-    // No more than what can be among the best.
-    std::sort(found.begin(), found.end());
-    found.resize(std::min<size_t>(found.size(), kBridgeChecks));
+    if (found.size() > kBridgeChecks) {
+      std::nth_element(found.begin(), found.begin() + kBridgeChecks, found.end());
+      found.resize(kBridgeChecks);
+    }
   }
   std::vector<PhotoPairKey> pairs;
   for (const auto& [score, key] : found) pairs.push_back(key);
@@ -533,7 +546,7 @@ void PairSearch::ListGuesses(const std::vector<std::vector<int>>& groups) {
       for (size_t i = 0; i < count; ++i) {
         PairEdge& edge = edges_[KeyOf(photo, best[i].second)];
         std::tie(edge.photo1, edge.photo2) = KeyOf(photo, best[i].second);
-        edge.listed = true;
+        edge.listed = !edge.in_database;
       }
     }
   }

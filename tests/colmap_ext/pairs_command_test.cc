@@ -190,6 +190,17 @@ TEST(PairsCommandOptions, AreListedAndChecked) {
                          {FieldsOf(&options)});
 }
 
+TEST(PairCheck, TakesFeaturesThatAllLieAtOnePlace) {
+  ComparedFeatures features;
+  for (int i = 0; i < 40; ++i) {
+    features.x.emplace_back(10, 20);
+    const std::vector<uint8_t> one = DescriptorOf(0, i, 0, 1);
+    features.descriptors.insert(features.descriptors.end(), one.begin(), one.end());
+  }
+  EXPECT_EQ(CheckPair(features, features, PairCheckOptions()).num_matches, 40);
+  EXPECT_EQ(CheckPair(features, ComparedFeatures(), PairCheckOptions()).num_matches, 0);
+}
+
 TEST(ViewGraph, KeepsTheStrongestSomeWeakOnesAndNothingFallsApart) {
   // Twenty photos in which each agrees with all others, less the farther, and a weak one at the
   // end.
