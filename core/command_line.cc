@@ -83,6 +83,12 @@ Outcome RunBody(const std::function<void()>& body) {
     if (error.code == cv::Error::StsNoMem) return {kExitInput, kOutOfMemory};
     return {kExitInternalError, "internal error: " + error.err};
   } catch (const std::exception& error) {
+    // std::system_error of ours, std::runtime_error of Embree's and OpenCV's threads.
+    if (std::string(error.what()).find("Resource temporarily unavailable") != std::string::npos) {
+      return {kExitInput,
+              "the system does not give the threads that are needed: raise ulimit -u, or the "
+              "container's limit"};
+    }
     return {kExitInternalError, std::string("internal error: ") + error.what()};
   } catch (...) {
     return {kExitInternalError, "internal error of an unknown kind"};

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <set>
@@ -18,6 +19,8 @@
 
 namespace roomtex {
 namespace {
+
+constexpr uintmax_t kMaxProjectBytes = 1 << 20;
 
 [[noreturn]] void FailValue(const std::string& option, const std::string& text,
                             const std::string& expected) {
@@ -181,6 +184,10 @@ std::vector<OptionList::Given> OptionList::ReadPassedThrough(
 // their messages do not name the line of an unknown or broken key.
 std::vector<OptionList::Given> OptionList::ReadProjectFile(const std::string& path) const {
   RequireFile(path, "Check --project_path");
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) > kMaxProjectBytes) {
+    throw InputError(path, "", "is too large for an ini file", "Check --project_path");
+  }
   std::ifstream stream(path);
   std::vector<Given> all;
   std::string line, section;

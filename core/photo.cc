@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <limits>
+#include <stdexcept>
 
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -83,6 +85,13 @@ std::vector<unsigned char> ReadBytes(const std::string& path) {
 // Exiv2 prints warnings about files to stderr by default; a library does not print.
 void SilenceExiv2() { Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute); }
 
+// A pipe would be waited for without end.
+auto OpenExif(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) throw std::runtime_error("no file");
+  return Exiv2::ImageFactory::open(path);
+}
+
 std::string CameraName(const Exiv2::ExifData& exif) {
   const std::string make = Text(exif, "Exif.Image.Make"), model = Text(exif, "Exif.Image.Model");
   return make.empty() || model.empty() ? make + model : make + " " + model;
@@ -117,7 +126,7 @@ std::optional<double> Angle(const Exiv2::ExifData& exif, const std::string& key,
 int ReadOrientation(const std::string& path) {
   SilenceExiv2();
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     const auto number = PositiveNumber(image->exifData(), "Exif.Image.Orientation");
     return number && *number <= 8 ? static_cast<int>(*number) : 1;
@@ -203,7 +212,7 @@ std::array<int, 2> ReadPhotoSize(const std::string& path) {
   NoteInput(path);
   SilenceExiv2();
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     return {image->pixelWidth(), image->pixelHeight()};
   } catch (const std::exception&) {
@@ -215,7 +224,7 @@ LensData ReadLensData(const std::string& path) {
   SilenceExiv2();
   LensData data;
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     const Exiv2::ExifData& exif = image->exifData();
     data.camera = CameraName(exif);
@@ -231,7 +240,7 @@ ExposureData ReadExposureData(const std::string& path) {
   SilenceExiv2();
   ExposureData data;
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     const Exiv2::ExifData& exif = image->exifData();
     data.exposure_time = PositiveNumber(exif, "Exif.Photo.ExposureTime");
@@ -255,7 +264,7 @@ ExposureData ReadExposureData(const std::string& path) {
 void WriteExposureData(const std::string& path, const ExposureData& exposure) {
   SilenceExiv2();
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     Exiv2::ExifData& exif = image->exifData();
     if (exposure.exposure_time) {
@@ -282,7 +291,7 @@ std::optional<double> ReadFocalLength(const std::string& path) {
   constexpr double kFilmDiagonal = 43.2666;  // millimetres, of 36 x 24
   std::optional<double> focal;
   try {
-    const auto image = Exiv2::ImageFactory::open(path);
+    const auto image = OpenExif(path);
     image->readMetadata();
     const Exiv2::ExifData& exif = image->exifData();
     if (const auto on_film = PositiveNumber(exif, "Exif.Photo.FocalLengthIn35mmFilm")) {
@@ -308,7 +317,7 @@ std::optional<double> ReadFocalLength(const std::string& path) {
 std::optional<GpsData> ReadGpsData(const std::string& path) {
   SilenceExiv2();
   try {
-    auto image = Exiv2::ImageFactory::open(path);
+    auto image = OpenExif(path);
     image->readMetadata();
     const Exiv2::ExifData& exif = image->exifData();
     const auto latitude = Angle(exif, "Exif.GPSInfo.GPSLatitude", 'N', 'S', 90);

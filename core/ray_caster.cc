@@ -4,8 +4,6 @@
 
 #include <embree3/rtcore.h>
 
-#include "core/resource_limits.h"
-
 namespace roomtex {
 namespace {
 
@@ -38,7 +36,7 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
   }
   if (bounds.min.x() <= bounds.max.x()) scene_->centre = 0.5 * (bounds.min + bounds.max);
 
-  scene_->device = rtcNewDevice(ThreadsNotStarted() > 0 ? "threads=1,set_affinity=0" : nullptr);
+  scene_->device = rtcNewDevice(nullptr);
   if (scene_->device == nullptr) throw std::runtime_error("Embree: no ray tracing device");
   scene_->scene = rtcNewScene(scene_->device);
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);

@@ -81,7 +81,8 @@ def at_every_rename(base):
 
 def by_signals(base):
     slow = "roomtex-simulate --quiet --output_path new --num_photos 40"
-    cases = [("simulate", slow, 0.7), ("texture", s.TEXTURE + " --output_path textured", 0.3)]
+    cases = [("simulate", slow, 0.7), ("texture", s.TEXTURE.replace("--Texture.scale 1", "--Texture.scale 8") +
+                               " --output_path textured", 1.0)]
     for title, line, seconds in cases:
         for what in (signal.SIGINT, signal.SIGTERM):
             here = base.copy()

@@ -57,7 +57,8 @@ def threads(base):
             here = base.copy()
             answer = here.run(line + " --num_threads 8", environment={
                 "LD_PRELOAD": FEW_THREADS, "THREADS_AT_MOST": str(at_most)})
-            yield f"{title} with {at_most} threads more", answer.problem({code})
+            # Embree does not do without: that is said.
+            yield f"{title} with {at_most} threads more", answer.problem({code, 3})
         here = base.copy()
         yield f"{title} --num_threads 100000", here.run(line + " --num_threads 100000").problem(
             {code})
@@ -121,7 +122,7 @@ def geometry(base):
         (here.root / "mesh.ply").write_bytes(mesh(reach))
         started = time.time()
         answer = here.run("roomtex-texture --quiet --input_path sparse --image_path photos "
-                          "--scan_path mesh.ply --output_path textured", seconds=120)
+                          "--scan_path mesh.ply --output_path textured --Texture.scale 1", seconds=120)
         seconds.append(time.time() - started)
         problem = answer.problem({0, 3, 4})
     if not problem and seconds[1] > 15 * seconds[0] + 2:
