@@ -61,10 +61,11 @@ void AddOptions(Arguments* a, Command* command) {
                         "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
                         "--image_path that have six picks are placed each by its own.",
                         Command::Kind::kOptional);
-  command->AddInputPaths("scan_path", &a->scan_paths,
-                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
-                         "an --input_path that was aligned before: it remembers its scans.",
-                         Command::Kind::kOptional);
+  command->AddInputPaths(
+      "scan_path", &a->scan_paths,
+      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
+      "an --input_path that was aligned before: it remembers its scans.",
+      Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
                         "weight: 1 = ordinary, "

@@ -483,8 +483,8 @@ CloudSurface FindCloudSurface(const Scan& cloud, int num_threads) {
   surface.noise = Median(&noises);
 
   // Of points without noise rounding is left.
-  const double noise = std::max(
-      {surface.noise, 1e-3 * static_cast<double>(Median(&spacings)), 1e-7 * sorted.size});
+  const double noise =
+      std::max({surface.noise, 1e-3 * static_cast<double>(Median(&spacings)), 1e-7 * sorted.size});
   const int num_blocks = (static_cast<int>(parts.size()) + kPartsAtOnce - 1) / kPartsAtOnce;
   std::vector<std::vector<Surfel>> blocks(static_cast<size_t>(num_blocks));
   ParallelFor(num_threads, 0, num_blocks, [&](int block) {

@@ -48,12 +48,11 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       "Folder of the COLMAP model in the scan frame, as roomtex-align writes it.");
   command->AddInputPath("image_path", &o->sources.image_path,
                         "Folder of the photos, as COLMAP was given it.");
-  command->AddInputPaths(
-      "scan_path", &o->scan_paths,
-      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not "
-      "needed for a model of roomtex-align, which remembers its scans and how "
-      "they were read.",
-      Command::Kind::kOptional);
+  command->AddInputPaths("scan_path", &o->scan_paths,
+                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not "
+                         "needed for a model of roomtex-align, which remembers its scans and how "
+                         "they were read.",
+                         Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,

@@ -33,11 +33,12 @@ void AddOptions(Arguments* a, Command* command) {
                         "--image_path are placed each by its own picks.",
                         Command::Kind::kOptional);
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
-  command->AddInputPaths("scan_path", &a->scene.scan_paths,
-                         "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
-                         "a model of roomtex-align, which remembers its scans and how they were "
-                         "read.",
-                         Command::Kind::kOptional);
+  command->AddInputPaths(
+      "scan_path", &a->scene.scan_paths,
+      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
+      "a model of roomtex-align, which remembers its scans and how they were "
+      "read.",
+      Command::Kind::kOptional);
   command->AddOutputPath("output_path", &a->output_path,
                          "Picks, a CSV file for roomtex-align. Saved after every change; one that "
                          "is there is continued, and kept as it was with .bak behind its name.");
