@@ -136,6 +136,20 @@ void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
   *scan = std::move(*grid);
 }
 
+// Formats that do not say their unit, and rooms of kilometres.
+void NoteDoubtfulUnit(const ScanReaderOptions& options, ScanFile* file) {
+  constexpr double kLargestInMetres = 1000;
+  const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
+                         file->format == "XYZ";
+  if (!is_silent || !options.units.empty()) return;
+  const Bounds bounds = FindBounds(file->scans[0]);
+  const double size = (bounds.max - bounds.min).maxCoeff();
+  if (!(size > kLargestInMetres)) return;
+  file->notes.push_back("the file does not say its unit; in metres it is " +
+                        std::to_string(std::llround(size)) +
+                        " m large. If that are millimetres, give --units millimeters");
+}
+
 ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
   ScanFile file;
   file.format = "E57";
@@ -236,6 +250,7 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
   for (Scan& scan : file.scans) {
     if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
   }
+  NoteDoubtfulUnit(options, &file);
   return file;
 }
 
@@ -271,7 +286,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     const int count = static_cast<int>(file.scans.size());
     PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
-    if (file.format == "E57") {
+    if (file.format != "RTPI") {  // whose notes are on the azimuth
       for (const std::string& note : file.notes) placed.notes.push_back(path + ": " + note + ".");
     }
     for (int k = 0; k < count; ++k) {

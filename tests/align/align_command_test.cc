@@ -5,7 +5,6 @@
 #include "core/frames.h"
 #include "core/report.h"
 #include "importers/content_hash.h"
-#include "importers/ply.h"
 #include "tests/align/case_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -104,8 +103,7 @@ TEST(AlignCommand, ACloudFarFromItsOriginIsAlignedLikeTheGrid) {
   for (Eigen::Vector3d& point : cloud.points) point += utm;
   cloud.scan_from_station.translation.setZero();
   files.scan_path = files.folder / "cloud.ply";
-  const std::vector<Triangle> no_mesh;
-  WritePly({{&cloud, &no_mesh}}, files.scan_path);
+  WriteScan(cloud, {}, files.scan_path);
   const CommandResult result = files.Align();
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));

@@ -166,6 +166,17 @@ TEST_F(ScanReader, BadPosesAreToldWithTheirLine) {
   EXPECT_INPUT_ERROR(ReadScans({a}, folder_ / "none.txt", {}), "does not exist");
 }
 
+TEST_F(ScanReader, ARoomOfKilometresIsNoticed) {
+  const std::string path = Write("a.obj", "v 0 0 0\nv 5000 0 0\nv 0 0 2500\nf 1 2 3\n");
+  const ScanFile file = ReadScanFile(path, {});
+  ASSERT_THAT(file.notes, SizeIs(1));
+  EXPECT_THAT(file.notes[0], testing::HasSubstr("--units millimeters"));
+  EXPECT_THAT(ReadPlacedScans({path}, "", {}).notes, SizeIs(1));
+  ScanReaderOptions options;
+  options.units = "millimeters";
+  EXPECT_THAT(ReadScanFile(path, options).notes, SizeIs(0));
+}
+
 TEST_F(ScanReader, EveryWriterGivesWhatTheReadersTake) {
   const Scan scan = ReadScan(WriteGoodRtpi("a.rtpi"), {});
   for (const std::string extension : {".pcd", ".ptx", ".rtpi"}) {

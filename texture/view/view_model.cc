@@ -150,6 +150,11 @@ ViewModel ReadViewPly(const std::string& path) {
     model.points.push_back((p - model.origin).cast<float>());
   }
   model.colors.assign(scan.points.size(), {200, 200, 200});
+  const auto brightest = std::max_element(scan.intensity.begin(), scan.intensity.end());
+  if (color.values[0].empty() && brightest != scan.intensity.end() && *brightest > 0) {
+    const std::vector<uint8_t> grey = IntensityAsGrey(scan);
+    for (size_t i = 0; i < grey.size(); ++i) model.colors[i] = {grey[i], grey[i], grey[i]};
+  }
   for (int k = 0; k < 3; ++k) {
     if (color.values[k].empty()) continue;
     for (size_t i = 0; i < model.colors.size(); ++i) {

@@ -66,8 +66,9 @@ ViewModel ReadViewModel(const std::string& path);
 // transforms. The scan frame is that below the root node of roomtex-texture's files, and glTF's own
 // for any other file. Numbers are checked against the bytes that are there.
 ViewModel ReadViewGlb(const std::string& path);
-// A triangle mesh or a cloud of points; colours by red, green, blue if it has them, otherwise light
-// grey. Of a cloud of more than kMostDiscs points every second, third ... is shown, larger.
+// A triangle mesh or a cloud of points; colours by red, green, blue if it has them, otherwise the
+// intensity or light grey. Of a cloud of more than kMostDiscs points every second, third ... is
+// shown, larger.
 inline constexpr size_t kMostDiscs = 8000000;
 ViewModel ReadViewPly(const std::string& path);
 
