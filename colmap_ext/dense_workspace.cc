@@ -77,9 +77,9 @@ std::vector<cv::Mat1f> ReadDenseArray(const std::string& path) {
   const double expected = 4.0 * sizes[0] * sizes[1] * sizes[2];
   const auto left = static_cast<double>(fs::file_size(path)) - static_cast<double>(stream.tellg());
   if (left != expected) {
-    throw InputError(path, "", "holds " + Number(left, 0) + " bytes of values, expected " +
-                                   Number(expected, 0),
-                     "The file is cut off: write it again");
+    throw InputError(
+        path, "", "holds " + Number(left, 0) + " bytes of values, expected " + Number(expected, 0),
+        "The file is cut off: write it again");
   }
   std::vector<cv::Mat1f> channels;
   for (int k = 0; k < sizes[2]; ++k) {

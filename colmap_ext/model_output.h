@@ -26,8 +26,8 @@ class ScratchFolder {
 // replacing it would destroy what is not ours.
 void RequireReplaceableModel(const std::string& folder);
 
-// Throws InputError unless `folder` does not exist, is empty, or holds what this command left there:
-// its report.json names it.
+// Throws InputError unless `folder` does not exist, is empty, or holds what this command left
+// there: its report.json names it.
 void RequireReplaceableOutput(const std::string& folder, const std::string& command);
 
 // The folder that holds `folder`, made if it is missing; a slash at the end means nothing.

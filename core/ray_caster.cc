@@ -121,11 +121,11 @@ bool NarrowToTriangle(RTCPointQueryFunctionArguments* arguments) {
       static_cast<const unsigned*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0));
   const auto corner = [&](int k) {
     return Eigen::Vector3f(Eigen::Map<const Eigen::Vector3f>(
-        vertices + 3 * static_cast<size_t>(corners[3 * static_cast<size_t>(arguments->primID) + k])));
+        vertices +
+        3 * static_cast<size_t>(corners[3 * static_cast<size_t>(arguments->primID) + k])));
   };
   const Eigen::Vector3f point(arguments->query->x, arguments->query->y, arguments->query->z);
-  const float distance =
-      (NearestOnTriangle(point, corner(0), corner(1), corner(2)) - point).norm();
+  const float distance = (NearestOnTriangle(point, corner(0), corner(1), corner(2)) - point).norm();
   if (distance >= arguments->query->radius) return false;
   arguments->query->radius = distance;
   return true;

@@ -11,8 +11,8 @@
 namespace roomtex {
 namespace {
 
-constexpr float kOutside = -1e6f;     // of every picture
-constexpr int kStripeRows = 128;      // the map of a whole photo of 20 MP would take 160 MB
+constexpr float kOutside = -1e6f;      // of every picture
+constexpr int kStripeRows = 128;       // the map of a whole photo of 20 MP would take 160 MB
 constexpr double kAverageBelow = 0.8;  // of the photo's size: coarser pictures are averaged first
 constexpr double kMaxEnlargement = 2;  // of the longest side, as COLMAP's undistorter
 constexpr int kSmallest = 16;          // pixels

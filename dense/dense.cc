@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
 constexpr int kMaxNeighbours = 8;  // photos that may confirm a depth
+constexpr int kSmallestSide = 32;  // pixels of a picture: smaller ones hold no window
 constexpr int kPointColumns = 48;  // of the raster of a photo's points
 
 class DenseRun {
@@ -47,9 +48,10 @@ class DenseRun {
     ParallelFor(num_threads_, 0, static_cast<int>(photos.size()), [&](int i) {
       const auto pinhole = PinholeCamera(photos[i].camera, options_.pinhole);
       const std::string path = workspace_.ImagePath(photos[i].name);
-      if (!pinhole) {
-        problems[i] = "It is a panorama, or nothing of it is left without its distortion: cut "
-                      "panoramas into faces (roomtex-import).";
+      if (!pinhole || std::min(pinhole->width, pinhole->height) < kSmallestSide) {
+        problems[i] =
+            "It is a panorama, or too little of it is left without its distortion: cut "
+            "panoramas into faces (roomtex-import).";
         return;
       }
       cv::Mat taken;
@@ -61,9 +63,9 @@ class DenseRun {
       }
       const cv::Mat picture = UndistortPhoto(taken, photos[i].camera, *pinhole).picture;
       std::vector<uchar> bytes;
-      if (!cv::haveImageWriter(path) || !cv::imencode(fs::path(path).extension().string(), picture,
-                                                      bytes,
-                                                      {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})) {
+      if (!cv::haveImageWriter(path) ||
+          !cv::imencode(fs::path(path).extension().string(), picture, bytes,
+                        {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})) {
         cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
       }
       OutputFile file(path);
@@ -154,9 +156,9 @@ class DenseRun {
       }
     }
     WriteDenseArray({depth}, Aside(i, ".depth"));
-    WriteDenseArray({is_open, estimate.score, estimate.normals[0], estimate.normals[1],
-                     estimate.normals[2]},
-                    Aside(i, ".estimate"));
+    WriteDenseArray(
+        {is_open, estimate.score, estimate.normals[0], estimate.normals[1], estimate.normals[2]},
+        Aside(i, ".estimate"));
     return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
   }
 
@@ -180,8 +182,8 @@ class DenseRun {
     WriteDenseArray(NormalsOfDepth(confirmed.depth, view.camera.params, 3),
                     workspace_.NormalMapPath(view.name, "geometric"));
     builder->Add(view, confirmed, estimate.score,
-                 cv::imread(workspace_.ImagePath(view.name), cv::IMREAD_COLOR |
-                                                                 cv::IMREAD_IGNORE_ORIENTATION));
+                 cv::imread(workspace_.ImagePath(view.name),
+                            cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION));
     return static_cast<double>(cv::countNonZero(confirmed.is_new)) /
            static_cast<double>(confirmed.is_new.total());
   }
@@ -204,17 +206,19 @@ class DenseRun {
           const Eigen::Vector3d in_cam = other.view->cam_from_scan * point.x_in_model;
           const auto at = other_projection.ImgFromCam(in_cam);
           if (!at || !other_projection.InImage(*at)) continue;
-          const double seen = other.depth(std::min(static_cast<int>(at->y()), other.depth.rows - 1),
-                                          std::min(static_cast<int>(at->x()), other.depth.cols - 1));
-          if (std::abs(seen - in_cam.z()) > options_.fusion.max_depth_difference * in_cam.z()) continue;
+          const double seen =
+              other.depth(std::min(static_cast<int>(at->y()), other.depth.rows - 1),
+                          std::min(static_cast<int>(at->x()), other.depth.cols - 1));
+          if (std::abs(seen - in_cam.z()) > options_.fusion.max_depth_difference * in_cam.z())
+            continue;
           sights.emplace_back(static_cast<int>(other.view - views_.data()), *at);
         }
         if (sights.size() < 2) continue;
         const uint64_t id = model_.points.size() + 1;
         for (const auto& [number, at] : sights) {
           SparseImage& image = model_.images[static_cast<uint32_t>(number + 1)];
-          point.track.push_back({static_cast<uint32_t>(number + 1),
-                                 static_cast<uint32_t>(image.points2d.size())});
+          point.track.push_back(
+              {static_cast<uint32_t>(number + 1), static_cast<uint32_t>(image.points2d.size())});
           image.points2d.push_back(at);
           image.point3d_ids.push_back(id);
         }

@@ -16,19 +16,19 @@
 namespace roomtex {
 namespace {
 
-constexpr int kBlockPx = 4;           // of the raster of open space
-constexpr double kNearest = 0.35;     // metres: nearer than any thing that is photographed sharply
-constexpr double kBeyondRoom = 0.1;   // metres that surfaces may lie outside the scan's box
-constexpr int kNormalRadiusPx = 3;    // of the scan's normals
-constexpr int kSide = 5;              // samples of a window, each way ...
-constexpr int kStep = 2;              // ... so many pixels apart
+constexpr int kBlockPx = 4;          // of the raster of open space
+constexpr double kNearest = 0.35;    // metres: nearer than any thing that is photographed sharply
+constexpr double kBeyondRoom = 0.1;  // metres that surfaces may lie outside the scan's box
+constexpr int kNormalRadiusPx = 3;   // of the scan's normals
+constexpr int kSide = 5;             // samples of a window, each way ...
+constexpr int kStep = 2;             // ... so many pixels apart
 constexpr int kSamples = kSide * kSide;
-constexpr int kBest = 2;              // sources that count: others may not see the place
-constexpr float kSigmaColor = 25;     // grey levels: what is of another colour is another thing
+constexpr int kBest = 2;               // sources that count: others may not see the place
+constexpr float kSigmaColor = 25;      // grey levels: what is of another colour is another thing
 constexpr float kMinDeviation = 2.5f;  // grey levels; flatter windows say nothing
-constexpr float kMaxSlope = 5;        // tangent of the angle to a plane that faces the camera
-constexpr float kSameDepth = 0.01f;   // share: a hypothesis is the scan's own surface
-constexpr float kNoMatch = 2;         // cost of a hypothesis that no two sources see
+constexpr float kMaxSlope = 5;         // tangent of the angle to a plane that faces the camera
+constexpr float kSameDepth = 0.01f;    // share: a hypothesis is the scan's own surface
+constexpr float kNoMatch = 2;          // cost of a hypothesis that no two sources see
 
 // Inverse depth at the pixel, and its change per pixel to the right and down.
 struct Plane {
@@ -44,8 +44,7 @@ struct Source {
 
 // `img` to `img`, homogeneous: turned * x + moved * w.
 Source MakeSource(const StereoPicture& reference, const Camera& reference_camera,
-                  const StereoPicture& source, const Camera& source_camera,
-                  const cv::Mat1f* grey) {
+                  const StereoPicture& source, const Camera& source_camera, const cv::Mat1f* grey) {
   const auto matrix = [](const Camera& camera) {
     Eigen::Matrix3d k = Eigen::Matrix3d::Identity();
     k(0, 0) = camera.params[0], k(1, 1) = camera.params[1];
@@ -54,11 +53,11 @@ Source MakeSource(const StereoPicture& reference, const Camera& reference_camera
   };
   const Rigid source_from_reference = source.cam_from_scan * reference.cam_from_scan.Inverse();
   const Eigen::Matrix3d k = matrix(source_camera);
-  return {grey,
-          (k * source_from_reference.rotation.toRotationMatrix() *
-           matrix(reference_camera).inverse())
-              .cast<float>(),
-          (k * source_from_reference.translation).cast<float>()};
+  return {
+      grey,
+      (k * source_from_reference.rotation.toRotationMatrix() * matrix(reference_camera).inverse())
+          .cast<float>(),
+      (k * source_from_reference.translation).cast<float>()};
 }
 
 Plane PlaneFromNormal(float depth, const Eigen::Vector3f& normal, const Camera& camera, float x,
@@ -111,8 +110,7 @@ class Window {
   // 1 - normalised cross-correlation, 0..2.
   float Cost(const Source& source, float x, float y, const Plane& plane) const {
     const cv::Mat1f& grey = *source.grey;
-    const Eigen::Vector3f at =
-        source.turned * Eigen::Vector3f(x, y, 1) + source.moved * plane.w;
+    const Eigen::Vector3f at = source.turned * Eigen::Vector3f(x, y, 1) + source.moved * plane.w;
     const Eigen::Vector3f right = source.turned.col(0) + source.moved * plane.a;
     const Eigen::Vector3f down = source.turned.col(1) + source.moved * plane.b;
     const auto max_x = static_cast<float>(grey.cols - 1), max_y = static_cast<float>(grey.rows - 1);
@@ -129,8 +127,8 @@ class Window {
       const float s = u - static_cast<float>(column), t = v - static_cast<float>(row);
       const float* above = grey[row] + column;
       const float* below = grey[row + 1] + column;
-      const float value = (1 - t) * ((1 - s) * above[0] + s * above[1]) +
-                          t * ((1 - s) * below[0] + s * below[1]);
+      const float value =
+          (1 - t) * ((1 - s) * above[0] + s * above[1]) + t * ((1 - s) * below[0] + s * below[1]);
       const float weighted = weight_[k] * value;
       sum += weighted;
       square += weighted * value;
@@ -304,8 +302,8 @@ class Level {
     std::array<float, kBest> best;
     best.fill(kNoMatch);
     for (const Source& source : sources_) {
-      const float cost = window.Cost(source, static_cast<float>(x) + 0.5f,
-                                     static_cast<float>(y) + 0.5f, plane);
+      const float cost =
+          window.Cost(source, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, plane);
       if (cost < best[0]) {
         best[1] = best[0];
         best[0] = cost;
@@ -335,9 +333,10 @@ class Level {
       if ((bins >> bin & 1) != 0 && number-- == 0) break;
     }
     Plane plane;
-    plane.w = open_.first() + (open_.last() - open_.first()) *
-                                  (static_cast<float>(bin) + static_cast<float>(random->Uniform())) /
-                                  OpenSpace::kBins;
+    plane.w =
+        open_.first() + (open_.last() - open_.first()) *
+                            (static_cast<float>(bin) + static_cast<float>(random->Uniform())) /
+                            OpenSpace::kBins;
     plane.a = static_cast<float>(random->Uniform(-2, 2)) * plane.w / focal();
     plane.b = static_cast<float>(random->Uniform(-2, 2)) * plane.w / focal();
     return plane;
@@ -376,9 +375,9 @@ class Level {
     const int column = std::min(static_cast<int>(at_x), grey_.cols - 1);
     const int row = std::min(static_cast<int>(at_y), grey_.rows - 1);
     const Plane& plane = planes_[row * grey_.cols + column];
-    return {plane.At(at_x - static_cast<float>(column) - 0.5f,
-                     at_y - static_cast<float>(row) - 0.5f),
-            plane.a * scale_x, plane.b * scale_y};
+    return {
+        plane.At(at_x - static_cast<float>(column) - 0.5f, at_y - static_cast<float>(row) - 0.5f),
+        plane.a * scale_x, plane.b * scale_y};
   }
 
   const OpenSpace& open_;
@@ -461,10 +460,9 @@ OpenSpace::OpenSpace(const ScanSpace& space, const StereoPicture& picture, doubl
 }
 
 uint64_t OpenSpace::BinsAt(double x_share, double y_share) const {
-  const int column = std::clamp(static_cast<int>(x_share * scan_depth_.cols) / kBlockPx, 0,
-                                columns_ - 1);
-  const int row =
-      std::clamp(static_cast<int>(y_share * scan_depth_.rows) / kBlockPx, 0, rows_ - 1);
+  const int column =
+      std::clamp(static_cast<int>(x_share * scan_depth_.cols) / kBlockPx, 0, columns_ - 1);
+  const int row = std::clamp(static_cast<int>(y_share * scan_depth_.rows) / kBlockPx, 0, rows_ - 1);
   return bins_[static_cast<size_t>(row) * columns_ + column];
 }
 

@@ -100,6 +100,11 @@ void FillReport(const DenseResult& result, const Command::Context& context) {
                       {"new", photo.share_new}});
   }
   report["images"] = images;
+  if (result.supplement.vertices.empty()) {
+    context.Warn(
+        "nothing was found that the scan does not have: its holes may be seen by too few photos, "
+        "or hold no texture");
+  }
   if (without > 0) {
     context.Warn(std::to_string(without) + " of " + std::to_string(result.photos.size()) +
                  " photos share too little of the scan with others from beside: no depth there");
@@ -122,9 +127,9 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   if (options.strict) ThrowIfAnyLeftOut(left_out, options.image_path);
   if (photos.empty()) {
     throw InputError(options.input_path, "",
-                     left_out.empty() ? "holds no registered photo"
-                                      : "holds no photo that can be used. " +
-                                            AsClause(left_out[0].reason),
+                     left_out.empty()
+                         ? "holds no registered photo"
+                         : "holds no photo that can be used. " + AsClause(left_out[0].reason),
                      "");
   }
   TakeOverTrust(alignment, options.accept_untrusted, context);

@@ -52,9 +52,8 @@ ScanSpace::ScanSpace(const std::vector<Scan>& scans, int num_threads)
         const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
                                         std::cos(elevation) * std::sin(azimuth),
                                         std::sin(elevation));
-        const auto hit = surface_.Cast(station.place,
-                                       station.station_from_scan.transpose() * direction,
-                                       kNearDepth);
+        const auto hit = surface_.Cast(
+            station.place, station.station_from_scan.transpose() * direction, kNearDepth);
         if (hit) range(row, column) = static_cast<float>(hit->distance);
       }
     });

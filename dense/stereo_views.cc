@@ -53,12 +53,11 @@ void FindNeighbours(const ScanSpace& space, int max_neighbours, std::vector<Ster
         if (!at || !projection.InImage(*at)) continue;
         const int column = std::min(static_cast<int>(at->x() * kProbeColumns / other.camera.width),
                                     kProbeColumns - 1);
-        const int row = std::min(static_cast<int>(at->y() * kProbeRows / other.camera.height),
-                                 kProbeRows - 1);
+        const int row =
+            std::min(static_cast<int>(at->y() * kProbeRows / other.camera.height), kProbeRows - 1);
         const double depth = depths[j](row, column);
         if (!(std::abs(depth - in_cam.z()) < kSameSight * in_cam.z())) continue;
-        score += WeightOfAngle(
-            AngleBetween((*views)[i].Centre() - place, other.Centre() - place));
+        score += WeightOfAngle(AngleBetween((*views)[i].Centre() - place, other.Centre() - place));
       }
       if (score > 0) scores.emplace_back(-score, static_cast<int>(j));
     }

@@ -17,11 +17,11 @@ namespace roomtex {
 namespace {
 
 constexpr double kMaxReprojection_px = 2;
-constexpr double kMatch_px = 0.4;        // standard deviation of a match, for the uncertainty
-constexpr double kOutsideBox = 0.1;      // metres outside the scan's box
-constexpr int kSpecklePx = 120;          // smaller islands of a depth map are chance
-constexpr double kDepthSteps = 4000;     // per unit of the logarithm of the depth, for 16 bits
-constexpr float kSameSurface = 0.02f;    // share of the depth per vertex step
+constexpr double kMatch_px = 0.4;       // standard deviation of a match, for the uncertainty
+constexpr double kOutsideBox = 0.1;     // metres outside the scan's box
+constexpr double kSpeckleShare = 5e-5;  // of a picture: smaller islands of depth are chance
+constexpr double kDepthSteps = 4000;    // per unit of the logarithm of the depth, for 16 bits
+constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
 
 uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
   uint64_t key = 0;
@@ -42,7 +42,9 @@ void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {
       code(y, x) = static_cast<int16_t>(std::clamp(steps, 1.0, 32000.0));
     }
   }
-  cv::filterSpeckles(code, 0, kSpecklePx, kDepthSteps * 0.01);
+  const int smallest =
+      std::max(10, static_cast<int>(kSpeckleShare * static_cast<double>(code.total())));
+  cv::filterSpeckles(code, 0, smallest, kDepthSteps * 0.01);
   is_new->setTo(0, code == 0);
 }
 
@@ -80,8 +82,11 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
                             const ScanSpace& space, const SupplementOptions& options,
                             int num_threads) {
   const cv::Size size = estimate.depth.size();
-  ConfirmedDepth result{scan_only.clone(), {}, cv::Mat1b(size, uint8_t{0}),
-                        cv::Mat1f::zeros(size), cv::Mat1b(size, uint8_t{0})};
+  ConfirmedDepth result{scan_only.clone(),
+                        {},
+                        cv::Mat1b(size, uint8_t{0}),
+                        cv::Mat1f::zeros(size),
+                        cv::Mat1b(size, uint8_t{0})};
   for (const cv::Mat1f& normal : estimate.normals) result.normals.push_back(normal.clone());
   const CameraProjection projection(view.camera);
   const Rigid scan_from_cam = view.cam_from_scan.Inverse();
@@ -106,8 +111,7 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
         const Eigen::Vector3d in_other = others[k].view->cam_from_scan * place;
         const auto there = other_projections[k].ImgFromCam(in_other);
         if (!there || !other_projections[k].InImage(*there)) continue;
-        const int column =
-            std::min(static_cast<int>(there->x()), others[k].depth.cols - 1);
+        const int column = std::min(static_cast<int>(there->x()), others[k].depth.cols - 1);
         const int row = std::min(static_cast<int>(there->y()), others[k].depth.rows - 1);
         const double seen = others[k].depth(row, column);
         if (!(seen > 0) ||
@@ -122,7 +126,8 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
         if (!here || (*here - at).norm() > kMaxReprojection_px) continue;
         // What is nearer or farther there is so here, to first order: the views look alike.
         depths.push_back(depth + (seen - in_other.z()));
-        const Eigen::Vector3d baseline = scan_from_others[k].translation - scan_from_cam.translation;
+        const Eigen::Vector3d baseline =
+            scan_from_others[k].translation - scan_from_cam.translation;
         const Eigen::Vector3d direction = (place - scan_from_cam.translation).normalized();
         baselines2 += (baseline - direction.dot(baseline) * direction).squaredNorm();
       }
@@ -132,8 +137,8 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
       const Eigen::Vector3d fused_place = scan_from_cam * (ray * fused);
       result.depth(y, x) = static_cast<float>(fused);
       result.support(y, x) = static_cast<uint8_t>(std::min(support, 255));
-      result.uncertainty(y, x) = static_cast<float>(
-          fused * fused / focal * kMatch_px / std::sqrt(std::max(baselines2, 1e-6)));
+      result.uncertainty(y, x) = static_cast<float>(fused * fused / focal * kMatch_px /
+                                                    std::sqrt(std::max(baselines2, 1e-6)));
       if (!space.IsInRoom(fused_place, kOutsideBox) ||
           space.IsSeenEmpty(fused_place, options.distance_to_scan) ||
           space.surface().DistanceTo(fused_place, options.distance_to_scan)) {
@@ -147,8 +152,8 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       if (result.support(y, x) == 0 || result.is_new(y, x) != 0) continue;
-      const Eigen::Vector3d place = scan_from_cam * (*projection.RayFromImg({x + 0.5, y + 0.5}) *
-                                                     result.depth(y, x));
+      const Eigen::Vector3d place =
+          scan_from_cam * (*projection.RayFromImg({x + 0.5, y + 0.5}) * result.depth(y, x));
       if (space.surface().DistanceTo(place, options.distance_to_scan)) continue;
       result.depth(y, x) = 0;
       result.support(y, x) = 0;
@@ -254,20 +259,20 @@ void WriteSupplement(const Supplement& supplement, const Scan& scan, const std::
   const char* const type = as_double ? "double" : "float";
   OutputFile file(path);
   std::ostream& stream = file.stream();
-  stream << "ply\nformat binary_little_endian 1.0\ncomment roomtex-dense: surface from photos, scan "
-            "frame, metres; support = photos, confidence = correlation 0..1, uncertainty = standard "
-            "deviation, metres\n"
-         << fmt::format("comment roomtex up {:.17g} {:.17g} {:.17g}\n", scan.up[0], scan.up[1],
-                        scan.up[2])
-         << "element vertex " << supplement.vertices.size() << "\n";
+  stream
+      << "ply\nformat binary_little_endian 1.0\ncomment roomtex-dense: surface from photos, scan "
+         "frame, metres; support = photos, confidence = correlation 0..1, uncertainty = standard "
+         "deviation, metres\n"
+      << fmt::format("comment roomtex up {:.17g} {:.17g} {:.17g}\n", scan.up[0], scan.up[1],
+                     scan.up[2])
+      << "element vertex " << supplement.vertices.size() << "\n";
   for (const char* name : {"x", "y", "z"}) stream << "property " << type << " " << name << "\n";
   for (const char* name : {"nx", "ny", "nz"}) stream << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue", "support"}) {
     stream << "property uchar " << name << "\n";
   }
   stream << "property float confidence\nproperty float uncertainty\nelement face "
-         << supplement.triangles.size()
-         << "\nproperty list uchar int vertex_indices\nend_header\n";
+         << supplement.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
   const auto put = [&stream](const void* value, size_t size) {
     stream.write(static_cast<const char*>(value), static_cast<std::streamsize>(size));
   };

@@ -38,11 +38,11 @@ struct SupplementOptions {
 
 struct SupplementVertex {
   Eigen::Vector3d x_in_scan;
-  Eigen::Vector3f normal;       // unit, towards the photo
-  std::array<uint8_t, 3> rgb;   // of the photo
-  int support;                  // photos that it was found from
-  float confidence;             // correlation, 0..1
-  float uncertainty;            // metres, standard deviation along the line of sight
+  Eigen::Vector3f normal;      // unit, towards the photo
+  std::array<uint8_t, 3> rgb;  // of the photo
+  int support;                 // photos that it was found from
+  float confidence;            // correlation, 0..1
+  float uncertainty;           // metres, standard deviation along the line of sight
 };
 
 struct Supplement {

@@ -379,7 +379,8 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   set.Commit();
 }
 
-// Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of model.glb.
+// Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of
+// model.glb.
 void AddSupplement(const std::string& path, PlacedScans* placed) {
   Scan supplement = ReadScan(path, {});
   if (supplement.kind() != Scan::Kind::kMesh) {
@@ -441,9 +442,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   context.report.AddCopy(options.output_path + "/report.json");
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result = 
-      ColorizeReadable(scans, colorize, options.strict, context.options.num_threads,
-                       &context.progress, &list);
+  const ColorizeResult result = ColorizeReadable(
+      scans, colorize, options.strict, context.options.num_threads, &context.progress, &list);
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
   if (!options.supplement_path.empty()) {

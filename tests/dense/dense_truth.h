@@ -83,8 +83,8 @@ class DenseTruth {
         for (int x = step / 2; x < room.camera().width; x += step) {
           const auto ray = projection.RayFromImg({x + 0.5, y + 0.5});
           if (!ray) continue;
-          const auto hit = scene.Cast(room_from_cam.translation,
-                                      room_from_cam.rotation * ray->normalized());
+          const auto hit =
+              scene.Cast(room_from_cam.translation, room_from_cam.rotation * ray->normalized());
           if (!hit || scene.SurfaceOf(hit->patch).kind != Surface::Kind::kOpaque) continue;
           const Eigen::Vector3d place = scan_from_room_ * hit->point;
           if (scanned.DistanceTo(place, 0.025)) continue;

@@ -67,9 +67,8 @@ Eigen::Matrix4d WorldFromOpenGlCam(const Rigid& cam_from_scan,
                                    const Eigen::Quaterniond& world_from_scan) {
   const Rigid scan_from_cam = cam_from_scan.Inverse();
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  matrix.topLeftCorner<3, 3>() =
-      (world_from_scan * scan_from_cam.rotation).toRotationMatrix() *
-      Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
+  matrix.topLeftCorner<3, 3>() = (world_from_scan * scan_from_cam.rotation).toRotationMatrix() *
+                                 Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
   matrix.topRightCorner<3, 1>() = world_from_scan * scan_from_cam.translation;
   return matrix;
 }

@@ -86,8 +86,12 @@ class PhotoExporter {
 
   ExportedPhoto Export() {
     const cv::Mat taken = ReadPhoto(photo_.path, photo_.pixels);
-    ExportedPhoto result{photo_.name, *PinholeCamera(photo_.camera, options_.pinhole),
-                         photo_.cam_from_scan, {}, 0, 0};
+    ExportedPhoto result{photo_.name,
+                         *PinholeCamera(photo_.camera, options_.pinhole),
+                         photo_.cam_from_scan,
+                         {},
+                         0,
+                         0};
     const auto [picture, shown] = UndistortPhoto(taken, photo_.camera, result.camera);
     const std::string path = PathInside(folder_ + "/images", photo_.name);
     if (picture.data == taken.data && photo_.pixels == PhotoPixels::kAsStored) {
@@ -104,8 +108,7 @@ class PhotoExporter {
     const double spacing_px = scene_.angular_spacing * result.camera.MeanFocalLength();
     if (options_.masks) {
       const int cell = std::max({8, result.camera.width / 160, static_cast<int>(2 * spacing_px)});
-      cv::Mat1b mask =
-          MaskOfMovingThings(pairs, result.camera.width, result.camera.height, cell);
+      cv::Mat1b mask = MaskOfMovingThings(pairs, result.camera.width, result.camera.height, cell);
       result.share_moving = ShareOfZeros(mask);
       mask.setTo(0, shown == 0);
       WriteImageFile(PathInside(folder_ + "/masks", photo_.name + ".png"), mask);

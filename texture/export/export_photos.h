@@ -34,11 +34,11 @@ struct ExportedPhoto {
   Camera camera;  // PINHOLE
   Rigid cam_from_scan;
   struct Sight {
-    int point;                // of ExportScene::points
+    int point;                 // of ExportScene::points
     Eigen::Vector2f x_in_img;  // undistorted
   };
-  std::vector<Sight> sights;  // points that it clearly sees
-  double share_moving = 0;    // of its pixels, masked as something that moved
+  std::vector<Sight> sights;   // points that it clearly sees
+  double share_moving = 0;     // of its pixels, masked as something that moved
   double share_unscanned = 0;  // of its pixels, where the scan has no surface
 };
 

@@ -120,8 +120,8 @@ ExportScene MakeExportScene(const std::vector<Scan>& scans, const ScanColors& co
     const Scan& scan = scans[s];
     const SmoothedScan surface = MakeSmoothedScan(scan, {}, {}, num_threads);
     scene.occluders.push_back(MakeOccluderTiles(scan, surface));
-    if (surface.angular_spacing > 0 && (!(scene.angular_spacing > 0) ||
-                                        surface.angular_spacing < scene.angular_spacing)) {
+    if (surface.angular_spacing > 0 &&
+        (!(scene.angular_spacing > 0) || surface.angular_spacing < scene.angular_spacing)) {
       scene.angular_spacing = surface.angular_spacing;
     }
     const Eigen::Vector3d station =

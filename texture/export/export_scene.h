@@ -17,7 +17,8 @@ namespace roomtex {
 // Colour and number of photos of every sample, one grid per scan.
 using ScanColors = std::vector<ColorGrid>;
 
-// Of the model.ply that roomtex-texture wrote for these scans. Throws InputError if it is of others.
+// Of the model.ply that roomtex-texture wrote for these scans. Throws InputError if it is of
+// others.
 ScanColors ReadScanColors(const std::vector<Scan>& scans, const std::string& model_ply);
 
 struct ExportScene {

@@ -17,7 +17,7 @@ namespace {
 // in a third of the photos (docs/export.md).
 constexpr float kContradiction = 0.08f;
 constexpr float kMinSamples = 4;  // of a cell
-constexpr int kMinCells = 6;    // that hang together
+constexpr int kMinCells = 6;      // that hang together
 
 std::array<double, 3> GainOfPhoto(const std::vector<ColorPair>& pairs) {
   std::array<double, 3> gain{1, 1, 1};

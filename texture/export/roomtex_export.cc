@@ -97,13 +97,14 @@ void WritePhotosAndModel(const std::vector<Scan>& scans, const ScanColors& color
       MakeExportScene(scans, colors, options.exporting.max_points, num_threads);
   context.progress.Stage("photos", static_cast<int>(list->photos.size()));
   const bool colmap = options.format == "colmap";
-  const std::vector<ExportedPhoto> photos = ExportPhotos(
-      scene, list->photos, colmap ? ExportFormat::kColmap : ExportFormat::kNerfstudio,
-      options.exporting, folder, num_threads, &context.progress, &list->left_out);
+  const std::vector<ExportedPhoto> photos =
+      ExportPhotos(scene, list->photos, colmap ? ExportFormat::kColmap : ExportFormat::kNerfstudio,
+                   options.exporting, folder, num_threads, &context.progress, &list->left_out);
   if (options.strict) ThrowIfAnyLeftOut(list->left_out, options.sources.image_path);
   if (photos.empty()) {
-    throw InputError(options.input_path, "", "holds no photo that can be exported. " +
-                         AsClause(list->left_out.at(0).reason), "");
+    throw InputError(
+        options.input_path, "",
+        "holds no photo that can be exported. " + AsClause(list->left_out.at(0).reason), "");
   }
   context.progress.Stage("write");
   size_t num_points = scene.points.size();
@@ -129,8 +130,9 @@ void WritePhotosAndModel(const std::vector<Scan>& scans, const ScanColors& color
   context.report["num_observations"] = num_observations;
   context.report["images"] = images;
   if (num_points == 0) {
-    context.report.SetUntrusted("no point of the scan is clearly seen by two photos. Is the model "
-                                "aligned? Run roomtex-align.");
+    context.report.SetUntrusted(
+        "no point of the scan is clearly seen by two photos. Is the model "
+        "aligned? Run roomtex-align.");
   }
 }
 
@@ -195,7 +197,8 @@ int main(int argc, char** argv) {
   roomtex::ExportCommandOptions options;
   roomtex::Command command(
       "roomtex-export",
-      "Aligned photos and scan for Gaussian splatting, nerfstudio, COLMAP's dense steps, or as E57.",
+      "Aligned photos and scan for Gaussian splatting, nerfstudio, COLMAP's dense steps, or as "
+      "E57.",
       "roomtex-export --input_path aligned --image_path images --scan_path room.rtpi "
       "--format colmap --output_path exported");
   roomtex::AddOptions(&options, &command);

@@ -159,8 +159,7 @@ TEST_F(ExportCommand, RefusesWhatItMustNotTouch) {
 TEST_F(ExportCommand, ChecksItsOptions) {
   ExportOptions options;
   ScanReaderOptions reader;
-  ExpectChecksItsOptions("roomtex-export",
-                         "--input_path none --image_path none --output_path none",
+  ExpectChecksItsOptions("roomtex-export", "--input_path none --image_path none --output_path none",
                          {FieldsOf(&options), FieldsOf(&options.occlusion), FieldsOf(&reader)});
 }
 
