@@ -19,7 +19,7 @@ namespace {
 constexpr double kMaxReprojection_px = 2;
 constexpr double kMatch_px = 0.4;       // standard deviation of a match, for the uncertainty
 constexpr double kOutsideBox = 0.1;     // metres outside the scan's box
-constexpr double kSpeckleShare = 5e-5;  // of a picture: smaller islands of depth are chance
+constexpr double kSpeckleShare = 2e-4;  // of a picture: smaller islands of depth are chance
 constexpr double kDepthSteps = 4000;    // per unit of the logarithm of the depth, for 16 bits
 constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
 
@@ -43,7 +43,7 @@ void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {
     }
   }
   const int smallest =
-      std::max(10, static_cast<int>(kSpeckleShare * static_cast<double>(code.total())));
+      std::max(40, static_cast<int>(kSpeckleShare * static_cast<double>(code.total())));
   cv::filterSpeckles(code, 0, smallest, kDepthSteps * 0.01);
   is_new->setTo(0, code == 0);
 }

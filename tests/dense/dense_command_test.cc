@@ -66,9 +66,9 @@ TEST_F(DenseCommand, AddsWhatTheStationMissedAndLittleElse) {
   const DenseScore score = DenseTruth(*room_, 8).Score(supplement.points);
   std::printf("%zu points, %.3f within 20 mm; %.3f of what was missed\n", score.num_points,
               score.accurate_20mm, score.complete_20mm);
-  EXPECT_GT(score.num_points, 300);
-  EXPECT_GT(score.accurate_20mm, 0.9);
-  EXPECT_GT(score.complete_20mm, 0.02);
+  EXPECT_GT(score.num_points, 1500);
+  EXPECT_GT(score.accurate_20mm, 0.85);
+  EXPECT_GT(score.complete_20mm, 0.05);
 }
 
 TEST_F(DenseCommand, WritesTheWorkspaceOfColmap) {

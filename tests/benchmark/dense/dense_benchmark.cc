@@ -159,7 +159,6 @@ int main(int argc, char** argv) {
         "off by more | CPU-s |\n|---|---|---|---|---|---|---|---|---|\n");
     roomtex::Measure("furnished", options, output_path);
     options.bare = true;
-    roomtex::Measure("bare", options, output_path);
     options.projectors = 2;
     options.pattern = [](int width, int height, int seed) {
       roomtex::PatternOptions pattern;
@@ -169,5 +168,7 @@ int main(int argc, char** argv) {
       return roomtex::MakePattern(pattern);
     };
     roomtex::Measure("bare_two_patterns", options, output_path);
+    options.projectors = 0;
+    roomtex::Measure("bare", options, output_path);
   });
 }
