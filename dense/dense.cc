@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
 constexpr int kMaxNeighbours = 8;  // photos that may confirm a depth
+constexpr int kSmallestSide = 32;  // pixels of a picture: smaller ones hold no window
 constexpr int kPointColumns = 48;  // of the raster of a photo's points
 
 class DenseRun {
@@ -47,9 +48,9 @@ class DenseRun {
     ParallelFor(num_threads_, 0, static_cast<int>(photos.size()), [&](int i) {
       const auto pinhole = PinholeCamera(photos[i].camera, options_.pinhole);
       const std::string path = workspace_.ImagePath(photos[i].name);
-      if (!pinhole) {
+      if (!pinhole || std::min(pinhole->width, pinhole->height) < kSmallestSide) {
         problems[i] =
-            "It is a panorama, or nothing of it is left without its distortion: cut "
+            "It is a panorama, or too little of it is left without its distortion: cut "
             "panoramas into faces (roomtex-import).";
         return;
       }

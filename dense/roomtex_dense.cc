@@ -101,6 +101,11 @@ void FillReport(const DenseResult& result, const Command::Context& context) {
                       {"new", photo.share_new}});
   }
   report["images"] = images;
+  if (result.supplement.vertices.empty()) {
+    context.Warn(
+        "nothing was found that the scan does not have: its holes may be seen by too few photos, "
+        "or hold no texture");
+  }
   if (without > 0) {
     context.Warn(std::to_string(without) + " of " + std::to_string(result.photos.size()) +
                  " photos share too little of the scan with others from beside: no depth there");

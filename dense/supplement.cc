@@ -17,11 +17,11 @@ namespace roomtex {
 namespace {
 
 constexpr double kMaxReprojection_px = 2;
-constexpr double kMatch_px = 0.4;      // standard deviation of a match, for the uncertainty
-constexpr double kOutsideBox = 0.1;    // metres outside the scan's box
-constexpr int kSpecklePx = 120;        // smaller islands of a depth map are chance
-constexpr double kDepthSteps = 4000;   // per unit of the logarithm of the depth, for 16 bits
-constexpr float kSameSurface = 0.02f;  // share of the depth per vertex step
+constexpr double kMatch_px = 0.4;       // standard deviation of a match, for the uncertainty
+constexpr double kOutsideBox = 0.1;     // metres outside the scan's box
+constexpr double kSpeckleShare = 2e-4;  // of a picture: smaller islands of depth are chance
+constexpr double kDepthSteps = 4000;    // per unit of the logarithm of the depth, for 16 bits
+constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
 
 uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
   uint64_t key = 0;
@@ -42,7 +42,9 @@ void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {
       code(y, x) = static_cast<int16_t>(std::clamp(steps, 1.0, 32000.0));
     }
   }
-  cv::filterSpeckles(code, 0, kSpecklePx, kDepthSteps * 0.01);
+  const int smallest =
+      std::max(40, static_cast<int>(kSpeckleShare * static_cast<double>(code.total())));
+  cv::filterSpeckles(code, 0, smallest, kDepthSteps * 0.01);
   is_new->setTo(0, code == 0);
 }
 

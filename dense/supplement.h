@@ -21,7 +21,7 @@ class OptionFields;
 struct SupplementOptions {
   // Normalised cross-correlation with the best two sources below which a depth counts for nothing.
   // Larger = stricter.
-  double min_correlation = 0.6;
+  double min_correlation = 0.7;
   // Photos that a place must be found from, the one itself included. Larger = stricter.
   int min_support = 3;
   // Depths of two photos agree within this share of the depth, and within two pixels. Larger = more

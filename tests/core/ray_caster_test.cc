@@ -113,5 +113,17 @@ TEST(RayCaster, GivesTheSameOnManyThreads) {
   EXPECT_EQ(alone, together);
 }
 
+TEST(RayCaster, TellsTheDistanceToTheNearestPlaceOnATriangle) {
+  const RayCaster caster({{1000, 0, 0}, {1002, 0, 0}, {1000, 2, 0}}, {{0, 1, 2}});
+  const auto distance = [&](double x, double y, double z) {
+    return caster.DistanceTo({1000 + x, y, z}, 5).value_or(-1);
+  };
+  EXPECT_NEAR(distance(0.5, 0.5, 0.3), 0.3, 1e-6);       // over the face
+  EXPECT_NEAR(distance(1, -0.3, 0.4), 0.5, 1e-6);        // beside an edge
+  EXPECT_NEAR(distance(2, 2, 0), std::sqrt(2.0), 1e-6);  // the long one
+  EXPECT_NEAR(distance(-2, -2, 1), 3, 1e-6);             // off a corner
+  EXPECT_FALSE(caster.DistanceTo({1000.5, 0.5, 6}, 5));
+}
+
 }  // namespace
 }  // namespace roomtex
