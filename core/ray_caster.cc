@@ -1,6 +1,7 @@
 #include "core/ray_caster.h"
 
 #include <limits>
+#include <new>
 
 #include <embree3/rtcore.h>
 
@@ -37,7 +38,7 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
   if (bounds.min.x() <= bounds.max.x()) scene_->centre = 0.5 * (bounds.min + bounds.max);
 
   scene_->device = rtcNewDevice(nullptr);
-  if (scene_->device == nullptr) throw std::runtime_error("Embree: no ray tracing device");
+  if (scene_->device == nullptr) throw std::bad_alloc();  // all that it can lack
   scene_->scene = rtcNewScene(scene_->device);
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);
   if (!triangles.empty()) {
