@@ -8,6 +8,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/surfels.h"
 #include "dense/dense.h"
