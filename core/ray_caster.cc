@@ -5,6 +5,8 @@
 
 #include <embree3/rtcore.h>
 
+#include "core/resource_limits.h"
+
 namespace roomtex {
 namespace {
 
@@ -37,7 +39,8 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
   }
   if (bounds.min.x() <= bounds.max.x()) scene_->centre = 0.5 * (bounds.min + bounds.max);
 
-  scene_->device = rtcNewDevice(nullptr);
+  // Embree ends the process with the first thread that cannot be started.
+  scene_->device = rtcNewDevice(ThreadsNotStarted() > 0 ? "threads=1" : nullptr);
   if (scene_->device == nullptr) throw std::bad_alloc();  // all that it can lack
   scene_->scene = rtcNewScene(scene_->device);
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);

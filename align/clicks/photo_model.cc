@@ -117,7 +117,9 @@ void PhotoCameraOptions::Declare(OptionFields* fields) {
                       "one radial term (SIMPLE_RADIAL, SIMPLE_PINHOLE)");
   if (params.empty()) return;
   std::string problems;
-  for (const std::string& problem : Camera{1, *model, 1, 1, params}.Problems()) {
+  // The photos and their size come later: one that any focal length may have.
+  const int side = params[0] > 1 ? static_cast<int>(std::min(params[0], 1e6)) : 1;
+  for (const std::string& problem : Camera{1, *model, side, side, params}.Problems()) {
     problems += (problems.empty() ? "" : "; ") + problem;
   }
   fields->Require(problems.empty(), "--camera_params " + camera_params + " with --camera_model " +

@@ -64,11 +64,6 @@ void AddOutlineOptions(OutlineArguments* a, Command* command) {
 #endif
 }
 
-bool SamePath(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::exists(a, error) && fs::exists(b, error) && fs::equivalent(a, b, error);
-}
-
 void CheckOutlineArguments(const OutlineArguments& a) {
   std::vector<std::string> problems = a.input.Problems();
   AppendProblems(a.proposal.Problems(), &problems);
@@ -92,10 +87,10 @@ void CheckOutlineArguments(const OutlineArguments& a) {
   if (fs::is_directory(a.output_path)) {
     throw InputError(a.output_path, "", "is a folder", "Name a file for the outline: outline.json");
   }
-  if (!window && WasEdited(a.output_path) && !SamePath(a.output_path, a.outline_path)) {
+  if (!window && WasEdited(a.output_path)) {
     throw InputError(a.output_path, "",
                      "is there already and was edited, or is another file: it is not replaced",
-                     "Give it as --outline_path to extrude it, or write to another --output_path");
+                     "Write to another --output_path, and give it as --outline_path to extrude it");
   }
 }
 
@@ -196,7 +191,7 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
     drawn.outline = ReadOutline(a.outline_path);
     ReportOutline(drawn, false, context);
     WriteModels(a, drawn.outline);
-    if (!SamePath(a.outline_path, a.output_path)) WriteOutline(a.output_path, drawn.outline, false);
+    WriteOutline(a.output_path, drawn.outline, false);
     PrintOutline(drawn, false);
     return;
   }
@@ -248,9 +243,7 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   context.progress.Finish();
   ReportOutline(proposal, true, context);
   WriteModels(a, proposal.outline);
-  if (!SamePath(a.outline_path, a.output_path)) {
-    WriteOutline(a.output_path, proposal.outline, a.outline_path.empty());
-  }
+  WriteOutline(a.output_path, proposal.outline, a.outline_path.empty());
   PrintOutline(proposal, true);
   SayDoubts(proposal, up, context);
 }

@@ -160,7 +160,9 @@ TEST(OutlineCommand, WritesTheStreetInEveryFormat) {
   // It is extruded as it stands, with the points and without; the wall that was moved off them is
   // noticed.
   const CommandResult judged =
-      RunCommandLine(line + " --outline_path " + (folder / "outline.json"));
+      RunCommandLine("roomtex-outline --input_path " + (folder / "model") +
+                     " --scale 1 --outline_path " + (folder / "outline.json") + " --output_path " +
+                     (folder / "judged.json") + " --report_path " + (folder / "report.json"));
   EXPECT_EQ(ReadBytes(folder / "outline.json"), edited.dump(1)) << judged.err;
   const Json again = ReadJson(folder / "report.json");
   EXPECT_EQ(again["buildings"][0]["corners"][0]["x"], -1.5);

@@ -58,7 +58,7 @@ TEST(SparseModel, EveryCameraModelComesBack) {
     camera.model = static_cast<CameraModel>(id);
     camera.width = 640;
     camera.height = 320;
-    camera.params = std::vector<double>(NumCameraParams(id), 0.25);
+    camera.params = std::vector<double>(NumCameraParams(id), 0.75);
     ASSERT_TRUE(camera.Problems().empty());
     const TempFolder binary, text;
     WriteSparseModel(model, binary.path());
