@@ -367,7 +367,8 @@ class FootprintFinder {
     for (const auto& [s, count] : squares) order.emplace_back(-count, s);
     std::sort(order.begin(), order.end());
     std::vector<std::vector<int>> families;
-    for (const auto& [minus_count, s] : order) {
+    for (const auto& [minus_count, surface] : order) {
+      const int s = surface;
       const double area = -minus_count * grid_->side() * grid_->side();
       if (-minus_count < 0.04 * total || area < 1.5 * cloud_.step * cloud_.step) continue;
       auto family = std::find_if(families.begin(), families.end(), [&](const auto& members) {
