@@ -4,6 +4,7 @@
 #include <new>
 
 #include <embree3/rtcore.h>
+#include <tbb/global_control.h>
 
 #include "core/resource_limits.h"
 
@@ -39,8 +40,14 @@ RayCaster::RayCaster(const std::vector<Eigen::Vector3d>& points,
   }
   if (bounds.min.x() <= bounds.max.x()) scene_->centre = 0.5 * (bounds.min + bounds.max);
 
-  // Embree ends the process with the first thread that cannot be started.
-  scene_->device = rtcNewDevice(ThreadsNotStarted() > 0 ? "threads=1" : nullptr);
+  // Embree's scheduler ends the process with the first thread that cannot be started. To the end of
+  // the process, and beyond: giving the limit up would start threads.
+  if (ThreadsNotStarted() > 0) {
+    static const auto* const no_threads =
+        new tbb::global_control(tbb::global_control::max_allowed_parallelism, 1);
+    static_cast<void>(no_threads);
+  }
+  scene_->device = rtcNewDevice(nullptr);
   if (scene_->device == nullptr) throw std::bad_alloc();  // all that it can lack
   scene_->scene = rtcNewScene(scene_->device);
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);

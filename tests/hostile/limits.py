@@ -57,8 +57,7 @@ def threads(base):
             here = base.copy()
             answer = here.run(line + " --num_threads 8", environment={
                 "LD_PRELOAD": FEW_THREADS, "THREADS_AT_MOST": str(at_most)})
-            # Embree does not do without: that is said.
-            yield f"{title} with {at_most} threads more", answer.problem({code, 3})
+            yield f"{title} with {at_most} threads more", answer.problem({code})
         here = base.copy()
         yield f"{title} --num_threads 100000", here.run(line + " --num_threads 100000").problem(
             {code})
