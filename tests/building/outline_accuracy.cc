@@ -82,5 +82,9 @@ int main(int argc, char** argv) {
     roomtex::WriteSparseModel(roomtex::MakeStreet({}).model, std::string(argv[2]) + "/street");
     return 0;
   }
+  if (argc > 2 || (argc == 2 && argv[1][0] == '-')) {
+    std::fprintf(stderr, "usage: outline_accuracy [FOLDER] | --street FOLDER\n");
+    return 2;
+  }
   return roomtex::Main(argc > 1 ? argv[1] : "outline_accuracy");
 }
