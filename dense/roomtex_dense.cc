@@ -139,15 +139,9 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  PlacedScans placed =
-      ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
-  for (const std::string& note : placed.notes) context.Warn(note);
+  PlacedScans placed = ReadScansOfModel(
+      alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   ReplaceClouds(&placed.scans, context.options.num_threads);
-  for (const Scan& scan : placed.scans) {
-    if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
-      throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
-    }
-  }
 
   const std::string& folder = outputs->aside();
   const DenseResult result = MakeDense(placed.scans, photos, options.dense, folder,

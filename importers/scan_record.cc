@@ -329,6 +329,17 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
   return placed;
 }
 
+PlacedScans ReadScansOfModel(const AlignmentRecord& record, const ScanRequest& request,
+                             const Command::Context& context) {
+  PlacedScans placed = ReadScansOfModel(record, request);
+  for (const std::string& note : placed.notes) context.Warn(note);
+  for (const Scan& scan : placed.scans) {
+    if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
+    throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
+  }
+  return placed;
+}
+
 void TakeOverTrust(const AlignmentRecord& record, bool accept, const Command::Context& context) {
   if (record.trusted) return;
   const std::string reason = "The alignment in " + record.folder + " is not to be trusted" +

@@ -65,6 +65,10 @@ void RequireScans(const std::vector<std::string>& paths, const std::string& mode
 // contradict what is remembered (azimuth, units, max_range where they are given, poses), InputError
 // for another scan and for one that is not found.
 PlacedScans ReadScansOfModel(const AlignmentRecord& record, const ScanRequest& request);
+// The same for a command that needs samples of all: notes on the scans are said, InputError for one
+// without a measured sample.
+PlacedScans ReadScansOfModel(const AlignmentRecord& record, const ScanRequest& request,
+                             const Command::Context& context);
 
 // The model's doubts are those of what is built on it: exit 4, or a warning if accept.
 void TakeOverTrust(const AlignmentRecord& record, bool accept, const Command::Context& context);

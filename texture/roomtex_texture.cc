@@ -131,8 +131,6 @@ void CheckScans(const std::vector<Scan>& scans, const TextureOptions& options) {
       throw InputError(scan.path, "", "has no grid, which model.e57 needs",
                        "Leave out --output_e57 and --E57.images");
     }
-    if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
-    throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
   }
 }
 
@@ -413,24 +411,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   context.progress.Stage("read model");
   const SparseModel model = ReadSparseModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
-  PhotoSources sources = options.sources;
-  sources.aligned_model = alignment.found;
-  PhotoList list = ListPhotos(model, sources);
-  if (options.strict) ThrowIfAnyLeftOut(list.left_out, options.sources.image_path);
-  for (const std::string& warning : list.warnings) context.Warn(warning);
-  if (list.photos.empty()) {
-    throw InputError(options.input_path, "", "holds no registered photo",
-                     "Give the folder that roomtex-align wrote");
-  }
-  if (list.photos.size() >= kMaxPhotos) {
-    throw InputError(options.input_path, "", "holds more photos than 32767", "Give a part of them");
-  }
+  PhotoList list = ListPhotosOf(model, alignment, options.sources, options.strict, context);
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  PlacedScans placed =
-      ReadScansOfModel(alignment, {options.scan_paths, options.scan_poses, options.scan_reader});
-  for (const std::string& note : placed.notes) context.Warn(note);
+  PlacedScans placed = ReadScansOfModel(
+      alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);

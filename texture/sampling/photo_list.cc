@@ -12,6 +12,7 @@
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "texture/sampling/observations.h"
 
 namespace roomtex {
 namespace {
@@ -231,6 +232,23 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
     throw InputError(
         sources.image_path, "",
         "holds no photo of the model that can be used. " + AsClause(list.left_out[0].reason), "");
+  }
+  return list;
+}
+
+PhotoList ListPhotosOf(const SparseModel& model, const AlignmentRecord& alignment,
+                       PhotoSources sources, bool strict, const Command::Context& context) {
+  sources.aligned_model = alignment.found;
+  PhotoList list = ListPhotos(model, sources);
+  if (strict) ThrowIfAnyLeftOut(list.left_out, sources.image_path);
+  for (const std::string& warning : list.warnings) context.Warn(warning);
+  if (list.photos.empty()) {
+    throw InputError(alignment.folder, "", "holds no registered photo",
+                     "Give the folder that roomtex-align wrote");
+  }
+  if (list.photos.size() >= kMaxPhotos) {
+    throw InputError(alignment.folder, "", fmt::format("holds more photos than {}", kMaxPhotos - 1),
+                     "Give a part of them");
   }
   return list;
 }

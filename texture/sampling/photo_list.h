@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/command_line.h"
 #include "core/photo_fit.h"
+#include "importers/scan_record.h"
 #include "texture/sampling/photo_view.h"
 
 namespace roomtex {
@@ -33,6 +35,11 @@ struct PhotoList {
 // that cannot be used is left out, a photo of the same shape but another size gets a scaled camera.
 // Throws InputError if none is left.
 PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sources);
+
+// The same for a command, of a model that `alignment` says what is known of: warnings are said,
+// `strict` stops at a photo that is left out. InputError also for more photos than kMaxPhotos.
+PhotoList ListPhotosOf(const SparseModel& model, const AlignmentRecord& alignment,
+                       PhotoSources sources, bool strict, const Command::Context& context);
 
 // CSV with a header that names patterned_image and plain_image among its columns. Pairs in file
 // order. Throws InputError with the line.
