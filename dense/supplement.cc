@@ -67,7 +67,8 @@ void SupplementOptions::Declare(OptionFields* fields) {
   fields
       ->Number("Fusion.distance_to_scan", &distance_to_scan,
                "What is nearer to the scan's surface, or to what the scanner saw empty, is not "
-               "added, metres. Larger = less is added.")
+               "added, metres; never less than twice the expected error of the alignment. Larger = "
+               "less is added.")
       .Within(0.001, 1, "metres");
   fields
       ->Number("Fusion.spacing", &spacing,

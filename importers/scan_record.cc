@@ -281,6 +281,9 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
     record.found = true;
     record.trusted = json.value("trusted", true);
     record.reason = json.value("reason", std::string());
+    const Json expected = json.value("expected_error", Json());
+    const Json far = expected.is_object() ? expected.value("at_far_corner_mm", Json()) : Json();
+    if (far.is_number()) record.expected_error = far.get<double>() / 1000;
     if (!json.contains("scans")) return record;
     for (const Json& scan : json.at("scans")) record.scans.push_back(RecordFromJson(scan));
   } catch (const std::exception&) {

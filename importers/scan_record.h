@@ -43,6 +43,7 @@ struct AlignmentRecord {
   bool found = false;        // false: the model was not made by roomtex-align
   bool trusted = true;
   std::string reason;
+  double expected_error = 0;      // metres, at the far corner of the room; 0 = not known
   std::vector<ScanRecord> scans;  // empty: not remembered
 };
 // Throws InputError for a file that is there and cannot be understood.

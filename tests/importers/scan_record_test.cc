@@ -202,6 +202,14 @@ TEST_F(ScanRecords, AModelThatRemembersNothingIsReadAsAsked) {
   EXPECT_FALSE(ReadAlignmentRecord(folder_ / "aligned").trusted);
 }
 
+TEST_F(ScanRecords, SaysHowFarTheAlignmentIsOff) {
+  Write("aligned/alignment.json",
+        "{\"trusted\": true, \"expected_error\": {\"at_far_corner_mm\": 45.5}}");
+  EXPECT_NEAR(ReadAlignmentRecord(folder_ / "aligned").expected_error, 0.0455, 1e-9);
+  Write("aligned/alignment.json", "{\"trusted\": true, \"expected_error\": null}");
+  EXPECT_EQ(ReadAlignmentRecord(folder_ / "aligned").expected_error, 0);
+}
+
 TEST_F(ScanRecords, ARecordThatIsNoneIsSaid) {
   for (const char* text : {"", "[]", "{\"scans\": [{}]}", "{\"scans\": 3}", "{\"trusted\": \"x\"}",
                            "{\"scans\": [{\"path\": 3}]}"}) {
