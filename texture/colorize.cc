@@ -5,6 +5,8 @@
 #include <limits>
 #include <set>
 
+#include <fmt/core.h>
+
 #include "core/cpu_stages.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -243,6 +245,32 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
 
 }  // namespace
 
+namespace {
+
+// At most a fifth: if more contradict each other, it is the poses that are wrong, or the room that
+// moves, and none of them is to be believed more than another.
+constexpr size_t kForeignOf = 5;
+
+// Throws UnusablePhotos.
+void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
+                           const std::vector<PhotoAgreement>& agreement, double min_correlation) {
+  if (min_correlation == 0) return;  // below it are photos that contradict more than chance does
+  const std::vector<int> foreign = FindForeignPhotos(agreement, min_correlation);
+  if (foreign.empty() || kForeignOf * foreign.size() > photos.size()) return;
+  std::vector<PhotoLeftOut> left_out;
+  for (const int i : foreign) {
+    left_out.push_back(
+        {photos[i].name,
+         fmt::format("It shows something else than the other photos at the same places "
+                     "(correlation {:.2f}): another room that looks alike, or furniture that was "
+                     "moved. Remove it, or keep it by --Blend.min_agreement 0.",
+                     agreement[i].correlation)});
+  }
+  throw UnusablePhotos(std::move(left_out));
+}
+
+}  // namespace
+
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
                              const std::vector<PhotoView>& given_photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress) {
@@ -264,6 +292,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
+  result.agreement = MeasureAgreement(store, result.exposure.gains);
+  LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
   if (options.registration.mode != "none") {
@@ -321,21 +351,21 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   return result;
 }
 
-ColorizeResult ColorizeReadable(const std::vector<Scan>& scans, const ColorizeOptions& options,
-                                bool strict, int num_threads, Progress* progress, PhotoList* list) {
+ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOptions& options,
+                              bool strict, int num_threads, Progress* progress, PhotoList* list) {
   while (true) {
     try {
       return ColorizeScans(scans, list->photos, options, num_threads, progress);
-    } catch (const UnreadablePhotos& unreadable) {
+    } catch (const UnusablePhotos& unusable) {
       if (strict) throw;
       std::set<std::string> names;
-      for (const PhotoLeftOut& photo : unreadable.photos()) names.insert(photo.name);
-      const auto is_unreadable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
+      for (const PhotoLeftOut& photo : unusable.photos()) names.insert(photo.name);
+      const auto is_unusable = [&](const PhotoView& view) { return names.count(view.name) > 0; };
       std::vector<PhotoView>& photos = list->photos;
-      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unreadable), photos.end());
+      photos.erase(std::remove_if(photos.begin(), photos.end(), is_unusable), photos.end());
       if (photos.empty()) throw;
-      list->left_out.insert(list->left_out.end(), unreadable.photos().begin(),
-                            unreadable.photos().end());
+      list->left_out.insert(list->left_out.end(), unusable.photos().begin(),
+                            unusable.photos().end());
     }
   }
 }

@@ -19,6 +19,7 @@
 #include "texture/texels/colored_scan.h"
 #include "texture/texels/mesh_atlas.h"
 #include "texture/tone/exposure.h"
+#include "texture/tone/photo_agreement.h"
 
 namespace roomtex {
 
@@ -53,6 +54,7 @@ struct ColorizeResult {
   double views_mean = 0;      // of the coloured ones
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
+  std::vector<PhotoAgreement> agreement;        // per photo
   std::vector<PhotoRegistration> registration;  // per photo; empty without
   std::vector<size_t> samples_seen;             // per photo
   // Photo pixels per sample and direction, median over the samples; 0 = not known.
@@ -61,13 +63,14 @@ struct ColorizeResult {
 };
 
 // Photos are decoded once each, num_threads of them at a time. The result does not depend on
-// num_threads. Throws UnreadablePhotos (photo_pass.h).
+// num_threads. Throws UnusablePhotos (photo_pass.h).
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress);
 
-// The same for a file that looked like a photo and is broken further down: it goes from
-// list->photos to list->left_out, and all is done again without it. strict, or none left: throws.
-ColorizeResult ColorizeReadable(const std::vector<Scan>& scans, const ColorizeOptions& options,
-                                bool strict, int num_threads, Progress* progress, PhotoList* list);
+// The same with photos that cannot be used: a file that looked like a photo and is broken further
+// down, a photo that contradicts the others. They go from list->photos to list->left_out, and all
+// is done again without them. strict, or none left: throws.
+ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOptions& options,
+                              bool strict, int num_threads, Progress* progress, PhotoList* list);
 
 }  // namespace roomtex

@@ -31,6 +31,9 @@
 namespace roomtex {
 namespace {
 
+// Correlation of a photo with the others below which a sentence warns of it.
+constexpr double kDoubtfulAgreement = 0.7;
+
 struct TextureOptions {
   std::string input_path, output_path, scan_poses, supplement_path;
   std::vector<std::string> scan_paths;
@@ -218,6 +221,14 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
     report["exposure_reference"] = photos[result.exposure.reference_photo].name;
   }
   report["samples_seen"] = seen;
+  Json agreement = Json::object();
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const PhotoAgreement& photo = result.agreement[i];
+    agreement[photos[i].name] = {{"correlation", std::round(1e3 * photo.correlation) / 1e3},
+                                 {"difference", std::round(1e3 * photo.difference) / 1e3},
+                                 {"num_samples", photo.num_samples}};
+  }
+  report["photo_agreement"] = agreement;
   FillToneReport(photos, result.exposure, &report);
   if (!result.registration.empty()) {
     report["images"] = RegistrationReport(photos, result.registration);
@@ -264,6 +275,11 @@ void Judge(const std::vector<PhotoView>& photos, const ColorizeResult& result,
   if (!exposure.contradicted.empty()) {
     context.Warn("the overlaps contradict EXIF by more than half an EV: " +
                  NameList(photos, exposure.contradicted));
+  }
+  const std::vector<int> foreign = FindForeignPhotos(result.agreement, kDoubtfulAgreement);
+  if (!foreign.empty()) {
+    context.Warn("much of what these photos show is not what the others show at the same places: " +
+                 NameList(photos, foreign));
   }
   std::vector<int> blind;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -430,7 +446,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   ProtectInputs(options, scans);
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result = ColorizeReadable(
+  const ColorizeResult result = ColorizeUsable(
       scans, colorize, options.strict, context.options.num_threads, &context.progress, &list);
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);

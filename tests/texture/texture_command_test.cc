@@ -172,6 +172,33 @@ TEST_F(TextureCommand, EvidenceIsThatOfTheVerticesAndOfTheReport) {
   EXPECT_NEAR(sum / num_pairs, reported, 0.05 * reported);
 }
 
+TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
+  fs::copy(Capture() + "/photos", Path("foreign"));
+  const auto overwrite = fs::copy_options::overwrite_existing;
+  fs::copy_file(Path("foreign/photo_009.jpg"), Path("foreign/photo_003.jpg"), overwrite);
+  const auto run = [](const std::string& output, const std::string& more) {
+    return RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
+                          "/truth --image_path " + Path("foreign") + " --scan_path " + Capture() +
+                          "/scan.rtpi --output_path " + Path(output) + more);
+  };
+  const CommandResult result = run("without_foreign", "");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ReadJson(Path("without_foreign/report.json"));
+  ASSERT_EQ(report["photos_left_out"].size(), 1u);
+  EXPECT_EQ(report["photos_left_out"][0]["name"], "photo_003.jpg");
+  EXPECT_FALSE(report["exposure_gain"].contains("photo_003.jpg"));
+  for (const auto& [name, photo] : report["photo_agreement"].items()) {
+    EXPECT_GT(photo["correlation"], 0.9) << name;
+  }
+  const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
+  ASSERT_EQ(run("with_foreign", " --Blend.min_agreement 0").exit_code, 0);
+  EXPECT_GT(Psnr(ReadPly(Path("without_foreign/model.ply")), truth),
+            Psnr(ReadPly(Path("with_foreign/model.ply")), truth) + 1);
+  const CommandResult strict = run("strict", " --strict 1");
+  EXPECT_EQ(strict.exit_code, 3);
+  EXPECT_NE(strict.err.find("photo_003.jpg"), std::string::npos) << strict.err;
+}
+
 TEST_F(TextureCommand, EvidenceIsLeftOutAsAsked) {
   ASSERT_EQ(Texture("bare", "--output_evidence 0").exit_code, 0);
   EXPECT_TRUE(fs::exists(Path("bare/model.ply")));

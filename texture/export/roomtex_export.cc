@@ -73,8 +73,8 @@ ScanColors ColorsOf(const std::vector<Scan>& scans, const ExportCommandOptions& 
   ColorizeOptions colorize;
   colorize.atlas.mode = "0";
   colorize.occlusion = options.exporting.occlusion;
-  ColorizeResult colored = ColorizeReadable(scans, colorize, options.strict,
-                                            context.options.num_threads, &context.progress, list);
+  ColorizeResult colored = ColorizeUsable(scans, colorize, options.strict,
+                                          context.options.num_threads, &context.progress, list);
   ScanColors colors;
   for (ColoredScan& scan : colored.scans) colors.push_back(std::move(scan.samples));
   return colors;

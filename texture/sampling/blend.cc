@@ -62,6 +62,12 @@ void BlendOptions::Declare(OptionFields* fields) {
                "lost; 0 = never.")
       .NotNegative();
   fields
+      ->Number("Blend.min_agreement", &min_agreement,
+               "A photo is left out, and named, when its brightness correlates less than this with "
+               "what the other photos show at the same samples: it shows another room, or moved "
+               "furniture. Larger = more are left out, at most a fifth of all; 0 = none.")
+      .Within(0, 0.95);
+  fields
       ->Number("Blend.footprint", &footprint,
                "Share of the sample spacing over which photo pixels are averaged. Larger = "
                "smoother; 0 = the colour at the sample.")

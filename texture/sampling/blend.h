@@ -29,6 +29,11 @@ struct BlendOptions {
   // scale of 0..1 that is about even to the eye. Larger = more tolerant; below 0.2, shiny surfaces,
   // which look different in every photo, come out in blotches. 0 = never (thesis).
   double outlier = 0.3;
+  // A photo whose brightness correlates less than this with that of the others at the same samples
+  // shows something else (another room that looks alike, furniture that was moved) and gives no
+  // colour, unless more than a fifth of the photos were to go. Photos 3 cm beside their places
+  // (the kitchen) have 0.7 and more, photos half full of people 0.6. 0 = never.
+  double min_agreement = 0.5;
   // Share of the spacing between samples over which a photo's pixels are averaged. 0 = the colour
   // at the sample (thesis); 1 = the whole cell, which keeps fine print from turning into grain.
   double footprint = 0.0;

@@ -174,7 +174,7 @@ std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector
   for (int i = 0; i < num_photos; ++i) {
     if (!problems[i].empty()) unreadable.push_back({photos[i].name, problems[i]});
   }
-  if (!unreadable.empty()) throw UnreadablePhotos(std::move(unreadable));
+  if (!unreadable.empty()) throw UnusablePhotos(std::move(unreadable));
   return num_seen;
 }
 

@@ -21,11 +21,12 @@ struct PhotoPassInput {
   double angular_spacing = 0;            // of the finest scan, radians; 0 = not known
 };
 
-// Photos that turned out to be unreadable when they were decoded. All photos were tried.
-class UnreadablePhotos : public InputError {
+// Photos that turned out to be unreadable when they were decoded (all were tried), or that
+// contradict the others (photo_agreement.h).
+class UnusablePhotos : public InputError {
  public:
-  explicit UnreadablePhotos(std::vector<PhotoLeftOut> photos)
-      : InputError(photos[0].name, "", "cannot be read: " + photos[0].reason, ""),
+  explicit UnusablePhotos(std::vector<PhotoLeftOut> photos)
+      : InputError(photos[0].name, "", "cannot be used: " + photos[0].reason, ""),
         photos_(std::move(photos)) {}
   const std::vector<PhotoLeftOut>& photos() const { return photos_; }
 
@@ -34,7 +35,7 @@ class UnreadablePhotos : public InputError {
 };
 
 // Adds every photo's observations to the store. Returns how many samples each photo sees. Throws
-// UnreadablePhotos; the store is then of no use.
+// UnusablePhotos; the store is then of no use.
 std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector<PhotoView>& photos,
                                   const OcclusionOptions& occlusion, const BlendOptions& blend,
                                   int num_threads, Progress* progress, ObservationStore* store);
