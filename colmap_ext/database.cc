@@ -19,6 +19,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/partial_path.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -631,9 +632,10 @@ void MakeTable(const std::string& table, const std::vector<TableColumn>& columns
   to->exec("CREATE TABLE " + QuotedName(table) + " (" + definition + keys + ")");
 }
 
-// Copies the columns that both tables have; `steps` is what LookAtWork counts.
+// Copies the columns that both tables have; `steps` is what LookAtWork counts. insert_verb: "INSERT
+// OR IGNORE" to keep rows that are there.
 void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const std::string& table,
-              int64_t* steps) {
+              int64_t* steps, const char* insert_verb = "INSERT") {
   const std::vector<TableColumn> known = ColumnsOf(to, table);
   std::string names, places;
   int num_columns = 0;
@@ -647,8 +649,8 @@ void CopyRows(const SQLite::Database& from, const SQLite::Database& to, const st
   }
   if (num_columns == 0) return;
   SQLite::Statement read(from, "SELECT " + names + " FROM \"" + table + "\"");
-  SQLite::Statement insert(to,
-                           "INSERT INTO \"" + table + "\" (" + names + ") VALUES (" + places + ")");
+  SQLite::Statement insert(to, std::string(insert_verb) + " INTO \"" + table + "\" (" + names +
+                                   ") VALUES (" + places + ")");
   *steps = 0;
   while (read.executeStep()) {
     *steps = 0;
@@ -682,6 +684,34 @@ void CopyTables(const SQLite::Database& from, SQLite::Database* to, int64_t* ste
     if (!HasTable(from, table)) continue;
     MakeTable(table, ColumnsOf(from, table), to);
     if (with_rows(table)) CopyRows(from, *to, table, steps);
+  }
+}
+
+void RequireSameFeatures(const Database& copy, const std::string& path,
+                         const std::map<uint32_t, DatabaseImage>& images,
+                         const std::map<uint32_t, size_t>& keypoints) {
+  const char* const remedy = "Give copies that were made of it after colmap feature_extractor";
+  const std::map<uint32_t, DatabaseImage> others = copy.ReadImages();
+  if (others.size() != images.size()) {
+    throw InputError(copy.path(), "",
+                     "has " + std::to_string(others.size()) + " photos, " + path + " has " +
+                         std::to_string(images.size()),
+                     remedy);
+  }
+  const std::map<uint32_t, size_t> other_keypoints = copy.CountKeypoints();
+  const auto count = [](const std::map<uint32_t, size_t>& counts, uint32_t image_id) {
+    const auto found = counts.find(image_id);
+    return found == counts.end() ? size_t{0} : found->second;
+  };
+  for (const auto& [image_id, image] : images) {
+    const auto other = others.find(image_id);
+    if (other != others.end() && other->second.name == image.name &&
+        count(other_keypoints, image_id) == count(keypoints, image_id)) {
+      continue;
+    }
+    throw InputError(copy.path(), "image " + std::to_string(image_id),
+                     "is not " + Quoted(image.name) + " with the keypoints that it has in " + path,
+                     remedy);
   }
 }
 
@@ -736,6 +766,28 @@ void Database::CopyWithCameras(const std::string& path,
       update.bind(6, static_cast<int64_t>(camera_id));
       update.exec();
       update.reset();
+    }
+    transaction.commit();
+  });
+}
+
+void Database::CopyWithMatches(const std::string& path,
+                               const std::vector<const Database*>& copies) const {
+  const std::map<uint32_t, DatabaseImage> images = ReadImages();
+  const std::map<uint32_t, size_t> keypoints = CountKeypoints();
+  for (const Database* const copy : copies)
+    RequireSameFeatures(*copy, this->path(), images, keypoints);
+  impl_->Guarded([&] {
+    SQLite::Database merged(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    merged.exec("PRAGMA journal_mode = MEMORY");  // no file beside it
+    SQLite::Transaction transaction(merged);
+    CopyTables(*impl_->sqlite, &merged, &impl_->steps, [](const std::string&) { return true; });
+    for (const Database* const copy : copies) {
+      copy->impl_->Guarded([&] {
+        for (const char* table : {"matches", "two_view_geometries"}) {
+          CopyRows(*copy->impl_->sqlite, merged, table, &copy->impl_->steps, "INSERT OR IGNORE");
+        }
+      });
     }
     transaction.commit();
   });

@@ -81,6 +81,11 @@ class Database {
   // (which it must have) replaced. Needs no WAL file beside it.
   void CopyWithCameras(const std::string& path, const std::map<uint32_t, Camera>& cameras) const;
 
+  // The same with the rows of `copies` for pairs that this one has not matched (tables matches and
+  // two_view_geometries); of a pair in several copies, that of the first. Throws InputError for a
+  // copy whose photos or numbers of keypoints are not these.
+  void CopyWithMatches(const std::string& path, const std::vector<const Database*>& copies) const;
+
   // Gives the images of a copy that CopyForMapper made these cameras. False, and nothing done,
   // where rigs name the cameras, too (COLMAP 4.x).
   static bool SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,

@@ -117,8 +117,7 @@ Json NamesOf(const std::vector<int>& photos, const PairSelection& selection) {
 
 // What stands apart, in words; counts and names in the report.
 void ReportGroups(const PairSelection& selection, const Command::Context& context) {
-  Json& groups = context.report["groups"] = Json::array();
-  Json& isolated = context.report["isolated"] = Json::array();
+  Json groups = Json::array(), isolated = Json::array(), lookalikes = Json::array();
   std::string names;
   for (const std::vector<int>& group : selection.groups) {
     if (group.size() > 1) {
@@ -137,7 +136,6 @@ void ReportGroups(const PairSelection& selection, const Command::Context& contex
     context.Warn(std::to_string(isolated.size()) +
                  " photos stand alone, nothing agrees with them: " + names);
   }
-  Json& lookalikes = context.report["lookalikes"] = Json::array();
   int num_lookalikes = 0;
   for (const GroupLookalike& one : selection.lookalikes) {
     lookalikes.push_back({{"groups", {one.group1, one.group2}}, {"num_pairs", one.num_pairs}});
@@ -149,6 +147,9 @@ void ReportGroups(const PairSelection& selection, const Command::Context& contex
                  "between them, as the same furniture in two rooms does: left out. If it is one "
                  "room, take photos between the groups, or give --Pairs.join_lookalikes");
   }
+  context.report["groups"] = groups;
+  context.report["isolated"] = isolated;
+  context.report["lookalikes"] = lookalikes;
   if (groups.size() > 1) {
     context.Warn("the photos fall into " + std::to_string(groups.size()) +
                  " groups that nothing connects (report, groups): other rooms, or photos between "

@@ -1,18 +1,13 @@
 #include "workflow/report_page.h"
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 
 #include "core/command_line.h"
 #include "core/error.h"
-#include "core/frames.h"
 #include "core/output_file.h"
 #include "core/text.h"
 #include "workflow/evidence_points.h"
 #include "workflow/html_text.h"
-#include "workflow/remaining_time.h"
-#include "workflow/report_style.h"
 #include "workflow/room_coverage.h"
 #include "workflow/room_plan.h"
 
@@ -20,36 +15,6 @@ namespace roomtex {
 namespace {
 
 constexpr int kWide = 1440, kNarrow = 720;  // pixels of pictures
-
-std::string Tag(const std::string& tag, const std::string& text) {
-  return "<" + tag + ">" + HtmlText(text) + "</" + tag.substr(0, tag.find(' ')) + ">";
-}
-
-std::string Memory(double bytes) {
-  return bytes < 1e9 ? Number(bytes / 1e6, 0) + " MB" : Number(bytes / 1e9, 1) + " GB";
-}
-
-std::string Time(double seconds) {
-  return seconds < 100 ? Number(seconds, 1) + " s" : DurationText(seconds);
-}
-
-// A number and its unit stay on one line.
-std::string WithUnits(std::string text) {
-  for (const char* unit : {" %", " mm", " m", " px", " s", " min", " GB", " MB"}) {
-    for (size_t at = text.find(unit); at != std::string::npos; at = text.find(unit, at + 1)) {
-      const bool follows_number = at > 0 && std::isdigit(static_cast<unsigned char>(text[at - 1]));
-      if (follows_number) text.replace(at, 1, "\u00a0");
-    }
-  }
-  return text;
-}
-
-// A dash where there is no number.
-std::string Cell(const Json& json, const char* key, double factor, int digits) {
-  const bool has = json.contains(key) && json[key].is_number();
-  return "<td class=\"n\">" + (has ? Number(factor * json[key].get<double>(), digits) : "–") +
-         "</td>";
-}
 
 class Page {
  public:
@@ -69,12 +34,7 @@ class Page {
     Notices();
     Photos();
     Steps();
-    return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta "
-           "name=\"viewport\" "
-           "content=\"width=device-width, initial-scale=1\"><meta name=\"generator\" "
-           "content=\"roomtex\"><title>" +
-           HtmlText(keys_["verdict"]["headline"]) + "</title><style>" + kReportStyle +
-           "</style></head>\n<body><main>\n" + body_ + "</main></body></html>\n";
+    return HtmlPage(keys_["verdict"]["headline"], body_);
   }
 
  private:
@@ -86,43 +46,33 @@ class Page {
     }
     return false;
   }
-  void Heading(const std::string& text) { body_ += Tag("h2", text) + "\n"; }
+  void Heading(const std::string& text) { body_ += HtmlTag("h2", text) + "\n"; }
 
   void Verdict() {
     const Json& verdict = keys_["verdict"];
     const std::string state = verdict["state"];
-    const std::string word = state == "trusted"     ? "Trusted"
-                             : state == "untrusted" ? "Not to be trusted"
-                             : state == "failed"    ? "Failed"
-                                                    : "Not finished";
-    body_ += "<header class=\"" + state + "\"><p class=\"state\">" + word + "</p>" +
-             Tag("h1", verdict["headline"]);
-    for (const Json& sentence : verdict["sentences"]) body_ += Tag("p", WithUnits(sentence));
+    body_ += "<header class=\"" + state + "\">" + HtmlTag("p class=\"state\"", VerdictWord(state)) +
+             HtmlTag("h1", verdict["headline"]);
+    for (const Json& sentence : verdict["sentences"]) body_ += HtmlTag("p", WithUnits(sentence));
     body_ += "</header>\n";
     if (!keys_["remedies"].empty()) {
       body_ += "<section class=\"todo\"><h2>What to do now</h2><ul>";
-      for (const Json& remedy : keys_["remedies"]) body_ += "<li>" + Remedy(remedy) + "</li>";
+      for (const Json& remedy : keys_["remedies"]) body_ += "<li>" + HtmlRemedy(remedy) + "</li>";
       body_ += "</ul></section>\n";
     }
     body_ += "<dl class=\"facts\">";
     for (const Json& fact : keys_["facts"]) {
-      body_ += "<div>" + Tag("dt", fact["name"]) + Tag("dd", WithUnits(fact["value"])) + "</div>";
+      body_ += "<div>" + HtmlTag("dt", fact["name"]) + HtmlTag("dd", WithUnits(fact["value"])) +
+               "</div>";
     }
     body_ += "</dl>\n";
-  }
-
-  // A command line behind a sentence is set apart.
-  static std::string Remedy(const std::string& text) {
-    const size_t command = text.find(": roomtex-");
-    if (command == std::string::npos) return HtmlText(text);
-    return HtmlText(text.substr(0, command + 1)) + Tag("pre", text.substr(command + 2));
   }
 
   void Figure(const std::string& path, int width, const std::string& alt,
               const std::string& caption) {
     const std::string picture = HtmlPicture(path, width, alt);
     if (picture.empty()) return;
-    body_ += "<figure>" + picture + Tag("figcaption", caption) + "</figure>\n";
+    body_ += "<figure>" + picture + HtmlTag("figcaption", caption) + "</figure>\n";
   }
 
   void FromOutside() {
@@ -167,16 +117,6 @@ class Page {
       const std::string text = path;
       Figure(text, kWide, "The scan's edges on a photo", text.substr(text.rfind('/') + 1));
     }
-  }
-
-  static Json PlaceToJson(const ViewingPlace& place) {
-    Json json;
-    json["centre_in_plan"] = ToJson(place.centre);
-    json["direction_in_plan"] = ToJson(place.forward);
-    json["area_m2"] = place.area_m2;
-    json["nearest_photo"] = place.nearest_photo;
-    json["distance_m"] = place.distance;
-    return json;
   }
 
   void Plans() {
@@ -227,18 +167,10 @@ class Page {
       body_ += "<p>No further photo from where somebody can stand would show much more.</p>\n";
       return;
     }
-    body_ += "<p>To see more, photograph from here, in this order:</p><ul>";
+    body_ += "<p>To see more, photograph from here, along the arrow, in this order:</p><ul>";
     for (size_t i = 0; i < coverage.places.size(); ++i) {
-      const ViewingPlace& place = coverage.places[i];
-      const double tilt = DegFromRad(std::asin(std::clamp(place.forward.z(), -1.0, 1.0)));
-      const std::string tilted = std::abs(tilt) < 15 ? "level"
-                                 : tilt > 0          ? "tilted up"
-                                                     : "tilted down";
       body_ += "<li><b>" + std::string(1, static_cast<char>('A' + i)) +
-               "</b>: " + Number(place.distance, 1) + " m from where " +
-               HtmlText(place.nearest_photo) + " was taken, " + Number(place.centre.z(), 1) +
-               " m above the floor, along the arrow, " + tilted + ": about " +
-               Number(place.area_m2, 1) + " m² more.</li>";
+               "</b>: " + HtmlText(PlaceText(coverage.places[i])) + "</li>";
     }
     body_ += "</ul>\n";
   }
@@ -248,7 +180,7 @@ class Page {
     Heading("What the steps noticed");
     body_ += "<ul>";
     for (const Json& notice : keys_["notices"]) {
-      body_ += "<li>" + Tag("b", notice["step"]) + ": " + HtmlText(notice["text"]) + "</li>";
+      body_ += "<li>" + HtmlTag("b", notice["step"]) + ": " + HtmlText(notice["text"]) + "</li>";
     }
     body_ += "</ul>\n";
   }
@@ -280,11 +212,11 @@ class Page {
       const std::string name = photo["name"];
       const std::string left_out = photo.value("left_out", "");
       body_ += left_out.empty() ? "<tr>" : "<tr class=\"out\">";
-      body_ += "<td class=\"n\">" + NumberOf(name) + "</td>" + Tag("td", name) +
-               Tag("td", photo.value("registered_by", "–")) +
-               Cell(photo, "expected_error_mm", 1, 1) + Cell(photo, "match_support", 100, 0) +
-               Cell(photo, "exposure_ev", 1, 1) + Cell(photo, "samples_seen", 1, 0) +
-               Tag("td", left_out) + "</tr>";
+      body_ += "<td class=\"n\">" + NumberOf(name) + "</td>" + HtmlTag("td", name) +
+               HtmlTag("td", photo.value("registered_by", "–")) +
+               HtmlCell(photo, "expected_error_mm", 1, 1) +
+               HtmlCell(photo, "match_support", 100, 0) + HtmlCell(photo, "exposure_ev", 1, 1) +
+               HtmlCell(photo, "samples_seen", 1, 0) + HtmlTag("td", left_out) + "</tr>";
     }
     body_ += "</tbody></table></div>\n";
   }
@@ -295,22 +227,23 @@ class Page {
         "<div class=\"table\"><table><thead><tr><th>Step</th><th></th><th class=\"n\">Time</th>"
         "<th class=\"n\">Processor</th><th class=\"n\">Memory</th></tr></thead><tbody>";
     for (const Json& step : keys_["steps"]) {
-      body_ += "<tr>" + Tag("td", step["name"]) + Tag("td", step["does"]) +
-               Tag("td class=\"n\"", Time(step["seconds"])) +
-               Tag("td class=\"n\"", Time(step["cpu_seconds"])) +
-               Tag("td class=\"n\"", Memory(step["peak_memory_bytes"])) + "</tr>";
+      body_ += "<tr>" + HtmlTag("td", step["name"]) + HtmlTag("td", step["does"]) +
+               HtmlTag("td class=\"n\"", TimeText(step["seconds"])) +
+               HtmlTag("td class=\"n\"", TimeText(step["cpu_seconds"])) +
+               HtmlTag("td class=\"n\"", MemoryText(step["peak_memory_bytes"])) + "</tr>";
     }
     const Json& total = keys_["total"];
-    body_ +=
-        "<tr class=\"sum\"><td>All</td><td></td>" + Tag("td class=\"n\"", Time(total["seconds"])) +
-        Tag("td class=\"n\"", Time(total["cpu_seconds"])) +
-        Tag("td class=\"n\"", Memory(total["peak_memory_bytes"])) + "</tr></tbody></table></div>\n";
+    body_ += "<tr class=\"sum\"><td>All</td><td></td>" +
+             HtmlTag("td class=\"n\"", TimeText(total["seconds"])) +
+             HtmlTag("td class=\"n\"", TimeText(total["cpu_seconds"])) +
+             HtmlTag("td class=\"n\"", MemoryText(total["peak_memory_bytes"])) +
+             "</tr></tbody></table></div>\n";
     Heading("The commands");
     const Json& versions = keys_["versions"];
     body_ += "<p class=\"quiet\">roomtex " + HtmlText(versions["roomtex"]) + ", " +
              HtmlText(versions["colmap"]) + ". Typed one after the other they do the same.</p>\n";
     for (const Json& step : keys_["steps"]) {
-      body_ += Tag("h3", step["name"]);
+      body_ += HtmlTag("h3", step["name"]);
       for (const Json& note : step["notes"]) {
         body_ += "<p class=\"quiet small\">" + HtmlText(note) + "</p>";
       }
@@ -318,9 +251,9 @@ class Page {
       for (const Json& line : step["commands"]) {
         lines += (lines.empty() ? "" : "\n") + line.get<std::string>();
       }
-      body_ += Tag("pre", lines) + "\n";
+      body_ += HtmlTag("pre", lines) + "\n";
     }
-    body_ += Tag("h3", "all of it") + Tag("pre", keys_["command_line"]) + "\n";
+    body_ += HtmlTag("h3", "all of it") + HtmlTag("pre", keys_["command_line"]) + "\n";
   }
 
   Chain& chain_;

@@ -66,6 +66,12 @@ table { border-collapse: collapse; width: 100%; font-size: .875rem; font-variant
 th { text-align: left; font-weight: 600; color: var(--quiet); border-bottom: 2px solid var(--line); padding: 6px 10px 6px 0; vertical-align: bottom; }
 td { border-bottom: 1px solid var(--line); padding: 5px 10px 5px 0; vertical-align: top; }
 td.n, th.n { text-align: right; white-space: nowrap; }
+td.state { font-weight: 600; white-space: nowrap; }
+td.notes { min-width: 10rem; }
+td.trusted { color: var(--good); }
+td.untrusted, td.unfinished { color: var(--warn); }
+td.failed { color: var(--bad); }
+a { color: var(--accent); }
 tr.out td { color: var(--bad); }
 tr.sum td { font-weight: 600; border-bottom: 0; }
 ul { padding-left: 22px; margin: 6px 0; }

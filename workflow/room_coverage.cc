@@ -9,6 +9,7 @@
 #include "core/frames.h"
 #include "core/similarity.h"
 #include "core/statistics.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -291,6 +292,36 @@ RoomCoverage MeasureCoverage(const std::vector<EvidencePoint>& points, const Pla
   coverage.unseen_m2 = kCell * kCell * (num_all - num_seen);
   if (!cameras.empty()) coverage.places = PlaceSearch(grid, frame, cameras).Best();
   return coverage;
+}
+
+Json PlaceToJson(const ViewingPlace& place) {
+  Json json;
+  json["centre_in_plan"] = ToJson(place.centre);
+  json["direction_in_plan"] = ToJson(place.forward);
+  json["area_m2"] = place.area_m2;
+  json["nearest_photo"] = place.nearest_photo;
+  json["distance_m"] = place.distance;
+  return json;
+}
+
+ViewingPlace PlaceFromJson(const Json& json) {
+  ViewingPlace place;
+  for (int i = 0; i < 3; ++i) {
+    place.centre[i] = json.at("centre_in_plan").at(static_cast<size_t>(i));
+    place.forward[i] = json.at("direction_in_plan").at(static_cast<size_t>(i));
+  }
+  place.area_m2 = json.at("area_m2");
+  place.nearest_photo = json.at("nearest_photo");
+  place.distance = json.at("distance_m");
+  return place;
+}
+
+std::string PlaceText(const ViewingPlace& place) {
+  const double tilt = DegFromRad(std::asin(std::clamp(place.forward.z(), -1.0, 1.0)));
+  const std::string tilted = std::abs(tilt) < 15 ? "level" : tilt > 0 ? "tilted up" : "tilted down";
+  return Number(place.distance, 1) + " m from where " + place.nearest_photo + " was taken, " +
+         Number(place.centre.z(), 1) + " m above the floor, " + tilted + ": about " +
+         Number(place.area_m2, 1) + " m² more.";
 }
 
 }  // namespace roomtex

@@ -45,6 +45,12 @@ struct ViewingPlace {
   double distance = 0;              // metres from that photo's place
 };
 
+Json PlaceToJson(const ViewingPlace& place);
+// Of what PlaceToJson made. Throws Json::exception for anything else.
+ViewingPlace PlaceFromJson(const Json& json);
+// "0.4 m from where photo_003.jpg was taken, 1.5 m above the floor, level: about 2.1 m² more."
+std::string PlaceText(const ViewingPlace& place);
+
 // Shares are of the surface, every cell counted once.
 struct RoomCoverage {
   double walls = 0, floor = 0, ceiling = 0, all = 0;

@@ -111,7 +111,8 @@ TEST_P(CraftedDatabase, IsDataAndNoProgram) {
     database.CopyForMapper(folder / "copy.db", Database::Schema::kAsIs);
     database.CopyForMapper(folder / "copy39.db", Database::Schema::kColmap39);
     database.CopyWithCameras(folder / "calibrated.db", database.ReadCameras());
-    for (const char* copy : {"copy.db", "copy39.db", "calibrated.db"}) {
+    database.CopyWithMatches(folder / "merged.db", {&database});
+    for (const char* copy : {"copy.db", "copy39.db", "calibrated.db", "merged.db"}) {
       SQLite::Database made(folder / copy);
       EXPECT_EQ(made.execAndGet("SELECT COUNT(*) FROM sqlite_master WHERE type NOT IN ('table', "
                                 "'index') OR name LIKE '%evil%'")

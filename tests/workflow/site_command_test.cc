@@ -1,0 +1,154 @@
+// roomtex-site as users call it, on rooms whose reports are written here.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/output_file.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+#include "workflow/run_state.h"
+
+namespace roomtex {
+namespace {
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+class SiteCommand : public testing::Test {
+ protected:
+  void AddStep(const std::string& room, const std::string& step, StepState state,
+               const std::string& reason = "") {
+    MakeFolder(folder_ / (room + "/log"));
+    StepRecord record;
+    record.state = state;
+    record.reason = reason;
+    record.seconds = 10;
+    record.cpu_seconds = 30;
+    record.peak_memory_bytes = 2'000'000'000;
+    RunState(folder_ / (room + "/steps.json")).Set(step, record);
+  }
+  void AddReport(const std::string& room, const std::string& state) {
+    json report = {
+        {"verdict",
+         {{"state", state}, {"headline", "It is " + state}, {"sentences", {"So <it> is."}}}},
+        {"remedies", json::array()},
+        {"photos",
+         {{{"name", "a.jpg"}, {"registered_by", "mapper"}},
+          {{"name", "b.jpg"}, {"registered_by", "none"}}}}};
+    if (state == "trusted") {
+      report["coverage"] = {{"all", 0.75}, {"surface_m2", 80.0}, {"unseen_m2", 20.0}};
+      report["places_to_photograph"] = {{{"centre_in_plan", {1, 2, 1.5}},
+                                         {"direction_in_plan", {0, 0.6, 0.8}},
+                                         {"area_m2", 3.5},
+                                         {"nearest_photo", "a.jpg"},
+                                         {"distance_m", 0.25}}};
+      WriteBytes(folder_ / (room + "/log/align.json"),
+                 R"({"expected_error": {"at_cameras_mm": 4.25, "at_far_corner_mm": 9}})");
+    } else {
+      report["remedies"] = {"Pick six points: roomtex-pick --input_path x"};
+    }
+    WriteBytes(folder_ / (room + "/report.json"), report.dump());
+    WriteBytes(folder_ / (room + "/report.html"), "<!doctype html>");
+  }
+  CommandResult Run(const std::string& more = "") {
+    return RunCommandLine("roomtex-site --input_path " + folder_.path() + " --output_path " +
+                          (folder_ / "site.html") + more);
+  }
+  json Site() { return json::parse(ReadBytes(folder_ / "site.json")); }
+  std::string Page() { return ReadBytes(folder_ / "site.html"); }
+
+  TempFolder folder_;
+};
+
+TEST_F(SiteCommand, SaysOfEveryRoomWhatItsOwnReportsSay) {
+  AddStep("hall", "align", StepState::kDone);
+  AddReport("hall", "trusted");
+  AddStep("closet", "align", StepState::kUntrusted, "two starts fit");
+  AddReport("closet", "untrusted");
+  AddStep("cellar", "mapper", StepState::kDone);
+  AddReport("cellar", "trusted");  // of a run before
+  AddStep("cellar", "texture", StepState::kFailed, "the disk is full");
+  AddStep("stairs", "matches", StepState::kStarted);
+  WriteBytes(
+      folder_ / "site.csv",
+      "photos,room,notes\na,hall,\"R&D, <north>\"\nb,closet,\nc,cellar\nd,stairs,\ne,attic,\n");
+  const CommandResult result = Run(" --rooms_path " + (folder_ / "site.csv"));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1 of 5 rooms is coloured"));
+
+  const json site = Site();
+  EXPECT_EQ(
+      site["counts"],
+      json({{"rooms", 5}, {"trusted", 1}, {"untrusted", 1}, {"failed", 1}, {"unfinished", 2}}));
+  EXPECT_EQ(site["verdict"]["state"], "failed");
+  const json& hall = site["rooms"][0];
+  EXPECT_EQ(hall["expected_error_mm"], 4.25);
+  EXPECT_EQ(hall["coverage"], 0.75);
+  EXPECT_EQ(hall["num_photos"], 2);
+  EXPECT_EQ(hall["num_registered"], 1);
+  EXPECT_EQ(site["rooms"][2]["sentences"][0], "the disk is full");
+  EXPECT_EQ(site["rooms"][4]["headline"], "Not begun");
+  EXPECT_EQ(site["total"]["cpu_seconds"], 5 * 30);
+  EXPECT_EQ(site["steps"].size(), 4u);
+
+  const std::string page = Page();
+  for (const char* text :
+       {"R&amp;D, &lt;north&gt;", "So &lt;it&gt; is.", "href=\"closet/report.html\"",
+        "<pre>roomtex-pick", "0.2 m from where a.jpg was taken, 1.5 m above the floor, tilted up",
+        "4.2", "2.0 GB"}) {
+    EXPECT_THAT(page, HasSubstr(text));
+  }
+  for (const char* text : {"http://", "https://", "<script", "<link", "url(//"}) {
+    EXPECT_THAT(page, Not(HasSubstr(text)));
+  }
+}
+
+TEST_F(SiteCommand, TrustsASiteOfWhichEveryRoomIsTrusted) {
+  for (const char* room : {"b", "a"}) {
+    AddStep(room, "align", StepState::kDone);
+    AddReport(room, "trusted");
+  }
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Site()["rooms"][0]["name"], "a");
+  EXPECT_THAT(Page(), HasSubstr("All 2 rooms are coloured and can be trusted"));
+  EXPECT_THAT(Page(), HasSubstr("75\u00a0% of 160"));
+}
+
+// A killed run, another program: what is no report counts as none.
+TEST_F(SiteCommand, GetsAlongWithFilesThatAreNoReports) {
+  AddStep("a", "align", StepState::kDone);
+  for (const char* bytes :
+       {"", "{", "[]", "{\"verdict\": 3, \"photos\": [1], \"coverage\": []}",
+        "{\"verdict\": {\"state\": \"rooms\", \"headline\": \"\", \"sentences\": []}, "
+        "\"remedies\": [], \"coverage\": {\"all\": 1, \"surface_m2\": 1, "
+        "\"unseen_m2\": 1}, \"places_to_photograph\": [{\"area_m2\": \"x\"}]}",
+        "{\"verdict\": {\"state\": 1, \"headline\": 2, \"sentences\": 3}, "
+        "\"remedies\": 4, \"coverage\": {\"all\": 1, \"surface_m2\": 1, "
+        "\"unseen_m2\": 1}, \"places_to_photograph\": 5}"}) {
+    WriteBytes(folder_ / "a/report.json", bytes);
+    WriteBytes(folder_ / "a/log/align.json", bytes);
+    EXPECT_EQ(Run().exit_code, 4) << bytes;
+    EXPECT_EQ(Site()["counts"]["unfinished"], 1) << bytes;
+  }
+}
+
+TEST_F(SiteCommand, RefusesTablesThatNameNoRooms) {
+  AddStep("a", "align", StepState::kDone);
+  for (const char* table :
+       {"", "photos,notes\n", "room\n", "room\na\na\n", "room\n../a\n", "room\n\"a\n"}) {
+    WriteBytes(folder_ / "site.csv", table);
+    const CommandResult result = Run(" --rooms_path " + (folder_ / "site.csv"));
+    EXPECT_EQ(result.exit_code, 3) << table;
+    EXPECT_THAT(result.err, HasSubstr("site.csv")) << table;
+  }
+  const TempFolder empty;
+  EXPECT_EQ(RunCommandLine("roomtex-site --input_path " + empty.path() + " --output_path " +
+                           (empty / "site.html"))
+                .exit_code,
+            3);
+}
+
+}  // namespace
+}  // namespace roomtex

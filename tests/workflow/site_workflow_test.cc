@@ -1,0 +1,117 @@
+// A site of two rooms on Snakemake, as docs/site.md has it: one that can be trusted, with its
+// matches made in parts, and one whose photos show nothing in common. Label `slow`.
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/folders.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+class SiteWorkflow : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (RunProgram("snakemake --version").exit_code != 0) {
+      GTEST_SKIP() << "Snakemake is not installed (scripts/setup.sh --site)";
+    }
+  }
+  CommandResult RunSite(const std::string& more = "") {
+    const std::string site = ROOMTEX_SITE_FOLDER;
+    CommandResult result = RunProgram(
+        "snakemake -s " + site + "/Snakefile --profile " + site + "/local --directory " +
+        folder_.path() + " --cores 2 --config photos_per_part=5 'options=--quality low' bin=" +
+        BinFolder() + " " + more);
+    result.err += result.out;
+    return result;
+  }
+  void Simulate(const std::string& room, const std::string& options) {
+    const CommandResult result = RunCommandLine("roomtex-simulate --quiet --output_path " +
+                                                (folder_ / room) + " " + options);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  std::string At(const std::string& name) { return folder_ / ("result/" + name); }
+
+  TempFolder folder_;
+};
+
+TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
+  Simulate(
+      "a",
+      "--random_seed 1 --num_photos 10 --photo_width 480 --photo_height 320 --scan_columns 500 "
+      "--scan_rows 200");
+  Simulate("b",
+           "--random_seed 9 --num_photos 3 --photo_width 240 --photo_height 160 --scan_columns 200 "
+           "--scan_rows 80");
+  WriteBytes(folder_ / "site.csv",
+             "room,photos,scans,notes,picks,cameras,options\n"
+             "hall,a/photos,a/scan.rtpi,\"north, first\",a/picks.csv,a/cameras.txt,--pairs 1\n"
+             "closet,b/photos,b/scan.rtpi,,,,\n");
+  const CommandResult first = RunSite();
+  EXPECT_NE(first.exit_code, 0);
+  EXPECT_THAT(first.err, HasSubstr("Error in rule mapper"));
+  const json site = json::parse(ReadBytes(At("site.json")));
+  EXPECT_EQ(site["counts"]["trusted"], 1);
+  EXPECT_EQ(site["counts"]["failed"], 1);
+  EXPECT_EQ(site["rooms"][0]["notes"], "north, first");
+  EXPECT_THAT(site["rooms"][1]["sentences"][0].get<std::string>(), HasSubstr("matches"));
+  EXPECT_EQ(ReadBytes(At("hall/log/pictures.state")), "done\n");
+  // The step matches found all its pairs matched by the two parts, which are gone.
+  EXPECT_THAT(ReadBytes(At("hall/log/parts.run.log")), HasSubstr("from 2 copies"));
+  EXPECT_THAT(ReadBytes(At("hall/log/matches.log")),
+              HasSubstr("SKIP: Matches for image pair already"));
+  EXPECT_FALSE(fs::exists(At("hall/parts/1.db")));
+
+  // The failed room is not to be trusted now: its state says so, nobody tries it again.
+  const auto model = fs::last_write_time(At("hall/textured/model.glb"));
+  for (const char* step : {"mapper", "align", "texture", "pictures"}) {
+    WriteBytes(At(std::string("closet/log/") + step + ".state"), "untrusted\n");
+  }
+  const CommandResult second = RunSite();
+  EXPECT_EQ(second.exit_code, 0) << second.err;
+  EXPECT_THAT(second.err, HasSubstr("Nothing to be done"));
+  EXPECT_EQ(fs::last_write_time(At("hall/textured/model.glb")), model);
+
+  // Picks that were made for it let it go on from align, where its state is passed on.
+  fs::copy_file(folder_ / "b/picks.csv", At("closet/picks.csv"));
+  const CommandResult third = RunSite("-n");
+  EXPECT_THAT(third.err, HasSubstr("rule align"));
+  EXPECT_THAT(third.err, Not(HasSubstr("rule mapper")));
+  EXPECT_THAT(third.err, Not(HasSubstr("room=hall")));
+}
+
+TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
+  EXPECT_THAT(RunSite("-n").err, HasSubstr("is no site"));
+  fs::create_directories(folder_ / "p");
+  WriteBytes(folder_ / "s.ptx", "1\n");
+  for (const auto& [table, finding] : {
+           std::pair{"room,photos\n", "no column \"scans\""},
+           {"room,photos,scans,colour\n", "column \"colour\" is not known"},
+           {"room,photos,scans\na,p,s.ptx\na,p,s.ptx\n", "line 3: room \"a\" is there already"},
+           {"room,photos,scans\n../a,p,s.ptx\n", "becomes the name of a folder"},
+           {"room,photos,scans\na,q,s.ptx\n", "folder of photos \"q\" does not exist"},
+           {"room,photos,scans\na,p,t.ptx;s.ptx\n", "scan \"t.ptx\" does not exist"},
+           {"room,photos,scans\na,p,\n", "no scan is named"},
+           {"room,photos,scans\na,,s.ptx\n", "no photos are named"},
+           {"room,photos,scans,options\na,p,s.ptx,--only align\n", "--only cannot be one"},
+           {"room,photos,scans,options\na,p,s.ptx,'\n", "No closing quotation"},
+       }) {
+    WriteBytes(folder_ / "site.csv", table);
+    const CommandResult result = RunSite("-n");
+    EXPECT_NE(result.exit_code, 0) << table;
+    EXPECT_THAT(result.err, HasSubstr(finding)) << table;
+  }
+}
+
+}  // namespace
+}  // namespace roomtex

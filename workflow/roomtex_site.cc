@@ -1,0 +1,68 @@
+// roomtex-site: one page over all rooms of a site, from what roomtex-auto reported of each.
+
+#include <cstdio>
+#include <filesystem>
+
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "workflow/site_page.h"
+#include "workflow/site_rooms.h"
+
+namespace roomtex {
+namespace {
+namespace fs = std::filesystem;
+
+struct SiteOptions {
+  std::string input_path, rooms_path, output_path;
+};
+
+void ReportSite(const SiteOptions& options, const Command::Context& context) {
+  RequireFolder(options.input_path, "Give the folder that holds the rooms' output folders");
+  const Json keys = MakeSiteKeys(options.input_path, options.rooms_path.empty()
+                                                         ? FindSiteRooms(options.input_path)
+                                                         : ReadSiteRooms(options.rooms_path));
+  const fs::path page = fs::absolute(options.output_path).lexically_normal();
+  const std::string to_rooms = fs::absolute(options.input_path)
+                                   .lexically_normal()
+                                   .lexically_relative(page.parent_path())
+                                   .generic_string();
+  OutputFile file(options.output_path);
+  file.stream() << MakeSitePage(keys, to_rooms == "." ? "" : to_rooms + "/");
+  file.Commit();
+  for (const auto& [key, value] : keys.items()) context.report[key] = value;
+  context.report.AddCopy(fs::path(options.output_path).replace_extension(".json").string());
+
+  std::string names;
+  for (const Json& room : keys["rooms"]) {
+    if (room["state"] == "trusted") continue;
+    names += (names.empty() ? "" : ", ") + room["name"].get<std::string>() + " (" +
+             room["headline"].get<std::string>() + ")";
+  }
+  if (!names.empty()) context.report.SetUntrusted("look after " + names);
+  std::printf("%s\n%s\n", keys["verdict"]["headline"].get<std::string>().c_str(),
+              options.output_path.c_str());
+}
+
+}  // namespace
+}  // namespace roomtex
+
+int main(int argc, char** argv) {
+  using namespace roomtex;
+  SiteOptions options;
+  Command command("roomtex-site",
+                  "One page over all rooms of a site: what can be trusted, what to do and to "
+                  "photograph again, what it cost.",
+                  "roomtex-site --input_path result --output_path result/site.html");
+  command.AddInputPath("input_path", &options.input_path,
+                       "Folder that holds a folder for each room, the --output_path of "
+                       "roomtex-auto.");
+  command.AddInputPath("rooms_path", &options.rooms_path,
+                       "Table with the column room, and notes if there are any, e.g. site.csv; not "
+                       "given = all rooms that are there.",
+                       Command::Kind::kOptional);
+  command.AddOutputPath("output_path", &options.output_path,
+                        "Where to write the page (.html); beside it the same as .json.");
+  return command.Run(argc, argv,
+                     [&](const Command::Context& context) { ReportSite(options, context); });
+}

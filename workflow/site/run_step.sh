@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# One step of a room, told by the room's state: nothing is done behind a step that is not to be trusted.
+# Usage: run_step.sh STATE [STATE_BEFORE] roomtex-auto ARGUMENTS...
+# STATE becomes "done" or "untrusted"; the end of a step that failed is the command's.
+set -euo pipefail
+state=$1
+shift
+if [ "$1" != roomtex-auto ]; then
+  before=$1
+  shift
+  if [ "$(cat "$before")" != "done" ]; then
+    cp "$before" "$state"
+    exit 0
+  fi
+fi
+code=0
+"$@" || code=$?
+case $code in
+  0) echo "done" >"$state" ;;
+  4) echo untrusted >"$state" ;;
+  *) exit "$code" ;;
+esac

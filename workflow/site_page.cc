@@ -1,0 +1,221 @@
+#include "workflow/site_page.h"
+
+#include <algorithm>
+#include <cctype>
+#include <vector>
+
+#include "core/command_line.h"
+#include "core/text.h"
+#include "workflow/html_text.h"
+#include "workflow/room_coverage.h"
+
+namespace roomtex {
+namespace {
+
+constexpr size_t kPlacesPerRoom = 3;
+
+// A path as it may stand in a link.
+std::string UrlPath(const std::string& path) {
+  static const char* const kDigits = "0123456789ABCDEF";
+  std::string url;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
+      url += c;
+    } else {
+      url += std::string("%") + kDigits[byte >> 4] + kDigits[byte & 15];
+    }
+  }
+  return url;
+}
+
+class SitePage {
+ public:
+  SitePage(const Json& keys, const std::string& to_rooms) : keys_(keys), to_rooms_(to_rooms) {}
+
+  std::string Make() {
+    Head();
+    Remedies();
+    Rooms();
+    Places();
+    Steps();
+    return HtmlPage(keys_["verdict"]["headline"], body_);
+  }
+
+ private:
+  void Heading(const std::string& text) { body_ += HtmlTag("h2", text) + "\n"; }
+
+  // The sum over the rooms that know it.
+  double Sum(const char* key) const {
+    double sum = 0;
+    for (const Json& room : keys_["rooms"]) {
+      if (room.contains(key)) sum += room[key].get<double>();
+    }
+    return sum;
+  }
+
+  void Fact(const std::string& name, const std::string& value) {
+    body_ += "<div>" + HtmlTag("dt", name) + HtmlTag("dd", WithUnits(value)) + "</div>";
+  }
+
+  void Head() {
+    const Json& verdict = keys_["verdict"];
+    const std::string state = verdict["state"];
+    const Json& counts = keys_["counts"];
+    const std::string word =
+        state == "trusted"
+            ? VerdictWord(state)
+            : std::to_string(counts["rooms"].get<int>() - counts["trusted"].get<int>()) +
+                  " to look after";
+    body_ += "<header class=\"" + state + "\">" + HtmlTag("p class=\"state\"", word) +
+             HtmlTag("h1", verdict["headline"]);
+    std::string sentences;
+    for (const Json& sentence : verdict["sentences"]) {
+      sentences += (sentences.empty() ? "" : " ") + sentence.get<std::string>();
+    }
+    if (!sentences.empty()) body_ += HtmlTag("p", sentences);
+    body_ += "</header>\n<dl class=\"facts\">";
+    const double photos = Sum("num_photos"), surface = Sum("surface_m2");
+    if (photos > 0) {
+      Fact("Photos registered", Number(Sum("num_registered"), 0) + " of " + Number(photos, 0));
+    }
+    if (surface > 0) {
+      Fact("Surface on a photo",
+           Percent(1 - Sum("unseen_m2") / surface) + " of " + Number(surface, 0) + " m²");
+    }
+    const Json* worst = nullptr;
+    for (const Json& room : keys_["rooms"]) {
+      const bool is_worse = room.contains("expected_error_mm") &&
+                            (worst == nullptr || room["expected_error_mm"].get<double>() >
+                                                     (*worst)["expected_error_mm"].get<double>());
+      if (is_worse) worst = &room;
+    }
+    if (worst != nullptr) {
+      Fact("Largest expected error", Number((*worst)["expected_error_mm"].get<double>(), 1) +
+                                         " mm, " + (*worst)["name"].get<std::string>());
+    }
+    const Json& total = keys_["total"];
+    Fact("Processor time", TimeText(total["cpu_seconds"]));
+    Fact("Most memory of a step", MemoryText(total["peak_memory_bytes"]));
+    body_ += "</dl>\n";
+  }
+
+  std::string NameOf(const Json& room) const {
+    if (!room["has_report"].get<bool>()) return HtmlTag("b", room["name"]);
+    return "<a href=\"" +
+           HtmlText(UrlPath(to_rooms_ + room["folder"].get<std::string>() + "/report.html")) +
+           "\">" + HtmlText(room["name"]) + "</a>";
+  }
+
+  void Remedies() {
+    std::string items;
+    for (const Json& room : keys_["rooms"]) {
+      if (room["state"] == "trusted") continue;
+      items += "<li>" + NameOf(room) + ": " + HtmlText(room["headline"]);
+      for (const Json& sentence : room["sentences"]) {
+        items += "<br><span class=\"quiet\">" + HtmlText(sentence) + "</span>";
+      }
+      for (const Json& remedy : room["remedies"]) {
+        items += "<div class=\"small\">" + HtmlRemedy(remedy) + "</div>";
+      }
+      items += "</li>";
+    }
+    if (items.empty()) return;
+    body_ += "<section class=\"todo\"><h2>What to do now</h2><ul>" + items + "</ul></section>\n";
+  }
+
+  static std::string RegisteredCell(const Json& room) {
+    const bool is_known = room.contains("num_photos");
+    return HtmlTag("td class=\"n\"", is_known
+                                         ? Number(room["num_registered"].get<double>(), 0) +
+                                               " of " + Number(room["num_photos"].get<double>(), 0)
+                                         : "\u2013");
+  }
+
+  void Rooms() {
+    Heading("Rooms");
+    body_ +=
+        "<p class=\"quiet\">The name leads to the room's own report. Error: expected, one standard "
+        "deviation, at the photos and at the far corner. Surface: share that is on a photo, of the "
+        "surface that was scanned.</p><div class=\"table\"><table><thead><tr>"
+        "<th>Room</th><th>Verdict</th><th class=\"n\">Photos</th><th class=\"n\">Surface, %</th>"
+        "<th class=\"n\">of m²</th><th class=\"n\">Error, mm</th><th class=\"n\">Corner, mm</th>"
+        "<th class=\"n\">Time</th><th class=\"n\">Processor</th><th class=\"n\">Memory</th>"
+        "<th>Notes</th></tr></thead><tbody>";
+    for (const Json& room : keys_["rooms"]) {
+      const std::string state = room["state"];
+      body_ += "<tr><td>" + NameOf(room) + "</td>" +
+               HtmlTag("td class=\"state " + state + "\"", VerdictWord(state)) +
+               RegisteredCell(room) + HtmlCell(room, "coverage", 100, 0) +
+               HtmlCell(room, "surface_m2", 1, 0) + HtmlCell(room, "expected_error_mm", 1, 1) +
+               HtmlCell(room, "far_corner_mm", 1, 1) +
+               HtmlTag("td class=\"n\"", TimeText(room["seconds"])) +
+               HtmlTag("td class=\"n\"", TimeText(room["cpu_seconds"])) +
+               HtmlTag("td class=\"n\"", MemoryText(room["peak_memory_bytes"])) +
+               HtmlTag("td class=\"notes\"", room["notes"]) + "</tr>";
+    }
+    body_ += "</tbody></table></div>\n";
+  }
+
+  // The rooms of which most is missing first.
+  void Places() {
+    std::vector<const Json*> rooms;
+    for (const Json& room : keys_["rooms"]) {
+      if (!room["places_to_photograph"].empty()) rooms.push_back(&room);
+    }
+    if (rooms.empty()) return;
+    std::stable_sort(rooms.begin(), rooms.end(), [](const Json* a, const Json* b) {
+      return (*a)["unseen_m2"].get<double>() > (*b)["unseen_m2"].get<double>();
+    });
+    Heading("What to photograph again");
+    body_ +=
+        "<p class=\"quiet\">The rooms of which most is on no photo first. Where the arrows point "
+        "is "
+        "in the plan of the room's report.</p>\n";
+    for (const Json* room : rooms) {
+      body_ += "<h3>" + NameOf(*room) + ": " + Number((*room)["unseen_m2"].get<double>(), 1) +
+               " m² on no photo</h3><ul>";
+      const Json& places = (*room)["places_to_photograph"];
+      for (size_t i = 0; i < std::min(places.size(), kPlacesPerRoom); ++i) {
+        body_ += "<li><b>" + std::string(1, static_cast<char>('A' + i)) +
+                 "</b>: " + HtmlText(PlaceText(PlaceFromJson(places[i]))) + "</li>";
+      }
+      body_ += "</ul>\n";
+    }
+  }
+
+  void Steps() {
+    if (keys_["steps"].empty()) return;
+    Heading("What it cost");
+    body_ +=
+        "<p class=\"quiet\">Sums over all rooms, of the last run of each step; memory: of the room "
+        "that needs most.</p><div class=\"table\"><table><thead><tr><th>Step</th>"
+        "<th class=\"n\">Time</th><th class=\"n\">Processor</th><th class=\"n\">Memory</th>"
+        "<th>of</th></tr></thead><tbody>";
+    for (const Json& step : keys_["steps"]) {
+      body_ += "<tr>" + HtmlTag("td", step["name"]) +
+               HtmlTag("td class=\"n\"", TimeText(step["seconds"])) +
+               HtmlTag("td class=\"n\"", TimeText(step["cpu_seconds"])) +
+               HtmlTag("td class=\"n\"", MemoryText(step["peak_memory_bytes"])) +
+               HtmlTag("td", step["largest_room"]) + "</tr>";
+    }
+    const Json& total = keys_["total"];
+    body_ += "<tr class=\"sum\"><td>All</td>" +
+             HtmlTag("td class=\"n\"", TimeText(total["seconds"])) +
+             HtmlTag("td class=\"n\"", TimeText(total["cpu_seconds"])) +
+             HtmlTag("td class=\"n\"", MemoryText(total["peak_memory_bytes"])) +
+             "<td></td></tr></tbody></table></div>\n" +
+             HtmlTag("p class=\"quiet small\"", std::string("roomtex ") + Version()) + "\n";
+  }
+
+  const Json& keys_;
+  std::string to_rooms_, body_;
+};
+
+}  // namespace
+
+std::string MakeSitePage(const Json& keys, const std::string& to_rooms) {
+  return SitePage(keys, to_rooms).Make();
+}
+
+}  // namespace roomtex
