@@ -56,7 +56,7 @@ Eigen::Vector3d PhotoRenderer::RayAt(double x_in_img, double y_in_img) const {
 
 PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_img,
                                          double y_in_img, double pixel_size,
-                                         const ProjectedLight* projected) const {
+                                         const PhotoSettings& settings) const {
   const auto direction_at = [&](double x, double y) -> Eigen::Vector3d {
     return room_from_cam.leftCols<3>() * RayAt(x, y).normalized();
   };
@@ -90,14 +90,54 @@ PhotoRenderer::Shot PhotoRenderer::Shoot(const Pose& room_from_cam, double x_in_
   const Eigen::Vector3d side_x = OffsetOnPlane(origin, next_x, hit->point, normal);
   const Eigen::Vector3d side_y = OffsetOnPlane(origin, next_y, hit->point, normal);
   LinearRgb added = LinearRgb::Zero();
-  if (projected != nullptr) {
-    const ProjectedLight::Arrival arrival = projected->At(*hit, side_x, side_y);
+  if (settings.projected != nullptr) {
+    const ProjectedLight::Arrival arrival = settings.projected->At(*hit, side_x, side_y);
     added.setConstant(arrival.light);
     // A border of a shadow is a border like that of a surface.
     shot.place = static_cast<int>(MixBits(shot.place, arrival.lit_by));
   }
-  shot.color = tint.cwiseProduct(scene_.Color(*hit, side_x, side_y, added));
+  LinearRgb color = scene_.Color(*hit, side_x, side_y, added);
+  if (settings.gloss > 0 && scene_.SurfaceOf(hit->patch).varnished) {
+    // Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering" (15).
+    const double flat = 1 - std::abs(normal.dot(direction));
+    const auto mirrored =
+        static_cast<float>(settings.gloss + (1 - settings.gloss) * std::pow(flat, 5));
+    color = (1 - mirrored) * color + mirrored * Reflection(*hit, direction);
+  }
+  shot.color = tint.cwiseProduct(color);
   return shot;
+}
+
+LinearRgb PhotoRenderer::Reflection(const SceneHit& hit, const Eigen::Vector3d& direction) const {
+  constexpr int kSide = 4;  // rays: its square
+  constexpr double kSpread =
+      0.12;  // side of the bundle of rays at distance 1: varnish is not glass
+  // A photo shows lamp and sky as white, whatever their light.
+  constexpr float kShine = 4;
+  Eigen::Vector3d normal = scene_.patches()[hit.patch].Normal();
+  if (normal.dot(direction) > 0) normal = -normal;
+  const Eigen::Vector3d mirrored = direction - 2 * normal.dot(direction) * normal;
+  const Eigen::Vector3d u = mirrored.unitOrthogonal(), v = mirrored.cross(u);
+  LinearRgb sum = LinearRgb::Zero();
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const double s = (i % kSide + 0.5) / kSide - 0.5, t = (i / kSide + 0.5) / kSide - 0.5;
+    const auto towards = [&](double ds, double dt) -> Eigen::Vector3d {
+      return (mirrored + kSpread * ((s + ds) * u + (t + dt) * v)).normalized();
+    };
+    Eigen::Vector3d ray = towards(0, 0);
+    ray += std::max(0.0, 0.02 - normal.dot(ray)) * normal;  // not into the surface
+    const std::optional<SceneHit> seen = scene_.Cast(hit.point, ray.normalized(), 1e-3);
+    if (!seen) {
+      sum += LinearRgb(0.7f, 0.8f, 0.9f);
+      continue;
+    }
+    const Eigen::Vector3d facing = scene_.patches()[seen->patch].Normal();
+    const LinearRgb light =
+        scene_.Color(*seen, OffsetOnPlane(hit.point, towards(1.0 / kSide, 0), seen->point, facing),
+                     OffsetOnPlane(hit.point, towards(0, 1.0 / kSide), seen->point, facing));
+    sum += (scene_.SurfaceOf(seen->patch).shines ? kShine : 1.0f) * light;
+  }
+  return sum / (kSide * kSide);
 }
 
 cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& settings,
@@ -107,7 +147,7 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
   cv::Mat place(height_, width_, CV_32S);
   ParallelFor(num_threads, 0, height_, [&](int y) {
     for (int x = 0; x < width_; ++x) {
-      const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings.projected);
+      const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings);
       linear.at<cv::Vec3f>(y, x) = {shot.color.z(), shot.color.y(), shot.color.x()};
       place.at<int>(y, x) = shot.place;
     }
@@ -127,7 +167,7 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
       LinearRgb sum = LinearRgb::Zero();
       for (int k = 0; k < kSide * kSide; ++k) {
         sum += Shoot(room_from_cam, x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide,
-                     1.0 / kSide, settings.projected)
+                     1.0 / kSide, settings)
                    .color;
       }
       sum /= kSide * kSide;

@@ -16,6 +16,7 @@ class ProjectedLight;
 
 struct PhotoSettings {
   double exposure_ev = 0;
+  double gloss = 0;         // see SimulatedRoomOptions
   double blur_px = 0;       // Gaussian sigma
   double noise = 0;         // grey levels of 255, standard deviation
   uint64_t noise_seed = 0;  // one per photo
@@ -42,7 +43,9 @@ class PhotoRenderer {
   Eigen::Vector3d RayAt(double x_in_img, double y_in_img) const;
   using Pose = Eigen::Matrix<double, 3, 4>;
   Shot Shoot(const Pose& room_from_cam, double x_in_img, double y_in_img, double pixel_size,
-             const ProjectedLight* projected) const;
+             const PhotoSettings& settings) const;
+  // Light that a varnished surface throws back at a hit to who looks along `direction` (unit).
+  LinearRgb Reflection(const SceneHit& hit, const Eigen::Vector3d& direction) const;
   void Develop(const cv::Mat& linear, const PhotoSettings& settings, int num_threads,
                cv::Mat* photo) const;
 

@@ -41,9 +41,13 @@ class RoomBuilder {
         MixBits(static_cast<uint64_t>(options_.random_seed), 77, ++num_seeds_));
   }
   int Add(const TexturePtr& texture, const Infrared& infrared,
-          Surface::Kind kind = Surface::Kind::kOpaque, bool shines = false) {
-    return scene_.AddSurface(
-        {options_.bare ? MakePlain(MeanAlbedo(*texture)) : texture, infrared, kind, shines});
+          Surface::Kind kind = Surface::Kind::kOpaque, bool shines = false,
+          bool varnished = false) {
+    return scene_.AddSurface({options_.bare ? MakePlain(MeanAlbedo(*texture)) : texture, infrared,
+                              kind, shines, varnished});
+  }
+  int AddVarnished(const TexturePtr& texture, const Infrared& infrared) {
+    return Add(texture, infrared, Surface::Kind::kOpaque, false, true);
   }
   // A picture of this size in metres, one pixel per millimetre of its longer side.
   int AddPictureSurface(const cv::Mat& picture, double width, double height, float grain = 0.03f,

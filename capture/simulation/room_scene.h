@@ -34,7 +34,8 @@ struct Surface {
   TexturePtr texture;
   Infrared infrared;
   Kind kind = Kind::kOpaque;
-  bool shines = false;  // looks the same under any light: a lamp, the sky
+  bool shines = false;     // looks the same under any light: a lamp, the sky
+  bool varnished = false;  // may mirror a part of the light: SimulatedRoomOptions::gloss
 };
 
 // A parallelogram, or the half of it with s + t <= 1. Seen from the front edge_s points right and

@@ -14,9 +14,12 @@ RoomBuilder::RoomBuilder(const SimulatedRoomOptions& options, RoomScene* scene)
       width_(options.width),
       depth_(options.depth),
       height_(options.height) {
-  oak_ = Add(MakeWood(RgbFromSrgb(196, 150, 98), NextSeed()), {0.25f, 0.5f, {0.8f, 0.2f, 0}});
-  walnut_ = Add(MakeWood(RgbFromSrgb(120, 78, 50), NextSeed()), {0.3f, 0.8f, {0.8f, 0.2f, 0}});
-  pine_ = Add(MakeWood(RgbFromSrgb(222, 186, 134), NextSeed()), {0.2f, 0.6f, {0.6f, 0.4f, 0}});
+  oak_ =
+      AddVarnished(MakeWood(RgbFromSrgb(196, 150, 98), NextSeed()), {0.25f, 0.5f, {0.8f, 0.2f, 0}});
+  walnut_ =
+      AddVarnished(MakeWood(RgbFromSrgb(120, 78, 50), NextSeed()), {0.3f, 0.8f, {0.8f, 0.2f, 0}});
+  pine_ =
+      AddVarnished(MakeWood(RgbFromSrgb(222, 186, 134), NextSeed()), {0.2f, 0.6f, {0.6f, 0.4f, 0}});
   white_ = Add(MakePlaster(RgbFromSrgb(236, 233, 225), 0.05f, NextSeed()),
                {0.5f, 0.3f, {0.4f, 0.3f, 0.3f}});
   black_ = Add(MakePlaster(RgbFromSrgb(48, 46, 46), 0.15f, NextSeed()),
@@ -43,12 +46,12 @@ void RoomBuilder::AddShell() {
   int floor, ceiling, walls[4];
   if (options_.bare_walls) {
     const Infrared infrared{0.2f, 0.6f, {0.5f, 0.3f, 0.2f}};
-    floor = Add(MakePlain(RgbFromSrgb(150, 140, 128)), infrared);
+    floor = AddVarnished(MakePlain(RgbFromSrgb(150, 140, 128)), infrared);
     ceiling = Add(MakePlain(RgbFromSrgb(240, 238, 232)), infrared);
     for (int& wall : walls) wall = Add(MakePlain(RgbFromSrgb(226, 222, 212)), infrared);
   } else {
-    floor =
-        Add(MakePlanks(RgbFromSrgb(190, 142, 92), NextSeed()), {0.2f, 0.7f, {0.8f, 0.3f, -0.2f}});
+    floor = AddVarnished(MakePlanks(RgbFromSrgb(190, 142, 92), NextSeed()),
+                         {0.2f, 0.7f, {0.8f, 0.3f, -0.2f}});
     ceiling = Add(MakePlaster(RgbFromSrgb(238, 234, 224), 0.09f, NextSeed()),
                   {0.75f, -0.35f, {0.3f, 0.3f, 0.3f}});
     walls[kSouth] = Add(MakePlaster(RgbFromSrgb(222, 190, 130), 0.1f, NextSeed()),

@@ -130,6 +130,7 @@ Eigen::Vector3f SimulatedRoom::WhiteBalance(int photo) const {
 cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   PhotoSettings settings;
   settings.exposure_ev = ExposureEv(photo);
+  settings.gloss = impl_->options.gloss;
   settings.blur_px = impl_->options.blur_px;
   settings.response = impl_->options.response;
   settings.vignetting = impl_->options.vignetting;

@@ -45,6 +45,11 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "metres: no surface has finer detail; larger = smoother pictures and prints")
       .Within(0, 0.1, "m");
   fields->Bool("shading", &shading, "light from a lamp and the window instead of even light");
+  fields
+      ->Number("gloss", &gloss,
+               "varnish on floor and wood: share of the light that it mirrors seen from straight "
+               "above, in the photos and not in the true colours; 0.05 = polished")
+      .Within(0, 1);
   fields->Int("num_photos", &num_photos, "number of photos; with projectors: of places")
       .Within(1, 1000);
   fields->Int("photo_width", &photo_width, "pixels").Within(64, 20000, "pixels");

@@ -36,6 +36,9 @@ struct SimulatedRoomOptions {
   // The 8-bit grey picture that projector k throws, with seed k + 1; needed if there are
   // projectors.
   std::function<cv::Mat1b(int width, int height, int seed)> pattern;
+  // Varnish on the floor and on wood: the share of the light that it mirrors seen from straight
+  // above, more at flat angles. In the photos only: true colours are those below the varnish.
+  double gloss = 0;
   // Photos.
   int num_photos = 30;                          // places, if there are projectors
   int photo_width = 1936, photo_height = 1288;  // pixels

@@ -123,6 +123,45 @@ TEST(SimulatedPhotos, MoveWithTheLensDistortion) {
   EXPECT_GT(cv::norm(distorted, pinhole.RenderPhoto(0), cv::NORM_L1) / distorted.total(), 5);
 }
 
+TEST(SimulatedPhotos, VarnishMirrorsOnTheFloorAloneAndInThePhotosAlone) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 2;
+  options.furnished = false;
+  options.scan_columns = 240;
+  options.scan_rows = 120;
+  const SimulatedRoom matt(options);
+  options.gloss = 0.2;
+  const SimulatedRoom glossy(options);
+  EXPECT_EQ(matt.TrueColors(), glossy.TrueColors());
+  const cv::Mat before = matt.RenderPhoto(0), after = glossy.RenderPhoto(0);
+  const Rigid room_from_cam = matt.CamFromRoom(0).Inverse();
+  const CameraProjection camera(matt.camera());
+  int num_floor = 0, num_changed = 0, num_wall = 0;
+  for (int y = 0; y < before.rows; y += 3) {
+    for (int x = 0; x < before.cols; x += 3) {
+      const auto ray = camera.RayFromImg({x + 0.5, y + 0.5});
+      ASSERT_TRUE(ray);
+      const Eigen::Vector3d down = room_from_cam.rotation * *ray;
+      const Eigen::Vector3d at =
+          room_from_cam.translation - room_from_cam.translation.z() / down.z() * down;
+      const bool on_floor = down.z() < 0 && at.x() > 0.1 && at.x() < options.width - 0.1 &&
+                            at.y() > 0.1 && at.y() < options.depth - 0.1;
+      const bool changed =
+          cv::norm(before.at<cv::Vec3b>(y, x), after.at<cv::Vec3b>(y, x), cv::NORM_INF) > 6;
+      if (on_floor) {
+        ++num_floor;
+        num_changed += changed;
+      } else if (down.z() > 0 && down.z() < 0.15 * down.head<2>().norm()) {  // a bare wall
+        ++num_wall;
+        EXPECT_FALSE(changed) << x << " " << y;
+      }
+    }
+  }
+  EXPECT_GT(num_floor, 500);
+  EXPECT_GT(num_wall, 500);
+  EXPECT_GT(num_changed, 0.5 * num_floor);
+}
+
 TEST(SimulatedPhotos, CarryTheNoiseOfTheOptions) {
   SimulatedRoomOptions options = SmallRoom();
   options.num_photos = 1;
