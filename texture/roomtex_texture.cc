@@ -17,12 +17,14 @@
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "texture/colorize.h"
+#include "texture/output/decimate_parts.h"
 #include "texture/output/evidence.h"
 #include "texture/output/write_e57.h"
 #include "texture/output/write_glb.h"
 #include "texture/output/write_obj.h"
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
+#include "texture/output/write_web_glb.h"
 #include "texture/sampling/photo_list.h"
 #include "texture/sampling/photo_pass.h"
 #include "texture/texels/grid_image.h"
@@ -42,8 +44,10 @@ struct TextureOptions {
   bool accept_untrusted = false, strict = false;
   ColorizeOptions colorize;
   GlbOptions glb;
+  WebOptions web;
   std::string image_format = "png";
-  bool output_obj = false, output_e57 = false, e57_images = false;
+  bool output_web = true, output_normals = false, output_obj = false, output_e57 = false,
+       e57_images = false;
   bool output_evidence = true;
 };
 
@@ -90,9 +94,16 @@ void AddTextureOptions(TextureOptions* o, Command* command) {
 }
 
 void AddWriteOptions(TextureOptions* o, Command* command) {
+  command->AddBool("output_web", &o->output_web,
+                   "Also write model_web.glb: fewer triangles, compressed, the same texture as "
+                   "JPEG, for web pages and to give away.");
+  command->AddBool("output_normals", &o->output_normals,
+                   "model.ply has normals, too: nx, ny, nz behind views, zero where no triangle "
+                   "is.");
   command->AddBool("output_obj", &o->output_obj,
                    "Also write model.obj, model.mtl and their texture images model_0.png ... into "
-                   "the output folder; the up axis stays the scan's.");
+                   "the output folder, with the triangles of --Mesh.max_triangles; the up axis "
+                   "stays the scan's.");
   command->AddBool("output_e57", &o->output_e57,
                    "Also write model.e57: all stations in one structured E57, with intensity, "
                    "colour and pose. Scans with a grid only.");
@@ -115,6 +126,7 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
       "rings around print; jpeg (quality 95) takes a fourth of its room. The mesh "
       "mostly weighs more than either.");
   command->Add(FieldsOf(&o->glb));
+  command->Add(FieldsOf(&o->web));
 }
 
 void AddColorOptions(ColorizeOptions* o, Command* command) {
@@ -321,6 +333,7 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
 void ProtectInputs(const TextureOptions& options, const std::vector<Scan>& scans) {
   std::vector<std::string> names = {"model.ply", "model.glb", "report.json", "response.txt"};
   if (options.output_evidence) names.emplace_back("evidence.ply");
+  if (options.output_web) names.emplace_back("model_web.glb");
   if (options.output_obj) names.insert(names.end(), {"model.obj", "model.mtl"});
   if (options.output_e57 || options.e57_images) names.emplace_back("model.e57");
   for (size_t s = 0; s < scans.size(); ++s) {
@@ -336,8 +349,8 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
                       const Command::Context& context) {
   std::string older;
   for (const char* name :
-       {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model.obj", "model.mtl",
-        "model_0.png", "model_0.jpg", "model.e57", "evidence.ply"}) {
+       {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model_web.glb", "model.obj",
+        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply"}) {
     const bool written = std::find(names.begin(), names.end(), name) != names.end();
     if (written || !std::filesystem::exists(folder + "/" + name)) continue;
     older += (older.empty() ? "" : ", ") + std::string(name);
@@ -358,6 +371,23 @@ void FillScansReport(const PlacedScans& placed, Report* report) {
   (*report)["scans"] = scans;
 }
 
+// Files with fewer triangles: for the web, for modelling programs.
+void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+                    const TextureOptions& options, OutputSet* set,
+                    const Command::Context& context) {
+  std::vector<std::vector<TexturedPart>> parts =
+      MakeMeshParts(scans, colored, options.glb.max_texture_size);
+  DecimateParts(scans, options.web.max_triangles, context.options.num_threads, &parts);
+  context.report["web_triangles"] = CountTriangles(parts);
+  if (options.output_web) {
+    WriteWebGlb(scans, colored, parts, set->Path("model_web.glb"), options.web);
+  }
+  if (options.output_obj) {
+    WriteColoredObj(scans, colored, parts, options.image_format == "jpeg",
+                    [set](const std::string& name) { return set->Path(name); });
+  }
+}
+
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const std::vector<PhotoView>& photos, const TextureOptions& options,
               OutputSet* outputs, const Command::Context& context) {
@@ -365,7 +395,7 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
   OutputSet& set = *outputs;
-  WriteColoredPly(scans, colored, set.Path("model.ply"));
+  WriteColoredPly(scans, colored, set.Path("model.ply"), options.output_normals);
   WriteColoredGlb(scans, colored, set.Path("model.glb"), glb);
   if (options.output_evidence) WriteEvidence(scans, colored, set.Path("evidence.ply"));
   for (size_t s = 0; s < scans.size(); ++s) {
@@ -379,9 +409,8 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
       WriteRtpiCopy(scans[s], colored[s], set.Path("model" + number + ".rtpi"));
     }
   }
-  if (options.output_obj) {
-    WriteColoredObj(scans, colored, glb,
-                    [&set](const std::string& name) { return set.Path(name); });
+  if (options.output_web || options.output_obj) {
+    WriteDecimated(scans, colored, options, &set, context);
   }
   if (options.output_e57 || options.e57_images) {
     WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, set.Path("model.e57"));
@@ -421,6 +450,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   std::vector<std::string> problems = options.scan_reader.Problems();
   AppendProblems(colorize.Problems(), &problems);
   AppendProblems(options.glb.Problems(), &problems);
+  AppendProblems(options.web.Problems(), &problems);
   ThrowIfProblems(problems);
   RequireScans(options.scan_paths, options.input_path);
 

@@ -235,9 +235,10 @@ TEST_F(TextureCommand, UnseenSamplesAreGreyOrBlackAsAsked) {
 }
 
 TEST_F(TextureCommand, GivesTheSameBytesOnOneThreadAndOnThree) {
-  ASSERT_EQ(Texture("one", "--num_threads 1").exit_code, 0);
-  ASSERT_EQ(Texture("three", "--num_threads 3").exit_code, 0);
-  for (const char* name : {"model.ply", "model.glb", "texture.png", "model.rtpi"}) {
+  ASSERT_EQ(Texture("one", "--num_threads 1 --Mesh.max_triangles 9000").exit_code, 0);
+  ASSERT_EQ(Texture("three", "--num_threads 3 --Mesh.max_triangles 9000").exit_code, 0);
+  for (const char* name :
+       {"model.ply", "model.glb", "model_web.glb", "texture.png", "model.rtpi"}) {
     EXPECT_EQ(ReadBytes(Path("one/") + name), ReadBytes(Path("three/") + name)) << name;
   }
 }
@@ -519,7 +520,8 @@ TEST_F(TextureCommand, WritesObjFilesBesideTheOthers) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Scan mesh = ReadScan(Path("obj/model.obj"), {});
   const PlyVertices ply = ReadPly(Path("obj/model.ply"));
-  ASSERT_EQ(mesh.points.size(), ply.points.size());
+  EXPECT_LE(mesh.points.size(), ply.points.size());  // those of triangles
+  EXPECT_GT(mesh.points.size(), 0.95 * ply.points.size());
   EXPECT_EQ(mesh.up, Eigen::Vector3d::UnitY());
   EXPECT_EQ(cv::imread(Path("obj/model_0.jpg")).cols, 501);
   EXPECT_EQ(LoadGlb(Path("obj/model.glb")).images.at(0).mimeType, "image/jpeg");

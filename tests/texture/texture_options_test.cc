@@ -6,6 +6,7 @@
 #include "tests/support/run_command.h"
 #include "texture/colorize.h"
 #include "texture/output/write_glb.h"
+#include "texture/output/write_web_glb.h"
 
 namespace roomtex {
 namespace {
@@ -16,12 +17,13 @@ constexpr char kArguments[] =
 TEST(TextureCommandOptions, AreListedAndChecked) {
   ColorizeOptions o;
   GlbOptions glb;
+  WebOptions web;
   ScanReaderOptions reader;
   ExpectChecksItsOptions(
       "roomtex-texture", kArguments,
-      {FieldsOf(&reader), FieldsOf(&o), FieldsOf(&o.atlas), FieldsOf(&glb), FieldsOf(&o.exposure),
-       FieldsOf(&o.registration), FieldsOf(&o.occlusion), FieldsOf(&o.blend), FieldsOf(&o.detail),
-       FieldsOf(&o.surface), FieldsOf(&o.mesh)});
+      {FieldsOf(&reader), FieldsOf(&o), FieldsOf(&o.atlas), FieldsOf(&glb), FieldsOf(&web),
+       FieldsOf(&o.exposure), FieldsOf(&o.registration), FieldsOf(&o.occlusion), FieldsOf(&o.blend),
+       FieldsOf(&o.detail), FieldsOf(&o.surface), FieldsOf(&o.mesh)});
 }
 
 TEST(TextureCommandOptions, ScaleIsANumberOrAuto) {

@@ -82,6 +82,7 @@ std::vector<TexturedPart> SplitGrid(const Scan& scan, const ColoredScan& colored
       part.first_row = down.First(i) * scale;
       part.width = samples_across * scale;
       part.height = down.Length(i) * scale;
+      part.texels_per_sample = scale;
       local.assign(static_cast<size_t>(down.Length(i)) * samples_across, -1);
     }
     for (int k = 0; k < 3; ++k) {

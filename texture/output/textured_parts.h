@@ -20,6 +20,7 @@ struct TexturedPart {
   // before the grid and end behind it.
   int page = -1;
   int first_column = 0, first_row = 0, width = 0, height = 0;
+  int texels_per_sample = 1;  // of a grid
 };
 
 // Parts in grid order, or page by page; none for a scan that has neither a grid nor an atlas. A

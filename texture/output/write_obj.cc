@@ -41,10 +41,24 @@ class TextSink {
   std::string text_;
 };
 
-void WriteVertices(const Scan& scan, const ColoredScan& colored, bool with_colors, TextSink* sink) {
+// Number of every sample's vertex, from 1 as OBJ counts; 0 = no part uses it. Advances *next.
+std::vector<size_t> NumberVertices(size_t num_points, const std::vector<TexturedPart>& parts,
+                                   size_t* next) {
+  std::vector<size_t> numbers(num_points, 0);
+  for (const TexturedPart& part : parts) {
+    for (const int vertex : part.vertices) numbers[vertex] = 1;
+  }
+  for (size_t& number : numbers) {
+    if (number > 0) number = (*next)++;
+  }
+  return numbers;
+}
+
+void WriteVertices(const Scan& scan, const ColoredScan& colored, const std::vector<size_t>& numbers,
+                   bool with_colors, TextSink* sink) {
   constexpr int kMicrometres = 6;
   for (size_t i = 0; i < scan.points.size(); ++i) {
-    if (scan.IsMissing(static_cast<int>(i))) continue;
+    if (numbers[i] == 0) continue;
     *sink << "v";
     for (int k = 0; k < 3; ++k) (*sink << " ").Number(scan.points[i][k], kMicrometres);
     if (with_colors) {
@@ -54,13 +68,17 @@ void WriteVertices(const Scan& scan, const ColoredScan& colored, bool with_color
   }
 }
 
-// Number of every sample's vertex, from 1 as OBJ counts; advances *next.
-std::vector<size_t> NumberVertices(const Scan& scan, size_t* next) {
-  std::vector<size_t> numbers(scan.points.size(), 0);
-  for (size_t i = 0; i < numbers.size(); ++i) {
-    if (!scan.IsMissing(static_cast<int>(i))) numbers[i] = (*next)++;
+void WriteFaces(const TexturedPart& part, const std::vector<size_t>& numbers, size_t first_uv,
+                TextSink* sink) {
+  for (size_t i = 0; i < part.corners.size(); i += 3) {
+    *sink << "f";
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t corner = part.corners[i + k];
+      (*sink << " ").Number(numbers[part.vertices[corner]]);
+      if (!part.uv.empty()) (*sink << "/").Number(first_uv + corner);
+    }
+    *sink << "\n";
   }
-  return numbers;
 }
 
 void WriteImage(const cv::Mat& image, bool jpeg, const std::string& path) {
@@ -70,7 +88,7 @@ void WriteImage(const cv::Mat& image, bool jpeg, const std::string& path) {
 }  // namespace
 
 void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                     const GlbOptions& images,
+                     const std::vector<std::vector<TexturedPart>>& parts, bool jpeg,
                      const std::function<std::string(const std::string&)>& file_path) {
   OutputFile obj(file_path("model.obj")), mtl(file_path("model.mtl"));
   mtl.stream() << "# roomtex-texture: photos on the scan; they hold the light already\n";
@@ -83,39 +101,26 @@ void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredSc
     sink << "\nmtllib model.mtl\n";
     size_t next_vertex = 1, next_uv = 1;
     for (size_t s = 0; s < scans.size(); ++s) {
-      const std::vector<TexturedPart> parts =
-          MakeTexturedParts(scans[s], colored[s], images.max_texture_size);
       const bool textured = scans[s].organised || !colored[s].atlas.empty();
       (sink << "o scan_").Number(s) << "\n";
-      WriteVertices(scans[s], colored[s], !textured, &sink);
-      const std::vector<size_t> number = NumberVertices(scans[s], &next_vertex);
-      for (const TexturedPart& part : parts) {
-        const std::string name = "model_" + std::to_string(num_images++);
-        const std::string image = name + (images.jpeg ? ".jpg" : ".png");
-        WriteImage(PartImage(scans[s], colored[s], part), images.jpeg, file_path(image));
-        mtl.stream() << "newmtl " << name << "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd "
-                     << image << "\n";
-        sink << "usemtl " << name << "\n";
+      const std::vector<size_t> numbers =
+          NumberVertices(scans[s].points.size(), parts[s], &next_vertex);
+      WriteVertices(scans[s], colored[s], numbers, !textured, &sink);
+      for (const TexturedPart& part : parts[s]) {
+        if (textured) {
+          const std::string name = "model_" + std::to_string(num_images++);
+          const std::string image = name + (jpeg ? ".jpg" : ".png");
+          WriteImage(PartImage(scans[s], colored[s], part), jpeg, file_path(image));
+          mtl.stream() << "newmtl " << name << "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd "
+                       << image << "\n";
+          sink << "usemtl " << name << "\n";
+        }
         for (const Eigen::Vector2f& uv : part.uv) {  // OBJ counts rows from below
           (sink << "vt ").Number(uv.x(), 7) << " ";
           sink.Number(1.0 - uv.y(), 7) << "\n";
         }
-        for (size_t i = 0; i < part.corners.size(); i += 3) {
-          sink << "f";
-          for (size_t k = 0; k < 3; ++k) {
-            const uint32_t corner = part.corners[i + k];
-            (sink << " ").Number(number[part.vertices[corner]]) << "/";
-            sink.Number(next_uv + corner);
-          }
-          sink << "\n";
-        }
+        WriteFaces(part, numbers, next_uv, &sink);
         next_uv += part.uv.size();
-      }
-      if (textured) continue;
-      for (const Triangle& t : colored[s].triangles) {
-        sink << "f";
-        for (const int corner : t) (sink << " ").Number(number[corner]);
-        sink << "\n";
       }
     }
   }

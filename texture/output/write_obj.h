@@ -6,18 +6,18 @@
 #include <vector>
 
 #include "core/scan.h"
-#include "texture/output/write_glb.h"
+#include "texture/output/textured_parts.h"
 #include "texture/texels/colored_scan.h"
 
 namespace roomtex {
 
-// Wavefront OBJ of all scans: model.obj, model.mtl and a texture image for each part of
-// textured_parts.h, model_0.png ... (or .jpg). Vertices are those of model.ply, in its order, in
-// the `scan` frame: no axis is turned; a comment names the one that points up. A mesh without grid
-// and atlas has its colours behind the coordinates, as MeshLab and Blender read them. file_path:
-// where to write the file of a name. Throws InputError if it cannot be written.
+// Wavefront OBJ of all scans: model.obj, model.mtl and a texture image for each of `parts`
+// (decimate_parts.h), model_0.png ... (or .jpg). Vertices are those of model.ply that the parts
+// use, in its order, in the `scan` frame: no axis is turned; a comment names the one that points
+// up. A part without an image has its colours behind the coordinates, as MeshLab and Blender read
+// them. file_path: where to write the file of a name. Throws InputError if it cannot be written.
 void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                     const GlbOptions& images,
+                     const std::vector<std::vector<TexturedPart>>& parts, bool jpeg,
                      const std::function<std::string(const std::string&)>& file_path);
 
 }  // namespace roomtex

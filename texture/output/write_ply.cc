@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "core/output_file.h"
+#include "core/scan_mesh.h"
 
 namespace roomtex {
 namespace {
@@ -60,7 +61,7 @@ bool NeedsDoubleCoordinates(const std::vector<Scan>& scans) {
 }
 
 void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                     const std::string& path) {
+                     const std::string& path, bool with_normals) {
   size_t num_vertices = 0, num_faces = 0;
   for (size_t s = 0; s < scans.size(); ++s) {
     num_vertices += scans[s].points.size() - scans[s].NumMissing();
@@ -74,6 +75,7 @@ void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredSc
                 << CommentsOf(scans) << "element vertex " << num_vertices << "\nproperty " << type
                 << " x\nproperty " << type << " y\nproperty " << type << " z\nproperty uchar red\n"
                 << "property uchar green\nproperty uchar blue\nproperty uchar views\n"
+                << (with_normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "")
                 << "element face " << num_faces
                 << "\nproperty list uchar int vertex_indices\nend_header\n";
   {
@@ -83,6 +85,8 @@ void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredSc
     for (size_t s = 0; s < scans.size(); ++s) {
       const Scan& scan = scans[s];
       vertex_of[s].assign(scan.points.size(), -1);
+      std::vector<Eigen::Vector3f> normals;
+      if (with_normals) normals = VertexNormals(scan, colored[s].triangles);
       for (size_t i = 0; i < scan.points.size(); ++i) {
         if (scan.IsMissing(static_cast<int>(i))) continue;
         vertex_of[s][i] = next++;
@@ -91,6 +95,7 @@ void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredSc
         }
         for (uint8_t value : colored[s].samples.rgb[i]) sink.Put(value);
         sink.Put(colored[s].samples.views[i]);
+        for (int k = 0; with_normals && k < 3; ++k) sink.Put(normals[i][k]);
         sink.EndOfRecord();
       }
     }

@@ -1,6 +1,9 @@
 // A model.glb of roomtex-texture as a mesh with texture images, in the scan frame.
 
 #include <cstring>
+#include <fstream>
+#include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
@@ -10,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "texture/render/mesh_renderer.h"
+#include "texture/render/unpack_glb.h"
 
 namespace roomtex {
 namespace {
@@ -19,30 +23,67 @@ InputError NotOurs(const std::string& path) {
           "Give a model.glb of roomtex-texture; roomtex-view shows others"};
 }
 
-template <typename T>
-constexpr int kComponentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
-template <>
-constexpr int kComponentType<uint32_t> = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+// One accessor, its numbers as doubles: floats, or integers as model_web.glb has them (normalised
+// ones from 0 to 1).
+class Elements {
+ public:
+  // Checks the bounds.
+  Elements(const tinygltf::Model& model, int number, int min_components, const std::string& path)
+      : accessor_(model.accessors.at(number)) {
+    const tinygltf::BufferView& view = model.bufferViews.at(accessor_.bufferView);
+    const std::vector<unsigned char>& bytes = model.buffers.at(view.buffer).data;
+    const int size = SizeOf(accessor_.componentType);
+    const int components = tinygltf::GetNumComponentsInType(accessor_.type);
+    if (size == 0 || components < min_components) throw NotOurs(path);
+    const size_t packed = static_cast<size_t>(size) * components;
+    stride_ = view.byteStride > 0 ? view.byteStride : packed;
+    const size_t begin = view.byteOffset + accessor_.byteOffset;
+    if (stride_ < packed) throw NotOurs(path);
+    if (begin > bytes.size() ||
+        (accessor_.count > 0 &&
+         (packed > bytes.size() - begin ||
+          accessor_.count - 1 > (bytes.size() - begin - packed) / stride_))) {
+      throw InputError(path, "", "holds less than it says", "Write it again");
+    }
+    begin_ = bytes.data() + begin;
+  }
 
-// The elements of an accessor, tightly packed as the writer packs them; checks the bounds.
-template <typename T>
-const T* Elements(const tinygltf::Model& model, int number, int components, size_t* count,
-                  const std::string& path) {
-  const tinygltf::Accessor& accessor = model.accessors.at(number);
-  if (accessor.componentType != kComponentType<T> ||
-      tinygltf::GetNumComponentsInType(accessor.type) != components) {
-    throw NotOurs(path);
+  size_t count() const { return accessor_.count; }
+  double At(size_t element, int component) const {
+    const unsigned char* at = begin_ + element * stride_;
+    switch (accessor_.componentType) {
+      case TINYGLTF_COMPONENT_TYPE_FLOAT:
+        return Value<float>(at, component);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+        return Value<uint32_t>(at, component);
+      default:
+        return Value<uint16_t>(at, component) / (accessor_.normalized ? 65535.0 : 1.0);
+    }
   }
-  const tinygltf::BufferView& view = model.bufferViews.at(accessor.bufferView);
-  if (view.byteStride != 0 && view.byteStride != components * sizeof(T)) throw NotOurs(path);
-  const std::vector<unsigned char>& bytes = model.buffers.at(view.buffer).data;
-  *count = accessor.count;
-  const size_t begin = view.byteOffset + accessor.byteOffset;
-  if (begin > bytes.size() || accessor.count > (bytes.size() - begin) / (components * sizeof(T))) {
-    throw InputError(path, "", "holds less than it says", "Write it again");
+
+ private:
+  static int SizeOf(int component_type) {
+    switch (component_type) {
+      case TINYGLTF_COMPONENT_TYPE_FLOAT:
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+        return 4;
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+        return 2;
+      default:
+        return 0;
+    }
   }
-  return reinterpret_cast<const T*>(bytes.data() + begin);
-}
+  template <typename T>
+  static double Value(const unsigned char* at, int component) {
+    T value;
+    std::memcpy(&value, at + component * sizeof value, sizeof value);
+    return static_cast<double>(value);
+  }
+
+  const tinygltf::Accessor& accessor_;
+  size_t stride_ = 0;
+  const unsigned char* begin_ = nullptr;
+};
 
 cv::Mat ImageOf(const tinygltf::Image& image, const std::string& path) {
   if (image.width <= 0 || image.component < 3 || image.bits != 8) {
@@ -56,28 +97,38 @@ cv::Mat ImageOf(const tinygltf::Image& image, const std::string& path) {
 }
 
 void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
-                  const Eigen::Vector3d& translation, const std::string& path, ColoredMesh* mesh) {
-  size_t count = 0, num_corners = 0;
+                  const tinygltf::Node& node, const std::string& path, ColoredMesh* mesh) {
   const auto first = static_cast<int>(mesh->points.size());
-  const float* positions =
-      Elements<float>(model, primitive.attributes.at("POSITION"), 3, &count, path);
+  const auto part = [](const std::vector<double>& values, double other) -> Eigen::Vector3d {
+    if (values.size() != 3) return Eigen::Vector3d::Constant(other);
+    return Eigen::Vector3d(values[0], values[1], values[2]);
+  };
+  const Eigen::Vector3d translation = part(node.translation, 0), scale = part(node.scale, 1);
+  const Elements positions(model, primitive.attributes.at("POSITION"), 3, path);
+  const size_t count = positions.count();
   for (size_t i = 0; i < count; ++i) {
-    mesh->points.push_back(translation +
-                           Eigen::Map<const Eigen::Vector3f>(positions + 3 * i).cast<double>());
+    const Eigen::Vector3d p(positions.At(i, 0), positions.At(i, 1), positions.At(i, 2));
+    mesh->points.push_back(translation + scale.cwiseProduct(p));
   }
   mesh->colors.resize(mesh->points.size(), Eigen::Matrix<uint8_t, 3, 1>::Constant(128));
   mesh->uv.resize(mesh->points.size(), Eigen::Vector2f::Zero());
+  const auto require_count = [&](const Elements& elements) {
+    if (elements.count() != count) throw NotOurs(path);
+  };
   int texture = -1;
   if (primitive.attributes.count("TEXCOORD_0") > 0 && primitive.material >= 0) {
     texture = model.materials.at(primitive.material).pbrMetallicRoughness.baseColorTexture.index;
-    const float* uv =
-        Elements<float>(model, primitive.attributes.at("TEXCOORD_0"), 2, &count, path);
-    std::memcpy(mesh->uv[first].data(), uv, 8 * count);
+    const Elements uv(model, primitive.attributes.at("TEXCOORD_0"), 2, path);
+    require_count(uv);
+    for (size_t i = 0; i < count; ++i) {
+      mesh->uv[first + i] = Eigen::Vector2d(uv.At(i, 0), uv.At(i, 1)).cast<float>();
+    }
   } else if (primitive.attributes.count("COLOR_0") > 0) {
-    const float* light =
-        Elements<float>(model, primitive.attributes.at("COLOR_0"), 3, &count, path);
+    const Elements light(model, primitive.attributes.at("COLOR_0"), 3, path);
+    require_count(light);
     for (size_t i = 0; i < 3 * count; ++i) {
-      mesh->colors[first + i / 3][i % 3] = SrgbByteFromLinear(light[i]);
+      mesh->colors[first + i / 3][i % 3] =
+          SrgbByteFromLinear(static_cast<float>(light.At(i / 3, static_cast<int>(i % 3))));
     }
   } else if (primitive.material >= 0) {
     const std::vector<double>& light =
@@ -86,14 +137,16 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
       mesh->colors[first + i / 3][i % 3] = SrgbByteFromLinear(static_cast<float>(light.at(i % 3)));
     }
   }
-  const uint32_t* corners = Elements<uint32_t>(model, primitive.indices, 1, &num_corners, path);
-  for (size_t i = 0; i + 2 < num_corners; i += 3) {
+  if (primitive.mode == TINYGLTF_MODE_POINTS) return;
+  const Elements corners(model, primitive.indices, 1, path);
+  for (size_t i = 0; i + 2 < corners.count(); i += 3) {
     Triangle triangle;
     for (int k = 0; k < 3; ++k) {
-      triangle[k] = first + static_cast<int>(corners[i + k]);
-      if (triangle[k] >= static_cast<int>(mesh->points.size())) {
+      const double corner = corners.At(i + k, 0);
+      if (!(corner < static_cast<double>(count))) {
         throw InputError(path, "", "has a face that names no vertex", "Write it again");
       }
+      triangle[k] = first + static_cast<int>(corner);
     }
     mesh->triangles.push_back(triangle);
     mesh->texture_of_triangle.push_back(texture < 0 ? -1 : model.textures.at(texture).source);
@@ -104,10 +157,17 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
 
 ColoredMesh ReadTexturedMesh(const std::string& path) {
   RequireFile(path, "Give a model.glb of roomtex-texture");
+  std::ifstream stream(path, std::ios::binary);
+  std::stringstream file;
+  file << stream.rdbuf();
+  const std::string bytes = UnpackGlb(path, file.str());
   tinygltf::TinyGLTF loader;
   tinygltf::Model model;
   std::string error, warning;
-  if (!loader.LoadBinaryFromFile(&model, &error, &warning, path)) {
+  if (bytes.size() > std::numeric_limits<unsigned int>::max() ||
+      !loader.LoadBinaryFromMemory(&model, &error, &warning,
+                                   reinterpret_cast<const unsigned char*>(bytes.data()),
+                                   static_cast<unsigned int>(bytes.size()))) {
     throw InputError(path, "", "is no glTF file that can be read", "Write it again");
   }
   ColoredMesh mesh;
@@ -115,11 +175,8 @@ ColoredMesh ReadTexturedMesh(const std::string& path) {
   try {
     for (const tinygltf::Node& node : model.nodes) {
       if (node.mesh < 0) continue;
-      Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-      if (node.translation.size() == 3)
-        translation = Eigen::Map<const Eigen::Vector3d>(node.translation.data());
       for (const tinygltf::Primitive& primitive : model.meshes.at(node.mesh).primitives) {
-        AddPrimitive(model, primitive, translation, path, &mesh);
+        AddPrimitive(model, primitive, node, path, &mesh);
       }
     }
   } catch (const std::out_of_range&) {  // a number that names nothing

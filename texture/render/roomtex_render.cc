@@ -318,7 +318,8 @@ int main(int argc, char** argv) {
                   "images --folder_path pictures");
   command.AddInputPath("ply_path", &o.ply_path, "model.ply: the colours of the vertices",
                        Command::Kind::kOptional);
-  command.AddInputPath("glb_path", &o.glb_path, "model.glb instead: with its texture images",
+  command.AddInputPath("glb_path", &o.glb_path,
+                       "model.glb or model_web.glb instead: with its texture images",
                        Command::Kind::kOptional);
   command.AddInputPath("input_path", &o.input_path, "COLMAP model in the scan frame");
   command.AddOutputPath("folder_path", &o.folder_path,

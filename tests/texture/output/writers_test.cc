@@ -12,11 +12,14 @@
 #include "importers/ply.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/sampling/two_walls.h"
+#include "texture/output/decimate_parts.h"
 #include "texture/output/textured_parts.h"
 #include "texture/output/write_glb.h"
 #include "texture/output/write_obj.h"
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
+#include "texture/output/write_web_glb.h"
+#include "texture/render/mesh_renderer.h"
 #include "texture/render/ply_vertices.h"
 #include "texture/texels/gutters.h"
 
@@ -239,6 +242,96 @@ TEST(TexturedParts, HolesArePaintedLikeTheirNeighbours) {
   }
 }
 
+double AreaOf(const Scan& scan, const std::vector<TexturedPart>& parts) {
+  double area = 0;
+  for (const TexturedPart& part : parts) {
+    for (size_t i = 0; i < part.corners.size(); i += 3) {
+      const auto at = [&](size_t k) { return scan.points[part.vertices[part.corners[i + k]]]; };
+      area += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+    }
+  }
+  return area;
+}
+
+// A flat wall with a hole, cut into ten images: wherever a gap opened or triangles overlapped, its
+// area would be another one.
+TEST(DecimateParts, LeavesAsManyAsWantedWithoutGapsAndColoursInPlace) {
+  const LargeWall wall;
+  std::vector<std::vector<TexturedPart>> parts = MakeMeshParts({wall.scan}, {wall.colored}, 256);
+  const double area = AreaOf(wall.scan, parts[0]);
+  ASSERT_GT(CountTriangles(parts), 100000u);
+  DecimateParts({wall.scan}, 5000, 2, &parts);
+  EXPECT_LE(CountTriangles(parts), 5000u);
+  EXPECT_GT(CountTriangles(parts), 3000u);
+  EXPECT_EQ(parts[0].size(), 10u);
+  EXPECT_NEAR(AreaOf(wall.scan, parts[0]), area, 1e-4 * area);
+  for (const TexturedPart& part : parts[0]) {
+    const cv::Mat3b image = PartImage(wall.scan, wall.colored, part);
+    for (size_t v = 0; v < part.vertices.size(); ++v) {
+      const Rgb want = LargeWall::ColorOf(part.vertices[v] % 400, part.vertices[v] / 400);
+      const auto x = static_cast<int>(std::lround(part.uv[v].x() * part.width));
+      const auto y = static_cast<int>(std::lround(part.uv[v].y() * part.height));
+      ASSERT_EQ(image(y, x), cv::Vec3b(want[2], want[1], want[0]));
+    }
+  }
+}
+
+TEST(WriteWebGlb, ThePictureIsThatOfTheWholeMesh) {
+  const TempFolder folder;
+  Scan scan = WallWithHole();
+  for (Eigen::Vector3d& p : scan.points) p += Eigen::Vector3d(500000, 5000000, 100);
+  const ColoredScan colored = ColorByCell(scan);
+  WriteColoredGlb({scan}, {colored}, folder / "full.glb");
+  const ColoredMesh full = ReadTexturedMesh(folder / "full.glb");
+  for (const char* compression : {"meshopt", "none"}) {
+    WebOptions options;
+    options.compression = compression;
+    WriteWebGlb({scan}, {colored}, MakeMeshParts({scan}, {colored}, 4096), folder / "web.glb",
+                options);
+    const ColoredMesh web = ReadTexturedMesh(folder / "web.glb");
+    ASSERT_EQ(web.points.size(), full.points.size());
+    ASSERT_EQ(web.triangles.size(), full.triangles.size());
+    ASSERT_EQ(web.textures.size(), 1u);
+    EXPECT_EQ(web.textures[0].size(), full.textures[0].size());
+    // By their texture coordinates, as the order is another one.
+    std::map<std::pair<int, int>, Eigen::Vector3d> place_of;
+    const auto cell = [](const Eigen::Vector2f& uv) {
+      return std::pair{static_cast<int>(uv.x() * 61), static_cast<int>(uv.y() * 40)};
+    };
+    for (size_t i = 0; i < full.points.size(); ++i) place_of[cell(full.uv[i])] = full.points[i];
+    for (size_t i = 0; i < web.points.size(); ++i) {
+      ASSERT_LT((web.points[i] - place_of.at(cell(web.uv[i]))).norm(), 1e-3);
+    }
+  }
+}
+
+TEST(WriteWebGlb, ABrokenViewIsRefused) {
+  const TempFolder folder;
+  const Scan scan = WallWithHole();
+  const ColoredScan colored = ColorByCell(scan);
+  WriteWebGlb({scan}, {colored}, MakeMeshParts({scan}, {colored}, 4096), folder / "web.glb");
+  std::string bytes = ReadBytes(folder / "web.glb");
+  bytes.replace(bytes.find("\"count\":"), 10, "\"count\":9e9");
+  WriteBytes(folder / "huge.glb", bytes);
+  EXPECT_THROW(ReadTexturedMesh(folder / "huge.glb"), InputError);
+}
+
+TEST(WriteColoredPly, WritesNormalsTowardsTheScanner) {
+  const TempFolder folder;
+  const Scan scan = WallWithHole();
+  const ColoredScan colored = ColorByCell(scan);
+  WriteColoredPly({scan}, {colored}, folder / "n.ply", true);
+  const std::string bytes = ReadBytes(folder / "n.ply");
+  const size_t header = bytes.find("end_header\n") + 11;
+  EXPECT_NE(bytes.find("property uchar views\nproperty float nx\n"), std::string::npos);
+  ASSERT_EQ(bytes.size(), header + 28 * (scan.points.size() - 1) + 13 * colored.triangles.size());
+  Eigen::Vector3f normal;
+  std::memcpy(normal.data(), bytes.data() + header + 16, sizeof normal);
+  EXPECT_NEAR(normal.norm(), 1, 1e-5);
+  const Eigen::Vector3d to_scanner = scan.Station() - scan.points[0];
+  EXPECT_GT(normal.cast<double>().dot(to_scanner), 0);
+}
+
 TEST(WriteColoredGlb, KeepsMillimetresOfGeoreferencedScans) {
   const TempFolder folder;
   Scan scan = WallWithHole();
@@ -264,10 +357,8 @@ TEST(WriteColoredObj, CornersFindTheirColorsAndTheMeshIsTheSame) {
   const TempFolder folder;
   std::filesystem::create_directories(folder / "with spaces");
   const LargeWall wall;
-  GlbOptions options;
-  options.max_texture_size = 512;
-  WriteColoredObj({wall.scan}, {wall.colored}, options,
-                  [&](const std::string& name) { return folder / ("with spaces/" + name); });
+  WriteColoredObj({wall.scan}, {wall.colored}, MakeMeshParts({wall.scan}, {wall.colored}, 512),
+                  false, [&](const std::string& name) { return folder / ("with spaces/" + name); });
   const std::string obj = ReadBytes(folder / "with spaces/model.obj");
   EXPECT_NE(obj.find("the up axis stays the scan's"), std::string::npos);
   std::map<std::string, cv::Mat3b> images;  // by material
@@ -332,7 +423,8 @@ TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
   ColoredScan colored;
   colored.triangles = {{0, 1, 2}};
   colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
-  WriteColoredObj({mesh, mesh}, {colored, colored}, {},
+  WriteColoredObj({mesh, mesh}, {colored, colored},
+                  MakeMeshParts({mesh, mesh}, {colored, colored}, 4096), false,
                   [&](const std::string& name) { return folder / name; });
   const std::string obj = ReadBytes(folder / "model.obj");
   EXPECT_NE(obj.find("v 0.000000 0.000000 0.000000 1.0000 0.0000 0.2000\n"), std::string::npos);
