@@ -14,6 +14,8 @@
 
 namespace roomtex {
 
+class DatabaseFile;
+
 struct DatabaseImage {
   uint32_t image_id = 0;
   uint32_t camera_id = 0;
@@ -94,8 +96,7 @@ class Database {
   const std::string& path() const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<DatabaseFile> file_;
 };
 
 }  // namespace roomtex

@@ -1,0 +1,240 @@
+// Copies of a database, with other cameras or more matches: what COLMAP is given instead of the
+// user's, and what commands write.
+
+#include <algorithm>
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include "colmap_ext/database.h"
+#include "colmap_ext/database_file.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+// Tables as COLMAP up to 3.9 expects them (its documentation of the database format).
+constexpr const char* kTables39[] = {
+    "CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER NOT "
+    "NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, params BLOB, prior_focal_length "
+    "INTEGER "
+    "NOT NULL)",
+    "CREATE TABLE images (image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, name TEXT NOT NULL "
+    "UNIQUE, camera_id INTEGER NOT NULL, prior_qw REAL, prior_qx REAL, prior_qy REAL, prior_qz "
+    "REAL, prior_tx REAL, prior_ty REAL, prior_tz REAL)",
+    "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, cols "
+    "INTEGER NOT NULL, data BLOB)",
+    "CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT "
+    "NULL, "
+    "cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB, qvec BLOB, "
+    "tvec BLOB)"};
+
+std::string QuotedName(const std::string& name) {
+  std::string quoted = "\"";
+  for (const char c : name) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+// Makes a table with these columns and nothing else: no default, check, trigger or index of the
+// other one. COLMAP adds its own indices when it opens a database.
+void MakeTable(const std::string& table, const std::vector<TableColumn>& columns,
+               SQLite::Database* to) {
+  static const std::set<std::string> types = {"INTEGER", "REAL", "BLOB", "TEXT"};
+  std::string definition, keys;
+  const auto num_keys =
+      std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c.key > 0; });
+  for (const TableColumn& column : columns) {
+    definition += (definition.empty() ? "" : ", ") + QuotedName(column.name);
+    if (types.count(column.type) > 0) definition += " " + column.type;
+    if (num_keys == 1 && column.key > 0) definition += " PRIMARY KEY";
+    if (column.not_null) definition += " NOT NULL";
+    if (num_keys > 1 && column.key > 0) {
+      keys += (keys.empty() ? ", PRIMARY KEY (" : ", ") + QuotedName(column.name);
+    }
+  }
+  if (!keys.empty()) keys += ")";
+  to->exec("CREATE TABLE " + QuotedName(table) + " (" + definition + keys + ")");
+}
+
+// Copies the columns that both tables have. insert_verb: "INSERT OR IGNORE" to keep rows that are
+// there.
+void CopyRows(const DatabaseFile& from, const SQLite::Database& to, const std::string& table,
+              const char* insert_verb = "INSERT") {
+  const std::vector<TableColumn> known = ColumnsOf(to, table);
+  std::string names, places;
+  int num_columns = 0;
+  if (!HasTable(from.sqlite(), table)) return;
+  for (const TableColumn& column : ColumnsOf(from.sqlite(), table)) {
+    const auto has_name = [&](const TableColumn& other) { return other.name == column.name; };
+    if (std::none_of(known.begin(), known.end(), has_name)) continue;
+    names += (num_columns == 0 ? "" : ", ") + QuotedName(column.name);
+    places += num_columns == 0 ? "?" : ", ?";
+    ++num_columns;
+  }
+  if (num_columns == 0) return;
+  SQLite::Statement read(from.sqlite(), "SELECT " + names + " FROM \"" + table + "\"");
+  SQLite::Statement insert(to, std::string(insert_verb) + " INTO \"" + table + "\" (" + names +
+                                   ") VALUES (" + places + ")");
+  from.RowIsRead();
+  while (read.executeStep()) {
+    from.RowIsRead();
+    for (int i = 0; i < num_columns; ++i) {
+      const SQLite::Column value = read.getColumn(i);
+      if (value.isNull()) {
+        insert.bind(i + 1);
+      } else if (value.isInteger()) {
+        insert.bind(i + 1, value.getInt64());
+      } else if (value.isFloat()) {
+        insert.bind(i + 1, value.getDouble());
+      } else if (value.isBlob()) {
+        insert.bindNoCopy(i + 1, value.getBlob(), value.getBytes());
+      } else {
+        insert.bind(i + 1, value.getString());
+      }
+    }
+    insert.exec();
+    insert.reset();
+  }
+}
+
+// COLMAP's tables of `from` in `to`, with their rows where `with_rows` says so.
+template <typename WithRows>
+void CopyTables(const DatabaseFile& from, SQLite::Database* to, const WithRows& with_rows) {
+  SQLite::Statement version(from.sqlite(), "PRAGMA user_version");
+  version.executeStep();
+  to->exec("PRAGMA user_version = " + std::to_string(version.getColumn(0).getInt()));
+  for (const std::string& table : KnownTables()) {
+    if (!HasTable(from.sqlite(), table)) continue;
+    MakeTable(table, ColumnsOf(from.sqlite(), table), to);
+    if (with_rows(table)) CopyRows(from, *to, table);
+  }
+}
+
+void RequireSameFeatures(const Database& copy, const std::string& path,
+                         const std::map<uint32_t, DatabaseImage>& images,
+                         const std::map<uint32_t, size_t>& keypoints) {
+  const char* const remedy = "Give copies that were made of it after colmap feature_extractor";
+  const std::map<uint32_t, DatabaseImage> others = copy.ReadImages();
+  if (others.size() != images.size()) {
+    throw InputError(copy.path(), "",
+                     "has " + std::to_string(others.size()) + " photos, " + path + " has " +
+                         std::to_string(images.size()),
+                     remedy);
+  }
+  const std::map<uint32_t, size_t> other_keypoints = copy.CountKeypoints();
+  const auto count = [](const std::map<uint32_t, size_t>& counts, uint32_t image_id) {
+    const auto found = counts.find(image_id);
+    return found == counts.end() ? size_t{0} : found->second;
+  };
+  for (const auto& [image_id, image] : images) {
+    const auto other = others.find(image_id);
+    if (other != others.end() && other->second.name == image.name &&
+        count(other_keypoints, image_id) == count(keypoints, image_id)) {
+      continue;
+    }
+    throw InputError(copy.path(), "image " + std::to_string(image_id),
+                     "is not " + Quoted(image.name) + " with the keypoints that it has in " + path,
+                     remedy);
+  }
+}
+
+}  // namespace
+
+void Database::CopyForMapper(const std::string& path, Schema schema) const {
+  file_->Guarded([&] {
+    SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    copy.exec("PRAGMA journal_mode = OFF");
+    copy.exec("PRAGMA synchronous = OFF");
+    SQLite::Transaction transaction(copy);
+    if (schema == Schema::kColmap39) {
+      for (const char* table : kTables39) copy.exec(table);
+      for (const char* table : {"cameras", "images", "keypoints", "two_view_geometries"}) {
+        CopyRows(*file_, copy, table);
+      }
+    } else {
+      CopyTables(*file_, &copy, [](const std::string& table) {
+        return table != "descriptors" && table != "matches";
+      });
+    }
+    transaction.commit();
+  });
+}
+
+void Database::CopyWithCameras(const std::string& path,
+                               const std::map<uint32_t, Camera>& cameras) const {
+  file_->Guarded([&] {
+    SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    copy.exec("PRAGMA journal_mode = MEMORY");  // no file beside it
+    SQLite::Transaction transaction(copy);
+    CopyTables(*file_, &copy, [](const std::string&) { return true; });
+    SQLite::Statement update(copy,
+                             "UPDATE cameras SET model = ?, width = ?, height = ?, params = ?, "
+                             "prior_focal_length = ? WHERE camera_id = ?");
+    for (const auto& [camera_id, camera] : cameras) {
+      update.bind(1, static_cast<int>(camera.model));
+      update.bind(2, camera.width);
+      update.bind(3, camera.height);
+      update.bindNoCopy(4, camera.params.data(),
+                        static_cast<int>(camera.params.size() * sizeof(double)));
+      update.bind(5, camera.has_prior_focal_length ? 1 : 0);
+      update.bind(6, static_cast<int64_t>(camera_id));
+      update.exec();
+      update.reset();
+    }
+    transaction.commit();
+  });
+}
+
+void Database::CopyWithMatches(const std::string& path,
+                               const std::vector<const Database*>& copies) const {
+  const std::map<uint32_t, DatabaseImage> images = ReadImages();
+  const std::map<uint32_t, size_t> keypoints = CountKeypoints();
+  for (const Database* const copy : copies)
+    RequireSameFeatures(*copy, this->path(), images, keypoints);
+  file_->Guarded([&] {
+    SQLite::Database merged(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    merged.exec("PRAGMA journal_mode = MEMORY");  // no file beside it
+    SQLite::Transaction transaction(merged);
+    CopyTables(*file_, &merged, [](const std::string&) { return true; });
+    for (const Database* const copy : copies) {
+      copy->file_->Guarded([&] {
+        for (const char* table : {"matches", "two_view_geometries"}) {
+          CopyRows(*copy->file_, merged, table, "INSERT OR IGNORE");
+        }
+      });
+    }
+    transaction.commit();
+  });
+}
+
+bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
+                          const std::map<uint32_t, DatabaseImage>& images) {
+  SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
+  if (copy.tableExists("rigs")) return false;
+  SQLite::Transaction transaction(copy);
+  copy.exec("DELETE FROM cameras");
+  SQLite::Statement add(copy,
+                        "INSERT INTO cameras(camera_id, model, width, height, params, "
+                        "prior_focal_length) VALUES(?, ?, ?, ?, ?, ?)");
+  for (const auto& [camera_id, camera] : cameras) {
+    add.bind(1, static_cast<int64_t>(camera_id));
+    add.bind(2, static_cast<int>(camera.model));
+    add.bind(3, camera.width);
+    add.bind(4, camera.height);
+    add.bindNoCopy(5, camera.params.data(),
+                   static_cast<int>(camera.params.size() * sizeof(double)));
+    add.bind(6, camera.has_prior_focal_length ? 1 : 0);
+    add.exec();
+    add.reset();
+  }
+  SQLite::Statement update(copy, "UPDATE images SET camera_id = ? WHERE image_id = ?");
+  for (const auto& [image_id, image] : images) {
+    update.bind(1, static_cast<int64_t>(image.camera_id));
+    update.bind(2, static_cast<int64_t>(image_id));
+    update.exec();
+    update.reset();
+  }
+  transaction.commit();
+  return true;
+}
+
+}  // namespace roomtex
