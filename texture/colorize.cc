@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include <fmt/core.h>
@@ -219,8 +220,8 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
 void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                       const ColorizeOptions& options, int num_threads,
                       std::vector<SmoothedScan>* surfaces, PhotoPassInput* input,
-                      Progress* progress, ColorizeResult* result) {
-  const TexelPassOptions texels{options.occlusion, options.blend, options.detail,
+                      const PhotoChoice* choice, Progress* progress, ColorizeResult* result) {
+  const TexelPassOptions texels{options.occlusion, options.blend, options.detail, choice,
                                 1e6 * options.texture_memory_mb};
   // A mesh has no spacing of samples that says how fine a depth map must be.
   TexelPassOptions on_mesh = texels;
@@ -316,11 +317,17 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   }
 
   progress->Stage("blend");
+  const PhotoChoice choice =
+      ChoosePhotos(input, store, result.exposure.gains, photos, options.blend, num_threads);
+  std::vector<int> numbers(photos.size());
+  std::iota(numbers.begin(), numbers.end(), 0);
   for (size_t s = 0; s < scans.size(); ++s) {
     ColoredScan colored;
-    colored.samples = GridColorizer(input, store, result.exposure.gains, options.blend,
-                                    options.detail, num_threads)
-                          .Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
+    GridColorizer colorizer(input, store, result.exposure.gains, options.blend, options.detail,
+                            num_threads);
+    colorizer.SetChoice(&choice, numbers);
+    colored.samples =
+        colorizer.Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
     colored.disagreement =
         Disagreements(grids[s], input, store, result.exposure.gains, num_threads);
     colored.triangles = std::move(surfaces[s].triangles);
@@ -346,7 +353,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     store = ObservationStore(0, 1);
     input.samples = {};
     progress->Stage("texture");
-    ColorizeTextures(scans, photos, options, num_threads, &surfaces, &input, progress, &result);
+    ColorizeTextures(scans, photos, options, num_threads, &surfaces, &input,
+                     choice.empty() ? nullptr : &choice, progress, &result);
   }
   return result;
 }

@@ -47,6 +47,12 @@ bool TwoAgree(const Eigen::Vector3f* roots, int count) {
 }  // namespace
 
 void BlendOptions::Declare(OptionFields* fields) {
+  fields->Choice(
+      "Blend.mode", &mode, {"auto", "average", "select"},
+      "Where the detail of a place comes from: average, the photos that see it together; "
+      "select, one of them, chosen with its neighbours so that seams lie where photos "
+      "agree; auto, one of them as far as they disagree. With Blend.detail 1 it is of no "
+      "effect.");
   fields
       ->Int("Blend.max_views", &max_views,
             "Photos blended per sample, the best ones. Larger = smoother; 8 bytes a sample "

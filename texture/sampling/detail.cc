@@ -80,8 +80,11 @@ void PreserveDetail(const Scan& scan, const GridLinks& links, const DominantMap&
                     const DetailOptions& options, int num_threads,
                     std::vector<Eigen::Vector3f>* blend) {
   if (!scan.organised) return;
-  const std::vector<uint8_t> borders =
-      DominanceBorders(scan.num_columns, scan.num_rows, dominant.photo, options.border);
+  const std::vector<float>& strength = dominant.strength;
+  std::vector<uint8_t> borders;
+  if (strength.empty()) {
+    borders = DominanceBorders(scan.num_columns, scan.num_rows, dominant.photo, options.border);
+  }
   // H is linear: H(C) - H(M) = H(C - M), one convolution.
   std::vector<Eigen::Vector3f> low(blend->size());
   for (size_t i = 0; i < low.size(); ++i) low[i] = dominant.color[i] - (*blend)[i];
@@ -89,9 +92,10 @@ void PreserveDetail(const Scan& scan, const GridLinks& links, const DominantMap&
   BlurAlong(scan, links, false, dominant.fits, kernel, num_threads, &low);
   BlurAlong(scan, links, true, dominant.fits, kernel, num_threads, &low);
   for (size_t i = 0; i < low.size(); ++i) {
-    if (dominant.fits[i] == 0 || borders[i] != 0) continue;
+    if (dominant.fits[i] == 0 || (strength.empty() && borders[i] != 0)) continue;
+    const float share = strength.empty() ? 1 : strength[i];
     const Eigen::Vector3f detail = dominant.color[i] - (*blend)[i] - low[i];
-    (*blend)[i] = ((*blend)[i] + detail).cwiseMax(0);
+    (*blend)[i] = ((*blend)[i] + share * detail).cwiseMax(0);
   }
 }
 

@@ -33,6 +33,9 @@ struct DominantMap {
   std::vector<Eigen::Vector3f> color;  // C = M_S
   std::vector<int16_t> photo;          // S
   std::vector<uint8_t> fits;           // 0 = no detail from this sample
+  // Share of the detail that is put in place of the blend's; it changes softly, and so borders are
+  // left alone. Empty: all of it, but none at borders.
+  std::vector<float> strength;
 };
 
 // Adds the detail to `blend` (M, linear light, one per grid cell):

@@ -57,6 +57,41 @@ GridColorizer::BlendedGrid GridColorizer::Blend(const GridOfSamples& grid) const
   return result;
 }
 
+// The photos chosen in place of the dominant ones.
+void GridColorizer::Choose(const GridOfSamples& grid, BlendedGrid* blended) const {
+  DominantMap& dominant = blended->dominant;
+  dominant.fits.assign(blended->blend.size(), 0);
+  dominant.strength.assign(blended->blend.size(), 0.0f);
+  const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
+  ParallelFor(num_threads_, first, end, [&](int t) {
+    const SampleTile& tile = input_.samples[t];
+    const PointBlock& points = tile.points;
+    PhotoChoice::Reader reader(*choice_);
+    for (int i = 0; i < points.size(); ++i) {
+      const int index = tile.index[i];
+      if (dominant.photo[index] < 0) continue;
+      const Eigen::Vector3f point(points.x[i], points.y[i], points.z[i]);
+      const PhotoChoice::Place& place = reader.At(points.origin + point.cast<double>());
+      if (!(place.strength > 0)) continue;
+      const size_t slot = static_cast<size_t>(tile.first_slot) + i;
+      const Observation* seen = store_.Begin(slot);
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      float shares = 0;
+      for (int k = 0; k < store_.Count(slot) && MayGiveDetail(seen[k], seen[0]); ++k) {
+        for (int p = 0; p < place.count; ++p) {
+          if (numbers_[place.photos[p]] != seen[k].photo) continue;
+          shares += place.shares[p];
+          sum += place.shares[p] * UnpackColor(seen[k].color).cwiseProduct(gains_[seen[k].photo]);
+        }
+      }
+      if (!(shares > 0)) continue;
+      dominant.color[index] = sum / shares;
+      dominant.fits[index] = 1;
+      dominant.strength[index] = place.strength;
+    }
+  });
+}
+
 ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& blended,
                                 const std::vector<Rgb>& unseen) const {
   const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
@@ -89,8 +124,10 @@ ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& bl
 ColorGrid GridColorizer::Colorize(const GridOfSamples& grid, const GridLinks& links,
                                   const std::vector<Rgb>& unseen) const {
   BlendedGrid blended = Blend(grid);
-  if (blend_.detail && grid.num_rows > 1) {
+  const bool is_chosen = choice_ != nullptr && !choice_->empty();
+  if ((blend_.detail || is_chosen) && grid.num_rows > 1) {
     const CpuTimer timer(CpuStage::kDetail, CpuTimer::Scope::kProcess);
+    if (is_chosen) Choose(grid, &blended);
     Scan shape;
     shape.num_columns = grid.num_columns;
     shape.num_rows = grid.num_rows;

@@ -10,6 +10,7 @@
 #include "texture/sampling/blend.h"
 #include "texture/sampling/detail.h"
 #include "texture/sampling/observations.h"
+#include "texture/sampling/photo_choice.h"
 #include "texture/sampling/photo_pass.h"
 
 namespace roomtex {
@@ -51,6 +52,13 @@ class GridColorizer {
         detail_(detail),
         num_threads_(num_threads) {}
 
+  // Detail comes from the photos chosen; null: from all. choice must outlive this. numbers: of its
+  // photos in `gains` and the store; -1 = not there.
+  void SetChoice(const PhotoChoice* choice, std::vector<int> numbers) {
+    choice_ = choice;
+    numbers_ = std::move(numbers);
+  }
+
   // links: neighbours on one surface; without any (all 0) there is no preservation of details.
   // unseen: colour per cell that no photo sees; empty = black.
   ColorGrid Colorize(const GridOfSamples& grid, const GridLinks& links,
@@ -59,6 +67,7 @@ class GridColorizer {
  private:
   struct BlendedGrid;
   BlendedGrid Blend(const GridOfSamples& grid) const;
+  void Choose(const GridOfSamples& grid, BlendedGrid* blended) const;
   ColorGrid Encode(const GridOfSamples& grid, const BlendedGrid& blended,
                    const std::vector<Rgb>& unseen) const;
 
@@ -68,6 +77,8 @@ class GridColorizer {
   const BlendOptions& blend_;
   const DetailOptions& detail_;
   int num_threads_;
+  const PhotoChoice* choice_ = nullptr;
+  std::vector<int> numbers_;
 };
 
 }  // namespace roomtex

@@ -18,9 +18,10 @@ constexpr int kTileRows = 32;
 std::vector<Band> SplitIntoBands(const TexelSource& source, const TexelPassOptions& options) {
   const int rows = source.num_rows();
   // Three sigmas of the Gaussian, the borders of dominance and their neighbours.
-  const int halo = options.blend.detail ? static_cast<int>(std::ceil(3 * options.detail.sigma)) +
-                                              options.detail.border + 2
-                                        : 0;
+  const bool has_detail = options.blend.detail || options.choice != nullptr;
+  const int halo =
+      has_detail ? static_cast<int>(std::ceil(3 * options.detail.sigma)) + options.detail.border + 2
+                 : 0;
   const double bytes_per_row = BytesPerTexel(options.blend) * source.num_columns();
   const double fitting = options.max_bytes / bytes_per_row - 2 * halo;
   const int most = static_cast<int>(std::clamp(fitting, std::max(16.0, 2.0 * halo), 1e9));
@@ -62,7 +63,9 @@ ColorGrid ColorizeBand(const TexelSource& source, const Band& band,
   block.normals = {};
   std::vector<PhotoView> band_photos;
   std::vector<Eigen::Vector3f> band_gains;
+  std::vector<int> numbers(photos.size(), -1);  // in the band
   for (int i : PhotosThatMaySee(photos, input.samples)) {
+    numbers[i] = static_cast<int>(band_photos.size());
     band_photos.push_back(photos[i]);
     band_gains.push_back(gains[i]);
   }
@@ -71,8 +74,9 @@ ColorGrid ColorizeBand(const TexelSource& source, const Band& band,
   ObservePhotos(input, band_photos, options.occlusion, options.blend, num_threads, progress,
                 &store);
   input.occluders.swap(scene->occluders);
-  return GridColorizer(input, store, band_gains, options.blend, options.detail, num_threads)
-      .Colorize(grid, block.links, block.unseen);
+  GridColorizer colorizer(input, store, band_gains, options.blend, options.detail, num_threads);
+  colorizer.SetChoice(options.choice, std::move(numbers));
+  return colorizer.Colorize(grid, block.links, block.unseen);
 }
 
 // In samples: what the options say; in texels: what the filters of the image need.
@@ -89,7 +93,7 @@ TexelPassOptions InTexels(TexelPassOptions options, double texels_per_sample) {
 double BytesPerTexel(const BlendOptions& blend) {
   // The block's and the tiles' places and normals, what one photo sees, blend and detail, beside
   // the observations.
-  return 110 + 8.0 * blend.max_views;
+  return 110 + 8.0 * blend.max_views + (blend.mode == "average" ? 0 : 4);
 }
 
 ColorGrid ColorizeTexels(const TexelSource& source, const std::vector<PhotoView>& photos,

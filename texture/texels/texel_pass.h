@@ -38,7 +38,8 @@ struct TexelPassOptions {
   OcclusionOptions occlusion;
   BlendOptions blend;
   DetailOptions detail;
-  double max_bytes = 2e9;  // of the working memory, the finished image not counted
+  const PhotoChoice* choice = nullptr;  // of photos whose detail is taken; null = of all
+  double max_bytes = 2e9;               // of the working memory, the finished image not counted
 };
 
 // Working memory per texel of a band, bytes.
