@@ -30,7 +30,7 @@ class SiteWorkflow : public testing::Test {
     const std::string site = ROOMTEX_SITE_FOLDER;
     CommandResult result = RunProgram(
         "snakemake -s " + site + "/Snakefile --profile " + site + "/local --directory " +
-        folder_.path() + " --cores 2 --config photos_per_part=5 'options=--quality low' bin=" +
+        folder_.path() + " --cores 2 --config photos_per_part=6 'options=--quality low' bin=" +
         BinFolder() + " " + more);
     result.err += result.out;
     return result;
@@ -48,7 +48,7 @@ class SiteWorkflow : public testing::Test {
 TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
   Simulate(
       "a",
-      "--random_seed 1 --num_photos 10 --photo_width 480 --photo_height 320 --scan_columns 500 "
+      "--random_seed 1 --num_photos 12 --photo_width 640 --photo_height 427 --scan_columns 500 "
       "--scan_rows 200");
   Simulate("b",
            "--random_seed 9 --num_photos 3 --photo_width 240 --photo_height 160 --scan_columns 200 "
@@ -69,7 +69,7 @@ TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
   // The step matches found all its pairs matched by the two parts, which are gone.
   EXPECT_THAT(ReadBytes(At("hall/log/parts.run.log")), HasSubstr("from 2 copies"));
   EXPECT_THAT(ReadBytes(At("hall/log/matches.log")),
-              HasSubstr("SKIP: Matches for image pair already"));
+              HasSubstr("Matching block [1/1] in 0.00"));
   EXPECT_FALSE(fs::exists(At("hall/parts/1.db")));
 
   // The failed room is not to be trusted now: its state says so, nobody tries it again.
