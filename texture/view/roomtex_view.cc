@@ -128,7 +128,9 @@ void View(const ViewOptions& options, const Command::Context& context) {
              : " photos cannot be shown. " + content.cameras.left_out()[0].reason));
   }
   ReportPhotosLeftOut(content.cameras.left_out(), context);
-  const fs::path evidence = fs::path(content.model.path).parent_path() / "evidence.ply";
+  const fs::path folder = fs::path(content.model.path).parent_path();
+  content.tones = ReadViewTones(folder.string());
+  const fs::path evidence = folder / "evidence.ply";
   std::error_code error;
   if (fs::is_regular_file(evidence, error)) {
     content.evidence_path = evidence.string();

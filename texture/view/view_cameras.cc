@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/undistortion.h"
 
 namespace roomtex {
 namespace {
@@ -26,6 +27,12 @@ Eigen::Vector3f Direction(const CameraProjection& projection, const Eigen::Vecto
 
 // A panorama is drawn, and looked out of, as if it saw 90 x 53 degrees.
 constexpr double kPanoramaHalfWidth = 1, kPanoramaHalfHeight = 0.5;  // x/z, y/z
+
+std::shared_ptr<const std::string> EncodeJpeg(const cv::Mat& picture) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 92});
+  return std::make_shared<const std::string>(bytes.begin(), bytes.end());
+}
 
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -94,7 +101,7 @@ ViewCameras::ViewCameras(SparseModel model_in_scan, const std::string& image_pat
     }
     const bool there = !image_path.empty() && fit.usable();
     paths_.push_back(there ? path.string() : "");
-    pixels_.push_back(fit.pixels);
+    fits_.push_back(fit);
   }
 }
 
@@ -161,7 +168,7 @@ std::shared_ptr<const std::string> ViewCameras::Photo(int id, int max_size) cons
   if (paths_[id].empty()) return nullptr;
   const int size = std::clamp(max_size, 16, 8192);
   if (auto found = cache_->Find({id, size})) return found;
-  cv::Mat photo = ReadPhoto(paths_[id], pixels_[id]);
+  cv::Mat photo = ReadPhoto(paths_[id], fits_[id].pixels);
   const Camera& camera = model_.cameras.at(image.camera_id);
   const double shape = static_cast<double>(photo.cols) / photo.rows;
   if (std::abs(shape * camera.height / camera.width - 1) > 0.02) {
@@ -177,10 +184,31 @@ std::shared_ptr<const std::string> ViewCameras::Photo(int id, int max_size) cons
                       std::max(1, static_cast<int>(std::lround(scale * photo.rows))));
     cv::resize(photo, photo, to, 0, 0, cv::INTER_AREA);
   }
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", photo, bytes, {cv::IMWRITE_JPEG_QUALITY, 92});
-  auto result = std::make_shared<const std::string>(bytes.begin(), bytes.end());
+  auto result = EncodeJpeg(photo);
   cache_->Keep({id, size}, result);
+  return result;
+}
+
+std::optional<Camera> ViewCameras::Pinhole(int id, int max_size) const {
+  const Camera& camera = model_.cameras.at(Image(id).camera_id);
+  if (paths_[id].empty()) return std::nullopt;
+  PinholeOptions options;
+  options.max_image_size = max_size;
+  return PinholeCamera(camera, options);
+}
+
+std::shared_ptr<const std::string> ViewCameras::PinholePhoto(int id, int max_size,
+                                                             const ResponseCurve* response) const {
+  const int size = std::clamp(max_size, 16, 8192);
+  const std::optional<Camera> pinhole = Pinhole(id, size);
+  if (!pinhole) return nullptr;
+  const std::pair<int, int> key(id, -size);  // beside the photo as it is
+  if (auto found = cache_->Find(key)) return found;
+  const Camera& camera = model_.cameras.at(Image(id).camera_id);
+  cv::Mat photo = ReadFittedPhoto(paths_[id], fits_[id], camera.width, camera.height);
+  if (response != nullptr) response->ToSrgb(&photo);
+  auto result = EncodeJpeg(UndistortPhoto(photo, camera, *pinhole).picture);
+  cache_->Keep(key, result);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "colmap_ext/sparse_model.h"
 #include "core/photo_fit.h"
 #include "core/report.h"
+#include "texture/sampling/photo_tone.h"
 
 namespace roomtex {
 
@@ -49,17 +51,24 @@ class ViewCameras {
   // JPEG with at most max_size pixels along its longer side, in the shape of the lattice; null if
   // there is no file. Throws InputError if it cannot be read.
   std::shared_ptr<const std::string> Photo(int id, int max_size) const;
+  // The camera without distortion that shows most of its photo, with at most max_size pixels along
+  // its longer side; none for a panorama or without a file.
+  std::optional<Camera> Pinhole(int id, int max_size) const;
+  // The photo as that camera sees it, JPEG; null without a file. response: of the photo's bytes,
+  // null = sRGB. Throws InputError if it cannot be read.
+  std::shared_ptr<const std::string> PinholePhoto(int id, int max_size,
+                                                  const ResponseCurve* response) const;
+  // Throws UsageError for a camera that is not there.
+  const SparseImage& Image(int id) const;
   // Points of the sparse model: float x y z (relative to `origin`), bytes r g b 255; without far
   // strays: see the .cc file.
   std::string EncodePoints(const Eigen::Vector3d& origin) const;
 
  private:
-  const SparseImage& Image(int id) const;
-
   SparseModel model_;
   std::vector<const SparseImage*> images_;  // by name
   std::vector<std::string> paths_;          // "" = no such file
-  std::vector<PhotoPixels> pixels_;
+  std::vector<PhotoFit> fits_;
   std::vector<PhotoLeftOut> left_out_;
   // The pictures asked for last; behind a pointer, so that this can be moved.
   struct Cache;

@@ -133,9 +133,10 @@ ViewChunks::ViewChunks(const ViewModel& model, const ViewChunkOptions& options)
     : model_(model), options_(options) {
   // Page by page, then by place.
   const std::vector<Eigen::Vector3f> sums = TriangleSums(model);
-  std::vector<std::vector<uint32_t>> by_page(model.images.size() + 1);
+  std::vector<std::vector<uint32_t>> by_page(2 * (model.images.size() + 1));
   for (size_t t = 0; t < model.triangles.size(); ++t) {
-    by_page[model.page_of_triangle[t] + 1].push_back(static_cast<uint32_t>(t));
+    const int page = model.page_of_triangle[t] + 1;
+    by_page[2 * page + (model.IsSupplement(t) ? 1 : 0)].push_back(static_cast<uint32_t>(t));
   }
   order_.reserve(model.triangles.size());
   for (std::vector<uint32_t>& triangles : by_page) {
@@ -152,11 +153,16 @@ ViewChunks::ViewChunks(const ViewModel& model, const ViewChunkOptions& options)
   size_t first = 0;
   while (first < order_.size()) {
     const int page = model.page_of_triangle[order_[first]];
+    const bool is_supplement = model.IsSupplement(order_[first]);
     size_t end = first;
-    while (end < order_.size() && model.page_of_triangle[order_[end]] == page) ++end;
+    while (end < order_.size() && model.page_of_triangle[order_[end]] == page &&
+           model.IsSupplement(order_[end]) == is_supplement) {
+      ++end;
+    }
     splitter.Split(first, end, is_small, [&](size_t from, size_t to) {
       ViewChunk chunk;
       chunk.page = page;
+      chunk.is_supplement = is_supplement;
       chunk.first = from;
       chunk.end = to;
       chunk.num_vertices = static_cast<int>(counts.back());

@@ -31,6 +31,7 @@ struct ViewChunkOptions {
 // Triangles of one image that lie close together.
 struct ViewChunk {
   int page = -1;  // index into ViewModel::images; -1 = colours of the points
+  bool is_supplement = false;
   size_t first = 0, end = 0;
   int num_vertices = 0;
   // Box, relative to ViewModel::origin.

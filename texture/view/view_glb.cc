@@ -57,7 +57,7 @@ class GlbReader {
  public:
   explicit GlbReader(const std::string& path) : path_(path) { ReadChunks(path); }
 
-  ViewModel Read() {
+  ViewModel Read(bool has_supplement) {
     model_.path = path_;
     CheckExtensions();
     ReadImages();
@@ -70,6 +70,7 @@ class GlbReader {
       scan_from_gltf = Transform(Object("nodes", Index(roots[0]))).inverse();
     }
     for (const json& node : roots) AddNode(Index(node), scan_from_gltf, 0);
+    if (has_supplement && ours) model_.first_supplement_triangle = last_node_;
     if (model_.triangles.empty()) Fail("has no triangles", "Give what roomtex-texture wrote");
     model_.up = (scan_from_gltf.linear() * Eigen::Vector3d::UnitY()).normalized();
     Recentre();
@@ -264,8 +265,10 @@ class GlbReader {
       for (const json& primitive : List(mesh, "primitives"))
         AddPrimitive(primitive, scan_from_node);
     }
-    for (const json& child : List(node, "children"))
+    for (const json& child : List(node, "children")) {
+      if (depth == 0) last_node_ = model_.triangles.size();
       AddNode(Index(child), scan_from_node, depth + 1);
+    }
   }
 
   // Index into images, -1 for a material without.
@@ -370,10 +373,13 @@ class GlbReader {
   ViewModel model_;
   std::vector<Eigen::Vector3d> points_;  // `scan`
   int num_nodes_ = 0;
+  size_t last_node_ = 0;  // first triangle of what is below the root's last node
 };
 
 }  // namespace
 
-ViewModel ReadViewGlb(const std::string& path) { return GlbReader(path).Read(); }
+ViewModel ReadViewGlb(const std::string& path, bool has_supplement) {
+  return GlbReader(path).Read(has_supplement);
+}
 
 }  // namespace roomtex

@@ -4,12 +4,15 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <optional>
 
 #include <Eigen/Geometry>
 
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
+#include "core/report.h"
 #include "core/surfels.h"
 #include "importers/file_reader.h"
 #include "importers/ply.h"
@@ -122,6 +125,27 @@ void ShowAsDiscs(const Scan& scan, ViewModel* model) {
   model->page_of_triangle.assign(model->triangles.size(), -1);
 }
 
+// Vertex of model.ply with which the supplement begins, by the report beside the model.
+std::optional<size_t> FirstSupplementVertex(const std::string& file) {
+  std::ifstream stream(fs::path(file).parent_path() / "report.json");
+  const Json report = Json::parse(stream, nullptr, false);
+  if (!report.is_object() || !report.contains("supplement")) return std::nullopt;
+  const Json& found = report["supplement"];
+  const auto number = [&found](const char* key) {
+    const bool is_one = found.is_object() && found.contains(key) && found[key].is_number_unsigned();
+    return is_one ? found[key].get<size_t>() : 0;
+  };
+  if (number("num_vertices") == 0) return std::nullopt;
+  return number("first_vertex");
+}
+
+// The faces of the supplement stand behind the others.
+void MarkSupplement(size_t first_vertex, ViewModel* model) {
+  size_t first = model->triangles.size();
+  while (first > 0 && static_cast<size_t>(model->triangles[first - 1][0]) >= first_vertex) --first;
+  model->first_supplement_triangle = first;
+}
+
 bool IsCloud(const std::string& ply_path) {
   const PlyHeader header = ReadPlyHeader(FileReader(ply_path));
   return std::none_of(header.elements.begin(), header.elements.end(),
@@ -187,7 +211,10 @@ ViewModel ReadViewModel(const std::string& path) {
                  [](unsigned char c) { return std::tolower(c); });
   RequireFile(file, "Give what roomtex-texture wrote");
   if (extension == ".glb" || extension == ".ply") {
-    ViewModel model = extension == ".glb" ? ReadViewGlb(file) : ReadViewPly(file);
+    const std::optional<size_t> supplement = FirstSupplementVertex(file);
+    ViewModel model =
+        extension == ".glb" ? ReadViewGlb(file, supplement.has_value()) : ReadViewPly(file);
+    if (extension == ".ply" && supplement && !model.is_cloud) MarkSupplement(*supplement, &model);
     if (!model.is_cloud) model.normals = SmoothNormals(model);
     return model;
   }

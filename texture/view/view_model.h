@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,9 +37,12 @@ struct ViewModel {
   std::vector<Triangle> triangles;
   std::vector<int> page_of_triangle;  // index into images; -1 = colours of the points
   std::vector<ViewImage> images;
+  // Triangles from here on are of the supplement (roomtex-dense), as report.json says.
+  size_t first_supplement_triangle = std::numeric_limits<size_t>::max();
   // Of a cloud: every triangle is a disc by itself, around one of the cloud's points.
   bool is_cloud = false;
 
+  bool IsSupplement(size_t triangle) const { return triangle >= first_supplement_triangle; }
   Eigen::Vector3d InScan(size_t point) const { return origin + points[point].cast<double>(); }
   // What the point shows: itself, or the middle of its disc. Relative to the origin.
   Eigen::Vector3f Shown(size_t point) const {
@@ -58,14 +62,15 @@ bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& dir
 inline constexpr float kFrontMargin = 0.05f;  // cosine
 
 // A folder that roomtex-texture wrote (model.glb; model.ply if there is no GLB, or the model is a
-// cloud), a .glb or a .ply. Throws InputError: nothing there, damaged, no triangles, things of glTF
-// that we do not read.
+// cloud), a .glb or a .ply; the report.json beside it says whether it has a supplement. Throws
+// InputError: nothing there, damaged, no triangles, things of glTF that we do not read.
 ViewModel ReadViewModel(const std::string& path);
 
 // Binary glTF 2.0: triangles with one texture image or vertex colours each; nodes with their
 // transforms. The scan frame is that below the root node of roomtex-texture's files, and glTF's own
 // for any other file. Numbers are checked against the bytes that are there.
-ViewModel ReadViewGlb(const std::string& path);
+// has_supplement: what is below the root's last node is the supplement.
+ViewModel ReadViewGlb(const std::string& path, bool has_supplement = false);
 // A triangle mesh or a cloud of points; colours by red, green, blue if it has them, otherwise the
 // intensity or light grey. Of a cloud of more than kMostDiscs points every second, third ... is
 // shown, larger.

@@ -11,6 +11,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <sstream>
 #include <thread>
 
 #include <Eigen/Geometry>
@@ -45,6 +46,26 @@ double DoubleOf(const LocalServer::Query& query, const std::string& name) {
   const double value = ParseDouble(name, Wanted(query, name));
   if (!std::isfinite(value)) throw UsageError("\"" + name + "\" must be a finite number.");
   return value;
+}
+
+// What lies between low and high along an axis is shown.
+struct Cut {
+  Eigen::Vector3d axis;
+  double low, high;
+};
+std::vector<Cut> CutsOf(const LocalServer::Query& query) {
+  std::vector<Cut> cuts;
+  for (const char* name : {"cut0", "cut1", "cut2"}) {
+    if (query.count(name) == 0) continue;
+    std::vector<double> values;
+    std::stringstream list(query.at(name));
+    for (std::string part; std::getline(list, part, ',');) {
+      values.push_back(ParseDouble(name, part));
+    }
+    if (values.size() != 5) throw UsageError("\"" + std::string(name) + "\" must be five numbers.");
+    cuts.push_back({{values[0], values[1], values[2]}, values[3], values[4]});
+  }
+  return cuts;
 }
 
 ViewChunks::Level LevelOf(const LocalServer::Query& query) {
@@ -90,6 +111,7 @@ struct ViewServer::Impl {
   Impl(ViewContent given, const LocalServer* local_server, int threads)
       : content(std::move(given)),
         chunks(content.model),
+        lumigraph(content.cameras, content.tones),
         server(local_server),
         num_threads(threads) {}
 
@@ -108,6 +130,7 @@ struct ViewServer::Impl {
 
   const ViewContent content;
   const ViewChunks chunks;
+  const ViewLumigraph lumigraph;
   const LocalServer* const server;
   const int num_threads;
   std::atomic<bool> stopping{false};
@@ -132,6 +155,7 @@ Json ViewServer::Impl::Scene() const {
     box.extend(chunk.high);
     pieces.push_back({{"id", i},
                       {"page", chunk.page},
+                      {"supplement", chunk.is_supplement},
                       {"min", ToArray(chunk.low)},
                       {"max", ToArray(chunk.high)},
                       {"num_triangles", chunk.num_triangles()},
@@ -222,9 +246,8 @@ Json ViewServer::Impl::CastRay(const LocalServer::Query& query) {
   if (!(direction.norm() > 1e-12)) throw UsageError("The ray has no direction.");
   direction.normalize();
   const bool front_only = query.count("front") > 0 && IntOf(query, "front") != 0;
-  const double infinity = std::numeric_limits<double>::infinity();
-  const double top = query.count("top") > 0 ? DoubleOf(query, "top") : infinity;
-  const double bottom = query.count("bottom") > 0 ? DoubleOf(query, "bottom") : -infinity;
+  const bool with_supplement = query.count("supplement") == 0 || IntOf(query, "supplement") != 0;
+  const std::vector<Cut> cuts = CutsOf(query);
   const ViewModel& model = content.model;
   // Bounded: a ray along a surface may touch many triangles that do not count.
   double nearest = 0;
@@ -232,9 +255,12 @@ Json ViewServer::Impl::CastRay(const LocalServer::Query& query) {
     const auto hit = rays->Cast(from, direction, nearest);
     if (!hit) break;
     const Triangle& t = model.triangles[hit->triangle];
-    const double height = hit->point.dot(model.up);
-    const bool counts = (!front_only || ShowsFront(model, hit->triangle, direction)) &&
-                        height <= top && height >= bottom;
+    const bool is_cut = std::any_of(cuts.begin(), cuts.end(), [&hit](const Cut& cut) {
+      const double at = hit->point.dot(cut.axis);
+      return at < cut.low || at > cut.high;
+    });
+    const bool counts = (with_supplement || !model.IsSupplement(hit->triangle)) &&
+                        (!front_only || ShowsFront(model, hit->triangle, direction)) && !is_cut;
     if (counts) {
       return {{"hit", true},
               {"point", ToArray(hit->point)},
@@ -306,6 +332,20 @@ void ViewServer::Impl::AddRoutes(LocalServer* target) {
   target->AddContent("/texture", [this](const Query& query) { return Texture(query); });
   target->AddContent("/points", [this](const Query&) -> std::optional<LocalServer::Content> {
     return Bytes(content.cameras.EncodePoints(content.model.origin));
+  });
+  target->AddJson("/lumigraph", [this](const Query&) { return lumigraph.ToJson(); });
+  target->AddContent("/pinhole_photo",
+                     [this](const Query& query) -> std::optional<LocalServer::Content> {
+                       auto bytes = lumigraph.Photo(IntOf(query, "id"), IntOf(query, "max"));
+                       if (!bytes) return std::nullopt;
+                       return LocalServer::Content{bytes, "image/jpeg", "", true};
+                     });
+  target->AddContent("/depths", [this](const Query& query) -> std::optional<LocalServer::Content> {
+    const auto rays = caster.Get([this] { return IsStopping(); });
+    if (!rays) throw UsageError("The mesh could not be prepared for depth maps.");
+    std::string bytes = lumigraph.Depths(IntOf(query, "id"), *rays, num_threads);
+    if (bytes.empty()) return std::nullopt;
+    return Bytes(std::move(bytes));
   });
   target->AddContent("/photo", [this](const Query& query) -> std::optional<LocalServer::Content> {
     auto bytes = content.cameras.Photo(IntOf(query, "id"), IntOf(query, "max"));

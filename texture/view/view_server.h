@@ -8,6 +8,7 @@
 #include "core/local_server.h"
 #include "texture/view/view_cameras.h"
 #include "texture/view/view_evidence.h"
+#include "texture/view/view_lumigraph.h"
 #include "texture/view/view_model.h"
 
 namespace roomtex {
@@ -16,6 +17,7 @@ namespace roomtex {
 struct ViewContent {
   ViewModel model;
   ViewCameras cameras;                // none: no cameras on the page
+  ViewTones tones;                    // of the photos of the cameras
   std::string evidence_path;          // "" = none
   std::string no_evidence_reason;     // a sentence, when there is none
   std::vector<std::string> warnings;  // sentences for the user
@@ -26,9 +28,9 @@ struct ViewContent {
 //
 // All GET; numbers are metres, `scan` frame, unless said; ids count from 0.
 //   scene            {version, name, path, origin, up, bounds, num_vertices, num_triangles, pages:
-//                    [{id, width, height}], chunks: [{id, page (-1 = colours), min, max (relative
-//                    to origin), num_triangles, num_vertices, spacing}], num_cameras, num_photos,
-//                    num_points, warnings}
+//                    [{id, width, height}], chunks: [{id, page (-1 = colours), supplement, min, max
+//                    (relative to origin), num_triangles, num_vertices, spacing}], num_cameras,
+//                    num_photos, num_points, warnings}
 //   chunk?id&level   level 0 = coarse, 1 = middle, 2 = everything; bytes of ViewChunks::Encode
 //   evidence         {available, reason, ...} of ViewEvidence::ToJson
 //   evidence_chunk?id&level   bytes of ViewEvidence::Encode, for the points of that chunk
@@ -36,11 +38,14 @@ struct ViewContent {
 //   cameras          [camera ...] of ViewCameras::ToJson
 //   lattice?id       of ViewCameras::Lattice
 //   photo?id&max     JPEG; 404 without a file
+//   lumigraph        of ViewLumigraph::ToJson
+//   pinhole_photo?id&max   JPEG of ViewLumigraph::Photo; 404 without a file
+//   depths?id        bytes of ViewLumigraph::Depths
 //   points           bytes of ViewCameras::EncodePoints
-//   cast?x&y&z&dx&dy&dz&front&top   nearest surface of the full mesh along a ray: {hit, point,
-//                    normal, distance}; front = 1: what is seen from behind (ShowsFront) does not
-//                    count; top: nor what is farther up than that many metres (along `up`, from the
-//                    scan's origin)
+//   cast?x&y&z&dx&dy&dz&front&supplement&cut0&cut1&cut2   nearest surface of the full mesh along a
+//                    ray: {hit, point, normal, distance}; front = 1: what is seen from behind
+//                    (ShowsFront) does not count; supplement = 0: nor does the supplement; cut0 ...
+//                    (x,y,z,low,high): nor what along that axis does not lie between low and high
 // The server must outlive this, and be stopped before this ends.
 class ViewServer {
  public:

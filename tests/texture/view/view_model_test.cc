@@ -1,5 +1,6 @@
 #include "texture/view/view_model.h"
 
+#include <fstream>
 #include <random>
 
 #include <Eigen/Geometry>
@@ -8,6 +9,7 @@
 #include "core/error.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/view/view_scene.h"
+#include "texture/view/view_chunks.h"
 
 namespace roomtex {
 namespace {
@@ -39,6 +41,37 @@ TEST(ViewModel, GlbComesBackInTheScanFrame) {
     EXPECT_NEAR(model.images[0].width, 60, 1);  // the texture may go on beyond the last sample
     EXPECT_NEAR(model.images[0].height, 40, 1);
     for (const int page : model.page_of_triangle) ASSERT_EQ(page, 0);
+  }
+}
+
+TEST(ViewModel, TheSupplementOfTheReportIsToldApartInItsChunksToo) {
+  const TempFolder folder;
+  const Scan scan = TwoWallsScan(60, 40);
+  Scan supplement = TwoWallsScan(30, 20);
+  for (Eigen::Vector3d& p : supplement.points) p.x() += 20;
+  const std::vector<Scan> scans = {scan, supplement};
+  const std::vector<ColoredScan> colored = {ColorForView(scan), ColorForView(supplement)};
+  WriteColoredGlb(scans, colored, folder / "model.glb", {});
+  WriteColoredPly(scans, colored, folder / "model.ply");
+  for (const char* name : {"model.glb", "model.ply"}) {
+    std::ofstream(folder / "report.json") << "{}";
+    EXPECT_FALSE(ReadViewModel(folder / name).IsSupplement(1u << 30)) << name;
+    std::ofstream(folder / "report.json")
+        << R"({"supplement": {"first_vertex": 2400, "num_vertices": 600}})";
+    const ViewModel model = ReadViewModel(folder / name);
+    size_t num_supplement = 0;
+    for (size_t t = 0; t < model.triangles.size(); ++t) {
+      EXPECT_EQ(model.IsSupplement(t), model.InScan(model.triangles[t][0]).x() > 10) << name;
+      num_supplement += model.IsSupplement(t);
+    }
+    EXPECT_EQ(num_supplement, colored[1].triangles.size()) << name;
+    size_t in_chunks = 0;
+    const ViewChunks chunks(model);
+    for (const ViewChunk& chunk : chunks.chunks()) {
+      EXPECT_EQ(chunk.is_supplement, model.origin.x() + chunk.low.x() > 10) << name;
+      if (chunk.is_supplement) in_chunks += chunk.num_triangles();
+    }
+    EXPECT_EQ(in_chunks, num_supplement) << name;
   }
 }
 

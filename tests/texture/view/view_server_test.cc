@@ -137,9 +137,11 @@ TEST_F(ServedView, RaysPassWhatIsNotShown) {
   EXPECT_EQ(GetJson(from_behind + "&front=1")["hit"], false);
   EXPECT_NEAR(GetJson(from_behind + "&front=0")["point"][2].get<double>(), -2, 5);
   EXPECT_EQ(GetJson(from_behind + "&front=0")["hit"], true);
-  // What is higher than `top` is cut away.
-  EXPECT_EQ(GetJson("cast?x=0&y=0&z=0&dx=0&dy=0.25&dz=-1&front=1&top=0.2")["hit"], false);
-  EXPECT_EQ(GetJson("cast?x=0&y=0&z=0&dx=0&dy=0.25&dz=-1&front=1&top=1.2")["hit"], true);
+  // What lies higher or farther back is cut away.
+  const std::string upwards = "cast?x=0&y=0&z=0&dx=0&dy=0.25&dz=-1&front=1";
+  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,0.2")["hit"], false);
+  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,1.2")["hit"], true);
+  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,1.2&cut2=0,0,1,-1.5,1")["hit"], false);
   EXPECT_EQ(GetJson("cast?x=0&y=0&z=0&dx=0&dy=0&dz=1&front=0")["hit"], false);
 }
 
@@ -154,8 +156,8 @@ TEST_F(ServedView, RefusesWhatMakesNoSense) {
   for (const char* path :
        {"chunk", "chunk?id=0", "chunk?id=-1&level=0", "chunk?id=999&level=0", "chunk?id=0&level=3",
         "chunk?id=x&level=0", "evidence_chunk?id=999&level=0", "photo?id=0&max=100", "lattice?id=0",
-        "cast?x=0&y=0&z=0&dx=0&dy=0&dz=0", "cast?x=inf&y=0&z=0&dx=0&dy=0&dz=1", "cast?x=0&y=0",
-        "texture?page=0"}) {
+        "cast?x=0&y=0&z=0&dx=0&dy=0&dz=0", "cast?x=0&y=0&z=0&dx=0&dy=0&dz=1&cut1=0,1",
+        "cast?x=inf&y=0&z=0&dx=0&dy=0&dz=1", "cast?x=0&y=0", "texture?page=0"}) {
     const auto answer = Get(path);
     ASSERT_TRUE(answer) << path;
     EXPECT_EQ(answer->status, 422) << path;

@@ -8,11 +8,13 @@ import {length} from './format.js';
 import {readFragment, writeFragment} from './fragment.js';
 import {Frames} from './frames.js';
 import {drawLegend} from './legend.js';
+import {Lumigraph} from './lumigraph.js';
 import {Measures} from './measure.js';
 import {Navigation} from './navigation.js';
 import {Panel, showFailure} from './panel.js';
 import {scaleBar} from './plan.js';
 import {Room} from './room.js';
+import {needsEvidence} from './surface.js';
 
 const kSlowFrame = 60;      // milliseconds of the graphics card: coarse while moving
 const kLongestFrame = 800;  // milliseconds: coarser at rest, too, up to kMaxTolerance
@@ -94,6 +96,7 @@ class Viewer {
       this.resize();
     }
     this.panel.showCameras();
+    await this.#findPhotos();
     await room;
     this.firstPicture = performance.now();
     if (!fromAddress.look && !this.touched) this.navigation.home(false);
@@ -106,6 +109,25 @@ class Viewer {
     this.panel.showEvidence();
     if (fromAddress.extra.surface) this.setMode(fromAddress.extra.surface);
     this.remember();
+  }
+
+  // Whether there are photos for view-dependent colour.
+  async #findPhotos() {
+    try {
+      const {photos, reason} = await getJson('lumigraph');
+      if (photos.length > 0) {
+        this.lumigraph = new Lumigraph(photos, this.cameras.list, {
+          renderer: this.renderer,
+          uniforms: this.room.look.lumigraphUniforms,
+          cast: (ray) => this.room.cast(ray),
+          invalidate: () => this.invalidate(),
+          fail: (sentence) => this.panel.fail(sentence),
+        });
+      }
+      this.panel.showPhotoColour(reason);
+    } catch (error) {
+      this.panel.showPhotoColour(error.message);
+    }
   }
 
   floorHeight() {
@@ -190,6 +212,11 @@ class Viewer {
     const started = performance.now();
     camera.updateMatrixWorld();
     const more = this.room.update(camera, this.heightPx);
+    if (this.mode === 'view-dependent') {
+      const fades = this.lumigraph.update(
+          camera, this.heightPx, (columns, rows) => this.#raysOver(columns, rows));
+      if (fades) this.invalidate();
+    }
     this.cameras.update(camera.position);
     this.measures.update(camera);
     this.renderer.render(this.world, camera);
@@ -202,6 +229,14 @@ class Viewer {
     if (!this.scheduled) this.#watch();
     ++this.numPictures;
     return more;
+  }
+  #raysOver(columns, rows) {
+    const {width, height} = this.navigation, rays = [];
+    for (let i = 0; i < columns * rows; ++i) {
+      const x = (i % columns + 0.5) / columns, y = (Math.floor(i / columns) + 0.5) / rows;
+      rays.push(this.navigation.rayAt(x * width, y * height));
+    }
+    return rays;
   }
   // Looks for the end of the picture although no other one is wanted, to learn its cost.
   #watch() {
@@ -321,7 +356,7 @@ class Viewer {
     }
     context.textAlign = 'left';
     context.textBaseline = 'alphabetic';
-    if (this.mode !== 'colour') drawLegend(context, this.mode, this.evidence, scale);
+    if (needsEvidence(this.mode)) drawLegend(context, this.mode, this.evidence, scale);
     this.#drawScale(context, scale);
     this.measures.setHover(hover);
     this.draw();
@@ -331,7 +366,8 @@ class Viewer {
   // --- what the panel sets --------------------------------------------------------------------
 
   async setMode(mode) {
-    if (mode !== 'colour' && !this.evidence?.available) return;
+    if (needsEvidence(mode) && !this.evidence?.available) return;
+    if (mode === 'view-dependent' && !this.lumigraph) return;
     this.mode = mode;
     this.panel.showMode();
     try {

@@ -65,7 +65,7 @@ export class Measures extends EventTarget {
   }
 
   // The point of the surface along a ray of the page, scan frame; null without.
-  async pick(ray, {frontOnly, bottom, top}) {
+  async pick(ray, {frontOnly, cut, supplementShown}) {
     const from = this.frames.toScan(ray.origin), along = this.frames.turnToScan(ray.direction);
     const query = new URLSearchParams({
       x: from.x,
@@ -76,9 +76,14 @@ export class Measures extends EventTarget {
       dz: along.z,
       front: frontOnly ? 1 : 0,
     });
-    const floor = this.frames.origin.dot(this.up);
-    if (top < 1e8) query.set('top', top + floor);
-    if (bottom > -1e8) query.set('bottom', bottom + floor);
+    if (!supplementShown) query.set('supplement', 0);
+    cut.axes.forEach((axis, k) => {
+      const inScan = this.frames.turnToScan(axis), at = this.frames.origin.dot(inScan);
+      const {x, y, z} = inScan;
+      if (cut.low[k] > -1e8 || cut.high[k] < 1e8) {
+        query.set(`cut${k}`, [x, y, z, cut.low[k] + at, cut.high[k] + at]);
+      }
+    });
     const answer = await getJson(`cast?${query}`);
     return answer.hit ? new THREE.Vector3(...answer.point) : null;
   }

@@ -1,9 +1,11 @@
 // Everything on the page that is not the picture: buttons, lists, keys, sentences.
 
+import {Vector3} from 'three';
+
 import {coordinates, count, length, setUnit, unit} from './format.js';
 import {showLegend} from './legend.js';
-import {makePlan} from './plan.js';
-import {kModes} from './surface.js';
+import {extentOf, makePlan, planRotation} from './plan.js';
+import {kModes, needsEvidence} from './surface.js';
 
 const $ = (id) => document.getElementById(id);
 const radios = (name) => [...document.querySelectorAll(`input[name="${name}"]`)];
@@ -91,9 +93,14 @@ export class Panel {
         () => this.#copy(location.href, 'The address of this view is in the clipboard.'));
     const onInput = (id, set) => $(id).addEventListener('input', (event) => set(event.target));
     onInput('both-sides', ({checked}) => viewer.room.setBothSides(checked));
+    const setSupplement = () => viewer.room.setSupplement(
+        $('show-supplement').checked, $('mark-supplement').checked);
+    onInput('show-supplement', setSupplement);
+    onInput('mark-supplement', setSupplement);
     onInput('opacity', ({value}) => viewer.cameras.setOpacity(Number(value)));
-    onInput('top', () => this.#setHeights());
-    onInput('bottom', () => this.#setHeights());
+    for (const side of ['top', 'bottom', 'left', 'right', 'front', 'back']) {
+      onInput(side, () => this.#setCut());
+    }
     onRadio('unit', (name) => this.#setUnit(name));
     onClick('save-plan', () => this.savePlan());
     this.#setUnit(keptUnit());
@@ -132,20 +139,34 @@ export class Panel {
     this.viewer.cameras.setSize(size);
     $('camera-size-value').textContent = `${Math.round(100 * size)} cm`;
   }
-  // The sliders run from floor to ceiling.
-  #setHeights() {
+  // The sliders run from floor to ceiling and from wall to wall.
+  #setCut() {
     const {viewer} = this;
     const {min, max} = viewer.navigation.bounds;
     const floor = viewer.floorHeight();
-    const read = (id, off, beyond) => {
-      const share = Number($(id).value);
-      const height = share === off ? beyond : min.y + share * (max.y - min.y);
-      const above = (height - floor) / unit().metres;
+    const read = (id, off, from, to, zero) => {
+      const share = Number($(id).value), place = from + share * (to - from);
+      const shown = Math.abs(place - zero) < 0.005 ? 0 : (place - zero) / unit().metres;
       $(`${id}-value`).textContent =
-          share === off ? 'off' : `${above.toFixed(2)} ${unit().name}`;
-      return height;
+          share === off ? 'off' : `${shown.toFixed(2)} ${unit().name}`;
+      return share !== off ? place : off === 0 ? -1e9 : 1e9;
     };
-    viewer.room.setHeights(read('bottom', 0, -1e9), read('top', 1, 1e9));
+    const rotation = planRotation(viewer.wallHeading());
+    const axes = [new Vector3(0, 1, 0)];
+    for (const axis of [new Vector3(1, 0, 0), new Vector3(0, 1, 0)]) {
+      axes.push(axis.applyQuaternion(rotation));
+    }
+    const sides = extentOf(viewer.room.samplePoints(), rotation.clone().invert());
+    const {left, right, bottom: front, top: back} = sides;
+    const low = [
+      read('bottom', 0, min.y, max.y, floor), read('left', 0, left, right, left),
+      read('front', 0, front, back, front)
+    ];
+    const high = [
+      read('top', 1, min.y, max.y, floor), read('right', 1, left, right, left),
+      read('back', 1, front, back, front)
+    ];
+    viewer.room.setCut({axes, low, high});
   }
   #setUnit(name) {
     setUnit(name);
@@ -156,7 +177,7 @@ export class Panel {
       // Not kept, then.
     }
     if (!this.viewer.measures) return;  // not built yet
-    this.#setHeights();
+    this.#setCut();
     this.showMeasures();
     this.viewer.invalidate();
   }
@@ -164,6 +185,8 @@ export class Panel {
     const {viewer} = this, button = $('save-plan');
     button.disabled = true;
     try {
+      // From everywhere above at once nothing is near: the blended colours.
+      if (viewer.mode === 'view-dependent') await viewer.room.setMode('colour', null);
       const {blob, world, width, height} =
           await makePlan(viewer, Number($('plan-step').value) / 1000, (share) => {
             this.hint(`Drawing the plan, ${Math.round(100 * share)} %`);
@@ -174,6 +197,7 @@ export class Panel {
     } catch (error) {
       this.fail(error.message);
     }
+    await viewer.room.setMode(viewer.mode, viewer.evidence);
     button.disabled = false;
   }
   #download(blob, ending) {
@@ -203,6 +227,7 @@ export class Panel {
         `${count(data.num_vertices)} points` +
         (data.num_triangles > 0 ? `, ${count(data.num_triangles)} triangles` : '') +
         (data.num_cameras ? `, ${data.num_cameras} cameras` : '');
+    $('supplement-controls').hidden = !data.chunks.some(({supplement}) => supplement);
     for (const warning of data.warnings) $('warnings').append(make('p', {text: warning}));
   }
   showProgress() {
@@ -226,10 +251,16 @@ export class Panel {
   showEvidence() {
     const {evidence} = this.viewer;
     for (const radio of radios('surface')) {
-      radio.disabled = radio.value !== 'colour' && !evidence.available;
+      if (needsEvidence(radio.value)) radio.disabled = !evidence.available;
     }
     $('no-evidence').hidden = evidence.available;
     $('no-evidence').textContent = evidence.reason;
+  }
+  // reason: why there is no view-dependent colour; "" = there is.
+  showPhotoColour(reason) {
+    radios('surface').find(({value}) => value === 'view-dependent').disabled = reason !== '';
+    $('no-photo-colour').hidden = reason === '';
+    $('no-photo-colour').textContent = reason;
   }
   showMovement() {
     const {mode} = this.viewer.navigation;
@@ -361,6 +392,7 @@ export class Panel {
       },
       f: () => toggle('show-cameras'),
       p: () => toggle('show-points'),
+      j: () => toggle('show-supplement'),
       ',': () => viewer.stepCamera(-1),
       '.': () => viewer.stepCamera(1),
       l: () => radios('background').find((radio) => !radio.checked).click(),

@@ -21,7 +21,7 @@ export function scaleBar(metresPerPx, maxPx) {
 }
 
 // Where the room lies along the sides of the picture, metres, without the few strays beyond it.
-function extentOf(points, inverse) {
+export function extentOf(points, inverse) {
   const seen = points.map((point) => point.clone().applyQuaternion(inverse));
   const between = (values) => {
     values.sort((a, b) => a - b);
@@ -33,10 +33,10 @@ function extentOf(points, inverse) {
   return {left, right, bottom, top};
 }
 
-// Of the four headings along the walls the one that turns the picture least.
-function yawAlongWalls(heading) {
+// From above, along the walls: of the four headings the one that turns the picture least.
+export function planRotation(heading) {
   const quarter = Math.PI / 2;
-  return heading - quarter * Math.round(heading / quarter);
+  return rotationOf(heading - quarter * Math.round(heading / quarter), -quarter);
 }
 
 async function drawn(viewer, camera, height) {
@@ -53,7 +53,7 @@ async function drawn(viewer, camera, height) {
 // level axes, x and y of a scan whose up is z, a pixel is), width, height}. Throws an Error whose
 // message is for the user.
 export async function makePlan(viewer, metresPerPixel, progress) {
-  const rotation = rotationOf(yawAlongWalls(viewer.wallHeading()), -Math.PI / 2);
+  const rotation = planRotation(viewer.wallHeading());
   const {left, right, bottom, top} =
       extentOf(viewer.room.samplePoints(), rotation.clone().invert());
   const width = Math.ceil((right - left) / metresPerPixel);

@@ -4,7 +4,7 @@
 import * as THREE from 'three';
 
 import {getBitmap, getBytes, Queue} from './api.js';
-import {kFrontMargin, kModes, SurfaceLook} from './surface.js';
+import {kFrontMargin, kModes, needsEvidence, SurfaceLook} from './surface.js';
 
 const kMagic = 0x31435452;
 const kUploadBytes = 3 << 20;  // handed to the graphics card per picture; where a picture takes
@@ -15,6 +15,7 @@ const kStripRows = 256;             // of a texture handed over per picture
 const kWantedEdgePx = 2;            // an edge longer than this on the screen asks for a finer level
 const kEdges = [4, 2, 1];           // edge of each level, in those of the whole mesh
 const kFull = 2;
+const kAxes = [new THREE.Vector3(0, 1, 0), new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 0, 1)];
 
 // Bytes of ViewChunks::Encode as a geometry whose arrays are views of them.
 function parseChunk(bytes, chunk) {
@@ -160,8 +161,9 @@ export class Room {
     this.materials = new Map();
     this.mode = 'colour';
     this.frontOnly = true;
-    this.bottom = -1e9;  // of what is shown
-    this.top = 1e9;
+    // What is shown lies between `low` and `high` along each of the axes (unit, page frame; up first).
+    this.cut = {axes: kAxes, low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9]};
+    this.supplementShown = true;
     this.coarseOnly = false;
     this.queue = new Queue(4);
     this.arrived = [];  // meshes to be handed over
@@ -195,9 +197,17 @@ export class Room {
     return (this.numCoarse + this.pages.filter((page) => page.texture).length) / Math.max(all, 1);
   }
 
-  #material(page) {
-    if (!this.materials.has(page)) this.materials.set(page, this.look.makeMaterial(page >= 0));
-    return this.materials.get(page);
+  // Of a page, of the scan or of the supplement.
+  #material(page, supplement) {
+    const key = `${page} ${supplement}`;
+    if (!this.materials.has(key)) {
+      const material = this.look.makeMaterial(page >= 0, supplement);
+      if (page >= 0 && this.pages[page].texture) {
+        material.uniforms.page.value = this.pages[page].texture;
+      }
+      this.materials.set(key, material);
+    }
+    return this.materials.get(key);
   }
 
   async load() {
@@ -223,15 +233,17 @@ export class Room {
     }
   }
   #showPage(page) {
-    this.#material(page.page.id).uniforms.page.value = page.texture;
+    for (const supplement of [false, true]) {
+      this.#material(page.page.id, supplement).uniforms.page.value = page.texture;
+    }
     this.refine();
   }
 
   async #load(chunk, level) {
     try {
       const geometry = parseChunk(await getBytes(`chunk?id=${chunk.id}&level=${level}`), chunk);
-      if (this.mode !== 'colour') await this.#loadEvidence(chunk, level, geometry);
-      const mesh = new THREE.Mesh(geometry, this.#material(chunk.page));
+      if (needsEvidence(this.mode)) await this.#loadEvidence(chunk, level, geometry);
+      const mesh = new THREE.Mesh(geometry, this.#material(chunk.page, chunk.supplement));
       mesh.matrixAutoUpdate = false;
       this.arrived.push({chunk, level, mesh});
       this.dirty = true;
@@ -252,7 +264,7 @@ export class Room {
   async setMode(mode, evidence) {
     if (!kModes.includes(mode)) return;
     this.mode = mode;
-    if (mode !== 'colour') {
+    if (needsEvidence(mode)) {
       const tasks = [];
       for (const chunk of this.chunks) {
         for (const [level, mesh] of chunk.levels.entries()) {
@@ -270,10 +282,15 @@ export class Room {
     this.look.setMode(mode, evidence);
     this.invalidate();
   }
-  setHeights(bottom, top) {
-    this.bottom = bottom;
-    this.top = top;
-    this.look.setHeights(bottom, top);
+  setCut(cut) {
+    this.cut = cut;
+    this.look.setCut(cut);
+    this.invalidate();
+  }
+  // What roomtex-dense has added: whether it is seen, and told apart by a tint.
+  setSupplement(shown, marked) {
+    this.supplementShown = shown;
+    this.look.setMarked(marked);
     this.invalidate();
   }
   setBothSides(both) {
@@ -322,12 +339,16 @@ export class Room {
       }
     }
     this.group.add(mesh);
-    if (this.mode !== 'colour' && !mesh.geometry.attributes.evidence) {  // chosen meanwhile
+    if (needsEvidence(this.mode) && !mesh.geometry.attributes.evidence) {  // chosen meanwhile
       this.queue.add(
           level,
           () => this.#loadEvidence(chunk, level, mesh.geometry)
                     .then(this.invalidate, (error) => this.fail(error.message)));
     }
+  }
+
+  #isShown(chunk) {
+    return this.supplementShown || !chunk.supplement;
   }
 
   // The level whose edges are short enough on the screen, and the nearest to it that is there.
@@ -348,7 +369,7 @@ export class Room {
         pxPerMetre = heightPx / (2 * distance * Math.tan(camera.fov * Math.PI / 360));
       }
       const edgePx = chunk.spacing * pxPerMetre;
-      const inView = frustum.intersectsBox(chunk.box);
+      const inView = this.#isShown(chunk) && frustum.intersectsBox(chunk.box);
       let level = 0;
       while (level < kFull && kEdges[level] * edgePx > kWantedEdgePx * this.tolerance) ++level;
       if (this.coarseOnly) level = 0;
@@ -362,7 +383,10 @@ export class Room {
       let shown = level;
       while (shown > 0 && !chunk.levels[shown]) --shown;
       chunk.levels.forEach((mesh, i) => {
-        if (mesh) mesh.visible = i === shown;
+        if (!mesh) return;
+        mesh.visible = i === shown && this.#isShown(chunk);
+        // From near to far, so that what is hidden costs little.
+        mesh.renderOrder = Math.min(chunk.box.distanceToPoint(eye), 900) - 1000;
       });
       if (inView && chunk.levels[shown]) {
         this.shownTriangles += chunk.levels[shown].geometry.index.count / 3;
@@ -397,7 +421,7 @@ export class Room {
     const at = new THREE.Vector3();
     for (const chunk of this.chunks) {
       const coarse = chunk.levels[0];
-      if (!coarse) continue;
+      if (!coarse || !this.#isShown(chunk)) continue;
       if (!chunk.box.containsPoint(local.origin)) {
         if (!local.intersectBox(chunk.box, at) || at.distanceTo(local.origin) > best) continue;
       }
@@ -409,8 +433,9 @@ export class Room {
         const distance = meet(local.origin, local.direction, positions, a, b, c);
         if (distance >= best) continue;
         if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
-        const height = ray.origin.y + distance * ray.direction.y;
-        if (height > this.top || height < this.bottom) continue;
+        ray.at(distance, at);
+        const {axes, low, high} = this.cut;
+        if (axes.some((axis, k) => axis.dot(at) < low[k] || axis.dot(at) > high[k])) continue;
         best = distance;
       }
     }

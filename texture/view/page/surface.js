@@ -3,7 +3,11 @@
 
 import * as THREE from 'three';
 
-export const kModes = ['colour', 'intensity', 'views', 'disagreement'];
+import {kLumigraph, lumigraphUniforms} from './lumigraph.js';
+
+export const kModes = ['colour', 'intensity', 'views', 'disagreement', 'view-dependent'];
+// Those that show what the colours rest on, by evidence.ply.
+export const needsEvidence = (mode) => ['intensity', 'views', 'disagreement'].includes(mode);
 
 // OKLCh (Ottosson 2020) to sRGB bytes; null outside sRGB.
 function srgbFromOklch(lightness, chroma, hueDeg) {
@@ -57,6 +61,9 @@ export function colorMap(mode, steps) {
 // maps holds at that lightness.
 export const kUnknownColor = [92, 98, 110];
 
+// Over what roomtex-dense has added, where that is to be told apart.
+const kMarkColor = [230, 60, 220];
+
 function mapTexture(mode) {
   const bytes = new Uint8Array(4 * 256);
   colorMap(mode, 256).forEach(([r, g, b], i) => bytes.set([r, g, b, 255], 4 * i));
@@ -77,8 +84,10 @@ uniform bool front_only;
 out float v_facing;
 out vec2 v_uv;
 out vec3 v_color;
-out vec2 v_place;
+out float v_known;
 out vec4 v_evidence;
+out vec3 v_point;
+out vec3 v_normal;
 void main() {
   v_uv = uv;
   v_color = tint.rgb;
@@ -92,7 +101,9 @@ void main() {
                               : normalize(place.xyz - cameraPosition);
   vec3 up = mat3(modelMatrix) * normal;
   v_facing = front_only && dot(up, up) > 0.1 ? dot(up, along) : -1.0;
-  v_place = vec2(place.y, known);
+  v_known = known;
+  v_point = place.xyz;
+  v_normal = up;
   gl_Position = projectionMatrix * viewMatrix * place;
 }`;
 
@@ -101,25 +112,47 @@ uniform int mode;
 uniform bool textured;
 uniform sampler2D page;
 uniform sampler2D ramp;
-uniform float top;
-uniform float bottom;
+uniform mat3 cutAxes;  // a row each
+uniform vec3 cutLow;
+uniform vec3 cutHigh;
 uniform float high;
 uniform vec3 unknown;
+uniform float mark;
 in vec2 v_uv;
 in vec3 v_color;
-in vec2 v_place;
+in float v_known;
 in vec4 v_evidence;
 in float v_facing;
+in vec3 v_point;
+in vec3 v_normal;
 out vec4 pixel;
+#ifdef LUMIGRAPH
+${kLumigraph}
+vec3 linear_from_srgb(vec3 c) {
+  return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+}
+vec3 srgb_from_linear(vec3 c) {
+  return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
+#endif
 vec3 mapped(float t) {
   return texture(ramp, vec2((clamp(t, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5)).rgb;
 }
 void main() {
-  if (v_place.x > top || v_place.x < bottom || v_facing > ${kFrontMargin}) discard;
+  vec3 along = cutAxes * v_point;
+  if (v_facing > ${kFrontMargin} || any(lessThan(along, cutLow)) ||
+      any(greaterThan(along, cutHigh))) {
+    discard;
+  }
   vec3 shown;
-  if (mode == 0) {
+  if (mode == 0 || mode == 4) {
     shown = textured ? texture(page, v_uv).rgb : v_color;
-  } else if (v_place.y < 0.5) {
+#ifdef LUMIGRAPH
+    float length2 = dot(v_normal, v_normal);
+    vec3 normal = length2 > 0.1 ? v_normal * inversesqrt(length2) : vec3(0.0);
+    shown = srgb_from_linear(clamp(lumigraph(v_point, normal, linear_from_srgb(shown)), 0.0, 1.0));
+#endif
+  } else if (v_known < 0.5) {
     shown = unknown;
   } else if (mode == 1) {
     shown = vec3(v_evidence.x);
@@ -129,7 +162,7 @@ void main() {
   } else {
     shown = v_evidence.w < 0.5 ? unknown : mapped(v_evidence.z / v_evidence.w / high);
   }
-  pixel = vec4(shown, 1.0);
+  pixel = vec4(mix(shown, vec3(${kMarkColor.map((value) => (value / 255).toFixed(3))}), mark), 1.0);
 }`;
 
 // The materials of all pages and what they have in common.
@@ -139,30 +172,55 @@ export class SurfaceLook {
   #shared = {
     mode: {value: 0},
     ramp: {value: this.#ramps.views},
-    top: {value: 1e9},
-    bottom: {value: -1e9},
+    cutAxes: {value: new THREE.Matrix3()},
+    cutLow: {value: new THREE.Vector3(-1e9, -1e9, -1e9)},
+    cutHigh: {value: new THREE.Vector3(1e9, 1e9, 1e9)},
     front_only: {value: true},
     high: {value: 1},
     unknown: {value: new THREE.Vector3(...kUnknownColor).divideScalar(255)},
+    ...lumigraphUniforms(),
   };
+  #mark = {value: 0};  // share of kMarkColor in the supplement
+  #materials = [];
+  #viewDependent = false;
 
   constructor() {
     this.#blank.needsUpdate = true;
   }
 
-  // page: a texture or null = colours of the points.
-  makeMaterial(textured) {
-    return new THREE.ShaderMaterial({
+  // textured: or in the colours of the points. supplement: what may be marked.
+  makeMaterial(textured, supplement) {
+    const material = new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
       vertexShader: kVertex,
       fragmentShader: kFragment,
       side: THREE.DoubleSide,
-      uniforms: {...this.#shared, textured: {value: textured}, page: {value: this.#blank}},
+      uniforms: {
+        ...this.#shared,
+        textured: {value: textured},
+        page: {value: this.#blank},
+        mark: supplement ? this.#mark : {value: 0},
+      },
+      defines: this.#viewDependent ? {LUMIGRAPH: ''} : {},
     });
+    this.#materials.push(material);
+    return material;
   }
 
-  // evidence: the server's description, null in mode colour.
+  // Those of kLumigraph.
+  get lumigraphUniforms() {
+    return this.#shared;
+  }
+
+  // evidence: the server's description; needed where needsEvidence(mode).
   setMode(mode, evidence) {
+    if (this.#viewDependent !== (mode === 'view-dependent')) {
+      this.#viewDependent = mode === 'view-dependent';
+      for (const material of this.#materials) {
+        material.defines = this.#viewDependent ? {LUMIGRAPH: ''} : {};
+        material.needsUpdate = true;
+      }
+    }
     this.#shared.mode.value = kModes.indexOf(mode);
     if (mode === 'views') this.#shared.high.value = Math.max(evidence.max_views, 2);
     if (mode === 'disagreement') {
@@ -171,9 +229,13 @@ export class SurfaceLook {
     this.#shared.ramp.value = this.#ramps[mode] ?? this.#ramps.views;
   }
   // What lies between is shown.
-  setHeights(bottom, top) {
-    this.#shared.bottom.value = bottom;
-    this.#shared.top.value = top;
+  setCut({axes: [a, b, c], low, high}) {
+    this.#shared.cutAxes.value.set(a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z);
+    this.#shared.cutLow.value.set(...low);
+    this.#shared.cutHigh.value.set(...high);
+  }
+  setMarked(marked) {
+    this.#mark.value = marked ? 0.45 : 0;
   }
   setBothSides(both) {
     this.#shared.front_only.value = !both;

@@ -1,0 +1,142 @@
+#include "texture/view/view_lumigraph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include <opencv2/core.hpp>
+
+#include "core/parallel.h"
+
+namespace roomtex {
+namespace {
+
+std::string TextOf(const Json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key].is_string()
+             ? object[key].get<std::string>()
+             : "";
+}
+
+std::optional<ResponseCurve> ReadResponse(const Json& report, const std::string& folder) {
+  const std::string source = TextOf(report, "response");
+  std::string path;
+  if (source == "bracket" || source == "estimate") {
+    path = (std::filesystem::path(folder) / "response.txt").string();
+  } else if (source == "file" && report.contains("options")) {
+    path = TextOf(report["options"], "Exposure.response");
+  }
+  std::error_code error;
+  if (path.empty() || !std::filesystem::exists(path, error)) return std::nullopt;
+  return ResponseCurve::Read(path);
+}
+
+// Of a plane 1/depth is linear over the picture; where it is not, one thing ends before another.
+constexpr float kJump = 0.02f;  // of 1/depth: 6 cm at 3 m
+
+cv::Mat1f WidenNearer(const cv::Mat1f& inverse) {
+  cv::Mat1f widened = inverse.clone();
+  for (int y = 0; y < inverse.rows; ++y) {
+    for (int x = 0; x < inverse.cols; ++x) {
+      const auto at = [&](int dx, int dy) {
+        return inverse(std::clamp(y + dy, 0, inverse.rows - 1),
+                       std::clamp(x + dx, 0, inverse.cols - 1));
+      };
+      const float here = inverse(y, x);
+      float largest = here;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) largest = std::max(largest, at(dx, dy));
+      }
+      const bool inside = x > 0 && y > 0 && x + 1 < inverse.cols && y + 1 < inverse.rows;
+      const float bend = std::max(
+          {std::abs(at(-1, 0) + at(1, 0) - 2 * here), std::abs(at(0, -1) + at(0, 1) - 2 * here),
+           std::abs(at(-1, -1) + at(1, 1) - 2 * here), std::abs(at(1, -1) + at(-1, 1) - 2 * here)});
+      if (inside && bend > kJump * largest) widened(y, x) = largest;
+    }
+  }
+  return widened;
+}
+
+}  // namespace
+
+ViewTones ReadViewTones(const std::string& folder) {
+  std::ifstream stream(std::filesystem::path(folder) / "report.json");
+  const Json report = Json::parse(stream, nullptr, false);
+  ViewTones tones;
+  if (!report.is_object()) return tones;
+  const bool by_channel = report.contains("channel_gain");
+  const char* key = by_channel ? "channel_gain" : "exposure_gain";
+  if (!report.contains(key) || !report[key].is_object()) return tones;
+  tones.gains.emplace();
+  for (const auto& [name, value] : report[key].items()) {
+    Eigen::Vector3f gain;
+    for (int k = 0; k < 3; ++k) {
+      const Json number = value.is_array() && value.size() == 3 ? Json(value[k]) : Json(value);
+      gain[k] = number.is_number() ? number.get<float>() : NAN;
+    }
+    if (gain.allFinite() && gain.minCoeff() > 0) (*tones.gains)[name] = gain;
+  }
+  tones.response = ReadResponse(report, folder);
+  return tones;
+}
+
+ViewLumigraph::ViewLumigraph(const ViewCameras& cameras, ViewTones tones)
+    : cameras_(cameras), tones_(std::move(tones)) {}
+
+bool ViewLumigraph::Has(int id) const {
+  return cameras_.Pinhole(id, kDepthSize).has_value() &&
+         (!tones_.gains || tones_.gains->count(cameras_.Image(id).name) > 0);
+}
+
+Json ViewLumigraph::ToJson() const {
+  Json photos = Json::array();
+  for (int id = 0; id < static_cast<int>(cameras_.size()); ++id) {
+    if (!Has(id)) continue;
+    const Camera pinhole = *cameras_.Pinhole(id, kDepthSize);
+    const double w = pinhole.width, h = pinhole.height;
+    Eigen::Vector3f gain = Eigen::Vector3f::Ones();
+    if (tones_.gains) gain = tones_.gains->at(cameras_.Image(id).name);
+    photos.push_back({{"id", id},
+                      {"focal", {pinhole.params[0] / w, pinhole.params[1] / h}},
+                      {"centre", {pinhole.params[2] / w, pinhole.params[3] / h}},
+                      {"gain", {gain[0], gain[1], gain[2]}}});
+  }
+  const char* reason = !photos.empty() ? ""
+                       : cameras_.num_photos() == 0
+                           ? "View-dependent colour needs the photos: give "
+                             "--aligned and --image_path."
+                           : "None of these photos has coloured the model.";
+  return {{"reason", reason}, {"photos", photos}};
+}
+
+std::shared_ptr<const std::string> ViewLumigraph::Photo(int id, int max_size) const {
+  if (!Has(id)) return nullptr;
+  return cameras_.PinholePhoto(id, max_size, tones_.response ? &*tones_.response : nullptr);
+}
+
+std::string ViewLumigraph::Depths(int id, const RayCaster& caster, int num_threads) const {
+  if (!Has(id)) return "";
+  const Camera pinhole = *cameras_.Pinhole(id, kDepthSize);
+  const CameraProjection projection(pinhole);
+  const Rigid scan_from_cam = cameras_.Image(id).cam_from_model.Inverse();
+  cv::Mat1f inverse(pinhole.height, pinhole.width, 0.0f);
+  ParallelFor(num_threads, 0, inverse.rows, [&](int y) {
+    for (int x = 0; x < inverse.cols; ++x) {
+      const auto ray = projection.RayFromImg({x + 0.5, y + 0.5});  // (x, y, 1)
+      if (!ray) continue;
+      const double length = ray->norm();
+      const auto hit =
+          caster.Cast(scan_from_cam.translation, scan_from_cam.rotation * (*ray / length));
+      if (hit && hit->distance > 1e-3) inverse(y, x) = static_cast<float>(length / hit->distance);
+    }
+  });
+  cv::Mat half;
+  WidenNearer(inverse).convertTo(half, CV_16F);
+  const uint32_t header[4] = {0x31445452, static_cast<uint32_t>(half.cols),
+                              static_cast<uint32_t>(half.rows), 0};
+  std::string bytes(reinterpret_cast<const char*>(header), sizeof header);
+  bytes.append(reinterpret_cast<const char*>(half.data), half.total() * half.elemSize());
+  return bytes;
+}
+
+}  // namespace roomtex
