@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include "building/cell_arrangement.h"
 #include "core/error.h"
 #include "core/frames.h"
-#include "core/output_file.h"
+#include "core/json_text.h"
 #include "core/random_stream.h"
 #include "core/text.h"
 
@@ -69,7 +68,7 @@ class OutlineParser {
     return value;
   }
   double Number(const Json& json, const std::string& key, const std::string& where) const {
-    return NumberAt(At(json, key, where), where + " " + key);
+    return NumberAt(At(json, key, where), Below(where, key));
   }
   template <int kSize>
   Eigen::Matrix<double, kSize, 1> Vector(const Json& json, const std::string& where) const {
@@ -83,14 +82,18 @@ class OutlineParser {
   const Json& List(const Json& json, const std::string& key, const std::string& where,
                    size_t most) const {
     const Json& list = At(json, key, where);
-    if (!list.is_array()) Fail(where + " " + key, "must be a list");
+    if (!list.is_array()) Fail(Below(where, key), "must be a list");
     if (list.size() > most) {
-      Fail(where + " " + key, "has more than " + std::to_string(most) + " entries");
+      Fail(Below(where, key), "has more than " + std::to_string(most) + " entries");
     }
     return list;
   }
 
  private:
+  static std::string Below(const std::string& where, const std::string& key) {
+    return where.empty() ? key : where + " " + key;
+  }
+
   std::string path_;
 };
 
@@ -245,16 +248,9 @@ Outline ParseOutline(const std::string& path, const Json& json) {
 }
 
 Outline ReadOutline(const std::string& path) {
-  RequireFile(path, "Give the outline.json that roomtex-outline wrote");
-  std::ifstream stream(path, std::ios::binary);
-  Json json;
-  try {
-    json = Json::parse(stream);
-  } catch (const nlohmann::json::parse_error& error) {
-    throw InputError(path, BytePosition(static_cast<long long>(error.byte)), "is no JSON",
-                     "Mend what was edited there: a comma, a bracket, a quote");
-  }
-  return ParseOutline(path, json);
+  return ParseOutline(path, ReadJson(path,
+                                     "Give the outline.json that roomtex-outline wrote, or mend "
+                                     "what was edited there: a comma, a bracket, a quote"));
 }
 
 Json OutlineToJson(const Outline& outline) {
@@ -301,8 +297,7 @@ void WriteOutline(const std::string& path, const Outline& outline, bool proposed
 bool WasEdited(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return false;
-  std::ifstream stream(path, std::ios::binary);
-  const Json json = Json::parse(stream, nullptr, false);
+  const Json json = ReadJsonIfAny(path);
   if (!json.is_object() || !json.contains("proposal_seal")) return true;
   return json["proposal_seal"] != SealOf(json);
 }

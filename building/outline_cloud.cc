@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <unordered_map>
 
@@ -13,6 +12,7 @@
 #include "colmap_ext/sparse_model.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/json_text.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -122,8 +122,7 @@ ModelPlace PlaceOfModel(const std::string& folder) {
   ModelPlace place;
   for (const char* name : {"alignment.json", "geo.json"}) {
     const std::string path = (std::filesystem::path(folder) / name).string();
-    std::ifstream stream(path);
-    const Json json = Json::parse(stream, nullptr, false);
+    const Json json = ReadJsonIfAny(path);
     if (!json.is_object()) continue;
     const bool is_alignment = std::string(name) == "alignment.json";
     place.aligned = true;

@@ -1,17 +1,13 @@
 #include "colmap_ext/mapper_verdict.h"
 
-#include <fstream>
-
-#include "core/report.h"
+#include "core/json_text.h"
 
 namespace roomtex {
 
 MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& model) {
   MapperVerdict verdict;
-  std::ifstream stream(folder + "/" + kMapperReportName);
-  if (!stream) return verdict;
-  const Json json = Json::parse(stream, nullptr, false);
-  if (json.is_discarded() || !json.is_object()) return verdict;
+  const Json json = ReadJsonIfAny(folder + "/" + kMapperReportName);
+  if (!json.is_object()) return verdict;
   if (json.value("num_reg_images", Json()) != model.images.size() ||
       json.value("num_points", Json()) != model.points.size()) {
     return verdict;

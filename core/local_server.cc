@@ -26,6 +26,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/local_server_address.h"
 #include "core/local_server_connection.h"
 #include "core/local_server_http.h"
@@ -38,7 +39,6 @@ namespace {
 constexpr int kMaxConnections = 128;  // open at a time, each with a thread
 constexpr int kMaxPerAddress = 48;    // of another computer
 constexpr int kFewConnections = 32;   // with more, each gets one answer
-constexpr int kMaxJsonDepth = 64;     // deeper nesting would use up the stack
 constexpr size_t kBlockBytes = size_t{1} << 16;
 
 // The time does not tell how much is right.
@@ -212,14 +212,11 @@ LocalServer::Query QueryOf(const httplib::Request& request) {
 // None if the text is no JSON or nested too deeply.
 std::optional<Json> ParseBody(const std::string& text) {
   if (text.empty()) return Json::object();
-  bool too_deep = false;
-  const auto look = [&](int depth, Json::parse_event_t, Json&) {
-    if (depth > kMaxJsonDepth) too_deep = true;
-    return !too_deep;  // what is too deep is dropped
-  };
-  Json json = Json::parse(text, look, false);
-  if (too_deep || json.is_discarded()) return std::nullopt;
-  return json;
+  try {
+    return ParseJson(text, "", "");
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 std::string Dump(const Json& json) {

@@ -101,7 +101,8 @@ const PassedThrough* OptionList::FindPassed(const std::string& argument) const {
 
 std::string OptionList::Unknown(const std::string& argument) const {
   std::string text = argument + " is not an option of " + command_;
-  const std::string name = argument.substr(argument.find_first_not_of('-'));
+  const std::string name =
+      argument.substr(std::min(argument.find_first_not_of('-'), argument.size()));
   const Option* nearest = nullptr;
   size_t nearest_distance = 3;  // more different names are no slips of the finger
   for (const Option& option : options_) {

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 #include <utility>
 
@@ -17,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/input_guard.h"
+#include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/set_journal.h"
 
@@ -122,8 +122,7 @@ std::vector<SetWithReport>& SetsWithReport() {
 void OutputSet::ReplaceAllOf(const std::string& command) {
   std::error_code error;
   if (fs::exists(folder_, error) && !fs::is_empty(folder_, error)) {
-    std::ifstream stream(folder_ + "/report.json");
-    const auto report = nlohmann::json::parse(stream, nullptr, false);
+    const Json report = ReadJsonIfAny(folder_ + "/report.json");
     const auto named = report.is_object() ? report.find("command") : report.end();
     if (!report.is_object() || named == report.end() || *named != command) {
       throw InputError(folder_, "", "holds files that " + command + " did not write",

@@ -1,11 +1,11 @@
 #include "core/panorama_set.h"
 
 #include <cmath>
-#include <fstream>
 #include <set>
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/report.h"
 
@@ -80,17 +80,15 @@ Camera CutPanorama::PanoramaCamera() const {
 }
 
 std::vector<CutPanorama> ReadPanoramaSet(const std::string& path) {
-  RequireFile(path, kRemedy);
-  std::ifstream stream(path, std::ios::binary);
+  const Json json = ReadJson(path, kRemedy);
   std::vector<CutPanorama> panoramas;
   try {
-    const Json json = Json::parse(stream);
     if (json.at("format") != kFormat) {
       throw InputError(path, "", std::string("is not of the format \"") + kFormat + "\"", kRemedy);
     }
     for (const Json& entry : json.at("panoramas")) panoramas.push_back(FromJson(entry, path));
-  } catch (const Json::exception& error) {
-    throw InputError(path, "", std::string("cannot be read: ") + error.what(), kRemedy);
+  } catch (const Json::exception&) {
+    throw InputError(path, "", "is not as roomtex-import writes it", kRemedy);
   }
   std::set<std::string> names;
   for (const CutPanorama& panorama : panoramas) {

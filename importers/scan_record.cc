@@ -3,12 +3,13 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <set>
+#include <stdexcept>
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/json_text.h"
 #include "core/text.h"
 #include "importers/content_hash.h"
 #include "importers/length_unit.h"
@@ -193,9 +194,15 @@ ScanRecord RecordFromJson(const Json& json) {
   record.units = json.at("units").is_null() ? "" : ValueOf<std::string>(json, "units");
   record.meters_per_unit = ValueOf<double>(json, "meters_per_unit");
   record.max_range = ValueOf<double>(json, "max_range");
+  if (!(record.meters_per_unit > 0) || !(record.max_range >= 0)) {
+    throw std::domain_error("a length out of range");
+  }
   for (const Json& pose : json.at("poses")) {
     const auto q = ValueOf<std::array<double, 4>>(pose, "rotation_wxyz");
     const auto t = ValueOf<std::array<double, 3>>(pose, "translation");
+    if (!(std::abs(Eigen::Vector4d(q.data()).norm() - 1) < 1e-3)) {
+      throw std::domain_error("no rotation");
+    }
     record.poses.push_back({{QuaternionFromWxyz({q[0], q[1], q[2], q[3]}), {t[0], t[1], t[2]}},
                             ValueOf<bool>(pose, "given")});
   }
@@ -274,8 +281,7 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
   record.path = (fs::path(model_folder) / "alignment.json").string();
   std::error_code error;
   if (!fs::is_regular_file(record.path, error)) return record;
-  std::ifstream stream(record.path, std::ios::binary);
-  const Json json = Json::parse(stream, nullptr, false);
+  const Json json = ReadJsonIfAny(record.path);
   try {
     if (!json.is_object()) throw InputError(record.path, "", "", "");
     record.found = true;

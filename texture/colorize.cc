@@ -192,6 +192,10 @@ std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) 
   return colors;
 }
 
+// Texels of the atlas of a mesh, per pixel of all photos: more of them show nothing more, except on
+// surface that no photo sees.
+constexpr double kMaxTexelsPerPixel = 4;
+
 // Atlases of the meshes without a grid. Probes on their surfaces are added to what the photos are
 // asked about: few vertices would say little about exposures.
 std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
@@ -199,9 +203,14 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
                                    const std::vector<SmoothedScan>& surfaces,
                                    const ColorizeOptions& options, PhotoPassInput* input) {
   constexpr int kNumProbes = 200000;
+  double pixels = 0;
+  for (const PhotoView& photo : photos) {
+    const Camera& camera = photo.camera;
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
   const double max_texels =
-      std::min(kMaxAutoTexels,
-               kMaxAutoBands * 1e6 * options.texture_memory_mb / BytesPerTexel(options.blend));
+      std::min({kMaxAutoTexels, kMaxTexelsPerPixel * pixels,
+                kMaxAutoBands * 1e6 * options.texture_memory_mb / BytesPerTexel(options.blend)});
   std::vector<MeshAtlas> atlases(scans.size());
   for (size_t s = 0; s < scans.size(); ++s) {
     if (scans[s].kind() != Scan::Kind::kMesh || options.atlas.mode == "0") continue;

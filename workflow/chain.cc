@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include "core/child_program.h"
+#include "core/json_text.h"
 #include "core/report.h"
 #include "workflow/step.h"
 
@@ -17,8 +17,7 @@ bool IsThere(const std::string& path) {
 }
 
 Json ReadJsonFile(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const Json json = Json::parse(stream, nullptr, false);
+  const Json json = ReadJsonIfAny(path);
   return json.is_object() ? json : Json();
 }
 

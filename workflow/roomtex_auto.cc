@@ -16,6 +16,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/partial_path.h"
+#include "core/photo_fit.h"
 #include "workflow/auto_options.h"
 #include "workflow/report_data.h"
 #include "workflow/report_page.h"
@@ -123,7 +124,9 @@ void CheckInputs(const AutoOptions& o) {
   }
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
   for (const std::string& path : o.scan_paths) {
-    RequireFile(path.substr(0, path.find('#')), "Give the file of the range scan");
+    // room.e57#2 is one scan of a file; but a name may hold a #, too.
+    const std::string file = IsThere(path) ? path : path.substr(0, path.find('#'));
+    RequireFile(file, "Give the file of the range scan");
   }
 }
 
@@ -139,7 +142,7 @@ void TellStop(const Stop& stop, const Command::Context& context) {
   } else if (stop.exit_code == kExitInternalError) {
     throw std::runtime_error(finding + remedies);
   } else {
-    throw InputError(stop.step, "", stop.reason, remedies);
+    throw InputError(stop.step, "", AsClause(stop.reason), remedies);
   }
 }
 

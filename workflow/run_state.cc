@@ -6,6 +6,7 @@
 #include <fstream>
 #include <set>
 
+#include "core/json_text.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -120,8 +121,7 @@ bool OutputsAreAsLeft(const StepRecord& record) {
 }
 
 RunState::RunState(const std::string& path) : path_(path) {
-  std::ifstream stream(path);
-  const Json json = Json::parse(stream, nullptr, false);
+  const Json json = ReadJsonIfAny(path);
   if (!json.is_object()) return;
   try {
     for (const auto& [name, record] : json.at("steps").items()) {

@@ -6,7 +6,6 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -15,6 +14,7 @@
 
 #include "core/child_program.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/signal_tidy.h"
 
 extern char** environ;
@@ -60,12 +60,6 @@ double ShareDone(int stages_done) {
     if (i < stages_done) done += kStages[i].seconds;
   }
   return done / all;
-}
-
-Json ReadReport(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  Json json = Json::parse(stream, nullptr, false);
-  return json.is_discarded() ? Json() : json;
 }
 
 // An untrusted result does not replace a trusted one: of both folders the one written last.
@@ -185,7 +179,7 @@ void AlignJob::Finish(int exit_code) {
   // Only these two write a report: another one is of an earlier run.
   const bool has_report = exit_code == kExitDone || exit_code == kExitUntrusted;
   const std::string written = has_report ? FolderOfRun(aligned_path_) : aligned_path_;
-  const Json report = has_report ? ReadReport(written + "/alignment.json") : Json();
+  const Json report = has_report ? ReadJsonIfAny(written + "/alignment.json") : Json();
   const std::lock_guard<std::mutex> lock(mutex_);
   written_path_ = written;
   if (cancelled_) {

@@ -145,7 +145,7 @@ void PickScene::AddPhotos() {
     throw InputError(input_.image_path, "",
                      (has_model() ? "none of the model's " : "none of the ") +
                          std::to_string(photos_.size()) + " photos can be shown. " + problem,
-                     "Give the folder that COLMAP was given as --image_path");
+                     "");
   }
 }
 

@@ -73,6 +73,9 @@ TEST_F(ServedPage, NamesThatAreNotOursAreRefused) {
   }
   EXPECT_THAT(SendRaw(port_, "GET " + base_ + "/ HTTP/1.1\r\nConnection: close\r\n\r\n"),
               StartsWith("HTTP/1.1 403"));
+  // httplib ends a line at a line feed.
+  EXPECT_THAT(SendRaw(port_, "GET " + base_ + "/ HTTP/1.1\n" + HostLine() + "\r\n"),
+              StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(SendRaw(port_, "GET " + base_ + "/ HTTP/1.1\r\n" + HostLine() + HostLine() + "\r\n"),
               StartsWith("HTTP/1.1 400"));
 }

@@ -1,5 +1,6 @@
 """Too little memory, too few threads, numbers at the ends of their range, files without end."""
 
+import math
 import os
 import random
 import resource
@@ -97,36 +98,53 @@ def poses(base):
             yield f"{title}, photos {value} m away", here.run(line, seconds=60).problem({0, 3, 4})
 
 
+def triangle_mesh(triangles):
+    """A PLY of triangles, given by their corners; equal ones are one vertex."""
+    numbers = {}
+    faces = b"".join(struct.pack("<B3i", 3, *(numbers.setdefault(tuple(corner), len(numbers))
+                                              for corner in t)) for t in triangles)
+    vertices = b"".join(struct.pack("<3f", *corner) for corner in numbers)
+    return (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(numbers)}\n"
+            "property float x\nproperty float y\nproperty float z\n"
+            f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+            ).encode() + vertices + faces
+
+
 def geometry(base):
-    """Meshes of random triangles of the room's size cost about what ordinary ones do."""
+    """Meshes of random triangles and of needles cost about what ordinary ones of as many do."""
     generator = random.Random(1)
-    count = 4000
 
-    def mesh(reach):
-        vertices, faces = b"", b""
-        for i in range(count):
-            corner = [generator.uniform(-3, 3) for _ in range(3)]
-            for _ in range(3):
-                vertices += struct.pack("<3f", *(c + generator.uniform(-reach, reach)
-                                                 for c in corner))
-            faces += struct.pack("<B3i", 3, 3 * i, 3 * i + 1, 3 * i + 2)
-        return (f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * count}\n"
-                "property float x\nproperty float y\nproperty float z\n"
-                f"element face {count}\nproperty list uchar int vertex_indices\nend_header\n"
-                ).encode() + vertices + faces
+    def scattered(reach):
+        corners = [[generator.uniform(-3, 3) for _ in range(3)] for _ in range(4000)]
+        return [[[c + generator.uniform(-reach, reach) for c in corner] for _ in range(3)]
+                for corner in corners]
 
-    seconds = []
-    for reach in (0.05, 5):
-        here = base.copy()
-        (here.root / "mesh.ply").write_bytes(mesh(reach))
-        started = time.time()
-        answer = here.run("roomtex-texture --quiet --input_path sparse --image_path photos "
-                          "--scan_path mesh.ply --output_path textured --Texture.scale 1", seconds=120)
-        seconds.append(time.time() - started)
-        problem = answer.problem({0, 3, 4})
-    if not problem and seconds[1] > 15 * seconds[0] + 2:
-        problem = f"{seconds[1]:.1f} s instead of {seconds[0]:.1f}"
-    yield f"texture on random triangles, {seconds[0]:.1f} and {seconds[1]:.1f} s", problem
+    def strips():
+        """Three needles each, edge to edge across the room: charts of large boxes, next to empty."""
+        points = [[[generator.uniform(-3, 3), generator.uniform(-3, 3), 0.5] for _ in range(5)]
+                  for _ in range(1500)]
+        return [five[k:k + 3] for five in points for k in range(3)]
+
+    fan = [[[0, 0, 0.5]] + [[3 * math.cos(angle / 3000), 3 * math.sin(angle / 3000), 0.5]
+                            for angle in (k, k + 1)] for k in range(18849)]
+    ordinary = scattered(0.05)
+    for scale in ("1", "auto"):
+        seconds = {}
+        for kind, triangles in (("ordinary", ordinary), ("random", scattered(5)), ("fan", fan),
+                                ("strips", strips())):
+            here = base.copy()
+            (here.root / "mesh.ply").write_bytes(triangle_mesh(triangles))
+            started = time.time()
+            answer = here.run("roomtex-texture --quiet --input_path sparse --image_path photos "
+                              "--scan_path mesh.ply --output_path textured --Texture.scale " +
+                              scale + (" --Texture.atlas 1" if scale == "auto" else ""),
+                              seconds=120)
+            seconds[kind] = time.time() - started
+            problem = answer.problem({0, 3, 4})
+            if not problem and seconds[kind] > 15 * seconds["ordinary"] + 2:
+                problem = f"{seconds[kind]:.1f} s instead of {seconds['ordinary']:.1f}"
+            yield (f"texture with scale {scale} on {kind} triangles, {seconds[kind]:.1f} s",
+                   problem)
 
 
 def endless(base):

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
@@ -84,7 +85,10 @@ struct FlatTriangle {
     const int column_last = static_cast<int>(std::floor(high.x() - 0.5));
     constexpr double kSlack = -1e-9;
     for (int row = row_begin; row < row_end; ++row) {
-      for (int column = column_begin; column <= column_last; ++column) {
+      const auto [from, to] = Span(row + 0.5 - corner[0].y(), ab, ac, area, 2 * kSlack);
+      const int column_end = 1 + static_cast<int>(std::min<double>(column_last, to));
+      for (int column = static_cast<int>(std::max<double>(column_begin, from)); column < column_end;
+           ++column) {
         const Eigen::Vector2d p = Eigen::Vector2d(column + 0.5, row + 0.5) - corner[0];
         const double b = (p.x() * ac.y() - p.y() * ac.x()) / area;
         const double c = (ab.x() * p.y() - ab.y() * p.x()) / area;
@@ -92,6 +96,25 @@ struct FlatTriangle {
         body(column, row, Eigen::Vector3d(1 - b - c, b, c));
       }
     }
+  }
+
+ private:
+  // Columns of the row y below corner[0] that may lie in the triangle: a needle across the page
+  // has few in each. Where all three shares are at least `slack`; a column more at both ends.
+  std::pair<double, double> Span(double y, const Eigen::Vector2d& ab, const Eigen::Vector2d& ac,
+                                 double area, double slack) const {
+    const double b_0 = -y * ac.x() / area, b_x = ac.y() / area;
+    const double c_0 = y * ab.x() / area, c_x = -ab.y() / area;
+    double from = -1, to = 1e9;
+    const auto cut = [&](double at_0, double per_column) {
+      const double at = (slack - at_0) / per_column + corner[0].x();
+      if (per_column > 0) from = std::max(from, at);
+      if (per_column < 0) to = std::min(to, at);
+    };
+    cut(b_0, b_x);
+    cut(c_0, c_x);
+    cut(1 - b_0 - c_0, -b_x - c_x);
+    return {std::min(from, 1e9) - 2, std::max(to, -2.0) + 1};
   }
 };
 
@@ -139,28 +162,44 @@ std::vector<std::vector<int>> ListMembers(const MeshCharts& charts) {
   return members;
 }
 
-// Charts that do not fold: what folds is made into charts of its own.
-MeshCharts MakeFlatCharts(const std::vector<Eigen::Vector3d>& points,
-                          const std::vector<Triangle>& triangles, const ChartOptions& options,
-                          double texel_size, std::vector<FlatChart>* flat) {
-  MeshCharts charts = GrowCharts(points, triangles, options);
-  std::vector<std::vector<int>> members = ListMembers(charts);
+// A chart with its gutters on a page of texels; larger texels where it would have no room.
+struct ChartSize {
+  double texel;
+  std::array<int, 2> size;  // texels
+  double area() const { return static_cast<double>(size[0]) * size[1]; }
+};
+
+ChartSize SizeOf(const FlatChart& chart, double texel, int room) {
+  const Eigen::Vector2d extent = chart.high - chart.low;
+  const double own = std::max(texel, extent.maxCoeff() / room);
+  return {own, {RoundUp(extent.x() / own + 2 * kGutter), RoundUp(extent.y() / own + 2 * kGutter)}};
+}
+
+// Charts that do not fold: what folds is made into charts of its own. None if they take more than
+// max_texels: what folds is looked for among no more than these.
+std::vector<FlatChart> MakeFlatCharts(const std::vector<Eigen::Vector3d>& points,
+                                      const std::vector<Triangle>& triangles, double texel,
+                                      int room, double max_texels, MeshCharts* charts) {
+  std::vector<std::vector<int>> members = ListMembers(*charts);
+  std::vector<FlatChart> flat;
+  double total = 0;
   for (size_t c = 0; c < members.size(); ++c) {
-    flat->push_back(FlattenChart(points, triangles, members[c], charts.normals[c]));
+    flat.push_back(FlattenChart(points, triangles, members[c], charts->normals[c]));
+    total += SizeOf(flat.back(), texel, room).area();
+    if (total > max_texels) return {};
     if (members[c].size() < 3) continue;
-    const std::vector<int> folds =
-        FindFolds(points, triangles, members[c], flat->back(), texel_size);
+    const std::vector<int> folds = FindFolds(points, triangles, members[c], flat.back(), texel);
     if (folds.empty()) continue;
     std::vector<int> kept;
     std::set_difference(members[c].begin(), members[c].end(), folds.begin(), folds.end(),
                         std::back_inserter(kept));
     const auto number = static_cast<int>(members.size());
-    for (const int t : folds) charts.chart_of[t] = number;
+    for (const int t : folds) charts->chart_of[t] = number;
     members.push_back(folds);
-    charts.normals.push_back(charts.normals[c]);
+    charts->normals.push_back(charts->normals[c]);
     members[c] = kept;
   }
-  return charts;
+  return flat;
 }
 
 // The power of two (or the largest size allowed) that wastes least on at most four pages.
@@ -261,21 +300,21 @@ MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
   ChartOptions chart_options;
   chart_options.max_extent = room * texel / std::sqrt(2.0);  // a chart may lie askew in its box
   chart_options.smooth_below = kWorthTexels * texel;
-  std::vector<FlatChart> flat;
-  MeshCharts charts = MakeFlatCharts(points, triangles, chart_options, texel, &flat);
+  MeshCharts charts = GrowCharts(points, triangles, chart_options);
+  const std::vector<FlatChart> flat =
+      MakeFlatCharts(points, triangles, texel, room, kMostGutters * max_texels, &charts);
+  if (flat.empty()) return atlas;
   std::vector<std::array<int, 2>> sizes;
   std::vector<double> texel_of;
   double total = 0;
   int widest = 0;
   for (const FlatChart& chart : flat) {
-    const Eigen::Vector2d extent = chart.high - chart.low;
-    texel_of.push_back(std::max(texel, extent.maxCoeff() / room));
-    sizes.push_back({RoundUp(extent.x() / texel_of.back() + 2 * kGutter),
-                     RoundUp(extent.y() / texel_of.back() + 2 * kGutter)});
-    total += static_cast<double>(sizes.back()[0]) * sizes.back()[1];
-    widest = std::max({widest, sizes.back()[0], sizes.back()[1]});
+    const ChartSize size = SizeOf(chart, texel, room);
+    texel_of.push_back(size.texel);
+    sizes.push_back(size.size);
+    total += size.area();
+    widest = std::max({widest, size.size[0], size.size[1]});
   }
-  if (total > kMostGutters * max_texels) return atlas;
   atlas.page_size = ChoosePageSize(total, widest, options.max_page_size);
   const Packing packing = PackRectangles(sizes, atlas.page_size);
   atlas.texel_size = texel;

@@ -1,7 +1,6 @@
 // roomtex-view: a look at the coloured scan in a browser.
 
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <optional>
 
@@ -9,6 +8,7 @@
 
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/local_server.h"
 #include "core/local_server_key.h"
 #include "core/open_browser.h"
@@ -28,8 +28,7 @@ struct ViewOptions {
 
 // A value of a report that roomtex wrote, e.g. {"options", "image_path"}; "" = not there.
 std::string FromReport(const fs::path& path, const std::vector<std::string>& keys) {
-  std::ifstream stream(path);
-  Json json = Json::parse(stream, nullptr, false);
+  Json json = ReadJsonIfAny(path.string());
   for (const std::string& key : keys) {
     if (!json.is_object() || !json.contains(key)) return "";
     json = Json(json[key]);
@@ -99,8 +98,7 @@ void WarnOfDoubts(const ViewOptions& options, const Command::Context& context,
                   std::vector<std::string>* warnings) {
   for (const fs::path& path : {fs::path(options.aligned) / "alignment.json",
                                fs::path(options.input_path) / "report.json"}) {
-    std::ifstream stream(path);
-    const Json json = Json::parse(stream, nullptr, false);
+    const Json json = ReadJsonIfAny(path.string());
     if (!json.is_object() || !json.contains("trusted") || json["trusted"] != false) continue;
     const std::string reason = FromReport(path, {"reason"});
     warnings->push_back(path.parent_path().string() + " is not to be trusted. " + reason);

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/photo.h"
 #include "importers/file_reader.h"
 #include "texture/view/view_model.h"
@@ -16,7 +16,7 @@
 namespace roomtex {
 namespace {
 
-using nlohmann::json;
+using json = Json;
 
 const char kDamaged[] = "The file is damaged: write it again";
 const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this";
@@ -99,7 +99,7 @@ class GlbReader {
       throw InputError(path, BytePosition(12), "the JSON part does not fit into the file",
                        kDamaged);
     }
-    root_ = json::parse(file.ReadSome(20, json_size), nullptr, false);
+    root_ = ParseJson(file.ReadSome(20, json_size), path, kDamaged);
     if (!root_.is_object()) {
       throw InputError(path, BytePosition(20), "the JSON part cannot be read", kDamaged);
     }
