@@ -112,7 +112,18 @@ std::string OptionList::Unknown(const std::string& argument) const {
       nearest_distance = distance;
     }
   }
-  return nearest == nullptr ? text : text + ". Did you mean --" + nearest->name + "?";
+  if (nearest != nullptr) return text + ". Did you mean --" + nearest->name + "?";
+  // --image for --image_path, --input for what it needs.
+  std::string needed;
+  for (const Option& option : options_) {
+    if (StartsWith(option.name, name + "_")) return text + ". Did you mean --" + option.name + "?";
+    const bool is_file =
+        option.name.size() > 5 && option.name.rfind("_path") == option.name.size() - 5;
+    if (is_file && option.name != "report_path" && option.name != "project_path") {
+      needed += (needed.empty() ? "" : ", ") + ("--" + option.name);
+    }
+  }
+  return needed.empty() ? text : text + ". Its files are " + needed + ".";
 }
 
 // CLI11 splits the arguments; what it leaves over must be options of another program with their

@@ -88,8 +88,12 @@ ul { padding-left: 22px; margin: 6px 0; }
   @page { margin: 16mm 14mm; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   main { max-width: none; padding: 0; }
-  h2 { break-after: avoid; margin-top: 26px; }
-  tr, .todo, dl.facts div { break-inside: avoid; }
+  h2, h3, h2 + p, h3 + p { break-after: avoid; }
+  h2 { margin-top: 26px; }
+  tr, .todo, dl.facts div, pre { break-inside: avoid; }
+  figure { margin-bottom: 10px; }
+  figure img { width: auto; max-width: 100%; max-height: 44mm; }
+  .two figure img { max-height: none; }
   .two { grid-template-columns: 1fr 1fr; }
   svg.plan { max-height: 110mm; }
 }

@@ -7,11 +7,13 @@
 #include <utility>
 
 #include "core/option_fields.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
 
 constexpr int kFewestSquares = 3, kMostSquares = 100;
+constexpr double kLargestSquare = 1;  // metres; beyond are millimetres
 
 struct Dictionary {
   const char* name;
@@ -79,8 +81,11 @@ void BoardOptions::Declare(OptionFields* fields) {
                "Side of a square, metres. The intrinsics do not depend on it, only the "
                "distances in the report do.")
       .Positive()
-      .Finite()
-      .Says("must be positive: the side of a square in metres, e.g. 0.025");
+      .AtMost(kLargestSquare)
+      .Says(square > kLargestSquare
+                ? "is " + Number(square, 0) +
+                      " m, larger than any board: it is in metres, 25 mm are 0.025"
+                : "must be positive: the side of a square in metres, e.g. 0.025");
   fields->Choice("board_type", &type, Types(),
                  "A checkerboard must be seen whole; of a ChArUco board a part is enough.");
   fields->Number("marker", &marker,

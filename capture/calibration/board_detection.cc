@@ -165,14 +165,18 @@ void CheckSizes(const std::string& folder, const std::vector<std::string>& names
     if (sizes[i][0] > 0) by_size[sizes[i]].push_back(names[i]);
   }
   if (by_size.size() < 2) return;
+  constexpr int kNamed = 5;
   std::string finding = "the photos are not all of one size: ";
   bool turned = false;
+  int named = 0;
   for (const auto& [size, with_it] : by_size) {
+    turned = turned || (size[0] != size[1] && by_size.count({size[1], size[0]}) > 0);
+    if (named++ >= kNamed) continue;
     finding += std::to_string(with_it.size()) + " of " + std::to_string(size[0]) + "x" +
                std::to_string(size[1]) + " (" + with_it[0] + "), ";
-    turned = turned || (size[0] != size[1] && by_size.count({size[1], size[0]}) > 0);
   }
   finding.resize(finding.size() - 2);
+  if (named > kNamed) finding += " and " + std::to_string(named - kNamed) + " sizes more";
   throw InputError(folder, "", finding,
                    turned
                        ? "A program turned the upright ones; take the files as the camera stored "

@@ -86,6 +86,15 @@ std::string FeatureExtractorOptions(const Camera& camera) {
   return options;
 }
 
+std::string FocalLengthLine(const Calibration& calibration) {
+  const double focal = calibration.camera.MeanFocalLength();
+  return "focal length " + Number(focal, 1) + " +- " +
+         Number(calibration.focal_sigma_percent / 100 * focal, 1) + " px (" +
+         Number(calibration.focal_sigma_percent, 2) + " %), reprojection " +
+         Number(calibration.rms_px, 2) + " px rms over " + std::to_string(calibration.NumUsed()) +
+         " photos";
+}
+
 void FillReport(const Calibration& calibration, const Board& board, Report* report) {
   Report& r = *report;
   r["camera_model"] = CameraModelName(calibration.camera.model);

@@ -13,7 +13,7 @@
 namespace roomtex {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNotKnown = std::numeric_limits<double>::infinity();
 
 // How the position of a viewing ray changes with the parameters and with a turn of the camera.
 struct Derivatives {
@@ -59,7 +59,7 @@ Eigen::Matrix2Xd PictureCorners(int width, int height) {
 
 std::vector<double> MappingSigma(const Camera& camera, const Eigen::MatrixXd& covariance,
                                  const Eigen::Matrix2Xd& x_in_img) {
-  std::vector<double> sigmas(x_in_img.cols(), kInfinity);
+  std::vector<double> sigmas(x_in_img.cols(), kNotKnown);
   const auto n = static_cast<Eigen::Index>(camera.params.size());
   if (!covariance.allFinite()) return sigmas;
   const CameraProjection projection(camera);

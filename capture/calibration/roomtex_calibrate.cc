@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "capture/calibration/board_detection.h"
+#include "capture/calibration/board_print.h"
 #include "capture/calibration/calibration.h"
 #include "capture/calibration/calibration_database.h"
 #include "capture/calibration/calibration_output.h"
@@ -23,7 +24,8 @@ namespace roomtex {
 namespace {
 
 struct Arguments {
-  std::string image_path, output_path, coverage_path, database_path, database_output_path;
+  std::string image_path, output_path, board_path, coverage_path, database_path,
+      database_output_path;
   BoardOptions board;
   CalibrationOptions calibration;
 };
@@ -32,9 +34,15 @@ void AddOptions(Arguments* a, Command* command) {
   command->AddInputPath("image_path", &a->image_path,
                         "Folder with photos of the board, taken with the focus and zoom of the "
                         "capture; used as they are stored (an EXIF orientation is ignored, as "
-                        "COLMAP ignores it).");
+                        "COLMAP ignores it).",
+                        Command::Kind::kOptional);
   command->Add(FieldsOf(&a->board));
-  command->AddOutputPath("output_path", &a->output_path, "The camera, as COLMAP's cameras.txt.");
+  command->AddOutputPath("output_path", &a->output_path, "The camera, as COLMAP's cameras.txt.",
+                         Command::Kind::kOptional);
+  command->AddOutputPath("board_path", &a->board_path,
+                         "Write the board as a PDF to print, in its true size; without "
+                         "--image_path that is all.",
+                         Command::Kind::kOptional);
   command->AddOutputPath("coverage_path", &a->coverage_path,
                          "Picture (PNG or JPEG) of where the corners lie, with the residuals and "
                          "the photos left out.",
@@ -54,6 +62,13 @@ void AddOptions(Arguments* a, Command* command) {
 void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->board.Problems();
   AppendProblems(a->calibration.Problems(), &problems);
+  const bool only_board = !a->board_path.empty() && a->image_path.empty();
+  if (!only_board && a->image_path.empty()) {
+    problems.push_back(
+        "--image_path is required: the photos of the board (to print a board first, "
+        "give --board_path board.pdf)");
+  }
+  if (!only_board && a->output_path.empty()) problems.push_back("--output_path is required");
   if (a->database_path.empty() && !a->database_output_path.empty()) {
     problems.push_back("--apply_output needs --apply, the database to copy");
   }
@@ -97,6 +112,11 @@ void Run(Arguments* a, const Command::Context& context) {
   // Photos side by side, each on one thread: OpenCV's own threads would come on top.
   cv::setNumThreads(1);
   const Board board = MakeBoard(a->board);
+  if (!a->board_path.empty()) WriteBoardPdf(board, a->board_path);
+  if (a->image_path.empty()) {
+    std::printf("%s\n", a->board_path.c_str());
+    return;
+  }
   const std::vector<std::string> names = ListPhotos(a->image_path);
   context.progress.Stage("find boards", static_cast<int>(names.size()));
   const std::vector<BoardPhoto> photos =
@@ -116,6 +136,7 @@ void Run(Arguments* a, const Command::Context& context) {
   WriteCamerasText(a->output_path, calibration.camera);
   if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
+  context.progress.Note(FocalLengthLine(calibration));
   std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
 }
 

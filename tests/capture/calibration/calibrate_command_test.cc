@@ -1,12 +1,17 @@
 // roomtex-calibrate as users call it.
 
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "capture/calibration/board_detection.h"
 #include "capture/calibration/calibration_database.h"
 #include "capture/calibration/calibration_output.h"
 #include "colmap_ext/database.h"
@@ -83,6 +88,8 @@ TEST_F(CalibrateCommand, WritesTheCameraTheOptionsThePictureAndTheReport) {
   const auto sigmas = report["params_sigma"].get<std::vector<double>>();
   for (int i = 0; i < 8; ++i) EXPECT_NEAR(camera.params[i], Truth().params[i], 4 * sigmas[i]) << i;
   EXPECT_EQ(result.out, FeatureExtractorOptions(camera) + "\n");
+  EXPECT_NE(result.err.find("focal length "), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find(" +- "), std::string::npos) << result.err;
   EXPECT_EQ(result.out.rfind("--ImageReader.single_camera 1 --ImageReader.camera_model OPENCV "
                              "--ImageReader.camera_params ",
                              0),
@@ -139,6 +146,10 @@ TEST_F(CalibrateCommand, SaysWhatIsWrongInSentences) {
   expect(images + "--board 9", 2, "expected COLUMNSxROWS of inner corners");
   expect(images + "--board 9x6 --square 0", 2, "--square must be positive");
   expect(images + "--board 9x6 --square nan", 2, "--square");
+  expect(images + "--board 9x6 --square 25", 2, "25 mm are 0.025");
+  expect("--board 9x6", 2, "--image_path is required");
+  expect("--input " + few_->path(), 2, "Its files are --image_path");
+  expect("--image " + few_->path(), 2, "Did you mean --image_path?");
   expect(images + "--board 9x6 --camera_model PINHOLE", 2, "--camera_model is \"PINHOLE\"");
   expect(images + "--board 9x6 --board_type charuco", 2, "--marker must be positive");
   expect(images + "--board 9x6 --coverage_path x.xyz", 2, "ends with .png");
@@ -147,6 +158,66 @@ TEST_F(CalibrateCommand, SaysWhatIsWrongInSentences) {
   expect("--board 9x6 --image_path " + (folder_ / "nowhere"), 3, "nowhere");
   expect("--board 9x6 --image_path " + folder_.path(), 3, "holds no photos");
   expect(images + "--board 10x7", 3, "Give --board 9x6");
+}
+
+// The black rectangles of a PDF of ours, a pixel for a quarter of a millimetre.
+cv::Mat1b Raster(const std::string& pdf) {
+  double width = 0, height = 0;
+  const size_t box = pdf.find("/MediaBox [0 0 ");
+  EXPECT_EQ(std::sscanf(pdf.c_str() + box, "/MediaBox [0 0 %lf %lf]", &width, &height), 2);
+  const double scale = 25.4 / 72 * 4;
+  cv::Mat1b picture(static_cast<int>(height * scale), static_cast<int>(width * scale),
+                    uint8_t{255});
+  std::istringstream lines(pdf);
+  std::string line;
+  while (std::getline(lines, line)) {
+    double x = 0, y = 0, w = 0, h = 0;
+    if (line.size() < 3 || line.substr(line.size() - 3) != " re") continue;
+    std::sscanf(line.c_str(), "%lf %lf %lf %lf re", &x, &y, &w, &h);
+    const auto pixel = [&](double points) { return static_cast<int>(std::lround(points * scale)); };
+    const cv::Rect rect(cv::Point(pixel(x), pixel(height - y - h)),
+                        cv::Point(pixel(x + w), pixel(height - y)));
+    picture(rect).setTo(0);
+  }
+  return picture;
+}
+
+TEST_F(CalibrateCommand, WritesBoardsToPrintThatItFindsAgain) {
+  const std::string pdf = folder_ / "board.pdf";
+  for (const char* options : {"--board 9x6 --square 0.025",
+                              "--board 8x6 --square 0.03 --board_type charuco --marker 0.022"}) {
+    const CommandResult result =
+        RunCommandLine(std::string("roomtex-calibrate --board_path ") + pdf + " " + options);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out, pdf + "\n");
+    const bool charuco = std::string(options).find("charuco") != std::string::npos;
+    const TempFolder photos;
+    // As a camera sees it: a little turned, a little soft.
+    const cv::Mat1b flat = Raster(ReadBytes(pdf));
+    constexpr double kScale = 0.9;
+    cv::Mat1b photo;
+    cv::warpAffine(flat, photo,
+                   cv::getRotationMatrix2D({flat.cols / 2.0F, flat.rows / 2.0F}, 4, kScale),
+                   flat.size(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, {255});
+    cv::GaussianBlur(photo, photo, {}, 1);
+    cv::imwrite(photos / "board.png", photo);
+    BoardOptions board;
+    board.size = charuco ? "8x6" : "9x6";
+    board.square = charuco ? 0.03 : 0.025;
+    if (charuco) {
+      board.type = "charuco";
+      board.marker = 0.022;
+    }
+    Progress progress(true);
+    const std::vector<BoardPhoto> found =
+        FindBoards(photos.path(), {"board.png"}, MakeBoard(board), 1, &progress);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].reason, "");
+    ASSERT_EQ(found[0].x_in_img.cols(), charuco ? 35 : 54);
+    // In true size: 4 pixels a millimetre.
+    const double square_px = (found[0].x_in_img.col(1) - found[0].x_in_img.col(0)).norm();
+    EXPECT_NEAR(square_px, kScale * 4000 * board.square, 0.5);
+  }
 }
 
 class ApplyToDatabaseTest : public CalibrateCommand {
