@@ -68,8 +68,7 @@ TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
   EXPECT_EQ(ReadBytes(At("hall/log/pictures.state")), "done\n");
   // The step matches found all its pairs matched by the two parts, which are gone.
   EXPECT_THAT(ReadBytes(At("hall/log/parts.run.log")), HasSubstr("from 2 copies"));
-  EXPECT_THAT(ReadBytes(At("hall/log/matches.log")),
-              HasSubstr("Matching block [1/1] in 0.00"));
+  EXPECT_THAT(ReadBytes(At("hall/log/matches.log")), HasSubstr("Matching block [1/1] in 0.00"));
   EXPECT_FALSE(fs::exists(At("hall/parts/1.db")));
 
   // The failed room is not to be trusted now: its state says so, nobody tries it again.
