@@ -1,7 +1,7 @@
 // roomtex-view in a browser, on a small simulated room and on squares of known colours.
 
 import assert from 'node:assert/strict';
-import {readFileSync, rmSync, writeFileSync} from 'node:fs';
+import {copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, makeFolder, openPage, run, screenshot, serve} from './browser.mjs';
@@ -70,7 +70,8 @@ async function settle(page) {
   await page.waitForFunction(
       () => globalThis.roomtexView?.evidence && roomtexView.room.settled &&
           !roomtexView.scheduled && !roomtexView.refineTimer && !roomtexView.fence &&
-          !roomtexView.navigation.moving,
+          !roomtexView.navigation.moving &&
+          (roomtexView.mode !== 'view-dependent' || roomtexView.lumigraph.settled),
       null, {timeout: 120000, polling: 100});
 }
 // What is in the picture, without the buttons over it.
@@ -85,10 +86,10 @@ async function picture(page) {
   });
   return readPng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
 }
+const isBackground = ([r, g, blue]) => r === 0x1b && g === 0x1e && blue === 0x24;
 // Mean absolute difference of two pictures, b moved by (dx, dy), in the middle of the picture; only
 // where both are surface and not background.
 function difference(a, b, dx = 0, dy = 0) {
-  const isBackground = ([r, g, blue]) => r === 0x1b && g === 0x1e && blue === 0x24;
   let sum = 0, count = 0;
   for (let y = Math.floor(a.height * 0.25); y < a.height * 0.75; y += 2) {
     for (let x = Math.floor(a.width * 0.25); x < a.width * 0.75; x += 2) {
@@ -206,6 +207,91 @@ test('a photo lies on the room to the pixel where it was taken', async () => {
   assert.ok(await page.isHidden('#standing'));
   assert.deepEqual(errors(), []);
   await page.close();
+});
+
+const fromSrgb = (byte) =>
+    byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4;
+const toSrgb = (light) => 255 *
+    (light <= 0.0031308 ? 12.92 * light : 1.055 * Math.min(light, 1) ** (1 / 2.4) - 0.055);
+// PSNR of a prediction of a photo, both as the page shows them, at the pixels where isMeant(x, y);
+// their exposures may differ by a factor.
+function psnr(photo, predicted, isMeant) {
+  const pairs = [];
+  let cross = 0, square = 0;
+  for (let y = 0; y < photo.height; ++y) {
+    for (let x = 0; x < photo.width; ++x) {
+      const p = photo.at(x, y), q = predicted.at(x, y);
+      if (isBackground(p) || isBackground(q) || !isMeant(x, y)) continue;
+      for (let k = 0; k < 3; ++k) {
+        pairs.push([p[k], fromSrgb(q[k])]);
+        cross += p[k] < 240 ? fromSrgb(p[k]) * fromSrgb(q[k]) : 0;
+        square += p[k] < 240 ? fromSrgb(q[k]) ** 2 : 0;
+      }
+    }
+  }
+  assert.ok(pairs.length > 3000, `${pairs.length / 3} pixels to compare`);
+  const gain = cross / square;
+  const sum = pairs.reduce((total, [p, q]) => total + (p - toSrgb(gain * q)) ** 2, 0);
+  return 10 * Math.log10(255 ** 2 * pairs.length / sum);
+}
+
+test('photos near the point of view predict one that was left out', async () => {
+  const kLeftOut = ['photo_005.jpg', 'photo_010.jpg'];
+  // Per room and photo: the photo itself, the blended colours, the view-dependent ones.
+  const shown = {};
+  for (const [name, gloss] of [['matt', '0'], ['glossy', '0.3']]) {
+    const capture = folder.path(name), rest = `${capture}/rest`;
+    await succeed('roomtex-simulate', [
+      '--output_path', capture, '--seed', '3', '--quiet', '1', '--num_photos', '16',
+      '--photo_width', '480', '--photo_height', '320', '--scan_columns', '600', '--scan_rows',
+      '300', '--range_noise', '0.0003', '--furnished', '0', '--gloss', gloss
+    ]);
+    mkdirSync(rest);
+    for (const file of readdirSync(`${capture}/photos`)) {
+      if (!kLeftOut.includes(file)) copyFileSync(`${capture}/photos/${file}`, `${rest}/${file}`);
+    }
+    await succeed('roomtex-texture', [
+      '--input_path', `${capture}/truth`, '--image_path', rest, '--scan_path',
+      `${capture}/scan.rtpi`, '--output_path', `${capture}/textured`, '--quiet', '1'
+    ]);
+    const own = await serveView(
+        '--input_path', `${capture}/textured`, '--aligned', `${capture}/truth`, '--image_path',
+        `${capture}/photos`);
+    const {page, errors} = await openView(own.url, {width: 840, height: 320});
+    await page.keyboard.press('f');
+    for (const file of kLeftOut) {
+      await page.click(`#camera-list li:has-text("${file}")`);
+      await page.waitForFunction(() => roomtexView.cameras.photoShown);
+      await page.keyboard.press('1');
+      await page.fill('#opacity', '1');
+      const photo = await picture(page);
+      await page.fill('#opacity', '0');
+      const blended = await picture(page);
+      await page.keyboard.press('5');
+      await page.waitForFunction(() => roomtexView.room.mode === 'view-dependent');
+      (shown[name] ??= []).push({photo, blended, mixed: await picture(page)});
+      await screenshot(page, `view-${name}-${file.slice(0, -4)}`);
+    }
+    assert.match(page.url(), /surface=view-dependent/);
+    assert.deepEqual(errors(), []);
+    await page.close();
+    assert.equal(await own.stop(), 0);
+  }
+  kLeftOut.forEach((file, i) => {
+    const matt = shown.matt[i], glossy = shown.glossy[i];
+    const shines = (x, y) => {
+      const p = matt.photo.at(x, y), q = glossy.photo.at(x, y);
+      return Math.max(...p.map((value, k) => Math.abs(value - q[k]))) > 12;
+    };
+    const gain = ({photo, blended, mixed}, isMeant) =>
+        psnr(photo, mixed, isMeant) - psnr(photo, blended, isMeant);
+    const everywhere = () => true;
+    assert.ok(gain(matt, everywhere) > -0.1, `${file}: ${gain(matt, everywhere)} dB, matt`);
+    assert.ok(gain(glossy, everywhere) > -0.2, `${file}: ${gain(glossy, everywhere)} dB, glossy`);
+    // Mirror images are foreseen where a photo was taken from a like direction: the first one's.
+    if (i > 0) return;
+    assert.ok(gain(glossy, shines) > 0.3, `${file}: ${gain(glossy, shines)} dB where it shines`);
+  });
 });
 
 // The view from a place of the room's own frame along a direction, as an address.
