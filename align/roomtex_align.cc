@@ -262,6 +262,7 @@ void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
 
 // Another scan than the one that a model was aligned to before is no mistake here.
 PlacedScans ReadScansToAlign(const Arguments& a) {
+  const SampleWork work("aligning to", kAlignBytesPerSample);
   if (!a.scan_paths.empty()) return ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
   return ReadScansOfModel(ReadAlignmentRecord(a.input_path),
                           {a.scan_paths, a.scan_poses, a.scan_reader});
@@ -294,11 +295,6 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
 struct Reading {
   Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
     for (const std::string& note : placed.notes) context.Warn(note);
-    for (const Scan& scan : placed.scans) {
-      RequireMemory(scan.path, "aligning to its " + std::to_string(scan.points.size()) + " samples",
-                    kAlignBytesPerSample * static_cast<double>(scan.points.size()),
-                    "Give a machine with more memory, or a scan with fewer samples");
-    }
     ReplaceClouds(&placed.scans, context.options.num_threads);
     CompareStations(a, &placed, context);
     geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));

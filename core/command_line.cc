@@ -79,6 +79,9 @@ Outcome RunBody(const std::function<void()>& body) {
     return {kExitInput, kOutOfMemory};
   } catch (const std::length_error&) {
     return {kExitInput, kOutOfMemory};
+  } catch (const std::filesystem::filesystem_error& error) {
+    return {kExitInput, error.path1().string() + ": cannot be looked at (" +
+                            error.code().message() + "). Check the path and its links"};
   } catch (const cv::Exception& error) {
     if (error.code == cv::Error::StsNoMem) return {kExitInput, kOutOfMemory};
     return {kExitInternalError, "internal error: " + error.err};

@@ -151,7 +151,8 @@ int LocalConnection::ParseHead(const std::string& head, LocalRequest* request) {
   std::map<std::string, std::string> fields;
   size_t begin = head.find("\r\n") + 2;
   const std::string request_line = head.substr(0, begin);
-  // httplib ends a line at a line feed alone: what followed it would be a field that nobody checked.
+  // httplib ends a line at a line feed alone: what followed it would be a field that nobody
+  // checked.
   const auto is_plain = [](unsigned char c) { return c >= ' ' && c < 127; };
   if (!std::all_of(head.begin(), head.begin() + static_cast<long>(begin) - 2, is_plain)) return 400;
   for (int count = 0; begin < head.size(); ++count) {

@@ -96,6 +96,20 @@ void CopyToDevice(const std::string& from, const std::string& path) {
   }
 }
 
+// path: the target as the user named it.
+void MoveToPlace(const std::string& partial, const std::string& target, const std::string& path) {
+  std::error_code error;
+  fs::rename(partial, target, error);
+  if (error) {
+    throw InputError(path, "", "cannot be replaced (" + error.message() + ")",
+                     "Check that you may write this file");
+  }
+  ReleasePartial(partial);
+  NoteOutput(path);
+}
+
+CommitTogether* together = nullptr;
+
 }  // namespace
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {
@@ -135,17 +149,29 @@ void OutputFile::Commit() {
     throw InputError(path_, "", "could not be written to its end", "Check the space on the disk");
   }
   if (direct_) return CopyToDevice(partial_path_, path_);
-  const CommitLock lock;
   RefuseToReplaceInput(path_);
-  std::error_code error;
-  fs::rename(partial_path_, target_, error);
-  if (error) {
-    throw InputError(path_, "", "cannot be replaced (" + error.message() + ")",
-                     "Check that you may write this file");
+  if (together != nullptr) {
+    together->whole_.push_back({path_, target_, partial_path_});
+    partial_path_.clear();
+    return;
   }
-  ReleasePartial(partial_path_);
+  const CommitLock lock;
+  MoveToPlace(partial_path_, target_, path_);
   partial_path_.clear();
-  NoteOutput(path_);
+}
+
+CommitTogether::CommitTogether() { together = this; }
+
+CommitTogether::~CommitTogether() {
+  together = nullptr;
+  for (const Whole& file : whole_) RemovePartial(file.partial_path);
+}
+
+void CommitTogether::Finish() {
+  const CommitLock lock;
+  for (; !whole_.empty(); whole_.erase(whole_.begin())) {
+    MoveToPlace(whole_.front().partial_path, whole_.front().target, whole_.front().path);
+  }
 }
 
 void MakeFolder(const std::string& path) {

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <future>
 #include <limits>
+#include <mutex>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -74,6 +76,42 @@ void RequireMemory(const std::string& path, const std::string& what, double num_
                    fmt::format("{} takes {} of memory, and {} are free", what, Gigabytes(num_bytes),
                                Gigabytes(available)),
                    remedy);
+}
+
+namespace {
+
+struct StateOfWork {
+  std::string what;
+  double bytes_per_sample, available, samples;
+};
+std::optional<StateOfWork> sample_work;
+std::mutex sample_work_mutex;
+
+}  // namespace
+
+SampleWork::SampleWork(const std::string& what, double bytes_per_sample) {
+  const std::lock_guard<std::mutex> lock(sample_work_mutex);
+  sample_work = StateOfWork{what, bytes_per_sample, static_cast<double>(AvailableMemory()), 0};
+}
+
+SampleWork::~SampleWork() {
+  const std::lock_guard<std::mutex> lock(sample_work_mutex);
+  sample_work.reset();
+}
+
+void RequireMemoryForSamples(const std::string& path, double count) {
+  constexpr double kReadBytesPerSample = 28;  // place and intensity
+  const std::lock_guard<std::mutex> lock(sample_work_mutex);
+  const auto now = static_cast<double>(AvailableMemory());
+  StateOfWork work = sample_work.value_or(StateOfWork{"reading", kReadBytesPerSample, now, 0});
+  work.samples += count;
+  if (sample_work) sample_work->samples = work.samples;
+  const double needed = work.samples * work.bytes_per_sample;
+  if (needed <= work.available) return;
+  throw InputError(path, "",
+                   fmt::format("{} {:.0f} samples takes {} of memory, and {} are free", work.what,
+                               work.samples, Gigabytes(needed), Gigabytes(work.available)),
+                   "Give a machine with more memory, or a scan with fewer samples");
 }
 
 std::string BytesPerSampleHelp(double bytes) {

@@ -16,8 +16,25 @@ void RequireMemory(const std::string& path, const std::string& what, double num_
                    const std::string& remedy);
 
 // Bytes of memory that commands take per sample of a scan (docs/reliability.md says how measured).
-inline constexpr double kImportBytesPerSample = 86, kAlignBytesPerSample = 47,
-                        kTextureBytesPerSample = 228;
+inline constexpr double kImportBytesPerSample = 75, kAlignBytesPerSample = 112,
+                        kTextureBytesPerSample = 228, kExportBytesPerSample = 234,
+                        kDenseBytesPerSample = 301;
+
+// What a command does with the samples of all scans that it reads while this lives: what they take
+// in the end is compared with what is free before room is made for any. One at a time.
+class SampleWork {
+ public:
+  // what: "colouring".
+  SampleWork(const std::string& what, double bytes_per_sample);
+  ~SampleWork();
+  SampleWork(const SampleWork&) = delete;
+  SampleWork& operator=(const SampleWork&) = delete;
+};
+// A reader knows from header or size of the file that so many samples come, and has not made room
+// for them yet. Throws InputError if the work on them and on those before takes more memory than
+// was free when it began; without a SampleWork, if reading these alone does.
+void RequireMemoryForSamples(const std::string& path, double count);
+
 // The same as a clause for --help: "about 86 bytes of memory a sample".
 std::string BytesPerSampleHelp(double bytes);
 

@@ -12,6 +12,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/resource_limits.h"
 #include "core/surfels.h"
 #include "dense/dense.h"
 #include "importers/scan_reader.h"
@@ -40,7 +41,8 @@ void AddOptions(DenseCommandOptions* o, Command* command) {
                         "pattern are the best: bare walls become dense.");
   command->AddInputPaths("scan_path", &o->scan_paths,
                          "Range scan. Not needed for a model of roomtex-align, which remembers its "
-                         "scans and how they were read.",
+                         "scans and how they were read. " +
+                             BytesPerSampleHelp(kDenseBytesPerSample),
                          Command::Kind::kOptional);
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write supplement.ply and COLMAP's dense workspace into: new, "
@@ -144,6 +146,7 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
+  const SampleWork work("finding surfaces beside", kDenseBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
       alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   ReplaceClouds(&placed.scans, context.options.num_threads);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/resource_limits.h"
 #include "importers/e57_document.h"
 #include "importers/e57_grid.h"
 #include "importers/e57_points.h"
@@ -149,6 +150,11 @@ std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
   if (document.scans.empty()) {
     throw InputError(path, "", "holds no scan", "Give an E57 file with a scan (data3D)");
   }
+  double num_records = 0;
+  for (const size_t i : ChosenScans(path, document.scans, part)) {
+    num_records += static_cast<double>(document.scans[i].points.num_records);
+  }
+  RequireMemoryForSamples(path, num_records);
   std::vector<Scan> scans;
   for (const size_t i : ChosenScans(path, document.scans, part)) {
     const E57Scan& source = document.scans[i];

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 #include "importers/file_reader.h"
 
 namespace roomtex {
@@ -127,6 +128,7 @@ bool LooksLikeLas(std::string_view start) { return start.substr(0, 4) == "LASF";
 Scan ReadLas(const std::string& path, const LasOptions& options) {
   const FileReader file(path);
   const LasHeader header = ReadLasHeader(file);
+  RequireMemoryForSamples(path, static_cast<double>(header.count));
   Scan scan;
   scan.path = path;
   scan.organised = false;

@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 #include "importers/up_axis.h"
@@ -364,6 +365,7 @@ void ReadCompressed(const FileReader& file, const PcdHeader& header, PcdFiller* 
 Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind) {
   const FileReader file(path);
   const PcdHeader header = PcdHeaderParser(file, options.clouds).Parse();
+  RequireMemoryForSamples(path, static_cast<double>(header.width * header.height));
   Scan scan;
   scan.path = path;
   PcdFiller filler(header, options, &scan);

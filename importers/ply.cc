@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 #include "importers/pcd.h"
@@ -298,6 +299,7 @@ class PlyParser {
   void ReadVertices() {
     const int intensity = vertex_->Find({"intensity", "scalar_intensity", "scalar_Intensity"});
     const auto count = static_cast<size_t>(vertex_->count);
+    RequireMemoryForSamples(scan_.path, static_cast<double>(count));
     scan_.points.reserve(count);
     scan_.intensity.reserve(count);
     const std::vector<std::vector<float>*> wanted = WantedByProperty();

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/resource_limits.h"
 #include "importers/file_reader.h"
 #include "importers/up_axis.h"
 
@@ -155,6 +156,7 @@ class PtxParser {
                            std::to_string(lines_.BytesLeft()) + " bytes follow",
                        "The file is cut off or its size damaged");
     }
+    RequireMemoryForSamples(file_.path(), cells);
     Scan scan;
     scan.path = file_.path();
     scan.num_columns = static_cast<int>(num_columns);

@@ -83,23 +83,21 @@ class Importer {
   void Run() {
     CheckOutputs(options_);
     context_.progress.Stage("read scan");
+    const SampleWork work("converting", kImportBytesPerSample);
     file_ = ReadScanFile(options_.input_path, options_.reader);
     for (const std::string& note : file_.notes) context_.Warn(note);
-    for (const Scan& scan : file_.scans) {
-      RequireMemory(scan.path, "converting its " + std::to_string(scan.points.size()) + " samples",
-                    kImportBytesPerSample * static_cast<double>(scan.points.size()),
-                    "Give a machine with more memory, or a scan with fewer samples");
-    }
     CheckGrid();
     context_.progress.Stage("triangulate");
     for (const Scan& scan : file_.scans) meshes_.push_back(BuildScanMesh(scan, options_.mesh));
     FillReport();
     context_.progress.Stage("write", static_cast<int>(options_.output_paths.size()));
     std::string answer = Summary();
+    CommitTogether outputs;
     for (const std::string& path : options_.output_paths) {
       for (const std::string& written : Write(path)) answer += written + "\n";
       context_.progress.Tick();
     }
+    outputs.Finish();
     context_.progress.Finish();
     std::cout << answer;
   }

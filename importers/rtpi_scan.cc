@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/statistics.h"
+#include "core/text.h"
 #include "importers/length_unit.h"
 #include "importers/rtpi.h"
 #include "importers/rtpi_grid.h"
@@ -71,7 +72,7 @@ void CheckAnyMeasured(const RtpiFile& file, const Scan& scan, double max_range) 
   }
   throw InputError(
       file.path, "",
-      "holds no sample within the largest range of " + std::to_string(max_range) + " m",
+      "holds no sample within the largest range of " + Significant(max_range, 6) + " m",
       "Give a larger --max_range or another --units");
 }
 

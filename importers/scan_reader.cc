@@ -10,6 +10,7 @@
 #include "core/frames.h"
 #include "core/input_guard.h"
 #include "core/option_fields.h"
+#include "core/resource_limits.h"
 #include "importers/cloud_grid.h"
 #include "importers/e57.h"
 #include "importers/e57_pages.h"
@@ -96,6 +97,8 @@ double MetersPerUnitOr(const std::string& units, double otherwise) {
 }
 
 ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
+  constexpr double kRtpiSampleBytes = 16;
+  RequireMemoryForSamples(path, static_cast<double>(FileReader(path).size()) / kRtpiSampleBytes);
   const RtpiFile rtpi = ReadRtpi(path);
   ScanFile file;
   file.format = "RTPI";
@@ -246,6 +249,9 @@ std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf
 
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file = ReadAsItIs(path, options);
+  if (file.format == "OBJ") {  // the only one that does not say how many there are
+    RequireMemoryForSamples(path, static_cast<double>(file.scans[0].points.size()));
+  }
   for (const Scan& scan : file.scans) NoteInput(scan.path, "the scan");
   for (Scan& scan : file.scans) {
     if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);

@@ -11,13 +11,15 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/resource_limits.h"
 #include "importers/file_reader.h"
 
 namespace roomtex {
 namespace {
 
 constexpr size_t kMostColumns = 64;
-constexpr int64_t kShortestPoint = 6;  // bytes: "0 0 0\n"
+constexpr int64_t kPointsToGuessBy = 1000;  // how many there are in all
+constexpr int64_t kShortestPoint = 6;       // bytes: "0 0 0\n"
 const char kNotXyz[] = "The file is damaged, or no list of points";
 
 // The words of a line.
@@ -168,6 +170,11 @@ class XyzParser {
     };
     if (++num_points_ > std::numeric_limits<int>::max()) {
       throw Error(line, "no more than 2147483647 points");
+    }
+    if (num_points_ == kPointsToGuessBy) {
+      const double all = static_cast<double>(file_.size());
+      RequireMemoryForSamples(file_.path(),
+                              kPointsToGuessBy * all / static_cast<double>(lines_.offset()));
     }
     Eigen::Vector3d point;
     for (int i = 0; i < 3; ++i) point[i] = options_.meters_per_unit * number(columns_->place[i]);

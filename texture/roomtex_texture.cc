@@ -461,16 +461,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
+  const SampleWork work("colouring", kTextureBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
       alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
   const std::vector<Scan>& scans = placed.scans;
   CheckScans(scans, options);
-  for (const Scan& scan : scans) {
-    RequireMemory(scan.path, "colouring its " + std::to_string(scan.points.size()) + " samples",
-                  kTextureBytesPerSample * static_cast<double>(scan.points.size()),
-                  "Give a machine with more memory, or a scan with fewer samples");
-  }
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   ProtectInputs(options, scans);

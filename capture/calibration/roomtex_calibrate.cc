@@ -109,6 +109,10 @@ void Apply(const Arguments& a, const Camera& camera, const Command::Context& con
 
 void Run(Arguments* a, const Command::Context& context) {
   CheckArguments(a);
+  // An output that cannot be written is better known before.
+  for (const std::string& path : {a->output_path, a->coverage_path, a->database_output_path}) {
+    if (!path.empty()) OutputFile probe(path);
+  }
   // Photos side by side, each on one thread: OpenCV's own threads would come on top.
   cv::setNumThreads(1);
   const Board board = MakeBoard(a->board);
@@ -133,9 +137,11 @@ void Run(Arguments* a, const Command::Context& context) {
   context.progress.Note(calibration.why_model);
 
   context.progress.Stage("write");
+  CommitTogether outputs;
   WriteCamerasText(a->output_path, calibration.camera);
   if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
+  outputs.Finish();
   context.progress.Note(FocalLengthLine(calibration));
   std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
 }

@@ -1,8 +1,11 @@
 // Loaded before the C library (LD_PRELOAD): ends the process at its N-th rename, before it happens
-// (DIE_AT=N) or after it (DIE_AFTER=N), as a power cut or kill -9 would.
+// (DIE_AT=N) or after it (DIE_AFTER=N), as a power cut or kill -9 would. DIE_PROGRAM: only the
+// process of this program, not those that it starts or is started by.
 
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 
 #include <dlfcn.h>
 #include <unistd.h>
@@ -13,6 +16,8 @@ int count = 0;
 
 bool IsTime(const char* name) {
   const char* const value = std::getenv(name);
+  const char* const program = std::getenv("DIE_PROGRAM");
+  if (program != nullptr && std::strcmp(program, program_invocation_short_name) != 0) return false;
   return value != nullptr && std::atoi(value) == count;
 }
 

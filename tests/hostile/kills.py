@@ -2,6 +2,7 @@
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -11,19 +12,49 @@ import scene as s
 LIBRARY = os.environ.get("ROOMTEX_DIE_AT_RENAME", "")
 
 
+def prepared(base):
+    """What mapper, calibrate and auto read, too."""
+    here = base.copy()
+    s.write_matches(here.root)
+    s.write_boards(here.root / "boards")
+    for folder in ("planes", "reports", "meshes", "clouds", "cover", "copies", "result/sparse"):
+        (here.root / folder).mkdir(parents=True)
+    for name in ("0", "init"):
+        shutil.copytree(here.root / "sparse", here.root / "result/sparse" / name)
+    shutil.copy(here.root / "database.db", here.root / "result")
+    return here
+
+
 def commands():
     # title, command line, the folder (or files) that appears as a set
     yield "align", s.ALIGN + " --output_path aligned", "aligned"
     yield "align in the folder that one works in", s.ALIGN + " --output_path .", None
+    yield "align into three folders", (s.ALIGN + " --output_path aligned --Plane.output_path "
+                                       "planes/planes.ply --report_path reports/r.json"), "aligned"
     yield "texture", s.TEXTURE + " --output_path textured", "textured"
     yield "import", ("roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"), None
+    yield "import into three folders", (
+        "roomtex-import --quiet --input_path scan.rtpi --output_path meshes/room.ply "
+        "--output_path clouds/room.pcd --report_path reports/r.json"), None
     yield "simulate", ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
                        "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0"), None
     yield "associate", ("roomtex-associate --quiet --database_path database.db --image_path photos "
                         "--output_path pairs.csv --links_path links"), "links"
+    yield "mapper", ("roomtex-mapper --quiet --database_path database.db --image_path photos "
+                     "--output_path mapped"), "mapped"
+    yield "calibrate into three folders", (
+        "roomtex-calibrate --quiet --image_path boards --board 6x4 --output_path camera.txt "
+        "--coverage_path cover/coverage.png --apply database.db --apply_output copies/copy.db "
+        "--report_path reports/r.json"), None
+    yield "auto", ("roomtex-auto --quiet --image_path photos --scan_path scan.rtpi --picks_path "
+                   "picks.csv --output_path result --only align --quality low "
+                   "--accept_untrusted 1"), None
 
 
-VOLATILE = {"aligned/alignment.json", "textured/report.json", "alignment.json"}  # hold times
+# They hold times.
+VOLATILE = {"aligned/alignment.json", "textured/report.json", "alignment.json", "reports/r.json",
+            "mapped/roomtex-mapper.log", "mapped/0/roomtex-mapper.json", "result/aligned/alignment.json",
+            "result/steps.json", "result/report.json", "result/report.html"}
 
 
 def below(state, folder):
@@ -31,11 +62,13 @@ def below(state, folder):
 
 
 def steady(files):
-    return {name: content for name, content in files.items() if name not in VOLATILE}
+    return {name: content for name, content in files.items()
+            if name not in VOLATILE and not name.startswith("result/log/")}
 
 
 def at_every_rename(base):
     """First over nothing, then over the results of another run."""
+    base = prepared(base)
     for title, line, folder in commands():
         for old in (False, True):
             here = base.copy()
@@ -55,6 +88,7 @@ def at_every_rename(base):
                 killed = here.copy()
                 how = "DIE_AT" if number % 2 else "DIE_AFTER"
                 answer = killed.run(line, environment={"LD_PRELOAD": LIBRARY,
+                                                       "DIE_PROGRAM": line.split()[0],
                                                        how: str((number + 1) // 2)})
                 if answer.code in (0, 4):
                     break
@@ -114,6 +148,7 @@ def by_signals(base):
 
 def full_disk(base):
     """A limit of the size of files stands for the full disk: writing fails in the same places."""
+    base = prepared(base)
     for title, line, folder in commands():
         for limit in (0, 2000, 20000):
             here = base.copy()

@@ -1,6 +1,7 @@
 """A small simulated room with everything that the commands read, and what every answer must keep."""
 
 import hashlib
+import math
 import os
 import pathlib
 import resource
@@ -11,9 +12,11 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 
 KEEP_SENTENCES = ("terminate called", "std::", "Assertion", "AddressSanitizer", "runtime error:",
-                  "Traceback", "internal error", "vector::", "basic_string")
+                  "Traceback", "internal error", "vector::", "basic_string", "basic_filebuf",
+                  "filesystem error", "exception.", ". .", "..\n")
 SECONDS = 120
 
 
@@ -232,6 +235,68 @@ def write_database(path, root):
                          (i + 1, photo.name))
     database.commit()
     database.close()
+
+
+def write_matches(root):
+    """Keypoints and verified matches in the database: what the photos of the sparse model share."""
+    _, images, _ = text_model(root / "sparse")
+    database = sqlite3.connect(root / "database.db")
+    ids = dict(database.execute("SELECT name, image_id FROM images"))
+    seen = {}
+    for fields, observed in images:
+        image = ids[fields[9]]
+        data = b"".join(struct.pack("<2f", float(observed[i]), float(observed[i + 1]))
+                        for i in range(0, len(observed), 3))
+        database.execute("INSERT INTO keypoints VALUES (?, ?, 2, ?)",
+                         (image, len(observed) // 3, data))
+        seen[image] = {observed[i + 2]: i // 3 for i in range(0, len(observed), 3)
+                       if observed[i + 2] != "-1"}
+    for first in sorted(seen):
+        for second in (image for image in sorted(seen) if image > first):
+            shared = [point for point in seen[first] if point in seen[second]]
+            data = b"".join(struct.pack("<2I", seen[first][point], seen[second][point])
+                            for point in shared)
+            database.execute("INSERT INTO two_view_geometries (pair_id, rows, cols, data, config) "
+                             "VALUES (?, ?, 2, ?, 2)",
+                             (2147483647 * first + second, len(shared), data))
+    database.commit()
+    database.close()
+
+
+def write_png(path, width, height, grey):
+    """grey(x, y) gives 0 to 255."""
+    rows = b"".join(b"\0" + bytes(grey(x, y) for x in range(width)) for y in range(height))
+    chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data +
+                                struct.pack(">I", zlib.crc32(kind + data)))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" +
+                     chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 0, 0, 0, 0)) +
+                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def write_boards(folder):
+    """Photos of a checkerboard with 6x4 inner corners, for roomtex-calibrate."""
+    folder.mkdir()
+    width, height, focal = 240, 160, 220.0
+    for number in range(4):
+        turn, tilt = 0.5 * math.sin(2.1 * number), 0.5 * math.cos(1.7 * number)
+        ct, st, cn, sn = math.cos(turn), math.sin(turn), math.cos(tilt), math.sin(tilt)
+        (r0, r1, r2), (d0, d1, d2) = (ct, st * sn, -st * cn), (0.0, cn, sn)
+        n0, n1, n2 = r1 * d2 - r2 * d1, r2 * d0 - r0 * d2, r0 * d1 - r1 * d0
+        c0, c1, c2 = 0.8 * math.sin(number), 0.5 * math.cos(3 * number), 9.0 + number % 3
+        distance = n0 * c0 + n1 * c1 + n2 * c2
+        left, up = r0 * c0 + r1 * c1 + r2 * c2 - 3.5, d0 * c0 + d1 * c1 + d2 * c2 - 2.5
+
+        def grey(x, y):
+            total = 0
+            for dx, dy in ((0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)):
+                a, b = (x + dx - width / 2) / focal, (y + dy - height / 2) / focal
+                depth = distance / (n0 * a + n1 * b + n2)
+                u = depth * (r0 * a + r1 * b + r2) - left
+                v = depth * (d0 * a + d1 * b + d2) - up
+                total += 20 if 0 <= u < 7 and 0 <= v < 5 and (int(u) + int(v)) % 2 == 0 else 230
+            return total // 4
+
+        write_png(folder / f"board_{number}.png", width, height, grey)
 
 
 ALIGN = "roomtex-align --quiet --input_path sparse --scan_path scan.rtpi --picks_path picks.csv"

@@ -110,6 +110,15 @@ int main(int argc, char** argv) {
   command.AddBool("fit_similarity", &fit,
                   "move the model by the best similarity first: for one that is not aligned");
   return command.Run(argc, argv, [&](const Command::Context& context) {
+    if (input_path.empty() && ply_path.empty()) {
+      throw UsageError("give --input_path or --ply_path: what is to be compared with the truth?");
+    }
+    if (ply_path.empty() && !(scan_paths.empty() && error_path.empty())) {
+      throw UsageError("--scan_path and --error_path are about colours: give --ply_path");
+    }
+    if (scan_paths.empty() && !error_path.empty()) {
+      throw UsageError("--error_path is a picture in the grid of a scan: give --scan_path");
+    }
     Json answer = Json::object();
     if (!input_path.empty()) {
       answer["poses"] =

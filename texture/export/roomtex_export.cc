@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_set.h"
+#include "core/resource_limits.h"
 #include "core/surfels.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -37,7 +38,8 @@ void AddOptions(ExportCommandOptions* o, Command* command) {
                         "Folder of the photos, as COLMAP was given it.");
   command->AddInputPaths("scan_path", &o->scan_paths,
                          "Range scan. Not needed for a model of roomtex-align, which remembers its "
-                         "scans and how they were read.",
+                         "scans and how they were read. " +
+                             BytesPerSampleHelp(kExportBytesPerSample),
                          Command::Kind::kOptional);
   command->AddChoice(
       "format", &o->format, {"colmap", "nerfstudio", "e57"},
@@ -153,6 +155,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
+  const SampleWork work("exporting", kExportBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
       alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   ReplaceClouds(&placed.scans, context.options.num_threads);

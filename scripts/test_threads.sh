@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Threaded code under the thread sanitizer: the servers, ParallelFor and what runs by it, reading and colouring. Before a
+# release; a build of its own (build-tsan) and some minutes. Usage: scripts/test_threads.sh [TEST...]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tests=("$@")
+if [ ${#tests[@]} = 0 ]; then
+  tests=(core_test server_test importers_test colmap_ext_test texture_test view_test align_pick_server_test)
+fi
+# Libraries that are not built for it synchronise by what it does not see.
+mkdir -p build-tsan
+cat >build-tsan/suppressions.txt <<'END'
+called_from_lib:libembree
+called_from_lib:libtbb.so
+called_from_lib:libopencv_core
+called_from_lib:libceres
+race:libembree
+race:libtbb
+race:libcpp-httplib
+deadlock:libgdal
+mutex:libgdal
+mutex:__GI___nptl_deallocate_tsd
+END
+# Long statistics, and tests that start commands, which are not built here.
+left_out='ModelCheck.*:LensCheck.*:Initializer.IsRightBeforeAWall:*Command.*:*Benchmark*'
+export GTEST_FILTER="${GTEST_FILTER:--$left_out}"
+export TSAN_OPTIONS="suppressions=$PWD/build-tsan/suppressions.txt die_after_fork=0 exitcode=66 second_deadlock_stack=1"
+cmake --preset tsan >/dev/null
+cmake --build --preset tsan --target "${tests[@]}"
+failed=0
+for test in "${tests[@]}"; do
+  log=build-tsan/$test.log
+  if build-tsan/bin/"$test" >"$log" 2>&1; then
+    echo "$test: $(tail -n 1 "$log")"
+  else
+    grep -A 25 'WARNING: ThreadSanitizer\|^\[  FAILED' "$log" | head -n 80 || true
+    echo "$test: FAILED, $(grep -c 'WARNING: ThreadSanitizer' "$log") reports (see $log)"
+    failed=1
+  fi
+done
+exit "$failed"

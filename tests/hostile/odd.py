@@ -1,0 +1,357 @@
+"""Odd inputs and options of every command: an answer or a sentence, and no input changed."""
+
+import json
+import os
+import shlex
+import socket
+
+import scene as s
+
+ALIGN = s.ALIGN + " --output_path aligned"
+TEXTURE = s.TEXTURE + " --output_path textured"
+IMPORT = "roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"
+ASSOCIATE = ("roomtex-associate --quiet --database_path database.db --image_path photos "
+             "--output_path pairs.csv")
+MAPPER = ("roomtex-mapper --quiet --database_path database.db --image_path photos "
+          "--output_path mapped")
+PAIRS = "roomtex-pairs --quiet --database_path database.db --output_path pairs.txt"
+CALIBRATE = "roomtex-calibrate --quiet --image_path photos --board 6x4 --output_path camera.txt"
+PATTERN = "roomtex-pattern --quiet --output_path pattern.png"
+SIMULATE = ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
+            "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0")
+EXPORT = "roomtex-export --quiet --input_path aligned --image_path photos --output_path exported"
+DENSE = "roomtex-dense --quiet --input_path aligned --image_path photos --output_path dense"
+OUTLINE = "roomtex-outline --quiet --input_path sparse --output_path outline.json"
+EXTRUDE = ("roomtex-outline --quiet --outline_path o.json --output_path out.json "
+           "--model_path house.obj")
+EVALUATE = "roomtex-evaluate --quiet --truth_path truth --input_path sparse"
+AUTO = "roomtex-auto --quiet --image_path photos --scan_path scan.rtpi --output_path result"
+PICK = ("roomtex-pick --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
+        "--output_path p.csv --port 0")
+VIEW = "roomtex-view --quiet --input_path textured --port 0"
+FLAT = {"format": "roomtex outline", "version": 1, "metric": True,
+        "outline_from_input": {"scale": 1, "rotation_wxyz": [1, 0, 0, 0], "translation": [0, 0, 0]},
+        "geo_origin": None,
+        "buildings": [{"name": "a", "ground": 0, "footprint": [[0, 0], [8, 0], [8, 5], [0, 5]],
+                       "roof": [{"point": [0, 0, 3], "slope_deg": 0, "downhill_deg": 0}]}]}
+
+
+def write(name, content):
+    def change(root):
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_symlink() or path.is_dir():
+            return
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return change
+
+
+def text(name, old, new, count=1):
+    return lambda root: write(name, (root / name).read_text().replace(old, new, count))(root)
+
+
+def outline(**changes):
+    return write("o.json", json.dumps({**FLAT, **changes}))
+
+
+def building(**changes):
+    return outline(buildings=[{**FLAT["buildings"][0], **changes}])
+
+
+def replaced(name, make):
+    def change(root):
+        path = root / name
+        if path.is_dir():
+            path.rename(root / "was_here")
+        elif path.exists():
+            path.unlink()
+        make(path)
+    return change
+
+
+def folder(name):
+    return replaced(name, lambda path: path.mkdir())
+
+
+def fifo(name):
+    return replaced(name, os.mkfifo)
+
+
+def loop(name):
+    return replaced(name, lambda path: path.symlink_to(path.name))
+
+
+def unix_socket(name):
+    def make(path):
+        here = os.getcwd()
+        os.chdir(path.parent)  # a long path does not fit into its address
+        socket.socket(socket.AF_UNIX).bind(path.name)
+        os.chdir(here)
+    return replaced(name, make)
+
+
+def moved(old, new):
+    return lambda root: (root / old).rename(root / new)
+
+
+def full(name):
+    """A folder in which nothing can be made, whoever asks: a link into the kernel's."""
+    return replaced(name, lambda path: path.symlink_to("/proc/self"))
+
+
+def pick_at(value):
+    """The x of the first pick."""
+    def change(root):
+        lines = (root / "picks.csv").read_text().split("\n")
+        fields = lines[1].split(",")
+        lines[1] = ",".join([fields[0], value] + fields[2:])
+        (root / "picks.csv").write_text("\n".join(lines))
+    return change
+
+
+def with_options(line, options):
+    """Options of the line with another value, and further ones; twice in the title is twice."""
+    words, given = shlex.split(line), shlex.split(options)
+    for name, value in zip(given[::2], given[1::2] + [""]):
+        if name in words and name + " " + value not in line:
+            words[words.index(name) + 1] = value
+        else:
+            words += [name, value] if len(given) > 1 else [name]
+    return words
+
+
+def nothing(root):
+    pass
+
+
+DEEP = '{"trusted": true, "options": ' + "[" * 200000 + "]" * 200000 + "}"
+RAN, BAD = {0, 4}, {2, 3}
+
+
+def fifo_in(parent, name):
+    def change(root):
+        (root / parent).mkdir()
+        os.mkfifo(root / parent / name)
+    return change
+
+
+def glb(text_of_json):
+    data = text_of_json.encode()
+    sizes = (2, 20 + len(data), len(data))
+    return b"glTF" + b"".join(n.to_bytes(4, "little") for n in sizes) + b"JSON" + data
+
+
+def command_of(line):
+    return line.split()[0][len("roomtex-"):]
+
+
+def wrong_kinds():
+    places = {"scan.rtpi": (IMPORT, ALIGN, TEXTURE), "picks.csv": (ALIGN,),
+              "database.db": (MAPPER, PAIRS, ASSOCIATE), "sparse/images.txt": (ALIGN, TEXTURE),
+              "sparse": (EVALUATE, OUTLINE), "photos": (CALIBRATE, PICK)}
+    for name, lines in places.items():
+        for line in lines:
+            for kind, change in (("an empty file", replaced(name, lambda path: path.touch())),
+                                 ("an empty folder", folder(name)),
+                                 ("a link to itself", loop(name)),
+                                 ("a socket", unix_socket(name))):
+                yield f"{command_of(line)}: {name} is {kind}", change, line, {3}
+
+
+def poses_of_zeros(root):
+    lines = (root / "sparse/images.txt").read_text().split("\n")
+    fields = lines[0].split()
+    lines[0] = " ".join([fields[0], "0", "0", "0", "0"] + fields[5:])
+    (root / "sparse/images.txt").write_text("\n".join(lines))
+
+
+def picks_as(change):
+    return lambda root: write("picks.csv", change((root / "picks.csv").read_text()))(root)
+
+
+def numbers():
+    for value in ("nan", "inf", "1e308", "-1e9", "", "0x10", "1e"):
+        yield f"align: a pick at {value!r}", pick_at(value), ALIGN, {3}
+        yield (f"align: a camera of {value!r}",
+               text("sparse/cameras.txt", " 240 160 ", f" {value} 160 "), ALIGN, {3})
+    yield ("align: an image of camera 4294967295",
+           text("sparse/images.txt", " 1 photo_000", " 4294967295 photo_000"), ALIGN, {3})
+    yield ("align: an image of no name", text("sparse/images.txt", " photo_000.jpg", " "), ALIGN,
+           {3})
+    yield "align: a quaternion of zeros", poses_of_zeros, ALIGN, {3}
+    yield ("align: every pick twice", picks_as(lambda p: p + p[p.index("\n") + 1:]), ALIGN, {3})
+    yield "align: picks with a header alone", picks_as(lambda p: p.split("\n")[0]), ALIGN, {3}
+    yield "align: a megabyte of commas as picks", picks_as(lambda p: "," * (1 << 20)), ALIGN, {3}
+    yield "align: picks in UTF-16", picks_as(lambda p: p.encode("utf-16")), ALIGN, {3}
+
+
+def beside():
+    for name, content in (("nested 200 000 deep", DEEP), ("empty", ""), ("a list", "[]"),
+                          ("broken", "{"), ("binary", b"\xff\xfe\0"),
+                          ("with a number of 1e999", '{"scans": [1e999]}')):
+        change = write("sparse/alignment.json", content)
+        yield f"texture: alignment.json is {name}", change, TEXTURE, {3}
+        yield f"outline: alignment.json is {name}", change, OUTLINE, {3}
+    for kind, change in (("a folder", folder("sparse/alignment.json")),
+                         ("a pipe", fifo("sparse/alignment.json"))):
+        yield f"texture: alignment.json is {kind}", change, TEXTURE, {0, 3, 4}
+        yield f"outline: alignment.json is {kind}", change, OUTLINE, {0, 3, 4}
+    dry = AUTO + " --dry_run"
+    yield "auto: steps.json is nested 200 000 deep", write("result/steps.json", DEEP), dry, {0, 3}
+    yield "auto: steps.json is a pipe", fifo_in("result", "steps.json"), dry, {0, 3}
+    yield "view: a model.glb of nothing", write("textured/model.glb", ""), VIEW, {3}
+    yield ("view: a model.glb of 2 GB of JSON", write(
+        "textured/model.glb", b"glTF\2\0\0\0\xff\xff\xff\x7f\xff\xff\xff\x7fJSON{}"), VIEW, {3})
+    yield ("view: a model.glb whose JSON is nested", write(
+        "textured/model.glb", glb('{"asset":' + "[" * 100000 + "]" * 100000 + "}")), VIEW, {3})
+    yield "view: a folder without a model", folder("textured"), VIEW, {3}
+    yield ("align: panoramas.json is a table", nothing, ALIGN + " --panoramas_path picks.csv", {3})
+
+
+def outlines():
+    zigzag = ([[8 + i / 300, (i % 2) + 1e-3 * i] for i in range(1000)] +
+              [[8 + i / 300, 9 + i % 2] for i in range(999, -1, -1)])
+    cone = [{"point": [0, 0, 3 + 0.01 * i], "slope_deg": 40, "downhill_deg": 7.2 * i}
+            for i in range(50)]
+    high = json.dumps(FLAT).replace('"ground": 0', '"ground": 1e999')
+    for title, change, codes in (
+            ("a good one", outline(), {0}),
+            ("nested 200 000 deep", write("o.json", DEEP), {3}),
+            ("a height of 1e999", write("o.json", high), {3}),
+            ("no building", outline(buildings=[]), {0, 3, 4}),
+            ("version \"1\"", outline(version="1"), {3}),
+            ("a bow tie", building(footprint=[[0, 0], [8, 5], [8, 0], [0, 5]]), {3}),
+            ("a name of control signs", building(name="a\n\"b\" <c>\t\u0000"), {0, 3}),
+            ("far away", building(footprint=[[1e9, 1e9], [1e9, 9e8], [9e8, 1e9]]), {0, 3}),
+            ("a needle", building(footprint=[[0, 0], [8, 0], [8, 1e-6]]), {0, 3}),
+            ("fifty roof planes", building(roof=cone), {0, 3}),
+            ("2000 corners", building(footprint=zigzag), {0, 3})):
+        yield "outline: " + title, change, EXTRUDE, codes
+    yield "outline: edited by a hand that nested it", write("outline.json", DEEP), OUTLINE, {3}
+    yield "outline: to an unknown kind", outline(), EXTRUDE.replace(".obj", ".dwg"), {2}
+
+
+OPTIONS = {
+    IMPORT: ("--max_range -1", "--max_range nan", "--max_range 1e-300", "--num_threads 0",
+             "--Mesh.max_edge_ratio 0", "--Mesh.max_bend inf", "--num_threads -2",
+             "--random_seed 1e99", "--quiet maybe", "--units furlongs",
+             "--output_path .ply", "--output_path /", "--output_path ''"),
+    ALIGN: ("--near nowhere", "--near 1,2", "--geo_origin 91,0,0", "--geo_origin 1e400,0,0",
+            "--overlays -1", "--overlays 2000000000 --image_path photos",
+            "--Scale.max_features 0", "--PlaneBA.num_rounds 2000000000",
+            "--PlaneBA.max_iterations 0", "--Plane.min_area_m2 1e300", "--Plane.min_window 0",
+            "--Plane.max_angle_deg 360", "--database_path photos"),
+    TEXTURE: ("--Texture.scale 17", "--Texture.scale 1e9", "--Texture.max_memory_mb 1",
+              "--Texture.texel_mm 1e-9", "--Blend.max_views 0", "--Blend.max_views 2000000000",
+              "--Blend.detail_sigma 1e9 --Blend.detail 1", "--Occlusion.depth_tolerance nan",
+              "--Occlusion.depth_map_size 2000000000", "--Exposure.bracket_path photos",
+              "--debug_path scan.rtpi", "--Surface.smoothing_radius 2000000000",
+              "--supplement_path scan.rtpi"),
+    PATTERN: ("--width 2000000000", "--width 0", "--height 1", "--blocks 0", "--blocks 100000",
+              "--brightness 7", "--input_path picks.csv", "--evaluate_path photos"),
+    SIMULATE: ("--num_photos 0", "--photo_width 100000 --photo_height 100000", "--seed nan",
+               "--scan_columns 1", "--scan_columns 1000000 --scan_rows 1000000"),
+    ASSOCIATE: ("--max_offset -1", "--max_offset inf", "--links_path photos",
+                "--links_path pairs.csv"),
+    PAIRS: ("--Pairs.max_neighbors 0", "--Pairs.num_features 2000000000",
+            "--Pairs.max_ratio nan", "--graph_path database.db", "--graph_path pairs.txt"),
+    MAPPER: ("--colmap /dev/null", "--colmap photos", "--colmap /bin/false",
+             "--Init.min_num_inliers -1", "--Mapper.nonsense 1", "--Mapper."),
+    OUTLINE: ("--up x", "--up 0,0,0", "--up nan,0,0", "--scale -1", "--scale 1e300",
+              "--area 1,2", "--area 0,0,nan,1", "--min_area 1e300", "--geo_origin ,,",
+              "--sparse_path photos"),
+    CALIBRATE: ("--board 1x1", "--board 100000x100000", "--board 9", "--board axb",
+                "--square 0", "--board_type charuco", "--apply photos",
+                "--camera_model FISHEYE"),
+    EVALUATE: ("--ply_path truth", "--error_path photos", "--scan_path picks.csv",
+               "--ply_path truth/true_colors.ply --error_path e.png", "--truth_path photos"),
+    AUTO + " --dry_run": ("--from nowhere", "--only align --from mapper", "--picks_path photos",
+                          "--cameras_path picks.csv", "--camera_params 1,2,x",
+                          "--colmap nowhere", "--scan_path nowhere.e57",
+                          "--video_path photos"),
+    PICK: ("--port 99999", "--port -1", "--host 256.1.1.1", "--host 0.0.0.0",
+           "--image_name nowhere.jpg", "--output_path photos"),
+}
+# Odd, and all the same an answer.
+FINE = ("max_bend inf", "min_area_m2 1e300", "texel_mm 1e-9", "--scale 1e300",
+        "--min_area 1e300", "--colmap nowhere", "--overlays 2000000000")
+
+
+def options():
+    for line, all_of_them in OPTIONS.items():
+        for option in all_of_them:
+            is_fine = any(fine in option for fine in FINE)
+            yield (f"{command_of(line)} {option}", s.write_matches if line == MAPPER else nothing,
+                   with_options(line, option), {0, 4} if is_fine else BAD)
+
+
+def names():
+    strange = "a b\n\u00fc'\"#2,x"
+    yield ("import: a name with everything in it", moved("scan.rtpi", strange),
+           ["roomtex-import", "--quiet", "--input_path", strange, "--output_path",
+            strange + ".ply"], {0})
+    yield "import: a name of 255 bytes", nothing, IMPORT.replace("room.ply", 251 * "n" + ".ply"), {0}
+    yield "import: a name of 256 bytes", nothing, IMPORT.replace("room.ply", 252 * "n" + ".ply"), {3}
+    yield ("auto: a scan with # in its name", moved("scan.rtpi", "a#b.rtpi"),
+           AUTO.replace("scan.rtpi", "a#b.rtpi") + " --dry_run", {0})
+    yield ("align: an output folder with a line end", nothing,
+           s.ALIGN.split() + ["--output_path", "new\nfolder"], RAN)
+    yield ("texture: an output folder that leads out and in", nothing,
+           TEXTURE.replace("textured", "photos/../textured"), RAN)
+
+
+def places():
+    for line, name in ((ALIGN, "aligned"), (TEXTURE, "textured"), (SIMULATE, "new"),
+                       (MAPPER, "mapped"), (AUTO, "result")):
+        for title, change in (("is a file", write(name, "mine")), ("cannot be written", full(name)),
+                              ("is a link to itself", loop(name))):
+            yield f"{command_of(line)}: the output folder {title}", change, line, {3}
+    for line in (IMPORT, PATTERN, PAIRS, ASSOCIATE):
+        output = line.split("--output_path ")[1].split()[0]
+        for title, change, changed_line in (
+                ("is a folder", folder(output), line),
+                ("is a socket", unix_socket(output), line),
+                ("has no folder", nothing, line.replace(output, "no/" + output)),
+                ("lies in /dev/null", nothing, line.replace(output, "/dev/null/" + output)),
+                ("stands, but not the report", nothing, line + " --report_path no/r.json")):
+            yield f"{command_of(line)}: the output {title}", change, changed_line, {3}
+    yield ("export: a model that is not aligned", nothing,
+           EXPORT.replace("aligned", "sparse") + " --scan_path scan.rtpi", {0, 2, 3, 4})
+    yield "dense: a model that is not there", nothing, DENSE, BAD
+    yield ("evaluate: nothing to compare", nothing, "roomtex-evaluate --quiet --truth_path truth",
+           {2})
+    yield ("evaluate: photos of other names", text("sparse/images.txt", "photo_", "other_", -1),
+           EVALUATE, {3, 4})
+
+
+def cases():
+    """Title, what is changed, the command line, exit codes."""
+    for group in (wrong_kinds, numbers, beside, outlines, options, names, places):
+        yield from group()
+
+
+VERBOSE = os.environ.get("ROOMTEX_SHOW_SENTENCES")
+
+
+def odd(base):
+    for title, change, line, codes in cases():
+        here = base.copy()
+        change(here.root)
+        before = here.state()
+        answer = here.run(shlex.split(line) if isinstance(line, str) else line)
+        after = here.state()
+        problem = answer.problem(codes)
+        changed = [name for name, content in before.items() if after.get(name) != content]
+        if not problem and changed:
+            problem = f"changed {changed[:3]}"
+        elif not problem and here.leftovers():
+            problem = f"leaves {here.leftovers()}"
+        elif not problem and answer.code == 0 and after == before and not answer.out:
+            problem = "ends with 0, and there is nothing"
+        yield f"{title} ({answer.code})", problem
+        if VERBOSE:
+            print("       " + answer.err.strip()[-600:].replace("\n", "\n       "), flush=True)
+
+
+if __name__ == "__main__":
+    s.main({"odd": odd})
