@@ -10,10 +10,17 @@ namespace {
 
 Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+Json RmsOrNull(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value * value;
+  return NumberOrNull(std::sqrt(sum / static_cast<double>(values.size())));
+}
+
 Json PicksToJson(const Alignment& alignment) {
   Json json;
   int num_used = 0;
   Json per_pick = Json::array();
+  std::vector<double> check_px, refined_check_px;  // of weight 0: nothing rests on them
   const AlignmentStart& start = alignment.start;
   for (size_t i = 0; i < start.picks.size(); ++i) {
     const PickOutcome& outcome = start.picks[i];
@@ -28,7 +35,11 @@ Json PicksToJson(const Alignment& alignment) {
     one["leave_one_out_px"] = NumberOrNull(outcome.leave_one_out_px);
     one["used"] = outcome.used;
     one["weight"] = outcome.pick.weight;
+    if (!outcome.pick.label.empty()) one["label"] = outcome.pick.label;
     per_pick.push_back(one);
+    if (outcome.pick.weight > 0 || !std::isfinite(outcome.residual_px)) continue;
+    check_px.push_back(outcome.residual_px);
+    refined_check_px.push_back(alignment.refined_pick_px[i]);
   }
   json["count"] = start.picks.size();
   json["num_used"] = num_used;
@@ -37,6 +48,11 @@ Json PicksToJson(const Alignment& alignment) {
   json["max_px"] = NumberOrNull(start.pick_max_px);
   json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
   json["position_sigma_m"] = NumberOrNull(start.position_sigma);
+  if (!check_px.empty()) {
+    json["check_points"] = {{"count", check_px.size()},
+                            {"rms_px", RmsOrNull(check_px)},
+                            {"refined_rms_px", RmsOrNull(refined_check_px)}};
+  }
   json["per_pick"] = per_pick;
   return json;
 }

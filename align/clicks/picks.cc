@@ -17,8 +17,9 @@ namespace roomtex {
 namespace {
 
 constexpr char kHeader[] = "image_name,x,y,scan_x,scan_y,scan_z";
-constexpr int kNumFields = 6;  // and a seventh, the weight, where the header has it
+constexpr int kNumFields = 6;  // and behind them, where the header has them:
 constexpr char kWeight[] = "weight";
+constexpr char kLabel[] = "label";
 const char* const kFieldNames[kNumFields] = {"image_name", "x", "y", "scan_x", "scan_y", "scan_z"};
 
 std::string Lowercase(std::string text) {
@@ -26,60 +27,82 @@ std::string Lowercase(std::string text) {
   return text;
 }
 
-// Number of fields that the header announces.
-int ReadHeader(const CsvReader& table) {
+// The columns that the header announces; -1 = it has none of them.
+struct Columns {
+  int count = 0, weight = -1, label = -1;
+  std::string names;
+};
+
+Columns ReadHeader(const CsvReader& table) {
   const auto fields = table.Fields();
-  const int num_fields = fields ? static_cast<int>(fields->size()) : 0;
-  bool matches = num_fields == kNumFields || num_fields == kNumFields + 1;
-  for (int i = 0; matches && i < num_fields; ++i) {
-    matches = Lowercase((*fields)[i]) == (i < kNumFields ? kFieldNames[i] : kWeight);
+  Columns columns;
+  columns.count = fields ? static_cast<int>(fields->size()) : 0;
+  columns.names = kHeader;
+  bool matches = columns.count >= kNumFields;
+  for (int i = 0; matches && i < columns.count; ++i) {
+    const std::string name = Lowercase((*fields)[i]);
+    if (i < kNumFields) {
+      matches = name == kFieldNames[i];
+      continue;
+    }
+    int* const column = name == kWeight  ? &columns.weight
+                        : name == kLabel ? &columns.label
+                                         : nullptr;
+    matches = column != nullptr && *column < 0;
+    if (!matches) break;
+    *column = i;
+    columns.names += "," + name;
   }
-  if (matches) return num_fields;
-  const bool looks_like_pick = num_fields >= kNumFields && ParseNumber((*fields)[1]);
+  if (matches) return columns;
+  const bool looks_like_pick = columns.count >= kNumFields && ParseNumber((*fields)[1]);
   throw table.Error(looks_like_pick ? "the header is missing: the first line is a pick already"
                                     : "found " + Quoted(table.line()) +
                                           " where the header of a picks file should be",
-                    fmt::format("Expected the header line {} (and, if wanted, a seventh field {})",
-                                kHeader, kWeight));
+                    fmt::format("Expected the header line {} (and, if wanted, {} and {} behind it)",
+                                kHeader, kWeight, kLabel));
 }
 
-Pick ParsePick(const CsvReader& table, int num_fields) {
+double ParseField(const CsvReader& table, const std::string& name, const std::string& field) {
+  const auto value = ParseNumber(field);
+  if (value) return *value;
+  throw table.Error(fmt::format("{} is {}, which is not a finite number", name, Quoted(field)),
+                    "Correct the line or remove it");
+}
+
+Pick ParsePick(const CsvReader& table, const Columns& columns) {
   const auto fields = table.Fields();
   if (!fields) {
     throw table.Error("a quoted name is not closed by a quote",
                       "A quote inside a quoted name is written twice");
   }
-  if (static_cast<int>(fields->size()) != num_fields) {
+  if (static_cast<int>(fields->size()) != columns.count) {
     throw table.Error(
-        fmt::format("found {} fields, expected {} ({})", fields->size(), num_fields,
-                    num_fields > kNumFields ? std::string(kHeader) + "," + kWeight : kHeader),
+        fmt::format("found {} fields, expected {} ({})", fields->size(), columns.count,
+                    columns.names),
         "Separate fields by commas, write decimals with a point, and put a name that holds a comma "
         "in double quotes");
   }
   if ((*fields)[0].empty()) {
     throw table.Error("the image name is empty", "Name the photo as in the sparse model");
   }
-  double values[kNumFields] = {0, 0, 0, 0, 0, 1};
-  for (int i = 1; i < num_fields; ++i) {
-    const auto value = ParseNumber((*fields)[i]);
-    if (!value) {
+  double values[kNumFields - 1];
+  for (int i = 1; i < kNumFields; ++i) {
+    values[i - 1] = ParseField(table, kFieldNames[i], (*fields)[i]);
+  }
+  Pick pick{
+      (*fields)[0], {values[0], values[1]}, {values[2], values[3], values[4]}, table.line_number()};
+  if (columns.weight >= 0) {
+    const std::string& field = (*fields)[columns.weight];
+    pick.weight = ParseField(table, kWeight, field);
+    if (!(pick.weight >= 0 && pick.weight <= kMaxPickWeight)) {
       throw table.Error(
-          fmt::format("{} is {}, which is not a finite number",
-                      i < kNumFields ? kFieldNames[i] : kWeight, Quoted((*fields)[i])),
-          "Correct the line or remove it");
+          fmt::format("{} is {}", kWeight, Quoted(field)),
+          "A weight is 1 for an ordinary pick, more for a more exact one (up to 1000), 0 for a "
+          "check point, on which nothing rests");
     }
-    values[i - 1] = *value;
   }
-  if (!(values[5] >= 0 && values[5] <= kMaxPickWeight)) {
-    throw table.Error(fmt::format("{} is {}", kWeight, Quoted((*fields)[kNumFields])),
-                      "A weight is 1 for an ordinary pick, more for a more exact one (up to 1000), "
-                      "0 for one that is switched off");
-  }
-  return {(*fields)[0],
-          {values[0], values[1]},
-          {values[2], values[3], values[4]},
-          table.line_number(),
-          values[5]};
+  if (columns.label >= 0) pick.label = (*fields)[columns.label];
+  return pick;
 }
 
 void RefuseDuplicates(const std::string& path, const std::vector<Pick>& picks) {
@@ -143,15 +166,15 @@ std::vector<Pick> ReadPicks(const std::string& path) {
   CsvReader table(path, "Check --picks_path",
                   std::string("Expected a CSV file with the header ") + kHeader);
   std::vector<Pick> picks;
-  int num_fields = 0;  // 0 = the header is still to come
+  Columns columns;  // none = the header is still to come
   while (table.Next()) {
-    if (num_fields == 0) {
-      num_fields = ReadHeader(table);
+    if (columns.count == 0) {
+      columns = ReadHeader(table);
     } else {
-      picks.push_back(ParsePick(table, num_fields));
+      picks.push_back(ParsePick(table, columns));
     }
   }
-  if (num_fields == 0) {
+  if (columns.count == 0) {
     throw InputError(path, "", "holds no picks",
                      std::string("Expected the header line ") + kHeader);
   }
@@ -163,12 +186,16 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
   OutputFile file(path);
   const bool weighted =
       std::any_of(picks.begin(), picks.end(), [](const Pick& pick) { return pick.weight != 1; });
-  file.stream() << kHeader << (weighted ? std::string(",") + kWeight : "") << '\n';
+  const bool labelled =
+      std::any_of(picks.begin(), picks.end(), [](const Pick& pick) { return !pick.label.empty(); });
+  file.stream() << kHeader << (weighted ? std::string(",") + kWeight : "")
+                << (labelled ? std::string(",") + kLabel : "") << '\n';
   for (const Pick& pick : picks) {
     std::vector<std::string> fields = {pick.image_name};
     for (const double x : pick.x_in_img) fields.push_back(Exact(x));
     for (const double x : pick.x_in_scan) fields.push_back(Exact(x));
     if (weighted) fields.push_back(Exact(pick.weight));
+    if (labelled) fields.push_back(pick.label);
     file.stream() << CsvLine(fields);
   }
   file.Commit();
@@ -204,7 +231,7 @@ void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& pi
   if (num_on >= kMinPicksPerPhoto) return;
   const std::string off =
       num_on < static_cast<long>(picks.size())
-          ? fmt::format(", of which {} count, the others being switched off", num_on)
+          ? fmt::format(", of which {} count, the others being check points (weight 0)", num_on)
           : "";
   throw InputError(path, "",
                    fmt::format("holds {} picks{}; at least {} are needed, in one photo or spread "

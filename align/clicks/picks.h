@@ -2,9 +2,9 @@
 // The picks file: points that a user saw both in a photo and in the scan. Photogrammetry calls them
 // control points (known in the scan) or tie points.
 //
-// CSV with the header image_name,x,y,scan_x,scan_y,scan_z and, if wanted, a seventh column weight;
-// `#` starts a comment line; a name with a comma stands in double quotes. x, y in `img` of the
-// photo as taken, scan_* in `scan` (metres).
+// CSV with the header image_name,x,y,scan_x,scan_y,scan_z and, if wanted, the columns weight and
+// label; `#` starts a comment line; a name with a comma stands in double quotes. x, y in `img` of
+// the photo as taken, scan_* in `scan` (metres).
 
 #include <string>
 #include <vector>
@@ -20,9 +20,10 @@ struct Pick {
   Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
   Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
   long line = 0;  // in the picks file; 0 = not from a file
-  // How many times less its click noise is than that of a pick with weight 1; 0 = switched off: it
+  // How many times less its click noise is than that of a pick with weight 1; 0 = a check point: it
   // is reported, but nothing rests on it.
   double weight = 1;
+  std::string label{};  // what the user calls the point, "" = nothing
 };
 
 // Where it stands, for a message: "line 4", or "a pick of a.jpg".

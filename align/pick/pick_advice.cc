@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "align/pick/mirror_picks.h"
 #include "align/pick_findings.h"
 #include "core/text.h"
 
@@ -16,33 +17,18 @@ constexpr double kThinShare = 0.12, kCrowdedShare = 0.1;
 // Photo and sparse model disagree: joint residuals over those of the photo alone, and pixels.
 constexpr double kModelFactor = 3, kModelPx = 4;
 
-std::string OtherAzimuth(const std::string& azimuth) {
-  return azimuth == "counterclockwise" ? "clockwise" : "counterclockwise";
-}
-
-// Metres along the ray of the nearest scan; 0 where nothing can be said, infinite where no scanner
-// looked.
-double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_scan) {
-  double distance = std::numeric_limits<double>::infinity();
-  for (int scan = 0; scan < scene.num_scans(); ++scan) {
-    const auto place = scene.places(scan).PlaceOf(x_in_scan);
-    if (!place) continue;
-    const ScanPlaces::Found found = scene.places(scan).PointAt(*place);
-    // At an edge the surface may be that of the one side or of the other.
-    if (found.reason != ScanPlaces::Reason::kNone) return 0;
-    distance = std::min(distance, (found.x_in_scan - x_in_scan).norm());
-  }
-  return distance;
-}
-
 // As the page numbers the picks.
 std::string NumberOf(int index) { return std::to_string(index + 1); }
 
+std::string HowToMirror(const std::string& azimuth) {
+  if (azimuth.empty()) return "";
+  return " Press Mirror above the scan to read it with --azimuth " + OtherAzimuth(azimuth) + ".";
+}
+
 std::string MirrorWarning(double rms_px, double mirrored_rms_px, const std::string& azimuth) {
   return "The scan looks like a mirror image of the room: the picks miss by " + Number(rms_px, 1) +
-         " pixels (rms), but by " + Number(mirrored_rms_px, 1) +
-         " when the scan is reflected. End this session and read an RTPI scan with --azimuth " +
-         OtherAzimuth(azimuth) + ".";
+         " pixels (rms), but by " + Number(mirrored_rms_px, 1) + " when the scan is reflected." +
+         HowToMirror(azimuth);
 }
 
 std::string LeftOut(int index, double distance_px) {
@@ -55,6 +41,19 @@ std::string Count(int number, const std::string& noun) {
 }
 
 }  // namespace
+
+double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_scan) {
+  double distance = std::numeric_limits<double>::infinity();
+  for (int scan = 0; scan < scene.num_scans(); ++scan) {
+    const auto place = scene.places(scan).PlaceOf(x_in_scan);
+    if (!place) continue;
+    const ScanPlaces::Found found = scene.places(scan).PointAt(*place);
+    // At an edge the surface may be that of the one side or of the other.
+    if (found.reason != ScanPlaces::Reason::kNone) return 0;
+    distance = std::min(distance, (found.x_in_scan - x_in_scan).norm());
+  }
+  return distance;
+}
 
 std::string AsSentence(std::string text) {
   if (text.empty()) return text;
@@ -152,10 +151,8 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
                        " off the scan's surface. Drag it to its place in the scan.");
   }
   if (num_off >= 2 && 3 * num_mirrored_off <= num_off) {
-    warnings = {
-        "These picks were made on a mirror image of this scan. End this session and read an "
-        "RTPI scan with --azimuth " +
-        OtherAzimuth(scene.azimuth()) + "."};
+    warnings = {"These picks were made on a mirror image of this scan." +
+                HowToMirror(scene.azimuth())};
   }
   return warnings;
 }

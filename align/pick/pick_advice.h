@@ -8,6 +8,10 @@
 
 namespace roomtex {
 
+// Metres along the ray of the nearest scan; 0 where nothing can be said, infinite where no scanner
+// looked.
+double DistanceFromSurface(const PickScene& scene, const Eigen::Vector3d& x_in_scan);
+
 // With a capital letter and a full stop.
 std::string AsSentence(std::string text);
 

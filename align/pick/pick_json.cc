@@ -10,6 +10,7 @@ namespace {
 constexpr size_t kMaxPicks = 2000;
 constexpr double kMaxCoordinate = 1e8;  // metres; the Earth is 1.3e7 across
 constexpr int kMaxShownName = 60;
+constexpr size_t kMaxLabel = 200;
 
 const char* StatusName(PickState::Status status) {
   switch (status) {
@@ -139,6 +140,13 @@ SessionPick ParsePick(const Json& json, const std::string& what, const PickScene
   if (const Json& weight = Member(json, "weight"); !weight.is_null()) {
     pick.weight = ParseNumber(weight, what + ".weight", 0, kMaxPickWeight);
   }
+  if (const Json& label = Member(json, "label"); !label.is_null()) {
+    if (!label.is_string()) throw UsageError(what + ".label must be a text.");
+    pick.label = label.get<std::string>();
+    if (pick.label.size() > kMaxLabel || pick.label.find_first_of("\r\n") != std::string::npos) {
+      throw UsageError("A label is one line of at most " + std::to_string(kMaxLabel) + " letters.");
+    }
+  }
   return pick;
 }
 
@@ -153,6 +161,7 @@ Json PickToJson(const SessionPick& pick, const PickState& state) {
   json["scan"] = pick.spot ? SpotToJson(*pick.spot) : Json();
   json["point"] = pick.x_in_scan ? Numbers(*pick.x_in_scan) : Json();
   json["weight"] = pick.weight;
+  json["label"] = pick.label;
   json["complete"] = pick.complete();
   json["used"] = state.status == PickState::Status::kUsed;
   json["residual_px"] = NumberOrNull(state.residual_px);
@@ -232,6 +241,12 @@ Json SessionToJson(const PickSession::Snapshot& snapshot, const PickScene& scene
     similarity["rms_px"] = NumberOrNull(solution.rms_px);
     similarity["num_photos"] = solution.num_clicked_photos;
     json["similarity"] = similarity;
+  }
+  json["check_points"] = nullptr;
+  if (solution.num_check_points > 0) {
+    json["check_points"] = {{"count", solution.num_check_points},
+                            {"rms_px", NumberOrNull(solution.check_rms_px)},
+                            {"rms_mm", NumberOrNull(1000 * solution.check_rms)}};
   }
   json["next"] = solution.next;
   json["milliseconds"] = snapshot.milliseconds;

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "align/pick/mirror_picks.h"
 #include "align/pick/photo_corner.h"
 #include "align/pick/pick_json.h"
 #include "align/pick/reduced_photo.h"
@@ -110,6 +111,14 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
     PutPicks put = ParsePutPicks(json, scene_);
     return SessionToJson(*session_->Put(put.revision, std::move(put.picks)), scene_);
   });
+  server_.AddPost("/mirror", [this](const Json&) {
+    const std::string problem = MirrorProblem(scene_);
+    if (!problem.empty()) throw UsageError(problem);
+    if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
+    mirror_asked_ = true;
+    server_.RequestStop();
+    return Json{{"path", "/" + setup_.next_token + "/"}};
+  });
   server_.AddJson("/edges", [this](const Query& query) { return Edges(query); });
   AddAlign();
 }
@@ -207,6 +216,7 @@ Json PickServer::State() {
   json["version"] = Version();
   json["min_picks"] = kMinPicksPerPhoto;
   json["has_model"] = scene_.has_model();
+  json["can_mirror"] = MirrorProblem(scene_).empty();
   json["picks_path"] = session_->picks_path();
   json["aligned_path"] = setup_.aligned_path;
   json["ready"] = snapshot->solution.with_rays;

@@ -2,6 +2,7 @@
 // Serves the page of roomtex-pick: the paths of align/pick/README.md.
 
 #include <array>
+#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -25,6 +26,7 @@ class PickServer {
     LocalServerOptions server;
     std::string image_name;    // the photo to begin with; "" = choose
     std::string aligned_path;  // where roomtex-align writes
+    std::string next_token;    // of the server that follows when the page asks for the mirror image
     std::string align_program = BesideThisProgram("roomtex-align");
   };
 
@@ -35,6 +37,8 @@ class PickServer {
   // As LocalServer.
   void Start(bool stop_on_signals) { server_.Start(stop_on_signals); }
   void Wait();
+  // The page wants the scans the other way round (mirror_picks.h): the server has stopped for that.
+  bool mirror_asked() const { return mirror_asked_; }
   const LocalServer& server() const { return server_; }
 
  private:
@@ -71,6 +75,7 @@ class PickServer {
   BackProjections back_projections_;
   PhotoSights sights_;
   AlignJob align_;
+  std::atomic<bool> mirror_asked_{false};
   LocalServer server_;  // last: its threads use the rest
 };
 

@@ -71,7 +71,7 @@ void PickSession::Read() {
     CheckPickNames(picks_path_, picks, scene_.model(),
                    scene_.has_model() ? "in the sparse model" : "among those of --image_path");
     for (const Pick& pick : picks) {
-      SessionPick one{pick.image_name, pick.x_in_img, pick.x_in_scan, {}, pick.weight};
+      SessionPick one{pick.image_name, pick.x_in_img, pick.x_in_scan, {}, pick.weight, pick.label};
       one.spot = SpotOf(scene_, pick.x_in_scan);
       snapshot.picks.push_back(one);
     }
@@ -150,7 +150,8 @@ std::string PickSession::Save(const std::vector<SessionPick>& picks) {
   std::vector<Pick> complete;
   for (const SessionPick& pick : picks) {
     if (!pick.complete()) continue;
-    complete.push_back({pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight});
+    complete.push_back(
+        {pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight, pick.label});
   }
   try {
     if (!backed_up_ && std::filesystem::exists(picks_path_)) {

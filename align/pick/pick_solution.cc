@@ -135,7 +135,8 @@ PickSolver::Complete PickSolver::CompletePicks(const std::vector<SessionPick>& p
     const SessionPick& pick = picks[i];
     if (!pick.complete()) continue;
     const int index = static_cast<int>(i);
-    complete.picks.push_back({pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight});
+    complete.picks.push_back(
+        {pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight, pick.label});
     complete.index.push_back(index);
     ++solution->photos[pick.image_name].num_complete;
     solution->picks[i].status =
@@ -249,7 +250,7 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
       weights += weight * weight;
     }
   };
-  Sums all;
+  Sums all, check;
   std::map<std::string, Sums> of_photo;
   for (size_t i = 0; i < picks.size(); ++i) {
     const SessionPick& pick = picks[i];
@@ -265,6 +266,10 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     if (error) state.error_px = *error;
     state.residual_px = state.error_px.norm();
     state.residual = MetresOff(projection, photo.cam_from_scan, pick);
+    if (state.status == PickState::Status::kOff && std::isfinite(state.residual)) {
+      check.Add(state, 1);
+      ++solution->num_check_points;
+    }
     if (state.status != PickState::Status::kUsed) continue;
     ++photo.num_used;
     all.Add(state, pick.weight);
@@ -281,6 +286,8 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     worst.worst = worst.residual_px > 0.01;
   }
   solution->rms_px = WeightedRms(all.px2, all.weights);
+  solution->check_rms_px = WeightedRms(check.px2, check.weights);
+  solution->check_rms = WeightedRms(check.metres2, check.weights);
   solution->num_clicked_photos = static_cast<int>(of_photo.size());
 }
 

@@ -65,6 +65,9 @@ struct PickSolution {
   std::optional<Similarity> scan_from_sparse;
   ScaleEstimate scale;
   double rms_px = kNoNumber;  // of all used picks, as roomtex-align's picks.rms_px
+  // Of the check points (weight 0) in photos that are solved; metres.
+  int num_check_points = 0;
+  double check_rms_px = kNoNumber, check_rms = kNoNumber;
   // What is wrong with picks that count together over several photos.
   std::vector<std::string> warnings;
   int num_clicked_photos = 0;

@@ -7,12 +7,14 @@
 #include <memory>
 #include <optional>
 
+#include "align/pick/mirror_picks.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_server.h"
 #include "align/pick/pick_session.h"
 #include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/local_server_key.h"
 #include "core/open_browser.h"
 #include "core/option_fields.h"
 #include "importers/scan_record.h"
@@ -98,33 +100,62 @@ void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context
                " All: " + names);
 }
 
+// Says where the page is; the browser shows it if asked to.
+void Announce(const Arguments& a, const LocalServer& server, std::optional<OpenBrowser>* browser,
+              const Command::Context& context) {
+  if (a.server.port != 0 && server.port() != a.server.port) {
+    context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +
+                          std::to_string(server.port()));
+  }
+  if (a.server.allow_remote) context.Warn(kNotEncrypted);
+  std::cout << server.Url() << "\n" << server.SshLine() << std::endl;
+  if (a.server.open) browser->emplace(server.Url());
+  if (*browser && !(*browser)->problem().empty()) context.Warn((*browser)->problem());
+}
+
+// One reading of the scans. picks: taken over, in place of those of the file. Gives the picks for
+// the next reading, or nothing: the session is over.
+std::optional<std::vector<SessionPick>> ServeScans(
+    const std::optional<std::vector<SessionPick>>& picks, Arguments* a,
+    std::optional<OpenBrowser>* browser, const Command::Context& context) {
+  PickScene scene(a->scene, &context.progress);
+  if (!a->image_name.empty() && scene.FindPhoto(a->image_name) == nullptr) {
+    throw UsageError("--image_name " + a->image_name + " is not among the photos");
+  }
+  const bool is_first = !picks;
+  for (const std::string& note : scene.notes()) {
+    if (is_first) context.Warn(note);
+  }
+  if (is_first) WarnOfMissingPhotos(scene, context);
+  PickSession session(scene, a->output_path);
+  if (picks) session.Put(session.Now()->revision, *picks);
+  scene.Prepare();
+  const std::string next_token = MakeToken();
+  PickServer server(
+      scene, &session, kPickPage,
+      {a->server, a->image_name, a->aligned_path, next_token, BesideThisProgram("roomtex-align")});
+  server.Start(true);
+  if (is_first) Announce(*a, server.server(), browser, context);
+  server.Wait();
+  if (!session.SaveAgain()) throw InputError(a->output_path, "", session.Now()->save_error, "");
+  context.report["num_picks"] = session.Now()->picks.size();
+  if (!server.mirror_asked()) return std::nullopt;
+  a->scene.scan_reader.azimuth = OtherAzimuth(scene.azimuth());
+  a->server.port = server.server().port();
+  a->server.port_may_differ = false;
+  a->server.token = next_token;
+  context.progress.Note("the scan is read again, azimuth " + a->scene.scan_reader.azimuth);
+  return MirrorPicks(scene, session.Now()->picks);
+}
+
 void ServePicking(Arguments a, const Command::Context& context) {
   CheckArguments(&a);
   a.scene.num_threads = context.options.num_threads;
-  PickScene scene(a.scene, &context.progress);
-  if (!a.image_name.empty() && scene.FindPhoto(a.image_name) == nullptr) {
-    throw UsageError("--image_name " + a.image_name + " is not among the photos");
-  }
-  for (const std::string& note : scene.notes()) context.Warn(note);
-  WarnOfMissingPhotos(scene, context);
-  PickSession session(scene, a.output_path);
-  scene.Prepare();
-  PickServer server(scene, &session, kPickPage,
-                    {a.server, a.image_name, a.aligned_path, BesideThisProgram("roomtex-align")});
-  server.Start(true);
-  if (a.server.port != 0 && server.server().port() != a.server.port) {
-    context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +
-                          std::to_string(server.server().port()));
-  }
-  if (a.server.allow_remote) context.Warn(kNotEncrypted);
-  std::cout << server.server().Url() << "\n" << server.server().SshLine() << std::endl;
   std::optional<OpenBrowser> browser;
-  if (a.server.open) browser.emplace(server.server().Url());
-  if (browser && !browser->problem().empty()) context.Warn(browser->problem());
-  server.Wait();
-  if (!session.SaveAgain()) throw InputError(a.output_path, "", session.Now()->save_error, "");
-  const auto now = session.Now();
-  context.report["num_picks"] = now->picks.size();
+  std::optional<std::vector<SessionPick>> picks;
+  do {
+    picks = ServeScans(picks, &a, &browser, context);
+  } while (picks);
 }
 
 }  // namespace

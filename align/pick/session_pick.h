@@ -22,7 +22,8 @@ struct SessionPick {
   std::optional<Eigen::Vector2d> x_in_img;
   std::optional<Eigen::Vector3d> x_in_scan;
   std::optional<ScanSpot> spot;  // where x_in_scan is drawn
-  double weight = 1;
+  double weight = 1;             // 0 = a check point
+  std::string label{};
 
   bool complete() const { return x_in_img && x_in_scan; }
 };

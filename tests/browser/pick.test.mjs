@@ -1,7 +1,7 @@
 // roomtex-pick in a browser, on a simulated room: by mouse and by keys, as its user works.
 
 import assert from 'node:assert/strict';
-import {readFileSync} from 'node:fs';
+import {readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, run, screenshot} from './browser.mjs';
@@ -168,11 +168,11 @@ test('off and on, remove and bring back, next and previous', async () => {
     await page.saved();
     assert.ok(page.file().every((pick) => pick.weight === 1));
     // The same by mouse.
-    await page.page.locator('#rows tr').nth(3).locator('input').click();
+    await page.page.locator('#rows tr').nth(3).locator('input[type=checkbox]').click();
     await page.rowIs(3, (row) => row.status === 'off', 'off by its box');
     await page.saved();
     assert.equal(page.file()[3].weight, 0);
-    await page.page.locator('#rows tr').nth(3).locator('input').click();
+    await page.page.locator('#rows tr').nth(3).locator('input[type=checkbox]').click();
     await page.rowIs(3, (row) => row.status === 'used', 'on by its box');
 
     const earlier = page.file();
@@ -501,4 +501,90 @@ test('Align can be cancelled, and run again', async () => {
     await page.page.waitForSelector('#align .verdict', {timeout: 240000});
     assert.match(await page.text('#align .verdict'), /Trusted/);
   }, {picksFile: fileOf(places.slice(0, 8))});
+});
+
+test('labels and check points: their errors are shown, nothing rests on them', async () => {
+  const eight = places.slice(0, 8);
+  // A check point that is far off changes nothing.
+  const wrong = {...eight[7], img: [eight[7].img[0] + 25, eight[7].img[1]]};
+  await pageOn(async (page) => {
+    await until(async () => (await page.rows())[7]?.px > 0, 'numbers');
+    for (const index of [6, 7]) {
+      await page.page.locator('#rows tr').nth(index).locator('input[type=checkbox]').uncheck();
+      await page.rowIs(index, (row) => row.status === 'off', 'a check point');
+    }
+    const label = page.page.locator('#rows tr').nth(7).locator('.label');
+    await label.fill('lamp, left');
+    await label.press('Enter');
+    await page.saved();
+    await until(() => page.file().length === 8, 'eight picks in the file');
+    const lines = readFileSync(page.picksPath, 'utf8').trim().split('\n');
+    assert.match(lines[0], /,weight,label$/);
+    assert.match(lines[8], /,0,"lamp, left"$/);
+    const rows = await page.rows();
+    assert.ok(rows.slice(0, 6).every(({px}) => px < 2.5));
+    assert.ok(rows[6].px < 4, `${rows[6].px}`);
+    assert.ok(rows[7].px > 20 && rows[7].px < 30, `${rows[7].px}`);
+    assert.match(await page.text('#summary-body'), /Check points\s+2, off by/);
+    await screenshot(page.page, 'pick-check-points');
+    await page.page.reload();
+    await page.page.waitForSelector('body[data-ready]');
+    await page.rowIs(7, (row) => row.label === 'lamp, left' && !row.on, 'is there again');
+  }, {picksFile: fileOf([...eight.slice(0, 7), wrong])});
+});
+
+test('targets with coordinates need a click in the photo only', async () => {
+  const six = places.slice(0, 6);
+  const csv = ['label;x;y;z', ...six.map(({point}, i) => [`T${i + 1}`, ...point].join(';'))];
+  await pageOn(async (page, {folder}) => {
+    const load = async (name, text) => {
+      writeFileSync(folder.path(name), text);
+      const chosen = page.page.waitForEvent('filechooser');
+      await page.page.click('#targets');
+      await (await chosen).setFiles(folder.path(name));
+    };
+    await load('broken.csv', 'T1,1,2\n');
+    await until(async () => /Line 1 is "T1,1,2"/.test(await page.text('#toast')), 'the sentence');
+    await load('targets.csv', csv.join('\n'));
+    await page.rowsAre(6);
+    await screenshot(page.page, 'pick-targets');
+    for (const [index, place] of six.entries()) {
+      await page.rowIs(index, (row) => row.status === 'half', 'waits');
+      await page.click('photo', place.img);
+      await page.rowIs(index, (row) => row.status !== 'half', 'completed');
+    }
+    await until(async () => (await page.rows()).every((row) => row.status === 'used'), 'all used');
+    await page.saved();
+    const file = page.file();
+    assert.deepEqual(file.map(({label}) => label), ['T1', 'T2', 'T3', 'T4', 'T5', 'T6']);
+    file.forEach(({point}, i) => assert.ok(distance(point, six[i].point) < 1e-9));
+  });
+});
+
+test('Mirror reads the scan the other way round and keeps the picks', async () => {
+  const six = places.slice(0, 6);
+  const mirror = async (page) => {
+    const old = page.page.url();
+    await page.page.click('#mirror');
+    await page.page.waitForURL((url) => String(url) !== old, {timeout: 60000});
+    await page.page.waitForSelector('body[data-ready]');
+  };
+  await pageOn(async (page) => {
+    await until(async () => /mirror image/.test(await page.text('#dock')), 'the warning');
+    await screenshot(page.page, 'pick-mirror');
+    await mirror(page);  // to the room that the picks were made in
+    await until(
+        async () => (await page.rows()).every(({status, px}) => status === 'used' && px < 2.5),
+        'they fit');
+    page.file().forEach(({point}, i) => assert.ok(distance(point, six[i].point) < 1e-9));
+    await mirror(page);  // and with the scan into its mirror image
+    await until(async () => (await page.rows()).length === 6, 'the picks');
+    page.file().forEach(({point: [x, y, z]}, i) => {
+      assert.ok(distance([-x, y, z], six[i].point) < 1e-6, `${[x, y, z]}`);
+    });
+  }, {
+    picksFile: fileOf(six),
+    more: ['--azimuth', 'counterclockwise'],
+    allowed: [/ERR_CONNECTION_REFUSED/, /failed/],
+  });
 });

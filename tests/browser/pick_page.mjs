@@ -18,15 +18,18 @@ export async function until(probe, what, seconds = 30) {
   }
 }
 
-// Picks of a file: [{image_name, img, point, weight}].
+// Picks of a file: [{image_name, img, point, weight, label}].
 export function readPicks(file) {
   if (!existsSync(file)) return [];
   const lines = readFileSync(file, 'utf8').split('\n').filter((line) => line && line[0] !== '#');
-  assert.match(lines[0], /^image_name,x,y,scan_x,scan_y,scan_z(,weight)?$/);
+  assert.match(lines[0], /^image_name,x,y,scan_x,scan_y,scan_z(,weight)?(,label)?$/);
+  const weighted = lines[0].includes(',weight');
   return lines.slice(1).map((line) => {
     const fields = line.split(',');
-    const [x, y, px, py, pz, weight = 1] = fields.slice(1).map(Number);
-    return {image_name: fields[0], img: [x, y], point: [px, py, pz], weight};
+    const [x, y, px, py, pz] = fields.slice(1, 6).map(Number);
+    const weight = weighted ? Number(fields[6]) : 1;
+    const label = fields[weighted ? 7 : 6] ?? '';
+    return {image_name: fields[0], img: [x, y], point: [px, py, pz], weight, label};
   });
 }
 
@@ -144,14 +147,15 @@ export class PickPage {
       const value = (text) => text === '–' ? null : Number(text);
       return {
         number: Number(cells[0]),
-        photo: cells[1],
-        px: value(cells[2]),
-        mm: value(cells[3]),
-        leftOut: value(cells[4]),
-        state: cells[5],
+        label: line.querySelector('.label').value,
+        photo: cells[2],
+        px: value(cells[3]),
+        mm: value(cells[4]),
+        leftOut: value(cells[5]),
+        state: cells[6],
         status: line.dataset.status,
         selected: line.hasAttribute('data-selected'),
-        on: line.querySelector('input').checked,
+        on: line.querySelector('input[type=checkbox]').checked,
       };
     }));
   }

@@ -51,6 +51,7 @@ export const api = {
   startAlign: () => send('POST', 'align', {}),
   endAlign: () => send('DELETE', 'align', {}),
   align: () => ask('align'),
+  mirror: () => send('POST', 'mirror', {}),
 
   photoTile: (photo) => (level, x, y) => `tile?photo=${photo}&level=${level}&x=${x}&y=${y}`,
   scanTile: (scan, picture) => (level, x, y) =>

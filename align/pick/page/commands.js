@@ -186,7 +186,7 @@ export const kKeys = [
       {
         keys: ['X'],
         shown: 'X',
-        does: 'switches the selected pick off or on',
+        does: 'makes the selected pick a check point, on which nothing rests, or one that counts',
         run: () => app.editor.toggle(),
       },
       {

@@ -6,6 +6,7 @@
 
 import {api, ServerError} from './api.js';
 import {clamp, say} from './dom.js';
+import {inScan} from './picks.js';
 
 const kCornerReach = 8;    // CSS pixels: how far from a corner somebody clicks
 const kLiveInterval = 80;  // milliseconds between two places tried while a marker is dragged
@@ -30,11 +31,12 @@ export class Editor {
   showPhoto(photo) {
     this.photo = photo;
     this.cross.photo = null;
-    // A scan point without a partner goes along to the new photo.
+    // Scan points without a partner go along to the new photo.
     const loose = this.picks.list.find((pick) => !pick.img);
     if (!loose || loose.image_name === photo.name) return;
     const label = `pick ${this.picks.numberOf(loose.uid)} to ${photo.name}`;
-    this.picks.set(label, loose.uid, {image_name: photo.name}, `photo of ${loose.uid}`);
+    const move = (pick) => pick.img ? pick : {...pick, image_name: photo.name};
+    this.picks.change(label, loose.uid, (list) => list.map(move), `photo of ${loose.uid}`);
   }
 
   showScan(scan) {
@@ -44,10 +46,10 @@ export class Editor {
 
   // The unfinished pick that a click completes or moves: of this photo, or of none yet.
   get half() {
-    return this.picks.list.find(
-               (pick) => (!pick.img || !pick.scan) &&
-                   (pick.image_name === this.photo?.name || !pick.img)) ??
-        null;
+    const isHalf = (pick) => (!pick.img || !inScan(pick)) &&
+        (pick.image_name === this.photo?.name || !pick.img);
+    const selected = this.picks.find(this.selected);
+    return selected && isHalf(selected) ? selected : this.picks.list.find(isHalf) ?? null;
   }
 
   // Where a pick lies on a side, or null; only what is on the picture that is shown.
@@ -84,6 +86,7 @@ export class Editor {
       markers.push({
         id: pick.uid,
         number: index + 1,
+        label: pick.label,
         place,
         status: this.picks.statusOf(pick),
         worst: row?.worst === true,
@@ -129,6 +132,7 @@ export class Editor {
     }
     this.forgetTried();
     const name = this.photo.name;
+    const target = half && !half.img;
     if (half) {
       const label = half.img ? 'moved' : 'completed';
       this.picks.set(
@@ -138,6 +142,33 @@ export class Editor {
       this.selected =
           this.picks.add(`pick ${this.picks.list.length + 1} begun`, {image_name: name, img});
     }
+    const next = target ? this.half : null;
+    if (next && !next.img) say(`Next: ${next.label || `pick ${this.picks.numberOf(next.uid)}`}`);
+    this.on.changed();
+  }
+
+  // Points with coordinates (targets.js): each waits for its click in the photo.
+  addTargets(targets) {
+    const name = this.photo.name;
+    const here = this.picks.list.filter((pick) => pick.image_name === name);
+    const fresh = targets.filter(({label}) => !here.some((pick) => pick.label === label));
+    if (fresh.length === 0) {
+      say(`All of these targets are there for ${name} already`);
+      return;
+    }
+    this.selected = this.picks.addAll(
+        `${fresh.length} targets added`,
+        fresh.map(({label, point}) => ({image_name: name, label, point})));
+    const first = this.picks.find(this.selected);
+    say(`${fresh.length} targets: click ${first.label} in the photo, or choose another below`,
+        {seconds: 6});
+    this.on.changed();
+  }
+
+  setLabel(uid, label) {
+    const pick = this.picks.find(uid);
+    if (!pick || pick.label === label) return;
+    this.picks.set(`pick ${this.picks.numberOf(uid)} labelled`, uid, {label});
     this.on.changed();
   }
 
@@ -240,10 +271,10 @@ export class Editor {
 
   enable(uid, on) {
     const pick = this.picks.find(uid);
-    if (!pick || !pick.img || !pick.scan || (pick.weight !== 0) === on) return;
+    if (!pick || !pick.img || !inScan(pick) || (pick.weight !== 0) === on) return;
     const number = this.picks.numberOf(uid);
     this.picks.set(
-        `pick ${number} ${on ? 'on' : 'off'}`, uid,
+        `pick ${number} ${on ? 'counts' : 'only checks'}`, uid,
         {weight: on ? pick.onWeight ?? 1 : 0, onWeight: pick.weight});
     this.on.changed();
   }

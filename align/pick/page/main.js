@@ -17,6 +17,7 @@ import {Results, showSummary} from './results.js';
 import {drawPicks, showLoupe} from './scene.js';
 import {showHint, showSync} from './status.js';
 import {Strip} from './strip.js';
+import {listenToTargets} from './targets.js';
 import {gammaTable} from './tiles.js';
 
 const kHeartbeat = 5000;   // milliseconds
@@ -183,6 +184,9 @@ function listen() {
   byId('scan-select').addEventListener('change', (event) => chooseScan(Number(event.target.value)));
   byId('scan-picture').addEventListener('change', () => chooseScan(editor.scan.id));
   listenToGamma();
+  listenToTargets();
+  byId('mirror').hidden = !app.server.can_mirror;
+  byId('mirror').addEventListener('click', () => mirrorScan());
   listenToDividers();
   listenToKeys(kKeys);
   picks.addEventListener('change', () => {
@@ -211,7 +215,7 @@ function listen() {
 
 // The shortest question there is; the answer does not matter.
 async function heartbeat() {
-  if (document.hidden || app.picks.state === 'gone' || app.picks.state === 'restarted') return;
+  if (document.hidden || app.picks.left || app.picks.state === 'gone' || app.picks.state === 'restarted') return;
   if (app.picks.state === 'unsaved') {
     app.picks.check();  // which has the server try again
     return;
@@ -221,6 +225,33 @@ async function heartbeat() {
   } catch {
     app.picks.check();
   }
+}
+
+// The scan's mirror image: the server reads the scan again and is then found under another address.
+async function mirrorScan() {
+  if (app.picks.pending) {
+    say('One moment: the picks are being saved');
+    return;
+  }
+  let path;
+  try {
+    ({path} = await api.mirror());
+  } catch (error) {
+    say(error.message, {seconds: 9, urgent: true});
+    return;
+  }
+  app.picks.leave();
+  setText(byId('next'), 'Reading the scan the other way round…');
+  document.body.inert = true;
+  while (true) {
+    await new Promise((done) => setTimeout(done, kStartAgain));
+    try {
+      if ((await fetch(`${path}align`)).ok) break;
+    } catch {
+      // It is still reading.
+    }
+  }
+  location.replace(path);
 }
 
 function listenToGamma() {
@@ -280,6 +311,7 @@ function build() {
   app.results = new Results({
     choose: (uid) => app.editor.select(uid, {centre: true}),
     enable: (uid, on) => app.editor.enable(uid, on),
+    label: (uid, text) => app.editor.setLabel(uid, text),
     remove: (uid) => app.editor.remove(uid),
   });
 }

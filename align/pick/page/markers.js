@@ -48,7 +48,9 @@ function label(context, text, x, y, color, strong) {
   context.fillText(text, x + 4, y - 3.5);
 }
 
-// pick: {id, number, place: [x, y] img, status, worst, selected, dim}.
+const shortened = (text) => text.length > 16 ? `${text.slice(0, 15)}…` : text;
+
+// pick: {id, number, label, place: [x, y] img, status, worst, selected, dim}.
 export function drawMarker(context, view, pick) {
   const [x, y] = view.toScreen(pick.place);
   const reach = 40;
@@ -77,9 +79,9 @@ export function drawMarker(context, view, pick) {
   });
   context.setLineDash([]);
   if (pick.selected) twice(context, '#ffffff', 1, () => context.arc(x, y, r + 8, 0, 2 * Math.PI));
-  const signs = {bad: ' ✕', off: ' off', half: ' ?'};
-  const text =
-      pick.number + (pick.status === 'used' && pick.worst ? ' ▲' : signs[pick.status] ?? '');
+  const signs = {bad: ' ✕', off: ' check', half: ' ?'};
+  const text = pick.number + (pick.label ? ` ${shortened(pick.label)}` : '') +
+      (pick.status === 'used' && pick.worst ? ' ▲' : signs[pick.status] ?? '');
   labelBeside(context, view, text, [x, y - r + 2], r + 4, color, pick.selected);
   context.globalAlpha = 1;
 }

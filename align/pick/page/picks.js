@@ -12,21 +12,28 @@ const kRetryAfter = 1500;  // milliseconds
 const kHistory = 500;      // changes that can be undone
 const kKeptHistory = 50;   // of these after a reload
 
-const sentFields = ({image_name, img, scan, point, weight}) =>
-    ({image_name, img, scan, point, weight});
+const sentFields = ({image_name, img, scan, point, weight, label}) =>
+    ({image_name, img, scan, point, weight, label});
+
+const kEmptyPick =
+    {image_name: '', img: null, scan: null, point: null, weight: 1, label: ''};
+
+// A target beside every scan has a point and no place in a picture.
+export const inScan = (pick) => Boolean(pick.scan || pick.point);
 
 function samePicks(a, b) {
   const text = (picks) => JSON.stringify(
       picks.map(({image_name,
                   img,
                   scan,
-                  weight}) => [image_name, img, scan && [scan.id, scan.x, scan.y], weight]));
+                  weight,
+                  label}) => [image_name, img, scan && [scan.id, scan.x, scan.y], weight, label]));
   return text(a) === text(b);
 }
 
 // Events: "change" (list or numbers), "sync" (state), "refused" (detail: the server's sentence).
 export class Picks extends EventTarget {
-  list = [];         // {uid, image_name, img, scan, point, weight}
+  list = [];         // {uid, image_name, img, scan, point, weight, label}
   rows = new Map();  // uid -> the server's pick with its numbers
   session = null;
   // "saved", "saving", "unsaved" (the file could not be written), "gone" (no answer), "restarted",
@@ -100,7 +107,7 @@ export class Picks extends EventTarget {
     return this.list.findIndex((pick) => pick.uid === uid) + 1;
   }
   statusOf(pick) {
-    if (!pick.img || !pick.scan) return 'half';
+    if (!pick.img || !inScan(pick)) return 'half';
     if (pick.weight === 0) return 'off';
     const status = this.rows.get(pick.uid)?.status;
     return status && status !== 'half' && status !== 'off' ? status : 'waiting';
@@ -127,9 +134,17 @@ export class Picks extends EventTarget {
 
   add(label, fields) {
     const uid = this.#nextUid++;
-    const pick = {uid, image_name: '', img: null, scan: null, point: null, weight: 1, ...fields};
+    const pick = {uid, ...kEmptyPick, ...fields};
     this.change(label, uid, (list) => [...list, pick]);
     return uid;
+  }
+
+  // Several at once; the first one's uid.
+  addAll(label, fieldsOfEach) {
+    const first = this.#nextUid;
+    const added = fieldsOfEach.map((fields) => ({uid: this.#nextUid++, ...kEmptyPick, ...fields}));
+    this.change(label, first, (list) => [...list, ...added]);
+    return first;
   }
 
   set(label, uid, fields, merge = '') {
@@ -260,7 +275,9 @@ export class Picks extends EventTarget {
     this.list = this.list.map((pick) => {
       const sent = list.find((one) => one.uid === pick.uid);
       const row = this.rows.get(pick.uid);
-      if (!row || !sent || sent.scan !== pick.scan || pick.point || !row.point) return pick;
+      if (!row || !sent || sent.scan !== pick.scan || !row.point) return pick;
+      // A target comes with its point; where that is drawn the server says.
+      if (pick.point) return pick.scan || !row.scan ? pick : {...pick, scan: row.scan};
       return {...pick, point: row.point};
     });
     if (this.pending) {
@@ -318,10 +335,17 @@ export class Picks extends EventTarget {
     this.#retry = setTimeout(() => this.check(), kRetryAfter);
   }
 
+  // This page is about to be replaced by that of another server.
+  left = false;
+  leave() {
+    this.left = true;
+    clearTimeout(this.#retry);
+  }
+
   // Asks how the picks stand at the server: after it was gone, and when this page comes back to the
   // front.
   async check() {
-    if (this.#busy || this.state === 'stale') return;
+    if (this.#busy || this.left || this.state === 'stale') return;
     this.#busy = true;
     let now;
     try {

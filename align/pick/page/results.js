@@ -4,7 +4,7 @@ import {byId, el, number, setText} from './dom.js';
 
 const kStates = {
   used: 'used',
-  off: 'off',
+  off: 'check point',
   bad: '✕ left out as wrong',
   half: '? one side missing',
   waiting: 'needs more picks',
@@ -13,7 +13,7 @@ const kStates = {
 export class Results {
   #rows = new Map();  // uid -> cells
 
-  // on: {choose(uid), enable(uid, bool), remove(uid)}
+  // on: {choose(uid), enable(uid, bool), label(uid, text), remove(uid)}
   constructor(on) {
     this.on = on;
     this.body = byId('rows');
@@ -54,6 +54,13 @@ export class Results {
     const cells = {
       number: el('button', {type: 'button', class: 'number', onfocus: () => this.on.choose(uid)}),
       photo: el('td', {class: 'photo'}),
+      label: el('input', {
+        type: 'text',
+        class: 'label',
+        maxlength: 60,
+        spellcheck: 'false',
+        onchange: (event) => this.on.label(uid, event.target.value.trim()),
+      }),
       px: el('span'),
       bar: el('span', {class: 'bar'}),
       mm: el('td', {class: 'right'}),
@@ -78,9 +85,10 @@ export class Results {
             if (!event.target.closest('.actions')) this.on.choose(uid);
           },
         },
-        el('td', {}, cells.number), cells.photo,
+        el('td', {}, cells.number), el('td', {class: 'actions'}, cells.label), cells.photo,
         el('td', {class: 'right value'}, cells.bar, cells.px), cells.mm, cells.leftOut, cells.state,
-        el('td', {class: 'actions'}, el('label', {title: 'Count this pick (X)'}, cells.on, ' on'),
+        el('td', {class: 'actions'}, el('label', {title: 'Unticked it is a check point: its error is shown, nothing rests on it (X)'},
+              cells.on, ' counts'),
            cells.remove));
     this.#rows.set(uid, cells);
     return cells;
@@ -96,6 +104,8 @@ export class Results {
     cells.number.setAttribute('aria-current', String(pick.uid === selected));
     setText(cells.number, String(index));
     cells.number.setAttribute('aria-label', `Pick ${index}`);
+    if (document.activeElement !== cells.label) cells.label.value = pick.label ?? '';
+    cells.label.setAttribute('aria-label', `Label of pick ${index}`);
     setText(cells.photo, pick.image_name);
     cells.photo.title = pick.image_name;
     setText(cells.px, number(numbers.residual_px, 2));
@@ -149,6 +159,12 @@ export function showSummary(photo, session, {min_picks, has_model: hasModel}) {
     add('All picks',
         `${number(similarity.rms_px, 2)} px rms in ${similarity.num_photos} ` +
             (similarity.num_photos === 1 ? 'photo' : 'photos'));
+  }
+  const check = session.check_points;
+  if (check) {
+    add('Check points',
+        `${check.count}, off by ${number(check.rms_px, 2)} px rms, ${
+            number(check.rms_mm, 1)} mm`);
   }
   const warnings = [...(solution?.warnings ?? [])];
   if (solution?.ambiguous) {

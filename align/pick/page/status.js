@@ -71,13 +71,14 @@ function copyButton() {
         type: 'button',
         onclick: async () => {
           const lines = app.picks.list.filter((pick) => pick.img && pick.point)
-                            .map(({image_name, img, point, weight}) => {
-                              const name = /[",]/.test(image_name) ?
-                                  `"${image_name.replaceAll('"', '""')}"` :
-                                  image_name;
-                              return [name, ...img, ...point, weight].join();
+                            .map(({image_name, img, point, weight, label}) => {
+                              const quoted = (text) =>
+                                  /[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+                              return [
+                                quoted(image_name), ...img, ...point, weight, quoted(label)
+                              ].join();
                             });
-          const text = ['image_name,x,y,scan_x,scan_y,scan_z,weight', ...lines, ''].join('\n');
+          const text = ['image_name,x,y,scan_x,scan_y,scan_z,weight,label', ...lines, ''].join('\n');
           try {
             await navigator.clipboard.writeText(text);
             button.textContent = `Copied ${lines.length} picks`;

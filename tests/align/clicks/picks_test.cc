@@ -37,6 +37,26 @@ std::vector<Pick> PicksOf(const std::string& name, int count) {
   return picks;
 }
 
+TEST(Picks, LabelsStandBehindTheOtherColumnsInAnyOrder) {
+  const TempFolder folder;
+  const std::string header = "image_name,x,y,scan_x,scan_y,scan_z,";
+  for (const std::string& text :
+       {header + "label,weight\na.jpg,1,2,3,4,5,\"door, left\",0\nb.jpg,1,2,3,4,5,,1\n",
+        header + "weight,label\na.jpg,1,2,3,4,5,0,\"door, left\"\nb.jpg,1,2,3,4,5,1,\n"}) {
+    WriteBytes(folder / "a.csv", text);
+    const std::vector<Pick> picks = ReadPicks(folder / "a.csv");
+    ASSERT_EQ(picks.size(), 2u);
+    EXPECT_EQ(picks[0].label, "door, left");
+    EXPECT_EQ(picks[0].weight, 0);
+    EXPECT_EQ(picks[1].label, "");
+    EXPECT_EQ(picks[1].weight, 1);
+    WritePicks(folder / "b.csv", picks);
+    EXPECT_EQ(ReadPicks(folder / "b.csv")[0].label, "door, left");
+  }
+  WriteBytes(folder / "c.csv", header + "label,label\na.jpg,1,2,3,4,5,a,b\n");
+  EXPECT_INPUT_ERROR(ReadPicks(folder / "c.csv"), "where the header of a picks file should be");
+}
+
 TEST(Picks, ReadsCommentsBlankLinesCarriageReturnsAndByteOrderMark) {
   const std::vector<Pick> picks = ReadText(
       "\xef\xbb\xbf# made by hand\r\n image_name, x ,y,scan_x,scan_y,scan_z\r\n\r\n"
