@@ -308,7 +308,9 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
 
   if (options.registration.mode != "none") {
     progress->Stage("registration");
-    result.registration = RegisterPhotos(input, grids, store, result.exposure.gains,
+    std::vector<std::vector<uint8_t>> intensities;
+    for (const Scan& scan : scans) intensities.push_back(IntensityAsGrey(scan));
+    result.registration = RegisterPhotos(input, grids, intensities, store, result.exposure.gains,
                                          options.registration, num_threads, &photos);
     const bool corrected =
         std::any_of(result.registration.begin(), result.registration.end(),

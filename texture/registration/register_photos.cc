@@ -118,6 +118,7 @@ class Registrar {
         std::optional<MeasuredShift> shift = ShiftAt(i, patch);
         if (shift) of_photo[i].push_back(std::move(*shift));
       }
+      AddShiftsAgainstScan(i, &of_photo[i]);
     });
     std::vector<MeasuredShift> shifts;
     for (std::vector<MeasuredShift>& some : of_photo) {
@@ -244,34 +245,74 @@ class Registrar {
     return members;
   }
 
-  void MeasurePhoto(int i, int radius) {
+  // The photo around a node against what `grey` says of its sightings.
+  template <typename GreyOf>
+  std::optional<Patch> Compare(int i, const std::vector<int>& members, int radius,
+                               const GreyOf& grey_of) const {
     const RegisteredPhoto& photo = registered_[i];
     const std::vector<Sighting>& sightings = samples_.Of(i);
     const auto scale = static_cast<float>(photo.scale / (1 << level_));
+    const size_t skip = std::max<size_t>(1, members.size() / kMostPixels);
+    std::vector<ExpectedPixel> expected;
+    Eigen::Vector2f middle = Eigen::Vector2f::Zero();
+    for (size_t k = 0; k < members.size(); k += skip) {
+      const Sighting& s = sightings[members[k]];
+      const Eigen::Vector2f shown = s.place + photo.warp.At(s.place.x(), s.place.y());
+      expected.push_back({shown * scale, grey_of(s)});
+      middle += s.place;
+    }
+    middle /= static_cast<float>(expected.size());
+    Patch patch;
+    patch.shift = FindPatchShift(photo.levels[level_], expected, radius);
+    if (!patch.shift.is_found()) return std::nullopt;
+    patch.middle = *std::min_element(members.begin(), members.end(), [&](int a, int b) {
+      return (sightings[a].place - middle).squaredNorm() <
+             (sightings[b].place - middle).squaredNorm();
+    });
+    return patch;
+  }
+
+  // What the scanner measured stays where it is, and so holds what all photos might do together.
+  // Counted only where photo and scan show the same: intensity is not brightness.
+  void AddShiftsAgainstScan(int i, std::vector<MeasuredShift>* shifts) const {
+    constexpr float kAlike = 0.7f;
+    constexpr int kRadius = 3;
+    for (const std::vector<int>& members : GatherPatches(i)) {
+      if (members.size() < kFewestOfPatch) continue;
+      const auto patch = Compare(i, members, kRadius, [this](const Sighting& s) {
+        return static_cast<float>(samples_.Intensity(s.sample));
+      });
+      if (!patch || patch->shift.likeness < kAlike) continue;
+      const auto seen = See(i, samples_.Of(i)[patch->middle]);
+      if (!seen) continue;
+      MeasuredShift shift;
+      shift.terms.push_back({seen->place, Eigen::Matrix2f::Identity()});
+      SetShift(i, *patch, &shift);
+      shifts->push_back(std::move(shift));
+    }
+  }
+
+  void SetShift(int i, const Patch& patch, MeasuredShift* shift) const {
+    const double scale = registered_[i].scale / (1 << level_);
+    shift->shift = patch.shift.shift / static_cast<float>(scale);
+    // However much texture it has, a patch knows its place no better than this.
+    constexpr double kBestPx = 0.2;
+    const double most = 2 / (kBestPx * kBestPx), trace = patch.shift.information.trace();
+    const double certain = std::min(1.0, most / trace) * scale * scale;
+    shift->information = patch.shift.information * static_cast<float>(certain);
+  }
+
+  void MeasurePhoto(int i, int radius) {
     std::vector<double> lengths;
     int num_asked = 0;
     for (const std::vector<int>& members : GatherPatches(i)) {
       if (members.size() < kFewestOfPatch) continue;
       ++num_asked;
-      const size_t skip = std::max<size_t>(1, members.size() / kMostPixels);
-      std::vector<ExpectedPixel> expected;
-      Eigen::Vector2f middle = Eigen::Vector2f::Zero();
-      for (size_t k = 0; k < members.size(); k += skip) {
-        const Sighting& s = sightings[members[k]];
-        const Eigen::Vector2f shown = s.place + photo.warp.At(s.place.x(), s.place.y());
-        expected.push_back({shown * scale, samples_.OthersGrey(s)});
-        middle += s.place;
-      }
-      middle /= static_cast<float>(expected.size());
-      Patch patch;
-      patch.shift = FindPatchShift(photo.levels[level_], expected, radius);
-      if (!patch.shift.is_found()) continue;
-      patch.middle = *std::min_element(members.begin(), members.end(), [&](int a, int b) {
-        return (sightings[a].place - middle).squaredNorm() <
-               (sightings[b].place - middle).squaredNorm();
-      });
-      lengths.push_back(patch.shift.shift.norm());
-      patches_[i].push_back(patch);
+      const auto patch =
+          Compare(i, members, radius, [this](const Sighting& s) { return samples_.OthersGrey(s); });
+      if (!patch) continue;
+      lengths.push_back(patch->shift.shift.norm());
+      patches_[i].push_back(*patch);
     }
     median_px_[i] = Median(&lengths);
     found_[i].share_measured = static_cast<double>(patches_[i].size()) / std::max(1, num_asked);
@@ -330,13 +371,7 @@ class Registrar {
       const Eigen::Matrix2d share = -other.weight / others * own_by_surface * by_surface.inverse();
       shift.terms.push_back({seen->place, share.cast<float>()});
     }
-    const double scale = registered_[i].scale / (1 << level_);
-    shift.shift = patch.shift.shift / static_cast<float>(scale);
-    // However much texture it has, a patch knows its place no better than this.
-    constexpr double kBestPx = 0.2;
-    const double most = 2 / (kBestPx * kBestPx), trace = patch.shift.information.trace();
-    const double certain = std::min(1.0, most / trace) * scale * scale;
-    shift.information = patch.shift.information * static_cast<float>(certain);
+    SetShift(i, patch, &shift);
     return shift;
   }
 
@@ -482,12 +517,13 @@ std::vector<std::string> RegistrationOptions::Problems() const { return Problems
 
 std::vector<PhotoRegistration> RegisterPhotos(const PhotoPassInput& input,
                                               const std::vector<GridOfSamples>& grids,
+                                              const std::vector<std::vector<uint8_t>>& intensities,
                                               const ObservationStore& store,
                                               const std::vector<Eigen::Vector3f>& gains,
                                               const RegistrationOptions& options, int num_threads,
                                               std::vector<PhotoView>* photos) {
   if (options.mode == "none" || photos->empty()) return {};
-  SharedSamples samples(input, grids, store, static_cast<int>(photos->size()));
+  SharedSamples samples(input, grids, intensities, store, static_cast<int>(photos->size()));
   std::vector<PhotoView> moved = *photos;
   Registrar registrar(&samples, gains, options, num_threads, &moved);
   if (!BringTogether(options.mode == "warp", &registrar)) registrar.Restore();

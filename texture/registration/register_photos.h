@@ -20,8 +20,8 @@ class OptionFields;
 struct RegistrationOptions {
   // "none": photos are taken as they are. "measure": how far they are off is found, but not
   // corrected. "pose": their poses are corrected. "warp": and what poses leave, by a smooth field
-  // of shifts per photo. None is the default: photos come to agree, but on a real room all of them
-  // drift along the surface together, away from where the alignment has them (docs/texture.md).
+  // of shifts per photo. None is the default: on a real room whose scan is off there is nothing to
+  // gain for nearly three times the time (docs/texture.md).
   std::string mode = "none";
   // How far poses may be off, one standard deviation of each axis: what the photos say of each
   // other counts against that. Larger = held less by the alignment.
@@ -59,9 +59,11 @@ struct PhotoRegistration {
 
 // Moves the poses of the photos and gives them warps. Photos are decoded once more, each into a
 // small grey picture; these take 256 MB at most. Returns one entry per photo, nothing for "none".
+// intensities: what the scanner measured at every cell of each grid, 0..255 (IntensityAsGrey).
 // The result does not depend on num_threads.
 std::vector<PhotoRegistration> RegisterPhotos(const PhotoPassInput& input,
                                               const std::vector<GridOfSamples>& grids,
+                                              const std::vector<std::vector<uint8_t>>& intensities,
                                               const ObservationStore& store,
                                               const std::vector<Eigen::Vector3f>& gains,
                                               const RegistrationOptions& options, int num_threads,

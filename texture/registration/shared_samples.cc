@@ -13,11 +13,13 @@ constexpr double kMostShared = 400000;  // samples
 }  // namespace
 
 SharedSamples::SharedSamples(const PhotoPassInput& input, const std::vector<GridOfSamples>& grids,
+                             const std::vector<std::vector<uint8_t>>& intensities,
                              const ObservationStore& store, int num_photos)
     : sightings_(num_photos) {
   const double share = static_cast<double>(store.num_samples()) / kMostShared;
   const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(share) - 1e-9)));
-  for (const GridOfSamples& grid : grids) {
+  for (size_t g = 0; g < grids.size(); ++g) {
+    const GridOfSamples& grid = grids[g];
     for (size_t t = grid.first_tile; t < grid.end_tile; ++t) {
       const SampleTile& tile = input.samples[t];
       PointBlock block;
@@ -39,6 +41,7 @@ SharedSamples::SharedSamples(const PhotoPassInput& input, const std::vector<Grid
         block.Add(block.origin +
                   Eigen::Vector3d(tile.points.x[i], tile.points.y[i], tile.points.z[i]));
         normals_.push_back(tile.normals[i]);
+        intensities_.push_back(intensities[g][tile.index[i]]);
       }
       blocks_.push_back(std::move(block));
     }

@@ -26,8 +26,10 @@ class SharedSamples {
  public:
   // An even selection of the samples that two photos or more see without doubt, by what is kept of
   // them in the store: memory is bounded, however fine the scan is.
+  // intensities: what the scanner measured at every cell of each grid, 0..255.
   SharedSamples(const PhotoPassInput& input, const std::vector<GridOfSamples>& grids,
-                const ObservationStore& store, int num_photos);
+                const std::vector<std::vector<uint8_t>>& intensities, const ObservationStore& store,
+                int num_photos);
 
   // Looks at all samples anew in the pictures of one level of detail, from where the photos stand
   // now, and adds up what they say.
@@ -52,6 +54,7 @@ class SharedSamples {
 
   Eigen::Vector3d Point(int sample) const;  // `scan` frame
   const Eigen::Vector3f& Normal(int sample) const { return normals_[sample]; }
+  uint8_t Intensity(int sample) const { return intensities_[sample]; }
 
  private:
   void ListBySample();
@@ -61,6 +64,7 @@ class SharedSamples {
   std::vector<PointBlock> blocks_;
   std::vector<int> first_of_block_;  // sample; one more at the end
   std::vector<Eigen::Vector3f> normals_;
+  std::vector<uint8_t> intensities_;
   std::vector<std::vector<Sighting>> sightings_;  // per photo
   std::vector<SightingOfPhoto> of_sample_;
   std::vector<int> first_of_sample_;
