@@ -15,7 +15,8 @@ Json PicksToJson(const Alignment& alignment) {
   int num_used = 0;
   Json per_pick = Json::array();
   const AlignmentStart& start = alignment.start;
-  for (size_t i = 0; i < start.picks.size(); ++i) {
+  const size_t num_picks = start.picks.size() - start.num_corners;
+  for (size_t i = 0; i < num_picks; ++i) {
     const PickOutcome& outcome = start.picks[i];
     num_used += outcome.used;
     Json one;
@@ -30,7 +31,7 @@ Json PicksToJson(const Alignment& alignment) {
     one["weight"] = outcome.pick.weight;
     per_pick.push_back(one);
   }
-  json["count"] = start.picks.size();
+  json["count"] = num_picks;
   json["num_used"] = num_used;
   json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
   json["rms_px"] = NumberOrNull(start.pick_rms_px);
