@@ -139,35 +139,6 @@ TEST(AutomaticAlignCommand, FindsThePlaceAndReportsTheEvidence) {
   EXPECT_LT(WorstPoseErrors(*folder.one.room, aligned, Similarity()).position, 0.005);
 }
 
-// The height rests on nothing but what the photos show.
-TEST(AutomaticAlignCommand, PhotosHoldWhatTheSurfaceLeavesOpen) {
-  const FolderWithPhotos& folder = FolderWithPhotos::Get();
-  SimulatedCase one = folder.one;
-  const SimulatedRoomOptions& room = one.room->options();
-  const Rigid room_from_scan = one.room->ScanFromRoom().Inverse();
-  for (auto it = one.model.points.begin(); it != one.model.points.end();) {
-    const Eigen::Vector3d x = room_from_scan * (one.room->ScanFromSparse() * it->second.x_in_model);
-    const double off_wall =
-        std::min(std::min(x.x(), room.width - x.x()), std::min(x.y(), room.depth - x.y()));
-    it = off_wall < 0.02 ? std::next(it) : one.model.points.erase(it);
-  }
-  for (auto& [id, image] : one.model.images) {
-    for (uint64_t& point : image.point3d_ids) {
-      if (one.model.points.count(point) == 0) point = kInvalidPoint3dId;
-    }
-  }
-  Progress progress(true);
-  AlignmentInput input{one.model, Survey(one.scans), {}, "", one.azimuth};
-  input.image_path = folder.image_path;
-  const AutomaticAlignment found = AlignAutomatically(input, {}, AlignmentOptions(), &progress);
-  ASSERT_TRUE(found.attempt.trusted()) << found.attempt.alignment->reasons[0];
-  const Alignment& alignment = *found.attempt.alignment;
-  EXPECT_GT(alignment.start.num_corners, 50);
-  EXPECT_EQ(alignment.open.num_facings, 2);
-  EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
-            0.01);
-}
-
 // What one station saw must not be taken for what another one did, from cell to cell: where scans
 // lie on each other by their noise alone, neither would be compared with the photos.
 TEST(AutomaticAlignCommand, PhotosSeeSeveralStationsAsWellAsOne) {
