@@ -22,7 +22,8 @@ Json PicksToJson(const Alignment& alignment) {
   Json per_pick = Json::array();
   std::vector<double> check_px, refined_check_px;  // of weight 0: nothing rests on them
   const AlignmentStart& start = alignment.start;
-  for (size_t i = 0; i < start.picks.size(); ++i) {
+  const size_t num_picks = start.picks.size() - start.num_corners;
+  for (size_t i = 0; i < num_picks; ++i) {
     const PickOutcome& outcome = start.picks[i];
     num_used += outcome.used;
     Json one;
@@ -41,7 +42,7 @@ Json PicksToJson(const Alignment& alignment) {
     check_px.push_back(outcome.residual_px);
     refined_check_px.push_back(alignment.refined_pick_px[i]);
   }
-  json["count"] = start.picks.size();
+  json["count"] = num_picks;
   json["num_used"] = num_used;
   json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
   json["rms_px"] = NumberOrNull(start.pick_rms_px);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/statistics.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -25,6 +26,72 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
            "Correct or remove it, or add others.";
   }
   return "";
+}
+
+// What leaves the photos' corners as exact as they are: half a step between the scan's samples is
+// not known of any, and neighbouring ones are off together.
+constexpr size_t kMostCorners = 200;
+
+// Pixels, one standard deviation per coordinate: of half of the corners, how far they are from
+// where the start has them.
+double CornerSigma(const std::vector<Pick>& corners, const SparseModel& model,
+                   const Similarity& scan_from_sparse) {
+  std::vector<double> distances = PickDistances(model, corners, scan_from_sparse);
+  constexpr double kSigmaPerMedian = 0.85;  // of a distance in two dimensions
+  return std::max(1.0, kSigmaPerMedian * Median(&distances));
+}
+
+// The corners that the photos confirmed a start by, evenly taken from all, as picks that are as
+// exact as they turn out to be. A start must be of these picks: the input's come first.
+std::vector<Pick> AddCorners(const AlignmentInput& input, const GradientShifts& shifts,
+                             const Similarity& scan_from_sparse, double pick_sigma_px) {
+  std::vector<Pick> corners;
+  const size_t stride = 1 + shifts.corners.size() / kMostCorners;
+  for (size_t i = 0; i < shifts.corners.size(); i += stride) {
+    const FittingCorner& corner = shifts.corners[i];
+    const auto image = input.model.images.find(corner.image_id);
+    if (image == input.model.images.end()) continue;  // the face of a panorama
+    const Rigid cam_from_scan = CamFromScan(image->second.cam_from_model, scan_from_sparse);
+    corners.push_back(
+        {image->second.name, corner.x_in_img, cam_from_scan.Inverse() * corner.x_in_cam});
+  }
+  if (corners.empty()) return input.picks;
+  const double sigma_px = CornerSigma(corners, input.model, scan_from_sparse);
+  for (Pick& corner : corners) corner.weight = pick_sigma_px / sigma_px;
+  std::vector<Pick> all = input.picks;
+  all.insert(all.end(), corners.begin(), corners.end());
+  return all;
+}
+
+// The surface leaves something open.
+bool IsOpen(const Alignment& alignment) {
+  return alignment.fit.surface.converged &&
+         !(alignment.open.None() && alignment.fit.surface.covariance.allFinite());
+}
+
+const GradientAgreement* PhotosAt(const StartVerdict& verdict) {
+  for (const AskedStart& asked : verdict.asked) {
+    if (asked.start == verdict.best) return &asked.gradient;
+  }
+  return nullptr;
+}
+
+// On the surface; where that leaves something open, by what the photos show of the scan's intensity
+// as well, if they confirm the start.
+Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& found,
+                         const AlignmentOptions& options, Progress* progress) {
+  const Similarity& best = found.search.starts[found.verdict.best].scan_from_sparse;
+  Alignment alignment = AlignToScan(
+      input, StartFromSimilarity(input.model, input.picks, best, kStartSigma), options, progress);
+  const GradientAgreement* const photos = PhotosAt(found.verdict);
+  if (!IsOpen(alignment) || found.verdict.support == PhotoSupport::kNone || photos == nullptr)
+    return alignment;
+  const std::vector<Pick> picks =
+      AddCorners(input, photos->shifts, best, alignment.start.pick_sigma_px);
+  if (picks.size() == input.picks.size()) return alignment;
+  AlignmentStart start = StartFromSimilarity(input.model, picks, best, kStartSigma);
+  start.num_corners = static_cast<int>(picks.size() - input.picks.size());
+  return AlignToScan(input.With(input.model, input.surveyed, picks), start, options, progress);
 }
 
 bool IsWorthALook(StartVerdict::Kind kind) {
@@ -55,10 +122,7 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     found.attempt.says_mirrored = found.verdict.kind == StartVerdict::Kind::kMirrored;
     return found;
   }
-  const FittedStart& best = found.search.starts[found.verdict.best];
-  Alignment alignment = AlignToScan(
-      input, StartFromSimilarity(input.model, input.picks, best.scan_from_sparse, kStartSigma),
-      options, progress);
+  Alignment alignment = AlignFromStart(input, found, options, progress);
   for (const std::string& reason :
        {found.verdict.reason, ContradictingHint(input, alignment, options.trust)}) {
     if (!reason.empty()) alignment.reasons.insert(alignment.reasons.begin(), reason);

@@ -170,7 +170,9 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
   judgement->open = FindOpenDirections(fit.surface, middle);
   const std::vector<bool> used = start.UsedPicks();
   const bool held = std::count(used.begin(), used.end(), true) > 0;
-  if (held && !judgement->open.None()) judgement->warnings.push_back(judgement->open.Sentence());
+  if (held && !judgement->open.None()) {
+    judgement->warnings.push_back(judgement->open.Sentence(start.num_corners > 0));
+  }
   // What is wholly open has no covariance at all.
   if (!held && !(judgement->open.None() && fit.surface.covariance.allFinite())) {
     judgement->reasons.push_back(
@@ -304,7 +306,7 @@ std::vector<std::string> PicksOffWarnings(const AlignmentStart& start,
   const double median = Median(&residuals);
   const double limit = std::max(min_bad_pick_px, 5 * median);
   std::vector<std::string> warnings;
-  for (size_t i = 0; i < start.picks.size(); ++i) {
+  for (size_t i = 0; i + start.num_corners < start.picks.size(); ++i) {
     const Pick& pick = start.picks[i].pick;
     if (!start.picks[i].used || !(Weighted(start.picks[i], surface_px[i]) > limit)) continue;
     warnings.push_back("The pick on " + LineOf(pick) + " (" + pick.image_name + ") is " +

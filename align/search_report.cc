@@ -15,28 +15,6 @@ Json SightsToJson(const SightAgreement& sights) {
   return json;
 }
 
-const char* NameOf(StartVerdict::Kind kind) {
-  switch (kind) {
-    case StartVerdict::Kind::kTrusted:
-      return "trusted";
-    case StartVerdict::Kind::kUnconfirmed:
-      return "unconfirmed";
-    case StartVerdict::Kind::kNone:
-      return "none";
-    case StartVerdict::Kind::kWeak:
-      return "weak";
-    case StartVerdict::Kind::kOpen:
-      return "open";
-    case StartVerdict::Kind::kAmbiguous:
-      return "ambiguous";
-    case StartVerdict::Kind::kMirrored:
-      return "mirrored";
-    case StartVerdict::Kind::kByPhotos:
-      return "photos contradict";
-  }
-  return "";
-}
-
 Json PhotosToJson(const GradientAgreement& gradient) {
   const GradientShifts& shifts = gradient.shifts;
   Json json;
@@ -78,7 +56,7 @@ Json SearchToJson(const AutomaticAlignment& found) {
   json["second"] = verdict.second < 0 ? Json(nullptr) : StartToJson(found, verdict.second);
   json["ratio"] = verdict.ratio;
   json["mirrored_score"] = verdict.mirrored_score;
-  json["agreement"] = verdict.photos_support;
+  json["agreement"] = verdict.support != PhotoSupport::kNone;
   json["chance_wrong"] = verdict.chance_wrong;
   json["hypotheses"] = Json::array();
   for (size_t i = 0; i < found.search.starts.size(); ++i) {

@@ -33,7 +33,10 @@ struct AlignmentStart {
   // Metres, of the cameras: how far off the surface is looked for.
   double position_sigma = 0;
   std::vector<PickOutcome> picks;  // those that there are, also of a start that is not from them
-  double pick_sigma_px = 1.5;      // click noise, per coordinate
+  // So many of `picks`, the last ones, are no clicks but corners of the scan's intensity that the
+  // photos show where they should (AddCorners).
+  int num_corners = 0;
+  double pick_sigma_px = 1.5;  // click noise, per coordinate
   // NaN without picks.
   double pick_rms_px = std::numeric_limits<double>::quiet_NaN();  // of those used
   double pick_max_px = std::numeric_limits<double>::quiet_NaN();  // of all that count

@@ -37,12 +37,13 @@ GradientAgreement AskPhotosAt(const AlignmentInput& input, const Similarity& sca
 }
 
 // Photos of another room with the same walls and furniture agree at the edges of both, so that more
-// fits than by chance: 0.2 in simulated rooms, where the right room has 0.7 to 0.9. Where model and
-// scan differ by centimetres (0.1 in a real kitchen) as much cannot be asked for.
-bool Confirms(const FittedStart& start, const GradientAgreement& gradient,
-              const StartVerdictOptions& options) {
-  return gradient.supports && (start.rms > options.exact_rms ||
-                               gradient.shifts.at_pose.Share() >= options.min_photo_share);
+// fits than by chance: 0.1 to 0.25 in simulated rooms, where the right room has 0.45 to 0.9. Where
+// model and scan differ by centimetres (0.1 in a real kitchen) as much cannot be asked for.
+PhotoSupport SupportOf(const FittedStart& start, const GradientAgreement& gradient,
+                       const StartVerdictOptions& options) {
+  if (!gradient.supports) return PhotoSupport::kNone;
+  if (gradient.shifts.at_pose.Share() >= options.min_photo_share) return PhotoSupport::kClear;
+  return start.rms > options.exact_rms ? PhotoSupport::kFaint : PhotoSupport::kNone;
 }
 
 const AskedStart* FindAsked(const StartVerdict& verdict, int start) {
@@ -53,19 +54,30 @@ const AskedStart* FindAsked(const StartVerdict& verdict, int start) {
 }
 
 // The best by its rays; of several that they agree with about as much, the only one that the photos
-// support.
+// support most.
 void Choose(const AlignmentInput& input, const StartSearch& search,
             const StartVerdictOptions& options, StartVerdict* verdict) {
   const double most = search.starts[0].sights.Score();
-  std::vector<int> supported;
   for (int i = 0; i < static_cast<int>(search.starts.size()); ++i) {
     if (i == options.max_rivals) break;
-    if (search.starts[i].sights.Score() < options.rival_share * most) break;
-    verdict->asked.push_back({i, AskPhotosAt(input, search.starts[i].scan_from_sparse)});
-    if (Confirms(search.starts[i], verdict->asked.back().gradient, options)) supported.push_back(i);
+    const FittedStart& start = search.starts[i];
+    if (start.sights.Score() < options.rival_share * most) break;
+    const GradientAgreement gradient = AskPhotosAt(input, start.scan_from_sparse);
+    verdict->asked.push_back({i, gradient, SupportOf(start, gradient, options)});
   }
-  verdict->best = supported.size() == 1 ? supported[0] : 0;
-  verdict->photos_support = supported.size() == 1;
+  for (const AskedStart& one : verdict->asked) {
+    verdict->support = std::max(verdict->support, one.support);
+  }
+  const auto has_most = [verdict](const AskedStart& one) {
+    return one.support == verdict->support;
+  };
+  if (verdict->support == PhotoSupport::kNone ||
+      std::count_if(verdict->asked.begin(), verdict->asked.end(), has_most) > 1) {
+    verdict->support = PhotoSupport::kNone;
+    verdict->best = 0;
+  } else {
+    verdict->best = std::find_if(verdict->asked.begin(), verdict->asked.end(), has_most)->start;
+  }
   if (search.starts.size() > 1) verdict->second = verdict->best == 0 ? 1 : 0;
 }
 
@@ -79,11 +91,15 @@ std::string Where(const StartSearch& search, int start) {
                      middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
 }
 
-// A logistic curve: even odds where a start fits little better than any other.
-double ChanceWrong(double score, double ratio, bool photos_support) {
-  const double evidence =
-      12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) + (photos_support ? 4.0 : 0.0) - 3.5;
-  return std::max(kLeastChance, 1 / (1 + std::exp(evidence)));
+// Where photos support a start, as counted. Else a logistic curve, set by hand: even odds where a
+// start fits little better than any other, and never less than where photos say something.
+double ChanceWrong(double score, double ratio, PhotoSupport support,
+                   const StartVerdictOptions& options) {
+  const double evidence = 12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) - 3.5;
+  const double guess = std::max(kChanceFaint, 1 / (1 + std::exp(evidence)));
+  if (support == PhotoSupport::kNone) return guess;
+  if (support == PhotoSupport::kClear) return score >= options.min_score ? kChanceClear : guess;
+  return ratio >= options.min_ratio_faint ? kChanceFaint : std::max(kEvenOdds, guess);
 }
 
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
@@ -141,6 +157,28 @@ std::string WeakReason(const FittedStart& best, const StartVerdictOptions& optio
 
 }  // namespace
 
+const char* NameOf(StartVerdict::Kind kind) {
+  switch (kind) {
+    case StartVerdict::Kind::kTrusted:
+      return "trusted";
+    case StartVerdict::Kind::kUnconfirmed:
+      return "unconfirmed";
+    case StartVerdict::Kind::kNone:
+      return "none";
+    case StartVerdict::Kind::kWeak:
+      return "weak";
+    case StartVerdict::Kind::kOpen:
+      return "open";
+    case StartVerdict::Kind::kAmbiguous:
+      return "ambiguous";
+    case StartVerdict::Kind::kMirrored:
+      return "mirrored";
+    case StartVerdict::Kind::kByPhotos:
+      return "photos contradict";
+  }
+  return "";
+}
+
 StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,
                          const StartVerdictOptions& options) {
   using Kind = StartVerdict::Kind;
@@ -155,18 +193,21 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const double score = best.sights.Score();
   if (!search.mirrored.empty()) verdict.mirrored_score = search.mirrored[0].sights.Score();
   const double second = verdict.second < 0 ? 0 : search.starts[verdict.second].sights.Score();
-  const AskedStart* const second_asked = FindAsked(verdict, verdict.second);
+  const bool clear = verdict.support == PhotoSupport::kClear;
+  const bool alone = verdict.support == PhotoSupport::kNone;
   // Of two that fit alike the photos may know better.
-  const bool photos_decide = verdict.photos_support && second_asked != nullptr;
-  const double rival =
-      std::max(photos_decide ? 0.0 : second, verdict.photos_support ? 0.0 : verdict.mirrored_score);
+  const bool photos_decide = clear && FindAsked(verdict, verdict.second) != nullptr;
+  const double rival = std::max(photos_decide ? 0.0 : second, clear ? 0.0 : verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
-  verdict.chance_wrong = ChanceWrong(score, score / std::max(rival, 1e-6), verdict.photos_support);
-  const bool alone = !verdict.photos_support;
+  verdict.chance_wrong =
+      ChanceWrong(score, score / std::max(rival, 1e-6), verdict.support, options);
   const double min_score = alone ? options.min_score_alone : options.min_score;
-  const double min_ratio = alone ? options.min_ratio_alone : options.min_ratio;
+  const double min_ratio = alone   ? options.min_ratio_alone
+                           : clear ? options.min_ratio
+                                   : options.min_ratio_faint;
   const AskedStart* const asked = FindAsked(verdict, verdict.best);
-  if (alone && verdict.mirrored_score >= min_score && verdict.mirrored_score >= min_ratio * score) {
+  if (alone && verdict.mirrored_score >= min_score &&
+      verdict.mirrored_score >= options.min_ratio_mirrored * score) {
     verdict.kind = Kind::kMirrored;
     verdict.reason = fmt::format(
         "The scan is a mirror image of the room: reflected, {} of the photos' rays meet its "

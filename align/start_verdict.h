@@ -15,26 +15,36 @@ namespace roomtex {
 struct StartVerdictOptions {
   // Of the photos' rays (SightAgreement::Score()): what the best start needs at least, and how many
   // times as much as the next best and as the mirror image. Larger = stricter. Where the photos
-  // support the start, and where nothing but geometry speaks for it.
+  // confirm the start; where they support it faintly, as those of a similar room do, too; and where
+  // nothing but geometry speaks for it.
   double min_score = 0.55, min_ratio = 1.2;
+  double min_ratio_faint = 1.6;
   double min_score_alone = 0.7, min_ratio_alone = 1.3;
+  // The scan is called a mirror image where that of the model has so many times the score.
+  double min_ratio_mirrored = 1.15;
   // Of the rays, those that may pass through the surface. Larger = more tolerant.
   double max_through_share = 0.12;
-  // Of the corners of the scan's intensity, those that the photos must have where they should be,
-  // if sparse points and surface agree within exact_rms metres. Larger = stricter.
+  // Of the corners of the scan's intensity, those that the photos must have where they should be to
+  // confirm a start. Larger = stricter. With fewer they support it faintly at most, and not at all
+  // where sparse points and surface agree within exact_rms metres: then so few are those of another
+  // room.
   double min_photo_share = 0.35, exact_rms = 0.01;
   // Starts that have at least this share of the best score are asked the photos about.
   double rival_share = 0.75;
   int max_rivals = 3;
 };
 
-// So few rooms were counted that no smaller share of wrong answers can be claimed.
-inline constexpr double kLeastChance = 0.02;
+enum class PhotoSupport { kNone, kFaint, kClear };
+
+// Of simulated rooms, what the counted ones leave possible (95 %): none of the answers with clear
+// support was wrong, and no wrong one had faint support and stood out by min_ratio_faint.
+inline constexpr double kChanceClear = 0.11, kChanceFaint = 0.13;
 
 // A start that the photos were asked about.
 struct AskedStart {
   int start = 0;  // index into StartSearch::starts
   GradientAgreement gradient;
+  PhotoSupport support = PhotoSupport::kNone;
 };
 
 struct StartVerdict {
@@ -51,14 +61,17 @@ struct StartVerdict {
   Kind kind = Kind::kNone;
   int best = -1, second = -1;  // indices into StartSearch::starts; -1 = there is none
   std::vector<AskedStart> asked;
-  bool photos_support = false;
+  PhotoSupport support = PhotoSupport::kNone;  // of the best one, and of no other
   double ratio = 0;           // best score over the larger of second's and the mirror image's
   double mirrored_score = 0;  // of the best start of the mirror image
-  // How many of 1000 answers with evidence like this are wrong, over 1000: a guess by a curve that
-  // was set on few simulated rooms, never less than kLeastChance.
+  // How many of 1000 answers with evidence like this are wrong at most, over 1000. Where the photos
+  // support the place it was counted (docs/automatic.md); else it is a guess by a curve.
   double chance_wrong = 1;
   std::string reason;  // in sentences, with a remedy; empty if trusted
 };
+
+// As the report has it.
+const char* NameOf(StartVerdict::Kind kind);
 
 // hinted: a user said where the photos belong, so that scan and photos are of one room.
 StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,

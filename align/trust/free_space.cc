@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/scan_mesh.h"
 
 namespace roomtex {
 namespace {
+
+// Metres, and a share of a ray's length: scans that differ by less show one surface.
+constexpr double kSameSurface = 0.02, kSameSurfaceShare = 0.005;
 
 // Every stride-th column and row.
 Scan Thinned(const Scan& scan, int stride) {
@@ -37,7 +41,8 @@ FreeSpace::FreeSpace(const std::vector<Scan>& scans, int max_samples) {
     const std::vector<Triangle> triangles = BuildScanMesh(thin, ScanMeshOptions());
     const std::vector<uint8_t> grey = IntensityAsGrey(thin);
     const int offset = static_cast<int>(points_.size());
-    thinnings_.push_back({scan.organised, offset, stride, thin.num_columns, scan.num_columns});
+    thinnings_.push_back({scan.organised, offset, static_cast<int>(triangles_.size()), stride,
+                          thin.num_columns, scan.num_columns});
     points_.insert(points_.end(), thin.points.begin(), thin.points.end());
     grey_.insert(grey_.end(), grey.begin(), grey.end());
     for (const Triangle& t : triangles) {
@@ -45,6 +50,7 @@ FreeSpace::FreeSpace(const std::vector<Scan>& scans, int max_samples) {
     }
     if (!scan.organised) continue;
     stations_.push_back(scan.Station());
+    scan_of_station_.push_back(static_cast<int>(thinnings_.size()) - 1);
     if (scans.size() > 1) {
       station_casters_.push_back(std::make_unique<RayCaster>(thin.points, triangles));
     }
@@ -68,10 +74,28 @@ FreeSpace::Place FreeSpace::Locate(const Eigen::Vector3d& x_in_scan, double tole
   return place;
 }
 
+RayHit FreeSpace::AsNearestStationHasIt(const Eigen::Vector3d& origin,
+                                        const Eigen::Vector3d& direction, const RayHit& hit) const {
+  std::vector<std::pair<double, size_t>> nearest;
+  for (size_t s = 0; s < station_casters_.size(); ++s) {
+    nearest.emplace_back((hit.point - stations_[s]).norm(), s);
+  }
+  std::sort(nearest.begin(), nearest.end());
+  const double tolerance = kSameSurface + kSameSurfaceShare * hit.distance;
+  for (const auto& [distance, s] : nearest) {
+    auto own = station_casters_[s]->Cast(origin, direction);
+    if (!own || std::abs(own->distance - hit.distance) > tolerance) continue;
+    own->triangle += thinnings_[scan_of_station_[s]].first_triangle;
+    return *own;
+  }
+  return hit;
+}
+
 std::optional<FreeSpace::Sight> FreeSpace::Look(const Eigen::Vector3d& origin,
                                                 const Eigen::Vector3d& direction) const {
-  const auto hit = caster_->Cast(origin, direction);
+  auto hit = caster_->Cast(origin, direction);
   if (!hit) return std::nullopt;
+  if (!station_casters_.empty()) hit = AsNearestStationHasIt(origin, direction, *hit);
   const Triangle& t = triangles_[hit->triangle];
   const Eigen::Vector3d& a = points_[t[0]];
   const Eigen::Vector3d ab = points_[t[1]] - a, ac = points_[t[2]] - a, ap = hit->point - a;

@@ -39,22 +39,28 @@ class FreeSpace {
     // lie between the last and num_columns. NaN for a mesh without a grid.
     double column = 0, row = 0;
   };
-  // What a ray from `origin` along the unit `direction` meets first.
+  // What a ray from `origin` along the unit `direction` meets first. Of several scans that have
+  // that surface, as the one with the nearest station has it: the noise of one is not taken for
+  // that of another from ray to ray.
   std::optional<Sight> Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
  private:
   // How the coarse grid of one scan lies in its own.
   struct Thinning {
     bool organised = true;
-    int first_point = 0;  // index into points_
+    int first_point = 0, first_triangle = 0;  // indices into points_, triangles_
     int stride = 1;
     int thin_columns = 0;
     int num_columns = 0;  // of the scan itself
   };
   void LocateInGrid(const Triangle& triangle, const Eigen::Vector3d& weights, Sight* sight) const;
+  // The same surface in the scan that was taken from nearest by; its triangle is one of all.
+  RayHit AsNearestStationHasIt(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                               const RayHit& hit) const;
 
   std::vector<Thinning> thinnings_;  // one per scan
   std::vector<Eigen::Vector3d> stations_;
+  std::vector<int> scan_of_station_;  // index into the scans
   std::vector<Eigen::Vector3d> points_;
   std::vector<Triangle> triangles_;
   std::vector<uint8_t> grey_;

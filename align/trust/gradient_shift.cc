@@ -24,7 +24,8 @@ constexpr double kBlank = 1;
 // patch is no structure, even when the scan has no noise at all.
 constexpr double kLeastCorner = 1e-3;
 
-constexpr long kMinPatches = 100;
+// For a contradiction, and for support, which says itself how clear it is (kClearly).
+constexpr long kMinPatches = 100, kMinSupporting = 40;
 constexpr double kClearly = 4;  // standard deviations; neighbouring patches are not independent
 constexpr double kChanceLike = 2;
 // Of the patches of a right alignment, at least this share fits: 0.77 to 0.92 in simulated rooms,
@@ -101,13 +102,19 @@ class PhotoMatcher {
     const bool clear = IsClear(photo_gradient_);
     for (size_t i = 0; i < patches_.size(); ++i) {
       const cv::Mat1f pattern = PatternOf(patches_[i]);
-      const auto shift = BestShift(pattern, patches_[i].cell.cast<double>());
-      if (!shift) continue;
-      result.shifts_px.push_back(*shift * view_.cell_px);
-      result.shifts_deg.push_back(DegFromRad(*shift * angle_per_cell_));
-      result.at_pose.Add(*shift <= tolerance_);
-      result.ring.Add(*shift > tolerance_ && *shift <= 2 * tolerance_);
-      if (clear) result.clear.Add(*shift <= tolerance_);
+      const Eigen::Vector2d at = patches_[i].cell.cast<double>();
+      const auto found = BestPlace(pattern, at);
+      if (!found) continue;
+      const double shift = (*found - at).norm();
+      result.shifts_px.push_back(shift * view_.cell_px);
+      result.shifts_deg.push_back(DegFromRad(shift * angle_per_cell_));
+      result.at_pose.Add(shift <= tolerance_);
+      result.ring.Add(shift > tolerance_ && shift <= 2 * tolerance_);
+      if (clear) result.clear.Add(shift <= tolerance_);
+      if (clear && shift <= tolerance_) {
+        const Eigen::Vector2d x_in_img = view_.cell_px * (*found + Eigen::Vector2d(0.5, 0.5));
+        result.corners.push_back({0, x_in_img, patches_[i].x_in_cam});
+      }
       CompareAtOtherPoses(i, pattern, &result);
       const auto other = OtherPlace(i);
       const auto chance_shift = other ? BestShift(pattern, *other) : std::nullopt;
@@ -196,9 +203,15 @@ class PhotoMatcher {
     return pattern;
   }
 
-  // Distance, in cells, between where the pattern fits the photo best and where it should;
-  // none if the search leaves the photo.
+  // Distance, in cells, between where the pattern fits the photo best and where it should.
   std::optional<double> BestShift(const cv::Mat1f& pattern, const Eigen::Vector2d& cell) const {
+    const auto found = BestPlace(pattern, cell);
+    return found ? std::make_optional((*found - cell).norm()) : std::nullopt;
+  }
+
+  // Where the pattern fits the photo best, around a cell; none if the search leaves the photo.
+  std::optional<Eigen::Vector2d> BestPlace(const cv::Mat1f& pattern,
+                                           const Eigen::Vector2d& cell) const {
     const int radius = options_.patch_radius;
     const int column = static_cast<int>(std::lround(cell.x()));
     const int row = static_cast<int>(std::lround(cell.y()));
@@ -218,7 +231,7 @@ class PhotoMatcher {
       found.x() += PeakOffset(at(-1, 0), at(0, 0), at(1, 0));
     if (peak.y > 0 && peak.y + 1 < score.rows)
       found.y() += PeakOffset(at(0, -1), at(0, 0), at(0, 1));
-    return (found - cell).norm();
+    return found;
   }
 
   // The middle of another patch, clear of this one's search.
@@ -281,6 +294,7 @@ void GradientShifts::Add(const GradientShifts& other) {
   far.Add(other.far);
   elsewhere.Add(other.elsewhere);
   tolerance_deg = std::max(tolerance_deg, other.tolerance_deg);
+  corners.insert(corners.end(), other.corners.begin(), other.corners.end());
 }
 
 GradientShifts MeasureGradientShifts(const ScanView& view, const cv::Mat& photo,
@@ -295,7 +309,7 @@ GradientAgreement JudgeGradientShifts(const GradientShifts& shifts) {
   result.median_shift_px = Median(shifts.shifts_px);
   result.median_shift_deg = Median(shifts.shifts_deg);
   // The ring has three times the area of the disc that it surrounds.
-  result.supports = shifts.at_pose.num >= kMinPatches &&
+  result.supports = shifts.at_pose.num >= kMinSupporting &&
                     SigmasAbove(shifts.at_pose, shifts.elsewhere) >= kClearly &&
                     SigmasAbove(shifts.at_pose, shifts.far) >= kClearly &&
                     shifts.at_pose.Share() >= 2 * shifts.elsewhere.Share() &&

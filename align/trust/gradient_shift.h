@@ -9,9 +9,11 @@
 // same patches at poses that are surely wrong, and the same patches at other places of the photo
 // (chance).
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include "align/trust/scan_view.h"
@@ -53,6 +55,13 @@ struct Tally {
   double High(double sigmas) const;
 };
 
+// A corner of the scan's intensity that a photo shows within the tolerance of where it should.
+struct FittingCorner {
+  uint32_t image_id = 0;  // set by MeasureAgreement()
+  Eigen::Vector2d x_in_img;
+  Eigen::Vector3d x_in_cam;  // of the pose that was looked from, metres
+};
+
 // The shifts of the patches of one or more photos.
 struct GradientShifts {
   int num_photos = 0;                // with at least one patch
@@ -68,6 +77,7 @@ struct GradientShifts {
   Tally far;
   Tally elsewhere;  // patches compared with another place of the photo: chance
   double tolerance_deg = 0;
+  std::vector<FittingCorner> corners;  // of clear photos
 
   void Add(const GradientShifts& other);
 };

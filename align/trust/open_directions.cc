@@ -74,7 +74,7 @@ OpenDirections FindOpenDirections(const SimilarityFit& fit, const Eigen::Vector3
   return open;
 }
 
-std::string OpenDirections::Sentence() const {
+std::string OpenDirections::Sentence(bool by_photos) const {
   if (None()) return "";
   std::string open;
   const auto add = [&](const std::string& what) { open += (open.empty() ? "" : ", ") + what; };
@@ -82,13 +82,12 @@ std::string OpenDirections::Sentence() const {
   if (!turns.empty()) add("how it is turned about " + Listed(turns));
   if (scale) add("its scale");
   return fmt::format(
-      "The surface of the scan that the sparse points lie on {} and leaves open {}: there the "
-      "picks "
+      "The surface of the scan that the sparse points lie on {} and leaves open {}: there {} "
       "alone hold it{}. More picks, or a scan of more of the room, would make it safer.",
       num_facings == 1   ? "faces one way only (one wall, or walls opposite each other)"
       : num_facings == 2 ? "faces two ways only"
                          : "is too small or too round",
-      open,
+      open, by_photos ? "the photos, by corners of the scan's intensity," : "the picks",
       slides.empty()
           ? ""
           : ", to " + Number(1000 * slide_sigma, 1) + " mm at the photos (one standard deviation)");

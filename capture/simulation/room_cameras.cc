@@ -175,7 +175,7 @@ std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomS
     const double yaw = std::atan2(-offset.y(), -offset.x()) + RadFromDeg(random.Uniform(-9, 9));
     double pitch = RadFromDeg(high ? random.Uniform(-21, -11) : random.Uniform(1, 11));
     if (level) pitch *= kLevelShare;
-    const double roll = RadFromDeg(random.Uniform(-3, 3));
+    const double roll = RadFromDeg(random.Uniform(-options.roll_deg, options.roll_deg));
     Eigen::Vector3d place;
     for (int attempt = 0; attempt < 14; ++attempt, offset *= 0.93) {
       place << middle + offset, height;

@@ -58,6 +58,8 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       ->Number("field_of_view_deg", &field_of_view_deg,
                "horizontal, degrees; beyond 100 for fisheyes; a panorama has 360")
       .Within(20, 240);
+  fields->Number("roll_deg", &roll_deg, "photos lean to either side by up to this, degrees")
+      .Within(0, 180);
   fields->Text("camera_model", &camera_model, "any of COLMAP's camera models");
   fields->Require(
       CameraModelFromName(camera_model).has_value(),

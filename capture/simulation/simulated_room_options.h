@@ -43,6 +43,7 @@ struct SimulatedRoomOptions {
   int num_photos = 30;                          // places, if there are projectors
   int photo_width = 1936, photo_height = 1288;  // pixels
   double field_of_view_deg = 65;                // horizontal
+  double roll_deg = 3;                          // photos lean to either side by up to this
   std::string camera_model = "OPENCV";          // any COLMAP model; distortion of an ordinary lens
   bool distortion = true;
   double exposure_range_ev = 1.0;  // exposure steps within +- this, in thirds of an EV

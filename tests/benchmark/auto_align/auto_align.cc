@@ -1,12 +1,12 @@
 // How often roomtex-align finds the place of the photos in the scan without clicks, and whether
-// wrong places are believed: simulated rooms with known truth, in memory (keypoints 0.7 px, range
-// noise 1 to 5 mm, other sizes, furniture, photos, points, and parts of the room scanned for every
-// seed).
-//   build/bin/auto_align --set tuning|check [--rooms N] [--first SEED] [--photos 1] [--whole 1]
-// A row for each room, then a table. --photos 1: photos are drawn, too, and asked (slow); without,
-// geometry is alone, and a user is taken to have said that scan and photos are of one room. --whole
-// 1: fitted and adjusted as well, as the command does (slow). The verdict was tuned on the set
-// `tuning` only.
+// wrong places are believed: simulated rooms with known truth, in memory, the whole way of the
+// command (search, verdict, fit, adjustment).
+//   build/bin/auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED]
+// A line of rooms.csv for each room, written when it is done; rooms that have one already are left
+// out, so that a run that was ended goes on where it was, and several may write side by side to
+// files of their own. tests/benchmark/auto_align/auto_align_table.py makes tables of them. Ten of
+// sixteen rooms have an answer, six must be refused. Constants were only ever chosen on the set
+// `tuning`.
 
 #include <cmath>
 #include <cstdio>
@@ -14,59 +14,107 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
-#include <map>
+#include <fstream>
+#include <set>
 #include <string>
 
 #include <opencv2/imgcodecs.hpp>
+#include <sys/resource.h>
 
 #include "align/automatic_alignment.h"
 #include "align/trust/scan_view.h"
+#include "core/csv.h"
 #include "core/frames.h"
 #include "core/random_stream.h"
 #include "core/statistics.h"
+#include "core/text.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {
 
-constexpr double kSearchRight = 0.02;                  // metres, before poses are adjusted
-constexpr double kRight = 0.005, kRightTurnDeg = 0.1;  // medians over the photos
-constexpr uint64_t kTuning = 1000, kCheck = 500000;    // first seeds
+constexpr uint64_t kTuning = 16000, kCheck = 800000;  // first seeds
+constexpr double kSightTolerance = 0.05;              // metres, as the search has it
+constexpr int kFirstPhotos = 8, kAllPhotos = 24;      // that are asked (AgreementOptions)
 
-struct Kind {
-  const char* name;
-  bool has_answer;
+enum class Kind {
+  kFurnished,
+  kTilted,
+  kPart,
+  kFew,
+  kBareWalls,
+  kBare,
+  kEmpty,
+  kSamePlan,
+  kSimilar,
+  kOther,
+  kMirrored,
 };
-enum KindIndex { kFurnished, kPart, kFew, kEmpty, kMirroredScan, kSimilarRoom, kOtherRoom, kNum };
-const Kind kKinds[kNum] = {{"furnished", true},
-                           {"40 to 90 % of the room scanned", true},
-                           {"8 photos, 300 points", true},
-                           {"empty room", true},
-                           {"mirrored scan", false},
-                           {"scan of a similar room", false},
-                           {"scan of another room", false}};
+
+const char* NameOf(Kind kind) {
+  switch (kind) {
+    case Kind::kFurnished:
+      return "furnished";
+    case Kind::kTilted:
+      return "cameras tilted by up to 40 degrees";
+    case Kind::kPart:
+      return "40 to 90 % of the room scanned";
+    case Kind::kFew:
+      return "8 photos with 300 points";
+    case Kind::kBareWalls:
+      return "plain walls, few points there";
+    case Kind::kBare:
+      return "bare, points by a projected pattern";
+    case Kind::kEmpty:
+      return "empty, alike from both ends";
+    case Kind::kSamePlan:
+      return "scan of a room of the same plan";
+    case Kind::kSimilar:
+      return "scan of a similar room";
+    case Kind::kOther:
+      return "scan of another room";
+    case Kind::kMirrored:
+      return "mirrored scan";
+  }
+  return "";
+}
+
+const Kind kKinds[16] = {Kind::kFurnished, Kind::kSamePlan, Kind::kTilted,    Kind::kPart,
+                         Kind::kMirrored,  Kind::kFew,      Kind::kBareWalls, Kind::kSimilar,
+                         Kind::kFurnished, Kind::kOther,    Kind::kBare,      Kind::kPart,
+                         Kind::kSamePlan,  Kind::kEmpty,    Kind::kTilted,    Kind::kSimilar};
+
+bool HasAnswer(Kind kind) {
+  return kind != Kind::kSamePlan && kind != Kind::kSimilar && kind != Kind::kOther &&
+         kind != Kind::kMirrored;
+}
 
 struct Settings {
   uint64_t first = kTuning;
-  int num_rooms = 28;
-  bool photos = false, whole = false;
+  int num_rooms = 16;
+  std::string output_path;
 };
 
-SimulatedRoomOptions RoomOptions(uint64_t seed, KindIndex kind) {
+SimulatedRoomOptions RoomOptions(uint64_t seed, Kind kind) {
   RandomStream random(MixBits(seed, 11, 0));
   SimulatedRoomOptions options;
   options.random_seed = static_cast<int>(seed);
   options.width = random.Uniform(4.6, 8.0);
   options.depth = random.Uniform(3.8, 6.5);
   options.height = random.Uniform(2.5, 3.4);
-  options.furnished = kind != kEmpty;
-  options.num_photos = kind == kFew ? 8 : static_cast<int>(random.Uniform(10, 40));
-  options.photo_width = 768;
-  options.photo_height = 512;
+  options.furnished = kind != Kind::kEmpty;
+  options.bare_walls = kind == Kind::kBareWalls;
+  options.bare = kind == Kind::kBare;
+  options.num_photos = static_cast<int>(random.Uniform(8, 61));
+  if (kind == Kind::kFew) options.num_photos = 8;
+  options.photo_width = 720;
+  options.photo_height = 480;
   options.field_of_view_deg = random.Uniform(55, 80);
-  options.scan_columns = 900;
-  options.scan_rows = 450;
+  if (kind == Kind::kTilted) options.roll_deg = 40;
+  options.num_stations = random.Uniform() < 0.2 ? 2 : 1;
+  options.scan_columns = 800;
+  options.scan_rows = 400;
   options.range_noise = random.Uniform(0.001, 0.005);
   return options;
 }
@@ -83,27 +131,156 @@ void LeaveOut(double share, double from, Scan* scan) {
   }
 }
 
+// What scanners report as intensity: 0 = as the simulation has it, falling with range and flatness;
+// 1 = a logarithm; 2 = dark and bright are alike, what lies between differs.
+void ChangeReflectance(int model, Scan* scan) {
+  std::vector<double> values;
+  for (const float value : scan->intensity) {
+    if (value > 0) values.push_back(value);
+  }
+  const double middle = Median(&values);
+  for (float& value : scan->intensity) {
+    if (!(value > 0)) continue;
+    const double changed = model == 1   ? 1000 * std::log1p(value / 60)
+                           : model == 2 ? std::abs(value - middle)
+                                        : value;
+    value = static_cast<float>(std::clamp(std::round(changed), 1.0, 4095.0));
+  }
+}
+
+// Where the rays through its keypoints come nearest together.
+void PlaceByItsRays(const SparseModel& model, const CameraProjection& camera, SparsePoint* point) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+  for (const TrackElement& element : point->track) {
+    const SparseImage& image = model.images.at(element.image_id);
+    const auto ray = camera.RayFromImg(image.points2d[element.point2d_index]);
+    if (!ray) continue;
+    const Eigen::Vector3d centre = image.cam_from_model.TargetOriginInSource();
+    const Eigen::Vector3d d = image.cam_from_model.rotation.conjugate() * ray->normalized();
+    const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - d * d.transpose()) /
+                                   (point->x_in_model - centre).squaredNorm();
+    normal += across;
+    right_side += across * centre;
+  }
+  const Eigen::Vector3d x = normal.ldlt().solve(right_side);
+  if (x.allFinite()) point->x_in_model = x;
+}
+
+// A wrong match along the epipolar line: two photos agree about a place that is none.
+void MismatchPoint(const CameraProjection& camera, double range_factor, SparsePoint* point,
+                   SparseModel* model) {
+  const SparseImage& first = model->images.at(point->track[0].image_id);
+  SparseImage& second = model->images.at(point->track[1].image_id);
+  const Eigen::Vector3d centre = first.cam_from_model.TargetOriginInSource();
+  const Eigen::Vector3d x = centre + range_factor * (point->x_in_model - centre);
+  const auto x_in_img = camera.ImgFromCam(second.cam_from_model * x);
+  if (!x_in_img || !camera.InImage(*x_in_img)) return;
+  second.points2d[point->track[1].point2d_index] = *x_in_img;
+  for (size_t i = 2; i < point->track.size(); ++i) {
+    const TrackElement& element = point->track[i];
+    model->images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+  }
+  point->track.resize(2);
+  point->x_in_model = x;
+}
+
+// As a reconstruction leaves it: poses inexact, points where their keypoints have them, some of
+// them wrong matches. metre: of the model.
+void MakeInexact(const SimulatedRoom& room, double metre, double outlier_share,
+                 RandomStream* random, SparseModel* model) {
+  const double off = random->Uniform(0, 0.002) * metre,
+               turned = RadFromDeg(random->Uniform(0, 0.02));
+  const auto gaussian = [random] {
+    const double x = random->Gaussian(), y = random->Gaussian();
+    return Eigen::Vector3d(x, y, random->Gaussian());
+  };
+  for (auto& [id, image] : model->images) {
+    Rigid& pose = image.cam_from_model;
+    const Eigen::Vector3d centre = pose.TargetOriginInSource() + off * gaussian();
+    const Eigen::Vector3d turn = turned * gaussian();
+    pose.rotation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.stableNormalized())) * pose.rotation;
+    pose.translation = -(pose.rotation * centre);
+  }
+  const CameraProjection camera(room.camera());
+  for (auto& [id, point] : model->points) {
+    PlaceByItsRays(*model, camera, &point);
+    if (random->Uniform() >= outlier_share) continue;
+    MismatchPoint(camera, random->Uniform(0.5, 1.6), &point, model);
+  }
+}
+
+// Leaves one in ten of the points that lie on walls, floor and ceiling.
+void ThinWalls(const SimulatedRoom& room, RandomStream* random, SparseModel* model) {
+  const SimulatedRoomOptions& options = room.options();
+  const Eigen::Vector3d size(options.width, options.depth, options.height);
+  const Similarity scan_from_sparse = room.ScanFromSparse();
+  const Rigid room_from_scan = room.ScanFromRoom().Inverse();
+  for (auto it = model->points.begin(); it != model->points.end();) {
+    const Eigen::Vector3d x = room_from_scan * (scan_from_sparse * it->second.x_in_model);
+    const double beside = x.cwiseMin(size - x).minCoeff();
+    if (beside > 0.01 || random->Uniform() < 0.1) {
+      ++it;
+      continue;
+    }
+    for (const TrackElement& element : it->second.track) {
+      model->images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+    }
+    it = model->points.erase(it);
+  }
+}
+
 struct Room {
-  KindIndex kind = kFurnished;
+  Kind kind = Kind::kFurnished;
   SimulatedCase one;
   Similarity truth;  // scan_from_sparse
+  double scanned_share = 1;
+  int reflectance = 0;
 };
 
 Room MakeRoom(uint64_t seed) {
   Room room;
-  room.kind = static_cast<KindIndex>(seed % kNum);
+  room.kind = kKinds[seed % 16];
   RandomStream random(MixBits(seed, 13, 0));
   const SimulatedRoomOptions options = RoomOptions(seed, room.kind);
   SimulatedCase& one = room.one;
   one.room = std::make_shared<SimulatedRoom>(options);
-  const int num_points = room.kind == kFew ? 300 : static_cast<int>(random.Uniform(500, 4000));
-  one.model = one.room->MakeSparseModel(num_points, 0.7);
+  const double noise_px = random.Uniform(0.4, 1.0);
+  const int num_points =
+      room.kind == Kind::kFew ? 300 : static_cast<int>(random.Uniform(500, 4000));
+  one.model = one.room->MakeSparseModel(num_points, noise_px);
+  if (room.kind == Kind::kBareWalls) ThinWalls(*one.room, &random, &one.model);
   SimulatedRoomOptions scanned = options;
-  if (room.kind == kSimilarRoom) scanned.random_seed += 7919;
-  if (room.kind == kOtherRoom) scanned = RoomOptions(seed + 7919 * kNum, kFurnished);
-  one.scans = {SimulatedRoom(scanned).MakeScan(0)};
-  if (room.kind == kPart) LeaveOut(random.Uniform(0.1, 0.6), random.Uniform(), &one.scans[0]);
-  if (room.kind == kMirroredScan) one.scans = MirrorScans(one.scans);
+  if (!HasAnswer(room.kind)) scanned.num_stations = 1;
+  if (room.kind == Kind::kSamePlan || room.kind == Kind::kSimilar) scanned.random_seed += 7919;
+  if (room.kind == Kind::kSimilar) {
+    scanned.width = std::max(4.6, options.width * random.Uniform(0.95, 1.05));
+    scanned.depth = std::max(3.8, options.depth * random.Uniform(0.95, 1.05));
+  }
+  if (room.kind == Kind::kOther) scanned = RoomOptions(seed + 7919 * 16, Kind::kFurnished);
+  const bool is_other = scanned.random_seed != options.random_seed;
+  room.reflectance = random.Index(3);
+  if (room.kind == Kind::kPart) room.scanned_share = random.Uniform(0.4, 0.9);
+  const double from = random.Uniform();
+  const auto scan_of = [&](const SimulatedRoom& of) {
+    for (int k = 0; k < of.options().num_stations; ++k) {
+      one.scans.push_back(of.MakeScan(k));
+      Scan& scan = one.scans.back();
+      scan.path = "scan" + std::to_string(k) + ".rtpi";
+      scan.is_rtpi = true;
+      ChangeReflectance(room.reflectance, &scan);
+      LeaveOut(1 - room.scanned_share, from, &scan);
+    }
+  };
+  if (is_other) {
+    scan_of(SimulatedRoom(scanned));
+  } else {
+    scan_of(*one.room);
+  }
+  if (room.kind == Kind::kMirrored) one.scans = MirrorScans(one.scans);
+  MakeInexact(*one.room, 1 / one.room->ScanFromSparse().scale, random.Uniform(0, 0.06), &random,
+              &one.model);
   // The scale is unknown by a factor of ten.
   const double factor = std::exp(random.Uniform(-1.15, 1.15));
   TransformModel({factor, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}, &one.model);
@@ -113,7 +290,7 @@ Room MakeRoom(uint64_t seed) {
 }
 
 struct Error {
-  double position = 0, turn_deg = 0;  // medians over the photos
+  double position = 1e9, turn_deg = 180;  // medians over the photos
 };
 
 Error ErrorOf(const SimulatedRoom& room, const SparseModel& aligned) {
@@ -127,103 +304,152 @@ Error ErrorOf(const SimulatedRoom& room, const SparseModel& aligned) {
   return {Median(&positions), Median(&turns)};
 }
 
-// Those that are asked first (MeasureAgreement); drawing is what takes most time here.
-void DrawPhotos(const SimulatedRoom& room, const SparseModel& model, const std::string& folder) {
-  const std::vector<const SparseImage*> images = SpreadImages(model, 24);
-  const size_t num_sets = (images.size() + 7) / 8;
-  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-    for (size_t i = num_sets / 2; i < images.size(); i += num_sets) {
-      if (images[i]->name != room.PhotoName(photo)) continue;
-      cv::imwrite(folder + "/" + room.PhotoName(photo), room.RenderPhoto(photo));
+// Those that are asked first, and where little is to be seen those that are asked then
+// (MeasureAgreement); drawing takes most time here.
+void DrawPhotos(const Room& room, const std::string& folder) {
+  const SimulatedRoom& of = *room.one.room;
+  const std::vector<const SparseImage*> images = SpreadImages(room.one.model, kAllPhotos);
+  const size_t num_sets = (images.size() + kFirstPhotos - 1) / kFirstPhotos;
+  const bool all = room.kind == Kind::kBare || room.kind == Kind::kEmpty;
+  for (int photo = 0; photo < of.NumPhotos(); ++photo) {
+    for (size_t i = all ? 0 : num_sets / 2; i < images.size(); i += all ? 1 : num_sets) {
+      if (images[i]->name != of.PhotoName(photo)) continue;
+      cv::imwrite(folder + "/" + of.PhotoName(photo), of.RenderPhoto(photo));
     }
   }
 }
 
-struct Count {
-  int rooms = 0, right_trusted = 0, right_refused = 0, wrong_trusted = 0, wrong_refused = 0;
-};
+double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-class Run {
+const char kHeader[] =
+    "seed,kind,has_answer,trusted,verdict,start_m,start_deg,position_m,turn_deg,expected_m,"
+    "truth_score,score,second,mirrored,through,rms_m,support,share,chance,far,ring,num_patches,num_"
+    "clear,"
+    "contradicts,"
+    "second_share,chance_wrong,cpu_s,make_s,peak_mb,points,photos,stations,scanned,reflectance,"
+    "range_noise_m,reason\n";
+
+class Line {
  public:
-  explicit Run(const Settings& settings) : settings_(settings) {}
-
-  void Room(uint64_t seed) {
-    const auto room = MakeRoom(seed);
-    const TempFolder folder;
-    if (settings_.photos) DrawPhotos(*room.one.room, room.one.model, folder.path());
-    const SurveyedScans surveyed(room.one.scans);
-    AlignmentInput input{room.one.model, surveyed, {}, "", "clockwise"};
-    if (settings_.photos) input.image_path = folder.path();
-    input.num_threads = 1;
-    const std::clock_t before = std::clock();
-    Progress progress(true);
-    AutomaticAlignment found;
-    if (settings_.whole) {
-      found = AlignAutomatically(input, {}, AlignmentOptions(), &progress);
-    } else {
-      StartSearchOptions search;
-      search.num_threads = 1;
-      found.search = SearchStarts(input, {}, AlignmentOptions(), search);
-      found.verdict = JudgeStarts(input, found.search, !settings_.photos, StartVerdictOptions());
-    }
-    const double seconds = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
-    Judge(seed, room.kind, *room.one.room, room.one.model, found, seconds);
-  }
-
-  void Table() const {
-    std::printf(
-        "\n| rooms | number | right, trusted | right, refused | wrong, refused | wrong, trusted "
-        "|\n|---|---|---|---|---|---|\n");
-    for (const auto& [kind, count] : counts_) {
-      std::printf("| %s | %d | %d | %d | %d | %d |\n", kKinds[kind].name, count.rooms,
-                  count.right_trusted, count.right_refused, count.wrong_refused,
-                  count.wrong_trusted);
-    }
-  }
+  void Add(const std::string& text) { fields_.push_back(text); }
+  void Add(double value, int decimals) { fields_.push_back(Number(value, decimals)); }
+  std::string Text() const { return CsvLine(fields_); }
 
  private:
-  void Judge(uint64_t seed, KindIndex kind, const SimulatedRoom& room, const SparseModel& model,
-             const AutomaticAlignment& found, double seconds) {
-    Error error{1e9, 180};
-    bool trusted = found.verdict.kind == StartVerdict::Kind::kTrusted;
-    SparseModel aligned = model;
-    const auto& alignment = found.attempt.alignment;
-    if (alignment && alignment->adjusted()) {
-      aligned = alignment->adjustment.bundle.model;
-    } else if (found.verdict.best >= 0) {
-      TransformModel(found.search.starts[found.verdict.best].scan_from_sparse, &aligned);
-    }
-    if (found.verdict.best >= 0) error = ErrorOf(room, aligned);
-    if (settings_.whole) trusted = found.attempt.trusted();
-    const bool right =
-        kKinds[kind].has_answer &&
-        (settings_.whole ? error.position <= kRight && error.turn_deg <= kRightTurnDeg
-                         : error.position <= kSearchRight);
-    Count& count = counts_[kind];
-    ++count.rooms;
-    (right ? (trusted ? count.right_trusted : count.right_refused)
-           : (trusted ? count.wrong_trusted : count.wrong_refused)) += 1;
-    const auto& starts = found.search.starts;
-    const StartVerdict& v = found.verdict;
-    const double score = v.best < 0 ? 0 : starts[v.best].sights.Score();
-    const GradientShifts shifts = v.asked.empty() ? GradientShifts() : v.asked[0].gradient.shifts;
-    std::printf(
-        "%llu %s: %s, %s; off %.4f m %.3f deg; score %.3f second %.3f mirrored %.3f through %.3f "
-        "photos %d share %.3f by chance %.3f far %.3f of %ld chance_wrong %.2g; verdict %d; %.1f "
-        "CPU-s; points %zu photos %d %.100s\n",
-        static_cast<unsigned long long>(seed), kKinds[kind].name, right ? "right" : "wrong",
-        trusted ? "trusted" : "refused", error.position, error.turn_deg, score,
-        v.second < 0 ? 0 : starts[v.second].sights.Score(), v.mirrored_score,
-        v.best < 0 ? 0 : starts[v.best].sights.ThroughShare(), v.photos_support,
-        shifts.at_pose.Share(), shifts.elsewhere.Share(), shifts.far.Share(), shifts.at_pose.num,
-        v.chance_wrong, static_cast<int>(v.kind), seconds, model.points.size(), room.NumPhotos(),
-        alignment && !alignment->reasons.empty() ? alignment->reasons[0].c_str() : "");
+  std::vector<std::string> fields_;
+};
+
+void AddErrors(const Room& room, const AutomaticAlignment& found, Line* line) {
+  Error start, final;
+  const auto& alignment = found.attempt.alignment;
+  if (found.verdict.best >= 0) {
+    SparseModel placed = room.one.model;
+    TransformModel(found.search.starts[found.verdict.best].scan_from_sparse, &placed);
+    start = final = ErrorOf(*room.one.room, placed);
+  }
+  if (alignment) {
+    SparseModel placed = room.one.model;
+    TransformModel(alignment->scan_from_sparse, &placed);
+    final = ErrorOf(*room.one.room,
+                    alignment->adjusted() ? alignment->adjustment.bundle.model : placed);
+  }
+  line->Add(start.position, 5);
+  line->Add(start.turn_deg, 3);
+  line->Add(final.position, 5);
+  line->Add(final.turn_deg, 3);
+  line->Add(alignment ? alignment->expected_error.at_cameras : -1, 5);
+}
+
+void AddEvidence(const Room& room, const SurveyedScans& surveyed, const AutomaticAlignment& found,
+                 Line* line) {
+  const StartVerdict& v = found.verdict;
+  const auto& starts = found.search.starts;
+  const FittedStart best = v.best < 0 ? FittedStart() : starts[v.best];
+  GradientAgreement photos, second;
+  for (const AskedStart& asked : v.asked) {
+    if (asked.start == v.best) photos = asked.gradient;
+    if (asked.start == v.second) second = asked.gradient;
+  }
+  const GradientShifts& shifts = photos.shifts;
+  const SightAgreement true_sights =
+      CheckSights(found.search.cloud, room.truth, surveyed.free_space(), kSightTolerance);
+  line->Add(HasAnswer(room.kind) ? true_sights.Score() : 0, 4);
+  line->Add(best.sights.Score(), 4);
+  line->Add(v.second < 0 ? 0 : starts[v.second].sights.Score(), 4);
+  line->Add(v.mirrored_score, 4);
+  line->Add(best.sights.ThroughShare(), 4);
+  line->Add(best.rms, 4);
+  line->Add(static_cast<int>(v.support), 0);
+  line->Add(shifts.at_pose.Share(), 4);
+  line->Add(shifts.elsewhere.Share(), 4);
+  line->Add(shifts.far.Share(), 4);
+  line->Add(shifts.ring.Share(), 4);
+  line->Add(static_cast<double>(shifts.at_pose.num), 0);
+  line->Add(static_cast<double>(shifts.clear.num), 0);
+  line->Add(photos.contradicts, 0);
+  line->Add(second.shifts.at_pose.Share(), 4);
+  line->Add(v.chance_wrong, 4);
+}
+
+std::string LineOfRoom(uint64_t seed) {
+  const double before_making = CpuSeconds();
+  const Room room = MakeRoom(seed);
+  const TempFolder folder;
+  DrawPhotos(room, folder.path());
+  const double before = CpuSeconds();
+  const SurveyedScans surveyed(room.one.scans);
+  AlignmentInput input{room.one.model, surveyed, {}, "", "clockwise"};
+  input.image_path = folder.path();
+  input.num_threads = 1;
+  Progress progress(true);
+  const AutomaticAlignment found = AlignAutomatically(input, {}, AlignmentOptions(), &progress);
+  const double after = CpuSeconds();
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+
+  Line line;
+  line.Add(std::to_string(seed));
+  line.Add(NameOf(room.kind));
+  line.Add(HasAnswer(room.kind), 0);
+  line.Add(found.attempt.trusted(), 0);
+  line.Add(NameOf(found.verdict.kind));
+  AddErrors(room, found, &line);
+  AddEvidence(room, surveyed, found, &line);
+  line.Add(after - before, 1);
+  line.Add(before - before_making, 1);
+  line.Add(static_cast<double>(usage.ru_maxrss) / 1024, 0);
+  line.Add(static_cast<double>(room.one.model.points.size()), 0);
+  line.Add(room.one.room->NumPhotos(), 0);
+  line.Add(static_cast<double>(room.one.scans.size()), 0);
+  line.Add(room.scanned_share, 2);
+  line.Add(room.reflectance, 0);
+  line.Add(room.one.room->options().range_noise, 4);
+  const auto& alignment = found.attempt.alignment;
+  line.Add(alignment && !alignment->reasons.empty() ? alignment->reasons[0]
+                                                    : found.attempt.refusal);
+  return line.Text();
+}
+
+std::set<std::string> SeedsIn(const std::string& path) {
+  std::set<std::string> seeds;
+  std::ifstream stream(path);
+  for (std::string line; std::getline(stream, line);) seeds.insert(line.substr(0, line.find(',')));
+  return seeds;
+}
+
+void Run(const Settings& settings) {
+  const std::set<std::string> done = SeedsIn(settings.output_path);
+  std::ofstream stream(settings.output_path, std::ios::app);
+  if (done.empty()) stream << kHeader;
+  for (int i = 0; i < settings.num_rooms; ++i) {
+    const uint64_t seed = settings.first + i;
+    if (done.count(std::to_string(seed)) > 0) continue;
+    const std::string line = LineOfRoom(seed);
+    stream << line << std::flush;
+    std::fputs(line.c_str(), stdout);
     std::fflush(stdout);
   }
-
-  const Settings settings_;
-  std::map<KindIndex, Count> counts_;
-};
+}
 
 bool Parse(int argc, char** argv, Settings* settings) {
   for (int i = 1; i + 1 < argc; i += 2) {
@@ -236,14 +462,12 @@ bool Parse(int argc, char** argv, Settings* settings) {
       settings->first = std::strtoull(argv[i + 1], nullptr, 10);
     else if (option == "--rooms")
       settings->num_rooms = std::atoi(argv[i + 1]);
-    else if (option == "--photos")
-      settings->photos = value == "1";
-    else if (option == "--whole")
-      settings->whole = value == "1";
+    else if (option == "--output_path")
+      settings->output_path = value;
     else
       return false;
   }
-  return argc % 2 == 1 && settings->num_rooms > 0;
+  return argc % 2 == 1 && settings->num_rooms > 0 && !settings->output_path.empty();
 }
 
 }  // namespace
@@ -252,12 +476,10 @@ bool Parse(int argc, char** argv, Settings* settings) {
 int main(int argc, char** argv) {
   roomtex::Settings settings;
   if (!roomtex::Parse(argc, argv, &settings)) {
-    std::fprintf(stderr,
-                 "auto_align --set tuning|check [--rooms N] [--first SEED] [--photos 1] "
-                 "[--whole 1]\n");
+    std::fprintf(
+        stderr,
+        "auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED]\n");
     return 2;
   }
-  roomtex::Run run(settings);
-  for (int i = 0; i < settings.num_rooms; ++i) run.Room(settings.first + i);
-  run.Table();
+  roomtex::Run(settings);
 }
