@@ -1,5 +1,6 @@
 #include "core/text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -37,12 +38,37 @@ std::string Trimmed(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 
-std::string Quoted(const std::string& text) {
-  std::string shown;
-  for (const char c : text.substr(0, 40)) {
-    shown += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+namespace {
+
+// Bytes of the UTF-8 character that begins at text[i]; 0 if none does.
+size_t CharacterBytes(std::string_view text, size_t i) {
+  const auto byte = [&](size_t k) { return static_cast<unsigned char>(text[k]); };
+  const size_t count = byte(i) < 0x80                      ? 1
+                       : byte(i) >= 0xc2 && byte(i) < 0xe0 ? 2
+                       : byte(i) >= 0xe0 && byte(i) < 0xf0 ? 3
+                       : byte(i) >= 0xf0 && byte(i) < 0xf5 ? 4
+                                                           : 0;
+  if (i + count > text.size()) return 0;
+  for (size_t k = i + 1; k < i + count; ++k) {
+    if ((byte(k) & 0xc0) != 0x80) return 0;
   }
-  return "\"" + shown + (text.size() > 40 ? "..." : "") + "\"";
+  return count;
+}
+
+}  // namespace
+
+std::string Quoted(const std::string& text) {
+  constexpr size_t kMaxBytes = 40;
+  std::string shown;
+  size_t i = 0;
+  while (i < text.size()) {
+    const size_t count = CharacterBytes(text, i);
+    if (i + std::max<size_t>(count, 1) > kMaxBytes) break;
+    const bool is_control = static_cast<unsigned char>(text[i]) < 0x20 || text[i] == 0x7f;
+    shown += count == 0 || is_control ? "?" : text.substr(i, count);
+    i += std::max<size_t>(count, 1);
+  }
+  return "\"" + shown + (i < text.size() ? "..." : "") + "\"";
 }
 
 }  // namespace roomtex

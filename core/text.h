@@ -24,7 +24,7 @@ std::optional<double> ParseNumber(std::string_view text);
 // Without blanks and control characters for spacing at both ends.
 std::string Trimmed(const std::string& text);
 // Text of a file as it may stand in a message: in double quotes, at most 40 bytes of it, `?` for
-// control characters.
+// control characters and for bytes that are not UTF-8.
 std::string Quoted(const std::string& text);
 
 }  // namespace roomtex

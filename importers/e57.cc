@@ -139,6 +139,14 @@ class E57ScanReader {
   Eigen::Matrix3d rotation_ = source_.file_from_scan.rotation.toRotationMatrix();
 };
 
+// No more than the bytes of the file can hold; records without bits are read as one.
+double MostRecords(const E57Points& points, int64_t num_bytes) {
+  double bits = 0;
+  for (const E57Field& field : points.fields) bits += field.num_bits;
+  const double fit = bits > 0 ? 8 * static_cast<double>(num_bytes) / bits : 1;
+  return std::min(static_cast<double>(points.num_records), fit);
+}
+
 }  // namespace
 
 std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
@@ -152,7 +160,7 @@ std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
   }
   double num_records = 0;
   for (const size_t i : ChosenScans(path, document.scans, part)) {
-    num_records += static_cast<double>(document.scans[i].points.num_records);
+    num_records += MostRecords(document.scans[i].points, pages.logical_size());
   }
   RequireMemoryForSamples(path, num_records);
   std::vector<Scan> scans;

@@ -82,10 +82,7 @@ void BoardOptions::Declare(OptionFields* fields) {
                "distances in the report do.")
       .Positive()
       .AtMost(kLargestSquare)
-      .Says(square > kLargestSquare
-                ? "is " + Number(square, 0) +
-                      " m, larger than any board: it is in metres, 25 mm are 0.025"
-                : "must be positive: the side of a square in metres, e.g. 0.025");
+      .Says("must be above 0 and at most 1: the side of a square in metres, 25 mm are 0.025");
   fields->Choice("board_type", &type, Types(),
                  "A checkerboard must be seen whole; of a ChArUco board a part is enough.");
   fields->Number("marker", &marker,

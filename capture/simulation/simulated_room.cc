@@ -278,8 +278,11 @@ std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const 
   for (const PickCandidate& candidate :
        SpreadPicks(impl_->Candidates(PlaceOf(photo)), count, impl_->PhotoDiagonal())) {
     const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
-    picks.push_back({PhotoName(photo), candidate.x_in_img + impl_->options.click_noise_px * noise,
-                     candidate.x_in_scan});
+    const Eigen::Vector2d click = candidate.x_in_img + impl_->options.click_noise_px * noise;
+    // Nobody clicks beside the photo.
+    const Eigen::Vector2d inside = click.cwiseMax(0).cwiseMin(
+        Eigen::Vector2d(impl_->options.photo_width, impl_->options.photo_height));
+    picks.push_back({PhotoName(photo), inside, candidate.x_in_scan});
   }
   return picks;
 }

@@ -148,7 +148,7 @@ TEST_F(FacesOfPanoramas, PanoramasJsonComesBackAsItWasWritten) {
       RotationAngle(back[2].faces[3].face_from_panorama, panoramas_[2].faces[3].face_from_panorama),
       1e-12);
   WriteBytes(folder / "broken.json", "{\"format\": \"roomtex panoramas 1\", \"panoramas\": [1]}");
-  EXPECT_INPUT_ERROR(ReadPanoramaSet(folder / "broken.json"), "cannot be read");
+  EXPECT_INPUT_ERROR(ReadPanoramaSet(folder / "broken.json"), "is not as roomtex-import writes it");
 }
 
 }  // namespace

@@ -67,6 +67,14 @@ TEST(Text, QuotesWhatMayStandInAMessage) {
   EXPECT_EQ(Quoted("a.jpg"), "\"a.jpg\"");
   EXPECT_EQ(Quoted("a\tb\x7f"), "\"a?b?\"");
   EXPECT_EQ(Quoted(std::string(50, 'x')), "\"" + std::string(40, 'x') + "...\"");
+  EXPECT_EQ(Quoted("K\xc3\xbc"
+                   "che"),
+            "\"K\xc3\xbc"
+            "che\"");
+  EXPECT_EQ(Quoted("\xff"
+                   "a\xc3"),
+            "\"?a?\"");
+  EXPECT_EQ(Quoted(std::string(39, 'x') + "\xc3\xbc"), "\"" + std::string(39, 'x') + "...\"");
 }
 
 TEST(Text, TrimsBothEnds) {

@@ -184,7 +184,9 @@ TEST_F(Colorize, ThingsOfOnePhotoThatAreNotInTheScanAreLeftOut) {
   cv::Mat photo = ReadPhoto(photos_[2].path);
   photo(cv::Rect(200, 100, 150, 380)).setTo(cv::Scalar(10, 200, 10));
   cv::imwrite(photos_[2].path, photo);
-  const ColorizeResult result = Run({scan});
+  ColorizeOptions options;
+  options.blend.min_agreement = 0;  // so much green that the whole photo would be left out
+  const ColorizeResult result = Run({scan}, options);
   const ColorGrid& grid = result.scans[0].samples;
   int green = 0;
   for (size_t i = 0; i < grid.rgb.size(); ++i) {

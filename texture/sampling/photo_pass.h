@@ -26,7 +26,7 @@ struct PhotoPassInput {
 class UnusablePhotos : public InputError {
  public:
   explicit UnusablePhotos(std::vector<PhotoLeftOut> photos)
-      : InputError(photos[0].name, "", "cannot be used: " + photos[0].reason, ""),
+      : InputError(photos[0].name, "", "cannot be used: " + AsClause(photos[0].reason), ""),
         photos_(std::move(photos)) {}
   const std::vector<PhotoLeftOut>& photos() const { return photos_; }
 

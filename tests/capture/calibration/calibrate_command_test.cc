@@ -144,7 +144,7 @@ TEST_F(CalibrateCommand, SaysWhatIsWrongInSentences) {
   const std::string images = "--image_path " + few_->path() + " ";
   expect(images, 2, "--board");
   expect(images + "--board 9", 2, "expected COLUMNSxROWS of inner corners");
-  expect(images + "--board 9x6 --square 0", 2, "--square must be positive");
+  expect(images + "--board 9x6 --square 0", 2, "must be above 0");
   expect(images + "--board 9x6 --square nan", 2, "--square");
   expect(images + "--board 9x6 --square 25", 2, "25 mm are 0.025");
   expect("--board 9x6", 2, "--image_path is required");
