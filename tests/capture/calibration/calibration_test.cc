@@ -352,8 +352,8 @@ TEST(BoardOptions, NameWhatIsWrong) {
   EXPECT_NE(problems("9x-6", 0.025).find("COLUMNSxROWS"), std::string::npos);
   EXPECT_NE(problems("99999x6", 0.025).find("COLUMNSxROWS"), std::string::npos);
   EXPECT_NE(problems("2x6", 0.025).find("3 to 100"), std::string::npos);
-  EXPECT_NE(problems("9x6", 0).find("--square must be positive"), std::string::npos);
-  EXPECT_NE(problems("9x6", -1).find("--square must be positive"), std::string::npos);
+  EXPECT_NE(problems("9x6", 0).find("--square must be above 0"), std::string::npos);
+  EXPECT_NE(problems("9x6", -1).find("--square must be above 0"), std::string::npos);
   EXPECT_NE(problems("9x6", 0.025, "charuco").find("--marker must be positive"), std::string::npos);
   EXPECT_NE(problems("9x6", 0.025, "charuco", 0.03).find("less than --square"), std::string::npos);
   EXPECT_NE(
