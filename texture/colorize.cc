@@ -253,10 +253,6 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
   }
 }
 
-}  // namespace
-
-namespace {
-
 // At most a fifth: if more contradict each other, it is the poses that are wrong, or the room that
 // moves, and none of them is to be believed more than another.
 constexpr size_t kForeignOf = 5;

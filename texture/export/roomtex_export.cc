@@ -28,7 +28,10 @@ struct ExportCommandOptions {
   ScanReaderOptions scan_reader;
   bool accept_untrusted = false, strict = false;
   ExportOptions exporting;
+  BlendOptions blend;  // only which photos are foreign: kBlendOptions
 };
+
+const std::vector<std::string> kBlendOptions = {"Blend.min_agreement"};
 
 void AddOptions(ExportCommandOptions* o, Command* command) {
   command->AddInputPath(
@@ -64,6 +67,7 @@ void AddOptions(ExportCommandOptions* o, Command* command) {
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->Add(FieldsOf(&o->scan_reader));
   command->Add(FieldsOf(&o->exporting.occlusion));
+  command->Add(FieldsOf(&o->blend).Only(kBlendOptions));
 }
 
 ScanColors ColorsOf(const std::vector<Scan>& scans, const ExportCommandOptions& options,
@@ -75,6 +79,7 @@ ScanColors ColorsOf(const std::vector<Scan>& scans, const ExportCommandOptions& 
   ColorizeOptions colorize;
   colorize.atlas.mode = "0";
   colorize.occlusion = options.exporting.occlusion;
+  colorize.blend = options.blend;
   ColorizeResult colored = ColorizeUsable(scans, colorize, options.strict,
                                           context.options.num_threads, &context.progress, list);
   ScanColors colors;
@@ -142,6 +147,7 @@ void WritePhotosAndModel(const std::vector<Scan>& scans, const ScanColors& color
 void Export(const ExportCommandOptions& options, const Command::Context& context) {
   std::vector<std::string> problems = options.scan_reader.Problems();
   AppendProblems(options.exporting.Problems(), &problems);
+  AppendProblems(options.blend.Problems(), &problems);
   ThrowIfProblems(problems);
   RequireScans(options.scan_paths, options.input_path);
   // Everything appears together, in the place of an earlier output.

@@ -161,8 +161,10 @@ TEST_F(ExportCommand, RefusesWhatItMustNotTouch) {
 TEST_F(ExportCommand, ChecksItsOptions) {
   ExportOptions options;
   ScanReaderOptions reader;
+  BlendOptions blend;
   ExpectChecksItsOptions("roomtex-export", "--input_path none --image_path none --output_path none",
-                         {FieldsOf(&options), FieldsOf(&options.occlusion), FieldsOf(&reader)});
+                         {FieldsOf(&options), FieldsOf(&options.occlusion), FieldsOf(&reader),
+                          FieldsOf(&blend).Only({"Blend.min_agreement"})});
 }
 
 }  // namespace
