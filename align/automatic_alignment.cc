@@ -33,7 +33,7 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
 constexpr size_t kMostCorners = 200;
 
 // Pixels, one standard deviation per coordinate: of half of the corners, how far they are from
-// where the start has them.
+// where the similarity has them.
 double CornerSigma(const std::vector<Pick>& corners, const SparseModel& model,
                    const Similarity& scan_from_sparse) {
   std::vector<double> distances = PickDistances(model, corners, scan_from_sparse);
@@ -41,32 +41,32 @@ double CornerSigma(const std::vector<Pick>& corners, const SparseModel& model,
   return std::max(1.0, kSigmaPerMedian * Median(&distances));
 }
 
-// The corners that the photos confirmed a start by, evenly taken from all, as picks that are as
-// exact as they turn out to be. A start must be of these picks: the input's come first.
-std::vector<Pick> AddCorners(const AlignmentInput& input, const GradientShifts& shifts,
-                             const Similarity& scan_from_sparse, double pick_sigma_px) {
+// The corners that the photos confirmed a start by, evenly taken from all.
+std::vector<Pick> ConfirmedCorners(const SparseModel& model, const GradientShifts& shifts,
+                                   const Similarity& scan_from_sparse) {
   std::vector<Pick> corners;
   const size_t stride = 1 + shifts.corners.size() / kMostCorners;
   for (size_t i = 0; i < shifts.corners.size(); i += stride) {
     const FittingCorner& corner = shifts.corners[i];
-    const auto image = input.model.images.find(corner.image_id);
-    if (image == input.model.images.end()) continue;  // the face of a panorama
+    const auto image = model.images.find(corner.image_id);
+    if (image == model.images.end()) continue;  // the face of a panorama
     const Rigid cam_from_scan = CamFromScan(image->second.cam_from_model, scan_from_sparse);
     corners.push_back(
         {image->second.name, corner.x_in_img, cam_from_scan.Inverse() * corner.x_in_cam});
   }
-  if (corners.empty()) return input.picks;
-  const double sigma_px = CornerSigma(corners, input.model, scan_from_sparse);
-  for (Pick& corner : corners) corner.weight = pick_sigma_px / sigma_px;
-  std::vector<Pick> all = input.picks;
-  all.insert(all.end(), corners.begin(), corners.end());
-  return all;
+  return corners;
 }
 
-// The surface leaves something open.
-bool IsOpen(const Alignment& alignment) {
-  return alignment.fit.surface.converged &&
-         !(alignment.open.None() && alignment.fit.surface.covariance.allFinite());
+// The surface leaves something open, so that it does not hold the model there, or it drew the model
+// away from where the photos confirmed the start.
+bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
+                  const SparseModel& model) {
+  constexpr double kDrawnAway = 2;  // times what the corners were off
+  const AlignmentFit& fit = alignment.fit;
+  if (!fit.surface.converged || !alignment.open.None() || !fit.surface.covariance.allFinite()) {
+    return true;
+  }
+  return CornerSigma(corners, model, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
 }
 
 const GradientAgreement* PhotosAt(const StartVerdict& verdict) {
@@ -76,21 +76,27 @@ const GradientAgreement* PhotosAt(const StartVerdict& verdict) {
   return nullptr;
 }
 
-// On the surface; where that leaves something open, by what the photos show of the scan's intensity
-// as well, if they confirm the start.
+// On the surface; where that does not hold the model, by what the photos show of the scan's
+// intensity as well, if they confirm the start.
 Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& found,
                          const AlignmentOptions& options, Progress* progress) {
   const Similarity& best = found.search.starts[found.verdict.best].scan_from_sparse;
   Alignment alignment = AlignToScan(
       input, StartFromSimilarity(input.model, input.picks, best, kStartSigma), options, progress);
   const GradientAgreement* const photos = PhotosAt(found.verdict);
-  if (!IsOpen(alignment) || found.verdict.support == PhotoSupport::kNone || photos == nullptr)
-    return alignment;
-  const std::vector<Pick> picks =
-      AddCorners(input, photos->shifts, best, alignment.start.pick_sigma_px);
-  if (picks.size() == input.picks.size()) return alignment;
+  if (found.verdict.support == PhotoSupport::kNone || photos == nullptr) return alignment;
+  std::vector<Pick> corners = ConfirmedCorners(input.model, photos->shifts, best);
+  if (corners.empty()) return alignment;
+  const double sigma_px = CornerSigma(corners, input.model, best);
+  if (!NeedsCorners(alignment, corners, sigma_px, input.model)) return alignment;
+  // As picks that are as exact as they turn out to be.
+  std::vector<Pick> picks = input.picks;
+  for (Pick& corner : corners) {
+    corner.weight = alignment.start.pick_sigma_px / sigma_px;
+    picks.push_back(std::move(corner));
+  }
   AlignmentStart start = StartFromSimilarity(input.model, picks, best, kStartSigma);
-  start.num_corners = static_cast<int>(picks.size() - input.picks.size());
+  start.num_corners = static_cast<int>(corners.size());
   return AlignToScan(input.With(input.model, input.surveyed, picks), start, options, progress);
 }
 

@@ -170,8 +170,12 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
   judgement->open = FindOpenDirections(fit.surface, middle);
   const std::vector<bool> used = start.UsedPicks();
   const bool held = std::count(used.begin(), used.end(), true) > 0;
+  const bool by_photos = start.num_corners > 0;
   if (held && !judgement->open.None()) {
-    judgement->warnings.push_back(judgement->open.Sentence(start.num_corners > 0));
+    // One wall leaves too much: corners that are off together, as by a lens, turn and scale all.
+    const bool is_too_much = by_photos && judgement->open.num_facings < 2;
+    (is_too_much ? judgement->reasons : judgement->warnings)
+        .push_back(judgement->open.Sentence(by_photos));
   }
   // What is wholly open has no covariance at all.
   if (!held && !(judgement->open.None() && fit.surface.covariance.allFinite())) {

@@ -34,7 +34,7 @@ struct AlignmentStart {
   double position_sigma = 0;
   std::vector<PickOutcome> picks;  // those that there are, also of a start that is not from them
   // So many of `picks`, the last ones, are no clicks but corners of the scan's intensity that the
-  // photos show where they should (AddCorners).
+  // photos show where they should (automatic_alignment.cc).
   int num_corners = 0;
   double pick_sigma_px = 1.5;  // click noise, per coordinate
   // NaN without picks.

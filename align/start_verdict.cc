@@ -215,7 +215,9 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
         Percent(search.mirrored[0].sights.Share()), Percent(best.sights.Share()));
     return verdict;
   }
-  const auto open = OpenSlides(input, search, best.scan_from_sparse);
+  // What the surface leaves open the photos hold where they clearly confirm the place.
+  const auto open =
+      clear ? std::vector<Eigen::Vector3d>() : OpenSlides(input, search, best.scan_from_sparse);
   if (!open.empty()) {
     verdict.kind = Kind::kOpen;
     verdict.reason = OpenReason(open) + kRemedy;

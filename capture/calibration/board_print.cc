@@ -15,15 +15,16 @@ namespace roomtex {
 namespace {
 
 constexpr double kPointsPerMetre = 72 / 0.0254;
-constexpr double kMargin = 0.010, kLine = 0.008;  // metres; the line of text below the board
-constexpr double kLongest = 5;                    // metres; PDF's own limit is 200 inches
+constexpr double kBoardMargin = 0.010,
+                 kTextLine = 0.008;  // metres; the line of text below the board
+constexpr double kLongest = 5;       // metres; PDF's own limit is 200 inches
 
 struct Page {
   double width, height;  // metres
 };
 
 Page PageFor(double width, double height) {
-  const double w = width + 2 * kMargin, h = height + 2 * kMargin + kLine;
+  const double w = width + 2 * kBoardMargin, h = height + 2 * kBoardMargin + kTextLine;
   for (const Page& a : {Page{0.210, 0.297}, Page{0.297, 0.420}, Page{0.420, 0.594},
                         Page{0.594, 0.841}, Page{0.841, 1.189}}) {
     if (w <= a.width && h <= a.height) return a;
@@ -101,7 +102,7 @@ void WriteBoardPdf(const Board& board, const std::string& path) {
   }
   const Page page = PageFor(width, height);
   const double left = (page.width - width) / 2;
-  const double bottom = (page.height - height + kLine) / 2;
+  const double bottom = (page.height - height + kTextLine) / 2;
   Drawing drawing(left, bottom + height);
   for (int row = 0; row < rows; ++row) {
     for (int column = row % 2; column < columns; column += 2) {
@@ -113,10 +114,10 @@ void WriteBoardPdf(const Board& board, const std::string& path) {
       "{}, squares of {:g} mm. Print at 100 %, measure, and glue it onto something flat.",
       board.Name(), 1000 * board.square);
   OutputFile file(path);
-  file.stream() << Pdf(page,
-                       drawing.Filled() + fmt::format("BT /F 8 Tf {:.3f} {:.3f} Td ({}) Tj ET",
-                                                      kPointsPerMetre * left,
-                                                      kPointsPerMetre * (bottom - kLine), line));
+  file.stream() << Pdf(
+      page, drawing.Filled() + fmt::format("BT /F 8 Tf {:.3f} {:.3f} Td ({}) Tj ET",
+                                           kPointsPerMetre * left,
+                                           kPointsPerMetre * (bottom - kTextLine), line));
   file.Commit();
 }
 

@@ -29,9 +29,9 @@ cv::Point Fixed(const Eigen::Vector2d& x) {
           static_cast<int>(std::lround(x.y() * (1 << kShift)))};
 }
 
-class Drawing {
+class CalibrationDrawing {
  public:
-  explicit Drawing(const Calibration& calibration)
+  explicit CalibrationDrawing(const Calibration& calibration)
       : calibration_(calibration),
         scale_(1.0 * kFrame / std::max(calibration.camera.width, calibration.camera.height)),
         width_(static_cast<int>(std::lround(calibration.camera.width * scale_))),
@@ -208,6 +208,8 @@ class Drawing {
 
 }  // namespace
 
-cv::Mat DrawCalibration(const Calibration& calibration) { return Drawing(calibration).Draw(); }
+cv::Mat DrawCalibration(const Calibration& calibration) {
+  return CalibrationDrawing(calibration).Draw();
+}
 
 }  // namespace roomtex

@@ -139,6 +139,44 @@ TEST(AutomaticAlignCommand, FindsThePlaceAndReportsTheEvidence) {
   EXPECT_LT(WorstPoseErrors(*folder.one.room, aligned, Similarity()).position, 0.005);
 }
 
+// Leaves only points on the walls, which say nothing of the height.
+void KeepPointsOnWalls(const SimulatedRoom& room, SparseModel* model) {
+  const Similarity scan_from_sparse = room.ScanFromSparse();
+  const Rigid room_from_scan = room.ScanFromRoom().Inverse();
+  const Eigen::Vector2d size(room.options().width, room.options().depth);
+  for (auto it = model->points.begin(); it != model->points.end();) {
+    const Eigen::Vector3d x = room_from_scan * (scan_from_sparse * it->second.x_in_model);
+    const Eigen::Vector2d plan = x.head<2>();
+    if (plan.cwiseMin(size - plan).minCoeff() < 0.02 && x.z() > 0.1 &&
+        x.z() < room.options().height - 0.1) {
+      ++it;
+      continue;
+    }
+    for (const TrackElement& element : it->second.track) {
+      model->images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+    }
+    it = model->points.erase(it);
+  }
+}
+
+TEST(AutomaticAlignCommand, PhotosHoldTheHeightThatWallsLeaveOpen) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  SparseModel walls = folder.one.model;
+  KeepPointsOnWalls(*folder.one.room, &walls);
+  const std::string input = folder.files.folder / "walls", output = folder.files.folder / "held";
+  WriteSparseModel(walls, input);
+  const CommandResult result = RunCommandLine(
+      "roomtex-align --quiet --input_path " + input + " --image_path " + folder.image_path +
+      " --scan_path " + folder.files.scan_path + " --output_path " + output);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(output + "/alignment.json"));
+  EXPECT_THAT(report["warnings"].dump(), HasSubstr("corners of the scan's intensity"));
+  const double expected = report["expected_error"]["at_cameras_mm"].get<double>() / 1000;
+  EXPECT_LT(expected, 0.01);
+  EXPECT_LT(WorstPoseErrors(*folder.one.room, ReadSparseModel(output), Similarity()).position,
+            3 * expected);
+}
+
 // What one station saw must not be taken for what another one did, from cell to cell: where scans
 // lie on each other by their noise alone, neither would be compared with the photos.
 TEST(AutomaticAlignCommand, PhotosSeeSeveralStationsAsWellAsOne) {

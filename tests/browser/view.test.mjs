@@ -241,7 +241,7 @@ function psnr(photo, predicted, isMeant) {
   return 10 * Math.log10(255 ** 2 * pairs.length / sum);
 }
 
-// Minutes where the processor draws: run by the test view_prediction, label slow.
+// Minutes where the processor draws: run by the tests view_prediction and view_large, label slow.
 const isSlowRun = process.env.ROOMTEX_SLOW === '1';
 
 test('photos near the point of view predict one that was left out', {skip: !isSlowRun}, async () => {
@@ -649,7 +649,7 @@ test('what is missing is said in words', async () => {
   await page.close();
 });
 
-test('a room of two million points opens without freezing', async () => {
+test('a room of two million points opens without freezing', {skip: !isSlowRun}, async () => {
   const capture = await simulate(
       'large', ['--num_photos', '1', '--photo_width', '300', '--photo_height', '200']);
   const own =
