@@ -137,6 +137,19 @@ void RequireSameFeatures(const Database& copy, const std::string& path,
   }
 }
 
+// The statement's parameters: model, width, height, params, prior_focal_length, camera_id.
+void ExecuteWith(uint32_t camera_id, const Camera& camera, SQLite::Statement* statement) {
+  statement->bind(1, static_cast<int>(camera.model));
+  statement->bind(2, camera.width);
+  statement->bind(3, camera.height);
+  statement->bindNoCopy(4, camera.params.data(),
+                        static_cast<int>(camera.params.size() * sizeof(double)));
+  statement->bind(5, camera.has_prior_focal_length ? 1 : 0);
+  statement->bind(6, static_cast<int64_t>(camera_id));
+  statement->exec();
+  statement->reset();
+}
+
 }  // namespace
 
 void Database::CopyForMapper(const std::string& path, Schema schema) const {
@@ -169,17 +182,7 @@ void Database::CopyWithCameras(const std::string& path,
     SQLite::Statement update(copy,
                              "UPDATE cameras SET model = ?, width = ?, height = ?, params = ?, "
                              "prior_focal_length = ? WHERE camera_id = ?");
-    for (const auto& [camera_id, camera] : cameras) {
-      update.bind(1, static_cast<int>(camera.model));
-      update.bind(2, camera.width);
-      update.bind(3, camera.height);
-      update.bindNoCopy(4, camera.params.data(),
-                        static_cast<int>(camera.params.size() * sizeof(double)));
-      update.bind(5, camera.has_prior_focal_length ? 1 : 0);
-      update.bind(6, static_cast<int64_t>(camera_id));
-      update.exec();
-      update.reset();
-    }
+    for (const auto& [camera_id, camera] : cameras) ExecuteWith(camera_id, camera, &update);
     transaction.commit();
   });
 }
@@ -213,19 +216,9 @@ bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t,
   SQLite::Transaction transaction(copy);
   copy.exec("DELETE FROM cameras");
   SQLite::Statement add(copy,
-                        "INSERT INTO cameras(camera_id, model, width, height, params, "
-                        "prior_focal_length) VALUES(?, ?, ?, ?, ?, ?)");
-  for (const auto& [camera_id, camera] : cameras) {
-    add.bind(1, static_cast<int64_t>(camera_id));
-    add.bind(2, static_cast<int>(camera.model));
-    add.bind(3, camera.width);
-    add.bind(4, camera.height);
-    add.bindNoCopy(5, camera.params.data(),
-                   static_cast<int>(camera.params.size() * sizeof(double)));
-    add.bind(6, camera.has_prior_focal_length ? 1 : 0);
-    add.exec();
-    add.reset();
-  }
+                        "INSERT INTO cameras(model, width, height, params, prior_focal_length, "
+                        "camera_id) VALUES(?, ?, ?, ?, ?, ?)");
+  for (const auto& [camera_id, camera] : cameras) ExecuteWith(camera_id, camera, &add);
   SQLite::Statement update(copy, "UPDATE images SET camera_id = ? WHERE image_id = ?");
   for (const auto& [image_id, image] : images) {
     update.bind(1, static_cast<int64_t>(image.camera_id));

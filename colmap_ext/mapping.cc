@@ -29,7 +29,8 @@ MatchedImages ImagesOfModel(const Database& database, const MatchedImages& image
                        [&database](uint32_t image_id) { return database.ReadKeypoints(image_id); });
 }
 
-HypothesisOptions PairOptions(const MappingOptions& options, const Command::Context& context) {
+HypothesisOptions HypothesisOptionsOf(const MappingOptions& options,
+                                      const Command::Context& context) {
   HypothesisOptions pair;
   pair.keypoint_noise_px = options.init.keypoint_noise_px;
   pair.max_error_px = options.init.max_error_px;
@@ -43,7 +44,7 @@ void ChainLeftOut(const Database& database, const MatchedImages& images, MapperR
                   MappingOutcome* outcome) {
   MatchedImages model_images = ImagesOfModel(database, images, outcome->result.model);
   context.progress.Stage("chain photos");
-  ViewChainer chainer(&model_images, options.chain, PairOptions(options, context),
+  ViewChainer chainer(&model_images, options.chain, HypothesisOptionsOf(options, context),
                       context.options.num_threads);
   ChainResult chain = chainer.Run(std::move(outcome->result), [&](const SparseModel& poses) {
     ThrowIfInterrupted();
@@ -249,7 +250,7 @@ MappingPass Mapping::Run() {
 ModelCheck Mapping::Check(const MappingPass& pass) const {
   MatchedImages images = ImagesOfModel(database_, *pass.images, pass.model());
   ModelCheckOptions check_options;
-  check_options.pair = PairOptions(options_, context_);
+  check_options.pair = HypothesisOptionsOf(options_, context_);
   check_options.min_confidence = options_.init.min_confidence;
   const PairTrial& trial = pass.best[0].seed.trial;
   return CheckModel(&images, pass.model(), {trial.image_id1, trial.image_id2}, check_options,

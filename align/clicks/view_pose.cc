@@ -16,8 +16,8 @@ namespace roomtex {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMinDepth = 1e-6;     // metres in front of the camera
-constexpr double kUsualResiduals = 4;  // what kUsualClickSigma counts as, beside real ones
+constexpr double kMinViewDepth = 1e-6;  // metres in front of the camera
+constexpr double kUsualResiduals = 4;   // what kUsualClickSigma counts as, beside real ones
 
 // The viewing rays of the clicks that have any, with their scan points.
 struct NormalisedPairs {
@@ -35,7 +35,7 @@ struct NormalisedPairs {
   }
   // The point (`cam`) can be what click i shows.
   bool IsAhead(int i, const Eigen::Vector3d& x_in_cam) const {
-    return is_perspective ? x_in_cam.z() > kMinDepth : ray.col(i).dot(x_in_cam) > kMinDepth;
+    return is_perspective ? x_in_cam.z() > kMinViewDepth : ray.col(i).dot(x_in_cam) > kMinViewDepth;
   }
 };
 
@@ -190,7 +190,7 @@ struct PickCost {
     T params[kMaxCameraParams], x, y;
     for (size_t i = 0; i < camera->params.size(); ++i) params[i] = T(camera->params[i]);
     if (camera_formulas::IsPerspective(camera->model)) {
-      if (p[2] < T(kMinDepth)) return false;
+      if (p[2] < T(kMinViewDepth)) return false;
       for (int i = 0; i < 2; ++i) p[i] = p[i] / p[2];
       p[2] = T(1);
     }

@@ -29,7 +29,7 @@ constexpr double kGateShrink = 0.8;
 constexpr int kMaxSteps = 40, kNumRegisterings = 3;
 constexpr double kSettled = 1e-5;  // metres and radians of a step at the last gate
 // What is known without any surface: keeps open directions where they are (metres, radians).
-constexpr double kPriorMove = 0.05, kPriorTurn = 0.02;
+constexpr double kPriorStationMove = 0.05, kPriorStationTurn = 0.02;
 // An offset counts from here on (metres), and when it is this many standard deviations.
 constexpr double kLeastOffset = 0.006, kDeviations = 4;
 
@@ -71,7 +71,7 @@ double Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
                        weights.Normal(k), pivot, root * root / weights.Variance(k));
   }
   for (int k = 0; k < 6; ++k) {
-    const double prior = k < 3 ? kPriorMove : kPriorTurn;
+    const double prior = k < 3 ? kPriorStationMove : kPriorStationTurn;
     normal.matrix(k, k) += 1 / (prior * prior);
   }
   normal.matrix.row(6).setZero();
