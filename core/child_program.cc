@@ -86,10 +86,10 @@ cpu_set_t Processors(int max_processors) {
 
 // What the child does between fork and exec: only calls that are safe there.
 [[noreturn]] void BecomeProgram(const char* path, char* const* argv, char* const* envp, int output,
-                                const cpu_set_t& processors) {
+                                const cpu_set_t& processors, int signal_of_our_end) {
   sched_setaffinity(0, sizeof(processors), &processors);
-  setpgid(0, 0);                     // so that all it starts can be killed together
-  prctl(PR_SET_PDEATHSIG, SIGKILL);  // and it does not outlive us
+  setpgid(0, 0);  // so that all it starts can be killed together
+  prctl(PR_SET_PDEATHSIG, signal_of_our_end);
   for (const int signal : kSignals) ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
@@ -104,26 +104,29 @@ cpu_set_t Processors(int max_processors) {
   _exit(127);
 }
 
-// Between reads: tells who waits, and kills a program that was asked to stop and does not.
+// Between reads: tells who waits, asks a program to stop, and kills one that was asked and does
+// not.
 class Waiting {
  public:
-  explicit Waiting(const std::function<void()>& on_wait) : on_wait_(on_wait) {}
+  Waiting(const ChildSettings& settings, pid_t child) : settings_(settings), child_(child) {}
 
   void operator()() {
-    if (on_wait_) on_wait_();
-    if (received_signal == 0) return;
+    if (settings_.on_wait) settings_.on_wait();
+    const bool should_stop = settings_.should_stop && settings_.should_stop();
+    if (received_signal == 0 && !should_stop) return;
     const auto now = std::chrono::steady_clock::now();
     if (!asked_) {
       asked_ = true;
       asked_at_ = now;
+      if (should_stop) kill(-child_, settings_.stop_signal);
     }
     const double seconds = std::chrono::duration<double>(now - asked_at_).count();
-    const pid_t group = running_group;
-    if (seconds > kPatienceSeconds && group > 0) kill(-group, SIGKILL);
+    if (seconds > kPatienceSeconds) kill(-child_, SIGKILL);
   }
 
  private:
-  const std::function<void()>& on_wait_;
+  const ChildSettings& settings_;
+  const pid_t child_;
   bool asked_ = false;
   std::chrono::steady_clock::time_point asked_at_;
 };
@@ -230,7 +233,8 @@ ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& setti
   stop_signal = settings.stop_signal;
   const pid_t child = fork();
   if (child == 0)
-    BecomeProgram(arguments[0].c_str(), argv.data(), envp.data(), ends[1], processors);
+    BecomeProgram(arguments[0].c_str(), argv.data(), envp.data(), ends[1], processors,
+                  settings.stop_signal);
   if (child > 0) {
     setpgid(child, child);
     running_group = child;
@@ -243,7 +247,7 @@ ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& setti
   }
 
   std::deque<std::string> last;
-  Waiting waiting(settings.on_wait);
+  Waiting waiting(settings, child);
   const auto take_line = [&](const std::string& line) {
     log << line << '\n';
     if (settings.on_line) settings.on_line(line);

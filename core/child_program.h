@@ -21,9 +21,10 @@ struct ChildRun {
 struct ChildSettings {
   std::string log_path;     // all that it prints is appended here; "" = nowhere
   int max_processors = -1;  // it sees no more than these; -1 = all
-  // What it gets first when a signal stops us: SIGTERM for a program that tidies up, which is
-  // killed when it is still there after some seconds.
+  // What it gets first when a signal or should_stop stops it, and when we are killed: SIGTERM for a
+  // program that tidies up, which is killed when it is still there after some seconds.
   int stop_signal = SIGKILL;
+  std::function<bool()> should_stop;                // asked some times a second
   std::function<void(const std::string&)> on_line;  // every line that it prints
   std::function<void()> on_wait;                    // some times a second
 };
@@ -34,7 +35,7 @@ std::string FindProgram(const std::string& program, const std::string& remedy);
 std::string BesideThisProgram(const std::string& name);
 
 // Runs arguments[0], a path, with the rest as its arguments, without a display and without input,
-// and waits. Throws Interrupted when a signal stops us: the program is ended first.
+// and waits, in any thread. Throws Interrupted when a signal stops us: the program is ended first.
 ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& settings);
 
 // A line for a shell.

@@ -13,7 +13,6 @@
 #include <utility>
 
 #include <opencv2/core.hpp>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 
 #include "core/child_program.h"
@@ -399,8 +398,6 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
   CommonOptions& common = impl_->common;
   impl_->AddCommonOptions(this);
-  // Who started us for its own sake may be killed, and asks nothing then.
-  if (std::getenv(kEndsWithParent) != nullptr) prctl(PR_SET_PDEATHSIG, SIGTERM);
   const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   const std::string answer = impl_->Answer(arguments);
   if (!answer.empty()) {

@@ -22,9 +22,6 @@ class SignalTidy {
   std::thread waiting_;
 };
 
-// A command that finds this in its environment ends when the process that started it does.
-inline constexpr char kEndsWithParent[] = "ROOMTEX_ENDS_WITH_PARENT";
-
 // Tells what had been written and ends the process.
 [[noreturn]] void StopBySignal(const std::string& command, int signal);
 

@@ -1,30 +1,21 @@
 #include "align/pick/align_job.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/json_text.h"
-#include "core/signal_tidy.h"
-
-extern char** environ;
 
 namespace roomtex {
 namespace {
 
-constexpr size_t kMaxLog = 300;    // lines
-constexpr size_t kMaxLine = 4000;  // characters
-constexpr int kPatienceMs = 2000;  // between SIGTERM and SIGKILL
+constexpr size_t kMaxLog = 300;                 // lines
+constexpr size_t kMaxLine = 4000;               // characters
+constexpr char kSpeaker[] = "roomtex-align: ";  // before what it has to say
 
 // The stages that roomtex-align prints, in their order, with their seconds on a scan of 2 M samples
 // and 30 photos: what a share of the whole is measured by. A stage prints when it is done.
@@ -89,76 +80,32 @@ void AlignJob::Start() {
     if (state_ == "running") throw UsageError("An alignment is running already.");
   }
   if (follower_.joinable()) follower_.join();
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  // A group of its own: Ctrl-C at the terminal ends us, and we end it.
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-  std::vector<char*> argv = {const_cast<char*>(program_.c_str())};
-  for (const std::string& argument : arguments_) {
-    argv.push_back(const_cast<char*>(argument.c_str()));
-  }
-  argv.push_back(nullptr);
-  std::string ends_with_us = std::string(kEndsWithParent) + "=1";  // also when we are killed
-  std::vector<char*> environment = {ends_with_us.data()};
-  for (char** entry = environ; *entry != nullptr; ++entry) environment.push_back(*entry);
-  environment.push_back(nullptr);
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, program_.c_str(), &actions, &attributes, argv.data(),
-                                  environment.data());
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  close(ends[1]);
-  if (failed != 0) {
-    close(ends[0]);
-    throw UsageError(program_ + " cannot be started: " + std::strerror(failed) + ".");
-  }
+  std::vector<std::string> line = {FindProgram(program_, "It belongs beside roomtex-pick")};
+  line.insert(line.end(), arguments_.begin(), arguments_.end());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     state_ = "running";
-    child_ = child;
-    cancelled_ = false;
     stages_done_ = 0;
     log_.clear();
     errors_.clear();
     overlays_.clear();
     verdict_ = {};
   }
-  follower_ = std::thread([this, child, fd = ends[0]] { Follow(child, fd); });
+  cancelled_ = false;
+  follower_ = std::thread([this, line] { Follow(line); });
 }
 
-void AlignJob::Follow(pid_t child, int errors_fd) {
-  std::string rest;
-  char block[4096];
-  while (true) {
-    const ssize_t count = read(errors_fd, block, sizeof block);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) break;
-    rest.append(block, static_cast<size_t>(count));
-    for (size_t end; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1)) {
-      TakeLine(rest.substr(0, end));
-    }
-    if (rest.size() > kMaxLine) rest.resize(kMaxLine);  // the rest of a line that never ends
+void AlignJob::Follow(const std::vector<std::string>& line) {
+  ChildSettings settings;
+  settings.stop_signal = SIGTERM;
+  settings.should_stop = [this] { return cancelled_.load(); };
+  settings.on_line = [this](const std::string& said) { TakeLine(said); };
+  try {
+    Finish(RunChild(line, settings).exit_code);
+  } catch (const std::exception& failure) {
+    TakeLine(std::string(kSpeaker) + failure.what());
+    Finish(kExitInternalError);
   }
-  if (!rest.empty()) TakeLine(rest);
-  close(errors_fd);
-  // Not reaped yet: until the lock below is held, Cancel() still hits this process and no other.
-  siginfo_t info{};
-  while (waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
-  }
-  int status = 0;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    child_ = 0;
-    waitpid(child, &status, 0);
-  }
-  Finish(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
 }
 
 void AlignJob::TakeLine(const std::string& line) {
@@ -167,9 +114,8 @@ void AlignJob::TakeLine(const std::string& line) {
   if (log_.size() > kMaxLog) log_.pop_front();
   const int stage = StageOf(line);
   if (stage >= 0) stages_done_ = std::max(stages_done_, stage + 1);
-  const std::string from = "roomtex-align: ";
-  if (line.rfind(from, 0) == 0) {
-    errors_.push_back(line.substr(from.size()));
+  if (line.rfind(kSpeaker, 0) == 0) {
+    errors_.push_back(line.substr(std::strlen(kSpeaker)));
   } else if (!errors_.empty() && stage < 0) {
     errors_.push_back(line);  // a message of several lines
   }
@@ -203,20 +149,7 @@ void AlignJob::Finish(int exit_code) {
 
 void AlignJob::Cancel() {
   const std::lock_guard<std::mutex> starting(starting_);
-  const auto kill_with = [this](int signal) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (child_ == 0) return false;
-    cancelled_ = true;
-    kill(-child_, signal);
-    return true;
-  };
-  bool alive = kill_with(SIGTERM);
-  for (int waited = 0; alive && waited < kPatienceMs; waited += 20) {
-    usleep(20000);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    alive = child_ != 0;
-  }
-  if (alive) kill_with(SIGKILL);
+  cancelled_ = true;
   if (follower_.joinable()) follower_.join();
 }
 

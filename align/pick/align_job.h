@@ -2,13 +2,12 @@
 // roomtex-align as the page runs it: a process of its own on the saved picks, followed by what it
 // prints, its report put into plain words.
 
+#include <atomic>
 #include <deque>
 #include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
-
-#include <sys/types.h>
 
 #include "core/report.h"
 
@@ -31,9 +30,9 @@ class AlignJob {
   AlignJob(std::string program, std::vector<std::string> arguments, std::string aligned_path);
   ~AlignJob();  // ends a running one
 
-  // Throws UsageError if it runs already or cannot be started.
+  // Throws UsageError if it runs already, InputError if there is no such program.
   void Start();
-  // Ends a running one (SIGTERM, after two seconds SIGKILL) and waits for it.
+  // Ends a running one (SIGTERM, after some seconds SIGKILL) and waits for it.
   void Cancel();
   // As GET align of align/pick/README.md.
   Json State();
@@ -41,7 +40,7 @@ class AlignJob {
   std::string OverlayPath(const std::string& name);
 
  private:
-  void Follow(pid_t child, int errors_fd);
+  void Follow(const std::vector<std::string>& line);
   void TakeLine(const std::string& line);
   void Finish(int exit_code);
 
@@ -50,11 +49,10 @@ class AlignJob {
   const std::string aligned_path_;
   std::mutex starting_;  // Start, Cancel: one at a time
   std::thread follower_;
+  std::atomic<bool> cancelled_{false};
 
   std::mutex mutex_;  // of all that follows
   std::string state_ = "idle";
-  pid_t child_ = 0;  // 0 = none
-  bool cancelled_ = false;
   int stages_done_ = 0;
   std::deque<std::string> log_;
   std::vector<std::string> errors_;

@@ -195,7 +195,7 @@ TEST_F(FakeProgram, OneThatIsNotThereIsSaid) {
   Put(1, ToJson(TruePicks(1)));
   const Answer answer = Post("align");
   EXPECT_EQ(answer.status, 422);
-  EXPECT_THAT(answer.body, HasSubstr("cannot be started"));
+  EXPECT_THAT(answer.body, HasSubstr("does not exist. It belongs beside roomtex-pick."));
   EXPECT_EQ(Get("align").json()["state"], "idle");
 }
 
