@@ -172,8 +172,11 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
   const bool held = std::count(used.begin(), used.end(), true) > 0;
   const bool by_photos = start.num_corners > 0;
   if (held && !judgement->open.None()) {
-    // One wall leaves too much: corners that are off together, as by a lens, turn and scale all.
-    const bool is_too_much = by_photos && judgement->open.num_facings < 2;
+    // In front of one wall corners that are off together, as by a lens, move, turn and scale all:
+    // there they must hold the model well.
+    constexpr double kHeldWell = 0.0025;  // metres
+    const bool is_too_much =
+        by_photos && judgement->open.num_facings < 2 && judgement->open.slide_sigma > kHeldWell;
     (is_too_much ? judgement->reasons : judgement->warnings)
         .push_back(judgement->open.Sentence(by_photos));
   }
