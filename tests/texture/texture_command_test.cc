@@ -317,9 +317,14 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   Scan scan = ReadCaptureScan();
   for (const double loss : {2.2, 4.5}) {  // dB; without the station nobody knows its shadows
     WriteScan(scan, {}, Path("cloud.ply"));
-    const CommandResult result = Texture("cloud", "", Path("cloud.ply"));
+    const CommandResult result = Texture("cloud", "--output_e57 1", Path("cloud.ply"));
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const PlyVertices model = ReadPly(Path("cloud/model.ply"));
+    ScanReaderOptions with_colors;
+    with_colors.colors = true;
+    const Scan e57 = ReadScan(Path("cloud/model.e57"), with_colors);
+    EXPECT_EQ(e57.points.size() - static_cast<size_t>(e57.NumMissing()), model.points.size());
+    EXPECT_EQ(e57.colors.size(), e57.points.size());
     ASSERT_EQ(model.points.size(), truth.points.size());
     EXPECT_GT(Psnr(model, truth), psnr_of_grid - loss);
     EXPECT_GT(ReadJson(Path("cloud/report.json"))["coverage"],
@@ -351,6 +356,25 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   std::string error, warning;
   ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("mesh/model.glb"))) << error;
   EXPECT_EQ(model.meshes.at(0).primitives.at(0).attributes.count("COLOR_0"), 1u);
+
+  // Decimated, its colours are in a texture, as fine as the photos.
+  const CommandResult fewer =
+      Texture("fewer", "--Texture.scale auto --Mesh.max_triangles 3000 --Mesh.compression none",
+              Path("room.ply"));
+  ASSERT_EQ(fewer.exit_code, 0) << fewer.err;
+  EXPECT_EQ(ReadBytes(Path("fewer/model.ply")), ReadBytes(Path("mesh/model.ply")));
+  const tinygltf::Model web = LoadGlb(Path("fewer/model_web.glb"));
+  ASSERT_FALSE(web.images.empty());
+  size_t num_texels = 0, num_triangles = 0;
+  for (const tinygltf::Image& image : web.images) {
+    num_texels += static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+  }
+  for (const tinygltf::Primitive& part : web.meshes.at(0).primitives) {
+    EXPECT_EQ(part.attributes.count("TEXCOORD_0"), 1u);
+    num_triangles += web.accessors.at(static_cast<size_t>(part.indices)).count / 3;
+  }
+  EXPECT_GT(num_texels, mesh.points.size());
+  EXPECT_LT(num_triangles, 10000u);
 }
 
 // The true colours between the samples: the same room, scanned more finely.
