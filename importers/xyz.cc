@@ -190,6 +190,10 @@ class XyzParser {
       for (int k = 0; k < 3; ++k) color[k] = number(columns_->color[k]);
       if (columns_->intensity < 0) intensity = GreyOf(color);
     }
+    if (options_.colors && color.minCoeff() < 0) {  // these columns are none
+      options_.colors = false;
+      scan_.colors = {};
+    }
     const double range = point.norm();
     if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) return;
     scan_.points.push_back(point);
