@@ -341,6 +341,15 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   EXPECT_EQ(model.accessors.at(primitive.attributes.at("COLOR_0")).count, truth.points.size());
 }
 
+tinygltf::Model LoadGlb(const std::string& path) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
+  EXPECT_EQ(error + warning, "");
+  return model;
+}
+
 TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const Scan scan = ReadCaptureScan();
   WriteScan(scan, BuildScanMesh(scan, ScanMeshOptions()), Path("room.ply"));
@@ -351,10 +360,7 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const PlyVertices mesh = ReadPly(Path("mesh/model.ply"));
   EXPECT_EQ(mesh.points.size(), scan.points.size() - scan.NumMissing());
   EXPECT_GT(Psnr(mesh, ReadPly(Capture() + "/truth/true_colors.ply")), 23.0);
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("mesh/model.glb"))) << error;
+  const tinygltf::Model model = LoadGlb(Path("mesh/model.glb"));
   EXPECT_EQ(model.meshes.at(0).primitives.at(0).attributes.count("COLOR_0"), 1u);
 
   // Decimated, its colours are in a texture, as fine as the photos.
@@ -431,15 +437,6 @@ TEST_F(TextureCommand, ChoosesTheScaleByThePhotosAndTheMemory) {
   EXPECT_EQ(scale, std::min(4.0, std::ceil(report["pixels_per_sample"].get<double>())));
   EXPECT_GT(scale, 1);
   EXPECT_EQ(cv::imread(Path("auto/texture.png")).cols, 500 * scale);
-}
-
-tinygltf::Model LoadGlb(const std::string& path) {
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
-  EXPECT_EQ(error + warning, "");
-  return model;
 }
 
 // The bare walls of the room as a mesh of twelve triangles that look inwards.
