@@ -3,6 +3,7 @@
 // took them (thesis 5.1.1), or a plain triangle mesh, or points, without a grid.
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ namespace roomtex {
 
 // Indices into Scan::points, counter-clockwise seen from the front.
 using Triangle = std::array<int, 3>;
+
+// Red, green and blue, sRGB.
+using CellColors = std::vector<std::array<uint8_t, 3>>;
 
 struct Scan {
   std::string path;  // the file it came from, for messages and reports
@@ -38,6 +42,11 @@ struct Scan {
   // One per grid cell, in the unit of the file (RTPI: integers; PTX: 0..1). Missing samples: 0.
   std::vector<float> intensity;
 
+  // The file's own colours, one per cell, where they were asked for and the file has some.
+  CellColors colors;
+  // Of a cloud whose file says them: unit normals of the surface, outwards; zero = none.
+  std::vector<Eigen::Vector3f> normals;
+
   // Triangles of a mesh without a grid. Empty when organised: see scan_mesh.h.
   std::vector<Triangle> triangles;
 
@@ -45,6 +54,7 @@ struct Scan {
   Rigid scan_from_station;
   // Unit vector of the scan frame that points up (RTPI: y; PTX: z).
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
+  bool up_is_assumed = false;  // the file does not say it
   bool is_rtpi = false;
 
   int Index(int column, int row) const { return row * num_columns + column; }

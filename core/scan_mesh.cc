@@ -211,4 +211,34 @@ std::vector<Eigen::Vector3f> VertexNormals(const Scan& scan,
   return normals;
 }
 
+SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
+                           const std::vector<Triangle>& triangles, int max_count) {
+  SurfaceProbes probes;
+  double total = 0;
+  for (const Triangle& t : triangles) {
+    const double area =
+        0.5 * (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]).norm();
+    if (std::isfinite(area)) total += area;
+  }
+  if (!(total > 0)) return probes;
+  const double area_per_probe = total / max_count;
+  // Roberts' R2 sequence inside the triangles: even, and the same in every run.
+  constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
+  double owed = 0.5 * area_per_probe, x = 0.5, y = 0.5;
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d a = points[t[0]], ab = points[t[1]] - a, ac = points[t[2]] - a;
+    const Eigen::Vector3d normal = ab.cross(ac);
+    const double area = 0.5 * normal.norm();
+    if (!std::isfinite(area)) continue;
+    for (owed += area; owed >= area_per_probe; owed -= area_per_probe) {
+      x = std::fmod(x + kStepX, 1.0);
+      y = std::fmod(y + kStepY, 1.0);
+      const bool beyond = x + y > 1;
+      probes.points.push_back(a + (beyond ? 1 - x : x) * ab + (beyond ? 1 - y : y) * ac);
+      probes.normals.push_back(normal.normalized().cast<float>());
+    }
+  }
+  return probes;
+}
+
 }  // namespace roomtex

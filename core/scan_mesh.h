@@ -40,4 +40,12 @@ std::vector<Triangle> BuildScanMesh(const Scan& scan, const ScanMeshOptions& opt
 std::vector<Eigen::Vector3f> VertexNormals(const Scan& scan,
                                            const std::vector<Triangle>& triangles);
 
+// Points spread evenly over the surface, with the normals of their triangles. At most max_count.
+struct SurfaceProbes {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector3f> normals;
+};
+SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
+                           const std::vector<Triangle>& triangles, int max_count);
+
 }  // namespace roomtex

@@ -126,16 +126,18 @@ Plane FitPlane(const Sums& sums) {
 }
 
 struct Surfel {
-  std::array<Eigen::Vector3f, 4> corners;  // around it, relative to the origin
+  std::array<Eigen::Vector3f, 4> corners;           // around it, relative to the origin
+  Eigen::Vector3f front = Eigen::Vector3f::Zero();  // sum of the file's normals, zero = none
   float intensity = 0;
 };
 
 // One part of the octree: a cell of at most kPointsOfWindow points, and the cells in it.
 class Part {
  public:
-  // usual_noise: metres; 0 = not known yet.
-  Part(const SortedPoints& sorted, const Eigen::Vector3d& station, double usual_noise)
-      : sorted_(sorted), station_(station), noise_(usual_noise) {}
+  // usual_noise: metres; 0 = not known yet. fronts: normals of the cloud's points, or null.
+  Part(const SortedPoints& sorted, const Eigen::Vector3d& station, double usual_noise,
+       const std::vector<Eigen::Vector3f>* fronts = nullptr)
+      : sorted_(sorted), station_(station), noise_(usual_noise), fronts_(fronts) {}
 
   void Grow(size_t begin, size_t end, int level) {
     nodes_.clear();
@@ -320,16 +322,18 @@ class Part {
     const Eigen::Vector3d v = plane.normal.cross(u);
     Eigen::Vector2d low(1e300, 1e300), high(-1e300, -1e300);
     double intensity = 0;
+    Surfel surfel;
     for (size_t i = begin; i < end; ++i) {
       const Eigen::Vector3d offset = At(i) - plane.mean;
       const Eigen::Vector2d at(u.dot(offset), v.dot(offset));
       low = low.cwiseMin(at);
       high = high.cwiseMax(at);
-      intensity += (*intensity_)[static_cast<size_t>(sorted_.index[i])];
+      const auto index = static_cast<size_t>(sorted_.index[i]);
+      intensity += (*intensity_)[index];
+      if (fronts_ != nullptr) surfel.front += (*fronts_)[index];
     }
     low.array() -= reach;
     high.array() += reach;
-    Surfel surfel;
     surfel.intensity = static_cast<float>(intensity / static_cast<double>(end - begin));
     const double at[4][2] = {
         {low[0], low[1]}, {high[0], low[1]}, {high[0], high[1]}, {low[0], high[1]}};
@@ -347,6 +351,9 @@ class Part {
     if (surface_->angular_spacing > 0 && plane.normal.dot(station_ - surface_->points[index]) < 0) {
       surface_->normals[index] *= -1;
     }
+    if (fronts_ != nullptr && surface_->normals[index].dot((*fronts_)[index]) < 0) {
+      surface_->normals[index] *= -1;
+    }
     const double distance = plane.normal.dot(At(i) - plane.mean);
     if (std::abs(distance) <= limit) surface_->points[index] -= distance * plane.normal;
   }
@@ -354,6 +361,7 @@ class Part {
   const SortedPoints& sorted_;
   Eigen::Vector3d station_;
   double noise_;
+  const std::vector<Eigen::Vector3f>* fronts_;
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   std::vector<Node> nodes_;
   std::vector<int> around_;  // the cells that hold the one at hand, outermost first
@@ -424,6 +432,20 @@ double FindAngularSpacing(const Scan& cloud) {
   return std::sqrt(4 * kPi * share / std::max(1.0, static_cast<double>(num_points)));
 }
 
+// The normals of the file have a side: see CloudSurface.
+bool NormalsAreTurned(const Scan& cloud, const Eigen::Vector3d& middle) {
+  constexpr double kMostOfThem = 0.75;
+  if (cloud.normals.size() != cloud.points.size()) return false;
+  size_t num_towards = 0, num_asked = 0;
+  for (size_t i = 0; i < cloud.points.size(); i += cloud.points.size() / 100000 + 1) {
+    if (cloud.IsMissing(static_cast<int>(i)) || cloud.normals[i].isZero()) continue;
+    ++num_asked;
+    num_towards += cloud.normals[i].cast<double>().dot(middle - cloud.points[i]) > 0;
+  }
+  const double share = static_cast<double>(num_towards) / std::max<size_t>(1, num_asked);
+  return num_asked > 0 && std::max(share, 1 - share) >= kMostOfThem;
+}
+
 Scan MeshOfSurfels(const Scan& cloud, bool station_is_known, const Eigen::Vector3d& origin,
                    std::vector<std::vector<Surfel>>* blocks) {
   Scan mesh;
@@ -447,7 +469,9 @@ Scan MeshOfSurfels(const Scan& cloud, bool station_is_known, const Eigen::Vector
       }
       const Eigen::Vector3d& a = mesh.points[first];
       const Eigen::Vector3d normal = (mesh.points[first + 1] - a).cross(mesh.points[first + 2] - a);
-      const bool is_turned = normal.dot(mesh.Station() - a) < 0;
+      const Eigen::Vector3d front =
+          surfel.front.isZero() ? Eigen::Vector3d(mesh.Station() - a) : surfel.front.cast<double>();
+      const bool is_turned = normal.dot(front) < 0;
       for (const int k : {1, 2}) {
         mesh.triangles.push_back({first, first + k + is_turned, first + k + !is_turned});
       }
@@ -473,6 +497,8 @@ CloudSurface FindCloudSurface(const Scan& cloud, int num_threads) {
   if (!sorted.keys.empty()) FindParts(sorted, {0, sorted.keys.size(), 0}, &parts);
 
   surface.angular_spacing = FindAngularSpacing(cloud);
+  const bool has_fronts = !(surface.angular_spacing > 0) && NormalsAreTurned(cloud, sorted.origin);
+  surface.front_is_known = surface.angular_spacing > 0 || has_fronts;
 
   std::vector<float> noises, spacings;
   Part asked(sorted, cloud.Station(), 0);
@@ -488,7 +514,7 @@ CloudSurface FindCloudSurface(const Scan& cloud, int num_threads) {
   const int num_blocks = (static_cast<int>(parts.size()) + kPartsAtOnce - 1) / kPartsAtOnce;
   std::vector<std::vector<Surfel>> blocks(static_cast<size_t>(num_blocks));
   ParallelFor(num_threads, 0, num_blocks, [&](int block) {
-    Part part(sorted, cloud.Station(), noise);
+    Part part(sorted, cloud.Station(), noise, has_fronts ? &cloud.normals : nullptr);
     const int end = std::min<int>((block + 1) * kPartsAtOnce, static_cast<int>(parts.size()));
     for (int i = block * kPartsAtOnce; i < end; ++i) {
       part.Grow(parts[i].begin, parts[i].end, parts[i].level);

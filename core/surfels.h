@@ -14,18 +14,24 @@ namespace roomtex {
 struct CloudSurface {
   // Per point of the cloud: its place with the noise across the surface taken out (`scan` frame;
   // NaN = missing), and the unit normal there; zero where the cloud shows no surface (stray
-  // points). Normals point to the station if the cloud was taken from there, else to either side.
+  // points). Normals point to the station if the cloud was taken from there, else to where those of
+  // its file do, if they have a side (front_is_known), else to either side.
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector3f> normals;
   std::vector<float> spacings;  // metres to the next points around; 0 = no surface
   // The surfels as a mesh without a grid: two triangles each, corners of their own, at the mean
-  // intensity of their points, turned to the cloud's station or, where that is none, its middle.
+  // intensity of their points, turned as the normals or, where they have no side, to the middle of
+  // the cloud.
   Scan patches;
   double noise = 0;    // metres, standard deviation of a point across the surface, median
   double spacing = 0;  // metres between neighbouring points, median
   // Radians between neighbouring points seen from the cloud's Station(); 0 = it was not taken from
   // there: too many points hide each other, or all lie in one direction.
   double angular_spacing = 0;
+  // Station or normals of the file say which side of the surface is the front. Those of a file are
+  // believed where three in four point to the middle of the cloud (a room), or away from it (a
+  // thing): many programs write normals of arbitrary sign.
+  bool front_is_known = false;
 };
 
 // Cells of an octree are cut until a few points are left in each. Where the points of a cell and of

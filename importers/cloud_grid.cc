@@ -113,8 +113,14 @@ double StartOfAzimuths(const std::vector<Angles>& angles) {
 
 class GridFinder {
  public:
-  explicit GridFinder(const Scan& cloud)
-      : cloud_(cloud), station_from_scan_(cloud.scan_from_station.Inverse()) {}
+  GridFinder(const Scan& cloud, const Eigen::Vector3d& axis_in_station)
+      : cloud_(cloud), upright_from_scan_(cloud.scan_from_station.Inverse()) {
+    if (axis_in_station == Eigen::Vector3d::UnitZ()) return;
+    const Rigid upright_from_station{
+        Eigen::Quaterniond::FromTwoVectors(axis_in_station, Eigen::Vector3d::UnitZ()),
+        Eigen::Vector3d::Zero()};
+    upright_from_scan_ = upright_from_station * upright_from_scan_;
+  }
 
   std::optional<Scan> Find() {
     if (!FindSteps() || !FindSize()) return std::nullopt;
@@ -122,7 +128,7 @@ class GridFinder {
   }
 
  private:
-  Angles AnglesAt(size_t i) const { return AnglesOf(station_from_scan_ * cloud_.points[i]); }
+  Angles AnglesAt(size_t i) const { return AnglesOf(upright_from_scan_ * cloud_.points[i]); }
   // From where the columns begin, 0 to a full turn.
   double Turn(double azimuth) const {
     const double turn = std::fmod(azimuth - start_, 2 * kPi);
@@ -188,6 +194,8 @@ class GridFinder {
     const size_t cells = static_cast<size_t>(num_rows_) * static_cast<size_t>(num_columns_);
     scan.points.assign(cells, Scan::MissingPoint());
     scan.intensity.assign(cells, 0.0f);
+    scan.normals.clear();
+    if (!cloud_.colors.empty()) scan.colors.assign(cells, {0, 0, 0});
     size_t num_doubled = 0;
     for (size_t i = 0; i < cloud_.points.size(); ++i) {
       const Angles a = AnglesAt(i);
@@ -202,6 +210,7 @@ class GridFinder {
       }
       scan.points[static_cast<size_t>(cell)] = cloud_.points[i];
       scan.intensity[static_cast<size_t>(cell)] = cloud_.intensity[i];
+      if (!scan.colors.empty()) scan.colors[static_cast<size_t>(cell)] = cloud_.colors[i];
     }
     if (static_cast<double>(num_doubled) >
         kMostDoubled * static_cast<double>(cloud_.points.size())) {
@@ -211,8 +220,8 @@ class GridFinder {
   }
 
   const Scan& cloud_;
-  Rigid station_from_scan_;
-  double start_ = 0;  // azimuth
+  Rigid upright_from_scan_;  // the axis is z
+  double start_ = 0;         // azimuth
   Lines rows_, columns_;
   double top_ = 0, first_column_ = 0;
   int num_rows_ = 0, num_columns_ = 0;
@@ -220,6 +229,8 @@ class GridFinder {
 
 }  // namespace
 
-std::optional<Scan> GridFromCloud(const Scan& cloud) { return GridFinder(cloud).Find(); }
+std::optional<Scan> GridFromCloud(const Scan& cloud, const Eigen::Vector3d& axis_in_station) {
+  return GridFinder(cloud, axis_in_station).Find();
+}
 
 }  // namespace roomtex

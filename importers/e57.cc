@@ -9,6 +9,7 @@
 #include "importers/e57_document.h"
 #include "importers/e57_grid.h"
 #include "importers/e57_points.h"
+#include "importers/mesh_scan.h"
 
 namespace roomtex {
 namespace {
@@ -55,7 +56,7 @@ class E57ScanReader {
  public:
   E57ScanReader(const E57Pages& pages, const E57Scan& source, const E57Options& options,
                 std::vector<std::string>* notes)
-      : source_(source), options_(options), reader_(pages, source) {
+      : source_(source), options_(options), reader_(pages, source, options.colors) {
     scan_.path = pages.path();
     scan_.name = source.name;
     scan_.up = Eigen::Vector3d::UnitZ();
@@ -84,12 +85,15 @@ class E57ScanReader {
     return rotation_ * point + scan_.scan_from_station.translation;
   }
 
+  bool HasColors() const { return options_.colors && reader_.HasColors(); }
+
   void ReadGrid() {
     scan_.num_rows = grid_->num_rows();
     scan_.num_columns = grid_->num_columns();
     const size_t cells = static_cast<size_t>(scan_.num_rows) * scan_.num_columns;
     scan_.points.assign(cells, Scan::MissingPoint());
     scan_.intensity.assign(cells, 0.0f);
+    if (HasColors()) scan_.colors.assign(cells, {0, 0, 0});
     std::vector<float> returns(reader_.HasReturns() ? cells : 0);
     while (const int64_t count = reader_.Next()) {
       for (int64_t i = 0; i < count; ++i) {
@@ -106,6 +110,9 @@ class E57ScanReader {
         }
         scan_.points[static_cast<size_t>(cell)] = point;
         scan_.intensity[static_cast<size_t>(cell)] = reader_.Intensity(i);
+        if (HasColors()) {
+          scan_.colors[static_cast<size_t>(cell)] = scale_.Bytes(reader_.Color(i), &scan_.colors);
+        }
         if (!returns.empty()) returns[static_cast<size_t>(cell)] = number;
       }
     }
@@ -125,6 +132,13 @@ class E57ScanReader {
         if (!(point.x() == point.x())) continue;
         scan_.points.push_back(point);
         scan_.intensity.push_back(reader_.Intensity(i));
+        if (HasColors()) scan_.colors.push_back(scale_.Bytes(reader_.Color(i), &scan_.colors));
+        if (reader_.HasNormals()) {
+          const Eigen::Vector3d normal = rotation_ * reader_.Normal(i);
+          const bool is_one = normal.allFinite() && normal.norm() > 0.5;
+          scan_.normals.emplace_back(is_one ? normal.normalized().cast<float>()
+                                            : Eigen::Vector3f::Zero().eval());
+        }
       }
     }
     scan_.num_rows = 1;
@@ -136,6 +150,7 @@ class E57ScanReader {
   E57PointReader reader_;
   std::optional<E57Grid> grid_;
   Scan scan_;
+  ColorScale scale_{1};
   Eigen::Matrix3d rotation_ = source_.file_from_scan.rotation.toRotationMatrix();
 };
 

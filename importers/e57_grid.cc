@@ -147,15 +147,18 @@ struct Steps {
 void Transpose(Scan* scan) {
   std::vector<Eigen::Vector3d> points(scan->points.size());
   std::vector<float> intensity(points.size());
+  CellColors colors(scan->colors.size());
   for (int row = 0; row < scan->num_rows; ++row) {
     for (int column = 0; column < scan->num_columns; ++column) {
       const size_t to = static_cast<size_t>(column) * scan->num_rows + row;
       points[to] = scan->points[scan->Index(column, row)];
       intensity[to] = scan->intensity[scan->Index(column, row)];
+      if (!colors.empty()) colors[to] = scan->colors[scan->Index(column, row)];
     }
   }
   scan->points = std::move(points);
   scan->intensity = std::move(intensity);
+  scan->colors = std::move(colors);
   std::swap(scan->num_rows, scan->num_columns);
 }
 
@@ -169,6 +172,7 @@ void TurnRowsRound(Scan* scan) {
     };
     swap_row(&scan->points);
     swap_row(&scan->intensity);
+    if (!scan->colors.empty()) swap_row(&scan->colors);
   }
 }
 

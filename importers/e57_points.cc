@@ -5,12 +5,10 @@
 
 #include "core/error.h"
 #include "core/scan.h"
+#include "importers/mesh_scan.h"
 
 namespace roomtex {
 namespace {
-
-// Of red, green and blue in grey (Rec. ITU-R BT.601).
-constexpr double kGreyWeights[3] = {0.299, 0.587, 0.114};
 
 Eigen::Vector3d PointOfAngles(double range, double azimuth, double elevation) {
   const double horizontal = range * std::cos(elevation);
@@ -24,14 +22,19 @@ bool IsStructured(const E57Scan& scan) {
   return scan.points.Find("rowIndex") >= 0 && scan.points.Find("columnIndex") >= 0;
 }
 
-E57PointReader::E57PointReader(const E57Pages& pages, const E57Scan& scan)
+E57PointReader::E57PointReader(const E57Pages& pages, const E57Scan& scan, bool with_colors)
     : pages_(pages), scan_(scan) {
   WantCoordinates();
   WantIntensity();
+  if (with_colors || intensity_slot_ == kNone) WantColors();
   if (IsStructured(scan)) {
     row_ = Want("rowIndex");
     column_ = Want("columnIndex");
     return_ = Want("returnIndex");
+  } else {
+    const char* const kNormals[] = {"nor:normalX", "nor:normalY", "nor:normalZ"};
+    for (int i = 0; i < 3; ++i) normals_[i] = Want(kNormals[i]);
+    if (normals_[0] == kNone || normals_[1] == kNone) normals_[2] = kNone;
   }
   records_.emplace(pages, scan.points, wanted_);
 }
@@ -67,18 +70,22 @@ void E57PointReader::WantCoordinates() {
 
 void E57PointReader::WantIntensity() {
   intensity_slot_ = Want("intensity");
-  if (intensity_slot_ != kNone) {
-    intensity_scaling_ = ScalingOf(intensity_slot_, scan_.intensity_limits);
-    intensity_state_ = Want("isIntensityInvalid");
-    return;
-  }
+  if (intensity_slot_ == kNone) return;
+  intensity_scaling_ = ScalingOf(intensity_slot_, scan_.intensity_limits);
+  intensity_state_ = Want("isIntensityInvalid");
+}
+
+void E57PointReader::WantColors() {
   const char* const kColors[] = {"colorRed", "colorGreen", "colorBlue"};
   for (int i = 0; i < 3; ++i) {
     colors_[i] = Want(kColors[i]);
-    if (colors_[i] == kNone) return;
+    if (colors_[i] == kNone) {
+      colors_[2] = kNone;
+      return;
+    }
     color_scaling_[i] = ScalingOf(colors_[i], scan_.color_limits[i]);
   }
-  intensity_state_ = Want("isColorInvalid");
+  color_state_ = Want("isColorInvalid");
 }
 
 // 0 to 1 by the limits of the scan, else by those of an integer field, else nothing changes.
@@ -120,23 +127,31 @@ void E57PointReader::TakePoints(int64_t count) {
 void E57PointReader::TakeIntensities(int64_t count) {
   if (count == 0) return;
   std::fill(intensity_.begin(), intensity_.end(), 0.0f);
-  const auto add = [&](int slot, const Scaling& scaling, double weight) {
-    const double* const values = Values(slot);
-    for (int64_t i = 0; i < count; ++i) {
-      intensity_[static_cast<size_t>(i)] +=
-          static_cast<float>((values[i] - scaling.offset) * scaling.factor * weight);
-    }
-  };
   if (intensity_slot_ != kNone) {
-    add(intensity_slot_, intensity_scaling_, 1);
-  } else if (colors_[2] != kNone) {
-    for (int k = 0; k < 3; ++k) add(colors_[k], color_scaling_[k], kGreyWeights[k]);
+    const double* const values = Values(intensity_slot_);
+    for (int64_t i = 0; i < count; ++i) {
+      intensity_[static_cast<size_t>(i)] =
+          static_cast<float>((values[i] - intensity_scaling_.offset) * intensity_scaling_.factor);
+    }
+  } else if (HasColors()) {
+    for (int64_t i = 0; i < count; ++i) {
+      intensity_[static_cast<size_t>(i)] = static_cast<float>(GreyOf(Color(i)));
+    }
   }
   const double* const state = intensity_state_ != kNone ? Values(intensity_state_) : nullptr;
   for (int64_t i = 0; i < count; ++i) {
     float& intensity = intensity_[static_cast<size_t>(i)];
     if ((state != nullptr && state[i] != 0) || !std::isfinite(intensity)) intensity = 0;
   }
+}
+
+Eigen::Vector3d E57PointReader::Color(int64_t i) const {
+  if (color_state_ != kNone && Values(color_state_)[i] != 0) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d color;
+  for (int k = 0; k < 3; ++k) {
+    color[k] = (Values(colors_[k])[i] - color_scaling_[k].offset) * color_scaling_[k].factor;
+  }
+  return color;
 }
 
 }  // namespace roomtex

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "core/command_line.h"
@@ -154,8 +153,10 @@ class ScanColumns {
         columns_.emplace_back(name, 0, 255);
       }
     }
-    columns_.emplace_back("rowIndex", 0, scan.num_rows - 1);
-    columns_.emplace_back("columnIndex", 0, scan.num_columns - 1);
+    if (scan.organised) {
+      columns_.emplace_back("rowIndex", 0, scan.num_rows - 1);
+      columns_.emplace_back("columnIndex", 0, scan.num_columns - 1);
+    }
     header_size_ = 6 + 2 * columns_.size();
     size_t bits = 0;
     for (const BitColumn& column : columns_) bits += static_cast<size_t>(column.num_bits());
@@ -249,6 +250,7 @@ class ScanColumns {
     for (int i = 0; i < 3 && colors_ != nullptr; ++i) {
       columns_[k++].Add((*colors_)[static_cast<size_t>(cell)][static_cast<size_t>(i)]);
     }
+    if (!scan_.organised) return;
     columns_[k++].Add(row);
     columns_[k].Add(column);
   }
@@ -338,7 +340,6 @@ void E57Writer::Align() { Write(std::string((4 - page_.size() % 4) % 4, '\0')); 
 uint64_t E57Writer::PhysicalOffset() const { return num_pages_ * kPageSize + page_.size(); }
 
 void E57Writer::AddScan(const Scan& scan, const CellColors* colors) {
-  if (!scan.organised) throw std::invalid_argument("E57Writer needs organised scans");
   if (stations_.empty()) {
     file_from_scan_ = Eigen::Quaterniond::FromTwoVectors(scan.up, Eigen::Vector3d::UnitZ());
   }
@@ -360,8 +361,9 @@ void E57Writer::AddScan(const Scan& scan, const CellColors* colors) {
   const std::string name = scan.name.empty() ? "scan " + std::to_string(number) : scan.name;
   scans_xml_ += Structure(
       "vectorChild",
-      Text("guid", guid) + Text("name", name) + PoseXml(file_from_station) + IndexBoundsXml(scan) +
-          LimitsXml(scan, colors != nullptr) + columns.BoundsXml() +
+      Text("guid", guid) + Text("name", name) + PoseXml(file_from_station) +
+          (scan.organised ? IndexBoundsXml(scan) : "") + LimitsXml(scan, colors != nullptr) +
+          columns.BoundsXml() +
           Element("points", "CompressedVector",
                   "\n" + Structure("prototype", columns.Prototype()) +
                       Element("codecs", "Vector", "", " allowHeterogeneousChildren=\"1\""),
@@ -443,7 +445,7 @@ void E57Writer::Commit() {
 
 void WriteE57(const std::vector<Scan>& scans, const std::string& path) {
   E57Writer writer(path);
-  for (const Scan& scan : scans) writer.AddScan(scan, nullptr);
+  for (const Scan& scan : scans) writer.AddScan(scan, scan.colors.empty() ? nullptr : &scan.colors);
   writer.Commit();
 }
 

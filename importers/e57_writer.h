@@ -1,5 +1,5 @@
 #pragma once
-// Writes E57 files: structured scans of several stations, with colours and photos.
+// Writes E57 files: scans of several stations, with colours and photos.
 
 #include <array>
 #include <cstdint>
@@ -12,9 +12,6 @@
 
 namespace roomtex {
 
-// Red, green and blue of each cell of a scan's grid.
-using CellColors = std::vector<std::array<uint8_t, 3>>;
-
 // Sections are written as they are added, the XML at the end: memory does not follow the scans. No
 // index packet: some programs do not read files with one. In an E57 z is up: scans whose up axis is
 // another (RTPI: y) are turned, and the photos with them.
@@ -24,8 +21,8 @@ class E57Writer {
   explicit E57Writer(const std::string& path);
 
   // The measured samples row by row from the top, in the station's frame to half a micrometre, with
-  // row and column, intensity and, unless null, colour (one per cell). Scan without a name: "scan
-  // N". scan: organised.
+  // row and column (where the scan has a grid), intensity and, unless null, colour (one per cell).
+  // Scan without a name: "scan N".
   void AddScan(const Scan& scan, const CellColors* colors);
 
   // A photo of a pinhole camera (SIMPLE_PINHOLE, PINHOLE), or a panorama (EQUIRECTANGULAR). It is
@@ -63,7 +60,7 @@ class E57Writer {
   int num_photos_ = 0;
 };
 
-// All scans in one file, without colours or photos. Organised scans only.
+// All scans in one file, with the colours that they have.
 void WriteE57(const std::vector<Scan>& scans, const std::string& path);
 
 }  // namespace roomtex

@@ -10,6 +10,7 @@
 #include "core/output_file.h"
 #include "core/resource_limits.h"
 #include "importers/file_reader.h"
+#include "importers/mesh_scan.h"
 
 namespace roomtex {
 namespace {
@@ -133,10 +134,14 @@ Scan ReadLas(const std::string& path, const LasOptions& options) {
   scan.path = path;
   scan.organised = false;
   scan.up = Eigen::Vector3d::UnitZ();
+  scan.up_is_assumed = true;
   scan.points.reserve(static_cast<size_t>(header.count));
   scan.intensity.reserve(static_cast<size_t>(header.count));
   std::vector<float> greys;
   const int colors = kPointFormats[header.format].colors;
+  const bool keeps_colors = options.colors && colors >= 0;
+  ColorScale color_scale(255);  // some programs write bytes
+  if (keeps_colors) scan.colors.reserve(static_cast<size_t>(header.count));
   const char withheld = static_cast<char>(header.format < kFirstOfLas14 ? 0x80 : 0x04);
   const int64_t per_block = std::max<int64_t>(1, kLasBlock / header.record_size);
   std::string block;
@@ -161,11 +166,14 @@ Scan ReadLas(const std::string& path, const LasOptions& options) {
       const auto intensity = ValueAt<uint16_t>(record + 12);
       has_intensity = has_intensity || intensity > 0;
       scan.intensity.push_back(intensity);
-      if (colors < 0 || has_intensity) continue;
-      const char* const color = record + colors;
+      if (colors < 0 || (has_intensity && !keeps_colors)) continue;
+      const char* const at = record + colors;
+      const Eigen::Vector3d color(ValueAt<uint16_t>(at), ValueAt<uint16_t>(at + 2),
+                                  ValueAt<uint16_t>(at + 4));
+      if (keeps_colors) scan.colors.push_back(color_scale.Bytes(color, &scan.colors));
+      if (has_intensity) continue;
       greys.resize(scan.points.size() - 1, 0.0f);
-      greys.push_back(0.299f * ValueAt<uint16_t>(color) + 0.587f * ValueAt<uint16_t>(color + 2) +
-                      0.114f * ValueAt<uint16_t>(color + 4));  // Rec. ITU-R BT.601
+      greys.push_back(static_cast<float>(GreyOf(color)));
     }
   }
   if (scan.points.empty()) {
@@ -183,7 +191,9 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
   uint64_t count = 0;
   Bounds all;
   float largest = 0;
+  bool has_colors = false;
   for (const Scan* scan : scans) {
+    has_colors = has_colors || !scan->colors.empty();
     count += scan->points.size() - static_cast<size_t>(scan->NumMissing());
     const Bounds bounds = FindBounds(*scan);
     all.min = all.min.cwiseMin(bounds.min);
@@ -200,6 +210,8 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
   double scale = kFinest;
   while ((all.max - all.min).maxCoeff() / scale > 4e9) scale *= 10;
 
+  const int format = has_colors ? 2 : 0;
+  const auto record_size = static_cast<size_t>(kPointFormats[format].size);
   std::string header(kLeastHeader, '\0');
   std::memcpy(header.data(), "LASF", 4);
   header[24] = 1;
@@ -207,7 +219,8 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
   std::memcpy(header.data() + 58, "roomtex", 7);
   PutAt<uint16_t>(94, kLeastHeader, &header);
   PutAt<uint32_t>(96, kLeastHeader, &header);
-  PutAt<uint16_t>(105, 20, &header);
+  header[104] = static_cast<char>(format);
+  PutAt(105, static_cast<uint16_t>(record_size), &header);
   PutAt(107, static_cast<uint32_t>(count), &header);
   PutAt(111, static_cast<uint32_t>(count), &header);  // all are first returns
   for (size_t k = 0; k < 3; ++k) {
@@ -223,7 +236,7 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
   for (const Scan* scan : scans) {
     for (size_t i = 0; i < scan->points.size(); ++i) {
       if (scan->IsMissing(static_cast<int>(i))) continue;
-      std::string record(20, '\0');
+      std::string record(record_size, '\0');
       for (size_t k = 0; k < 3; ++k) {
         const auto axis = static_cast<Eigen::Index>(k);
         PutAt(4 * k,
@@ -232,6 +245,9 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
       }
       PutAt(12, LasIntensity(scan->intensity[i], largest), &record);
       record[14] = 9;  // return 1 of 1
+      for (size_t k = 0; k < 3 && !scan->colors.empty(); ++k) {
+        PutAt(20 + 2 * k, static_cast<uint16_t>(257 * scan->colors[i][k]), &record);
+      }
       block += record;
       if (static_cast<int64_t>(block.size()) < kLasBlock) continue;
       output.stream() << block;

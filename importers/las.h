@@ -12,6 +12,7 @@ namespace roomtex {
 struct LasOptions {
   double meters_per_unit = 1;
   double max_range = 0;  // metres from the middle of the file's points; 0 = no limit
+  bool colors = false;   // keep them (Scan::colors)
 };
 
 // Point formats 0 to 10: coordinates by scale and offset, all returns, without what is marked as
@@ -24,9 +25,10 @@ Scan ReadLas(const std::string& path, const LasOptions& options);
 // The start of a file is that of a LAS or LAZ.
 bool LooksLikeLas(std::string_view start);
 
-// LAS 1.2, point format 0, of all measured points of all scans: whole tenths of a millimetre about
-// whole metres; intensities from 0 to 1 become 0 to 65535, others are rounded, and scaled where
-// they are larger than that. Throws InputError: cannot be written, too many points.
+// LAS 1.2, point format 0, or 2 where a scan has colours, of all measured points of all scans:
+// whole tenths of a millimetre about whole metres; intensities from 0 to 1 become 0 to 65535,
+// others are rounded, and scaled where they are larger than that. Throws InputError: cannot be
+// written, too many points.
 void WriteLas(const std::vector<const Scan*>& scans, const std::string& path);
 
 }  // namespace roomtex

@@ -1,5 +1,5 @@
 #pragma once
-// What the readers of meshes and clouds (PLY, OBJ, PCD) have in common.
+// What the readers of meshes and clouds (PLY, OBJ, PCD ...) have in common.
 
 #include <string>
 
@@ -7,14 +7,34 @@
 
 namespace roomtex {
 
+// Colours that come one after the other without saying their scale: 0 to 1, 0 to 255 or 0 to 65535,
+// the smallest that holds all.
+class ColorScale {
+ public:
+  // largest: 1, 255 or 65535, of the scale that it is at least.
+  explicit ColorScale(double largest) : largest_(largest) {}
+
+  // rgb as bytes (black where it is none). before: those of earlier calls, which change when rgb
+  // shows that the scale is a larger one.
+  std::array<uint8_t, 3> Bytes(const Eigen::Vector3d& rgb, CellColors* before);
+
+ private:
+  double largest_;
+};
+
+// Grey of a colour in the unit of its channels (Rec. ITU-R BT.601).
+inline double GreyOf(const Eigen::Vector3d& rgb) {
+  return rgb.dot(Eigen::Vector3d(0.299, 0.587, 0.114));
+}
+
 // Makes the vertices and triangles that were read a scan without a grid: points that are not finite
 // or farther from the station than max_range (metres; 0 = no limit) are missing, and triangles at
-// them go. points and intensity have one value per vertex. Throws InputError if no triangle is
-// left.
+// them go. points and intensity (and colors, if there are any) have one value per vertex. Throws
+// InputError if no triangle is left.
 void FinishMesh(const std::string& path, double max_range, Scan* scan);
 
 // Makes the points that were read a cloud (Scan::Kind): those that are not finite or too far away
-// go. Throws InputError if none is left.
+// go, with their intensities, colours and normals. Throws InputError if none is left.
 void FinishCloud(const std::string& path, double max_range, Scan* scan);
 
 }  // namespace roomtex

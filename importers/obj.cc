@@ -45,6 +45,7 @@ class ObjParser {
 
   Scan Parse() {
     scan_.up = Eigen::Vector3d::UnitZ();
+    scan_.up_is_assumed = true;
     std::string_view line;
     while (NextLine(&line)) {
       const std::string_view whole = line;
@@ -91,7 +92,9 @@ class ObjParser {
     std::string who, what;
     Eigen::Vector3d v;
     if (!(words >> who >> what >> v[0] >> v[1] >> v[2]) || who != "roomtex") return;
-    if (what == "up" && v.allFinite() && v.norm() > 0.5) scan_.up = v.normalized();
+    if (what != "up" || !v.allFinite() || !(v.norm() > 0.5)) return;
+    scan_.up = v.normalized();
+    scan_.up_is_assumed = false;
   }
 
   void ReadVertex(std::string_view line, std::string_view whole) {
@@ -110,6 +113,21 @@ class ObjParser {
                        "is more than 2^31 vertices", "Divide the mesh");
     }
     scan_.points.push_back(options_.meters_per_unit * point);
+    ReadColor(line);
+  }
+
+  // "r g b" behind the place; else what stands there is passed over.
+  void ReadColor(std::string_view line) {
+    if (!options_.colors && !options_.grey_as_intensity) return;
+    Eigen::Vector3d color = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const std::string_view word = TakeWord(&line);
+      if (word.empty()) return;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), color[k]);
+      if (error != std::errc() || end != word.data() + word.size()) return;
+    }
+    scan_.colors.resize(scan_.points.size() - 1, {0, 0, 0});
+    scan_.colors.push_back(color_scale_.Bytes(color, &scan_.colors));
   }
 
   // "7", "7/1", "7//3", "7/1/3" or negative; the vertex alone counts.
@@ -163,6 +181,12 @@ class ObjParser {
                        kDamaged);
     }
     scan_.intensity.assign(scan_.points.size(), 1.0f);
+    if (!scan_.colors.empty()) scan_.colors.resize(scan_.points.size(), {0, 0, 0});
+    for (size_t i = 0; i < scan_.colors.size() && options_.grey_as_intensity; ++i) {
+      const std::array<uint8_t, 3>& c = scan_.colors[i];
+      scan_.intensity[i] = static_cast<float>(GreyOf(Eigen::Vector3d(c[0], c[1], c[2])));
+    }
+    if (!options_.colors) scan_.colors = {};
     FinishMesh(file_.path(), options_.max_range, &scan_);
     return std::move(scan_);
   }
@@ -174,6 +198,7 @@ class ObjParser {
   Scan scan_;
   int64_t num_faces_ = 0, highest_ = 0;
   long highest_line_ = 0;
+  ColorScale color_scale_{1};
 };
 
 }  // namespace

@@ -7,11 +7,11 @@
 #include "importers/pcd.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 #include <string_view>
 #include <vector>
 
@@ -241,16 +241,54 @@ double ValueAt(const uint8_t* bytes, char type, int size) {
                      : as(uint64_t{});
 }
 
+// The field with the packed colour, null if there is none.
+const PcdField* PcdColor(const PcdHeader& header) {
+  for (const char* name : {"rgb", "rgba"}) {
+    const PcdField* const field = header.Find(name);
+    if (field != nullptr && field->size == 4 && field->count == 1) return field;
+  }
+  return nullptr;
+}
+
+const PcdField* PcdNormal(const PcdHeader& header, int axis) {
+  return header.Find(std::string("normal_") + "xyz"[axis]);
+}
+
 class PcdFiller {
  public:
   PcdFiller(const PcdHeader& header, const PcdOptions& options, Scan* scan)
-      : options_(options), scan_(scan) {
+      : options_(options), scan_(scan), has_intensity_(header.Find("intensity") != nullptr) {
     scan->num_columns = static_cast<int>(header.width);
     scan->num_rows = static_cast<int>(header.height);
     scan->scan_from_station = header.viewpoint;
     scan->scan_from_station.translation *= options.meters_per_unit;
     scan->points.resize(static_cast<size_t>(header.width * header.height));
     scan->intensity.resize(scan->points.size());
+    if (options.colors && PcdColor(header) != nullptr) {
+      scan->colors.assign(scan->points.size(), {0, 0, 0});
+    }
+    if (header.height == 1 && PcdNormal(header, 0) != nullptr && PcdNormal(header, 1) != nullptr &&
+        PcdNormal(header, 2) != nullptr) {
+      scan->normals.assign(scan->points.size(), Eigen::Vector3f::Zero());
+    }
+  }
+
+  bool wants_normals() const { return !scan_->normals.empty(); }
+  void SetNormal(int cell, const Eigen::Vector3d& normal) {
+    scan_->normals[static_cast<size_t>(cell)] = normal.cast<float>();
+  }
+
+  // rgb: packed, 0xrrggbb.
+  void SetColor(int cell, uint32_t rgb) {
+    const auto at = static_cast<size_t>(cell);
+    if (scan_->IsMissing(cell)) return;
+    const std::array<uint8_t, 3> color = {
+        static_cast<uint8_t>(rgb >> 16), static_cast<uint8_t>(rgb >> 8), static_cast<uint8_t>(rgb)};
+    if (!scan_->colors.empty()) scan_->colors[at] = color;
+    if (!has_intensity_) {
+      scan_->intensity[at] =
+          static_cast<float>(GreyOf(Eigen::Vector3d(color[0], color[1], color[2])));
+    }
   }
 
   void Set(int cell, const Eigen::Vector3d& x_in_file, double intensity) {
@@ -266,7 +304,20 @@ class PcdFiller {
  private:
   PcdOptions options_;
   Scan* scan_;
+  bool has_intensity_;
 };
+
+// In text the bits of the colour are those of a float, or it is the number itself.
+uint32_t PackedColor(double value, char type) {
+  uint32_t bits = 0;
+  if (type == 'F') {
+    const auto as_float = static_cast<float>(value);
+    std::memcpy(&bits, &as_float, sizeof(bits));
+  } else if (value >= -2147483648.0 && value <= 4294967295.0) {
+    bits = static_cast<uint32_t>(static_cast<int64_t>(value));
+  }
+  return bits;
+}
 
 void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* filler) {
   LineReader lines(file, header.data_offset);
@@ -278,6 +329,7 @@ void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* fille
   const PcdField* const intensity = header.Find("intensity");
   const int64_t offsets[3] = {header.Find("x")->offset, header.Find("y")->offset,
                               header.Find("z")->offset};
+  const PcdField* const color = PcdColor(header);
   std::vector<double> values(static_cast<size_t>(header.values_per_point));
   std::string_view line;
   for (int64_t cell = 0; cell < header.width * header.height;) {
@@ -293,21 +345,31 @@ void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* fille
       throw error("is " + Quoted(line) + ", expected " + std::to_string(values.size()) +
                   " numbers");
     }
-    filler->Set(static_cast<int>(cell++),
-                {values[offsets[0]], values[offsets[1]], values[offsets[2]]},
+    const int at = static_cast<int>(cell++);
+    filler->Set(at, {values[offsets[0]], values[offsets[1]], values[offsets[2]]},
                 intensity != nullptr ? values[intensity->offset] : 0);
+    if (color != nullptr) filler->SetColor(at, PackedColor(values[color->offset], color->type));
+    if (filler->wants_normals()) {
+      Eigen::Vector3d normal;
+      for (int k = 0; k < 3; ++k) normal[k] = values[PcdNormal(header, k)->offset];
+      filler->SetNormal(at, normal);
+    }
   }
   while (lines.Next(&line)) {
     if (!Words(line).empty()) throw error("is " + Quoted(line) + ", expected the end of the file");
   }
 }
 
-// Where the values of x, y, z and intensity stand.
+// Where the values of x, y, z and intensity stand, and those of colours and normals.
 struct PcdColumns {
   const PcdField* fields[4];
+  const PcdField* color;
+  const PcdField* normals[3];
 
   explicit PcdColumns(const PcdHeader& header)
-      : fields{header.Find("x"), header.Find("y"), header.Find("z"), header.Find("intensity")} {}
+      : fields{header.Find("x"), header.Find("y"), header.Find("z"), header.Find("intensity")},
+        color(PcdColor(header)),
+        normals{PcdNormal(header, 0), PcdNormal(header, 1), PcdNormal(header, 2)} {}
 
   // value_at(field) gives the address of the field's value for this cell.
   template <typename ValueAddress>
@@ -318,6 +380,17 @@ struct PcdColumns {
       values[k] = ValueAt(value_at(*fields[k]), fields[k]->type, fields[k]->size);
     }
     filler->Set(cell, {values[0], values[1], values[2]}, values[3]);
+    if (color != nullptr) {
+      uint32_t rgb = 0;
+      std::memcpy(&rgb, value_at(*color), sizeof(rgb));
+      filler->SetColor(cell, rgb);
+    }
+    if (!filler->wants_normals()) return;
+    Eigen::Vector3d normal;
+    for (int k = 0; k < 3; ++k) {
+      normal[k] = ValueAt(value_at(*normals[k]), normals[k]->type, normals[k]->size);
+    }
+    filler->SetNormal(cell, normal);
   }
 };
 
@@ -381,7 +454,8 @@ Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* da
                      options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
   }
   if (header.height == 1) FinishCloud(path, options.max_range, &scan);
-  scan.up = FindUpAxis(scan);
+  scan.up = scan.organised ? FindUpAxis(scan) : Eigen::Vector3d::UnitZ();
+  scan.up_is_assumed = !scan.organised;
   if (data_kind != nullptr) *data_kind = header.data;
   return scan;
 }
@@ -393,20 +467,26 @@ bool NeedsDouble(const Scan& scan) {
 }
 
 void WritePcd(const Scan& scan, const std::string& path) {
-  if (!scan.organised) throw std::invalid_argument("WritePcd needs an organised scan");
+  const size_t count = scan.organised ? scan.points.size()
+                                      : scan.points.size() - static_cast<size_t>(scan.NumMissing());
+  const bool has_colors = !scan.colors.empty();
   const bool as_double = NeedsDouble(scan);
   OutputFile output(path);
   std::ostream& stream = output.stream();
   const char* const size = as_double ? "8" : "4";
-  stream << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity\nSIZE "
-         << size << ' ' << size << ' ' << size << " 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH "
-         << scan.num_columns << "\nHEIGHT " << scan.num_rows << "\nVIEWPOINT";
+  stream << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z intensity"
+         << (has_colors ? " rgb" : "") << "\nSIZE " << size << ' ' << size << ' ' << size << " 4"
+         << (has_colors ? " 4" : "") << "\nTYPE F F F F" << (has_colors ? " F" : "")
+         << "\nCOUNT 1 1 1 1" << (has_colors ? " 1" : "") << "\nWIDTH "
+         << (scan.organised ? static_cast<size_t>(scan.num_columns) : count) << "\nHEIGHT "
+         << scan.num_rows << "\nVIEWPOINT";
   const Eigen::Vector4d wxyz = WxyzFromQuaternion(scan.scan_from_station.rotation);
   stream.precision(17);
   for (int i = 0; i < 3; ++i) stream << ' ' << scan.Station()[i];
   for (int i = 0; i < 4; ++i) stream << ' ' << wxyz[i];
-  stream << "\nPOINTS " << scan.points.size() << "\nDATA binary\n";
+  stream << "\nPOINTS " << count << "\nDATA binary\n";
   for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (!scan.organised && scan.IsMissing(static_cast<int>(i))) continue;
     if (as_double) {
       stream.write(reinterpret_cast<const char*>(scan.points[i].data()), 3 * sizeof(double));
     } else {
@@ -414,6 +494,11 @@ void WritePcd(const Scan& scan, const std::string& path) {
       stream.write(reinterpret_cast<const char*>(point.data()), 3 * sizeof(float));
     }
     stream.write(reinterpret_cast<const char*>(&scan.intensity[i]), sizeof(float));
+    if (!has_colors) continue;
+    const std::array<uint8_t, 3>& c = scan.colors[i];
+    const uint32_t rgb =
+        static_cast<uint32_t>(c[0]) << 16 | static_cast<uint32_t>(c[1]) << 8 | c[2];
+    stream.write(reinterpret_cast<const char*>(&rgb), sizeof(rgb));
   }
   output.Commit();
 }

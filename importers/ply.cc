@@ -6,6 +6,7 @@
 #include "importers/ply.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -246,13 +247,17 @@ class PlyParser {
   // What our own writer says about the scan.
   void ReadComments() {
     scan_.up = Eigen::Vector3d::UnitZ();
+    scan_.up_is_assumed = true;
     for (const std::string& comment : header_.comments) {
       std::istringstream words(comment);
       std::string who, what;
       Eigen::Vector3d v;
       if (!(words >> who >> what >> v[0] >> v[1] >> v[2]) || who != "roomtex" || !v.allFinite())
         continue;
-      if (what == "up" && v.norm() > 0.5) scan_.up = v.normalized();
+      if (what == "up" && v.norm() > 0.5) {
+        scan_.up = v.normalized();
+        scan_.up_is_assumed = false;
+      }
       if (what == "station") scan_.scan_from_station.translation = options_.meters_per_unit * v;
     }
   }
@@ -296,6 +301,35 @@ class PlyParser {
     return targets;
   }
 
+  // Three properties of the vertices that go together.
+  struct Triple {
+    int property[3] = {-1, -1, -1};
+    bool found = false;
+  };
+  Triple FindTriple(const std::vector<std::vector<std::string>>& names) const {
+    Triple triple;
+    for (int k = 0; k < 3; ++k) {
+      triple.property[k] = vertex_->Find(names[static_cast<size_t>(k)]);
+      if (triple.property[k] < 0 || vertex_->properties[triple.property[k]].is_list) return {};
+    }
+    triple.found = true;
+    return triple;
+  }
+  // Floats may go to 1, bytes go to 255.
+  double ColorScaleOf(const Triple& color) const {
+    if (!color.found) return 255;
+    switch (vertex_->properties[color.property[0]].type) {
+      case PlyType::kFloat:
+      case PlyType::kDouble:
+        return 1;
+      case PlyType::kUint16:
+      case PlyType::kInt16:
+        return 65535;
+      default:
+        return 255;
+    }
+  }
+
   void ReadVertices() {
     const int intensity = vertex_->Find({"intensity", "scalar_intensity", "scalar_Intensity"});
     const auto count = static_cast<size_t>(vertex_->count);
@@ -303,9 +337,21 @@ class PlyParser {
     scan_.points.reserve(count);
     scan_.intensity.reserve(count);
     const std::vector<std::vector<float>*> wanted = WantedByProperty();
+    const Triple color = FindTriple({{"red", "r", "diffuse_red"},
+                                     {"green", "g", "diffuse_green"},
+                                     {"blue", "b", "diffuse_blue"}});
+    const Triple normal =
+        HasFaces() ? Triple{}
+                   : FindTriple({{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}});
+    const bool is_grey = options_.grey_as_intensity && intensity < 0;
+    ColorScale color_scale(ColorScaleOf(color));
+    if (color.found && options_.colors) scan_.colors.reserve(count);
+    if (normal.found) scan_.normals.reserve(count);
     for (size_t i = 0; i < count; ++i) {
       Eigen::Vector3d point = Eigen::Vector3d::Zero();
       double value_of_intensity = 0;
+      Eigen::Vector3d value_of_color = Eigen::Vector3d::Zero();
+      Eigen::Vector3d value_of_normal = Eigen::Vector3d::Zero();
       source_->BeginEntry();
       for (int p = 0; p < static_cast<int>(vertex_->properties.size()); ++p) {
         const PlyProperty& property = vertex_->properties[p];
@@ -316,11 +362,18 @@ class PlyParser {
         const double value = source_->Next(property.type);
         for (int k = 0; k < 3; ++k) {
           if (p == coordinate_[k]) point[k] = value;
+          if (p == color.property[k]) value_of_color[k] = value;
+          if (p == normal.property[k]) value_of_normal[k] = value;
         }
         if (p == intensity) value_of_intensity = value;
         if (wanted[p] != nullptr) wanted[p]->push_back(static_cast<float>(value));
       }
       source_->EndEntry();
+      if (color.found && is_grey) value_of_intensity = GreyOf(value_of_color);
+      if (color.found && options_.colors) {
+        scan_.colors.push_back(color_scale.Bytes(value_of_color, &scan_.colors));
+      }
+      if (normal.found) scan_.normals.emplace_back(value_of_normal.cast<float>());
       scan_.points.push_back(options_.meters_per_unit * point);
       scan_.intensity.push_back(
           std::isfinite(value_of_intensity) ? static_cast<float>(value_of_intensity) : 0.0f);
@@ -380,7 +433,7 @@ class PlyParser {
   Scan scan_;
 };
 
-void AppendVertices(const Scan& scan, bool as_double, std::ostream& stream) {
+void AppendVertices(const Scan& scan, bool as_double, bool has_colors, std::ostream& stream) {
   for (size_t i = 0; i < scan.points.size(); ++i) {
     if (scan.IsMissing(static_cast<int>(i))) continue;
     if (as_double) {
@@ -390,6 +443,10 @@ void AppendVertices(const Scan& scan, bool as_double, std::ostream& stream) {
       stream.write(reinterpret_cast<const char*>(point.data()), 3 * sizeof(float));
     }
     stream.write(reinterpret_cast<const char*>(&scan.intensity[i]), sizeof(float));
+    if (!has_colors) continue;
+    const std::array<uint8_t, 3> color =
+        scan.colors.empty() ? std::array<uint8_t, 3>{0, 0, 0} : scan.colors[i];
+    stream.write(reinterpret_cast<const char*>(color.data()), 3);
   }
 }
 
@@ -422,8 +479,9 @@ Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* fo
 
 void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {
   size_t num_vertices = 0, num_faces = 0;
-  bool as_double = false;
+  bool as_double = false, has_colors = false;
   for (const PlyPart& part : parts) {
+    has_colors = has_colors || !part.scan->colors.empty();
     num_vertices += part.scan->points.size() - static_cast<size_t>(part.scan->NumMissing());
     num_faces += part.triangles->size();
     as_double = as_double || NeedsDouble(*part.scan);
@@ -441,9 +499,13 @@ void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {
   const char* const type = as_double ? "double" : "float";
   stream << "element vertex " << num_vertices << '\n';
   for (const char axis : {'x', 'y', 'z'}) stream << "property " << type << ' ' << axis << '\n';
-  stream << "property float intensity\nelement face " << num_faces
+  stream << "property float intensity\n";
+  for (const char* name : {"red", "green", "blue"}) {
+    if (has_colors) stream << "property uchar " << name << '\n';
+  }
+  stream << "element face " << num_faces
          << "\nproperty list uchar int vertex_indices\nend_header\n";
-  for (const PlyPart& part : parts) AppendVertices(*part.scan, as_double, stream);
+  for (const PlyPart& part : parts) AppendVertices(*part.scan, as_double, has_colors, stream);
   int first_vertex = 0;
   for (const PlyPart& part : parts) first_vertex += AppendFaces(part, first_vertex, stream);
   output.Commit();

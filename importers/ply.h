@@ -14,6 +14,9 @@ struct PlyOptions {
   double max_range = 0;
   // Also files without faces, which are refused otherwise.
   bool clouds = false;
+  bool colors = false;  // keep them (Scan::colors)
+  // The intensity of vertices without one is the grey of their colours.
+  bool grey_as_intensity = false;
 };
 
 // Values of vertex properties that ReadPly itself has no use for, e.g. colours.
@@ -24,17 +27,18 @@ struct PlyVertexValues {
 };
 
 // Reads ascii and binary files of both byte orders: vertices x, y, z and, if there, intensity
-// (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles. Other
-// elements and properties are skipped. The scan is not organised; `up` and station come from our
-// own files' comments, otherwise z and the origin. Throws InputError with line or byte; a cloud
-// without faces is refused, or one of Scan::Kind::kCloud. format: "ascii", "little" or "big"
-// endian; may be null. values: what else is wanted of the vertices; may be null.
+// (also scalar_intensity, CloudCompare's name), faces of any size as fans of triangles; of clouds
+// the normals nx, ny, nz. Other elements and properties are skipped. The scan is not organised;
+// `up` and station come from our own files' comments, otherwise z and the origin. Throws InputError
+// with line or byte; a cloud without faces is refused, or one of Scan::Kind::kCloud. format:
+// "ascii", "little" or "big" endian; may be null. values: what else is wanted of the vertices; may
+// be null.
 Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr,
              PlyVertexValues* values = nullptr);
 
 // Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate, pcd.h), intensity
-// float; faces. triangles index scan.points; missing samples are left out. Several scans become one
-// mesh.
+// float, red, green, blue uchar where a scan has colours; faces. triangles index scan.points;
+// missing samples are left out. Several scans become one mesh.
 struct PlyPart {
   const Scan* scan;
   const std::vector<Triangle>* triangles;

@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/resource_limits.h"
 #include "importers/file_reader.h"
+#include "importers/mesh_scan.h"
 #include "importers/up_axis.h"
 
 namespace roomtex {
@@ -196,6 +197,10 @@ class PtxParser {
           scan->points[cell] = Scan::MissingPoint();
           scan->intensity[cell] = 0;
         } else {
+          if (options_.colors && count == 7) {
+            if (scan->colors.empty()) scan->colors.assign(scan->points.size(), {0, 0, 0});
+            scan->colors[cell] = color_scale_.Bytes({v[4], v[5], v[6]}, &scan->colors);
+          }
           scan->points[cell] = point;
           scan->intensity[cell] = std::isfinite(v[3]) ? static_cast<float>(v[3]) : 0.0f;
         }
@@ -210,6 +215,7 @@ class PtxParser {
   const FileReader& file_;
   PtxOptions options_;
   LineReader lines_;
+  ColorScale color_scale_{255};
 };
 
 // Appends numbers with the given digits after the point.
@@ -304,13 +310,17 @@ void WritePtx(const std::vector<Scan>& scans, const std::string& path) {
       for (int row = scan.num_rows - 1; row >= 0; --row) {
         const int cell = scan.Index(column, row);
         if (scan.IsMissing(cell)) {
-          line.Text("0 0 0 0.500000\n");
+          line.Text(scan.colors.empty() ? "0 0 0 0.500000\n" : "0 0 0 0.500000 0 0 0\n");
           continue;
         }
         const Eigen::Vector3d point = station_from_scan * scan.points[cell];
         for (int i = 0; i < 3; ++i) line.Add(point[i], 6, ' ');
         const double intensity = scan.intensity[cell];
-        line.Add(std::isfinite(intensity) ? (intensity - offset) / divisor : 0, 6, '\n');
+        line.Add(std::isfinite(intensity) ? (intensity - offset) / divisor : 0, 6,
+                 scan.colors.empty() ? '\n' : ' ');
+        for (size_t k = 0; k < 3 && !scan.colors.empty(); ++k) {
+          line.Add(scan.colors[static_cast<size_t>(cell)][k], 0, k < 2 ? ' ' : '\n');
+        }
         line.FlushTo(output.stream(), 1 << 20);
       }
     }

@@ -14,6 +14,7 @@ namespace roomtex {
 struct PtxOptions {
   double meters_per_unit = 1;
   double max_range = 0;  // metres from the scanner; 0 = no limit
+  bool colors = false;   // keep them (Scan::colors)
 };
 
 // All scans of the file, in the file's order, in one frame: each scan's own 4x4 pose is applied to
@@ -24,7 +25,8 @@ std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options);
 
 // Coordinates to the micrometre in the station frame with the pose as the scan's 4x4 matrix;
 // intensities 0..1 (others are divided by 255, 4095 or 65535, whichever is the first to hold them
-// all). Organised scans only.
+// all). With the colours of
+// scans that have some. Organised scans only.
 void WritePtx(const std::vector<Scan>& scans, const std::string& path);
 
 // What the intensities of the scan are to be divided by to lie in 0..1, after subtracting *offset

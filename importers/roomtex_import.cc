@@ -14,12 +14,14 @@
 #include "importers/las.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
+#include "importers/photo_picks.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
 #include "importers/scan_path.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_writer.h"
+#include "importers/xyz.h"
 
 namespace fs = std::filesystem;
 namespace roomtex {
@@ -29,7 +31,7 @@ struct ImportOptions {
   std::string input_path;
   std::vector<std::string> output_paths;
   std::string images_path;  // of an E57: folder for its photos
-  bool cut_panoramas = false;
+  bool cut_panoramas = false, image_picks = false;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
   FaceOptions faces;  // of panoramas
@@ -112,7 +114,7 @@ class Importer {
   void RequireGridless(const Scan& scan) const {
     for (const std::string& path : options_.output_paths) {
       const std::string extension = ScanWriterExtension(path);
-      if (extension == ".ply" || extension == ".las") continue;
+      if (CanHold(extension, scan.kind())) continue;
       throw InputError(
           options_.input_path, "",
           std::string(scan.kind() == Scan::Kind::kCloud ? "is a cloud" : "is a mesh") +
@@ -133,10 +135,14 @@ class Importer {
       WritePtx(file_.scans, path);
     } else if (extension == ".e57") {
       WriteE57(file_.scans, path);
-    } else if (extension == ".las") {
+    } else if (extension == ".las" || extension == ".xyz" || extension == ".pts" ||
+               extension == ".csv") {
       std::vector<const Scan*> scans;
       for (const Scan& scan : file_.scans) scans.push_back(&scan);
-      WriteLas(scans, path);
+      if (extension == ".las") WriteLas(scans, path);
+      if (extension == ".xyz") WriteXyz(scans, path, XyzKind::kXyz);
+      if (extension == ".pts") WriteXyz(scans, path, XyzKind::kPts);
+      if (extension == ".csv") WriteXyz(scans, path, XyzKind::kCsv);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
@@ -181,12 +187,14 @@ class Importer {
     for (const auto& [key, value] : total.items()) context_.report[key] = value;
     context_.report["format"] = file_.format;
     context_.report["byte_order"] = file_.byte_order;
+    context_.report["has_colors"] = !file_.scans[0].colors.empty();
+    context_.report["up"] = {{"axis", file_.up_axis}, {"assumed", file_.scans[0].up_is_assumed}};
     context_.report["bounds"] = {{"min", ToJson(bounds.min)}, {"max", ToJson(bounds.max)}};
     if (each.size() > 1) context_.report["scans"] = each;
     if (each.size() > 1) {
       context_.progress.Note(
           std::to_string(each.size()) +
-          " scans: .ply, .ptx, .e57 and .las hold all of them, other outputs are numbered");
+          " scans: .pcd, .png and .rtpi outputs are numbered, the others hold all of them");
     }
   }
 
@@ -242,6 +250,16 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
                                             options.images_path, images, &context.progress);
   context.progress.Finish();
   for (const std::string& note : photos.notes) context.Warn(note);
+  if (options.image_picks) {
+    const ScanFile scans = ReadScanFile(options.input_path, options.reader);
+    const std::vector<PhotoPick> picks = PicksOfPosedPhotos(photos.posed, scans.scans);
+    if (picks.empty()) {
+      context.Warn("no picks: no photo with a pose shows six places of the scans");
+    } else {
+      WritePhotoPicks(picks, (fs::path(options.images_path) / "picks.csv").string());
+    }
+    context.report["num_picks"] = picks.size();
+  }
   Json json = Json::array();
   for (const E57Photos::Photo& photo : photos.photos) {
     json.push_back(
@@ -270,6 +288,7 @@ void RunImport(const ImportOptions& options, const Command::Context& context) {
 int main(int argc, char** argv) {
   using roomtex::Command;
   roomtex::ImportOptions options;
+  options.reader.colors = true;
   options.reader.azimuth = "clockwise";  // conversions do not depend on what a header says
   Command command(
       "roomtex-import",
@@ -279,8 +298,8 @@ int main(int argc, char** argv) {
       "roomtex-import --input_path room.rtpi --output_path room.ply --output_path room.png");
   command.AddInputPath(
       "input_path", &options.input_path,
-      "The scan. A PTX or E57 may hold several: .ply, .ptx, .e57 and .las outputs then hold "
-      "all of them, the others are written one per scan as NAME_1, NAME_2 ... "
+      "The scan. A PTX or E57 may hold several: .pcd, .png and .rtpi outputs are then written one "
+      "per scan as NAME_1, NAME_2 ..., the others hold all of them. "
       "site.e57#NAME or site.e57#2 is one scan of an E57. Or a "
       "panorama (.jpg, .png, .tif; equirectangular), or a folder of them, to be "
       "cut into faces for COLMAP up to 4.0, which knows no panoramas. " +
@@ -288,7 +307,9 @@ int main(int argc, char** argv) {
   command.AddOutputPaths(
       "output_path", &options.output_paths,
       "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
-      "image, .rtpi (RTPI 3.0), .ptx, .e57 or .las (points). Of panoramas: the folder for their "
+      "image, .rtpi (RTPI 3.0), .ptx, .e57, or points: .las, .xyz, .pts, .csv. Colours of the scan "
+      "itself go where the format holds them (all but .png and .rtpi). Of panoramas: the folder "
+      "for their "
       "faces, panoramas.json (which face is which part of which panorama) and "
       "camera_options.txt (for colmap feature_extractor).",
       Command::Kind::kOptional);
@@ -301,6 +322,11 @@ int main(int argc, char** argv) {
       "E57.cut_panoramas", &options.cut_panoramas,
       "With --images_path: panoramas as faces (--Faces.*) of perspective cameras in the "
       "model, for programs that know no EQUIRECTANGULAR.");
+  command.AddBool(
+      "E57.picks", &options.image_picks,
+      "With --images_path: also picks.csv, places of the scans in the photos with a pose. "
+      "A sparse model that has these photos among its own is aligned by them "
+      "(roomtex-align --picks_path) without clicks.");
   command.Add(FieldsOf(&options.reader));
   command.Add(FieldsOf(&options.mesh));
   command.Add(FieldsOf(&options.faces));

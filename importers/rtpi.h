@@ -59,6 +59,7 @@ struct RtpiScanOptions {
   bool counterclockwise = false;
   double meters_per_unit = 0;  // 0 = by the header, metres if it names no unit
   double max_range = 0;        // metres; 0 = the header's max_range, if any
+  bool colors = false;         // keep them (Scan::colors)
 };
 
 // The scan frame is the scanner's (y up). Rows are steps of elevation: by

@@ -198,6 +198,8 @@ Scan ScanFromRtpi(const RtpiFile& file, const RtpiScanOptions& options,
   scan.points.resize(static_cast<size_t>(grid.num_columns) * grid.num_rows);
   scan.intensity.resize(scan.points.size());
   const double azimuth_sign = options.counterclockwise ? -1 : 1;
+  const bool has_colors = options.colors && file.header.has_color;
+  if (has_colors) scan.colors.assign(scan.points.size(), {0, 0, 0});
   RtpiColumnRows rows(file, grid);
   ColumnBlock block(grid.num_rows);
   for (int begin = 0; begin < grid.num_columns; begin += ColumnBlock::kBlock) {
@@ -211,6 +213,11 @@ Scan ScanFromRtpi(const RtpiFile& file, const RtpiScanOptions& options,
           continue;
         }
         const RtpiSample& sample = file.samples[index];
+        if (has_colors) {
+          scan.colors[static_cast<size_t>(scan.Index(begin + k, row))] = {
+              static_cast<uint8_t>(sample.value), static_cast<uint8_t>(sample.value >> 8),
+              static_cast<uint8_t>(sample.value >> 16)};
+        }
         block.Set(
             k, row,
             PointFromAngles(sample.range * meters_per_unit, sample.theta, sample.phi, azimuth_sign),

@@ -222,6 +222,9 @@ void PlaceScan(const Rigid& scan_from_station, Scan* scan) {
   for (size_t i = 0; i < scan->points.size(); ++i) {
     if (!scan->IsMissing(static_cast<int>(i))) scan->points[i] = moved * scan->points[i];
   }
+  for (Eigen::Vector3f& normal : scan->normals) {
+    normal = moved.rotation.cast<float>() * normal;
+  }
   scan->up = moved.rotation * scan->up;
   scan->scan_from_station = scan_from_station;
 }

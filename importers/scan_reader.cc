@@ -24,6 +24,7 @@
 #include "importers/rtpi.h"
 #include "importers/scan_path.h"
 #include "importers/scan_poses.h"
+#include "importers/up_axis.h"
 #include "importers/xyz.h"
 
 namespace roomtex {
@@ -122,6 +123,7 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   file.meters_per_unit = scan_options.meters_per_unit > 0 ? scan_options.meters_per_unit
                                                           : MetersPerUnitOr(rtpi.header.units, 1);
   scan_options.max_range = options.max_range;
+  scan_options.colors = options.colors;
   file.scans.push_back(ScanFromRtpi(rtpi, scan_options, &file.notes));
   return file;
 }
@@ -130,13 +132,42 @@ std::string NameOrFile(const Scan& scan) {
   return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
 }
 
+void TakeUpAxis(const ScanReaderOptions& options, ScanFile* file) {
+  if (options.up_axis == "auto" || file->format == "RTPI") return;
+  for (Scan& scan : file->scans) {
+    scan.up = UpAxisOf(options.up_axis);
+    scan.up_is_assumed = false;
+  }
+}
+
 void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
-  std::optional<Scan> grid = GridFromCloud(*scan);
+  const Eigen::Quaterniond station_from_scan = scan->scan_from_station.rotation.conjugate();
+  std::vector<Eigen::Vector3d> axes = {Eigen::Vector3d::UnitZ()};  // of the station
+  const Eigen::Vector3d up = station_from_scan * scan->up;
+  if (!up.isApprox(axes[0], 1e-6)) axes.push_back(up);
+  if (scan->up_is_assumed) axes.push_back(station_from_scan * Eigen::Vector3d::UnitY());
+  std::optional<Scan> grid;
+  for (size_t i = 0; i < axes.size() && !grid; ++i) {
+    grid = GridFromCloud(*scan, axes[i]);
+    if (grid && scan->up_is_assumed) grid->up = scan->scan_from_station.rotation * axes[i];
+  }
   if (!grid) return;
   notes->push_back(
       NameOrFile(*scan) + " is a cloud without a grid; its angles from the station show one of " +
       std::to_string(grid->num_columns) + " columns x " + std::to_string(grid->num_rows) + " rows");
   *scan = std::move(*grid);
+}
+
+void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
+  if (!scan->up_is_assumed) return;
+  // A grid was found about the axis that is up.
+  if (!scan->organised) scan->up = FindUpAxis(*scan);
+  const std::string axis = NameOfUpAxis(scan->up);
+  if (axis == "z" || axis.empty()) return;
+  scan->up_is_assumed = false;
+  notes->push_back("the file does not say which way is up; its " +
+                   std::string(scan->organised ? "grid" : "surface") + " shows that " + axis +
+                   " is (--up_axis says another)");
 }
 
 // Formats that do not say their unit, and rooms of kilometres.
@@ -159,7 +190,8 @@ ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
   file.byte_order = "little";
   file.meters_per_unit = MetersPerUnitOr(options.units, 1);
   file.scans = ReadE57(path.file, path.part,
-                       {file.meters_per_unit, options.max_range, options.e57_check}, &file.notes);
+                       {file.meters_per_unit, options.max_range, options.e57_check, options.colors},
+                       &file.notes);
   return file;
 }
 
@@ -183,31 +215,31 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
   const double meters_per_unit = MetersPerUnitOr(options.units, 1);
   ScanFile file;
   file.meters_per_unit = meters_per_unit;
+  const PlyOptions mesh_options{meters_per_unit, options.max_range, true, options.colors, true};
   if (BeginsWith(start, "ply\n") || BeginsWith(start, "ply\r")) {
     file.format = "PLY";
-    file.scans.push_back(
-        ReadPly(path, {meters_per_unit, options.max_range, true}, &file.byte_order));
+    file.scans.push_back(ReadPly(path, mesh_options, &file.byte_order));
   } else if (LooksLikePcd(start)) {
     file.format = "PCD";
-    file.scans.push_back(
-        ReadPcd(path, {meters_per_unit, options.max_range, true}, &file.byte_order));
+    file.scans.push_back(ReadPcd(path, {meters_per_unit, options.max_range, true, options.colors},
+                                 &file.byte_order));
     file.byte_order = file.byte_order == "ascii" ? "text" : "little";
   } else if (LooksLikePtx(start)) {
     file.format = "PTX";
     file.byte_order = "text";
-    file.scans = ReadPtx(path, {meters_per_unit, options.max_range});
+    file.scans = ReadPtx(path, {meters_per_unit, options.max_range, options.colors});
   } else if (LooksLikeLas(start)) {
     file.format = "LAS";
     file.byte_order = "little";
-    file.scans.push_back(ReadLas(path, {meters_per_unit, options.max_range}));
+    file.scans.push_back(ReadLas(path, {meters_per_unit, options.max_range, options.colors}));
   } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
     file.format = "OBJ";
     file.byte_order = "text";
-    file.scans.push_back(ReadObj(path, {meters_per_unit, options.max_range}));
+    file.scans.push_back(ReadObj(path, mesh_options));
   } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
     file.format = "XYZ";
     file.byte_order = "text";
-    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range}));
+    file.scans.push_back(ReadXyz(path, {meters_per_unit, options.max_range, options.colors}));
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),
@@ -240,6 +272,13 @@ void ScanReaderOptions::Declare(OptionFields* fields) {
       .NotNegative()
       .Finite()
       .Says("must be 0 (no limit) or a number of metres");
+  std::vector<std::string> axes = UpAxisNames();
+  axes.insert(axes.begin(), "auto");
+  fields->Choice(
+      "up_axis", &up_axis, axes,
+      "Axis of the file's coordinates that points up. auto: as the file says it (E57: z); "
+      "where it does not (PLY, OBJ, PCD, PTX, LAS, text), y if grid, floor and walls "
+      "show it, else z. RTPI: y always.");
   fields->Bool("E57.check", &e57_check,
                "Compare the checksums of an E57 file before it is read; 0 = take a damaged file as "
                "it is.");
@@ -253,9 +292,12 @@ ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options)
     RequireMemoryForSamples(path, static_cast<double>(file.scans[0].points.size()));
   }
   for (const Scan& scan : file.scans) NoteInput(scan.path, "the scan");
+  TakeUpAxis(options, &file);
   for (Scan& scan : file.scans) {
     if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
+    FindUpAxisAgain(&scan, &file.notes);
   }
+  file.up_axis = NameOfUpAxis(file.scans[0].up);
   NoteDoubtfulUnit(options, &file);
   return file;
 }
@@ -290,7 +332,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   for (const std::string& path : paths) {
     ScanFile file = ReadScanFile(path, options);
     const int count = static_cast<int>(file.scans.size());
-    PlacedScans::File read{path, file.azimuth, file.meters_per_unit, {}};
+    PlacedScans::File read{path, file.azimuth, file.up_axis, file.meters_per_unit, {}};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
     if (file.format != "RTPI") {  // whose notes are on the azimuth
       for (const std::string& note : file.notes) placed.notes.push_back(path + ": " + note + ".");

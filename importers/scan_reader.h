@@ -22,8 +22,14 @@ struct ScanReaderOptions {
   std::string units;
   // Metres; samples farther away count as missing. 0 = the limit that the file gives, if any.
   double max_range = 0;
+  // The axis of the file's coordinates that points up (UpAxisNames(), up_axis.h). "auto": what the
+  // file says, otherwise as the grid or the surface show it (FindUpAxis), with a note where that is
+  // not z. RTPI: always y.
+  std::string up_axis = "auto";
   // E57: compare the checksums of the whole file before anything is read from it.
   bool e57_check = true;
+  // Keep the colours of the file (Scan::colors), no option of the command line.
+  bool colors = false;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
@@ -39,6 +45,8 @@ struct ScanFile {
   // sentence or "". Other formats: "".
   std::string azimuth, azimuth_note;
   double meters_per_unit = 1;
+  // Of the first scan, as it was read, "" where that is none of UpAxisNames().
+  std::string up_axis;
 
   // The file says where each of its scans stands.
   bool CarriesPoses() const { return format == "PTX" || format == "E57"; }
@@ -66,7 +74,7 @@ struct PlacedScans {
   std::vector<Scan> scans;
   // The files that they came from, in the order of the paths.
   struct File {
-    std::string path, azimuth;  // azimuth as in ScanFile
+    std::string path, azimuth, up_axis;  // as in ScanFile
     double meters_per_unit = 1;
     std::vector<bool> placed;  // one per scan of the file: its pose is one of poses_path
   };

@@ -143,6 +143,10 @@ void CheckOptions(const AlignmentRecord& alignment, const std::vector<Found>& fo
     if (!given.units.empty() && std::abs(unit / record.meters_per_unit - 1) > 1e-9) {
       add("--units " + given.units, record, "in units of " + Metres(record.meters_per_unit));
     }
+    if (given.up_axis != "auto" && record.azimuth.empty() && !record.up_axis.empty() &&
+        given.up_axis != record.up_axis) {
+      add("--up_axis " + given.up_axis, record, "with " + record.up_axis + " up");
+    }
     if (given.max_range > 0 && given.max_range != record.max_range) {
       add("--max_range", record,
           record.max_range > 0 ? "up to " + Metres(record.max_range) : "without such a limit");
@@ -194,6 +198,7 @@ ScanRecord RecordFromJson(const Json& json) {
   record.units = json.at("units").is_null() ? "" : ValueOf<std::string>(json, "units");
   record.meters_per_unit = ValueOf<double>(json, "meters_per_unit");
   record.max_range = ValueOf<double>(json, "max_range");
+  record.up_axis = json.value("up_axis", std::string());
   if (!(record.meters_per_unit > 0) || !(record.max_range >= 0)) {
     throw std::domain_error("a length out of range");
   }
@@ -215,6 +220,7 @@ ScanReaderOptions OptionsOf(const ScanRecord& record, const ScanReaderOptions& g
   if (!record.azimuth.empty()) options.azimuth = record.azimuth;
   options.units = record.units;
   options.max_range = record.max_range;
+  if (!record.up_axis.empty()) options.up_axis = record.up_axis;
   return options;
 }
 
@@ -241,6 +247,7 @@ std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderO
     record.units = options.units;
     record.meters_per_unit = file.meters_per_unit;
     record.max_range = options.max_range;
+    record.up_axis = file.up_axis;
     for (const bool given : file.placed) {
       record.poses.push_back({placed.scans[scan++].scan_from_station, given});
     }
@@ -263,6 +270,7 @@ Json ToJson(const std::vector<ScanRecord>& records) {
     one["units"] = record.units.empty() ? Json(nullptr) : Json(record.units);
     one["meters_per_unit"] = record.meters_per_unit;
     one["max_range"] = record.max_range;
+    one["up_axis"] = record.up_axis;
     one["poses"] = Json::array();
     for (const ScanRecord::Pose& pose : record.poses) {
       one["poses"].push_back(
@@ -326,7 +334,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
                            std::to_string(file.scans.size()) + " scans of " + one.path,
                        "Align anew");
     }
-    PlacedScans::File read{one.path, file.azimuth, file.meters_per_unit, {}};
+    PlacedScans::File read{one.path, file.azimuth, file.up_axis, file.meters_per_unit, {}};
     for (size_t k = 0; k < poses.size(); ++k) {
       if (poses[k].given) PlaceScan(poses[k].scan_from_station, &file.scans[k]);
       read.placed.push_back(poses[k].given);

@@ -25,6 +25,7 @@ struct ScanRecord {
   std::string units;           // as given, "" = by the file
   double meters_per_unit = 1;  // in effect
   double max_range = 0;        // metres, as given
+  std::string up_axis;         // in effect; "" = as the file says it
   struct Pose {
     Rigid scan_from_station;
     bool given = false;  // by --scan_poses, else the file's own

@@ -15,6 +15,7 @@
 #include "importers/ply.h"
 #include "importers/ptx.h"
 #include "importers/rtpi.h"
+#include "importers/xyz.h"
 
 namespace roomtex {
 namespace {
@@ -35,8 +36,8 @@ void WriteIntensityImage(const Scan& scan, const std::string& path) {
 }  // namespace
 
 const std::vector<std::string>& ScanWriterExtensions() {
-  static const std::vector<std::string> kExtensions = {".ply", ".pcd", ".png", ".rtpi",
-                                                       ".ptx", ".e57", ".las"};
+  static const std::vector<std::string> kExtensions = {".ply", ".pcd", ".png", ".rtpi", ".ptx",
+                                                       ".e57", ".las", ".xyz", ".pts",  ".csv"};
   return kExtensions;
 }
 
@@ -47,18 +48,25 @@ std::string ScanWriterExtension(const std::string& path) {
   return std::find(known.begin(), known.end(), extension) != known.end() ? extension : "";
 }
 
+bool CanHold(const std::string& extension, Scan::Kind kind) {
+  if (kind == Scan::Kind::kGrid) return true;
+  if (extension == ".pcd" || extension == ".e57") return kind == Scan::Kind::kCloud;
+  return extension != ".png" && extension != ".rtpi" && extension != ".ptx";
+}
+
 void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,
                const ScanWriterOptions& options) {
   const std::string extension = ScanWriterExtension(path);
   if (extension.empty()) {
     throw UsageError(path +
                      ": the extension names no known format (.ply, .pcd, .png, .rtpi, .ptx, "
-                     ".e57, .las)");
+                     ".e57, .las, .xyz, .pts, .csv)");
   }
-  if (!scan.organised && extension != ".ply" && extension != ".las") {
-    throw InputError(
-        scan.path, "", "is without a grid, so that it cannot be written as " + extension,
-        "Write a .ply or .las, or give the scan with its grid (RTPI, PTX or organised PCD)");
+  if (!CanHold(extension, scan.kind())) {
+    throw InputError(scan.path, "",
+                     "is without a grid, so that it cannot be written as " + extension,
+                     "Write a .ply or .las, or give the scan with its grid (RTPI, PTX or "
+                     "organised PCD)");
   }
   if (extension == ".ply") WritePly({{&scan, &triangles}}, path);
   if (extension == ".pcd") WritePcd(scan, path);
@@ -67,6 +75,9 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension == ".ptx") WritePtx({scan}, path);
   if (extension == ".e57") WriteE57({scan}, path);
   if (extension == ".las") WriteLas({&scan}, path);
+  if (extension == ".xyz") WriteXyz({&scan}, path, XyzKind::kXyz);
+  if (extension == ".pts") WriteXyz({&scan}, path, XyzKind::kPts);
+  if (extension == ".csv") WriteXyz({&scan}, path, XyzKind::kCsv);
 }
 
 }  // namespace roomtex

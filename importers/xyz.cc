@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/output_file.h"
 #include "core/resource_limits.h"
 #include "importers/file_reader.h"
+#include "importers/mesh_scan.h"
 
 namespace roomtex {
 namespace {
@@ -67,6 +69,7 @@ struct XyzColumns {
     columns.count = count;
     if (count == 4 || count >= 7) columns.intensity = 3;
     if (count == 6) std::iota(columns.color, columns.color + 3, 3);
+    if (count >= 7) std::iota(columns.color, columns.color + 3, 4);
     return columns;
   }
   // None if the words do not name x, y and z.
@@ -91,6 +94,7 @@ struct XyzColumns {
     columns.color[0] = find({"r", "red"});
     columns.color[1] = find({"g", "green"});
     columns.color[2] = find({"b", "blue"});
+    if (std::min(columns.color[0], columns.color[1]) < 0) columns.color[2] = -1;
     return columns;
   }
 };
@@ -104,6 +108,7 @@ class XyzParser {
     scan_.path = file_.path();
     scan_.organised = false;
     scan_.up = Eigen::Vector3d::UnitZ();
+    scan_.up_is_assumed = true;
     std::string_view line;
     while (lines_.Next(&line)) ParseLine(line);
     if (said_ >= 0 && num_points_ < said_) {
@@ -178,17 +183,23 @@ class XyzParser {
     }
     Eigen::Vector3d point;
     for (int i = 0; i < 3; ++i) point[i] = options_.meters_per_unit * number(columns_->place[i]);
-    double intensity = 0;
-    if (columns_->intensity >= 0) {
-      intensity = number(columns_->intensity);
-    } else if (columns_->color[0] >= 0 && columns_->color[1] >= 0 && columns_->color[2] >= 0) {
-      // Rec. ITU-R BT.601
-      intensity = 0.299 * number(columns_->color[0]) + 0.587 * number(columns_->color[1]) +
-                  0.114 * number(columns_->color[2]);
+    double intensity = columns_->intensity >= 0 ? number(columns_->intensity) : 0;
+    Eigen::Vector3d color = Eigen::Vector3d::Zero();
+    const bool has_color = columns_->color[2] >= 0;
+    if (has_color && (options_.colors || columns_->intensity < 0)) {
+      for (int k = 0; k < 3; ++k) color[k] = number(columns_->color[k]);
+      if (columns_->intensity < 0) intensity = GreyOf(color);
+    }
+    if (options_.colors && color.minCoeff() < 0) {  // these columns are none
+      options_.colors = false;
+      scan_.colors = {};
     }
     const double range = point.norm();
     if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) return;
     scan_.points.push_back(point);
+    if (options_.colors && has_color) {
+      scan_.colors.push_back(color_scale_.Bytes(color, &scan_.colors));
+    }
     scan_.intensity.push_back(std::isfinite(intensity) ? static_cast<float>(intensity) : 0.0f);
   }
 
@@ -199,6 +210,7 @@ class XyzParser {
   std::optional<XyzColumns> columns_;
   int64_t said_ = -1, num_points_ = 0;
   Scan scan_;
+  ColorScale color_scale_{1};
 };
 
 }  // namespace
@@ -225,6 +237,45 @@ bool LooksLikeXyz(std::string_view start) {
     had_count = true;
   }
   return false;
+}
+
+void WriteXyz(const std::vector<const Scan*>& scans, const std::string& path, XyzKind kind) {
+  constexpr size_t kBlock = 1 << 20;
+  bool has_colors = false;
+  size_t count = 0;
+  for (const Scan* scan : scans) {
+    has_colors = has_colors || !scan->colors.empty();
+    count += scan->points.size() - static_cast<size_t>(scan->NumMissing());
+  }
+  const char between = kind == XyzKind::kCsv ? ',' : ' ';
+  OutputFile output(path);
+  std::string text;
+  if (kind == XyzKind::kPts) text = std::to_string(count) + "\n";
+  if (kind == XyzKind::kCsv) text = has_colors ? "x,y,z,intensity,r,g,b\n" : "x,y,z,intensity\n";
+  char number[352];  // the longest double without exponent has 309 digits before the point
+  char* const end = number + sizeof(number);
+  for (const Scan* scan : scans) {
+    for (size_t i = 0; i < scan->points.size(); ++i) {
+      if (scan->IsMissing(static_cast<int>(i))) continue;
+      for (int k = 0; k < 3; ++k) {
+        text.append(
+            number,
+            std::to_chars(number, end, scan->points[i][k], std::chars_format::fixed, 6).ptr);
+        text += between;
+      }
+      const float intensity = std::isfinite(scan->intensity[i]) ? scan->intensity[i] : 0.0f;
+      text.append(number, std::to_chars(number, end, intensity).ptr);
+      for (size_t k = 0; k < 3 && has_colors; ++k) {
+        text += between + std::to_string(scan->colors.empty() ? 0 : scan->colors[i][k]);
+      }
+      text += '\n';
+      if (text.size() < kBlock) continue;
+      output.stream() << text;
+      text.clear();
+    }
+  }
+  output.stream() << text;
+  output.Commit();
 }
 
 }  // namespace roomtex

@@ -11,6 +11,7 @@ namespace roomtex {
 struct XyzOptions {
   double meters_per_unit = 1;
   double max_range = 0;  // metres from the origin; 0 = no limit
+  bool colors = false;   // keep them (Scan::colors)
 };
 
 // Lines "x y z", "x y z intensity", "x y z r g b" or "x y z intensity r g b", all alike, between
@@ -23,5 +24,11 @@ Scan ReadXyz(const std::string& path, const XyzOptions& options);
 
 // The start of a file is that of such a text.
 bool LooksLikeXyz(std::string_view start);
+
+// All measured points of all scans: "x y z intensity" and, where a scan has colours, "r g b" from 0
+// to 255; lengths to the micrometre. kPts: their number in the first line. kCsv: with commas and a
+// line of names. Throws InputError if the file cannot be written.
+enum class XyzKind { kXyz, kPts, kCsv };
+void WriteXyz(const std::vector<const Scan*>& scans, const std::string& path, XyzKind kind);
 
 }  // namespace roomtex

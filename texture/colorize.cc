@@ -62,6 +62,7 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
   SmoothedScan surface;
   surface.range_noise = cloud.noise;
   surface.station_is_known = cloud.angular_spacing > 0;
+  surface.front_is_known = cloud.front_is_known;
   surface.angular_spacing =
       surface.station_is_known ? cloud.angular_spacing : SpacingInPhotos(cloud, photos);
   surface.points = std::move(cloud.patches.points);
@@ -97,7 +98,7 @@ PhotoPassInput MakeInput(const std::vector<Scan>& scans, const std::vector<Photo
     grids->push_back(
         AddGrid(scan.num_columns, scan.num_rows, surface.points, surface.normals, station, &input));
     for (size_t t = grids->back().first_tile; t < grids->back().end_tile; ++t) {
-      input.samples[t].is_two_sided = is_cloud && !surface.station_is_known;
+      input.samples[t].is_two_sided = is_cloud && !surface.front_is_known;
     }
     if (surface.angular_spacing > 0 &&
         (!(input.angular_spacing > 0) || surface.angular_spacing < input.angular_spacing)) {

@@ -105,8 +105,8 @@ void AddWriteOptions(TextureOptions* o, Command* command) {
                    "the output folder, with the triangles of --Mesh.max_triangles; the up axis "
                    "stays the scan's.");
   command->AddBool("output_e57", &o->output_e57,
-                   "Also write model.e57: all stations in one structured E57, with intensity, "
-                   "colour and pose. Scans with a grid only.");
+                   "Also write model.e57: all stations in one E57 (structured where there is a "
+                   "grid), with intensity, colour and pose.");
   command->AddBool("E57.images", &o->e57_images,
                    "model.e57 also holds the photos, undistorted, with their cameras and poses: "
                    "what programs for splatting read. Writes model.e57, too.");
@@ -138,15 +138,6 @@ void AddColorOptions(ColorizeOptions* o, Command* command) {
   command->Add(FieldsOf(&o->detail));
   command->Add(FieldsOf(&o->surface));
   command->Add(FieldsOf(&o->mesh));
-}
-
-void CheckScans(const std::vector<Scan>& scans, const TextureOptions& options) {
-  for (const Scan& scan : scans) {
-    if (!scan.organised && (options.output_e57 || options.e57_images)) {
-      throw InputError(scan.path, "", "has no grid, which model.e57 needs",
-                       "Leave out --output_e57 and --E57.images");
-    }
-  }
 }
 
 double RoundedGain(float gain) { return std::round(1e6 * gain) / 1e6; }
@@ -447,6 +438,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   ColorizeOptions colorize = options.colorize;
   if (colorize.texture_scale == 1 && colorize.atlas.mode == "auto") colorize.atlas.mode = "0";
   colorize.atlas.max_page_size = options.glb.max_texture_size;
+  if (options.output_web || options.output_obj) {
+    colorize.atlas.decimated_to = options.web.max_triangles;
+  }
   std::vector<std::string> problems = options.scan_reader.Problems();
   AppendProblems(colorize.Problems(), &problems);
   AppendProblems(options.glb.Problems(), &problems);
@@ -466,7 +460,6 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
       alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
   if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
   const std::vector<Scan>& scans = placed.scans;
-  CheckScans(scans, options);
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   ProtectInputs(options, scans);

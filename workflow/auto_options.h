@@ -17,7 +17,7 @@ struct AutoOptions {
   // One of the first three.
   std::string image_path, panoramas_path, video_path;
   std::vector<std::string> scan_paths;
-  std::string scan_poses, azimuth = "auto", units;
+  std::string scan_poses, azimuth = "auto", up_axis = "auto", units;
   std::string output_path, picks_path;
   std::string camera_model, camera_params, cameras_path;
   std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";

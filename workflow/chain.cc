@@ -102,6 +102,7 @@ CommandLine Chain::PickCommand() const {
   for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
   AddOption("--scan_poses", options_.scan_poses, &line);
   if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
+  if (options_.up_axis != "auto") AddOption("--up_axis", options_.up_axis, &line);
   AddOption("--units", options_.units, &line);
   AddOption("--output_path", options_.picks_path.empty() ? At("picks.csv") : options_.picks_path,
             &line);
@@ -116,6 +117,7 @@ CommandLine Chain::AutoCommand() const {
   for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
   AddOption("--scan_poses", options_.scan_poses, &line);
   if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
+  if (options_.up_axis != "auto") AddOption("--up_axis", options_.up_axis, &line);
   AddOption("--units", options_.units, &line);
   AddOption("--output_path", options_.output_path, &line);
   AddOption("--picks_path", options_.picks_path, &line);

@@ -39,6 +39,8 @@ void AddOptions(AutoOptions* o, Command* command) {
                         "Where the scanners stood, as roomtex-align has it.", optional);
   command->AddChoice("azimuth", &o->azimuth, {"auto", "clockwise", "counterclockwise"},
                      "RTPI: sense in which the azimuth grows, as roomtex-align has it.");
+  command->AddChoice("up_axis", &o->up_axis, {"auto", "x", "y", "z", "-x", "-y", "-z"},
+                     "Axis of the scan's coordinates that points up, as roomtex-align has it.");
   command->AddString("units", &o->units,
                      "Unit of the lengths in the scan, as roomtex-align has it; not given = what "
                      "the file says.");

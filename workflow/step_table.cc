@@ -364,6 +364,7 @@ Step MakeAlign(Chain* chain) {
   AddOption("--scan_poses", options.scan_poses, &line);
   if (!options.scan_poses.empty()) step.inputs.push_back(options.scan_poses);
   if (options.azimuth != "auto") AddOption("--azimuth", options.azimuth, &line);
+  if (options.up_axis != "auto") AddOption("--up_axis", options.up_axis, &line);
   AddOption("--units", options.units, &line);
   const std::string picks = chain->PicksPath();
   if (picks.empty()) {

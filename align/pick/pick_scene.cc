@@ -97,6 +97,9 @@ void PickScene::ReadScans() {
   if (!azimuth_.empty()) input_.scan_reader.azimuth = azimuth_;
   input_.scan_reader.units = record.scans[0].units;
   input_.scan_reader.max_range = record.scans[0].max_range;
+  if (!record.scans[0].up_axis.empty() && record.scans[0].azimuth.empty()) {
+    input_.scan_reader.up_axis = record.scans[0].up_axis;
+  }
 }
 
 void PickScene::AddPanorama(const Scan& mesh) {

@@ -51,6 +51,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
   const ScanReaderOptions &reader = input.scan_reader, defaults;
   if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
   if (reader.units != defaults.units) add("--units", reader.units);
+  if (reader.up_axis != defaults.up_axis) add("--up_axis", reader.up_axis);
   if (reader.max_range != defaults.max_range) {
     add("--max_range", Exact(reader.max_range));
   }

@@ -67,6 +67,42 @@ TEST(Surfels, NormalsAndPlacesAreThoseOfTheSurface) {
   }
 }
 
+TEST(Surfels, NormalsOfTheFileSayTheFront) {
+  // As merged stations: nothing is known of where they were taken from.
+  const auto share_inwards = [](const Sides& sides, const CloudSurface& surface) {
+    int num_inwards = 0, num_asked = 0;
+    for (const Triangle& t : surface.patches.triangles) {
+      const Eigen::Vector3d& a = surface.patches.points[t[0]];
+      const Eigen::Vector3d normal =
+          (surface.patches.points[t[1]] - a).cross(surface.patches.points[t[2]] - a);
+      num_inwards += normal.dot(0.5 * kRoom - a) > 0;
+      ++num_asked;
+    }
+    for (size_t i = 0; i < sides.cloud.points.size(); ++i) {
+      if (surface.normals[i].isZero()) continue;
+      num_inwards += surface.normals[i].cast<double>().dot(0.5 * kRoom - sides.cloud.points[i]) > 0;
+      ++num_asked;
+    }
+    return static_cast<double>(num_inwards) / num_asked;
+  };
+  std::mt19937 random(3);
+  for (const double turn : {1.0, -1.0, 0.0}) {  // a room; a thing; either way
+    Sides sides(30000);
+    sides.cloud.scan_from_station.translation = {40, 0, 0};
+    for (size_t i = 0; i < sides.cloud.points.size(); ++i) {
+      Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+      const float inwards = sides.height[i] == 0 ? 1 : -1;
+      normal[sides.axis[i]] = inwards * (turn != 0 ? turn : random() % 2 == 0 ? 1 : -1);
+      sides.cloud.normals.push_back(normal);
+    }
+    const CloudSurface surface = FindCloudSurface(sides.cloud, 1);
+    EXPECT_EQ(surface.angular_spacing, 0);
+    EXPECT_EQ(surface.front_is_known, turn != 0);
+    if (turn == 0) continue;
+    EXPECT_NEAR(share_inwards(sides, surface), turn > 0 ? 1 : 0, 0.01);
+  }
+}
+
 TEST(Surfels, PatchesCloseTheSurfaceAndReachHardlyBeyond) {
   const Sides sides(100000);
   const CloudSurface surface = FindCloudSurface(sides.cloud, 2);

@@ -6,9 +6,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/photo.h"
+#include "importers/e57_writer.h"
 #include "tests/importers/e57_bytes.h"
 #include "tests/support/folders.h"
 #include "tests/support/matchers.h"
@@ -222,6 +224,55 @@ TEST_F(E57Images, TheCommandWritesThemBesideTheScan) {
   EXPECT_EQ(none.exit_code, 3);
   EXPECT_THAT(none.err, HasSubstr("holds no photos"));
   EXPECT_EQ(RunCommandLine("roomtex-import --input_path " + (folder_ / "walls.e57")).exit_code, 2);
+}
+
+TEST_F(E57Images, PicksFollowFromThePosesOfThePhotos) {
+  Scan scan;  // a wall, and a board in front of its left half
+  scan.organised = false;
+  scan.up = Eigen::Vector3d::UnitZ();
+  for (double y = -4; y < 4; y += 0.02) {
+    for (double z = -3; z < 3; z += 0.02) {
+      scan.points.emplace_back(4, y, z);
+      if (y > 0.3) scan.points.emplace_back(2, 0.5 * y, 0.5 * z);
+    }
+  }
+  scan.intensity.assign(scan.points.size(), 1.0f);
+  scan.num_columns = static_cast<int>(scan.points.size());
+  scan.num_rows = 1;
+  Camera camera;
+  camera.model = CameraModel::kPinhole;
+  camera.width = 400;
+  camera.height = 300;
+  camera.params = {200, 200, 200, 150};
+  Eigen::Matrix3d along_x;
+  along_x << 0, -1, 0,  //
+      0, 0, -1,         //
+      1, 0, 0;
+  const Rigid cam_from_scan{Eigen::Quaterniond(along_x), Eigen::Vector3d::Zero()};
+  E57Writer writer(folder_ / "site.e57");
+  writer.AddScan(scan, nullptr);
+  writer.AddPhoto({"front", Picture(400, 300, ".jpg"), camera, cam_from_scan});
+  writer.Commit();
+  const CommandResult result =
+      RunCommandLine("roomtex-import --quiet --input_path " + (folder_ / "site.e57") +
+                     " --images_path " + (folder_ / "photos") + " --E57.picks 1");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  CsvReader picks(folder_ / "photos/picks.csv", "", "");
+  ASSERT_TRUE(picks.Next());
+  EXPECT_EQ(picks.line(), "image_name,x,y,scan_x,scan_y,scan_z");
+  const SparseModel model = Model();
+  int count = 0, num_on_board = 0;
+  for (; picks.Next(); ++count) {
+    const std::vector<std::string> fields = *picks.Fields();
+    const auto number = [&](size_t i) { return std::stod(fields[i]); };
+    const Eigen::Vector3d x_in_scan(number(3), number(4), number(5));
+    EXPECT_THAT(Project(model, fields[0], x_in_scan),
+                IsNearMatrix(Eigen::Vector2d(number(1), number(2)), 1e-3));
+    EXPECT_NEAR(x_in_scan.x(), number(1) < 180 ? 2 : 4, 1e-5);
+    num_on_board += x_in_scan.x() < 3;
+  }
+  EXPECT_EQ(count, 9);
+  EXPECT_EQ(num_on_board, 3);
 }
 
 }  // namespace

@@ -226,6 +226,7 @@ TEST_F(E57Written, OtherFormatsBecomeE57AndBack) {
   }
   Scan mesh = scan;
   mesh.organised = false;
+  mesh.triangles = {{0, 1, 30}};
   EXPECT_INPUT_ERROR(WriteScan(mesh, {}, Path()), "without a grid");
 }
 

@@ -103,6 +103,88 @@ TEST_F(ImportCommand, WritesEveryFormatAndTheReport) {
   EXPECT_EQ(image.at<uchar>(4, 3), 0);     // missing
 }
 
+// Points in the order of the file with their colours, by way of a PLY.
+struct ColoredPoints {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<std::vector<float>> rgb;
+};
+
+TEST_F(ImportCommand, ColoursOfTheScanGoWhereTheFormatHoldsThem) {
+  // A grid of 3 columns x 2 rows, one sample missing; and the points alone.
+  const std::string samples =
+      "1 2 -1 0.5 255 0 7\n1 2 1 0.25 1 2 3\n1.5 2 -1 0.5 9 99 199\n0 0 0 0.5 0 0 0\n"
+      "2 2 -1 1 0 0 0\n2 2 1 0 128 64 32\n";
+  WriteBytes(folder_ / "grid.ptx",
+             "3\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 "
+             "0\n0 0 0 1\n" +
+                 samples);
+  WriteBytes(folder_ / "points.pts",
+             "5\n1 2 -1 0.5 255 0 7\n1 2 1 0.25 1 2 3\n1.5 2 -1 0.5 9 99 199\n2 2 -1 1 0 0 "
+             "0\n2 2 1 0 128 64 32\n");
+  const auto read = [&](const std::string& file) {
+    ColoredPoints result;
+    EXPECT_EQ(RunOn(file, "--quiet" + Output("again.ply")).exit_code, 0) << file;
+    PlyVertexValues values;
+    values.names = {"red", "green", "blue", "intensity"};
+    PlyOptions options;
+    options.clouds = true;
+    result.points = ReadPly(folder_ / "again.ply", options, nullptr, &values).points;
+    result.rgb = values.values;
+    return result;
+  };
+  for (const std::string input : {"grid.ptx", "points.pts"}) {
+    const ColoredPoints truth = read(input);
+    ASSERT_EQ(truth.points.size(), 5u);
+    ASSERT_EQ(truth.rgb[1].size(), 5u) << input;
+    EXPECT_EQ(truth.rgb[0][0] + truth.rgb[1][0] + truth.rgb[2][0],
+              input == "grid.ptx" ? 1 + 2 + 3 : 255 + 7);
+    for (const std::string extension : {"ptx", "e57", "pcd", "ply", "las", "xyz", "pts", "csv"}) {
+      if (extension == "ptx" && input != "grid.ptx") continue;
+      ASSERT_EQ(RunOn(input, "--quiet" + Output("copy." + extension)).exit_code, 0) << extension;
+      const ColoredPoints copy = read("copy." + extension);
+      ASSERT_EQ(copy.points.size(), truth.points.size()) << extension;
+      for (size_t i = 0; i < truth.points.size(); ++i) {
+        EXPECT_LT((copy.points[i] - truth.points[i]).norm(), 1e-4) << extension;
+      }
+      for (int k = 0; k < 3; ++k) EXPECT_EQ(copy.rgb[k], truth.rgb[k]) << extension;
+      // LAS has whole numbers from 0 to 65535.
+      const float largest = extension == "las" ? 65535 : 1;
+      ASSERT_EQ(copy.rgb[3].size(), truth.rgb[3].size());
+      for (size_t i = 0; i < truth.rgb[3].size(); ++i) {
+        EXPECT_NEAR(copy.rgb[3][i] / largest, truth.rgb[3][i], 1e-5) << extension;
+      }
+    }
+  }
+}
+
+TEST_F(ImportCommand, GreyOfTheColoursIsTheIntensityWhereThereIsNone) {
+  WriteBytes(folder_ / "a.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+             "property float z\nproperty float red\nproperty float green\nproperty float blue\n"
+             "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+             "0 0 0 1 0 0\n1 0 0 0 1 0\n0 1 0 0 0 0.2\n3 0 1 2\n");
+  WriteBytes(folder_ / "b.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.2\nf 1 2 3\n");
+  // 0xff0000, 0x00ff00 and 0x000033
+  WriteBytes(folder_ / "c.pcd",
+             "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 3\nHEIGHT 1\n"
+             "POINTS 3\nDATA ascii\n0 0 1 16711680\n1 0 1 65280\n0 1 1 51\n");
+  for (const char* name : {"a.ply", "b.obj", "c.pcd"}) {
+    ASSERT_EQ(RunOn(name, "--quiet" + Output("out.ply")).exit_code, 0) << name;
+    PlyVertexValues values;
+    values.names = {"intensity", "red", "green", "blue"};
+    PlyOptions options;
+    options.clouds = true;
+    ReadPly(folder_ / "out.ply", options, nullptr, &values);
+    ASSERT_EQ(values.values[1].size(), 3u) << name;
+    EXPECT_THAT(values.values[1], testing::ElementsAre(255, 0, 0));
+    EXPECT_THAT(values.values[2], testing::ElementsAre(0, 255, 0));
+    EXPECT_THAT(values.values[3], testing::ElementsAre(0, 0, 51));
+    const float* const grey = values.values[0].data();
+    EXPECT_NEAR(grey[0] / grey[1], 0.299 / 0.587, 1e-3) << name;
+    EXPECT_NEAR(grey[2] / grey[1], 0.2 * 0.114 / 0.587, 1e-3) << name;
+  }
+}
+
 TEST_F(ImportCommand, RtpiToRtpiKeepsEverySample) {
   ASSERT_EQ(RunOn("room.rtpi", Output("copy.rtpi")).exit_code, 0);
   const std::string body = RtpiBody(columns_, true), copy = ReadBytes(folder_ / "copy.rtpi");
@@ -145,7 +227,7 @@ TEST_F(ImportCommand, SeveralScansGoIntoOneMeshOnePtxAndNumberedClouds) {
   EXPECT_EQ(report["num_samples"], 8);
 }
 
-TEST_F(ImportCommand, AMeshGoesToPlyOnly) {
+TEST_F(ImportCommand, AMeshDoesNotBecomeAGrid) {
   ASSERT_EQ(RunOn("room.rtpi", Output("a.ply")).exit_code, 0);
   ASSERT_EQ(RunOn("a.ply", Output("b.ply")).exit_code, 0);
   EXPECT_EQ(ReadBytes(folder_ / "a.ply"), ReadBytes(folder_ / "b.ply"));
@@ -157,7 +239,7 @@ TEST_F(ImportCommand, AMeshGoesToPlyOnly) {
 
 TEST_F(ImportCommand, WrongUsageIsToldBeforeTheInputIsRead) {
   const std::pair<std::string, const char*> cases[] = {
-      {Output("a.xyz"), ".ply, .pcd, .png, .rtpi, .ptx"},
+      {Output("a.stl"), ".ply, .pcd, .png, .rtpi, .ptx"},
       {Output("a"), "unknown extension"},
       {Output("a.ply") + Output("a.ply"), "is given twice"},
       {Output("a.ply") + " --Mesh.max_edge_ratio 0.5", "--Mesh.max_edge_ratio"},

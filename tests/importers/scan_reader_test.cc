@@ -1,5 +1,6 @@
 #include "importers/scan_reader.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -78,12 +79,90 @@ TEST_F(ScanReader, OptionsReachTheFormats) {
   EXPECT_EQ(ReadScan(path, options).NumMissing(), 3);
 }
 
+// The sides of a box-shaped room and a table in it as an OBJ, turned about the vertical.
+std::string RoomAsObj(const Eigen::Vector3d& size, double turn, char up) {
+  std::string vertices, faces;
+  int count = 0;
+  const auto add_box = [&](const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const bool far : {false, true}) {
+        for (int corner = 0; corner < 4; ++corner) {
+          Eigen::Vector3d p = low;
+          if (far) p[axis] = high[axis];
+          if (corner == 1 || corner == 2) p[(axis + 1) % 3] = high[(axis + 1) % 3];
+          if (corner >= 2) p[(axis + 2) % 3] = high[(axis + 2) % 3];
+          p = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()) * p;
+          if (up == 'y') p = {p.x(), p.z(), -p.y()};
+          vertices += "v " + std::to_string(p.x()) + " " + std::to_string(p.y()) + " " +
+                      std::to_string(p.z()) + "\n";
+        }
+        faces += "f";
+        for (int k = 1; k <= 4; ++k) faces += " " + std::to_string(count + k);
+        faces += "\n";
+        count += 4;
+      }
+    }
+  };
+  add_box({0, 0, 0}, size);
+  add_box({1, 1, 0}, {2, 1.6, 0.75});
+  return vertices + faces;
+}
+
+TEST_F(ScanReader, FindsWhichWayIsUp) {
+  const Eigen::Vector3d room(6, 5, 2.7), corridor(20, 1.6, 2.6);
+  for (const char up : {'y', 'z'}) {
+    for (const double turn : {0.0, 0.4, 0.8}) {
+      const ScanFile file =
+          ReadScanFile(Write("room.obj", RoomAsObj(room, turn, up)), ScanReaderOptions());
+      EXPECT_EQ(file.up_axis, std::string(1, up)) << turn;
+      EXPECT_THAT(file.notes, SizeIs(up == 'y' ? 1 : 0)) << turn;
+      EXPECT_EQ(file.scans[0].up_is_assumed, up == 'z');
+    }
+    const std::string path = Write("corridor.obj", RoomAsObj(corridor, 0.4, up));
+    EXPECT_EQ(ReadScanFile(path, {}).up_axis, std::string(1, up));
+  }
+  // What stands along the axes and is no plain room is taken as usual.
+  const std::string path = Write("corridor.obj", RoomAsObj(corridor, 0, 'z'));
+  EXPECT_EQ(ReadScanFile(path, {}).up_axis, "z");
+  ScanReaderOptions options;
+  options.up_axis = "-y";
+  const ScanFile told = ReadScanFile(path, options);
+  EXPECT_THAT(told.scans[0].up, IsNearMatrix(Eigen::Vector3d(0, -1, 0), 0));
+  EXPECT_THAT(told.notes, SizeIs(0));
+  EXPECT_THAT(ReadScan(WriteGoodRtpi("a.rtpi"), options).up,
+              IsNearMatrix(Eigen::Vector3d(0, 1, 0), 0));
+}
+
+TEST_F(ScanReader, AGridSaysWhichWayIsUp) {
+  std::string text;
+  for (int column = 0; column < 120; ++column) {
+    for (int row = 0; row < 60; ++row) {
+      const double azimuth = 0.0523 * column, elevation = 1.2 - 0.03 * row;
+      const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth), std::sin(elevation),
+                                      -std::cos(elevation) * std::sin(azimuth));
+      const Eigen::Vector3d p =
+          direction / direction.cwiseAbs().cwiseQuotient(Eigen::Vector3d(4, 1.5, 3)).maxCoeff();
+      text += std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) +
+              " " + std::to_string(row) + "\n";
+    }
+  }
+  const ScanFile file = ReadScanFile(Write("a.xyz", text), {});
+  ASSERT_TRUE(file.scans[0].organised);
+  EXPECT_EQ(file.scans[0].num_rows, 60);
+  EXPECT_EQ(file.scans[0].num_columns, 120);
+  EXPECT_EQ(file.scans[0].intensity[0], 0);  // row 0 on top
+  EXPECT_EQ(file.up_axis, "y");
+  EXPECT_THAT(file.notes, SizeIs(2));
+}
+
 TEST_F(ScanReader, BadOptionsAreUsageErrors) {
   ScanReaderOptions options;
   options.azimuth = "left";
   options.units = "miles";
   options.max_range = -1;
-  EXPECT_THAT(options.Problems(), SizeIs(3));
+  options.up_axis = "w";
+  EXPECT_THAT(options.Problems(), SizeIs(4));
+  options.up_axis = "auto";
   EXPECT_THROW(ReadScan(WriteGoodRtpi("a.rtpi"), options), UsageError);
   options.max_range = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(options.Problems(), SizeIs(3));
@@ -188,9 +267,10 @@ TEST_F(ScanReader, EveryWriterGivesWhatTheReadersTake) {
       EXPECT_THAT(again.points[i], IsNearMatrix(scan.points[i], 1e-6)) << extension;
     }
   }
-  EXPECT_THROW(WriteScan(scan, {}, folder_ / "out.xyz"), UsageError);
+  EXPECT_THROW(WriteScan(scan, {}, folder_ / "out.stl"), UsageError);
   Scan mesh = scan;
   mesh.organised = false;
+  mesh.triangles = {{0, 5, 4}};
   EXPECT_INPUT_ERROR(WriteScan(mesh, {}, folder_ / "out.pcd"), "without a grid");
   EXPECT_EQ(ScanWriterExtension("a.b/ROOM.PlY"), ".ply");
   EXPECT_EQ(ScanWriterExtension("room"), "");

@@ -189,6 +189,17 @@ TEST_F(ScanRecords, OptionsThatContradictAreRefused) {
   refused(options);
 }
 
+TEST_F(ScanRecords, TheUpAxisIsRemembered) {
+  const std::string path = Write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  ScanReaderOptions options;
+  options.up_axis = "y";
+  Align({path}, options);
+  EXPECT_EQ(Read().scans[0].up, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(Read({path}, options).scans[0].up, Eigen::Vector3d(0, 1, 0));
+  options.up_axis = "z";
+  EXPECT_THROW(Read({}, options), UsageError);
+}
+
 TEST_F(ScanRecords, AModelThatRemembersNothingIsReadAsAsked) {
   const std::string path = WriteRtpi("scans/a.rtpi");
   ScanReaderOptions options;

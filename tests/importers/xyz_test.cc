@@ -44,6 +44,16 @@ TEST_F(Xyz, TheNumberOfColumnsSaysWhatTheyAre) {
   EXPECT_THAT(Read("1\t2\t3\t-900 10 20 30\n").intensity, ElementsAre(-900));
 }
 
+TEST_F(Xyz, ColoursBehindTheIntensityAreKeptOnRequest) {
+  XyzOptions options;
+  options.colors = true;
+  EXPECT_THAT(Read("1 2 3 0.5 255 0 7\n", options).colors,
+              ElementsAre(std::array<uint8_t, 3>{255, 0, 7}));
+  // Normals, these.
+  EXPECT_THAT(Read("1 2 3 0.5 1 0 0\n2 2 3 0.5 0 -1 0\n3 2 3 0.5 0 1 0\n", options).colors,
+              SizeIs(0));
+}
+
 TEST_F(Xyz, NamesSayWhatTheColumnsAre) {
   const Scan scan =
       Read("# made by hand\n//X,Intensity,Z,other,Y\n1,7,3,text?,2\n\n4,8,6,more,5\n");

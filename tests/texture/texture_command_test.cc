@@ -315,11 +315,17 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
   const double psnr_of_grid = Psnr(ReadPly(Path("textured/model.ply")), truth);
   Scan scan = ReadCaptureScan();
+  scan.up = Eigen::Vector3d::UnitZ();     // about it the angles show no grid
   for (const double loss : {2.2, 4.5}) {  // dB; without the station nobody knows its shadows
     WriteScan(scan, {}, Path("cloud.ply"));
-    const CommandResult result = Texture("cloud", "", Path("cloud.ply"));
+    const CommandResult result = Texture("cloud", "--output_e57 1", Path("cloud.ply"));
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const PlyVertices model = ReadPly(Path("cloud/model.ply"));
+    ScanReaderOptions with_colors;
+    with_colors.colors = true;
+    const Scan e57 = ReadScan(Path("cloud/model.e57"), with_colors);
+    EXPECT_EQ(e57.points.size() - static_cast<size_t>(e57.NumMissing()), model.points.size());
+    EXPECT_EQ(e57.colors.size(), e57.points.size());
     ASSERT_EQ(model.points.size(), truth.points.size());
     EXPECT_GT(Psnr(model, truth), psnr_of_grid - loss);
     EXPECT_GT(ReadJson(Path("cloud/report.json"))["coverage"],
@@ -336,6 +342,15 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   EXPECT_EQ(model.accessors.at(primitive.attributes.at("COLOR_0")).count, truth.points.size());
 }
 
+tinygltf::Model LoadGlb(const std::string& path) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
+  EXPECT_EQ(error + warning, "");
+  return model;
+}
+
 TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const Scan scan = ReadCaptureScan();
   WriteScan(scan, BuildScanMesh(scan, ScanMeshOptions()), Path("room.ply"));
@@ -346,11 +361,27 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   const PlyVertices mesh = ReadPly(Path("mesh/model.ply"));
   EXPECT_EQ(mesh.points.size(), scan.points.size() - scan.NumMissing());
   EXPECT_GT(Psnr(mesh, ReadPly(Capture() + "/truth/true_colors.ply")), 23.0);
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("mesh/model.glb"))) << error;
+  const tinygltf::Model model = LoadGlb(Path("mesh/model.glb"));
   EXPECT_EQ(model.meshes.at(0).primitives.at(0).attributes.count("COLOR_0"), 1u);
+
+  // Decimated, its colours are in a texture, as fine as the photos.
+  const CommandResult fewer =
+      Texture("fewer", "--Texture.scale auto --Mesh.max_triangles 3000 --Mesh.compression none",
+              Path("room.ply"));
+  ASSERT_EQ(fewer.exit_code, 0) << fewer.err;
+  EXPECT_EQ(ReadPly(Path("fewer/model.ply")).points.size(), mesh.points.size());
+  const tinygltf::Model web = LoadGlb(Path("fewer/model_web.glb"));
+  ASSERT_FALSE(web.images.empty());
+  size_t num_texels = 0, num_triangles = 0;
+  for (const tinygltf::Image& image : web.images) {
+    num_texels += static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+  }
+  for (const tinygltf::Primitive& part : web.meshes.at(0).primitives) {
+    EXPECT_EQ(part.attributes.count("TEXCOORD_0"), 1u);
+    num_triangles += web.accessors.at(static_cast<size_t>(part.indices)).count / 3;
+  }
+  EXPECT_GT(num_texels, mesh.points.size());
+  EXPECT_LT(num_triangles, 10000u);
 }
 
 // The true colours between the samples: the same room, scanned more finely.
@@ -407,15 +438,6 @@ TEST_F(TextureCommand, ChoosesTheScaleByThePhotosAndTheMemory) {
   EXPECT_EQ(scale, std::min(4.0, std::ceil(report["pixels_per_sample"].get<double>())));
   EXPECT_GT(scale, 1);
   EXPECT_EQ(cv::imread(Path("auto/texture.png")).cols, 500 * scale);
-}
-
-tinygltf::Model LoadGlb(const std::string& path) {
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
-  EXPECT_EQ(error + warning, "");
-  return model;
 }
 
 // The bare walls of the room as a mesh of twelve triangles that look inwards.

@@ -22,6 +22,8 @@ namespace {
 constexpr int kGutter = 8;
 constexpr double kMostGutters = 3;  // texels with gutters, of those allowed without
 constexpr double kWorthTexels = 8;  // from vertex to vertex, in mode "auto"
+// Decimation takes the vertices where the surface is flat: there they lie much farther apart.
+constexpr double kWorthDecimated = 2;
 
 int RoundUp(double length) {
   return static_cast<int>(std::ceil(length / kGutter - 1e-9)) * kGutter;
@@ -219,10 +221,12 @@ int ChoosePageSize(double num_texels, int widest, int max_size) {
 }  // namespace
 
 void AtlasOptions::Declare(OptionFields* fields) {
-  fields->Choice("Texture.atlas", &mode, {"auto", "1", "0"},
-                 "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
-                 "colours. auto: unless --Texture.scale is 1, where the photos show more than the "
-                 "vertices can hold (eight texels from one to the next).");
+  fields->Choice(
+      "Texture.atlas", &mode, {"auto", "1", "0"},
+      "Meshes without a grid: a texture atlas for model.glb beside the vertices' "
+      "colours. auto: unless --Texture.scale is 1, where the photos show more than the "
+      "vertices can hold (eight texels from one to the next, or two if the mesh has more "
+      "than --Mesh.max_triangles and is also written with fewer).");
   fields
       ->Number("Texture.texel_mm", &texel_mm,
                "Millimetres a texel of that atlas; 0 = what a photo's pixel covers on the "
@@ -232,35 +236,6 @@ void AtlasOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> AtlasOptions::Problems() const { return ProblemsOf(*this); }
-
-SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
-                           const std::vector<Triangle>& triangles, int max_count) {
-  SurfaceProbes probes;
-  double total = 0;
-  for (const Triangle& t : triangles) {
-    const double area = TriangleArea(points, t);
-    if (std::isfinite(area)) total += area;
-  }
-  if (!(total > 0)) return probes;
-  const double area_per_probe = total / max_count;
-  // Roberts' R2 sequence inside the triangles: even, and the same in every run.
-  constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
-  double owed = 0.5 * area_per_probe, x = 0.5, y = 0.5;
-  for (const Triangle& t : triangles) {
-    const Eigen::Vector3d a = points[t[0]], ab = points[t[1]] - a, ac = points[t[2]] - a;
-    const Eigen::Vector3d normal = ab.cross(ac);
-    const double area = 0.5 * normal.norm();
-    if (!std::isfinite(area)) continue;
-    for (owed += area; owed >= area_per_probe; owed -= area_per_probe) {
-      x = std::fmod(x + kStepX, 1.0);
-      y = std::fmod(y + kStepY, 1.0);
-      const bool beyond = x + y > 1;
-      probes.points.push_back(a + (beyond ? 1 - x : x) * ab + (beyond ? 1 - y : y) * ac);
-      probes.normals.push_back(normal.normalized().cast<float>());
-    }
-  }
-  return probes;
-}
 
 double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>& photos) {
   const size_t stride = std::max<size_t>(1, probes.points.size() / 10000);
@@ -293,8 +268,14 @@ MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
   double texel = options.texel_mm > 0 ? options.texel_mm / 1000 : pixel_on_surface;
   if (!(texel > 0) || !(area > 0) || !std::isfinite(area)) return atlas;
   texel = std::max(texel, std::sqrt(area / max_texels));
-  const double edge = std::sqrt(2 * area / static_cast<double>(triangles.size()));
-  if (options.mode == "auto" && edge < kWorthTexels * texel) return atlas;
+  const auto edge_of = [area](size_t count) {
+    return std::sqrt(2 * area / static_cast<double>(count));
+  };
+  const auto left = static_cast<size_t>(options.decimated_to);
+  const bool is_worth_it =
+      edge_of(triangles.size()) >= kWorthTexels * texel ||
+      (left > 0 && left < triangles.size() && edge_of(left) >= kWorthDecimated * texel);
+  if (options.mode == "auto" && !is_worth_it) return atlas;
 
   const int room = options.max_page_size - 3 * kGutter;
   ChartOptions chart_options;

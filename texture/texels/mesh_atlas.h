@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "core/scan.h"
+#include "core/scan_mesh.h"
 #include "texture/sampling/grid_colors.h"
 #include "texture/sampling/photo_view.h"
 #include "texture/texels/texel_pass.h"
@@ -44,24 +44,19 @@ struct MeshAtlas {
 
 struct AtlasOptions {
   // "auto": where the photos show more than the vertices can hold (eight texels or more from vertex
-  // to vertex); "1": always; "0": never.
+  // to vertex, or two where the mesh is decimated); "1": always; "0": never.
   std::string mode = "auto";
   // Millimetres a texel; 0 = what a photo's pixel covers on the surface, median.
   double texel_mm = 0;
+  // A mesh of more triangles is also written decimated to that many, which leaves its colours to
+  // fewer vertices; 0 = it is not. No option of its own: commands give it that of WebOptions.
+  int decimated_to = 0;
   // Largest side of a page, texels. No option of its own: commands give it GlbOptions' largest.
   int max_page_size = 4096;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
 };
-
-// Points spread evenly over the surface, with the normals of their triangles. At most max_count.
-struct SurfaceProbes {
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector3f> normals;
-};
-SurfaceProbes SpreadProbes(const std::vector<Eigen::Vector3d>& points,
-                           const std::vector<Triangle>& triangles, int max_count);
 
 // What a pixel of the nearest photo that looks at a probe covers there, metres: median. 0 = none.
 double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>& photos);

@@ -245,6 +245,11 @@ TEST(LayOutAtlas, LeavesFineMeshesToTheirVertices) {
   AtlasOptions options;
   EXPECT_FALSE(LayOutAtlas(box.points, box.triangles, 0.01, 1e8, options).empty());
   EXPECT_TRUE(LayOutAtlas(box.points, box.triangles, 1.0, 1e8, options).empty());
+  EXPECT_TRUE(LayOutAtlas(box.points, box.triangles, 0.5, 1e8, options).empty());
+  options.decimated_to = 11;  // of 12: vertices go
+  EXPECT_FALSE(LayOutAtlas(box.points, box.triangles, 0.5, 1e8, options).empty());
+  options.decimated_to = 12;
+  EXPECT_TRUE(LayOutAtlas(box.points, box.triangles, 0.5, 1e8, options).empty());
   options.mode = "1";
   EXPECT_FALSE(LayOutAtlas(box.points, box.triangles, 0.5, 1e8, options).empty());
   options.mode = "0";
