@@ -111,10 +111,11 @@ void RequireMemoryForSamples(const std::string& path, double count, double large
   work.samples += count;
   work.largest = std::max(work.largest, largest > 0 ? largest : count);
   if (sample_work) *sample_work = work;
-  const bool thinned = work.samples > work.max_samples && work.largest < work.samples;
-  const double needed =
-      thinned ? work.max_samples * work.bytes_per_sample + work.largest * work.bytes_per_full_sample
-              : work.samples * work.bytes_per_sample;
+  double needed = work.samples * work.bytes_per_sample;
+  if (work.largest < work.samples) {  // one alone is not thinned
+    needed = std::min(needed, work.max_samples * work.bytes_per_sample +
+                                  work.largest * work.bytes_per_full_sample);
+  }
   if (needed <= work.available) return;
   throw InputError(path, "",
                    fmt::format("{} {:.0f} samples takes {} of memory, and {} are free", work.what,

@@ -362,7 +362,7 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
   std::string older;
   for (const char* name :
        {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model_web.glb", "model.obj",
-        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply"}) {
+        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply", "station_0"}) {
     const bool written = std::find(names.begin(), names.end(), name) != names.end();
     if (written || !std::filesystem::exists(folder + "/" + name)) continue;
     older += (older.empty() ? "" : ", ") + std::string(name);
@@ -563,7 +563,9 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     ColorizeStations(placed, index_of, options, colorize, &result, context);
   }
   context.report["files"] = outputs->names();
-  WarnOfOlderFiles(outputs->names(), options.output_path, context);
+  std::vector<std::string> written = outputs->names();
+  if (by_station) written.push_back(StationFolder(0));
+  WarnOfOlderFiles(written, options.output_path, context);
   CommitWithReport("report.json", outputs);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;

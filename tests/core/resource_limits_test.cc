@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {
