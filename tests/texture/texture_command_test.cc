@@ -574,8 +574,9 @@ TEST_F(TextureCommand, TakesManyStationsOneByOne) {
     first += count;
     RecordProperty("psnr_one_by_one_" + std::to_string(k), std::to_string(Psnr(station, truth)));
     RecordProperty("psnr_at_once_" + std::to_string(k), std::to_string(Psnr(held, truth)));
-    EXPECT_GT(Psnr(station, truth), Psnr(held, truth) - 0.1);
-    EXPECT_GT(static_cast<double>(num_same_sight) / static_cast<double>(count), 0.99);
+    // Of these scans the thinned ones have a sample every 12 cm at 4 m.
+    EXPECT_GT(Psnr(station, truth), Psnr(held, truth) - 0.5);
+    EXPECT_GT(static_cast<double>(num_same_sight) / static_cast<double>(count), 0.93);
     // The same bytes, whatever its number.
     const std::string turned = "turned/station_" + std::to_string((k + 1) % 3);
     for (const char* name :
