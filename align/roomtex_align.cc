@@ -51,6 +51,7 @@ struct Arguments {
   std::vector<std::string> scan_paths;
   std::string near;
   ScanReaderOptions scan_reader;
+  ScanBound bound;
   AlignmentOptions alignment;
   PhotoCameraOptions camera;
   ScanPlaneOptions planes;
@@ -69,7 +70,7 @@ void AddOptions(Arguments* a, Command* command) {
       "scan_path", &a->scan_paths,
       "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
       "an --input_path that was aligned before: it remembers its scans. " +
-          BytesPerSampleHelp(kAlignBytesPerSample),
+          BytesPerSampleHelp(kAlignBytesPerSample, true),
       Command::Kind::kOptional);
   command->AddInputPath("picks_path", &a->picks_path,
                         "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
@@ -110,6 +111,7 @@ void AddOptions(Arguments* a, Command* command) {
                    "say so, and trust nothing that rests on them.");
   command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
   command->Add(FieldsOf(&a->scan_reader));
+  command->Add(FieldsOf(&a->bound));
   command->Add(FieldsOf(&a->camera));
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
@@ -142,6 +144,7 @@ void CheckArguments(const Arguments& a) {
         "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
   }
   std::vector<std::string> problems = a.scan_reader.Problems();
+  AppendProblems(a.bound.Problems(), &problems);
   AppendProblems(a.alignment.Problems(), &problems);
   AppendProblems(a.planes.Problems(), &problems);
   AppendProblems(a.camera.Problems(), &problems);
@@ -262,10 +265,13 @@ void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
 
 // Another scan than the one that a model was aligned to before is no mistake here.
 PlacedScans ReadScansToAlign(const Arguments& a) {
-  const SampleWork work("aligning to", kAlignBytesPerSample);
-  if (!a.scan_paths.empty()) return ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader);
+  const double max_samples = a.bound.max_samples;
+  const SampleWork work("aligning to", kAlignBytesPerSample, max_samples);
+  if (!a.scan_paths.empty()) {
+    return ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader, max_samples);
+  }
   return ReadScansOfModel(ReadAlignmentRecord(a.input_path),
-                          {a.scan_paths, a.scan_poses, a.scan_reader});
+                          {a.scan_paths, a.scan_poses, a.scan_reader, max_samples});
 }
 
 // Scans of several stations against each other; the report's `stations`.
@@ -295,8 +301,14 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
 struct Reading {
   Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
     for (const std::string& note : placed.notes) context.Warn(note);
+    context.report["sample_stride"] = placed.stride;
+    if (placed.stride > 1) {
+      context.progress.Note("The scans have more than --max_samples: of every " +
+                            std::to_string(placed.stride) + " columns and rows one is held.");
+    }
     ReplaceClouds(&placed.scans, context.options.num_threads);
     CompareStations(a, &placed, context);
+    as_named = placed.SortByPath();
     geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
     origin = LocalOrigin(placed.scans);
     origin.MoveToLocal(&placed.scans);
@@ -307,7 +319,8 @@ struct Reading {
   Reading(const Reading&) = delete;  // the survey is one of these scans
   Reading& operator=(const Reading&) = delete;
 
-  PlacedScans placed;  // about the origin, until WriteAligned()
+  PlacedScans placed;            // about the origin and sorted by path, until WriteAligned()
+  std::vector<size_t> as_named;  // the order of its files on the command line
   LocalOrigin origin{{}};
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
@@ -442,6 +455,7 @@ void WriteAligned(const Arguments& a, SparseModel model,
   context.progress.Stage("write");
   reading->origin.MoveBack(&model);
   reading->origin.MoveBack(&reading->placed.scans);
+  reading->placed.Reorder(reading->as_named);
   reading->origin.MoveBack(&context.report.keys());
   WriteSparseModel(model, outputs->aside());
   if (local_from_sparse) {

@@ -82,16 +82,19 @@ namespace {
 
 struct StateOfWork {
   std::string what;
-  double bytes_per_sample, available, samples;
+  double bytes_per_sample, max_samples, bytes_per_full_sample, available;
+  double samples = 0, largest = 0;
 };
 std::optional<StateOfWork> sample_work;
 std::mutex sample_work_mutex;
 
 }  // namespace
 
-SampleWork::SampleWork(const std::string& what, double bytes_per_sample) {
+SampleWork::SampleWork(const std::string& what, double bytes_per_sample, double max_samples,
+                       double bytes_per_full_sample) {
   const std::lock_guard<std::mutex> lock(sample_work_mutex);
-  sample_work = StateOfWork{what, bytes_per_sample, static_cast<double>(AvailableMemory()), 0};
+  sample_work = StateOfWork{what, bytes_per_sample, max_samples, bytes_per_full_sample,
+                            static_cast<double>(AvailableMemory())};
 }
 
 SampleWork::~SampleWork() {
@@ -99,14 +102,20 @@ SampleWork::~SampleWork() {
   sample_work.reset();
 }
 
-void RequireMemoryForSamples(const std::string& path, double count) {
+void RequireMemoryForSamples(const std::string& path, double count, double largest) {
   constexpr double kReadBytesPerSample = 28;  // place and intensity
   const std::lock_guard<std::mutex> lock(sample_work_mutex);
   const auto now = static_cast<double>(AvailableMemory());
-  StateOfWork work = sample_work.value_or(StateOfWork{"reading", kReadBytesPerSample, now, 0});
+  StateOfWork work = sample_work.value_or(
+      StateOfWork{"reading", kReadBytesPerSample, std::numeric_limits<double>::infinity(), 0, now});
   work.samples += count;
-  if (sample_work) sample_work->samples = work.samples;
-  const double needed = work.samples * work.bytes_per_sample;
+  work.largest = std::max(work.largest, largest > 0 ? largest : count);
+  if (sample_work) *sample_work = work;
+  double needed = work.samples * work.bytes_per_sample;
+  if (work.largest < work.samples) {  // one alone is not thinned
+    needed = std::min(needed, work.max_samples * work.bytes_per_sample +
+                                  work.largest * work.bytes_per_full_sample);
+  }
   if (needed <= work.available) return;
   throw InputError(path, "",
                    fmt::format("{} {:.0f} samples takes {} of memory, and {} are free", work.what,
@@ -114,8 +123,12 @@ void RequireMemoryForSamples(const std::string& path, double count) {
                    "Give a machine with more memory, or a scan with fewer samples");
 }
 
-std::string BytesPerSampleHelp(double bytes) {
-  return fmt::format("Takes about {:.0f} bytes of memory a sample.", bytes);
+std::string BytesPerSampleHelp(double bytes, bool bounded) {
+  if (!bounded) return fmt::format("Takes about {:.0f} bytes of memory a sample.", bytes);
+  return fmt::format(
+      "Takes about {:.0f} bytes of memory a sample of at most --max_samples; of scans with more, "
+      "one at a time is held in full beside them.",
+      bytes);
 }
 
 int ThreadsNotStarted() { return threads_not_started; }

@@ -2,6 +2,7 @@
 // What the machine does not give: memory and threads.
 
 #include <cstdint>
+#include <limits>
 #include <string>
 
 namespace roomtex {
@@ -24,19 +25,25 @@ inline constexpr double kImportBytesPerSample = 75, kAlignBytesPerSample = 112,
 // in the end is compared with what is free before room is made for any. One at a time.
 class SampleWork {
  public:
-  // what: "colouring".
-  SampleWork(const std::string& what, double bytes_per_sample);
+  // what: "colouring". max_samples: of several scans with more no more are held in the end, since
+  // they are thinned out as they are read; the largest one is there in full beside them, for which
+  // the command takes bytes_per_full_sample.
+  SampleWork(const std::string& what, double bytes_per_sample,
+             double max_samples = std::numeric_limits<double>::infinity(),
+             double bytes_per_full_sample = kImportBytesPerSample);
   ~SampleWork();
   SampleWork(const SampleWork&) = delete;
   SampleWork& operator=(const SampleWork&) = delete;
 };
 // A reader knows from header or size of the file that so many samples come, and has not made room
-// for them yet. Throws InputError if the work on them and on those before takes more memory than
-// was free when it began; without a SampleWork, if reading these alone does.
-void RequireMemoryForSamples(const std::string& path, double count);
+// for them yet. largest: of those of its scans that has most; 0 = there is one. Throws InputError
+// if the work on them and on those before takes more memory than was free when it began; without a
+// SampleWork, if reading these alone does.
+void RequireMemoryForSamples(const std::string& path, double count, double largest = 0);
 
-// The same as a clause for --help: "about 86 bytes of memory a sample".
-std::string BytesPerSampleHelp(double bytes);
+// The same for --help: "Takes about 86 bytes of memory a sample." bounded: of at most
+// --max_samples.
+std::string BytesPerSampleHelp(double bytes, bool bounded = false);
 
 // Threads that could not be started since the start of the process (ulimit -u, a container's
 // limit): the work was done by fewer.

@@ -14,6 +14,33 @@ int Scan::NumMissing() const {
   return count;
 }
 
+Scan Thinned(const Scan& scan, int stride) {
+  if (stride == 1 || scan.kind() == Scan::Kind::kMesh) return scan;
+  Scan thin;
+  thin.path = scan.path;
+  thin.name = scan.name;
+  thin.organised = scan.organised;
+  thin.scan_from_station = scan.scan_from_station;
+  thin.up = scan.up;
+  thin.up_is_assumed = scan.up_is_assumed;
+  thin.is_rtpi = scan.is_rtpi;
+  const int column_stride = scan.organised ? stride : stride * stride;
+  thin.num_columns = (scan.num_columns + column_stride - 1) / column_stride;
+  thin.num_rows = (scan.num_rows + stride - 1) / stride;
+  thin.points.reserve(static_cast<size_t>(thin.num_columns) * thin.num_rows);
+  thin.intensity.reserve(thin.points.capacity());
+  for (int row = 0; row < scan.num_rows; row += stride) {
+    for (int column = 0; column < scan.num_columns; column += column_stride) {
+      const int index = scan.Index(column, row);
+      thin.points.push_back(scan.points[index]);
+      thin.intensity.push_back(scan.intensity[index]);
+      if (!scan.colors.empty()) thin.colors.push_back(scan.colors[index]);
+      if (!scan.normals.empty()) thin.normals.push_back(scan.normals[index]);
+    }
+  }
+  return thin;
+}
+
 Bounds FindBounds(const Scan& scan) {
   Bounds bounds;
   for (const Eigen::Vector3d& point : scan.points) {

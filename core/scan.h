@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -66,6 +67,14 @@ struct Scan {
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
 };
+
+// Called for every scan of a file as soon as it is read, the last one of `of_file`. Those there may
+// be changed before the next one is read, so that not all have to be held in full.
+using ScanVisitor = std::function<void(std::vector<Scan>* of_file)>;
+
+// Every stride-th column and row of a grid, from the first on; every stride^2-th point of a cloud;
+// a mesh as it is. Thinned by 2 twice is thinned by 4.
+Scan Thinned(const Scan& scan, int stride);
 
 // Smallest axis-aligned box around the measured points; min > max when there are none.
 struct Bounds {

@@ -165,7 +165,8 @@ double MostRecords(const E57Points& points, int64_t num_bytes) {
 }  // namespace
 
 std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
-                          const E57Options& options, std::vector<std::string>* notes) {
+                          const E57Options& options, std::vector<std::string>* notes,
+                          const ScanVisitor& visit) {
   std::vector<std::string> ignored;
   if (notes == nullptr) notes = &ignored;
   const E57Pages pages(path, options.check);
@@ -173,11 +174,13 @@ std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
   if (document.scans.empty()) {
     throw InputError(path, "", "holds no scan", "Give an E57 file with a scan (data3D)");
   }
-  double num_records = 0;
+  double num_records = 0, largest = 0;
   for (const size_t i : ChosenScans(path, document.scans, part)) {
-    num_records += MostRecords(document.scans[i].points, pages.logical_size());
+    const double records = MostRecords(document.scans[i].points, pages.logical_size());
+    num_records += records;
+    largest = std::max(largest, records);
   }
-  RequireMemoryForSamples(path, num_records);
+  RequireMemoryForSamples(path, num_records, largest);
   std::vector<Scan> scans;
   for (const size_t i : ChosenScans(path, document.scans, part)) {
     const E57Scan& source = document.scans[i];
@@ -187,6 +190,7 @@ std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
     }
     if (scan.NumMissing() < static_cast<int>(scan.points.size())) {
       scans.push_back(std::move(scan));
+      if (visit) visit(&scans);
     } else {
       notes->push_back("scan " + std::to_string(i + 1) + " " + Quoted(source.name) +
                        " holds no measured point and is left out");

@@ -26,6 +26,7 @@ struct E57Options {
 // are; grey of the colours where there are none. Normals of clouds (extension nor) are kept. Memory
 // is that of the scans that are asked for. Throws InputError with the byte.
 std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
-                          const E57Options& options, std::vector<std::string>* notes);
+                          const E57Options& options, std::vector<std::string>* notes,
+                          const ScanVisitor& visit = nullptr);
 
 }  // namespace roomtex

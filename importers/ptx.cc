@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 
@@ -64,10 +65,17 @@ class PtxParser {
   PtxParser(const FileReader& file, const PtxOptions& options)
       : file_(file), options_(options), lines_(file) {}
 
-  std::vector<Scan> Parse() {
+  // empty: number (from 0) of the first scan without a measured sample, if there is one.
+  std::vector<Scan> Parse(const ScanVisitor& visit, std::optional<size_t>* empty) {
     std::vector<Scan> scans;
     std::string_view line;
-    while (NextUnblankLine(&line)) scans.push_back(ParseScan(line));
+    while (NextUnblankLine(&line)) {
+      scans.push_back(ParseScan(line));
+      if (!*empty && scans.back().NumMissing() == static_cast<int>(scans.back().points.size())) {
+        *empty = scans.size() - 1;
+      }
+      if (visit && !*empty) visit(&scans);
+    }
     if (scans.empty()) throw InputError(file_.path(), "", "is empty", "Give a PTX file");
     return scans;
   }
@@ -281,18 +289,16 @@ double IntensityDivisor(const Scan& scan, double* offset) {
   return high;
 }
 
-std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options) {
+std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options,
+                          const ScanVisitor& visit) {
   const FileReader file(path);
-  std::vector<Scan> scans = PtxParser(file, options).Parse();
-  for (size_t i = 0; i < scans.size(); ++i) {
-    const Scan& scan = scans[i];
-    if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
-    throw InputError(path, "",
-                     "scan " + std::to_string(i + 1) + " of " + std::to_string(scans.size()) +
-                         " holds no measured sample",
-                     options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
-  }
-  return scans;
+  std::optional<size_t> empty;
+  std::vector<Scan> scans = PtxParser(file, options).Parse(visit, &empty);
+  if (!empty) return scans;
+  throw InputError(path, "",
+                   "scan " + std::to_string(*empty + 1) + " of " + std::to_string(scans.size()) +
+                       " holds no measured sample",
+                   options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
 }
 
 void WritePtx(const std::vector<Scan>& scans, const std::string& path) {

@@ -21,7 +21,8 @@ struct PtxOptions {
 // its points (translation in the last row as Cyclone writes it, or in the last column). Row 0 of
 // the grid is the top one. `up` is z, unless the order of the samples shows that the elevation
 // grows along y (see up_axis.h). Throws InputError with the line.
-std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options);
+std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options,
+                          const ScanVisitor& visit = nullptr);
 
 // Coordinates to the micrometre in the station frame with the pose as the scan's 4x4 matrix;
 // intensities 0..1 (others are divided by 255, 4095 or 65535, whichever is the first to hold them

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string_view>
 
@@ -132,12 +133,10 @@ std::string NameOrFile(const Scan& scan) {
   return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
 }
 
-void TakeUpAxis(const ScanReaderOptions& options, ScanFile* file) {
-  if (options.up_axis == "auto" || file->format == "RTPI") return;
-  for (Scan& scan : file->scans) {
-    scan.up = UpAxisOf(options.up_axis);
-    scan.up_is_assumed = false;
-  }
+void TakeUpAxis(const ScanReaderOptions& options, const std::string& format, Scan* scan) {
+  if (options.up_axis == "auto" || format == "RTPI") return;
+  scan->up = UpAxisOf(options.up_axis);
+  scan->up_is_assumed = false;
 }
 
 void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
@@ -171,12 +170,12 @@ void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
 }
 
 // Formats that do not say their unit, and rooms of kilometres.
-void NoteDoubtfulUnit(const ScanReaderOptions& options, ScanFile* file) {
+void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFile* file) {
   constexpr double kLargestInMetres = 1000;
   const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
                          file->format == "XYZ";
   if (!is_silent || !options.units.empty()) return;
-  const Bounds bounds = FindBounds(file->scans[0]);
+  const Bounds bounds = FindBounds(scan);
   const double size = (bounds.max - bounds.min).maxCoeff();
   if (!(size > kLargestInMetres)) return;
   file->notes.push_back("the file does not say its unit; in metres it is " +
@@ -184,19 +183,44 @@ void NoteDoubtfulUnit(const ScanReaderOptions& options, ScanFile* file) {
                         " m large. If that are millimetres, give --units millimeters");
 }
 
-ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options) {
+// What every scan goes through as soon as it is read.
+class ScanFinish {
+ public:
+  ScanFinish(const ScanReaderOptions& options, const ScanVisitor& visit)
+      : options_(options), visit_(visit) {}
+
+  ScanVisitor Of(ScanFile* file) const {
+    return [this, file](std::vector<Scan>* scans) {
+      Scan& scan = scans->back();
+      NoteInput(scan.path, "the scan");
+      TakeUpAxis(options_, file->format, &scan);
+      if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file->notes);
+      FindUpAxisAgain(&scan, &file->notes);
+      if (file->up_axis.empty()) file->up_axis = NameOfUpAxis(scan.up);
+      NoteDoubtfulUnit(options_, scan, file);
+      if (visit_) visit_(scans);
+    };
+  }
+
+ private:
+  const ScanReaderOptions& options_;
+  const ScanVisitor& visit_;
+};
+
+ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options,
+                   const ScanFinish& finish) {
   ScanFile file;
   file.format = "E57";
   file.byte_order = "little";
   file.meters_per_unit = MetersPerUnitOr(options.units, 1);
   file.scans = ReadE57(path.file, path.part,
                        {file.meters_per_unit, options.max_range, options.e57_check, options.colors},
-                       &file.notes);
+                       &file.notes, finish.Of(&file));
   return file;
 }
 
-// Clouds stay clouds.
-ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& options) {
+ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& options,
+                  const ScanFinish& finish) {
   ThrowIfProblems(options.Problems());
   const ScanPath parts = SplitScanPath(given_path);
   const std::string& path = parts.file;
@@ -206,14 +230,19 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
     if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
     start = reader.ReadSome(0, kLookAt);
   }
-  if (LooksLikeE57(start)) return ReadAsE57(parts, options);
+  if (LooksLikeE57(start)) return ReadAsE57(parts, options, finish);
   if (!parts.part.empty()) {
     throw InputError(path, "", "is no E57: a single scan of it cannot be named",
                      "Leave out " + Quoted("#" + parts.part));
   }
-  if (LooksLikeRtpi(start)) return ReadAsRtpi(path, options);
-  const double meters_per_unit = MetersPerUnitOr(options.units, 1);
   ScanFile file;
+  const ScanVisitor visit = finish.Of(&file);
+  if (LooksLikeRtpi(start)) {
+    file = ReadAsRtpi(path, options);
+    visit(&file.scans);
+    return file;
+  }
+  const double meters_per_unit = MetersPerUnitOr(options.units, 1);
   file.meters_per_unit = meters_per_unit;
   const PlyOptions mesh_options{meters_per_unit, options.max_range, true, options.colors, true};
   if (BeginsWith(start, "ply\n") || BeginsWith(start, "ply\r")) {
@@ -227,7 +256,7 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
   } else if (LooksLikePtx(start)) {
     file.format = "PTX";
     file.byte_order = "text";
-    file.scans = ReadPtx(path, {meters_per_unit, options.max_range, options.colors});
+    file.scans = ReadPtx(path, {meters_per_unit, options.max_range, options.colors}, visit);
   } else if (LooksLikeLas(start)) {
     file.format = "LAS";
     file.byte_order = "little";
@@ -236,6 +265,8 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
     file.format = "OBJ";
     file.byte_order = "text";
     file.scans.push_back(ReadObj(path, mesh_options));
+    // The only one that does not say how many there are.
+    RequireMemoryForSamples(path, static_cast<double>(file.scans[0].points.size()));
   } else if (ForeignFormat(start).empty() && LooksLikeXyz(start)) {
     file.format = "XYZ";
     file.byte_order = "text";
@@ -249,6 +280,7 @@ ScanFile ReadAsItIs(const std::string& given_path, const ScanReaderOptions& opti
                      kKnownFormats);
   }
   if (file.byte_order == "ascii") file.byte_order = "text";
+  if (file.format != "PTX") visit(&file.scans);
   return file;
 }
 
@@ -286,20 +318,9 @@ void ScanReaderOptions::Declare(OptionFields* fields) {
 
 std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf(*this); }
 
-ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options) {
-  ScanFile file = ReadAsItIs(path, options);
-  if (file.format == "OBJ") {  // the only one that does not say how many there are
-    RequireMemoryForSamples(path, static_cast<double>(file.scans[0].points.size()));
-  }
-  for (const Scan& scan : file.scans) NoteInput(scan.path, "the scan");
-  TakeUpAxis(options, &file);
-  for (Scan& scan : file.scans) {
-    if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file.notes);
-    FindUpAxisAgain(&scan, &file.notes);
-  }
-  file.up_axis = NameOfUpAxis(file.scans[0].up);
-  NoteDoubtfulUnit(options, &file);
-  return file;
+ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options,
+                      const ScanVisitor& visit) {
+  return ReadWith(path, options, ScanFinish(options, visit));
 }
 
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
@@ -313,8 +334,40 @@ Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {
   return std::move(file.scans.front());
 }
 
+std::vector<size_t> PlacedScans::SortByPath() {
+  std::vector<size_t> order(files.size()), back(files.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [this](size_t a, size_t b) { return files[a].path < files[b].path; });
+  for (size_t i = 0; i < order.size(); ++i) back[order[i]] = i;
+  Reorder(order);
+  return back;
+}
+
+std::vector<size_t> PlacedScans::ScanOrder(const std::vector<size_t>& order) const {
+  std::vector<size_t> first(files.size() + 1, 0), result;
+  for (size_t i = 0; i < files.size(); ++i) first[i + 1] = first[i] + files[i].placed.size();
+  for (const size_t i : order) {
+    for (size_t k = first[i]; k < first[i + 1]; ++k) result.push_back(k);
+  }
+  for (size_t k = result.size(); k < scans.size(); ++k) result.push_back(k);
+  return result;
+}
+
+void PlacedScans::Reorder(const std::vector<size_t>& order) {
+  PlacedScans now;
+  for (const size_t k : ScanOrder(order)) {
+    now.scans.push_back(std::move(scans[k]));
+    if (k < stations.size()) now.stations.push_back(stations[k]);
+  }
+  for (const size_t i : order) now.files.push_back(std::move(files[i]));
+  files = std::move(now.files);
+  scans = std::move(now.scans);
+  stations = std::move(now.stations);
+}
+
 PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::string& poses_path,
-                            const ScanReaderOptions& options) {
+                            const ScanReaderOptions& options, double max_samples) {
   if (paths.empty()) throw UsageError("--scan_path is missing");
   for (size_t i = 0; i < paths.size(); ++i) {
     if (std::count(paths.begin(), paths.begin() + static_cast<long>(i), paths[i]) > 0) {
@@ -329,10 +382,12 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     int index, count;
   };
   std::vector<Missing> missing;
+  ScanThinner thinner(max_samples, &placed.scans);
+  const auto thin = [&thinner](std::vector<Scan>* of_file) { thinner.Take(of_file); };
   for (const std::string& path : paths) {
-    ScanFile file = ReadScanFile(path, options);
+    ScanFile file = ReadScanFile(path, options, thin);
     const int count = static_cast<int>(file.scans.size());
-    PlacedScans::File read{path, file.azimuth, file.up_axis, file.meters_per_unit, {}};
+    PlacedScans::File read{path, file.azimuth, file.up_axis, file.meters_per_unit, {}, options};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
     if (file.format != "RTPI") {  // whose notes are on the azimuth
       for (const std::string& note : file.notes) placed.notes.push_back(path + ": " + note + ".");
@@ -352,11 +407,28 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     }
     placed.files.push_back(std::move(read));
   }
+  placed.stride = thinner.stride();
   poses.RequireAllTaken();
   if (!missing.empty() && (placed.scans.size() > 1 || poses.surveyed())) {
     poses.ThrowMissing(missing[0].path, missing[0].index, missing[0].count, placed.scans.size());
   }
   return placed;
+}
+
+void ForEachFullScan(const PlacedScans& placed,
+                     const std::function<void(size_t index, Scan scan)>& take) {
+  size_t first = 0;
+  for (const PlacedScans::File& file : placed.files) {
+    ReadScanFile(file.path, file.options, [&](std::vector<Scan>* of_file) {
+      const size_t k = of_file->size() - 1;
+      if (k >= file.placed.size()) return;  // the file has grown meanwhile
+      Scan scan = std::move(of_file->back());
+      of_file->back() = Scan();
+      if (file.placed[k]) PlaceScan(placed.scans[first + k].scan_from_station, &scan);
+      take(first + k, std::move(scan));
+    });
+    first += file.placed.size();
+  }
 }
 
 std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,

@@ -1,12 +1,15 @@
 #pragma once
 // Reads any scan file: the content decides the format, not the extension.
 
+#include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/scan.h"
 #include "importers/geo_frame.h"
+#include "importers/scan_bound.h"
 
 namespace roomtex {
 
@@ -53,7 +56,8 @@ struct ScanFile {
 };
 // path: a file, or one scan of an E57 (scan_path.h). Throws InputError (missing, not a scan, broken
 // ...).
-ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options);
+ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options,
+                      const ScanVisitor& visit = nullptr);
 
 // The only scan of the file, of any kind. Throws InputError as above, and for a file with
 // several.
@@ -76,16 +80,33 @@ struct PlacedScans {
   struct File {
     std::string path, azimuth, up_axis;  // as in ScanFile
     double meters_per_unit = 1;
-    std::vector<bool> placed;  // one per scan of the file: its pose is one of poses_path
+    std::vector<bool> placed;   // one per scan of the file: its pose is one of poses_path
+    ScanReaderOptions options;  // as it was read
   };
   std::vector<File> files;
   std::vector<std::string> notes;  // on azimuths and on scans of an E57; sentences
   // With surveyed stations: the scan frame, and one station per scan.
   std::optional<GeoFrame> enu;
   std::vector<SurveyedStation> stations;
+  // Every stride-th column and row is held of each scan (ScanThinner); 1 = all.
+  int stride = 1;
+
+  // Puts the files, and their scans, into the order of their paths, so that what is computed from
+  // them does not depend on how they were named. Returns the order as it was, for Reorder().
+  std::vector<size_t> SortByPath();
+  // File i becomes the one that was files[order[i]]. Scans behind those of the files stay there.
+  void Reorder(const std::vector<size_t>& order);
+  // Scan i is then the one that is scans[ScanOrder(order)[i]] now.
+  std::vector<size_t> ScanOrder(const std::vector<size_t>& order) const;
 };
+// max_samples: held of all scans together, see ScanBound.
 PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::string& poses_path,
-                            const ScanReaderOptions& options);
+                            const ScanReaderOptions& options,
+                            double max_samples = std::numeric_limits<double>::infinity());
+// The scans of `placed` once more, one after the other and each in full, read as they were read and
+// standing where they stand there. index: in placed.scans.
+void ForEachFullScan(const PlacedScans& placed,
+                     const std::function<void(size_t index, Scan scan)>& take);
 // The scans alone.
 std::vector<Scan> ReadScans(const std::vector<std::string>& paths, const std::string& poses_path,
                             const ScanReaderOptions& options);

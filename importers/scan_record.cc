@@ -320,13 +320,16 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
       throw UsageError("--scan_path is required: " + alignment.path +
                        " does not say which scan the model was aligned to");
     }
-    return ReadPlacedScans(request.paths, request.poses_path, request.options);
+    return ReadPlacedScans(request.paths, request.poses_path, request.options, request.max_samples);
   }
   const std::vector<Found> found = FindScans(alignment, request.paths);
   CheckOptions(alignment, found, request.options);
   PlacedScans placed;
+  ScanThinner thinner(request.max_samples, &placed.scans);
+  const auto thin = [&thinner](std::vector<Scan>* of_file) { thinner.Take(of_file); };
   for (const Found& one : found) {
-    ScanFile file = ReadScanFile(one.path, OptionsOf(*one.record, request.options));
+    const ScanReaderOptions options = OptionsOf(*one.record, request.options);
+    ScanFile file = ReadScanFile(one.path, options, thin);
     const std::vector<ScanRecord::Pose>& poses = one.record->poses;
     if (file.scans.size() != poses.size()) {
       throw InputError(alignment.path, "",
@@ -334,7 +337,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
                            std::to_string(file.scans.size()) + " scans of " + one.path,
                        "Align anew");
     }
-    PlacedScans::File read{one.path, file.azimuth, file.up_axis, file.meters_per_unit, {}};
+    PlacedScans::File read{one.path, file.azimuth, file.up_axis, file.meters_per_unit, {}, options};
     for (size_t k = 0; k < poses.size(); ++k) {
       if (poses[k].given) PlaceScan(poses[k].scan_from_station, &file.scans[k]);
       read.placed.push_back(poses[k].given);
@@ -342,6 +345,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
     }
     placed.files.push_back(std::move(read));
   }
+  placed.stride = thinner.stride();
   CheckPoses(alignment, found, request.poses_path, placed.scans);
   return placed;
 }

@@ -4,6 +4,7 @@
 // model reads the same scans in the same way.
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,7 @@ struct ScanRequest {
   const std::vector<std::string>& paths;
   const std::string& poses_path;
   const ScanReaderOptions& options;
+  double max_samples = std::numeric_limits<double>::infinity();  // held of all scans, see ScanBound
 };
 // Throws UsageError if there are no paths and nothing at model_folder could remember any: said
 // before anything is read.

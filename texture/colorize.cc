@@ -77,11 +77,21 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
   return surface;
 }
 
-PhotoPassInput MakeInput(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
-                         std::vector<SmoothedScan>* surfaces, const ColorizeOptions& options,
-                         int num_threads, std::vector<GridOfSamples>* grids) {
-  const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
+// Everything that photos are asked about, and what lies between.
+struct Scene {
   PhotoPassInput input;
+  std::vector<GridOfSamples> grids;    // one per scan
+  std::vector<SmoothedScan> surfaces;  // one per scan
+  std::vector<MeshAtlas> atlases;      // one per scan, most of them empty
+  bool has_atlas = false;
+};
+
+// All but the atlases.
+Scene MakeSamples(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
+                  const ColorizeOptions& options, int num_threads) {
+  const CpuTimer timer(CpuStage::kMesh, CpuTimer::Scope::kProcess);
+  Scene scene;
+  PhotoPassInput& input = scene.input;
   for (const Scan& scan : scans) {
     const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
     SmoothedScan surface;
@@ -95,9 +105,9 @@ PhotoPassInput MakeInput(const std::vector<Scan>& scans, const std::vector<Photo
     }
     const Eigen::Vector3d station =
         surface.station_is_known ? scan.Station() : Eigen::Vector3d(Scan::MissingPoint());
-    grids->push_back(
+    scene.grids.push_back(
         AddGrid(scan.num_columns, scan.num_rows, surface.points, surface.normals, station, &input));
-    for (size_t t = grids->back().first_tile; t < grids->back().end_tile; ++t) {
+    for (size_t t = scene.grids.back().first_tile; t < scene.grids.back().end_tile; ++t) {
       input.samples[t].is_two_sided = is_cloud && !surface.front_is_known;
     }
     if (surface.angular_spacing > 0 &&
@@ -108,9 +118,9 @@ PhotoPassInput MakeInput(const std::vector<Scan>& scans, const std::vector<Photo
       surface.points = {};
       surface.normals = {};
     }
-    surfaces->push_back(std::move(surface));
+    scene.surfaces.push_back(std::move(surface));
   }
-  return input;
+  return scene;
 }
 
 }  // namespace
@@ -278,24 +288,96 @@ void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
 
 }  // namespace
 
+namespace {
+
+Scene MakeScene(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
+                const ColorizeOptions& options, int num_threads) {
+  Scene scene = MakeSamples(scans, photos, options, num_threads);
+  scene.atlases = PlanAtlases(scans, photos, scene.surfaces, options, &scene.input);
+  scene.has_atlas = std::any_of(scene.atlases.begin(), scene.atlases.end(),
+                                [](const MeshAtlas& atlas) { return !atlas.empty(); });
+  return scene;
+}
+
+std::vector<size_t> SumsOf(const std::vector<std::vector<size_t>>& counts) {
+  std::vector<size_t> sums;
+  for (const std::vector<size_t>& of_photo : counts) {
+    sums.push_back(std::accumulate(of_photo.begin(), of_photo.end(), size_t{0}));
+  }
+  return sums;
+}
+
+// From what the photos said to colours of all scans. The gains are those of result->exposure. Takes
+// the scene apart.
+void Blend(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
+           const ColorizeOptions& options, int num_threads, Progress* progress, Scene* scene,
+           ObservationStore* store, ColorizeResult* result) {
+  PhotoPassInput& input = scene->input;
+  const std::vector<Eigen::Vector3f>& gains = result->exposure.gains;
+  if (options.texture_scale == 1 && !scene->has_atlas && options.debug_path.empty() &&
+      !options.keep_occluders) {
+    input.occluders.clear();
+  }
+  progress->Stage("blend");
+  const PhotoChoice choice = ChoosePhotos(input, *store, gains, photos, options.blend, num_threads);
+  std::vector<int> numbers(photos.size());
+  std::iota(numbers.begin(), numbers.end(), 0);
+  for (size_t s = 0; s < scans.size(); ++s) {
+    ColoredScan colored;
+    GridColorizer colorizer(input, *store, gains, options.blend, options.detail, num_threads);
+    colorizer.SetChoice(&choice, numbers);
+    colored.samples = colorizer.Colorize(scene->grids[s], scene->surfaces[s].links,
+                                         UnseenColors(scans[s], options));
+    colored.disagreement = Disagreements(scene->grids[s], input, *store, gains, num_threads);
+    colored.triangles = std::move(scene->surfaces[s].triangles);
+    AppendTrianglesOverHoles(scans[s], FindSingleHoles(scans[s], scene->surfaces[s].links),
+                             &colored.triangles);
+    colored.atlas = std::move(scene->atlases[s]);
+    result->scans.push_back(std::move(colored));
+  }
+  CountVertices(scans, result);
+  if (!options.debug_path.empty()) {
+    WriteDebugImages(
+        options.debug_path,
+        {scans, photos, input, scene->grids, *store, gains, options.occlusion, options.blend},
+        num_threads, progress);
+  }
+
+  result->pixels_per_sample = MedianPixelsPerSample(input, *store, photos);
+  result->texture_scale = options.texture_scale > 0
+                              ? options.texture_scale
+                              : ChooseTextureScale(scans, result->pixels_per_sample, options.blend,
+                                                   1e6 * options.texture_memory_mb);
+  if (result->texture_scale > 1 || scene->has_atlas) {
+    *store = ObservationStore(0, 1);
+    input.samples = {};
+    progress->Stage("texture");
+    ColorizeTextures(scans, photos, options, num_threads, &scene->surfaces, &input,
+                     choice.empty() ? nullptr : &choice, progress, result);
+  }
+}
+
+}  // namespace
+
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
                              const std::vector<PhotoView>& given_photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress) {
-  std::vector<PhotoView> photos = given_photos;  // their tones are found here
+  ColorizeResult result;
+  result.photos = given_photos;  // their tones are found here
+  std::vector<PhotoView>& photos = result.photos;
   SetResponse(options.exposure, &photos);
   progress->Stage("mesh");
-  std::vector<SmoothedScan> surfaces;
-  std::vector<GridOfSamples> grids;
-  PhotoPassInput input = MakeInput(scans, photos, &surfaces, options, num_threads, &grids);
-  std::vector<MeshAtlas> atlases = PlanAtlases(scans, photos, surfaces, options, &input);
-  const bool has_atlas = std::any_of(atlases.begin(), atlases.end(),
-                                     [](const MeshAtlas& atlas) { return !atlas.empty(); });
+  Scene scene = MakeScene(scans, photos, options, num_threads);
+  PhotoPassInput& input = scene.input;
 
   progress->Stage("photos", static_cast<int>(photos.size()));
-  ColorizeResult result;
   ObservationStore store(NumSlots(input), options.blend.max_views);
-  result.samples_seen =
-      ObservePhotos(input, photos, options.occlusion, options.blend, num_threads, progress, &store);
+  const auto observe = [&] {
+    result.seen_of = ObservePhotos(input, photos, options.occlusion, options.blend, num_threads,
+                                   progress, &store);
+    result.samples_seen = SumsOf(result.seen_of);
+  };
+  observe();
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
@@ -307,63 +389,49 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     progress->Stage("registration");
     std::vector<std::vector<uint8_t>> intensities;
     for (const Scan& scan : scans) intensities.push_back(IntensityAsGrey(scan));
-    result.registration = RegisterPhotos(input, grids, intensities, store, result.exposure.gains,
-                                         options.registration, num_threads, &photos);
+    result.registration =
+        RegisterPhotos(input, scene.grids, intensities, store, result.exposure.gains,
+                       options.registration, num_threads, &photos);
     const bool corrected =
         std::any_of(result.registration.begin(), result.registration.end(),
                     [](const PhotoRegistration& photo) { return photo.corrected; });
     if (corrected) {
       store = ObservationStore(0, 1);  // before the next one takes its room
       store = ObservationStore(NumSlots(input), options.blend.max_views);
-      result.samples_seen = ObservePhotos(input, photos, options.occlusion, options.blend,
-                                          num_threads, progress, &store);
+      observe();
       result.disagreement.after = MeasureDisagreement(store, result.exposure.gains).after;
     }
   }
-  if (options.texture_scale == 1 && !has_atlas && options.debug_path.empty()) {
-    input.occluders.clear();
-  }
+  Blend(scans, photos, options, num_threads, progress, &scene, &store, &result);
+  if (options.keep_occluders) result.occluders = std::move(input.occluders);
+  return result;
+}
 
-  progress->Stage("blend");
-  const PhotoChoice choice =
-      ChoosePhotos(input, store, result.exposure.gains, photos, options.blend, num_threads);
-  std::vector<int> numbers(photos.size());
-  std::iota(numbers.begin(), numbers.end(), 0);
-  for (size_t s = 0; s < scans.size(); ++s) {
-    ColoredScan colored;
-    GridColorizer colorizer(input, store, result.exposure.gains, options.blend, options.detail,
-                            num_threads);
-    colorizer.SetChoice(&choice, numbers);
-    colored.samples =
-        colorizer.Colorize(grids[s], surfaces[s].links, UnseenColors(scans[s], options));
-    colored.disagreement =
-        Disagreements(grids[s], input, store, result.exposure.gains, num_threads);
-    colored.triangles = std::move(surfaces[s].triangles);
-    AppendTrianglesOverHoles(scans[s], FindSingleHoles(scans[s], surfaces[s].links),
-                             &colored.triangles);
-    colored.atlas = std::move(atlases[s]);
-    result.scans.push_back(std::move(colored));
+ColorizeResult ColorizeStation(const std::vector<Scan>& station, size_t index,
+                               const ColorizeOptions& options, int num_threads, Progress* progress,
+                               ColorizeResult* coarse) {
+  ColorizeResult result;
+  std::vector<PhotoView>& photos = result.photos;
+  for (size_t i = 0; i < coarse->photos.size(); ++i) {
+    if (coarse->seen_of[i][index] == 0) continue;
+    photos.push_back(coarse->photos[i]);
+    result.exposure.gains.push_back(coarse->exposure.gains[i]);
   }
-  CountVertices(scans, &result);
-  if (!options.debug_path.empty()) {
-    WriteDebugImages(options.debug_path,
-                     {scans, photos, input, grids, store, result.exposure.gains, options.occlusion,
-                      options.blend},
-                     num_threads, progress);
-  }
+  progress->Stage("mesh");
+  Scene scene = MakeScene(station, photos, options, num_threads);
+  for (OccluderTiles& tiles : coarse->occluders) tiles.set_back = kCoarseTolerance;
+  std::swap(scene.input.occluders[0], coarse->occluders[index]);
+  scene.input.occluders.swap(coarse->occluders);
 
-  result.pixels_per_sample = MedianPixelsPerSample(input, store, photos);
-  result.texture_scale = options.texture_scale > 0
-                             ? options.texture_scale
-                             : ChooseTextureScale(scans, result.pixels_per_sample, options.blend,
-                                                  1e6 * options.texture_memory_mb);
-  if (result.texture_scale > 1 || has_atlas) {
-    store = ObservationStore(0, 1);
-    input.samples = {};
-    progress->Stage("texture");
-    ColorizeTextures(scans, photos, options, num_threads, &surfaces, &input,
-                     choice.empty() ? nullptr : &choice, progress, &result);
-  }
+  progress->Stage("photos", static_cast<int>(photos.size()));
+  ObservationStore store(NumSlots(scene.input), options.blend.max_views);
+  result.seen_of = ObservePhotos(scene.input, photos, options.occlusion, options.blend, num_threads,
+                                 progress, &store);
+  result.samples_seen = SumsOf(result.seen_of);
+  Blend(station, photos, options, num_threads, progress, &scene, &store, &result);
+
+  scene.input.occluders.swap(coarse->occluders);
+  std::swap(scene.input.occluders[0], coarse->occluders[index]);
   return result;
 }
 

@@ -41,7 +41,9 @@ struct ColorizeOptions {
   // Working memory for texture images finer than the samples, megabytes (1e6 bytes); the finished
   // image adds 7 bytes a texel. Less = more passes over the photos.
   double texture_memory_mb = 2000;
-  AtlasOptions atlas;      // of meshes without a grid
+  AtlasOptions atlas;  // of meshes without a grid
+  // ColorizeStation() follows: the result keeps what hides.
+  bool keep_occluders = false;
   std::string debug_path;  // folder for debug_images.h; "" = none
 
   void Declare(OptionFields* fields);  // its own, not those of the structs in it
@@ -57,6 +59,9 @@ struct ColorizeResult {
   std::vector<PhotoAgreement> agreement;        // per photo
   std::vector<PhotoRegistration> registration;  // per photo; empty without
   std::vector<size_t> samples_seen;             // per photo
+  std::vector<std::vector<size_t>> seen_of;     // per photo and scan: samples that it sees
+  std::vector<PhotoView> photos;                // with the tones, poses and warps that were found
+  std::vector<OccluderTiles> occluders;         // per scan; empty without keep_occluders
   // Photo pixels per sample and direction, median over the samples; 0 = not known.
   double pixels_per_sample = 0;
   int texture_scale = 1;  // in effect
@@ -67,9 +72,20 @@ struct ColorizeResult {
 ColorizeResult ColorizeScans(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                              const ColorizeOptions& options, int num_threads, Progress* progress);
 
-// The same with photos that cannot be used: a file that looked like a photo and is broken further
-// down, a photo that contradicts the others. They go from list->photos to list->left_out, and all
-// is done again without them. strict, or none left: throws.
+// One of many stations in full, after all of them were coloured together as coarse scans (with
+// keep_occluders): in the light and with the poses that were found there. Hidden it is by itself
+// and by the coarse surface of the others, set back by kCoarseTolerance. station: the one scan;
+// index: of its coarse scan in `coarse`, which is as it was afterwards. The result has scans[0] and
+// the counts.
+ColorizeResult ColorizeStation(const std::vector<Scan>& station, size_t index,
+                               const ColorizeOptions& options, int num_threads, Progress* progress,
+                               ColorizeResult* coarse);
+// Metres: what another station alone has seen hides nothing that lies less than this behind it.
+inline constexpr double kCoarseTolerance = 0.02;
+
+// ColorizeScans with photos that cannot be used: a file that looked like a photo and is broken
+// further down, a photo that contradicts the others. They go from list->photos to list->left_out,
+// and all is done again without them. strict, or none left: throws.
 ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOptions& options,
                               bool strict, int num_threads, Progress* progress, PhotoList* list);
 

@@ -41,6 +41,7 @@ struct TextureOptions {
   std::vector<std::string> scan_paths;
   PhotoSources sources;
   ScanReaderOptions scan_reader;
+  ScanBound bound;
   bool accept_untrusted = false, strict = false;
   ColorizeOptions colorize;
   GlbOptions glb;
@@ -61,7 +62,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                          "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not "
                          "needed for a model of roomtex-align, which remembers its scans and how "
                          "they were read. " +
-                             BytesPerSampleHelp(kTextureBytesPerSample),
+                             BytesPerSampleHelp(kTextureBytesPerSample, true),
                          Command::Kind::kOptional);
   command->AddInputPath("supplement_path", &o->supplement_path,
                         "supplement.ply of roomtex-dense: what the photos saw and the scan did not "
@@ -71,7 +72,9 @@ void AddPathOptions(TextureOptions* o, Command* command) {
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write model.ply, model.glb, texture.png, report.json (and "
-                         "model.rtpi) into.");
+                         "model.rtpi) into. Of scans with more than --max_samples these show the "
+                         "thinned scans, and station_0, station_1 ... hold the same files of each "
+                         "scan in full, written as each is finished.");
   command->AddInputPath("database_path", &o->sources.database_path,
                         "COLMAP database: its intrinsics are used instead of the model's, by image "
                         "name; not for a model of roomtex-align, whose poses go with its own "
@@ -84,6 +87,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
       Command::Kind::kOptional);
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->Add(FieldsOf(&o->scan_reader));
+  command->Add(FieldsOf(&o->bound));
 }
 
 void AddTextureOptions(TextureOptions* o, Command* command) {
@@ -320,17 +324,25 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
   WriteColoredRtpi(scan.path, colors, path);
 }
 
+std::string StationFolder(size_t number) { return "station_" + std::to_string(number); }
+
 // The names that WriteAll may write, before the work that leads to them.
-void ProtectInputs(const TextureOptions& options, const std::vector<Scan>& scans) {
+void ProtectInputs(const TextureOptions& options, const std::vector<Scan>& scans, bool by_station) {
   std::vector<std::string> names = {"model.ply", "model.glb", "report.json", "response.txt"};
   if (options.output_evidence) names.emplace_back("evidence.ply");
   if (options.output_web) names.emplace_back("model_web.glb");
   if (options.output_obj) names.insert(names.end(), {"model.obj", "model.mtl"});
   if (options.output_e57 || options.e57_images) names.emplace_back("model.e57");
+  const size_t num_shared = names.size();
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     if (scans[s].organised) names.push_back("texture" + number + ".png");
-    if (scans[s].is_rtpi) names.push_back("model" + number + ".rtpi");
+    if (scans[s].is_rtpi && !by_station) names.push_back("model" + number + ".rtpi");
+    if (!by_station) continue;
+    const std::string folder = StationFolder(s) + "/";
+    for (size_t i = 0; i < num_shared; ++i) names.push_back(folder + names[i]);
+    if (scans[s].organised) names.push_back(folder + "texture.png");
+    if (scans[s].is_rtpi) names.push_back(folder + "model.rtpi");
   }
   for (const std::string& name : names) RequireReplaceable(options.output_path + "/" + name);
 }
@@ -341,7 +353,7 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
   std::string older;
   for (const char* name :
        {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model_web.glb", "model.obj",
-        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply"}) {
+        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply", "station_0"}) {
     const bool written = std::find(names.begin(), names.end(), name) != names.end();
     if (written || !std::filesystem::exists(folder + "/" + name)) continue;
     older += (older.empty() ? "" : ", ") + std::string(name);
@@ -364,12 +376,11 @@ void FillScansReport(const PlacedScans& placed, Report* report) {
 
 // Files with fewer triangles: for the web, for modelling programs.
 void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                    const TextureOptions& options, OutputSet* set,
-                    const Command::Context& context) {
+                    const TextureOptions& options, int num_threads, OutputSet* set, Json* report) {
   std::vector<std::vector<TexturedPart>> parts =
       MakeMeshParts(scans, colored, options.glb.max_texture_size);
-  DecimateParts(scans, options.web.max_triangles, context.options.num_threads, &parts);
-  context.report["web_triangles"] = CountTriangles(parts);
+  DecimateParts(scans, options.web.max_triangles, num_threads, &parts);
+  (*report)["web_triangles"] = CountTriangles(parts);
   if (options.output_web) {
     WriteWebGlb(scans, colored, parts, set->Path("model_web.glb"), options.web);
   }
@@ -379,9 +390,10 @@ void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredSca
   }
 }
 
+// in_full: the scans are whole, not thinned. Fills `web_triangles`.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-              const std::vector<PhotoView>& photos, const TextureOptions& options,
-              OutputSet* outputs, const Command::Context& context) {
+              const std::vector<PhotoView>& photos, const TextureOptions& options, bool in_full,
+              int num_threads, OutputSet* outputs, Json* report) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
@@ -396,18 +408,44 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
           colored[s].texture.num_columns > 0 ? colored[s].texture : colored[s].samples;
       WritePng(ImageOfGrid(grid), set.Path("texture" + number + ".png"));
     }
-    if (scans[s].is_rtpi) {
+    if (scans[s].is_rtpi && in_full) {
       WriteRtpiCopy(scans[s], colored[s], set.Path("model" + number + ".rtpi"));
     }
   }
   if (options.output_web || options.output_obj) {
-    WriteDecimated(scans, colored, options, &set, context);
+    WriteDecimated(scans, colored, options, num_threads, &set, report);
   }
   if (options.output_e57 || options.e57_images) {
     WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, set.Path("model.e57"));
   }
-  context.report["files"] = set.names();
-  WarnOfOlderFiles(set.names(), options.output_path, context);
+}
+
+// The scans in full, of which `coarse` shows the thinned ones: one after the other, each written
+// before the next one is read. index_of: of each scan of `placed` in `coarse`. The report's
+// `stations`.
+void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& index_of,
+                      const TextureOptions& options, const ColorizeOptions& colorize,
+                      ColorizeResult* coarse, const Command::Context& context) {
+  const int num_threads = context.options.num_threads;
+  context.report["stations"] = Json::array();
+  ForEachFullScan(placed, [&](size_t number, Scan scan) {
+    context.progress.Note(StationFolder(number) + ": " + scan.path);
+    const std::vector<Scan> station = {std::move(scan)};
+    OutputSet outputs(options.output_path + "/" + StationFolder(number));
+    const ColorizeResult result = ColorizeStation(station, index_of[number], colorize, num_threads,
+                                                  &context.progress, coarse);
+    Json one = {{"folder", StationFolder(number)},
+                {"path", station[0].path},
+                {"name", station[0].name},
+                {"num_photos", result.photos.size()},
+                {"num_vertices", result.num_vertices},
+                {"num_colored", result.num_colored},
+                {"texture_scale", result.texture_scale}};
+    context.progress.Stage("write");
+    WriteAll(station, result.scans, result.photos, options, true, num_threads, &outputs, &one);
+    outputs.Commit();
+    context.report["stations"].push_back(std::move(one));
+  });
 }
 
 // Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of
@@ -442,6 +480,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     colorize.atlas.decimated_to = options.web.max_triangles;
   }
   std::vector<std::string> problems = options.scan_reader.Problems();
+  AppendProblems(options.bound.Problems(), &problems);
   AppendProblems(colorize.Problems(), &problems);
   AppendProblems(options.glb.Problems(), &problems);
   AppendProblems(options.web.Problems(), &problems);
@@ -455,18 +494,36 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   TakeOverTrust(alignment, options.accept_untrusted, context);
 
   context.progress.Stage("read scan");
-  const SampleWork work("colouring", kTextureBytesPerSample);
+  const double max_samples = options.bound.max_samples;
+  const SampleWork work("colouring", kTextureBytesPerSample, max_samples, kTextureBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
-      alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
+      alignment, {options.scan_paths, options.scan_poses, options.scan_reader, max_samples},
+      context);
+  const bool by_station = placed.stride > 1;
+  context.report["sample_stride"] = placed.stride;
+  if (by_station) {
+    context.progress.Note(
+        "The scans have more than --max_samples: exposures are found on one of every " +
+        std::to_string(placed.stride) +
+        " columns and rows, then each station is coloured in full.");
+  }
   if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
-  const std::vector<Scan>& scans = placed.scans;
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
-  ProtectInputs(options, scans);
+  ProtectInputs(options, placed.scans, by_station);
   FillScansReport(placed, &context.report);
 
-  const ColorizeResult result = ColorizeUsable(
-      scans, colorize, options.strict, context.options.num_threads, &context.progress, &list);
+  // Colours do not depend on the order in which the scans were named.
+  const std::vector<size_t> as_named = placed.SortByPath();
+  colorize.keep_occluders = by_station;
+  ColorizeResult result = ColorizeUsable(placed.scans, colorize, options.strict,
+                                         context.options.num_threads, &context.progress, &list);
+  const std::vector<size_t> index_of = placed.ScanOrder(as_named);
+  placed.Reorder(as_named);
+  std::vector<ColoredScan> colored;
+  for (const size_t index : index_of) colored.push_back(std::move(result.scans[index]));
+  result.scans = std::move(colored);
+  const std::vector<Scan>& scans = placed.scans;
   ReportPhotosLeftOut(list.left_out, context);
   FillReport(list.photos, colorize, result, context);
   if (!options.supplement_path.empty()) {
@@ -486,7 +543,22 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("write");
-  WriteAll(scans, result.scans, list.photos, options, outputs.get(), context);
+  WriteAll(scans, result.scans, list.photos, options, !by_station, context.options.num_threads,
+           outputs.get(), &context.report.keys());
+  if (by_station) {
+    // Of the thinned scans no more is needed than where they stand, and what they hide.
+    result.scans.clear();
+    for (Scan& scan : placed.scans) {
+      scan.points = {};
+      scan.intensity = {};
+    }
+    colorize.debug_path.clear();
+    ColorizeStations(placed, index_of, options, colorize, &result, context);
+  }
+  context.report["files"] = outputs->names();
+  std::vector<std::string> written = outputs->names();
+  if (by_station) written.push_back(StationFolder(0));
+  WarnOfOlderFiles(written, options.output_path, context);
   CommitWithReport("report.json", outputs);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;

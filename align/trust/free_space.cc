@@ -13,23 +13,6 @@ namespace {
 // Metres, and a share of a ray's length: scans that differ by less show one surface.
 constexpr double kSameSurface = 0.02, kSameSurfaceShare = 0.005;
 
-// Every stride-th column and row.
-Scan Thinned(const Scan& scan, int stride) {
-  Scan thin;
-  thin.organised = true;
-  thin.scan_from_station = scan.scan_from_station;
-  thin.up = scan.up;
-  thin.num_columns = (scan.num_columns + stride - 1) / stride;
-  thin.num_rows = (scan.num_rows + stride - 1) / stride;
-  for (int row = 0; row < scan.num_rows; row += stride) {
-    for (int column = 0; column < scan.num_columns; column += stride) {
-      thin.points.push_back(scan.points[scan.Index(column, row)]);
-      thin.intensity.push_back(scan.intensity[scan.Index(column, row)]);
-    }
-  }
-  return thin;
-}
-
 }  // namespace
 
 FreeSpace::FreeSpace(const std::vector<Scan>& scans, int max_samples) {
@@ -37,7 +20,7 @@ FreeSpace::FreeSpace(const std::vector<Scan>& scans, int max_samples) {
     const double share = static_cast<double>(scan.points.size()) * scans.size() / max_samples;
     const int stride =
         scan.organised ? std::max(1, static_cast<int>(std::ceil(std::sqrt(share)))) : 1;
-    const Scan thin = scan.organised ? Thinned(scan, stride) : scan;
+    const Scan thin = Thinned(scan, stride);
     const std::vector<Triangle> triangles = BuildScanMesh(thin, ScanMeshOptions());
     const std::vector<uint8_t> grey = IntensityAsGrey(thin);
     const int offset = static_cast<int>(points_.size());

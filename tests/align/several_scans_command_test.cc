@@ -144,6 +144,32 @@ TEST_F(TwoStations, AreAlignedToWithTheirPoses) {
   EXPECT_FALSE(std::filesystem::exists(output_ / "aligned/geo"));
 }
 
+// Also of scans that have to be thinned out.
+TEST_F(TwoStations, GiveTheSameBytesInEitherOrder) {
+  for (const char* bound : {"", " --max_samples 200000"}) {
+    std::string bytes[2];
+    for (const bool turned : {false, true}) {
+      const std::string poses = " --scan_poses " + Capture("scan_poses.txt") + " --picks_path " +
+                                Capture("picks.csv") + bound;
+      const CommandResult result =
+          Run("--scan_path " + Capture(turned ? "scan_1.rtpi" : "scan.rtpi") + " --scan_path " +
+              Capture(turned ? "scan.rtpi" : "scan_1.rtpi") + poses);
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+        bytes[turned] += ReadBytes(output_ / "aligned/" + name);
+      }
+      const Json report = ReadReport();
+      EXPECT_EQ(report["sample_stride"], *bound == 0 ? 1 : 2);
+      // What is remembered stands in the order of the command line.
+      EXPECT_THAT(report["scans"][0]["path"].get<std::string>(),
+                  testing::EndsWith(turned ? "scan_1.rtpi" : "scan.rtpi"));
+      EXPECT_EQ(report["scans"][turned ? 0 : 1]["poses"][0]["given"], true);
+    }
+    EXPECT_LT(WorstPosition(output_ / "aligned", Rigid()), 0.004);
+    EXPECT_TRUE(bytes[0] == bytes[1]);
+  }
+}
+
 TEST_F(TwoStations, AreAlignedToAsSurveyed) {
   const CommandResult result = AlignSurveyed();
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -196,6 +196,69 @@ TEST_F(ScanReader, AFileWithSeveralScansNeedsACommandThatTakesThem) {
   EXPECT_INPUT_ERROR(ReadScan(path, {}), "holds 3 scans, expected one");
 }
 
+// 8 x 4 samples a scan, all different.
+class ManyScans : public ScanReader {
+ protected:
+  std::string WriteLargePtx(const std::string& name, int num_scans, double first) {
+    std::string text;
+    for (int scan = 0; scan < num_scans; ++scan) {
+      text += std::string("8\n4\n") + kPose;
+      for (int i = 0; i < 32; ++i) {
+        text += std::to_string(first + scan) + " " + std::to_string(1 + i) + " 3 0.5\n";
+      }
+    }
+    return Write(name, text);
+  }
+  static std::vector<double> FirstCoordinates(const PlacedScans& placed) {
+    std::vector<double> x;
+    for (const Scan& scan : placed.scans) x.push_back(scan.points[0].x());
+    return x;
+  }
+};
+
+TEST_F(ManyScans, AreThinnedToTheBoundInWhateverOrder) {
+  const std::string a = WriteLargePtx("a.ptx", 2, 1), b = WriteLargePtx("b.ptx", 1, 3);
+  EXPECT_EQ(ReadPlacedScans({a, b}, "", {}, 96).stride, 1);
+  const PlacedScans ab = ReadPlacedScans({a, b}, "", {}, 95);
+  PlacedScans ba = ReadPlacedScans({b, a}, "", {}, 95);
+  EXPECT_EQ(ab.stride, 2);
+  EXPECT_EQ(ReadPlacedScans({b, a}, "", {}, 23).stride, 4);
+  EXPECT_EQ(ba.stride, 2);
+  EXPECT_THAT(FirstCoordinates(ba), ElementsAre(3, 1, 2));
+  // Sorted by path they are the same, and go back.
+  const std::vector<size_t> as_named = ba.SortByPath();
+  EXPECT_THAT(FirstCoordinates(ba), ElementsAre(1, 2, 3));
+  const PlacedScans whole = ReadPlacedScans({a, b}, "", {});
+  for (size_t s = 0; s < 3; ++s) {
+    EXPECT_EQ(ba.scans[s].points, ab.scans[s].points);
+    ASSERT_EQ(ba.scans[s].num_columns, 4);
+    ASSERT_EQ(ba.scans[s].num_rows, 2);
+    for (int i = 0; i < 8; ++i) {
+      EXPECT_EQ(ba.scans[s].points[i], whole.scans[s].points[2 * (i % 4) + 16 * (i / 4)]);
+    }
+  }
+  EXPECT_THAT(ba.ScanOrder(as_named), ElementsAre(2, 0, 1));
+  ba.Reorder(as_named);
+  EXPECT_THAT(FirstCoordinates(ba), ElementsAre(3, 1, 2));
+  EXPECT_EQ(ba.files[0].path, b);
+  // One alone is held in full, whatever the bound.
+  EXPECT_EQ(ReadPlacedScans({b}, "", {}, 4).stride, 1);
+}
+
+TEST_F(ManyScans, AreReadAgainInFullWhereTheyStand) {
+  const std::string a = WriteLargePtx("a.ptx", 2, 1), b = WriteLargePtx("b.ptx", 1, 3);
+  const std::string poses = Write("poses.txt", "b.ptx 1 0 0 0  0 0 7\n");
+  const PlacedScans whole = ReadPlacedScans({a, b}, poses, {});
+  const PlacedScans thinned = ReadPlacedScans({a, b}, poses, {}, 10);
+  std::vector<size_t> order;
+  ForEachFullScan(thinned, [&](size_t index, const Scan& scan) {
+    order.push_back(index);
+    EXPECT_EQ(scan.points, whole.scans[index].points);
+    EXPECT_EQ(scan.Station(), whole.scans[index].Station());
+  });
+  EXPECT_THAT(order, ElementsAre(0, 1, 2));
+}
+
 TEST_F(ScanReader, SeveralScansNeedTheirPoses) {
   const std::string a = WriteGoodRtpi("a.rtpi"), b = WriteGoodRtpi("b.rtpi"),
                     c = WriteGoodPtx("c.ptx");

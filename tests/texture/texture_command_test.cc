@@ -537,6 +537,86 @@ TEST_F(TextureCommand, SeveralScansShareOneSolutionAndOneModel) {
   EXPECT_NEAR(gain[0] / gain[1], 1, 0.01);
 }
 
+// More samples than may be held: station by station in full, in the light that was found on all of
+// them thinned out. Judged against what they give when all are held, and against the truth.
+TEST_F(TextureCommand, TakesManyStationsOneByOne) {
+  SimulatedRoomOptions options = RoomOptions();
+  options.num_stations = 3;
+  options.scan_columns = 400;
+  options.scan_rows = 152;
+  Progress progress(true);
+  const SimulatedRoom room(options);
+  WriteCapture(room, Path("site"), &progress);
+  const auto texture = [&](std::vector<int> order, const std::string& output,
+                           const std::string& more) {
+    std::string scans;
+    for (const int k : order) {
+      scans +=
+          " --scan_path " + Path("site/scan" + (k == 0 ? "" : "_" + std::to_string(k)) + ".rtpi");
+    }
+    return RunCommandLine("roomtex-texture --quiet --input_path " + Path("site/truth") +
+                          " --image_path " + Path("site/photos") + scans + " --scan_poses " +
+                          Path("site/scan_poses.txt") +
+                          " --Texture.scale 2 --output_web 0 --output_path " + Path(output) + more);
+  };
+  ASSERT_EQ(texture({0, 1, 2}, "at_once", "").exit_code, 0);
+  const CommandResult one_by_one = texture({0, 1, 2}, "one_by_one", " --max_samples 100000");
+  ASSERT_EQ(one_by_one.exit_code, 0) << one_by_one.err;
+  ASSERT_EQ(texture({2, 0, 1}, "turned", " --max_samples 100000 --num_threads 1").exit_code, 0);
+  const json report = ReadJson(Path("one_by_one/report.json"));
+  EXPECT_EQ(report["sample_stride"], 2);
+  ASSERT_EQ(report["stations"].size(), 3u);
+  // All of the first run, cut into its scans.
+  const PlyVertices all = ReadPly(Path("at_once/model.ply"));
+  size_t first = 0, num_overview = 0;
+  for (int k = 0; k < 3; ++k) {
+    const std::string folder = "one_by_one/station_" + std::to_string(k);
+    const PlyVertices station = ReadPly(Path(folder + "/model.ply"));
+    const size_t count = station.points.size();
+    EXPECT_EQ(report["stations"][k]["num_vertices"], count);
+    EXPECT_EQ(report["stations"][k]["texture_scale"], 2);
+    PlyVertices truth = station, held = station;
+    size_t vertex = 0, num_same_sight = 0;
+    const Scan scan = room.MakeScan(k);
+    const std::vector<Eigen::Vector3f> colors = room.TrueColors(k);
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      if (scan.IsMissing(static_cast<int>(i))) continue;
+      ASSERT_LT(first + vertex, all.points.size());
+      ASSERT_EQ(station.points[vertex], all.points[first + vertex]);
+      for (int c = 0; c < 3; ++c) {
+        truth.colors[vertex][c] =
+            static_cast<uint8_t>(std::lround(255 * SrgbFromLinear(colors[i][c])));
+      }
+      held.colors[vertex] = all.colors[first + vertex];
+      held.views[vertex] = all.views[first + vertex];
+      num_same_sight += (station.views[vertex] > 0) == (held.views[vertex] > 0);
+      ++vertex;
+    }
+    ASSERT_EQ(vertex, count);
+    first += count;
+    RecordProperty("psnr_one_by_one_" + std::to_string(k), std::to_string(Psnr(station, truth)));
+    RecordProperty("psnr_at_once_" + std::to_string(k), std::to_string(Psnr(held, truth)));
+    // Of these scans the thinned ones have a sample every 12 cm at 4 m.
+    EXPECT_GT(Psnr(station, truth), Psnr(held, truth) - 0.5);
+    EXPECT_GT(static_cast<double>(num_same_sight) / static_cast<double>(count), 0.93);
+    // The same bytes, whatever its number.
+    const std::string turned = "turned/station_" + std::to_string((k + 1) % 3);
+    for (const char* name :
+         {"model.ply", "model.glb", "texture.png", "evidence.ply", "model.rtpi"}) {
+      EXPECT_TRUE(ReadBytes(Path(folder + "/" + name)) == ReadBytes(Path(turned + "/" + name)))
+          << name << " " << k;
+    }
+    num_overview += count;
+  }
+  EXPECT_EQ(first, all.points.size());
+  // The folder itself shows the thinned scans.
+  const size_t vertices = ReadPly(Path("one_by_one/model.ply")).points.size();
+  EXPECT_EQ(report["num_vertices"], vertices);
+  EXPECT_NEAR(static_cast<double>(vertices), static_cast<double>(num_overview) / 4,
+              0.01 * static_cast<double>(num_overview));
+  EXPECT_FALSE(fs::exists(Path("one_by_one/model.rtpi")));
+}
+
 TEST_F(TextureCommand, WritesObjFilesBesideTheOthers) {
   const CommandResult result = Texture("obj", "--output_obj 1 --Texture.image_format jpeg");
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -24,6 +24,7 @@ GridOfSamples AddGrid(int columns, int rows, const std::vector<Eigen::Vector3d>&
     input->samples.push_back(std::move(tile));
   }
   grid.end_tile = input->samples.size();
+  input->grid_ends.push_back(grid.end_tile);
   return grid;
 }
 

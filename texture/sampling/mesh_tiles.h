@@ -27,6 +27,9 @@ struct OccluderTiles {
   // to the next one.
   std::vector<MeshTile> fringes;
   double range_noise = 0;  // of the scan, metres, standard deviation; 0 = not known
+  // Metres by which `surface` hides less than it would: that a coarse mesh departs from the
+  // surface.
+  double set_back = 0;
 };
 
 OccluderTiles MakeOccluderTiles(const Scan& scan, const SmoothedScan& surface);

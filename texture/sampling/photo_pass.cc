@@ -130,13 +130,15 @@ class PhotoObserver {
 
 }  // namespace
 
-std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector<PhotoView>& photos,
-                                  const OcclusionOptions& occlusion, const BlendOptions& blend,
-                                  int num_threads, Progress* progress, ObservationStore* store) {
+std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
+                                               const std::vector<PhotoView>& photos,
+                                               const OcclusionOptions& occlusion,
+                                               const BlendOptions& blend, int num_threads,
+                                               Progress* progress, ObservationStore* store) {
   const int num_photos = static_cast<int>(photos.size());
   const int num_tiles = static_cast<int>(input.samples.size());
   const int batch_size = EffectiveThreads(num_threads);
-  std::vector<size_t> num_seen(num_photos, 0);
+  std::vector<std::vector<size_t>> num_seen(num_photos);
   std::vector<PhotoObservations> batch(batch_size);
   std::vector<std::string> problems(num_photos);
   for (int first = 0; first < num_photos; first += batch_size) {
@@ -153,7 +155,12 @@ std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector
       }
       batch[i] =
           PhotoObserver(input, photos[photo], std::move(picture), occlusion, blend).Observe(photo);
-      num_seen[photo] = batch[i].all.size();
+      size_t before = 0;
+      for (const size_t end_tile : input.grid_ends) {
+        const size_t end = end_tile == 0 ? 0 : batch[i].tile_end[end_tile - 1];
+        num_seen[photo].push_back(end - before);
+        before = end;
+      }
       progress->Tick();
     });
     constexpr int kTilesAtOnce = 64;

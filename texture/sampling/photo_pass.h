@@ -18,6 +18,7 @@ namespace roomtex {
 struct PhotoPassInput {
   std::vector<OccluderTiles> occluders;  // of all scans
   std::vector<SampleTile> samples;       // of all scans; first_slot numbers them through
+  std::vector<size_t> grid_ends;         // the tiles of each grid (AddGrid) end here
   double angular_spacing = 0;            // of the finest scan, radians; 0 = not known
 };
 
@@ -34,10 +35,12 @@ class UnusablePhotos : public InputError {
   std::vector<PhotoLeftOut> photos_;
 };
 
-// Adds every photo's observations to the store. Returns how many samples each photo sees. Throws
-// UnusablePhotos; the store is then of no use.
-std::vector<size_t> ObservePhotos(const PhotoPassInput& input, const std::vector<PhotoView>& photos,
-                                  const OcclusionOptions& occlusion, const BlendOptions& blend,
-                                  int num_threads, Progress* progress, ObservationStore* store);
+// Adds every photo's observations to the store. Returns how many samples each photo sees of each
+// grid. Throws UnusablePhotos; the store is then of no use.
+std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
+                                               const std::vector<PhotoView>& photos,
+                                               const OcclusionOptions& occlusion,
+                                               const BlendOptions& blend, int num_threads,
+                                               Progress* progress, ObservationStore* store);
 
 }  // namespace roomtex

@@ -442,7 +442,10 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
   const auto map_px = [this](double px) {
     return static_cast<int>(std::ceil(px * surface_.scale_x()));
   };
-  for (const OccluderTiles& tiles : occluders) surface_.Draw(projector, tiles.surface);
+  for (const OccluderTiles& tiles : occluders) {
+    if (tiles.set_back == 0) surface_.Draw(projector, tiles.surface);
+  }
+  DrawSetBack(projector, occluders, angular_spacing, options);
   surface_.CloseGaps(map_px(kGapSpacings * spacing_px));
   if (options.shadows) {
     DepthMap shadow(projector.width(), projector.height(),
@@ -464,6 +467,23 @@ PhotoVisibility::PhotoVisibility(const PhotoProjector& projector,
       wraps_ ? Padded(surface_.inverse_depth(), pad) : cv::Mat1f(surface_.inverse_depth());
   mask_ = BoundaryMask(DepthBoundaries(map, options.boundary_jump, hole_px), radius_px);
   if (wraps_) mask_ = Cropped(mask_, pad);
+}
+
+void PhotoVisibility::DrawSetBack(const PhotoProjector& projector,
+                                  const std::vector<OccluderTiles>& occluders,
+                                  double angular_spacing, const OcclusionOptions& options) {
+  double set_back = 0;
+  for (const OccluderTiles& tiles : occluders) set_back = std::max(set_back, tiles.set_back);
+  if (set_back == 0) return;
+  DepthMap coarse(projector.width(), projector.height(),
+                  MapScale(projector, angular_spacing, options), wraps_);
+  for (const OccluderTiles& tiles : occluders) {
+    if (tiles.set_back > 0) coarse.Draw(projector, tiles.surface);
+  }
+  // Inverse depths: 1 / (1 / w + d) = w / (1 + w d).
+  const cv::Mat1f& w = coarse.inverse_depth();
+  const cv::Mat1f behind = w / (1 + w * set_back);
+  surface_.inverse_depth() = cv::max(surface_.inverse_depth(), behind);
 }
 
 Sight PhotoVisibility::Look(float x, float y, float depth) const {

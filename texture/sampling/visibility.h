@@ -104,6 +104,10 @@ class PhotoVisibility {
   const cv::Mat1b& boundary_mask() const { return mask_; }
 
  private:
+  // The coarse surfaces, behind where they are.
+  void DrawSetBack(const PhotoProjector& projector, const std::vector<OccluderTiles>& occluders,
+                   double angular_spacing, const OcclusionOptions& options);
+
   DepthMap surface_;
   cv::Mat1f shadow_;  // inverse depth of the nearest shadow
   cv::Mat1f fringe_;  // and of the nearest fringe

@@ -52,13 +52,14 @@ class Bench:
             json.dump(self.measured, stream, indent=1)
         os.replace(self.path + ".new", self.path)
 
-    def simulate(self, name, photos, samples):
+    def simulate(self, name, photos, samples, stations=1):
         a = self.arguments
         rows = round(1000 * math.sqrt(samples / 2))
         if not os.path.exists(self.at(name, "README.txt")):
             subprocess.run([self.program("roomtex-simulate"), "--quiet", "--seed", "7", "--output_path", self.at(name),
                             "--num_photos", str(photos), "--photo_width", str(a.width), "--photo_height",
-                            str(a.width * 2 // 3), "--scan_columns", str(2 * rows), "--scan_rows", str(rows)],
+                            str(a.width * 2 // 3), "--scan_columns", str(2 * rows), "--scan_rows", str(rows),
+                            "--num_stations", str(stations)],
                            check=True, stdout=subprocess.DEVNULL)
 
     def photo_curve(self):
@@ -118,6 +119,31 @@ class Bench:
                 self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
                 place("aligned")], (0, 4))
 
+    def station_curve(self):
+        """Beyond the eight stations that a simulated room has, they come again under other names."""
+        a = self.arguments
+        self.simulate("site", 10, a.station_samples, 8)
+        poses = [line.split(maxsplit=1)[1] for line in open(self.at("site", "scan_poses.txt"))
+                 if line.startswith("scan")]
+        for count in a.stations:
+            place = lambda *parts: self.at(f"stations_{count}", *parts)
+            os.makedirs(place(), exist_ok=True)
+            scans = ["--scan_poses", place("poses.txt"), "--max_samples", str(round(1e6 * a.held_samples))]
+            with open(place("poses.txt"), "w") as stream:
+                for k in range(count):
+                    stream.write(f"station{k}.rtpi {poses[k % 8]}")
+                    if not os.path.exists(place(f"station{k}.rtpi")):
+                        os.link(self.at("site", f"scan_{k % 8}.rtpi" if k % 8 else "scan.rtpi"), place(f"station{k}.rtpi"))
+                    scans += ["--scan_path", place(f"station{k}.rtpi")]
+            photos = ["--image_path", self.at("site", "photos")]
+            self.run("stations", "align", count, [
+                "roomtex-align", "--quiet", "--input_path", self.at("site", "truth"), "--picks_path",
+                self.at("site", "picks.csv"), "--output_path", place("aligned")] + photos + scans, (0, 4))
+            self.run("stations", "texture", count, [
+                "roomtex-texture", "--quiet", "--input_path", self.at("site", "truth"), "--Texture.scale", "1",
+                "--output_path", place("textured")] + photos + scans, (0, 4))
+            shutil.rmtree(place("textured"), ignore_errors=True)
+
     def table(self, curve, sizes, unit, key, digits):
         steps = []
         for name in self.measured:
@@ -144,6 +170,9 @@ def main():
     parser.add_argument("--bin", default="build/bin")
     parser.add_argument("--photos", type=int, nargs="*", default=[20, 40, 80, 160], help="numbers of photos")
     parser.add_argument("--samples", type=float, nargs="*", default=[1, 4, 10], help="millions of samples")
+    parser.add_argument("--stations", type=int, nargs="*", default=[4, 8, 16], help="numbers of stations")
+    parser.add_argument("--station_samples", type=float, default=0.5, help="millions, of each station")
+    parser.add_argument("--held_samples", type=float, default=1, help="millions, --max_samples of the commands")
     parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
     parser.add_argument("--features", type=int, default=2048, help="per photo, for COLMAP")
     parser.add_argument("--exhaustive", type=int, default=40, help="all pairs are matched, too, up to so many photos")
@@ -154,7 +183,12 @@ def main():
         bench.photo_curve()
     if arguments.samples:
         bench.sample_curve()
-    for curve, sizes, unit in (("photos", arguments.photos, "photos"), ("samples", arguments.samples, "M samples")):
+    if arguments.stations:
+        bench.station_curve()
+    for curve, sizes, unit in (("photos", arguments.photos, "photos"), ("samples", arguments.samples, "M samples"),
+                               ("stations", arguments.stations, "stations")):
+        if not sizes:
+            continue
         bench.table(curve, sizes, unit + ": CPU s", "cpu", 1)
         bench.table(curve, sizes, unit + ": peak MB", "peak", 0)
 
