@@ -57,7 +57,8 @@ std::string ScriptOf(const ViewAnswers& answers, const Question& question) {
 
 std::vector<Question> QuestionsOf(const ViewAnswers& answers, int photo_size) {
   const auto ask = [&answers](const char* word) { return answers.json().at(word)({}); };
-  const Json scene = ask("scene"), evidence = ask("evidence");
+  const Json scene = ask("scene"), evidence = ask("evidence"), cameras = ask("cameras"),
+             lumigraph = ask("lumigraph");
   std::vector<Question> questions = {
       {"scene", {}}, {"evidence", {}}, {"cameras", {}}, {"lumigraph", {}}, {"points", {}}};
   const bool has_evidence = evidence["available"];
@@ -76,14 +77,14 @@ std::vector<Question> QuestionsOf(const ViewAnswers& answers, int photo_size) {
       questions.push_back({"texture", {{"page", id}, {"max", kWholeTexture}}});
     }
   }
-  for (const Json& camera : ask("cameras")) {
+  for (const Json& camera : cameras) {
     const int id = camera["id"];
     questions.push_back({"lattice", {{"id", id}}});
     if (camera["photo"] != true) continue;
     questions.push_back({"photo", {{"id", id}, {"max", kThumbnail}}});
     questions.push_back({"photo", {{"id", id}, {"max", photo_size}}});
   }
-  for (const Json& photo : ask("lumigraph")["photos"]) {
+  for (const Json& photo : lumigraph["photos"]) {
     const int id = photo["id"];
     questions.push_back({"pinhole_photo", {{"id", id}, {"max", kPinholePhoto}}});
     questions.push_back({"depths", {{"id", id}}});
