@@ -112,6 +112,7 @@ std::vector<std::string> ViewFolderOptions::Problems() const { return ProblemsOf
 
 ViewFolderSize WriteViewFolder(ViewContent content, const ViewFolderOptions& options,
                                const std::string& folder, int num_threads, Progress* progress) {
+  progress->Stage("prepare");
   const ViewAnswers answers(std::move(content), num_threads, [] { return false; });
   const std::vector<Question> questions = QuestionsOf(answers, options.photo_size);
   std::atomic<size_t> num_files{0}, num_bytes{0};
