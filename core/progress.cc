@@ -102,8 +102,9 @@ void Progress::Redraw() {
     std::fprintf(stderr, "\r\033[K%s ...", stage_.c_str());
   } else {
     const int filled = static_cast<int>(int64_t{kBarWidth} * std::min(done_, total_) / total_);
-    std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %d/%d", stage_.c_str(), filled,
-                 "################################", kBarWidth - filled, "", done_, total_);
+    std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %d/%d%s", stage_.c_str(), filled,
+                 "################################", kBarWidth - filled, "", done_, total_,
+                 RemainingText(SecondsSince(started_), done_, total_).c_str());
   }
   std::fflush(stderr);
 }
