@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 namespace roomtex {
@@ -11,9 +12,18 @@ namespace {
 
 constexpr int kBarWidth = 32;
 constexpr double kSecondsBetweenLines = 20;  // of one stage, without a terminal
+constexpr double kTooSoon = 2;               // seconds: nothing is said of the remaining time yet
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// ", 1:20 left" in a stage that has done so many of its steps in so many seconds; "" where that
+// cannot be told.
+std::string RemainingText(double seconds, int done, int total) {
+  if (seconds < kTooSoon || done <= 0 || done >= total) return "";
+  const auto left = static_cast<int>(seconds * (total - done) / done + 0.5);
+  return fmt::format(", {}:{:02} left", left / 60, left % 60);
 }
 
 }  // namespace
@@ -35,7 +45,13 @@ void Progress::Stage(const std::string& name, int total) {
 void Progress::Tick() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
-  if (terminal_ && SecondsSince(redrawn_) > 0.1) Redraw();
+  if (terminal_) {
+    if (SecondsSince(redrawn_) > 0.1) Redraw();
+  } else if (!quiet_ && total_ > 0 && SecondsSince(said_) > kSecondsBetweenLines) {
+    said_ = std::chrono::steady_clock::now();
+    std::fprintf(stderr, "  %s: %d of %d%s\n", stage_.c_str(), done_, total_,
+                 RemainingText(SecondsSince(started_), done_, total_).c_str());
+  }
 }
 
 void Progress::Share(double share, const std::string& text) {
@@ -86,8 +102,9 @@ void Progress::Redraw() {
     std::fprintf(stderr, "\r\033[K%s ...", stage_.c_str());
   } else {
     const int filled = static_cast<int>(int64_t{kBarWidth} * std::min(done_, total_) / total_);
-    std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %d/%d", stage_.c_str(), filled,
-                 "################################", kBarWidth - filled, "", done_, total_);
+    std::fprintf(stderr, "\r\033[K%-24s [%.*s%*s] %d/%d%s", stage_.c_str(), filled,
+                 "################################", kBarWidth - filled, "", done_, total_,
+                 RemainingText(SecondsSince(started_), done_, total_).c_str());
   }
   std::fflush(stderr);
 }

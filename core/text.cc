@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <fmt/core.h>
@@ -69,6 +70,21 @@ std::string Quoted(const std::string& text) {
     i += std::max<size_t>(count, 1);
   }
   return "\"" + shown + (i < text.size() ? "..." : "") + "\"";
+}
+
+std::string Base64(const void* bytes, size_t count) {
+  static const char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const auto* from = static_cast<const unsigned char*>(bytes);
+  std::string text;
+  text.reserve((count + 2) / 3 * 4);
+  for (size_t i = 0; i < count; i += 3) {
+    uint32_t block = 0;
+    for (size_t k = 0; k < 3; ++k) block = block << 8 | (i + k < count ? from[i + k] : 0u);
+    for (size_t k = 0; k < 4; ++k) {
+      text += i + k <= count ? kDigits[block >> (18 - 6 * k) & 63] : '=';
+    }
+  }
+  return text;
 }
 
 }  // namespace roomtex

@@ -2,6 +2,7 @@
 // Numbers as text, and text as numbers: in messages, tables and files. The decimal point is a
 // point, whatever the locale.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,5 +27,8 @@ std::string Trimmed(const std::string& text);
 // Text of a file as it may stand in a message: in double quotes, at most 40 bytes of it, `?` for
 // control characters and for bytes that are not UTF-8.
 std::string Quoted(const std::string& text);
+
+// RFC 4648, with padding.
+std::string Base64(const void* bytes, size_t count);
 
 }  // namespace roomtex

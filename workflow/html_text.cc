@@ -88,20 +88,6 @@ std::string HtmlCell(const Json& json, const char* key, double factor, int digit
                  has ? Number(factor * json[key].get<double>(), digits) : "\u2013");
 }
 
-std::string Base64(const std::vector<uint8_t>& bytes) {
-  static const char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t block = 0;
-    for (size_t k = 0; k < 3; ++k) block = block << 8 | (i + k < bytes.size() ? bytes[i + k] : 0u);
-    for (size_t k = 0; k < 4; ++k) {
-      text += i + k <= bytes.size() ? kDigits[block >> (18 - 6 * k) & 63] : '=';
-    }
-  }
-  return text;
-}
-
 std::string HtmlPicture(const std::string& path, int max_width, const std::string& alt) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return "";
@@ -115,7 +101,7 @@ std::string HtmlPicture(const std::string& path, int max_width, const std::strin
   cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 82});
   return "<img alt=\"" + HtmlText(alt) + "\" width=\"" + std::to_string(picture.cols) +
          "\" height=\"" + std::to_string(picture.rows) + "\" src=\"data:image/jpeg;base64," +
-         Base64(bytes) + "\">";
+         Base64(bytes.data(), bytes.size()) + "\">";
 }
 
 }  // namespace roomtex

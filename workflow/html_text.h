@@ -28,7 +28,6 @@ std::string WithUnits(std::string text);
 // A cell of a table; a dash where there is no number.
 std::string HtmlCell(const Json& json, const char* key, double factor, int digits);
 
-std::string Base64(const std::vector<uint8_t>& bytes);
 // An <img> of a picture file, at most `max_width` pixels wide, JPEG in itself; "" if it cannot be
 // read.
 std::string HtmlPicture(const std::string& path, int max_width, const std::string& alt);

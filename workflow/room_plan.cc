@@ -82,7 +82,7 @@ std::string PictureOf(const std::vector<EvidencePoint>& points, const PlanFrame&
   }
   std::vector<uint8_t> bytes;
   cv::imencode(".png", picture, bytes);
-  return "data:image/png;base64," + Base64(bytes);
+  return "data:image/png;base64," + Base64(bytes.data(), bytes.size());
 }
 
 class Drawing {

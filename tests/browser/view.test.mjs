@@ -2,6 +2,8 @@
 
 import assert from 'node:assert/strict';
 import {copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
+import {createServer} from 'node:http';
+import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, makeFolder, openPage, run, screenshot, serve} from './browser.mjs';
@@ -141,6 +143,7 @@ test('a texture is on the screen as it is in the file', async () => {
   for (const [path, expected] of [[glb, colors], [ply, Array(4).fill(colors[0])]]) {
     const own = await serveView('--input_path', path);
     const {page, errors} = await openView(own.url + look);
+    assert.ok(await page.isVisible('#no-cameras'));
     const shown = await picture(page);
     const {width, height} = shown;
     const quarter = 0.17 * height;  // of the square, some way from its middle
@@ -621,6 +624,85 @@ test('text stands out from its background', async () => {
   await page.close();
 });
 
+// Files of a folder, as any web server gives them.
+function serveFiles(root) {
+  const types = {
+    html: 'text/html',
+    js: 'text/javascript',
+    css: 'text/css'
+  };
+  const own = createServer((request, response) => {
+    const file = join(root, new URL(request.url, 'http://any').pathname);
+    try {
+      const bytes = readFileSync(file.endsWith('/') ? `${file}index.html` : file);
+      response.setHeader('Content-Type', types[file.split('.').at(-1)] ?? types.html);
+      response.end(bytes);
+    } catch {
+      response.writeHead(404).end();
+    }
+  });
+  return new Promise((done) => {
+    own.listen(0, '127.0.0.1', () => done({url: `http://127.0.0.1:${own.address().port}/`, own}));
+  });
+}
+
+test('a folder to give away shows the same from a disk and from any web server', async () => {
+  const capture = folder.path('room'), given = folder.path('given');
+  await succeed('roomtex-view', [
+    '--input_path', `${capture}/textured`, '--aligned', `${capture}/truth`, '--image_path',
+    `${capture}/photos`, '--output_path', given
+  ]);
+  const look = (towards) => lookAlong(capture, [2.5, 2.0, 2.45], towards);
+  const {page: served} = await openView(server.url + look([-1, 0, 0]));
+  const expected = await picture(served);
+  await served.close();
+  const {url, own} = await serveFiles(given);
+  for (const at of [url, `file://${given}/index.html`]) {
+    const {page, errors} = await openView(at + look([-1, 0, 0]));
+    assert.ok(difference(await picture(page), expected) < 4, at);
+    if (at === url) {
+      assert.deepEqual(errors(), []);
+      await page.close();
+      continue;
+    }
+    // From wall to wall, on the whole mesh.
+    await page.keyboard.press('m');
+    const canvas = await page.locator('#canvas').boundingBox();
+    const middle = [canvas.x + canvas.width / 2, canvas.y + canvas.height / 2];
+    await page.mouse.click(...middle);
+    await page.waitForFunction(() => roomtexView.measures.first);
+    await page.evaluate((hash) => {
+      location.hash = hash;
+    }, look([1, 0, 0]));
+    await settle(page);
+    await page.mouse.click(...middle);
+    await page.waitForFunction(() => roomtexView.measures.list.length === 1);
+    const {distance} = await page.evaluate(() => roomtexView.measures.list[0]);
+    assert.ok(Math.abs(distance - 5) < 0.005, `${distance} m`);
+    await page.keyboard.press('Escape');
+    // The photo where it was taken, and what the colours rest on.
+    await page.keyboard.press('2');
+    await page.waitForFunction(() => document.querySelector('#legend').textContent !== '');
+    await page.keyboard.press('5');
+    await page.waitForFunction(() => roomtexView.room.mode === 'view-dependent');
+    await settle(page);
+    await page.locator('#camera-list li').first().click();
+    await page.waitForFunction(() => roomtexView.cameras.photoShown);
+    assert.match(await page.getAttribute('#camera-list img', 'src'), /^blob:/);
+    assert.match(await page.evaluate(() => location.hash), /at=/);
+    await screenshot(page, 'view-given');
+    assert.deepEqual(errors(), []);
+    await page.close();
+  }
+  own.close();
+  rmSync(`${given}/data/points.js`);
+  const {page} = await openView(`file://${given}/index.html`);
+  await page.check('#show-points');
+  await page.waitForSelector('#errors div');
+  assert.match(await page.textContent('#errors'), /points\.js is missing in this folder/);
+  await page.close();
+});
+
 test('what is missing is said in words', async () => {
   const {page: blind} = await openPage(browser, 'about:blank', kSize);
   await blind.addInitScript(() => {
@@ -633,17 +715,16 @@ test('what is missing is said in words', async () => {
 
   const textured = folder.path('room', 'textured');
   rmSync(`${textured}/evidence.ply`);
-  const own = await serveView('--input_path', textured);
+  const own =
+      await serveView('--input_path', textured, '--aligned', folder.path('room', 'truth'));
   const {page, errors} = await openView(own.url);
   assert.match(await page.textContent('#no-evidence'), /Run roomtex-texture again/);
   assert.ok(await page.isDisabled('input[name="surface"][value="views"]'));
-  assert.ok(await page.isVisible('#no-cameras'));
   await page.keyboard.press('3');
   assert.ok(await page.isChecked('input[name="surface"][value="colour"]'));
   assert.deepEqual(errors(), []);
   await own.stop();
-  await page.keyboard.press('m');
-  await page.mouse.click(400, 400);
+  await page.check('#show-points');
   await page.waitForSelector('#errors div');
   assert.match(await page.textContent('#errors'), /no longer answers/);
   await page.close();

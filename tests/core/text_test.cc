@@ -82,5 +82,17 @@ TEST(Text, TrimsBothEnds) {
   EXPECT_EQ(Trimmed(" \t"), "");
 }
 
+TEST(Base64, OfTheVectorsOfItsRfc) {
+  const auto encode = [](const std::string& text) { return Base64(text.data(), text.size()); };
+  EXPECT_EQ(encode(""), "");
+  EXPECT_EQ(encode("f"), "Zg==");
+  EXPECT_EQ(encode("fo"), "Zm8=");
+  EXPECT_EQ(encode("foo"), "Zm9v");
+  EXPECT_EQ(encode("foob"), "Zm9vYg==");
+  EXPECT_EQ(encode("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(encode("\xff\xfe\xfd"), "//79");
+}
+
 }  // namespace
 }  // namespace roomtex

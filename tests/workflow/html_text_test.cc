@@ -14,20 +14,6 @@ TEST(HtmlText, IsOnlyText) {
 }
 
 // RFC 4648, section 10.
-TEST(Base64, OfTheVectorsOfItsRfc) {
-  const auto encode = [](const std::string& text) {
-    return Base64(std::vector<uint8_t>(text.begin(), text.end()));
-  };
-  EXPECT_EQ(encode(""), "");
-  EXPECT_EQ(encode("f"), "Zg==");
-  EXPECT_EQ(encode("fo"), "Zm8=");
-  EXPECT_EQ(encode("foo"), "Zm9v");
-  EXPECT_EQ(encode("foob"), "Zm9vYg==");
-  EXPECT_EQ(encode("fooba"), "Zm9vYmE=");
-  EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
-  EXPECT_EQ(Base64({0xff, 0xfe, 0xfd}), "//79");
-}
-
 TEST(HtmlPicture, IsNoWiderThanAskedForAndInThePageItself) {
   const TempFolder folder;
   cv::imwrite(folder / "a.png", cv::Mat3b(40, 100, cv::Vec3b(1, 2, 3)));

@@ -10,7 +10,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int kJpegQuality = 95;
+constexpr int kPhotoJpegQuality = 95;
 
 E57Writer::Photo PhotoForE57(const PhotoView& view) {
   E57Writer::Photo photo{view.name, "", view.camera, view.cam_from_scan};
@@ -22,7 +22,7 @@ E57Writer::Photo PhotoForE57(const PhotoView& view) {
     picture = UndistortPhoto(picture, view.camera, photo.camera).picture;
   }
   std::vector<uchar> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, kPhotoJpegQuality});
   photo.bytes.assign(bytes.begin(), bytes.end());
   return photo;
 }

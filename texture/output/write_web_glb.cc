@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kSteps = 65535;
 constexpr double kLongestStep = 1e-3;  // metres
-constexpr int kJpegQuality = 88;
+constexpr int kWebJpegQuality = 88;
 constexpr int kPointsPerTriangle = 5;
 
 // glTF's numbers (glTF 2.0 specification).
@@ -217,7 +217,7 @@ size_t WebGlbBuilder::AddMaterial(const cv::Mat& image) {
   Json shade = {{"metallicFactor", 0}, {"roughnessFactor", 1}};
   if (!image.empty()) {
     std::vector<unsigned char> file;
-    cv::imencode(".jpg", image, file, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+    cv::imencode(".jpg", image, file, {cv::IMWRITE_JPEG_QUALITY, kWebJpegQuality});
     const size_t offset = Append(file.data(), file.size());
     views_.push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", file.size()}});
     images_.push_back({{"bufferView", views_.size() - 1}, {"mimeType", "image/jpeg"}});

@@ -14,6 +14,8 @@
 #include "core/open_browser.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
+#include "texture/view/view_folder.h"
 #include "texture/view/view_server.h"
 
 namespace roomtex {
@@ -22,7 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ViewOptions {
-  std::string input_path, aligned, image_path;
+  std::string input_path, aligned, image_path, output_path;
+  ViewFolderOptions folder;
   LocalServerOptions server;
 };
 
@@ -106,8 +109,8 @@ void WarnOfDoubts(const ViewOptions& options, const Command::Context& context,
   }
 }
 
-void View(const ViewOptions& options, const Command::Context& context) {
-  ThrowIfProblems(options.server.Problems());
+// All that there is to see; what there is to warn of is said.
+ViewContent ReadContent(const ViewOptions& options, const Command::Context& context) {
   context.progress.Stage("read model");
   ViewContent content;
   WarnOfDoubts(options, context, &content.warnings);
@@ -138,13 +141,31 @@ void View(const ViewOptions& options, const Command::Context& context) {
         "--output_evidence 0. Run roomtex-texture again.";
   }
 
-  context.progress.Stage("prepare");
   const bool is_cloud = content.model.is_cloud;
   const size_t num_triangles = content.model.triangles.size();
   context.report["num_vertices"] = is_cloud ? num_triangles : content.model.points.size();
   context.report["num_triangles"] = is_cloud ? 0 : num_triangles;
   context.report["num_cameras"] = content.cameras.size();
   context.report["num_photos"] = content.cameras.num_photos();
+  return content;
+}
+
+void Write(const ViewOptions& options, const Command::Context& context) {
+  OutputSet outputs(options.output_path);
+  outputs.ReplaceAllOf("roomtex-view");
+  const ViewFolderSize size =
+      WriteViewFolder(ReadContent(options, context), options.folder, outputs.aside(),
+                      context.options.num_threads, &context.progress);
+  outputs.Commit();
+  context.report["num_files"] = size.num_files;
+  context.report["num_bytes"] = size.num_bytes;
+  context.progress.Finish();
+  std::cout << (fs::path(options.output_path) / "index.html").string() << std::endl;
+}
+
+void Serve(const ViewOptions& options, const Command::Context& context) {
+  ViewContent content = ReadContent(options, context);
+  context.progress.Stage("prepare");
   LocalServerOptions server_options = options.server;
   server_options.token = KeptToken(options.input_path);  // links to views stay good
   LocalServer server(server_options);
@@ -182,10 +203,21 @@ int Main(int argc, char** argv) {
                        "Folder of the photos; default: where alignment.json or report.json says "
                        "they were.",
                        Command::Kind::kOptional);
+  command.AddOutputPath("output_path", &options.output_path,
+                        "Serve nothing, but write a folder to give away: open its index.html, from "
+                        "a disk or from any web server.",
+                        Command::Kind::kOptional);
+  command.Add(FieldsOf(&options.folder));
   command.Add(FieldsOf(&options.server));
   LetPortDiffer(argc, argv, &options.server);
-  return command.Run(argc, argv,
-                     [&options](const Command::Context& context) { View(options, context); });
+  return command.Run(argc, argv, [&options](const Command::Context& context) {
+    std::vector<std::string> problems = options.folder.Problems();
+    for (const std::string& problem : options.server.Problems()) {
+      problems.push_back(problem);
+    }
+    ThrowIfProblems(problems);
+    options.output_path.empty() ? Serve(options, context) : Write(options, context);
+  });
 }
 
 }  // namespace

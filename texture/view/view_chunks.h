@@ -1,9 +1,10 @@
 #pragma once
 // A large mesh in pieces that a browser takes one by one: near pieces whole, far ones coarse
 // (levels of detail, by meshoptimizer's quadric error: Garland and Heckbert 1997, "Surface
-// Simplification Using Quadric Error Metrics").
+// Simplification Using Quadric Error Metrics"). Whole pieces lie on disk.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -12,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "texture/view/view_model.h"
+#include "texture/view/view_spool.h"
 
 namespace roomtex {
 
@@ -32,29 +34,41 @@ struct ViewChunkOptions {
 struct ViewChunk {
   int page = -1;  // index into ViewModel::images; -1 = colours of the points
   bool is_supplement = false;
-  size_t first = 0, end = 0;
+  size_t num_triangles = 0;
   int num_vertices = 0;
   // Box, relative to ViewModel::origin.
   Eigen::Vector3f low = Eigen::Vector3f::Zero(), high = Eigen::Vector3f::Zero();
-  float spacing = 0;  // metres, a typical edge of its triangles
-
-  size_t num_triangles() const { return end - first; }
+  float spacing = 0;           // metres, a typical edge of its triangles
+  ViewSpool::Piece full = {};  // the whole of it
 };
 
 class ViewChunks {
  public:
   enum Level { kCoarse = 0, kMiddle = 1, kFull = 2 };
 
-  // The model must outlive this. Cuts the mesh; coarser levels are made when asked for.
-  explicit ViewChunks(const ViewModel& model, const ViewChunkOptions& options = {});
+  // Cuts the mesh, puts its pieces aside and frees the model's arrays; coarser levels are made when
+  // asked for. Once `stop` says so it is given up; the chunks are then of no use. Throws InputError
+  // if the disk is full.
+  explicit ViewChunks(
+      ViewModel model, const ViewChunkOptions& options = {}, int num_threads = 1,
+      const std::function<bool()>& stop = [] { return false; });
 
   const std::vector<ViewChunk>& chunks() const { return chunks_; }
-  // Order in which the chunks hold the triangles of the model; every one once.
-  const std::vector<uint32_t>& order() const { return order_; }
+
+  // Points of a chunk, relative to ViewModel::origin, and its triangles: three indices into them
+  // each.
+  struct Mesh {
+    std::vector<Eigen::Vector3f> points;
+    std::vector<uint16_t> corners;
+  };
+  Mesh Read(int chunk) const;
+  // What each of its points shows, relative to ViewModel::origin: itself, or the middle of its
+  // disc.
+  std::vector<Eigen::Vector3f> Shown(int chunk) const;
 
   // One level of a chunk. May be called from several threads.
   struct Geometry {
-    std::vector<uint32_t> points;   // indices into ViewModel::points, in the order of their use
+    std::vector<uint16_t> points;   // indices into those of the chunk, in the order of their use
     std::vector<uint16_t> corners;  // three per triangle, into points
     double error = 0;               // metres, as in the options
     float disc_size = 1;            // of a cloud: times that of its discs, where some are left out
@@ -68,15 +82,14 @@ class ViewChunks {
   std::string Encode(int chunk, Level level) const;
 
  private:
-  Geometry Simplify(const ViewChunk& chunk, double share, double tolerance) const;
-  Geometry MakeFull(const ViewChunk& chunk) const;
+  Geometry Simplify(const Mesh& mesh, double share, double tolerance) const;
   // Of a cloud: every second, third ... disc, as much larger.
-  Geometry Thin(const ViewChunk& chunk, double share) const;
+  static Geometry Thin(const Mesh& mesh, double share);
 
-  const ViewModel& model_;
   const ViewChunkOptions options_;
-  std::vector<uint32_t> order_;
+  bool is_cloud_ = false;
   std::vector<ViewChunk> chunks_;
+  ViewSpool spool_;
   mutable std::mutex mutex_;
   // Made before; [level][chunk].
   mutable std::vector<std::shared_ptr<const Geometry>> made_[kFull];

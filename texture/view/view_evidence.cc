@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/parallel.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -83,29 +84,38 @@ uint8_t Byte(double value, double largest) {
 
 }  // namespace
 
-ViewEvidence::ViewEvidence(const ViewModel& model, const Evidence& evidence) {
+ViewEvidence::ViewEvidence(const ViewChunks& chunks, const Eigen::Vector3d& origin,
+                           const Evidence& evidence, int num_threads) {
   intensity_low_ = Quantile(Finite(evidence.intensity), 0.01);
   intensity_high_ = Quantile(Finite(evidence.intensity), 0.99);
   disagreement_high_ = std::max<double>(1.0, Quantile(Finite(evidence.disagreement), 0.98));
   for (const uint8_t views : evidence.views) max_views_ = std::max<int>(max_views_, views);
   const double width = std::max(intensity_high_ - intensity_low_, 1e-9);
-  const NearestPoint nearest(evidence.points, model.origin, kMaxDistance);
-  codes_.reserve(model.points.size());
-  size_t num_found = 0;
-  for (size_t i = 0; i < model.points.size(); ++i) {
-    const int found = nearest.Find(model.origin + model.Shown(i).cast<double>());
-    if (found < 0) {
-      codes_.push_back({0, 0, 255, 255});
-      continue;
+  const NearestPoint nearest(evidence.points, origin, kMaxDistance);
+  codes_.resize(chunks.chunks().size());
+  std::vector<size_t> num_found(codes_.size(), 0);
+  ParallelFor(num_threads, 0, static_cast<int>(codes_.size()), [&](int chunk) {
+    for (const Eigen::Vector3f& point : chunks.Shown(chunk)) {
+      const int found = nearest.Find(origin + point.cast<double>());
+      if (found < 0) {
+        codes_[chunk].push_back({0, 0, 255, 255});
+        continue;
+      }
+      ++num_found[chunk];
+      const float intensity = evidence.intensity[found], difference = evidence.disagreement[found];
+      const double grey = 255 * (intensity - intensity_low_) / width;
+      codes_[chunk].push_back(
+          {Byte(std::isfinite(grey) ? grey : 0, 255), evidence.views[found],
+           std::isfinite(difference) ? Byte(difference / kDisagreementStep, 254) : uint8_t{255},
+           0});
     }
-    ++num_found;
-    const float intensity = evidence.intensity[found], difference = evidence.disagreement[found];
-    const double grey = 255 * (intensity - intensity_low_) / width;
-    codes_.push_back(
-        {Byte(std::isfinite(grey) ? grey : 0, 255), evidence.views[found],
-         std::isfinite(difference) ? Byte(difference / kDisagreementStep, 254) : uint8_t{255}, 0});
+  });
+  size_t found = 0, all = 0;
+  for (size_t chunk = 0; chunk < codes_.size(); ++chunk) {
+    found += num_found[chunk];
+    all += codes_[chunk].size();
   }
-  if (2 * num_found < model.points.size()) {
+  if (2 * found < all) {
     reason_ =
         "evidence.ply belongs to another model: its points lie elsewhere. Run roomtex-texture "
         "again.";
@@ -122,12 +132,12 @@ Json ViewEvidence::ToJson() const {
           {"disagreement_step", kDisagreementStep}};
 }
 
-std::string ViewEvidence::Encode(const std::vector<uint32_t>& points) const {
+std::string ViewEvidence::Encode(int chunk, const std::vector<uint16_t>& points) const {
   std::string bytes;
   bytes.reserve(4 * points.size());
-  for (const uint32_t point : points) {
+  for (const uint16_t point : points) {
     static constexpr std::array<uint8_t, 4> kNothing = {0, 0, 255, 255};
-    const auto& code = codes_.empty() ? kNothing : codes_[point];
+    const auto& code = codes_.empty() ? kNothing : codes_[chunk][point];
     bytes.append(reinterpret_cast<const char*>(code.data()), 4);
   }
   return bytes;

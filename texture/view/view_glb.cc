@@ -1,5 +1,6 @@
 // An own reader, because the viewer opens files of any origin: everything that the JSON part says
-// is compared with the bytes of the binary part, and images stay encoded for the browser.
+// is compared with the bytes of the binary part, images stay encoded for the browser, and numbers
+// are read in blocks, so that what lies in memory is the model alone.
 
 #include <cstring>
 #include <limits>
@@ -23,17 +24,32 @@ const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this
 constexpr int kMaxDepth = 32;           // of nodes
 constexpr size_t kMaxJson = 256 << 20;  // bytes; ours have some thousand
 
-// The numbers of one accessor as floats or indices.
+// The numbers of one accessor as floats or indices, to be read from the first to the last.
 struct Elements {
-  const char* begin = nullptr;
-  size_t count = 0, stride = 0;
+  const FileReader* file = nullptr;
+  int64_t begin = 0;  // in the file
+  size_t count = 0, stride = 0, size = 0;
   int type = 0, components = 0;
   bool normalized = false;
+  // What is in memory of it.
+  mutable std::vector<char> block;
+  mutable size_t first = 0, end = 0;
 
+  const char* At(size_t i) const {
+    if (i < first || i >= end) {
+      constexpr size_t kBlock = 1 << 20;  // bytes
+      first = i;
+      end = std::min(count, i + std::max<size_t>(kBlock / stride, 1));
+      block.resize((end - first - 1) * stride + size);
+      file->Read(begin + static_cast<int64_t>(first * stride), block.data(),
+                 static_cast<int64_t>(block.size()));
+    }
+    return block.data() + (i - first) * stride;
+  }
   template <typename T>
   T As(size_t i, int k) const {
     T value;
-    std::memcpy(&value, begin + i * stride + static_cast<size_t>(k) * sizeof(T), sizeof(T));
+    std::memcpy(&value, At(i) + static_cast<size_t>(k) * sizeof(T), sizeof(T));
     return value;
   }
   float Float(size_t i, int k) const {
@@ -53,9 +69,15 @@ struct Elements {
   }
 };
 
+// Triangles, where they stand.
+struct Primitive {
+  const json* triangles;
+  Eigen::Affine3d scan_from_node;
+};
+
 class GlbReader {
  public:
-  explicit GlbReader(const std::string& path) : path_(path) { ReadChunks(path); }
+  explicit GlbReader(const std::string& path) : path_(path), file_(path) { ReadChunks(); }
 
   ViewModel Read(bool has_supplement) {
     model_.path = path_;
@@ -70,7 +92,7 @@ class GlbReader {
       scan_from_gltf = Transform(Object("nodes", Index(roots[0]))).inverse();
     }
     for (const json& node : roots) AddNode(Index(node), scan_from_gltf, 0);
-    if (has_supplement && ours) model_.first_supplement_triangle = last_node_;
+    AddPrimitives(has_supplement && ours);
     if (model_.triangles.empty()) Fail("has no triangles", "Give what roomtex-texture wrote");
     model_.up = (scan_from_gltf.linear() * Eigen::Vector3d::UnitY()).normalized();
     Recentre();
@@ -82,38 +104,37 @@ class GlbReader {
     throw InputError(path_, "", finding, remedy);
   }
 
-  void ReadChunks(const std::string& path) {
-    const FileReader file(path);
-    const auto word = [&file](int64_t at) {
+  void ReadChunks() {
+    const auto word = [this](int64_t at) {
       uint32_t value;
-      file.Read(at, &value, 4);
+      file_.Read(at, &value, 4);
       return value;
     };
-    if (file.size() < 20 || word(0) != 0x46546c67) {
+    if (file_.size() < 20 || word(0) != 0x46546c67) {
       Fail("is no binary glTF (GLB)", "Give the model.glb that roomtex-texture wrote");
     }
     if (word(4) != 2)
       Fail("is glTF of version " + std::to_string(word(4)) + ", expected 2", kNotOurs);
     const uint32_t json_size = word(12);
-    if (word(16) != 0x4e4f534a || json_size > file.size() - 20 || json_size > kMaxJson) {
-      throw InputError(path, BytePosition(12), "the JSON part does not fit into the file",
+    if (word(16) != 0x4e4f534a || json_size > file_.size() - 20 || json_size > kMaxJson) {
+      throw InputError(path_, BytePosition(12), "the JSON part does not fit into the file",
                        kDamaged);
     }
-    root_ = ParseJson(file.ReadSome(20, json_size), path, kDamaged);
+    root_ = ParseJson(file_.ReadSome(20, json_size), path_, kDamaged);
     if (!root_.is_object()) {
-      throw InputError(path, BytePosition(20), "the JSON part cannot be read", kDamaged);
+      throw InputError(path_, BytePosition(20), "the JSON part cannot be read", kDamaged);
     }
     const int64_t at = 20 + static_cast<int64_t>(json_size);
-    if (at + 8 > file.size()) return;  // without a binary part
+    if (at + 8 > file_.size()) return;  // without a binary part
     const uint32_t size = word(at);
-    if (word(at + 4) != 0x004e4942 || size > file.size() - at - 8) {
+    if (word(at + 4) != 0x004e4942 || size > file_.size() - at - 8) {
       throw InputError(
-          path, BytePosition(at),
+          path_, BytePosition(at),
           "the binary part of " + std::to_string(size) + " bytes does not fit into the file",
           "The file is cut off: copy it again");
     }
-    binary_.resize(size);
-    file.Read(at + 8, binary_.data(), size);
+    binary_begin_ = at + 8;
+    binary_size_ = size;
   }
 
   // Members of the JSON; a damaged one is an InputError.
@@ -171,9 +192,9 @@ class GlbReader {
         !Member(Object("buffers", 0), "uri").is_null()) {
       Fail("keeps data in another file", kNotOurs);
     }
-    if (offset > binary_.size() || size > binary_.size() - offset) {
+    if (offset > binary_size_ || size > binary_size_ - offset) {
       Fail("says it holds " + std::to_string(offset + size) + " bytes of data, but has " +
-           std::to_string(binary_.size()));
+           std::to_string(binary_size_));
     }
     return {offset, size};
   }
@@ -207,7 +228,9 @@ class GlbReader {
       Fail("says that a list has " + std::to_string(elements.count) +
            " items, more than its bytes can hold");
     }
-    elements.begin = binary_.data() + view_offset + offset;
+    elements.file = &file_;
+    elements.begin = binary_begin_ + static_cast<int64_t>(view_offset + offset);
+    elements.size = element;
     return elements;
   }
 
@@ -216,8 +239,12 @@ class GlbReader {
       if (!Member(image, "uri").is_null()) Fail("keeps its images in other files", kNotOurs);
       const auto [offset, size] = View(Number(image, "bufferView", std::nullopt));
       ViewImage result;
-      result.bytes = std::make_shared<const std::string>(binary_.data() + offset, size);
+      result.bytes = std::make_shared<const std::string>(
+          file_.ReadSome(binary_begin_ + static_cast<int64_t>(offset), static_cast<int64_t>(size)));
       const auto [width, height] = EncodedImageSize(*result.bytes);
+      if (model_.images.size() >= static_cast<size_t>(std::numeric_limits<int16_t>::max())) {
+        Fail("has more images than can be read", kNotOurs);
+      }
       if (width <= 0 || height <= 0) Fail("has an image that is neither PNG nor JPEG", kNotOurs);
       result.width = width;
       result.height = height;
@@ -262,11 +289,13 @@ class GlbReader {
     const Eigen::Affine3d scan_from_node = scan_from_parent * Transform(node);
     if (!Member(node, "mesh").is_null()) {
       const json& mesh = Object("meshes", Number(node, "mesh", std::nullopt));
-      for (const json& primitive : List(mesh, "primitives"))
-        AddPrimitive(primitive, scan_from_node);
+      for (const json& primitive : List(mesh, "primitives")) {
+        if (Number(primitive, "mode", 4) != 4) continue;  // points and lines
+        found_.push_back({&primitive, scan_from_node});
+      }
     }
     for (const json& child : List(node, "children")) {
-      if (depth == 0) last_node_ = model_.triangles.size();
+      if (depth == 0) last_node_ = found_.size();
       AddNode(Index(child), scan_from_node, depth + 1);
     }
   }
@@ -284,30 +313,72 @@ class GlbReader {
     return static_cast<int>(page);
   }
 
-  void AddPrimitive(const json& primitive, const Eigen::Affine3d& scan_from_node) {
-    if (Number(primitive, "mode", 4) != 4) return;  // points and lines
+  Elements Positions(const json& primitive) const {
     const json& attributes = Member(primitive, "attributes");
-    const Elements positions = ElementsOf(Number(attributes, "POSITION", std::nullopt));
+    Elements positions = ElementsOf(Number(attributes, "POSITION", std::nullopt));
     if (positions.components != 3 || positions.type != 5126)
       Fail("has positions that are no floats");
-    const size_t first = points_.size();
-    if (positions.count > static_cast<size_t>(std::numeric_limits<int>::max()) - first) {
-      Fail("has more than 2^31 vertices", "Divide the mesh");
+    return positions;
+  }
+
+  // last_is_supplement: what is below the root's last node.
+  void AddPrimitives(bool last_is_supplement) {
+    // Room for all at once: vectors that grow take twice their size.
+    size_t num_points = 0, num_corners = 0;
+    bool textured = false, plain = false;
+    for (const Primitive& found : found_) {
+      const size_t count = Positions(*found.triangles).count;
+      const bool indexed = !Member(*found.triangles, "indices").is_null();
+      num_points += count;
+      num_corners +=
+          indexed ? ElementsOf(Number(*found.triangles, "indices", std::nullopt)).count : count;
+      constexpr auto kMost = static_cast<size_t>(std::numeric_limits<int>::max());
+      if (num_points > kMost || num_corners / 3 > kMost) {
+        Fail("has more than 2^31 vertices or triangles", "Divide the mesh");
+      }
+      (PageOf(*found.triangles) >= 0 ? textured : plain) = true;
     }
+    model_.points.reserve(num_points);
+    model_.triangles.reserve(num_corners / 3);
+    model_.page_of_triangle.reserve(num_corners / 3);
+    if (textured) model_.uv.reserve(num_points);
+    if (plain) model_.colors.reserve(num_points);
+    for (size_t i = 0; i < found_.size(); ++i) {
+      if (last_is_supplement && i == last_node_) {
+        model_.first_supplement_triangle = model_.triangles.size();
+      }
+      AddPrimitive(found_[i], textured, plain);
+    }
+    if (last_is_supplement && last_node_ == found_.size()) {
+      model_.first_supplement_triangle = model_.triangles.size();
+    }
+  }
+
+  void AddPrimitive(const Primitive& found, bool textured, bool plain) {
+    const json& primitive = *found.triangles;
+    const Elements positions = Positions(primitive);
+    const size_t first = model_.points.size();
     for (size_t i = 0; i < positions.count; ++i) {
       const Eigen::Vector3d p(positions.As<float>(i, 0), positions.As<float>(i, 1),
                               positions.As<float>(i, 2));
-      points_.push_back(scan_from_node * p);
+      const Eigen::Vector3d in_scan = found.scan_from_node * p;
+      // Floats are relative to the first point, until all are known.
+      if (!has_origin_ && in_scan.allFinite()) {
+        model_.origin = in_scan;
+        has_origin_ = true;
+      }
+      model_.points.push_back((in_scan - model_.origin).cast<float>());
     }
     const int page = PageOf(primitive);
+    const json& attributes = Member(primitive, "attributes");
+    if (textured) model_.uv.resize(model_.points.size(), Eigen::Vector2f::Zero());
+    if (plain) model_.colors.resize(model_.points.size(), {200, 200, 200});
     AddColors(attributes, page, positions.count);
-    AddTriangles(primitive, first, page, scan_from_node.linear().determinant() < 0);
+    AddTriangles(primitive, first, page, found.scan_from_node.linear().determinant() < 0);
   }
 
   void AddColors(const json& attributes, int page, size_t count) {
-    model_.uv.resize(points_.size(), Eigen::Vector2f::Zero());
-    model_.colors.resize(points_.size(), {200, 200, 200});
-    const size_t first = points_.size() - count;
+    const size_t first = model_.points.size() - count;
     const char* name = page >= 0 ? "TEXCOORD_0" : "COLOR_0";
     if (Member(attributes, name).is_null()) {
       if (page >= 0) Fail("has a texture without texture coordinates");
@@ -329,7 +400,7 @@ class GlbReader {
   }
 
   void AddTriangles(const json& primitive, size_t first, int page, bool mirrored) {
-    const size_t num_points = points_.size() - first;
+    const size_t num_points = model_.points.size() - first;
     Elements indices;
     const bool indexed = !Member(primitive, "indices").is_null();
     if (indexed) {
@@ -348,32 +419,36 @@ class GlbReader {
         triangle[k] = static_cast<int>(first + corner);
       }
       if (mirrored) std::swap(triangle[1], triangle[2]);
-      const bool finite = points_[triangle[0]].allFinite() && points_[triangle[1]].allFinite() &&
-                          points_[triangle[2]].allFinite();
+      const bool finite = model_.points[triangle[0]].allFinite() &&
+                          model_.points[triangle[1]].allFinite() &&
+                          model_.points[triangle[2]].allFinite();
       if (!finite) continue;
       model_.triangles.push_back(triangle);
-      model_.page_of_triangle.push_back(page);
+      model_.page_of_triangle.push_back(static_cast<int16_t>(page));
     }
   }
 
+  // The origin goes into the middle of the room.
   void Recentre() {
-    Eigen::AlignedBox3d box;
+    Eigen::AlignedBox3f box;
     for (const Triangle& triangle : model_.triangles) {
-      for (const int corner : triangle) box.extend(points_[corner]);
+      for (const int corner : triangle) box.extend(model_.points[corner]);
     }
-    model_.origin = box.center();
-    model_.points.reserve(points_.size());
-    for (const Eigen::Vector3d& p : points_) {
-      model_.points.push_back((p - model_.origin).cast<float>());
-    }
+    const Eigen::Vector3f middle = box.center();
+    model_.origin += middle.cast<double>();
+    for (Eigen::Vector3f& p : model_.points) p -= middle;
   }
 
-  std::string path_, binary_;
+  std::string path_;
+  FileReader file_;
+  int64_t binary_begin_ = 0;
+  size_t binary_size_ = 0;
   json root_;
   ViewModel model_;
-  std::vector<Eigen::Vector3d> points_;  // `scan`
+  std::vector<Primitive> found_;
   int num_nodes_ = 0;
-  size_t last_node_ = 0;  // first triangle of what is below the root's last node
+  bool has_origin_ = false;
+  size_t last_node_ = 0;  // first of found_ that is below the root's last node
 };
 
 }  // namespace

@@ -1,13 +1,16 @@
 #include "texture/view/view_lumigraph.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 
 #include <opencv2/core.hpp>
 
 #include "core/parallel.h"
+#include "texture/sampling/rasterizer.h"
 
 namespace roomtex {
 namespace {
@@ -33,6 +36,47 @@ std::optional<ResponseCurve> ReadResponse(const Json& report, const std::string&
 
 // Of a plane 1/depth is linear over the picture; where it is not, one thing ends before another.
 constexpr float kJump = 0.02f;  // of 1/depth: 6 cm at 3 m
+
+// Draws a triangle, in `cam` of the pinhole camera, as far as it lies before it.
+void DrawInCamera(const Camera& pinhole, const std::array<Eigen::Vector3f, 3>& corners,
+                  cv::Mat1f* inverse) {
+  constexpr float kNear = 1e-3f;  // metres
+  std::array<RasterVertex, 4> seen;
+  size_t count = 0;
+  const auto add = [&](const Eigen::Vector3f& p) {
+    seen[count++] = {static_cast<float>(pinhole.params[0] * p.x() / p.z() + pinhole.params[2]),
+                     static_cast<float>(pinhole.params[1] * p.y() / p.z() + pinhole.params[3]),
+                     1 / p.z()};
+  };
+  for (size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3f &p = corners[k], &next = corners[(k + 1) % 3];
+    if (p.z() >= kNear) add(p);
+    // Where the side crosses the plane just before the camera.
+    if ((p.z() >= kNear) != (next.z() >= kNear)) {
+      add(p + (kNear - p.z()) / (next.z() - p.z()) * (next - p));
+    }
+  }
+  for (size_t k = 2; k < count; ++k) DrawTriangle(seen[0], seen[k - 1], seen[k], inverse);
+}
+
+// Whether the box, between two corners, lies beside or behind what the camera sees.
+bool IsOutOfView(const Camera& pinhole, const Rigid& cam_from_scan, const Eigen::Vector3d& low,
+                 const Eigen::Vector3d& high) {
+  std::array<int, 5> beyond{};
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d p =
+        cam_from_scan * Eigen::Vector3d(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(),
+                                        i & 4 ? high.z() : low.z());
+    const double x = pinhole.params[0] * p.x() + pinhole.params[2] * p.z();
+    const double y = pinhole.params[1] * p.y() + pinhole.params[3] * p.z();
+    beyond[0] += p.z() <= 0;
+    beyond[1] += x < 0;
+    beyond[2] += x > pinhole.width * p.z();
+    beyond[3] += y < 0;
+    beyond[4] += y > pinhole.height * p.z();
+  }
+  return std::any_of(beyond.begin(), beyond.end(), [](int corners) { return corners == 8; });
+}
 
 cv::Mat1f WidenNearer(const cv::Mat1f& inverse) {
   cv::Mat1f widened = inverse.clone();
@@ -114,21 +158,33 @@ std::shared_ptr<const std::string> ViewLumigraph::Photo(int id, int max_size) co
   return cameras_.PinholePhoto(id, max_size, tones_.response ? &*tones_.response : nullptr);
 }
 
-std::string ViewLumigraph::Depths(int id, const RayCaster& caster, int num_threads) const {
+std::string ViewLumigraph::Depths(int id, const ViewChunks& chunks, const Eigen::Vector3d& origin,
+                                  int num_threads) const {
   if (!Has(id)) return "";
   const Camera pinhole = *cameras_.Pinhole(id, kDepthSize);
-  const CameraProjection projection(pinhole);
-  const Rigid scan_from_cam = cameras_.Image(id).cam_from_model.Inverse();
+  const Rigid& cam_from_scan = cameras_.Image(id).cam_from_model;
+  const Eigen::Matrix3f rotation = cam_from_scan.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f origin_in_cam = (cam_from_scan * origin).cast<float>();
   cv::Mat1f inverse(pinhole.height, pinhole.width, 0.0f);
-  ParallelFor(num_threads, 0, inverse.rows, [&](int y) {
-    for (int x = 0; x < inverse.cols; ++x) {
-      const auto ray = projection.RayFromImg({x + 0.5, y + 0.5});  // (x, y, 1)
-      if (!ray) continue;
-      const double length = ray->norm();
-      const auto hit =
-          caster.Cast(scan_from_cam.translation, scan_from_cam.rotation * (*ray / length));
-      if (hit && hit->distance > 1e-3) inverse(y, x) = static_cast<float>(length / hit->distance);
+  std::mutex mutex;
+  ParallelFor(num_threads, 0, static_cast<int>(chunks.chunks().size()), [&](int c) {
+    const ViewChunk& chunk = chunks.chunks()[c];
+    if (IsOutOfView(pinhole, cam_from_scan, origin + chunk.low.cast<double>(),
+                    origin + chunk.high.cast<double>())) {
+      return;
     }
+    ViewChunks::Mesh mesh = chunks.Read(c);
+    for (Eigen::Vector3f& point : mesh.points) point = rotation * point + origin_in_cam;
+    cv::Mat1f drawn(inverse.size(), 0.0f);
+    for (size_t i = 0; i < mesh.corners.size(); i += 3) {
+      const uint16_t* corner = &mesh.corners[i];
+      DrawInCamera(pinhole,
+                   {mesh.points[corner[0]], mesh.points[corner[1]], mesh.points[corner[2]]},
+                   &drawn);
+    }
+    const std::lock_guard<std::mutex> lock(mutex);
+    std::transform(drawn.begin(), drawn.end(), inverse.begin(), inverse.begin(),
+                   [](float a, float b) { return std::max(a, b); });
   });
   cv::Mat half;
   WidenNearer(inverse).convertTo(half, CV_16F);

@@ -9,10 +9,10 @@
 
 #include <Eigen/Core>
 
-#include "core/ray_caster.h"
 #include "core/report.h"
 #include "texture/sampling/photo_tone.h"
 #include "texture/view/view_cameras.h"
+#include "texture/view/view_chunks.h"
 
 namespace roomtex {
 
@@ -45,8 +45,9 @@ class ViewLumigraph {
   // What the photo sees of the mesh, in its frame without distortion, little-endian: uint32 "RTD1",
   // width, height, 0; then row by row 1/depth as half floats, per metre, 0 = no surface. Where the
   // depth jumps, the nearer surface is one pixel wider, so that nothing of it falls on what lies
-  // behind.
-  std::string Depths(int id, const RayCaster& caster, int num_threads) const;
+  // behind. origin: ViewModel::origin.
+  std::string Depths(int id, const ViewChunks& chunks, const Eigen::Vector3d& origin,
+                     int num_threads) const;
 
  private:
   bool Has(int id) const;

@@ -84,12 +84,6 @@ std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes) {
   return normals;
 }
 
-bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& direction) {
-  const Triangle& t = model.triangles[triangle];
-  const Eigen::Vector3f sum = model.normals[t[0]] + model.normals[t[1]] + model.normals[t[2]];
-  return sum.normalized().dot(direction.cast<float>()) < kFrontMargin;
-}
-
 namespace {
 
 // A triangle on the surface around each point, as large as its share of it: in place of the points.
@@ -158,7 +152,7 @@ ViewModel ReadViewPly(const std::string& path) {
   PlyVertexValues color{{"red", "green", "blue"}, {}};
   PlyOptions options;
   options.clouds = true;
-  const Scan scan = ReadPly(path, options, nullptr, &color);
+  Scan scan = ReadPly(path, options, nullptr, &color);
   const Bounds bounds = FindBounds(scan);
   if (!(bounds.min.x() <= bounds.max.x())) {
     throw InputError(path, "", "holds no point", "Give what roomtex-texture wrote");
@@ -167,7 +161,8 @@ ViewModel ReadViewPly(const std::string& path) {
   model.path = path;
   model.up = scan.up;
   model.origin = 0.5 * (bounds.min + bounds.max);
-  model.triangles = scan.triangles;
+  const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
+  model.triangles = std::move(scan.triangles);
   model.page_of_triangle.assign(model.triangles.size(), -1);
   model.points.reserve(scan.points.size());
   for (const Eigen::Vector3d& p : scan.points) {
@@ -187,7 +182,7 @@ ViewModel ReadViewPly(const std::string& path) {
       model.colors[i][k] = static_cast<uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f);
     }
   }
-  if (scan.kind() == Scan::Kind::kCloud) ShowAsDiscs(scan, &model);
+  if (is_cloud) ShowAsDiscs(scan, &model);
   return model;
 }
 

@@ -29,13 +29,13 @@ struct ViewModel {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();  // unit
   std::vector<Eigen::Vector3f> points;
   // One per point: a place in the image (glTF: 0, 0 = upper-left corner), and the colour where
-  // there is no image, sRGB. Either may be empty.
+  // there is no image, sRGB. Empty where no triangle needs them.
   std::vector<Eigen::Vector2f> uv;
   std::vector<std::array<uint8_t, 3>> colors;
   // One per point: unit, of the surface around it (SmoothNormals); zero where there is none.
   std::vector<Eigen::Vector3f> normals;
   std::vector<Triangle> triangles;
-  std::vector<int> page_of_triangle;  // index into images; -1 = colours of the points
+  std::vector<int16_t> page_of_triangle;  // index into images; -1 = colours of the points
   std::vector<ViewImage> images;
   // Triangles from here on are of the supplement (roomtex-dense), as report.json says.
   size_t first_supplement_triangle = std::numeric_limits<size_t>::max();
@@ -44,23 +44,12 @@ struct ViewModel {
 
   bool IsSupplement(size_t triangle) const { return triangle >= first_supplement_triangle; }
   Eigen::Vector3d InScan(size_t point) const { return origin + points[point].cast<double>(); }
-  // What the point shows: itself, or the middle of its disc. Relative to the origin.
-  Eigen::Vector3f Shown(size_t point) const {
-    if (!is_cloud) return points[point];
-    const size_t first = point / 3 * 3;
-    return (points[first] + points[first + 1] + points[first + 2]) / 3;
-  }
 };
 
 // Front = the side that the scanner saw. A single triangle does not say it: where the scanner
 // looked along a wall, range noise turns triangles over. So these are normals weighted by area,
 // averaged over the neighbours `passes` times.
 std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes = 5);
-// Whether the triangle shows its front to who looks along `direction` (unit), or nearly so: at
-// edges the averaged normals lean over.
-bool ShowsFront(const ViewModel& model, int triangle, const Eigen::Vector3d& direction);
-inline constexpr float kFrontMargin = 0.05f;  // cosine
-
 // A folder that roomtex-texture wrote (model.glb; model.ply if there is no GLB, or the model is a
 // cloud), a .glb or a .ply; the report.json beside it says whether it has a supplement. Throws
 // InputError: nothing there, damaged, no triangles, things of glTF that we do not read.

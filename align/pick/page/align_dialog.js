@@ -18,7 +18,14 @@ function withoutVerdict(headline) {
 
 // The reasons come as one paragraph; a line each is easier to work through.
 function lines(sentences) {
-  return sentences.flatMap((one) => one.split(/(?<=\S\S[.!]) (?=[A-Z])/));
+  return sentences.flatMap((one) => one.split(/(?<=\S\S[.!]) (?=[A-Z])/)).map(withoutOptions);
+}
+// Options of the command line help nobody here.
+function withoutOptions(sentence) {
+  if (/^Say where the photos belong: --near/.test(sentence)) {
+    return 'Set six pairs: then the place need not be searched for.';
+  }
+  return sentence.replace(/ \(--[^)]*\)/g, '');
 }
 
 export class AlignDialog {

@@ -84,18 +84,19 @@ TEST(ViewEvidence, FindsThePointsOfTheModelInTheGlb) {
   WriteViewFolder(scan, folder.path(), 256);
   const ViewModel model = ReadViewModel(folder.path());
   const Evidence evidence = ReadEvidence(folder / "evidence.ply");
-  const ViewEvidence view(model, evidence);
+  const Eigen::Vector3d origin = model.origin;
+  const ViewChunks chunks(model);
+  const ViewEvidence view(chunks, origin, evidence, 2);
   EXPECT_EQ(view.ToJson()["available"], true);
   EXPECT_EQ(view.ToJson()["max_views"], 3);
-  std::vector<uint32_t> all;
-  for (uint32_t i = 0; i < model.points.size(); ++i) all.push_back(i);
-  const std::string codes = view.Encode(all);
-  ASSERT_EQ(codes.size(), 4 * all.size());
-  for (size_t i = 0; i < all.size(); ++i) {
+  const std::vector<Eigen::Vector3f> points = chunks.Read(0).points;
+  const std::string codes = view.Encode(0, chunks.Make(0, ViewChunks::kFull)->points);
+  ASSERT_EQ(codes.size(), 4 * points.size());
+  for (size_t i = 0; i < points.size(); ++i) {
     size_t nearest = 0;
     double distance = 1e9;
     for (size_t k = 0; k < evidence.points.size(); ++k) {
-      const double d = (evidence.points[k] - model.InScan(i)).norm();
+      const double d = (evidence.points[k] - origin - points[i].cast<double>()).norm();
       if (d < distance) nearest = k, distance = d;
     }
     ASSERT_LT(distance, 1e-4);
@@ -113,7 +114,7 @@ TEST(ViewEvidence, SaysWhenItBelongsToAnotherModel) {
   const ViewModel model = ReadViewModel(folder.path());
   Evidence evidence = ReadEvidence(folder / "evidence.ply");
   for (Eigen::Vector3d& p : evidence.points) p.x() += 0.5;
-  const Json json = ViewEvidence(model, evidence).ToJson();
+  const Json json = ViewEvidence(ViewChunks(model), model.origin, evidence, 1).ToJson();
   EXPECT_EQ(json["available"], false);
   EXPECT_THAT(json["reason"].get<std::string>(), testing::HasSubstr("another model"));
 }

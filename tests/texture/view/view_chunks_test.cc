@@ -1,6 +1,7 @@
 #include "texture/view/view_chunks.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <map>
 #include <set>
@@ -28,7 +29,7 @@ class ViewChunksOfAWall : public testing::Test {
     model_ = new ViewModel(ReadViewModel(folder.path()));
     ViewChunkOptions options;
     options.max_triangles = 30000;
-    chunks_ = new ViewChunks(*model_, options);
+    chunks_ = new ViewChunks(*model_, options, 2);
   }
   static void TearDownTestSuite() {
     delete chunks_;
@@ -38,42 +39,52 @@ class ViewChunksOfAWall : public testing::Test {
   static inline ViewChunks* chunks_ = nullptr;
 };
 
-TEST_F(ViewChunksOfAWall, HoldEveryTriangleExactlyOnce) {
-  ASSERT_GT(chunks_->chunks().size(), 8u);
-  ASSERT_GT(model_->images.size(), 1u);
-  std::vector<int> times(model_->triangles.size(), 0);
-  size_t next = 0;
-  for (const ViewChunk& chunk : chunks_->chunks()) {
-    EXPECT_EQ(chunk.first, next);
-    next = chunk.end;
-    EXPECT_LE(chunk.num_triangles(), 30000u);
-    for (size_t i = chunk.first; i < chunk.end; ++i) {
-      const uint32_t triangle = chunks_->order()[i];
-      ++times[triangle];
-      ASSERT_EQ(model_->page_of_triangle[triangle], chunk.page);
-    }
-  }
-  EXPECT_EQ(next, model_->triangles.size());
-  EXPECT_EQ(std::count(times.begin(), times.end(), 1), static_cast<long>(times.size()));
+using Corners = std::array<std::array<float, 3>, 3>;
+Corners CornersOf(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
+  return {{{a.x(), a.y(), a.z()}, {b.x(), b.y(), b.z()}, {c.x(), c.y(), c.z()}}};
+}
+// Begins with the smallest corner: the same triangle turned round is the same.
+Corners InOrder(Corners corners) {
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+  return corners;
 }
 
-TEST_F(ViewChunksOfAWall, TheFullLevelIsTheMesh) {
+TEST_F(ViewChunksOfAWall, HoldEveryTriangleOfTheMeshExactlyOnce) {
+  ASSERT_GT(chunks_->chunks().size(), 8u);
+  ASSERT_GT(model_->images.size(), 1u);
+  std::multiset<std::pair<int, Corners>> sent, expected;
   for (size_t c = 0; c < chunks_->chunks().size(); ++c) {
     const ViewChunk& chunk = chunks_->chunks()[c];
-    const auto full = chunks_->Make(static_cast<int>(c), ViewChunks::kFull);
-    ASSERT_EQ(full->corners.size(), 3 * chunk.num_triangles());
-    ASSERT_EQ(full->points.size(), static_cast<size_t>(chunk.num_vertices));
-    std::multiset<std::array<uint32_t, 3>> sent, expected;
-    for (size_t i = 0; i < full->corners.size(); i += 3) {
-      sent.insert({full->points[full->corners[i]], full->points[full->corners[i + 1]],
-                   full->points[full->corners[i + 2]]});
+    const ViewChunks::Mesh mesh = chunks_->Read(static_cast<int>(c));
+    ASSERT_EQ(mesh.points.size(), static_cast<size_t>(chunk.num_vertices));
+    ASSERT_EQ(mesh.corners.size(), 3 * chunk.num_triangles);
+    EXPECT_LE(chunk.num_triangles, 30000u);
+    for (size_t i = 0; i < mesh.corners.size(); i += 3) {
+      sent.insert({chunk.page,
+                   InOrder(CornersOf(mesh.points[mesh.corners[i]], mesh.points[mesh.corners[i + 1]],
+                                     mesh.points[mesh.corners[i + 2]]))});
     }
-    for (size_t i = chunk.first; i < chunk.end; ++i) {
-      const Triangle& t = model_->triangles[chunks_->order()[i]];
-      expected.insert(
-          {static_cast<uint32_t>(t[0]), static_cast<uint32_t>(t[1]), static_cast<uint32_t>(t[2])});
+    EXPECT_EQ(chunks_->Make(static_cast<int>(c), ViewChunks::kFull)->corners, mesh.corners);
+  }
+  for (size_t t = 0; t < model_->triangles.size(); ++t) {
+    const Triangle& corners = model_->triangles[t];
+    expected.insert({model_->page_of_triangle[t],
+                     InOrder(CornersOf(model_->points[corners[0]], model_->points[corners[1]],
+                                       model_->points[corners[2]]))});
+  }
+  EXPECT_TRUE(sent == expected);
+}
+
+// However many threads cut it, whatever the order on disk.
+TEST_F(ViewChunksOfAWall, AreTheSameForAnyNumberOfThreads) {
+  ViewChunkOptions options;
+  options.max_triangles = 30000;
+  const ViewChunks alone(*model_, options, 1);
+  ASSERT_EQ(alone.chunks().size(), chunks_->chunks().size());
+  for (int c = 0; c < static_cast<int>(alone.chunks().size()); ++c) {
+    for (const auto level : {ViewChunks::kCoarse, ViewChunks::kFull}) {
+      ASSERT_EQ(alone.Encode(c, level), chunks_->Encode(c, level));
     }
-    EXPECT_TRUE(sent == expected);
   }
 }
 
@@ -113,7 +124,10 @@ TEST_F(ViewChunksOfAWall, CoarseLevelsAreSmallAndNear) {
       const auto geometry = chunks_->Make(static_cast<int>(c), level);
       EXPECT_LE(geometry->error, 1.01 * tolerance);
       const int first = static_cast<int>(points.size());
-      for (const uint32_t point : geometry->points) points.push_back(model_->InScan(point));
+      const ViewChunks::Mesh mesh = chunks_->Read(static_cast<int>(c));
+      for (const uint16_t point : geometry->points) {
+        points.push_back(model_->origin + mesh.points[point].cast<double>());
+      }
       for (size_t i = 0; i < geometry->corners.size(); i += 3) {
         triangles.push_back({first + geometry->corners[i], first + geometry->corners[i + 1],
                              first + geometry->corners[i + 2]});
@@ -152,18 +166,21 @@ TEST_F(ViewChunksOfAWall, EncodingHoldsPointsTextureAndCorners) {
   EXPECT_EQ(header[1], n);
   EXPECT_EQ(header[2], m);
   EXPECT_EQ(header[3], 1u);
-  for (size_t i = 0; i < n; i += 11) {
+  for (size_t i = 0; i < n; i += 97) {
     float position[3];
     uint16_t uv[2];
     int8_t normal[4];
     std::memcpy(position, &bytes[16 + 12 * i], 12);
     std::memcpy(uv, &bytes[16 + 12 * n + 4 * i], 4);
     std::memcpy(normal, &bytes[16 + 16 * n + 4 * i], 4);
-    const uint32_t point = geometry->points[i];
-    for (int k = 0; k < 3; ++k) {
-      EXPECT_EQ(position[k], model_->points[point][k]);
-      EXPECT_NEAR(normal[k] / 127.0, model_->normals[point][k], 0.005);
-    }
+    // The point of the model that stands there, by its place.
+    const auto found = std::find_if(
+        model_->points.begin(), model_->points.end(),
+        [&position](const Eigen::Vector3f& p) { return p == Eigen::Vector3f(position); });
+    ASSERT_NE(found, model_->points.end());
+    const auto point = static_cast<size_t>(found - model_->points.begin());
+    EXPECT_EQ(*found, chunks_->Read(chunk).points[geometry->points[i]]);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(normal[k] / 127.0, model_->normals[point][k], 0.005);
     EXPECT_NEAR(uv[0] / 65535.0, model_->uv[point].x(), 1e-5);
     EXPECT_NEAR(uv[1] / 65535.0, model_->uv[point].y(), 1e-5);
   }

@@ -54,6 +54,38 @@ TEST_F(ViewCommand, RefusesAModelWithoutImages) {
   EXPECT_THAT(result.err, HasSubstr("holds no registered photo"));
 }
 
+// What the page makes of it: tests/browser/view.test.mjs.
+TEST_F(ViewCommand, WritesAFolderToGiveAway) {
+  const std::string out = folder_ / "give away";
+  const std::string line =
+      "roomtex-view --input_path '" + folder_.path() + "' --output_path '" + out + "'";
+  const CommandResult result = RunCommandLine(line);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, out + "/index.html\n");
+  const std::string page = ReadBytes(out + "/index.html");
+  EXPECT_LT(page.find("data/folder.js"), page.find("view.js"));
+  const std::string scene = ReadBytes(out + "/data/scene.js");
+  EXPECT_THAT(scene, testing::StartsWith("roomtexGive(\"scene\",{"));
+  EXPECT_THAT(scene, testing::Not(HasSubstr(folder_.path())));  // where it was made
+  EXPECT_THAT(ReadBytes(out + "/data/chunk.id-0.level-2.js"),
+              testing::EndsWith("\",\"application/octet-stream\");\n"));
+  EXPECT_TRUE(std::filesystem::exists(out + "/data/evidence_chunk.id-0.level-0.js"));
+  EXPECT_TRUE(std::filesystem::exists(out + "/data/texture.page-0.max-1024.js"));
+  // Written again it is replaced as a whole, and what is not ours stays.
+  std::ofstream(out + "/data/chunk.id-7.level-2.js") << "of an earlier room";
+  EXPECT_EQ(RunCommandLine(line).exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(out + "/data/chunk.id-7.level-2.js"));
+  EXPECT_EQ(ReadBytes(out + "/data/scene.js"), scene);
+  const CommandResult refused = RunCommandLine("roomtex-view --input_path '" + folder_.path() +
+                                               "' --output_path '" + folder_.path() + "'");
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "model.glb"));
+  // No room to put the pieces aside.
+  const CommandResult full = RunProgram("TMPDIR=/nowhere " + BinFolder() + "/" + line);
+  EXPECT_EQ(full.exit_code, 3) << full.err;
+  EXPECT_THAT(full.err, HasSubstr("Set TMPDIR"));
+}
+
 TEST_F(ViewCommand, PrintsItsAddressAndEndsOnCtrlC) {
   const std::string out = folder_ / "out";
   const pid_t pid = fork();

@@ -43,9 +43,18 @@ class LumigraphOfTwoWalls : public testing::Test {
 TEST_F(LumigraphOfTwoWalls, DepthsAreThoseOfTheMeshAndTheNearerSurfaceIsWider) {
   const ViewLumigraph lumigraph(cameras_, {});
   const Scan scan = walls_.MakeScan(400, 400);
-  const RayCaster caster(scan.points, BuildScanMesh(scan, ScanMeshOptions()));
-  const std::string bytes = lumigraph.Depths(0, caster, 2);
-  EXPECT_EQ(bytes, lumigraph.Depths(0, caster, 1));
+  ViewModel mesh;
+  mesh.origin = {1, 2, 3};
+  for (const Eigen::Vector3d& p : scan.points)
+    mesh.points.push_back((p - mesh.origin).cast<float>());
+  mesh.colors.resize(mesh.points.size());
+  mesh.triangles = BuildScanMesh(scan, ScanMeshOptions());
+  mesh.page_of_triangle.assign(mesh.triangles.size(), -1);
+  mesh.normals = SmoothNormals(mesh);
+  const Eigen::Vector3d origin = mesh.origin;
+  const ViewChunks chunks(std::move(mesh));
+  const std::string bytes = lumigraph.Depths(0, chunks, origin, 2);
+  EXPECT_EQ(bytes, lumigraph.Depths(0, chunks, origin, 1));
   uint32_t header[4];
   ASSERT_GT(bytes.size(), sizeof header);
   std::memcpy(header, bytes.data(), sizeof header);
@@ -67,6 +76,20 @@ TEST_F(LumigraphOfTwoWalls, DepthsAreThoseOfTheMeshAndTheNearerSurfaceIsWider) {
   // Just beside the board's edge, seen from the photo: a pixel is 5 mm there.
   EXPECT_NEAR(at({-0.403, 0, -2}), 0.5, 1e-3);
   EXPECT_LT(at({-0.43, 0, -2}), 0.3);
+  // A triangle that goes on behind the camera is cut off at it: the plane 1 m below, all around.
+  ViewModel floor;
+  floor.points = {{-100, -1, 100}, {100, -1, 100}, {0, -1, -100}};
+  floor.colors.resize(3);
+  floor.triangles = {{0, 1, 2}};
+  floor.page_of_triangle = {-1};
+  floor.normals = SmoothNormals(floor);
+  const ViewChunks below(std::move(floor));
+  const std::string seen = lumigraph.Depths(0, below, Eigen::Vector3d::Zero(), 1);
+  cv::Mat(pinhole.height, pinhole.width, CV_16F, const_cast<char*>(seen.data()) + 16)
+      .convertTo(inverse, CV_32F);
+  EXPECT_NEAR(at({0, -1, -4}), 0.25, 1e-3);
+  EXPECT_NEAR(at({0, -1, -8}), 0.125, 1e-3);
+  EXPECT_EQ(at({0, 1, -4}), 0);
 }
 
 TEST_F(LumigraphOfTwoWalls, TakesThePhotosThatColouredTheModelWithTheirGains) {

@@ -2,13 +2,16 @@
 
 #include "core/local_server.h"
 #include "tests/support/option_check.h"
+#include "texture/view/view_folder.h"
 
 namespace roomtex {
 namespace {
 
 TEST(ViewCommandOptions, AreListedAndChecked) {
   LocalServerOptions server;
-  ExpectChecksItsOptions("roomtex-view", "--input_path none", {FieldsOf(&server)});
+  ViewFolderOptions folder;
+  ExpectChecksItsOptions("roomtex-view", "--input_path none",
+                         {FieldsOf(&folder), FieldsOf(&server)});
 }
 
 }  // namespace

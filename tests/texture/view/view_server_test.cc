@@ -118,33 +118,6 @@ TEST_F(ServedView, TexturesAreScaledToWhatIsAskedFor) {
   EXPECT_EQ(Status("texture?page=1&max=100"), 404);
 }
 
-TEST_F(ServedView, CastsRaysAtTheWholeMeshToAMillimetre) {
-  // Beside the board the wall is 4 m away, on it 2 m.
-  for (const auto& [dx, dy, z] : {std::tuple{0.0, 0.0, -2.0}, std::tuple{0.11, -0.07, -2.0},
-                                  std::tuple{0.3, 0.2, -4.0}, std::tuple{-0.35, 0.1, -4.0}}) {
-    const Json hit = GetJson("cast?x=0&y=0&z=0&dx=" + std::to_string(dx) +
-                             "&dy=" + std::to_string(dy) + "&dz=-1&front=1");
-    ASSERT_EQ(hit["hit"], true);
-    EXPECT_NEAR(hit["point"][0].get<double>(), -z * dx, 1e-3);
-    EXPECT_NEAR(hit["point"][1].get<double>(), -z * dy, 1e-3);
-    EXPECT_NEAR(hit["point"][2].get<double>(), z, 1e-3);
-    EXPECT_GT(hit["normal"][2].get<double>(), 0.99);
-  }
-}
-
-TEST_F(ServedView, RaysPassWhatIsNotShown) {
-  const std::string from_behind = "cast?x=0&y=0&z=-9&dx=0&dy=0&dz=1";
-  EXPECT_EQ(GetJson(from_behind + "&front=1")["hit"], false);
-  EXPECT_NEAR(GetJson(from_behind + "&front=0")["point"][2].get<double>(), -2, 5);
-  EXPECT_EQ(GetJson(from_behind + "&front=0")["hit"], true);
-  // What lies higher or farther back is cut away.
-  const std::string upwards = "cast?x=0&y=0&z=0&dx=0&dy=0.25&dz=-1&front=1";
-  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,0.2")["hit"], false);
-  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,1.2")["hit"], true);
-  EXPECT_EQ(GetJson(upwards + "&cut0=0,1,0,-1,1.2&cut2=0,0,1,-1.5,1")["hit"], false);
-  EXPECT_EQ(GetJson("cast?x=0&y=0&z=0&dx=0&dy=0&dz=1&front=0")["hit"], false);
-}
-
 TEST_F(ServedView, DescribesTheEvidence) {
   const Json evidence = GetJson("evidence");
   EXPECT_EQ(evidence["available"], true);
@@ -156,8 +129,7 @@ TEST_F(ServedView, RefusesWhatMakesNoSense) {
   for (const char* path :
        {"chunk", "chunk?id=0", "chunk?id=-1&level=0", "chunk?id=999&level=0", "chunk?id=0&level=3",
         "chunk?id=x&level=0", "evidence_chunk?id=999&level=0", "photo?id=0&max=100", "lattice?id=0",
-        "cast?x=0&y=0&z=0&dx=0&dy=0&dz=0", "cast?x=0&y=0&z=0&dx=0&dy=0&dz=1&cut1=0,1",
-        "cast?x=inf&y=0&z=0&dx=0&dy=0&dz=1", "cast?x=0&y=0", "texture?page=0"}) {
+        "texture?page=0"}) {
     const auto answer = Get(path);
     ASSERT_TRUE(answer) << path;
     EXPECT_EQ(answer->status, 422) << path;

@@ -501,7 +501,11 @@ class Viewer {
         camera: this.target?.name,
         surface: this.mode === 'colour' ? '' : this.mode,
       });
-      history.replaceState(null, '', this.written);
+      try {
+        history.replaceState(null, '', this.written);
+      } catch {
+        location.replace(this.written);  // a page from a disk has no other way in some browsers
+      }
     }, kFragmentPause);
   }
   applyExtra(extra) {

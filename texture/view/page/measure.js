@@ -1,12 +1,9 @@
-// Distances between points of the surface. The points come from the server, which casts the rays at
-// the whole mesh; the page only draws.
+// Distances between points of the surface, of the whole mesh whatever is drawn of it.
 
 import * as THREE from 'three';
 import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
 import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
 import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
-
-import {getJson} from './api.js';
 
 const kColor = 0xffc247;
 
@@ -65,27 +62,9 @@ export class Measures extends EventTarget {
   }
 
   // The point of the surface along a ray of the page, scan frame; null without.
-  async pick(ray, {frontOnly, cut, supplementShown}) {
-    const from = this.frames.toScan(ray.origin), along = this.frames.turnToScan(ray.direction);
-    const query = new URLSearchParams({
-      x: from.x,
-      y: from.y,
-      z: from.z,
-      dx: along.x,
-      dy: along.y,
-      dz: along.z,
-      front: frontOnly ? 1 : 0,
-    });
-    if (!supplementShown) query.set('supplement', 0);
-    cut.axes.forEach((axis, k) => {
-      const inScan = this.frames.turnToScan(axis), at = this.frames.origin.dot(inScan);
-      const {x, y, z} = inScan;
-      if (cut.low[k] > -1e8 || cut.high[k] < 1e8) {
-        query.set(`cut${k}`, [x, y, z, cut.low[k] + at, cut.high[k] + at]);
-      }
-    });
-    const answer = await getJson(`cast?${query}`);
-    return answer.hit ? new THREE.Vector3(...answer.point) : null;
+  async pick(ray, room) {
+    const hit = await room.castWhole(ray);
+    return hit ? this.frames.toScan(hit.point) : null;
   }
 
   add(point) {

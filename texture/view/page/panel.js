@@ -2,6 +2,7 @@
 
 import {Vector3} from 'three';
 
+import {getImageUrl} from './api.js';
 import {coordinates, count, length, setUnit, unit} from './format.js';
 import {showLegend} from './legend.js';
 import {extentOf, makePlan, planRotation} from './plan.js';
@@ -302,7 +303,7 @@ export class Panel {
     this.#setCameraSize(size);
     this.options = list.map((camera) => {
       const image = make('img', {alt: '', loading: 'lazy', width: 54, height: 36});
-      if (camera.photo) image.src = `photo?id=${camera.id}&max=128`;
+      if (camera.photo) this.#showSmall(image, camera);
       const option = make(
           'li', {id: `camera-${camera.id}`, camera}, image,
           make('span', {text: camera.name, title: camera.name}));
@@ -315,6 +316,13 @@ export class Panel {
     });
     $('camera-list').replaceChildren(...this.options);
     $('camera-list').addEventListener('keydown', (event) => this.#listKey(event));
+  }
+  async #showSmall(image, camera) {
+    try {
+      image.src = await getImageUrl(`photo?id=${camera.id}&max=128`);
+    } catch (error) {
+      this.fail(error.message);
+    }
   }
   #activate(option) {
     for (const other of this.options) other.classList.toggle('active', other === option);

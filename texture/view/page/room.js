@@ -331,7 +331,8 @@ export class Room {
       ++this.numCoarse;
     } else {
       this.numTriangles += mesh.geometry.index.count / 3;
-      // The graphics card has them then; rays are cast at the coarse level and by the server.
+      // The graphics card has them then; rays are cast at the coarse level, or at chunks that
+      // come anew.
       for (const attribute of [...Object.values(mesh.geometry.attributes), mesh.geometry.index]) {
         attribute.onUpload(() => {
           attribute.array = null;
@@ -413,33 +414,59 @@ export class Room {
     }
   }
 
-  // Where a ray meets the coarse level, for moving about; {distance, point} or null. Measuring asks
-  // the server.
+  // Where a ray meets the coarse level, for moving about; {distance, point} or null.
   cast(ray) {
-    const local = ray.clone().applyMatrix4(this.group.matrixWorld.clone().invert());
+    const local = this.#toGroup(ray);
     let best = Infinity;
-    const at = new THREE.Vector3();
-    for (const chunk of this.chunks) {
-      const coarse = chunk.levels[0];
-      if (!coarse || !this.#isShown(chunk)) continue;
-      if (!chunk.box.containsPoint(local.origin)) {
-        if (!local.intersectBox(chunk.box, at) || at.distanceTo(local.origin) > best) continue;
-      }
-      const positions = coarse.geometry.attributes.position.array;
-      const corners = coarse.geometry.index.array;
-      const normals = coarse.geometry.attributes.normal.array;
-      for (let i = 0; i < corners.length; i += 3) {
-        const a = corners[i], b = corners[i + 1], c = corners[i + 2];
-        const distance = meet(local.origin, local.direction, positions, a, b, c);
-        if (distance >= best) continue;
-        if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
-        ray.at(distance, at);
-        const {axes, low, high} = this.cut;
-        if (axes.some((axis, k) => axis.dot(at) < low[k] || axis.dot(at) > high[k])) continue;
-        best = distance;
-      }
+    for (const {chunk, entry} of this.#alongRay(local)) {
+      if (entry >= best) break;
+      if (chunk.levels[0]) best = this.#meet(chunk.levels[0].geometry, ray, local, best);
     }
     return best < Infinity ? {distance: best, point: ray.at(best, new THREE.Vector3())} : null;
+  }
+  // The same of the whole mesh, for measuring: the chunks along the ray come once more, whole.
+  async castWhole(ray) {
+    const local = this.#toGroup(ray);
+    let best = Infinity;
+    for (const {chunk, entry} of this.#alongRay(local)) {
+      if (entry >= best) break;
+      const bytes = await getBytes(`chunk?id=${chunk.id}&level=${kFull}`);
+      best = this.#meet(parseChunk(bytes, chunk), ray, local, best);
+    }
+    return best < Infinity ? {distance: best, point: ray.at(best, new THREE.Vector3())} : null;
+  }
+  #toGroup(ray) {
+    return ray.clone().applyMatrix4(this.group.matrixWorld.clone().invert());
+  }
+  // The chunks whose boxes the ray meets, the nearest first.
+  #alongRay(local) {
+    const at = new THREE.Vector3(), found = [];
+    for (const chunk of this.chunks) {
+      if (!this.#isShown(chunk)) continue;
+      if (chunk.box.containsPoint(local.origin)) {
+        found.push({chunk, entry: 0});
+      } else if (local.intersectBox(chunk.box, at)) {
+        found.push({chunk, entry: at.distanceTo(local.origin)});
+      }
+    }
+    return found.sort((a, b) => a.entry - b.entry);
+  }
+  // The distance to the nearest triangle that is seen and nearer than best, or best.
+  #meet(geometry, ray, local, best) {
+    const positions = geometry.attributes.position.array;
+    const corners = geometry.index.array;
+    const normals = geometry.attributes.normal.array;
+    const at = new THREE.Vector3(), {axes, low, high} = this.cut;
+    for (let i = 0; i < corners.length; i += 3) {
+      const a = corners[i], b = corners[i + 1], c = corners[i + 2];
+      const distance = meet(local.origin, local.direction, positions, a, b, c);
+      if (distance >= best) continue;
+      if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
+      ray.at(distance, at);
+      if (axes.some((axis, k) => axis.dot(at) < low[k] || axis.dot(at) > high[k])) continue;
+      best = distance;
+    }
+    return best;
   }
 
   // Some points of the room, page frame; before it is loaded the corners of its boxes.
