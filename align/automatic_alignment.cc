@@ -12,6 +12,8 @@ namespace {
 // Metres, one standard deviation: how far off the surface a start may be that was fitted to it.
 constexpr double kStartSigma = 0.03;
 
+constexpr int kStartsPerScale = 3;
+
 // A hint that contradicts what was found. "" = none does.
 std::string ContradictingHint(const AlignmentInput& input, const Alignment& alignment,
                               const TrustOptions& trust) {
@@ -116,13 +118,22 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
                                       const std::vector<NearHint>& near,
                                       const AlignmentOptions& options, Progress* progress) {
   AutomaticAlignment found;
-  progress->Stage("search");
+  const bool hinted = !near.empty() || !input.picks.empty();
   StartSearchOptions search;
   search.num_threads = input.num_threads;
-  found.search = SearchStarts(input, near, options, search);
-  progress->Stage("search verdict");
-  const bool hinted = !near.empty() || !input.picks.empty();
-  found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
+  const auto look = [&] {
+    progress->Stage("search");
+    found.search = SearchStarts(input, near, options, search);
+    progress->Stage("search verdict");
+    found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
+  };
+  look();
+  if (found.verdict.kind == StartVerdict::Kind::kWeak) {
+    // A model of the whole room fits a scan of a part of it best when it is small enough to lie in
+    // that part: so many are in the way that what is best for each scale has to be asked for.
+    search.geometry.num_kept_per_scale = kStartsPerScale;
+    look();
+  }
   if (!IsWorthALook(found.verdict.kind)) {
     found.attempt.refusal = found.verdict.reason;
     found.attempt.says_mirrored = found.verdict.kind == StartVerdict::Kind::kMirrored;

@@ -38,7 +38,7 @@ enum class PhotoSupport { kNone, kFaint, kClear };
 
 // Of simulated rooms, what the counted ones leave possible (95 %): none of the answers with clear
 // support was wrong, and no wrong one had faint support and stood out by min_ratio_faint.
-inline constexpr double kChanceClear = 0.11, kChanceFaint = 0.13;
+inline constexpr double kChanceClear = 0.055, kChanceFaint = 0.13;
 
 // A start that the photos were asked about.
 struct AskedStart {

@@ -170,6 +170,22 @@ bool AreSame(const StartHypothesis& a, const StartHypothesis& b, const Eigen::Ve
          (s * middle - t * middle).norm() < kSamePlace;
 }
 
+// Adds the `count` best of those that are not kept already.
+void KeepBest(std::vector<StartHypothesis> found, int count, const Eigen::Vector3d& middle,
+              std::vector<StartHypothesis>* kept) {
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.score > b.score; });
+  for (const StartHypothesis& one : found) {
+    if (count == 0) break;
+    const bool is_new = std::none_of(kept->begin(), kept->end(), [&](const StartHypothesis& other) {
+      return AreSame(one, other, middle);
+    });
+    if (!is_new) continue;
+    kept->push_back(one);
+    --count;
+  }
+}
+
 }  // namespace
 
 std::vector<StartHypothesis> SearchByGeometry(
@@ -190,17 +206,16 @@ std::vector<StartHypothesis> SearchByGeometry(
     found[i] = one.Search(hints, RadFromDeg(options.turn_step_deg));
   });
 
-  std::vector<StartHypothesis> ranked;
-  for (const auto& some : found) ranked.insert(ranked.end(), some.begin(), some.end());
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.score > b.score; });
-  std::vector<StartHypothesis> kept;
-  for (const StartHypothesis& one : ranked) {
-    if (static_cast<int>(kept.size()) == options.num_kept) break;
-    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const StartHypothesis& other) {
-      return AreSame(one, other, levels[0].middle);
-    });
-    if (is_new) kept.push_back(one);
+  std::vector<StartHypothesis> all_found, kept;
+  for (const auto& some : found) all_found.insert(all_found.end(), some.begin(), some.end());
+  const Eigen::Vector3d& middle = levels[0].middle;
+  KeepBest(all_found, options.num_kept, middle, &kept);
+  for (int scale = 0; scale < num_scales; ++scale) {
+    std::vector<StartHypothesis> of_scale;
+    for (size_t i = scale; i < found.size(); i += num_scales) {
+      of_scale.insert(of_scale.end(), found[i].begin(), found[i].end());
+    }
+    KeepBest(std::move(of_scale), options.num_kept_per_scale, middle, &kept);
   }
   return kept;
 }

@@ -20,7 +20,8 @@ struct GeometrySearchOptions {
   // The scale is looked for within this factor, either way, of the ratio of the extents of scan and
   // model.
   double scale_reach = 2.3;
-  int num_kept = 60;  // hypotheses
+  int num_kept = 60;           // hypotheses, the best of all
+  int num_kept_per_scale = 0;  // and of each scale
   ScanVolumeOptions volume;
 };
 
