@@ -286,10 +286,6 @@ void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
   throw UnusablePhotos(std::move(left_out));
 }
 
-}  // namespace
-
-namespace {
-
 Scene MakeScene(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                 const ColorizeOptions& options, int num_threads) {
   Scene scene = MakeSamples(scans, photos, options, num_threads);
