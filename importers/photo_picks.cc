@@ -55,7 +55,7 @@ std::vector<PhotoPick> PicksOf(const PosedPhoto& photo, const std::vector<Scan>&
   return picks;
 }
 
-std::string TextOf(double number) {
+std::string PickNumber(double number) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(6) << number;
   return text.str();
@@ -79,9 +79,9 @@ void WritePhotoPicks(const std::vector<PhotoPick>& picks, const std::string& pat
   output.stream() << "# Made from the poses of the photos in the E57\n"
                      "image_name,x,y,scan_x,scan_y,scan_z\n";
   for (const PhotoPick& pick : picks) {
-    output.stream() << CsvLine({pick.image_name, TextOf(pick.x_in_img.x()),
-                                TextOf(pick.x_in_img.y()), TextOf(pick.x_in_scan.x()),
-                                TextOf(pick.x_in_scan.y()), TextOf(pick.x_in_scan.z())});
+    output.stream() << CsvLine({pick.image_name, PickNumber(pick.x_in_img.x()),
+                                PickNumber(pick.x_in_img.y()), PickNumber(pick.x_in_scan.x()),
+                                PickNumber(pick.x_in_scan.y()), PickNumber(pick.x_in_scan.z())});
   }
   output.Commit();
 }

@@ -20,7 +20,7 @@ namespace {
 // nearer to each other share them.
 constexpr double kWaveLength = 0.2;
 constexpr double kLeastWaves = 0.0002;  // metres; no surface is known to be flatter
-constexpr double kGates = 2.5;          // standard deviations that noise may add to a limit
+constexpr double kNoiseGates = 2.5;     // standard deviations that noise may add to a limit
 constexpr double kMostCurved = 0.6;     // of the largest angle: how far ends may turn
 constexpr int kRounds = 12;             // of growing and fitting
 constexpr double kRefitGrowth = 1.3;  // the plane is fitted anew when the region has grown by this
@@ -188,10 +188,11 @@ class RegionGrower {
   bool Belongs(int index, double slack) const {
     const SurfaceCell& cell = cells_[index];
     if (normal_.dot(cell.normal.cast<double>()) < 0.5) return false;
-    if (std::abs(normal_.dot(cell.point - mean_)) > slack * limit_ + kGates * cell.point_sigma) {
+    if (std::abs(normal_.dot(cell.point - mean_)) >
+        slack * limit_ + kNoiseGates * cell.point_sigma) {
       return false;
     }
-    return Angle(normal_, cell) < slack * max_angle_ + kGates * cell.normal_sigma;
+    return Angle(normal_, cell) < slack * max_angle_ + kNoiseGates * cell.normal_sigma;
   }
 
   // No step between two neighbours.
@@ -202,7 +203,7 @@ class RegionGrower {
     const double slope_sigma = 0.7 * std::max(from.normal_sigma, to.normal_sigma) * between.norm();
     const double sigma = std::sqrt(from.point_sigma * from.point_sigma +
                                    to.point_sigma * to.point_sigma + slope_sigma * slope_sigma);
-    return std::abs(normal.dot(between)) < options_.min_step + kGates * sigma;
+    return std::abs(normal.dot(between)) < options_.min_step + kNoiseGates * sigma;
   }
 
   const ScanSurface& surface_;

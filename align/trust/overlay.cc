@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kCropWidth = 160, kCropHeight = 120;  // pixels of the photo
 constexpr int kCaption = 26;                        // pixels; height of a line of text
-constexpr int kNodeCells = 4;                       // cells between the rays that are cast
+constexpr int kOverlayNodeCells = 4;                // cells between the rays that are cast
 // A point is hidden if the scan's surface lies nearer by this share of its distance. The coarse
 // mesh of FreeSpace cuts corners.
 constexpr double kHiddenShare = 0.015;
@@ -319,7 +319,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     if (viewer.has_mesh()) cell_px = std::max(cell_px, (camera.width + 639) / 640);
     cell_px = std::min({cell_px, camera.width, camera.height});
     const CameraProjection projection(camera);
-    const double step = viewer.has_mesh() ? cell_px : kNodeCells * cell_px;
+    const double step = viewer.has_mesh() ? cell_px : kOverlayNodeCells * cell_px;
     setups.emplace(image->camera_id, Setup{projection, cell_px, RayLattice(projection, step)});
   }
   MakeFolder(folder);
