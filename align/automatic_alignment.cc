@@ -12,7 +12,7 @@ namespace {
 // Metres, one standard deviation: how far off the surface a start may be that was fitted to it.
 constexpr double kStartSigma = 0.03;
 
-constexpr int kStartsPerScale = 3;
+constexpr int kStartsPerScale = 3;  // of the second look
 
 // A hint that contradicts what was found. "" = none does.
 std::string ContradictingHint(const AlignmentInput& input, const Alignment& alignment,

@@ -10,7 +10,6 @@
 #include <exception>
 #include <list>
 #include <mutex>
-#include <new>
 #include <set>
 #include <stdexcept>
 #include <string_view>
@@ -26,8 +25,8 @@
 #include <unistd.h>
 
 #include "core/error.h"
-#include "core/json_text.h"
 #include "core/local_server_address.h"
+#include "core/local_server_answers.h"
 #include "core/local_server_connection.h"
 #include "core/local_server_http.h"
 #include "core/local_server_key.h"
@@ -39,7 +38,6 @@ namespace {
 constexpr int kMaxConnections = 128;  // open at a time, each with a thread
 constexpr int kMaxPerAddress = 48;    // of another computer
 constexpr int kFewConnections = 32;   // with more, each gets one answer
-constexpr size_t kBlockBytes = size_t{1} << 16;
 
 // The time does not tell how much is right.
 bool EqualSecrets(const std::string& a, const std::string& b) {
@@ -118,112 +116,6 @@ struct LocalServer::Impl {
   struct sigaction old_interrupt {
   }, old_terminate{};
 };
-
-namespace {
-
-void SetJson(httplib::Response& response, int status, const std::string& text) {
-  response.status = status;
-  response.set_content(text, "application/json");
-}
-
-void SetError(httplib::Response& response, int status, const std::string& sentence) {
-  SetJson(response, status, ErrorText(sentence));
-}
-
-constexpr char kLacksToken[] =
-    "The address lacks the token; open the address that the command has printed.";
-
-// For people who open a link that was copied, or kept from an earlier run.
-std::string RefusalPage() {
-  return "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Not this address</title>"
-         "<link rel=\"icon\" href=\"data:,\"><h1>This address does not open anything</h1><p>" +
-         std::string(kLacksToken) +
-         "</p><p>Every start makes a new address: a link from an earlier run has ended with it. "
-         "Start "
-         "the command again and open what it prints. What stands behind the # of an old link is "
-         "the "
-         "point of view: put it behind the new address.</p></html>";
-}
-
-void SetContent(const httplib::Request& request, const LocalServer::Content& content,
-                httplib::Response& response) {
-  const std::string etag = "\"" + content.etag + "\"";
-  response.headers.erase("Cache-Control");
-  response.set_header("Cache-Control", content.immutable      ? "private, max-age=86400, immutable"
-                                       : content.etag.empty() ? "no-store"
-                                                              : "private, no-cache");
-  if (!content.etag.empty()) {
-    response.set_header("ETag", etag);
-    if (request.get_header_value("If-None-Match").find(etag) != std::string::npos) {
-      response.status = 304;
-      return;
-    }
-  }
-  response.status = 200;
-  if (!content.bytes || content.bytes->empty()) {
-    response.set_content("", content.type);
-    return;
-  }
-  // Not copied: a GLB has hundreds of megabytes.
-  response.set_content_provider(
-      content.bytes->size(), content.type,
-      [bytes = content.bytes](size_t offset, size_t length, httplib::DataSink& sink) {
-        return sink.write(bytes->data() + offset, std::min(length, kBlockBytes));
-      });
-}
-
-// Whatever a handler throws becomes an answer.
-void SetException(httplib::Response& response, const std::exception_ptr& thrown) {
-  try {
-    std::rethrow_exception(thrown);
-  } catch (const InputError& error) {
-    SetError(response, 422, error.what());
-  } catch (const UsageError& error) {
-    SetError(response, 422, error.what());
-  } catch (const std::bad_alloc&) {
-    SetError(response, 500, "out of memory");
-  } catch (const std::exception& error) {
-    SetError(response, 500, std::string("internal error: ") + error.what());
-  } catch (...) {
-    SetError(response, 500, "internal error of an unknown kind");
-  }
-}
-
-// httplib's routes are regular expressions.
-std::string Literally(const std::string& path) {
-  std::string pattern;
-  for (const char c : path) {
-    if (std::strchr("^$\\.*+?()[]{}|", c) != nullptr) pattern += '\\';
-    pattern += c;
-  }
-  return pattern;
-}
-
-bool IsJson(const httplib::Request& request) {
-  return LowerCase(request.get_header_value("Content-Type")).rfind("application/json", 0) == 0;
-}
-
-LocalServer::Query QueryOf(const httplib::Request& request) {
-  LocalServer::Query query;
-  for (const auto& [name, value] : request.params) query.emplace(name, value);
-  return query;
-}
-
-// None if the text is no JSON or nested too deeply.
-std::optional<Json> ParseBody(const std::string& text) {
-  if (text.empty()) return Json::object();
-  try {
-    return ParseJson(text, "", "");
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
-
-std::string Dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-}  // namespace
 
 LocalServer::Impl::Impl(const LocalServerOptions& server_options) : options(server_options) {
   ThrowIfProblems(options.Problems());

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
 
 #include "core/csv.h"
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -55,12 +54,6 @@ std::vector<PhotoPick> PicksOf(const PosedPhoto& photo, const std::vector<Scan>&
   return picks;
 }
 
-std::string PickNumber(double number) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(6) << number;
-  return text.str();
-}
-
 }  // namespace
 
 std::vector<PhotoPick> PicksOfPosedPhotos(const std::vector<PosedPhoto>& photos,
@@ -79,9 +72,10 @@ void WritePhotoPicks(const std::vector<PhotoPick>& picks, const std::string& pat
   output.stream() << "# Made from the poses of the photos in the E57\n"
                      "image_name,x,y,scan_x,scan_y,scan_z\n";
   for (const PhotoPick& pick : picks) {
-    output.stream() << CsvLine({pick.image_name, PickNumber(pick.x_in_img.x()),
-                                PickNumber(pick.x_in_img.y()), PickNumber(pick.x_in_scan.x()),
-                                PickNumber(pick.x_in_scan.y()), PickNumber(pick.x_in_scan.z())});
+    std::vector<std::string> fields = {pick.image_name};
+    for (const double x : pick.x_in_img) fields.push_back(Number(x, 6));
+    for (const double x : pick.x_in_scan) fields.push_back(Number(x, 6));
+    output.stream() << CsvLine(fields);
   }
   output.Commit();
 }

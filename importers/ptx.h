@@ -26,8 +26,7 @@ std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options,
 
 // Coordinates to the micrometre in the station frame with the pose as the scan's 4x4 matrix;
 // intensities 0..1 (others are divided by 255, 4095 or 65535, whichever is the first to hold them
-// all). With the colours of
-// scans that have some. Organised scans only.
+// all), and the colours of scans that have some. Organised scans only.
 void WritePtx(const std::vector<Scan>& scans, const std::string& path);
 
 // What the intensities of the scan are to be divided by to lie in 0..1, after subtracting *offset

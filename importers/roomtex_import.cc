@@ -135,14 +135,10 @@ class Importer {
       WritePtx(file_.scans, path);
     } else if (extension == ".e57") {
       WriteE57(file_.scans, path);
-    } else if (extension == ".las" || extension == ".xyz" || extension == ".pts" ||
-               extension == ".csv") {
+    } else if (const auto kind = XyzKindOf(extension); kind || extension == ".las") {
       std::vector<const Scan*> scans;
       for (const Scan& scan : file_.scans) scans.push_back(&scan);
-      if (extension == ".las") WriteLas(scans, path);
-      if (extension == ".xyz") WriteXyz(scans, path, XyzKind::kXyz);
-      if (extension == ".pts") WriteXyz(scans, path, XyzKind::kPts);
-      if (extension == ".csv") WriteXyz(scans, path, XyzKind::kCsv);
+      kind ? WriteXyz(scans, path, *kind) : WriteLas(scans, path);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});

@@ -75,9 +75,7 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension == ".ptx") WritePtx({scan}, path);
   if (extension == ".e57") WriteE57({scan}, path);
   if (extension == ".las") WriteLas({&scan}, path);
-  if (extension == ".xyz") WriteXyz({&scan}, path, XyzKind::kXyz);
-  if (extension == ".pts") WriteXyz({&scan}, path, XyzKind::kPts);
-  if (extension == ".csv") WriteXyz({&scan}, path, XyzKind::kCsv);
+  if (const auto kind = XyzKindOf(extension)) WriteXyz({&scan}, path, *kind);
 }
 
 }  // namespace roomtex

@@ -31,9 +31,8 @@ struct ScanWriterOptions {
 //   .e57   E57 (e57_writer.h), structured where there is a grid
 //   .las   points (las.h)
 //   .xyz, .pts, .csv   points as text (xyz.h)
-// Colours of the scan go where the format holds them: all but .png and .rtpi. InputError
-// where CanHold() says no. Throws
-// UsageError for another extension.
+// Colours of the scan go where the format holds them: all but .png and .rtpi. Throws InputError
+// where CanHold() says no, UsageError for another extension.
 void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const std::string& path,
                const ScanWriterOptions& options = {});
 

@@ -239,6 +239,13 @@ bool LooksLikeXyz(std::string_view start) {
   return false;
 }
 
+std::optional<XyzKind> XyzKindOf(const std::string& extension) {
+  if (extension == ".xyz") return XyzKind::kXyz;
+  if (extension == ".pts") return XyzKind::kPts;
+  if (extension == ".csv") return XyzKind::kCsv;
+  return std::nullopt;
+}
+
 void WriteXyz(const std::vector<const Scan*>& scans, const std::string& path, XyzKind kind) {
   constexpr size_t kBlock = 1 << 20;
   bool has_colors = false;

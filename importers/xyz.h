@@ -1,8 +1,10 @@
 #pragma once
 // XYZ, CSV and PTS: text files with a point a line.
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/scan.h"
 
@@ -29,6 +31,7 @@ bool LooksLikeXyz(std::string_view start);
 // to 255; lengths to the micrometre. kPts: their number in the first line. kCsv: with commas and a
 // line of names. Throws InputError if the file cannot be written.
 enum class XyzKind { kXyz, kPts, kCsv };
+std::optional<XyzKind> XyzKindOf(const std::string& extension);  // ".xyz", ".pts", ".csv"
 void WriteXyz(const std::vector<const Scan*>& scans, const std::string& path, XyzKind kind);
 
 }  // namespace roomtex

@@ -209,7 +209,7 @@ std::vector<StartHypothesis> SearchByGeometry(
   std::vector<StartHypothesis> all_found, kept;
   for (const auto& some : found) all_found.insert(all_found.end(), some.begin(), some.end());
   const Eigen::Vector3d& middle = levels[0].middle;
-  KeepBest(all_found, options.num_kept, middle, &kept);
+  KeepBest(std::move(all_found), options.num_kept, middle, &kept);
   for (int scale = 0; scale < num_scales; ++scale) {
     std::vector<StartHypothesis> of_scale;
     for (size_t i = scale; i < found.size(); i += num_scales) {

@@ -15,9 +15,9 @@ namespace roomtex {
 namespace {
 
 constexpr double kPointsPerMetre = 72 / 0.0254;
-constexpr double kBoardMargin = 0.010,
-                 kTextLine = 0.008;  // metres; the line of text below the board
-constexpr double kLongest = 5;       // metres; PDF's own limit is 200 inches
+constexpr double kBoardMargin = 0.010;  // metres
+constexpr double kTextLine = 0.008;     // metres, below the board
+constexpr double kLongest = 5;          // metres; PDF's own limit is 200 inches
 
 struct Page {
   double width, height;  // metres

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <tiny_gltf.h>
 
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
@@ -20,6 +19,7 @@
 #include "importers/scan_writer.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
+#include "tests/texture/load_glb.h"
 #include "texture/output/evidence.h"
 #include "texture/render/ply_vertices.h"
 #include "texture/sampling/blend.h"
@@ -245,12 +245,7 @@ TEST_F(TextureCommand, GivesTheSameBytesOnOneThreadAndOnThree) {
 
 TEST_F(TextureCommand, GlbLoadsInAStandardReader) {
   ASSERT_EQ(result_.exit_code, 0) << result_.err;
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("textured/model.glb")))
-      << error;
-  EXPECT_EQ(warning, "");
+  const tinygltf::Model model = LoadGlb(Path("textured/model.glb"));
   ASSERT_EQ(model.images.size(), 1u);
   // The scan is a full turn: the first column stands again behind the last one, to close the seam.
   EXPECT_EQ(model.images[0].width, 501);
@@ -283,11 +278,7 @@ TEST_F(TextureCommand, RootNodeTurnsAZUpScan) {
   // The photos' poses do not fit the turned scan, so the answer is not trusted; the file is
   // written.
   Texture("turned", "", Path("z_up.ptx"));
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("turned/model.glb")))
-      << error;
+  const tinygltf::Model model = LoadGlb(Path("turned/model.glb"));
   const tinygltf::Node& root = model.nodes.at(model.scenes.at(model.defaultScene).nodes.at(0));
   ASSERT_EQ(root.rotation.size(), 4u);
   const Eigen::Quaterniond turn(root.rotation[3], root.rotation[0], root.rotation[1],
@@ -333,22 +324,10 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
     scan.scan_from_station.translation = {50, 0, 0};
   }
   EXPECT_FALSE(fs::exists(Path("cloud/texture.png")));
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, Path("cloud/model.glb")));
+  const tinygltf::Model model = LoadGlb(Path("cloud/model.glb"));
   const tinygltf::Primitive& primitive = model.meshes.at(0).primitives.at(0);
   EXPECT_EQ(primitive.mode, TINYGLTF_MODE_POINTS);
   EXPECT_EQ(model.accessors.at(primitive.attributes.at("COLOR_0")).count, truth.points.size());
-}
-
-tinygltf::Model LoadGlb(const std::string& path) {
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
-  EXPECT_EQ(error + warning, "");
-  return model;
 }
 
 TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {

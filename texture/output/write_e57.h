@@ -12,8 +12,8 @@ namespace roomtex {
 
 // One E57 (importers/e57_writer.h) with all stations: samples in the order of model.ply,
 // intensity, colour, pose. photos: written along as JPEGs of pinhole cameras, undistorted,
-// panoramas as they are; null = none. Throws InputError if the file cannot
-// be written or a photo not be read.
+// panoramas as they are; null = none. Throws InputError if the file cannot be written or a photo
+// not be read.
 void WriteColoredE57(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
                      const std::vector<PhotoView>* photos, const std::string& path);
 

@@ -212,11 +212,13 @@ int Main(int argc, char** argv) {
   LetPortDiffer(argc, argv, &options.server);
   return command.Run(argc, argv, [&options](const Command::Context& context) {
     std::vector<std::string> problems = options.folder.Problems();
-    for (const std::string& problem : options.server.Problems()) {
-      problems.push_back(problem);
-    }
+    AppendProblems(options.server.Problems(), &problems);
     ThrowIfProblems(problems);
-    options.output_path.empty() ? Serve(options, context) : Write(options, context);
+    if (options.output_path.empty()) {
+      Serve(options, context);
+    } else {
+      Write(options, context);
+    }
   });
 }
 

@@ -22,9 +22,9 @@ constexpr int kThumbnail = 256;                              // cameras.js
 constexpr int kPinholePhoto = 1536;                          // lumigraph.js
 
 const char kReadme[] =
-    "A room to look at: open index.html in a browser (Firefox, Chrome, Edge or Safari). Everything "
-    "is in\nthis folder, nothing is fetched from the internet. On a web server any address of the "
-    "folder does.\nMade with roomtex-view.\n";
+    "A room to look at: open index.html in a browser. Everything is in this folder, nothing is\n"
+    "fetched from the internet. On a web server any address of the folder does.\n"
+    "Made with roomtex-view.\n";
 
 // A question of the page: a word, and values in the order in which the page says them.
 struct Question {

@@ -5,12 +5,12 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
-#include <tiny_gltf.h>
 
 #include "core/error.h"
 #include "importers/obj.h"
 #include "importers/ply.h"
 #include "tests/support/temp_folder.h"
+#include "tests/texture/load_glb.h"
 #include "tests/texture/sampling/two_walls.h"
 #include "texture/output/decimate_parts.h"
 #include "texture/output/textured_parts.h"
@@ -48,15 +48,6 @@ Scan WallWithHole() {
   Scan scan = scene.MakeScan(60, 40);
   scan.points[scan.Index(10, 10)] = Scan::MissingPoint();
   return scan;
-}
-
-tinygltf::Model LoadGlb(const std::string& path) {
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
-  EXPECT_EQ(error + warning, "");
-  return model;
 }
 
 template <typename T>
