@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/statistics.h"
+#include "align/start_photos.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -34,31 +34,6 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
 // not known of any, and neighbouring ones are off together.
 constexpr size_t kMostCorners = 200;
 
-// Pixels, one standard deviation per coordinate: of half of the corners, how far they are from
-// where the similarity has them.
-double CornerSigma(const std::vector<Pick>& corners, const SparseModel& model,
-                   const Similarity& scan_from_sparse) {
-  std::vector<double> distances = PickDistances(model, corners, scan_from_sparse);
-  constexpr double kSigmaPerMedian = 0.85;  // of a distance in two dimensions
-  return std::max(1.0, kSigmaPerMedian * Median(&distances));
-}
-
-// The corners that the photos confirmed a start by, evenly taken from all.
-std::vector<Pick> ConfirmedCorners(const SparseModel& model, const GradientShifts& shifts,
-                                   const Similarity& scan_from_sparse) {
-  std::vector<Pick> corners;
-  const size_t stride = 1 + shifts.corners.size() / kMostCorners;
-  for (size_t i = 0; i < shifts.corners.size(); i += stride) {
-    const FittingCorner& corner = shifts.corners[i];
-    const auto image = model.images.find(corner.image_id);
-    if (image == model.images.end()) continue;  // the face of a panorama
-    const Rigid cam_from_scan = CamFromScan(image->second.cam_from_model, scan_from_sparse);
-    corners.push_back(
-        {image->second.name, corner.x_in_img, cam_from_scan.Inverse() * corner.x_in_cam});
-  }
-  return corners;
-}
-
 // The surface leaves something open, so that it does not hold the model there, or it drew the model
 // away from where the photos confirmed the start.
 bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
@@ -71,23 +46,17 @@ bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, 
   return CornerSigma(corners, model, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
 }
 
-const GradientAgreement* PhotosAt(const StartVerdict& verdict) {
-  for (const AskedStart& asked : verdict.asked) {
-    if (asked.start == verdict.best) return &asked.gradient;
-  }
-  return nullptr;
-}
-
 // On the surface; where that does not hold the model, by what the photos show of the scan's
 // intensity as well, if they confirm the start.
 Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& found,
                          const AlignmentOptions& options, Progress* progress) {
-  const Similarity& best = found.search.starts[found.verdict.best].scan_from_sparse;
+  const FittedStart& start = found.search.starts[found.verdict.best];
+  const Similarity& best = start.scan_from_sparse;
   Alignment alignment = AlignToScan(
       input, StartFromSimilarity(input.model, input.picks, best, kStartSigma), options, progress);
-  const GradientAgreement* const photos = PhotosAt(found.verdict);
-  if (found.verdict.support == PhotoSupport::kNone || photos == nullptr) return alignment;
-  std::vector<Pick> corners = ConfirmedCorners(input.model, photos->shifts, best);
+  if (found.verdict.support == PhotoSupport::kNone || !start.photos) return alignment;
+  std::vector<Pick> corners =
+      PicksOf(start.photos->shifts.corners, input.model, best, kMostCorners);
   if (corners.empty()) return alignment;
   const double sigma_px = CornerSigma(corners, input.model, best);
   if (!NeedsCorners(alignment, corners, sigma_px, input.model)) return alignment;
@@ -97,9 +66,9 @@ Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& 
     corner.weight = alignment.start.pick_sigma_px / sigma_px;
     picks.push_back(std::move(corner));
   }
-  AlignmentStart start = StartFromSimilarity(input.model, picks, best, kStartSigma);
-  start.num_corners = static_cast<int>(corners.size());
-  return AlignToScan(input.With(input.model, input.surveyed, picks), start, options, progress);
+  AlignmentStart again = StartFromSimilarity(input.model, picks, best, kStartSigma);
+  again.num_corners = static_cast<int>(corners.size());
+  return AlignToScan(input.With(input.model, input.surveyed, picks), again, options, progress);
 }
 
 bool IsWorthALook(StartVerdict::Kind kind) {
@@ -125,6 +94,7 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     progress->Stage("search");
     found.search = SearchStarts(input, near, options, search);
     progress->Stage("search verdict");
+    AskPhotos(input, options, StartPhotosOptions(), &found.search);
     found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
   };
   look();

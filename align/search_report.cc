@@ -36,10 +36,7 @@ Json StartToJson(const AutomaticAlignment& found, int index) {
   json["num_on_surface"] = start.num_on_surface;
   json["surface_rms_m"] = start.rms;
   json["rays"] = SightsToJson(start.sights);
-  json["photos"] = nullptr;
-  for (const AskedStart& asked : found.verdict.asked) {
-    if (asked.start == index) json["photos"] = PhotosToJson(asked.gradient);
-  }
+  json["photos"] = start.photos ? PhotosToJson(*start.photos) : Json(nullptr);
   return json;
 }
 

@@ -34,10 +34,12 @@ class Fitter {
     const SearchCloud few = Thinned(cloud, kFirstPoints);
     std::vector<FittedStart> starts;
     for (const StartHypothesis& one : hypotheses) {
-      starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}});
+      starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}, {}});
     }
-    starts = Distinct(cloud, FitEach(few, kFirstGate, kMaxScaleChange, starts));
-    return Distinct(cloud, FitEach(cloud, kLastGate, options_.fit.max_scale_change, starts));
+    starts = DistinctStarts(cloud, FitEach(few, kFirstGate, kMaxScaleChange, starts),
+                            search_.num_finalists);
+    return DistinctStarts(cloud, FitEach(cloud, kLastGate, options_.fit.max_scale_change, starts),
+                          search_.num_finalists);
   }
 
  private:
@@ -48,39 +50,11 @@ class Fitter {
     // Picks belong to the model as it is.
     static const std::vector<Pick> kNone;
     const std::vector<Pick>& picks = cloud.is_mirrored ? kNone : input_.picks;
-    std::vector<bool> used;
-    for (const Pick& pick : picks) used.push_back(pick.weight > 0);
     std::vector<FittedStart> fitted = starts;
     ParallelFor(search_.num_threads, 0, static_cast<int>(starts.size()), [&](int i) {
-      const SimilarityFit fit =
-          FitToSurface(input_.model, cloud.points, input_.surveyed.patches(), picks, used,
-                       kPickSigma, gate, starts[i].scan_from_sparse, fit_options);
-      FittedStart& one = fitted[i];
-      one.settled = fit.converged;
-      one.num_on_surface = fit.num_points;
-      one.rms = fit.rms_after;
-      one.sights =
-          CheckSights(cloud, fit.scan_from_sparse, input_.surveyed.free_space(), kSightTolerance);
-      one.scan_from_sparse = fit.scan_from_sparse;
+      FitStart(input_, cloud, picks, kPickSigma, gate, fit_options, &fitted[i]);
     });
     return fitted;
-  }
-
-  // Of several that the fit brought to one place the best, in the order of their scores.
-  std::vector<FittedStart> Distinct(const SearchCloud& cloud,
-                                    std::vector<FittedStart> starts) const {
-    std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) {
-      return a.sights.Score() > b.sights.Score();
-    });
-    std::vector<FittedStart> kept;
-    for (const FittedStart& one : starts) {
-      if (static_cast<int>(kept.size()) == search_.num_finalists) break;
-      const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const FittedStart& other) {
-        return DistanceBetween(cloud, one.scan_from_sparse, other.scan_from_sparse) < kSameStart;
-      });
-      if (is_new) kept.push_back(one);
-    }
-    return kept;
   }
 
   static constexpr double kPickSigma = 3;  // pixels; a hint may be hurried
@@ -91,12 +65,43 @@ class Fitter {
 
 }  // namespace
 
+void FitStart(const AlignmentInput& input, const SearchCloud& cloud, const std::vector<Pick>& picks,
+              double sigma_px, double gate, const SimilarityFitOptions& options,
+              FittedStart* start) {
+  std::vector<bool> used;
+  for (const Pick& pick : picks) used.push_back(pick.weight > 0);
+  const SimilarityFit fit = FitToSurface(input.model, cloud.points, input.surveyed.patches(), picks,
+                                         used, sigma_px, gate, start->scan_from_sparse, options);
+  start->settled = fit.converged;
+  start->num_on_surface = fit.num_points;
+  start->rms = fit.rms_after;
+  start->sights =
+      CheckSights(cloud, fit.scan_from_sparse, input.surveyed.free_space(), kSightTolerance);
+  start->scan_from_sparse = fit.scan_from_sparse;
+}
+
 double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b) {
   std::vector<double> distances;
   for (const SurfacePoint& point : Thinned(cloud, 200).points) {
     distances.push_back((a * point.x_in_sparse - b * point.x_in_sparse).norm());
   }
   return Median(&distances);
+}
+
+std::vector<FittedStart> DistinctStarts(const SearchCloud& cloud, std::vector<FittedStart> starts,
+                                        int most) {
+  std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) {
+    return a.sights.Score() > b.sights.Score();
+  });
+  std::vector<FittedStart> kept;
+  for (FittedStart& one : starts) {
+    if (static_cast<int>(kept.size()) == most) break;
+    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const FittedStart& other) {
+      return DistanceBetween(cloud, one.scan_from_sparse, other.scan_from_sparse) < kSameStart;
+    });
+    if (is_new) kept.push_back(std::move(one));
+  }
+  return kept;
 }
 
 StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,

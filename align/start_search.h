@@ -2,12 +2,14 @@
 // Starts without a click, fitted to the scan's surface and ranked by what the photos' rays say of
 // them: the search (align/search) finds where the model could be, this says where it fits.
 
+#include <optional>
 #include <vector>
 
 #include "align/alignment_input.h"
 #include "align/search/geometry_search.h"
 #include "align/search/search_cloud.h"
 #include "align/search/search_hint.h"
+#include "align/trust/gradient_shift.h"
 #include "align/trust/sight_agreement.h"
 
 namespace roomtex {
@@ -25,7 +27,11 @@ struct FittedStart {
   int num_on_surface = 0;       // sparse points
   double rms = 0;               // metres, their distances
   SightAgreement sights;
+  std::optional<GradientAgreement> photos;  // of the best starts (start_photos.h)
 };
+
+// Metres; where sparse points and surface agree within this, photos of this room do so, too.
+inline constexpr double kExactRms = 0.01;
 
 struct StartSearch {
   int num_hypotheses = 0;
@@ -37,8 +43,18 @@ struct StartSearch {
   std::vector<FittedStart> mirrored;
 };
 
+// Fits a start to the surface and to picks (noise sigma_px), and asks the rays again.
+// gate: metres, FitToSurface().
+void FitStart(const AlignmentInput& input, const SearchCloud& cloud, const std::vector<Pick>& picks,
+              double sigma_px, double gate, const SimilarityFitOptions& options,
+              FittedStart* start);
+
 StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,
                          const AlignmentOptions& options, const StartSearchOptions& search);
+
+// Of several starts at one place the best, in the order of what the rays say, so many at most.
+std::vector<FittedStart> DistinctStarts(const SearchCloud& cloud, std::vector<FittedStart> starts,
+                                        int most);
 
 // Metres: how far apart two starts put what the photos see, at the median over its points.
 double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b);

@@ -6,7 +6,6 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/core.h>
 
-#include "align/trust/agreement.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -25,58 +24,34 @@ constexpr long kEnoughPatches = 100;
 // What geometry alone is worth where photos do not confirm it.
 constexpr double kEvenOdds = 0.5;
 
-// The photos at a start. Without photos, or where nothing can be compared, no patches.
-GradientAgreement AskPhotosAt(const AlignmentInput& input, const Similarity& scan_from_sparse) {
-  if (input.image_path.empty()) return {};
-  SparseModel aligned = input.model;
-  TransformModel(scan_from_sparse, &aligned);
-  std::vector<std::string> ignored;  // comes again when the result is compared
-  return MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(), AgreementOptions(),
-                          input.num_threads, &ignored)
-      .gradient;
-}
-
 // Photos of another room with the same walls and furniture agree at the edges of both, so that more
 // fits than by chance: 0.1 to 0.25 in simulated rooms, where the right room has 0.45 to 0.9. Where
 // model and scan differ by centimetres (0.1 in a real kitchen) as much cannot be asked for.
-PhotoSupport SupportOf(const FittedStart& start, const GradientAgreement& gradient,
-                       const StartVerdictOptions& options) {
-  if (!gradient.supports) return PhotoSupport::kNone;
-  if (gradient.shifts.at_pose.Share() >= options.min_photo_share) return PhotoSupport::kClear;
-  return start.rms > options.exact_rms ? PhotoSupport::kFaint : PhotoSupport::kNone;
-}
-
-const AskedStart* FindAsked(const StartVerdict& verdict, int start) {
-  for (const AskedStart& one : verdict.asked) {
-    if (one.start == start) return &one;
-  }
-  return nullptr;
+PhotoSupport SupportOf(const FittedStart& start, const StartVerdictOptions& options) {
+  if (!start.photos || !start.photos->supports) return PhotoSupport::kNone;
+  const double share = start.photos->shifts.at_pose.Share();
+  if (share >= options.min_photo_share) return PhotoSupport::kClear;
+  return start.rms > kExactRms ? PhotoSupport::kFaint : PhotoSupport::kNone;
 }
 
 // The best by its rays; of several that they agree with about as much, the only one that the photos
 // support most.
-void Choose(const AlignmentInput& input, const StartSearch& search,
-            const StartVerdictOptions& options, StartVerdict* verdict) {
-  const double most = search.starts[0].sights.Score();
+void Choose(const StartSearch& search, const StartVerdictOptions& options, StartVerdict* verdict) {
+  verdict->best = 0;
+  bool is_only = true;
   for (int i = 0; i < static_cast<int>(search.starts.size()); ++i) {
-    if (i == options.max_rivals) break;
-    const FittedStart& start = search.starts[i];
-    if (start.sights.Score() < options.rival_share * most) break;
-    const GradientAgreement gradient = AskPhotosAt(input, start.scan_from_sparse);
-    verdict->asked.push_back({i, gradient, SupportOf(start, gradient, options)});
+    const PhotoSupport support = SupportOf(search.starts[i], options);
+    if (support > verdict->support) {
+      verdict->support = support;
+      verdict->best = i;
+      is_only = true;
+    } else if (support == verdict->support) {
+      is_only = false;
+    }
   }
-  for (const AskedStart& one : verdict->asked) {
-    verdict->support = std::max(verdict->support, one.support);
-  }
-  const auto has_most = [verdict](const AskedStart& one) {
-    return one.support == verdict->support;
-  };
-  if (verdict->support == PhotoSupport::kNone ||
-      std::count_if(verdict->asked.begin(), verdict->asked.end(), has_most) > 1) {
+  if (verdict->support == PhotoSupport::kNone || !is_only) {
     verdict->support = PhotoSupport::kNone;
     verdict->best = 0;
-  } else {
-    verdict->best = std::find_if(verdict->asked.begin(), verdict->asked.end(), has_most)->start;
   }
   if (search.starts.size() > 1) verdict->second = verdict->best == 0 ? 1 : 0;
 }
@@ -139,8 +114,7 @@ std::string OpenReason(const std::vector<Eigen::Vector3d>& open) {
       open.size() > 1 ? " about the surface's normal, nor how large it is" : "");
 }
 
-std::string UnconfirmedReason(const AskedStart& asked) {
-  const GradientShifts& shifts = asked.gradient.shifts;
+std::string UnconfirmedReason(const GradientShifts& shifts) {
   return fmt::format(
       "Photos and scan do not confirm the place that fits best: of {} corners of the scan's "
       "intensity, {:.1f} % lie where the photos have them, and {:.1f} % do so by chance.",
@@ -188,7 +162,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
         std::string("No place was found where the sparse model fits the scan.") + kRemedy;
     return verdict;
   }
-  Choose(input, search, options, &verdict);
+  Choose(search, options, &verdict);
   const FittedStart& best = search.starts[verdict.best];
   const double score = best.sights.Score();
   if (!search.mirrored.empty()) verdict.mirrored_score = search.mirrored[0].sights.Score();
@@ -196,7 +170,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const bool clear = verdict.support == PhotoSupport::kClear;
   const bool alone = verdict.support == PhotoSupport::kNone;
   // Of two that fit alike the photos may know better.
-  const bool photos_decide = clear && FindAsked(verdict, verdict.second) != nullptr;
+  const bool photos_decide = clear && verdict.second >= 0 && search.starts[verdict.second].photos;
   const double rival = std::max(photos_decide ? 0.0 : second, clear ? 0.0 : verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
   verdict.chance_wrong =
@@ -205,7 +179,6 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const double min_ratio = alone   ? options.min_ratio_alone
                            : clear ? options.min_ratio
                                    : options.min_ratio_faint;
-  const AskedStart* const asked = FindAsked(verdict, verdict.best);
   if (alone && verdict.mirrored_score >= min_score &&
       verdict.mirrored_score >= options.min_ratio_mirrored * score) {
     verdict.kind = Kind::kMirrored;
@@ -242,11 +215,11 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.reason += kRemedy;
     return verdict;
   }
-  if (alone && asked && asked->gradient.shifts.clear.num >= kEnoughPatches) {
+  if (alone && best.photos && best.photos->shifts.clear.num >= kEnoughPatches) {
     verdict.kind = Kind::kByPhotos;
     verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
-        asked->gradient.contradicts ? asked->gradient.reason : UnconfirmedReason(*asked);
+        best.photos->contradicts ? best.photos->reason : UnconfirmedReason(best.photos->shifts);
     verdict.reason += kRemedy;
     return verdict;
   }

@@ -8,7 +8,6 @@
 
 #include "align/alignment_input.h"
 #include "align/start_search.h"
-#include "align/trust/gradient_shift.h"
 
 namespace roomtex {
 
@@ -26,12 +25,8 @@ struct StartVerdictOptions {
   double max_through_share = 0.12;
   // Of the corners of the scan's intensity, those that the photos must have where they should be to
   // confirm a start. Larger = stricter. With fewer they support it faintly at most, and not at all
-  // where sparse points and surface agree within exact_rms metres: then so few are those of another
-  // room.
-  double min_photo_share = 0.35, exact_rms = 0.01;
-  // Starts that have at least this share of the best score are asked the photos about.
-  double rival_share = 0.75;
-  int max_rivals = 3;
+  // where sparse points and surface agree within kExactRms: then so few are those of another room.
+  double min_photo_share = 0.35;
 };
 
 enum class PhotoSupport { kNone, kFaint, kClear };
@@ -39,13 +34,6 @@ enum class PhotoSupport { kNone, kFaint, kClear };
 // Of simulated rooms, what the counted ones leave possible (95 %): none of the answers with clear
 // support was wrong, and no wrong one had faint support and stood out by min_ratio_faint.
 inline constexpr double kChanceClear = 0.055, kChanceFaint = 0.13;
-
-// A start that the photos were asked about.
-struct AskedStart {
-  int start = 0;  // index into StartSearch::starts
-  GradientAgreement gradient;
-  PhotoSupport support = PhotoSupport::kNone;
-};
 
 struct StartVerdict {
   enum class Kind {
@@ -60,7 +48,6 @@ struct StartVerdict {
   };
   Kind kind = Kind::kNone;
   int best = -1, second = -1;  // indices into StartSearch::starts; -1 = there is none
-  std::vector<AskedStart> asked;
   PhotoSupport support = PhotoSupport::kNone;  // of the best one, and of no other
   double ratio = 0;           // best score over the larger of second's and the mirror image's
   double mirrored_score = 0;  // of the best start of the mirror image
@@ -73,7 +60,8 @@ struct StartVerdict {
 // As the report has it.
 const char* NameOf(StartVerdict::Kind kind);
 
-// hinted: a user said where the photos belong, so that scan and photos are of one room.
+// search: the photos have been asked (start_photos.h). hinted: a user said where the photos belong,
+// so that scan and photos are of one room.
 StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search, bool hinted,
                          const StartVerdictOptions& options);
 

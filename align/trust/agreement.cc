@@ -152,7 +152,9 @@ PhotoAgreement MeasurePhoto(const PerspectiveViews& views, const SparseImage& im
   MeasureImages(view, *photo, setup, options, &result);
   result.shifts = MeasureGradientShifts(view, *photo, setup.projection, viewer.sample_angle(),
                                         options.gradient);
-  for (FittingCorner& corner : result.shifts.corners) corner.image_id = image.image_id;
+  for (auto* const corners : {&result.shifts.corners, &result.shifts.shifted_alike}) {
+    for (FittingCorner& corner : *corners) corner.image_id = image.image_id;
+  }
   return result;
 }
 

@@ -55,11 +55,11 @@ struct Tally {
   double High(double sigmas) const;
 };
 
-// A corner of the scan's intensity that a photo shows within the tolerance of where it should.
+// A corner of the scan's intensity, where a photo shows it.
 struct FittingCorner {
   uint32_t image_id = 0;  // set by MeasureAgreement()
-  Eigen::Vector2d x_in_img;
-  Eigen::Vector3d x_in_cam;  // of the pose that was looked from, metres
+  Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
+  Eigen::Vector3d x_in_cam = Eigen::Vector3d::Zero();  // metres, of the pose that was looked from
 };
 
 // The shifts of the patches of one or more photos.
@@ -77,7 +77,11 @@ struct GradientShifts {
   Tally far;
   Tally elsewhere;  // patches compared with another place of the photo: chance
   double tolerance_deg = 0;
-  std::vector<FittingCorner> corners;  // of clear photos
+  std::vector<FittingCorner> corners;  // of clear photos, those within the tolerance
+  // Where a clear photo shows many more patches shifted alike than by chance: these patches, where
+  // the photo shows them. A pose that is a few degrees off, by drift or by a bent model, shifts all
+  // of what one photo shows.
+  std::vector<FittingCorner> shifted_alike;
 
   void Add(const GradientShifts& other);
 };

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "align/start_photos.h"
 #include "align/trust/scan_view.h"
 #include "core/frames.h"
 #include "core/report.h"
@@ -157,6 +158,34 @@ void KeepPointsOnWalls(const SimulatedRoom& room, SparseModel* model) {
     }
     it = model->points.erase(it);
   }
+}
+
+// As the surface fit of a drifting model leaves it: too far off for the photos to confirm.
+TEST(AutomaticAlignment, PhotosDrawAStartToItsPlaceWhereSurfaceAndModelDiffer) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  const SimulatedRoom& room = *folder.one.room;
+  const std::vector<Pick> no_picks;
+  AlignmentInput input{folder.one.model, Survey(folder.one.scans), no_picks, "",
+                       folder.one.azimuth};
+  input.image_path = folder.image_path;
+  StartSearch search;
+  search.cloud = MakeSearchCloud(input.model, 1, 1000);
+  FittedStart start;
+  Similarity turn;
+  turn.rotation = Eigen::AngleAxisd(RadFromDeg(2), Eigen::Vector3d::UnitY());
+  start.scan_from_sparse = turn * room.ScanFromSparse();
+  start.rms = 0.5 * kExactRms;
+  search.starts = {start};
+  AskPhotos(input, AlignmentOptions(), StartPhotosOptions(), &search);
+  ASSERT_TRUE(search.starts[0].photos);
+  EXPECT_LT(search.starts[0].photos->shifts.at_pose.Share(), 0.1);
+  EXPECT_EQ(search.starts[0].scan_from_sparse.Matrix(), start.scan_from_sparse.Matrix());
+
+  search.starts[0].rms = 2 * kExactRms;
+  AskPhotos(input, AlignmentOptions(), StartPhotosOptions(), &search);
+  EXPECT_GT(search.starts[0].photos->shifts.at_pose.Share(), 0.35);
+  EXPECT_LT(DistanceBetween(search.cloud, room.ScanFromSparse(), search.starts[0].scan_from_sparse),
+            0.005);
 }
 
 TEST(AutomaticAlignCommand, PhotosHoldTheHeightThatWallsLeaveOpen) {

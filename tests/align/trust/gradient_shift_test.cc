@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
+#include "core/statistics.h"
 #include "tests/align/trust/exposed_room.h"
 
 namespace roomtex {
@@ -52,6 +53,49 @@ TEST(GradientShift, ForetellsWhatItMeasuresAtAPoseThatIsReallyTurned) {
                                      one.viewer->sample_angle(), GradientShiftOptions()));
   }
   EXPECT_NEAR(really.at_pose.Share(), right.shifts.turned[1].Share(), 0.04);
+}
+
+// Each photo turned another way, as those of a model that drifts: no patch is where it should be,
+// and those of one photo are off alike.
+TEST(GradientShift, ShowsWhereThePatchesOfEachTurnedPhotoReallyAre) {
+  const Exposed& one = Room(0);
+  for (int photo = 0; photo < Exposed::kNumPhotos; ++photo) {
+    SCOPED_TRACE(photo);
+    Rigid turn;
+    turn.rotation = Eigen::AngleAxisd(RadFromDeg(photo % 2 == 0 ? 1 : -1),
+                                      Eigen::Vector3d::Unit(photo / 2 % 2));
+    const ScanView view = one.viewer->Look(*one.lattice, one.room->camera(),
+                                           turn * one.room->CamFromScan(photo), Exposed::kCell);
+    const GradientShifts shifts =
+        MeasureGradientShifts(view, one.photos[photo], *one.projection, one.viewer->sample_angle(),
+                              GradientShiftOptions());
+    EXPECT_LT(shifts.at_pose.Share(), 0.1);
+    EXPECT_GT(static_cast<double>(shifts.shifted_alike.size()) / shifts.at_pose.num, 0.4);
+    std::vector<double> distances;
+    for (const FittingCorner& corner : shifts.shifted_alike) {
+      const auto x_in_img = one.projection->ImgFromCam(turn.Inverse() * corner.x_in_cam);
+      ASSERT_TRUE(x_in_img);
+      distances.push_back((*x_in_img - corner.x_in_img).norm());
+    }
+    EXPECT_LT(Median(&distances), 1.5);
+  }
+}
+
+TEST(GradientShift, ShowsNothingShiftedAlikeInAnotherRoom) {
+  const Exposed& one = Room(0);
+  size_t num_alike = 0;
+  long num_patches = 0;
+  for (int photo = 0; photo < Exposed::kNumPhotos; ++photo) {
+    const ScanView view = Room(1).viewer->Look(*one.lattice, one.room->camera(),
+                                               one.room->CamFromScan(photo), Exposed::kCell);
+    const GradientShifts shifts =
+        MeasureGradientShifts(view, one.photos[photo], *one.projection, one.viewer->sample_angle(),
+                              GradientShiftOptions());
+    num_alike += shifts.shifted_alike.size();
+    num_patches += shifts.at_pose.num;
+  }
+  ASSERT_GT(num_patches, 100);
+  EXPECT_LT(static_cast<double>(num_alike), 0.1 * static_cast<double>(num_patches));
 }
 
 TEST(GradientShift, TheShiftIsTheTurnOfTheCamera) {

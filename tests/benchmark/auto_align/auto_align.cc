@@ -365,11 +365,10 @@ void AddEvidence(const Room& room, const SurveyedScans& surveyed, const Automati
   const StartVerdict& v = found.verdict;
   const auto& starts = found.search.starts;
   const FittedStart best = v.best < 0 ? FittedStart() : starts[v.best];
-  GradientAgreement photos, second;
-  for (const AskedStart& asked : v.asked) {
-    if (asked.start == v.best) photos = asked.gradient;
-    if (asked.start == v.second) second = asked.gradient;
-  }
+  const auto photos_at = [&](int start) {
+    return start < 0 ? GradientAgreement() : starts[start].photos.value_or(GradientAgreement());
+  };
+  const GradientAgreement photos = photos_at(v.best), second = photos_at(v.second);
   const GradientShifts& shifts = photos.shifts;
   const SightAgreement true_sights =
       CheckSights(found.search.cloud, room.truth, surveyed.free_space(), kSightTolerance);
