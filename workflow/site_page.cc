@@ -1,7 +1,6 @@
 #include "workflow/site_page.h"
 
 #include <algorithm>
-#include <cctype>
 #include <vector>
 
 #include "core/command_line.h"
@@ -13,21 +12,6 @@ namespace roomtex {
 namespace {
 
 constexpr size_t kPlacesPerRoom = 3;
-
-// A path as it may stand in a link.
-std::string UrlPath(const std::string& path) {
-  static const char* const kDigits = "0123456789ABCDEF";
-  std::string url;
-  for (const char c : path) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
-      url += c;
-    } else {
-      url += std::string("%") + kDigits[byte >> 4] + kDigits[byte & 15];
-    }
-  }
-  return url;
-}
 
 class SitePage {
  public:
