@@ -121,31 +121,97 @@ bool AnyGiven(const ScanRecord& scan) {
                      [](const ScanRecord::Pose& pose) { return pose.given; });
 }
 
-// Of one file to which both rooms were aligned. Its stations tell where one frame lies in the
-// other; other parts of a file whose own poses hold lie in the frame of the file.
-std::vector<SharedView> ViewsOfFile(const RoomRecord& first, const ScanRecord& a,
-                                    const RoomRecord& second, const ScanRecord& b) {
+// Of one file to which both rooms were aligned: its stations tell where one frame lies in the
+// other.
+std::vector<SharedView> ViewsOfStations(const RoomRecord& first, const ScanRecord& a,
+                                        const RoomRecord& second, const ScanRecord& b) {
   std::vector<SharedView> views;
-  const std::string name = a.path + (a.part.empty() ? "" : "#" + a.part);
-  if (a.part == b.part && a.poses.size() == b.poses.size()) {
-    for (size_t k = 0; k < a.poses.size(); ++k) {
-      const Rigid& in_first = a.poses[k].scan_from_station;
-      views.push_back(ScanView(name + (a.poses.size() > 1 ? ", scan " + std::to_string(k + 1) : ""),
-                               first, second, in_first * b.poses[k].scan_from_station.Inverse(),
-                               in_first.translation));
-    }
-  } else if (!AnyGiven(a) && !AnyGiven(b) && !a.poses.empty()) {
-    views.push_back(ScanView(a.path + ", the frame of the file", first, second, Rigid(),
-                             a.poses[0].scan_from_station.translation));
+  for (size_t k = 0; k < a.poses.size(); ++k) {
+    const Rigid& in_first = a.poses[k].scan_from_station;
+    std::string name = a.path + (a.part.empty() ? "" : "#" + a.part);
+    if (a.poses.size() > 1) name += ", scan " + std::to_string(k + 1);
+    views.push_back(ScanView(name, first, second, in_first * b.poses[k].scan_from_station.Inverse(),
+                             in_first.translation));
   }
   return views;
+}
+
+// Parts of a file whose own poses hold lie in the frame of the file.
+SharedView ViewOfFile(const RoomRecord& first, const ScanRecord& a, const RoomRecord& second) {
+  return ScanView(a.path + ", the frame of the file", first, second, Rigid(),
+                  a.poses[0].scan_from_station.translation);
 }
 
 std::string ReadingOf(const ScanRecord& scan) {
   return scan.azimuth + " " + std::to_string(scan.meters_per_unit);
 }
 
+struct ScanOfRoom {
+  int room = 0;
+  const ScanRecord* scan = nullptr;
+};
+
+using LinkMap = std::map<std::pair<int, int>, RoomLink>;
+
+// Frames are exact: each scan is compared with the first one that it can be, not with all of a file
+// that hundreds of rooms share.
+void AddScans(const std::vector<RoomRecord>& rooms, LinkMap* links,
+              std::vector<std::string>* problems) {
+  std::map<std::string, std::vector<ScanOfRoom>> by_hash;
+  for (int room = 0; room < static_cast<int>(rooms.size()); ++room) {
+    for (const ScanRecord& scan : rooms[room].alignment.scans) {
+      if (!scan.poses.empty()) by_hash[scan.content_hash].push_back({room, &scan});
+    }
+  }
+  const auto is_same = [](const ScanRecord& a, const ScanRecord& b) {
+    return a.part == b.part && a.poses.size() == b.poses.size();
+  };
+  const auto are_in_frame = [](const ScanRecord& a, const ScanRecord& b) {
+    return !AnyGiven(a) && !AnyGiven(b);
+  };
+  for (const auto& [hash, scans] : by_hash) {
+    for (auto at = scans.begin(); at != scans.end(); ++at) {
+      const ScanRecord& b = *at->scan;
+      const auto first_of = [&](const auto& fits) {
+        return std::find_if(scans.begin(), at, [&](const ScanOfRoom& other) {
+          return other.room != at->room && fits(*other.scan, b);
+        });
+      };
+      auto other = first_of(is_same);
+      const bool is_station = other != at;
+      if (!is_station) other = first_of(are_in_frame);
+      if (other == at) continue;
+      const ScanRecord& a = *other->scan;
+      const RoomRecord &first = rooms[other->room], &second = rooms[at->room];
+      if (ReadingOf(a) != ReadingOf(b)) {
+        problems->push_back(a.path + " was read in another way for " + first.name + " than for " +
+                            second.name +
+                            " (azimuth, units): one of them is wrong. Align it anew.");
+        continue;
+      }
+      std::vector<SharedView>& views = (*links)[{other->room, at->room}].views;
+      for (const SharedView& view : is_station
+                                        ? ViewsOfStations(first, a, second, b)
+                                        : std::vector<SharedView>{ViewOfFile(first, a, second)}) {
+        const bool is_there = std::any_of(views.begin(), views.end(), [&](const SharedView& known) {
+          return known.kind == view.kind && known.name == view.name;
+        });
+        if (!is_there) views.push_back(view);  // of many parts
+      }
+    }
+  }
+}
+
 // ---- the relation
+
+// Of a view from the relation that another one gives, with the errors of both.
+Misfit MisfitBetween(const SharedView& view, const SharedView& by) {
+  SharedView both = view;
+  both.rotation_sigma = std::hypot(view.rotation_sigma, by.rotation_sigma);
+  const double arm = (view.x_in_first - by.x_in_first).norm();
+  both.position_sigma = std::hypot(view.position_sigma, by.position_sigma, by.rotation_sigma * arm);
+  return MisfitOf(both, by.first_from_second);
+}
 
 // The view with which most others agree; of equals the one that they fit best.
 const SharedView& Elected(const std::vector<SharedView>& views) {
@@ -154,12 +220,7 @@ const SharedView& Elected(const std::vector<SharedView>& views) {
   for (size_t i = 0; i < views.size(); ++i) {
     std::pair<int, double> votes(0, 0);
     for (const SharedView& other : views) {
-      SharedView both = other;
-      both.rotation_sigma = std::hypot(other.rotation_sigma, views[i].rotation_sigma);
-      const double arm = (other.x_in_first - views[i].x_in_first).norm();
-      both.position_sigma =
-          std::hypot(other.position_sigma, views[i].position_sigma, views[i].rotation_sigma * arm);
-      const Misfit misfit = MisfitOf(both, views[i].first_from_second);
+      const Misfit misfit = MisfitBetween(other, views[i]);
       if (misfit.Contradicts()) continue;
       ++votes.first;
       votes.second -= std::pow(misfit.offset / misfit.offset_sigma, 2) +
@@ -235,16 +296,9 @@ RelationVariance VarianceAt(const RoomLink& link, const Eigen::Vector3d& x_in_fi
 }
 
 void FitRoomLink(RoomLink* link) {
-  link->first_from_second = Elected(link->views).first_from_second;
-  const SharedView* const elected = &Elected(link->views);
-  for (SharedView& view : link->views) {
-    SharedView both = view;
-    both.rotation_sigma = std::hypot(view.rotation_sigma, elected->rotation_sigma);
-    both.position_sigma =
-        std::hypot(view.position_sigma, elected->position_sigma,
-                   elected->rotation_sigma * (view.x_in_first - elected->x_in_first).norm());
-    view.agrees = !MisfitOf(both, link->first_from_second).Contradicts();
-  }
+  const SharedView elected = Elected(link->views);
+  link->first_from_second = elected.first_from_second;
+  for (SharedView& view : link->views) view.agrees = !MisfitBetween(view, elected).Contradicts();
   const Matrix6d normal = Adjust(link);
   const int count = link->NumAgreeing();
   link->covariance = count * normal.inverse();
@@ -256,7 +310,7 @@ void FitRoomLink(RoomLink* link) {
 
 std::vector<RoomLink> FindRoomLinks(const std::vector<RoomRecord>& rooms,
                                     std::vector<std::string>* problems) {
-  std::map<std::pair<int, int>, RoomLink> links;
+  LinkMap links;
   for (const std::vector<PhotoOfRoom>& same : FindSharedPhotos(rooms)) {
     for (size_t i = 0; i < same.size(); ++i) {
       for (size_t j = i + 1; j < same.size(); ++j) {
@@ -266,38 +320,9 @@ std::vector<RoomLink> FindRoomLinks(const std::vector<RoomRecord>& rooms,
       }
     }
   }
-  std::map<std::string, std::vector<std::pair<int, const ScanRecord*>>> by_hash;
-  for (int room = 0; room < static_cast<int>(rooms.size()); ++room) {
-    for (const ScanRecord& scan : rooms[room].alignment.scans) {
-      by_hash[scan.content_hash].emplace_back(room, &scan);
-    }
-  }
-  for (const auto& [hash, scans] : by_hash) {
-    for (size_t i = 0; i < scans.size(); ++i) {
-      for (size_t j = i + 1; j < scans.size(); ++j) {
-        const auto& [first, a] = scans[i];
-        const auto& [second, b] = scans[j];
-        if (first == second) continue;
-        if (ReadingOf(*a) != ReadingOf(*b)) {
-          problems->push_back(a->path + " was read in another way for " + rooms[first].name +
-                              " than for " + rooms[second].name +
-                              " (azimuth, units): one of them is wrong. Align it anew.");
-          continue;
-        }
-        std::vector<SharedView>& views = links[{first, second}].views;
-        for (const SharedView& view : ViewsOfFile(rooms[first], *a, rooms[second], *b)) {
-          const bool is_there =
-              std::any_of(views.begin(), views.end(), [&](const SharedView& known) {
-                return known.kind == view.kind && known.name == view.name;
-              });
-          if (!is_there) views.push_back(view);  // a file of many parts has one frame
-        }
-      }
-    }
-  }
+  AddScans(rooms, &links, problems);
   std::vector<RoomLink> result;
   for (auto& [pair, link] : links) {
-    if (link.views.empty()) continue;
     link.first = pair.first;
     link.second = pair.second;
     std::sort(link.views.begin(), link.views.end(), [](const SharedView& a, const SharedView& b) {

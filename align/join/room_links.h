@@ -56,8 +56,9 @@ struct RelationVariance {
 };
 RelationVariance VarianceAt(const RoomLink& link, const Eigen::Vector3d& x_in_first);
 
-// Of all pairs of rooms that share something, by their indices. Scans that both read in different
-// ways are no link; a sentence for each in *problems.
+// Of all pairs of rooms that share photos, by their indices; of those that share a scan or the
+// frame of a file, each with the first such room. Scans that both read in different ways are no
+// link; a sentence for each in *problems.
 std::vector<RoomLink> FindRoomLinks(const std::vector<RoomRecord>& rooms,
                                     std::vector<std::string>* problems);
 
