@@ -13,8 +13,10 @@
 namespace roomtex {
 namespace {
 
-constexpr double kWidth = 1000, kMarginShare = 0.04;  // of the drawing
-constexpr double kLongestScale = 0.2;                 // of its width
+// Of the drawing, at most: as wide and as high as the page shows it.
+constexpr double kWidth = 1000, kHeight = 620;
+constexpr double kMarginShare = 0.04;  // of the rooms' longer side
+constexpr double kLongestScale = 0.2;  // of the width
 
 Eigen::Vector3d VectorOf(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
@@ -60,9 +62,10 @@ class SiteDrawing {
     low_.array() -= margin;
     high_.array() += margin;
     low_.y() -= margin;  // for the scale
-    units_ = kWidth / (high_.x() - low_.x());
-    std::string svg = "<svg class=\"plan site\" role=\"img\" viewBox=\"0 0 " + Number(kWidth, 0) +
-                      " " + Number(units_ * (high_.y() - low_.y()), 0) +
+    const Eigen::Vector2d size = high_ - low_;
+    units_ = std::min(kWidth / size.x(), kHeight / size.y());
+    std::string svg = "<svg class=\"plan site\" role=\"img\" viewBox=\"0 0 " +
+                      Number(units_ * size.x(), 0) + " " + Number(units_ * size.y(), 0) +
                       "\" aria-label=\"Plan of the rooms that are linked\">";
     for (const PlacedPlan& plan : plans_) svg += Room(plan);
     for (const PlacedPlan& plan : plans_) svg += Name(plan);
@@ -160,7 +163,7 @@ class SiteDrawing {
   std::string Scale() const {
     double metres = 1;
     for (const double next : {2., 5., 10., 20., 50., 100., 200., 500.}) {
-      if (next * units_ < kLongestScale * kWidth) metres = next;
+      if (next < kLongestScale * (high_.x() - low_.x())) metres = next;
     }
     const Eigen::Vector2d left = OnPage(low_) + Eigen::Vector2d(20, -16);
     const Eigen::Vector2d right = left + Eigen::Vector2d(metres * units_, 0);
