@@ -1,6 +1,7 @@
 #include "core/text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -70,6 +71,20 @@ std::string Quoted(const std::string& text) {
     i += std::max<size_t>(count, 1);
   }
   return "\"" + shown + (i < text.size() ? "..." : "") + "\"";
+}
+
+std::string UrlPath(const std::string& path) {
+  static const char* const kDigits = "0123456789ABCDEF";
+  std::string url;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
+      url += c;
+    } else {
+      url += std::string("%") + kDigits[byte >> 4] + kDigits[byte & 15];
+    }
+  }
+  return url;
 }
 
 std::string Base64(const void* bytes, size_t count) {

@@ -28,6 +28,9 @@ std::string Trimmed(const std::string& text);
 // control characters and for bytes that are not UTF-8.
 std::string Quoted(const std::string& text);
 
+// A path as it may stand in a link: "my%20room/report.html" (RFC 3986).
+std::string UrlPath(const std::string& path);
+
 // RFC 4648, with padding.
 std::string Base64(const void* bytes, size_t count);
 

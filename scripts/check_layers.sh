@@ -18,6 +18,7 @@ declare -A allowed=(
   [align/fit]="$below align/clicks align/surface"
   [align/clicks]="$below"
   [align/surface]="$below"
+  [align/join]="$below"
   [align/pick]="$below align align/trust align/search align/fit align/clicks align/surface"
 
   [texture]="$below texture/output texture/texels texture/tone texture/registration texture/sampling"

@@ -10,7 +10,7 @@ root=$PWD
 export PATH="$root/build/bin:$PATH" USER="${USER:-$(id -un)}"
 
 [ "$(id -u)" -eq 0 ] || { echo "test_slurm: needs root, as slurmd does." >&2; exit 1; }
-for program in snakemake slurmctld slurmd munged sbatch roomtex-simulate roomtex-auto roomtex-site; do
+for program in snakemake slurmctld slurmd munged sbatch roomtex-simulate roomtex-auto roomtex-join roomtex-site; do
   PATH="$PATH:/usr/sbin" command -v $program >/dev/null ||
     { echo "test_slurm: $program is missing; apt-get install snakemake slurm-wlm munge, and build roomtex." >&2; exit 1; }
 done

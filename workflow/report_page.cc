@@ -139,6 +139,7 @@ class Page {
     for (const ViewingPlace& place : coverage.places) {
       keys_["places_to_photograph"].push_back(PlaceToJson(place));
     }
+    WritePlan(points, frame);
     Heading("What the photos saw");
     CoverageText(coverage);
     body_ +=
@@ -155,6 +156,22 @@ class Page {
         " levels or more</span><span><i style=\"background:#999\"></i>fewer than two photos</span>"
         "</div><figcaption>How far the photos disagree in colour. Red: something moved, shines, or "
         "lies a little out of place.</figcaption></figure></div>\n";
+  }
+
+  // For the page over all rooms of a site.
+  void WritePlan(const std::vector<EvidencePoint>& points, const PlanFrame& frame) {
+    const char name[] = "log/plan.png";
+    OutputFile file(chain_.At(name));
+    file.stream() << PlanPicture(points, frame, PlanShows::kCoverage);
+    file.Commit();
+    Json rows = Json::array();
+    for (int row = 0; row < 3; ++row) {
+      rows.push_back(ToJson(frame.plan_from_scan.row(row).transpose()));
+    }
+    keys_["plan"] = {{"picture", name},
+                     {"plan_from_scan", rows},
+                     {"low", ToJson(frame.low)},
+                     {"size", ToJson(frame.Size())}};
   }
 
   void CoverageText(const RoomCoverage& coverage) {

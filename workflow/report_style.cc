@@ -56,6 +56,11 @@ svg .camera text { paint-order: stroke; stroke: var(--ground); stroke-width: 4px
 svg .place path { stroke: var(--text); stroke-width: 4; fill: none; }
 svg .tip { fill: var(--text); }
 svg .place circle { fill: var(--ground); stroke: var(--text); stroke-width: 3; }
+svg.site .room { fill: none; stroke: var(--text); stroke-opacity: .6; stroke-width: 1.5; }
+svg.site .room.doubted { stroke: var(--bad); stroke-opacity: 1; stroke-width: 3; stroke-dasharray: 9 6; }
+svg.site .name text { paint-order: stroke; stroke: var(--ground); stroke-width: 5px; font-size: 18px; }
+svg.site .door { fill: var(--ground); stroke: var(--text); stroke-width: 3; }
+svg.site .door.doubted { stroke: var(--bad); }
 svg .scale path { stroke: var(--text); stroke-width: 3; }
 .key { display: flex; flex-wrap: wrap; gap: 4px 18px; margin: 8px 0; font-size: .875rem; color: var(--quiet); }
 .key i { display: inline-block; width: 14px; height: 14px; border-radius: 3px; margin-right: 6px; vertical-align: -2px; }

@@ -49,42 +49,6 @@ cv::Vec4b ColorOf(const Column& column, PlanShows shows) {
   return {color[0], color[1], color[2], static_cast<uint8_t>(stands ? 255 : 90)};
 }
 
-std::string PictureOf(const std::vector<EvidencePoint>& points, const PlanFrame& frame,
-                      PlanShows shows) {
-  const int columns = std::max(1, static_cast<int>(frame.Size().x() / kPixel));
-  const int rows = std::max(1, static_cast<int>(frame.Size().y() / kPixel));
-  std::vector<Column> grid(static_cast<size_t>(columns) * static_cast<size_t>(rows));
-  for (const EvidencePoint& point : points) {
-    const Eigen::Vector3d x = frame.InPlan(point.x_in_scan.cast<double>());
-    const int column = static_cast<int>(x.x() / kPixel);
-    const int row = rows - 1 - static_cast<int>(x.y() / kPixel);
-    const bool is_shown =
-        x.minCoeff() >= 0 && x.z() < frame.Size().z() - kCeiling && column < columns && row >= 0;
-    if (!is_shown) continue;
-    Column& there =
-        grid[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
-    ++there.num_points;
-    there.num_unseen += point.views == 0;
-    there.num_thin += point.views == 1;
-    there.low = std::min(there.low, static_cast<float>(x.z()));
-    there.high = std::max(there.high, static_cast<float>(x.z()));
-    if (std::isnan(point.disagreement)) continue;
-    ++there.num_compared;
-    there.disagreement += point.disagreement;
-  }
-  cv::Mat4b picture(rows, columns, cv::Vec4b(0, 0, 0, 0));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Column& there = grid[static_cast<size_t>(row) * static_cast<size_t>(columns) +
-                                 static_cast<size_t>(column)];
-      if (there.num_points > 0) picture(row, column) = ColorOf(there, shows);
-    }
-  }
-  std::vector<uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
-  return "data:image/png;base64," + Base64(bytes.data(), bytes.size());
-}
-
 class Drawing {
  public:
   explicit Drawing(const PlanFrame& frame) : size_(frame.Size()) {}
@@ -141,6 +105,42 @@ class Drawing {
 
 }  // namespace
 
+std::string PlanPicture(const std::vector<EvidencePoint>& points, const PlanFrame& frame,
+                        PlanShows shows) {
+  const int columns = std::max(1, static_cast<int>(frame.Size().x() / kPixel));
+  const int rows = std::max(1, static_cast<int>(frame.Size().y() / kPixel));
+  std::vector<Column> grid(static_cast<size_t>(columns) * static_cast<size_t>(rows));
+  for (const EvidencePoint& point : points) {
+    const Eigen::Vector3d x = frame.InPlan(point.x_in_scan.cast<double>());
+    const int column = static_cast<int>(x.x() / kPixel);
+    const int row = rows - 1 - static_cast<int>(x.y() / kPixel);
+    const bool is_shown =
+        x.minCoeff() >= 0 && x.z() < frame.Size().z() - kCeiling && column < columns && row >= 0;
+    if (!is_shown) continue;
+    Column& there =
+        grid[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
+    ++there.num_points;
+    there.num_unseen += point.views == 0;
+    there.num_thin += point.views == 1;
+    there.low = std::min(there.low, static_cast<float>(x.z()));
+    there.high = std::max(there.high, static_cast<float>(x.z()));
+    if (std::isnan(point.disagreement)) continue;
+    ++there.num_compared;
+    there.disagreement += point.disagreement;
+  }
+  cv::Mat4b picture(rows, columns, cv::Vec4b(0, 0, 0, 0));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const Column& there = grid[static_cast<size_t>(row) * static_cast<size_t>(columns) +
+                                 static_cast<size_t>(column)];
+      if (there.num_points > 0) picture(row, column) = ColorOf(there, shows);
+    }
+  }
+  std::vector<uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
 std::string DrawPlan(const std::vector<EvidencePoint>& points, const PlanFrame& frame,
                      const std::vector<PlanCamera>& cameras,
                      const std::vector<ViewingPlace>& places, PlanShows shows) {
@@ -151,10 +151,12 @@ std::string DrawPlan(const std::vector<EvidencePoint>& points, const PlanFrame& 
   svg +=
       "<defs><marker id=\"tip\" markerWidth=\"5\" markerHeight=\"5\" refX=\"2\" refY=\"2.5\" "
       "orient=\"auto\"><path class=\"tip\" d=\"M0,0 L5,2.5 L0,5 Z\"/></marker></defs>";
+  const std::string picture = PlanPicture(points, frame, shows);
   svg += "<image x=\"" + Number(margin, 0) + "\" y=\"" + Number(margin, 0) + "\" width=\"" +
          Number(kUnitsPerMetre * frame.Size().x(), 1) + "\" height=\"" +
-         Number(kUnitsPerMetre * frame.Size().y(), 1) + "\" preserveAspectRatio=\"none\" href=\"" +
-         PictureOf(points, frame, shows) + "\"/>";
+         Number(kUnitsPerMetre * frame.Size().y(), 1) +
+         "\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," +
+         Base64(picture.data(), picture.size()) + "\"/>";
   for (size_t i = 0; i < cameras.size(); ++i) {
     svg += drawing.Wedge(cameras[i], static_cast<int>(i) + 1);
   }

@@ -40,6 +40,10 @@ void ReportSite(const SiteOptions& options, const Command::Context& context) {
              room["headline"].get<std::string>() + ")";
   }
   if (!names.empty()) context.report.SetUntrusted("look after " + names);
+  const Json& joined = keys["joined"];
+  if (!joined.is_null() && !joined["trusted"].get<bool>()) {
+    context.report.SetUntrusted(joined["reason"].get<std::string>());
+  }
   std::printf("%s\n%s\n", keys["verdict"]["headline"].get<std::string>().c_str(),
               options.output_path.c_str());
 }

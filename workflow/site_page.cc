@@ -1,33 +1,18 @@
 #include "workflow/site_page.h"
 
 #include <algorithm>
-#include <cctype>
 #include <vector>
 
 #include "core/command_line.h"
 #include "core/text.h"
 #include "workflow/html_text.h"
 #include "workflow/room_coverage.h"
+#include "workflow/site_plan.h"
 
 namespace roomtex {
 namespace {
 
 constexpr size_t kPlacesPerRoom = 3;
-
-// A path as it may stand in a link.
-std::string UrlPath(const std::string& path) {
-  static const char* const kDigits = "0123456789ABCDEF";
-  std::string url;
-  for (const char c : path) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
-      url += c;
-    } else {
-      url += std::string("%") + kDigits[byte >> 4] + kDigits[byte & 15];
-    }
-  }
-  return url;
-}
 
 class SitePage {
  public:
@@ -37,6 +22,7 @@ class SitePage {
     Head();
     Remedies();
     Rooms();
+    Joined();
     Places();
     Steps();
     return HtmlPage(keys_["verdict"]["headline"], body_);
@@ -62,11 +48,10 @@ class SitePage {
     const Json& verdict = keys_["verdict"];
     const std::string state = verdict["state"];
     const Json& counts = keys_["counts"];
-    const std::string word =
-        state == "trusted"
-            ? VerdictWord(state)
-            : std::to_string(counts["rooms"].get<int>() - counts["trusted"].get<int>()) +
-                  " to look after";
+    const int num_others = counts["rooms"].get<int>() - counts["trusted"].get<int>();
+    const std::string word = state == "trusted" ? VerdictWord(state)
+                             : num_others > 0   ? std::to_string(num_others) + " to look after"
+                                                : "Doorways to look after";
     body_ += "<header class=\"" + state + "\">" + HtmlTag("p class=\"state\"", word) +
              HtmlTag("h1", verdict["headline"]);
     std::string sentences;
@@ -155,6 +140,123 @@ class SitePage {
                HtmlTag("td class=\"notes\"", room["notes"]) + "</tr>";
     }
     body_ += "</tbody></table></div>\n";
+  }
+
+  // How the rooms stand to each other, if roomtex-join ran; nothing of a report that it did not
+  // write.
+  void Joined() {
+    if (keys_["joined"].is_null()) return;
+    const std::string before = body_;
+    try {
+      Plans();
+      Links();
+      Loops();
+    } catch (const Json::exception&) {
+      body_ = before;
+    }
+  }
+
+  void Plans() {
+    const Json& joined = keys_["joined"];
+    std::vector<std::string> frames = {joined["reference"]};
+    std::string alone;
+    for (const Json& room : joined["rooms"]) {
+      const std::string frame = room.at("frame"), name = room.at("name");
+      const auto others =
+          std::count_if(joined["rooms"].begin(), joined["rooms"].end(),
+                        [&](const Json& other) { return other.at("frame") == frame; });
+      if (others == 1 && joined["rooms"].size() > 1) {
+        alone += (alone.empty() ? "" : ", ") + name;
+      } else if (std::find(frames.begin(), frames.end(), frame) == frames.end()) {
+        frames.push_back(frame);
+      }
+    }
+    Heading("How the rooms stand to each other");
+    for (const std::string& frame : frames) {
+      const std::string plan = DrawSitePlan(keys_, frame, to_rooms_);
+      if (plan.empty()) continue;
+      body_ += "<figure>" + plan + "<figcaption>In the scan frame of " + HtmlText(frame) +
+               ". Circles: doorways with photos or scans that both rooms share; red: not to be "
+               "trusted. Colours as in the reports of the rooms: blue two photos or more, orange "
+               "one, red none.</figcaption></figure>\n";
+    }
+    if (!alone.empty()) {
+      body_ += HtmlTag("p",
+                       "Nothing links these rooms to others, and each stands in its own "
+                       "frame: " +
+                           alone +
+                           ". Let two or three photos of each doorway be in the folders of both "
+                           "rooms.") +
+               "\n";
+    }
+    if (joined["scene"].is_string()) {
+      const std::string scene = joined["scene"];
+      body_ += "<p>All rooms in one scene: <a href=\"" +
+               HtmlText(UrlPath(to_rooms_ + "joined/" + scene)) + "\">" + HtmlText(scene) +
+               "</a> (it refers to the rooms' own files).</p>\n";
+    }
+  }
+
+  // Scans of one file link all rooms of it to each other: those that are as they should be are only
+  // counted.
+  void Links() {
+    int num_silent = 0;
+    std::string rows;
+    for (const Json& link : keys_["joined"]["links"]) {
+      const bool trusted = link.at("trusted");
+      if (trusted && link.at("num_photos") == 0) {
+        ++num_silent;
+        continue;
+      }
+      rows += "<tr>" +
+              HtmlTag("td", link.at("first").get<std::string>() + " – " +
+                                link.at("second").get<std::string>()) +
+              HtmlTag(trusted ? "td class=\"state trusted\"" : "td class=\"state untrusted\"",
+                      VerdictWord(trusted ? "trusted" : "untrusted")) +
+              HtmlTag("td class=\"n\"", Number(link.at("num_photos").get<double>(), 0)) +
+              HtmlTag("td class=\"n\"", Number(link.at("num_scans").get<double>(), 0)) +
+              HtmlTag("td class=\"n\"", Number(link.at("num_agreeing").get<double>(), 0));
+      const Json& residual = link.at("residual");
+      for (const char* key : {"offset_mm", "offset_sigma_mm"}) {
+        rows += HtmlCell(residual, key, 1, 1);
+      }
+      for (const char* key : {"turn_deg", "turn_sigma_deg"}) rows += HtmlCell(residual, key, 1, 2);
+      rows += HtmlTag("td class=\"notes\"", link.at("reason")) + "</tr>";
+    }
+    if (!rows.empty()) {
+      body_ +=
+          "<p class=\"quiet\">Misfit: of a doorway, against the places of its two rooms by all "
+          "others together; a dash where only it holds them. Expected: one standard deviation."
+          "</p><div class=\"table\"><table><thead><tr><th>Doorway</th><th>Verdict</th>"
+          "<th class=\"n\">Photos</th><th class=\"n\">Scans</th><th class=\"n\">Agree</th>"
+          "<th class=\"n\">Misfit, mm</th><th class=\"n\">expected</th>"
+          "<th class=\"n\">Misfit, °</th><th class=\"n\">expected</th><th>Why</th>"
+          "</tr></thead><tbody>" +
+          rows + "</tbody></table></div>\n";
+    }
+    if (num_silent > 0) {
+      body_ += HtmlTag("p class=\"quiet\"", std::to_string(num_silent) +
+                                                " pairs of rooms share scans and nothing else; "
+                                                "all of them fit.") +
+               "\n";
+    }
+  }
+
+  void Loops() {
+    const Json& loops = keys_["joined"]["loops"];
+    if (loops.empty()) return;
+    double worst = 0;
+    int num_open = 0;
+    for (const Json& loop : loops) {
+      worst = std::max(worst, loop.at("offset_mm").get<double>());
+      num_open += !loop.at("closes").get<bool>();
+    }
+    body_ +=
+        HtmlTag("p", std::to_string(loops.size()) + (loops.size() == 1 ? " way" : " ways") +
+                         " around over several doorways: " +
+                         (num_open == 0 ? "closed" : std::to_string(num_open) + " not closed") +
+                         ", at worst to " + Number(worst, 1) + " mm.") +
+        "\n";
   }
 
   // The rooms of which most is missing first.

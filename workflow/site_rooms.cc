@@ -33,6 +33,7 @@ class RoomMaker {
     json_["has_report"] = IsThere(folder_ + "/report.html");
     Photos();
     Coverage();
+    Plan();
     Errors();
     Cost();
     return json_;
@@ -117,6 +118,15 @@ class RoomMaker {
     }
   }
 
+  void Plan() {
+    if (!report_.is_object() || !report_.contains("plan")) return;
+    const Json& plan = report_["plan"];
+    const Json picture = plan.is_object() ? plan.value("picture", Json()) : Json();
+    if (picture.is_string() && IsThere(folder_ + "/" + picture.get<std::string>())) {
+      json_["plan"] = plan;
+    }
+  }
+
   void Errors() {
     const StepRecord* const align = state_.Find("align");
     if (align == nullptr || align->state != StepState::kDone) return;
@@ -180,7 +190,26 @@ Json SiteSteps(const Json& rooms) {
   return steps;
 }
 
-Json SiteVerdict(const Json& counts) {
+// Null if it did not run.
+Json JoinedKeys(const std::string& folder) {
+  const Json report = ReadJsonFile(folder + "/joined/joined.json");
+  Json joined;
+  try {
+    joined["trusted"] = report.at("trusted").get<bool>();
+    joined["reason"] = report.at("reason").get<std::string>();
+    joined["reference"] = report.at("reference").get<std::string>();
+    for (const char* list : {"rooms", "links", "loops"}) {
+      if (!report.at(list).is_array()) return nullptr;
+      joined[list] = report[list];
+    }
+    joined["scene"] = report.at("scene");
+  } catch (const Json::exception&) {
+    return nullptr;
+  }
+  return joined;
+}
+
+Json SiteVerdict(const Json& counts, const Json& joined) {
   const auto count = [&](const char* state) { return counts[state].get<int>(); };
   const int num_rooms = count("rooms");
   Json verdict;
@@ -188,6 +217,8 @@ Json SiteVerdict(const Json& counts) {
                      : count("untrusted") > 0  ? "untrusted"
                      : count("unfinished") > 0 ? "unfinished"
                                                : "trusted";
+  const bool is_joined_ill = !joined.is_null() && !joined["trusted"].get<bool>();
+  if (is_joined_ill && verdict["state"] == "trusted") verdict["state"] = "untrusted";
   const std::string number =
       count("trusted") == num_rooms
           ? (num_rooms == 1 ? "The room is" : "All " + std::to_string(num_rooms) + " rooms are")
@@ -201,6 +232,10 @@ Json SiteVerdict(const Json& counts) {
     if (count(state) > 0) {
       verdict["sentences"].push_back(std::to_string(count(state)) + " " + words + ".");
     }
+  }
+  if (is_joined_ill) {
+    verdict["sentences"].push_back("How the rooms stand to each other is not to be trusted: " +
+                                   joined["reason"].get<std::string>());
   }
   return verdict;
 }
@@ -282,9 +317,11 @@ Json MakeSiteKeys(const std::string& folder, const std::vector<SiteRoom>& rooms)
     memory = std::max(memory, one["peak_memory_bytes"].get<long long>());
     list.push_back(one);
   }
-  keys["verdict"] = SiteVerdict(counts);
+  const Json joined = JoinedKeys(folder);
+  keys["verdict"] = SiteVerdict(counts, joined);
   keys["counts"] = counts;
   keys["rooms"] = list;
+  keys["joined"] = joined;
   keys["steps"] = SiteSteps(list);
   keys["total"] = {
       {"seconds", seconds}, {"cpu_seconds", cpu_seconds}, {"peak_memory_bytes", memory}};

@@ -22,8 +22,9 @@ std::vector<SiteRoom> FindSiteRooms(const std::string& folder);
 // cpu_seconds, peak_memory_bytes}. Of a room: name, notes, state, headline, sentences[],
 // remedies[], folder (below `folder`), has_report, num_photos, num_registered, coverage,
 // surface_m2, unseen_m2, expected_error_mm, far_corner_mm, seconds, cpu_seconds,
-// peak_memory_bytes, places_to_photograph[]; what is not known is not there. An unreadable file
-// counts as none.
+// peak_memory_bytes, places_to_photograph[], plan (of report.json); what is not known is not there.
+// joined: what roomtex-join reported in joined/joined.json {trusted, reason, reference, rooms[],
+// links[], loops[], scene}; null = it did not run. An unreadable file counts as none.
 Json MakeSiteKeys(const std::string& folder, const std::vector<SiteRoom>& rooms);
 
 }  // namespace roomtex

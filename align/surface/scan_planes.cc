@@ -161,18 +161,26 @@ class PlaneFitter {
   void Sum(const Visit& visit) {
     for (const LabelledScan& one : scans_) {
       const int num_samples = one.surface->NumSamples();
+      // Of the planes of this scan alone: of many rooms a scan shows few.
+      std::vector<int> place(planes_.size(), -1), present;
+      for (const int label : one.labels) {
+        if (label < 0 || place[label] >= 0) continue;
+        place[label] = static_cast<int>(present.size());
+        present.push_back(label);
+      }
       std::vector<std::vector<PlaneInWork>> sums(kNumChunks);
       ParallelFor(num_threads_, 0, kNumChunks, [&](int chunk) {
-        sums[chunk].resize(planes_.size());
+        sums[chunk].resize(present.size());
         const auto begin = static_cast<int64_t>(num_samples) * chunk / kNumChunks;
         const auto end = static_cast<int64_t>(num_samples) * (chunk + 1) / kNumChunks;
         for (int i = static_cast<int>(begin); i < end; ++i) {
           const int label = one.labels[i];
-          if (label >= 0) visit(one, i, one.surface->Point(i), planes_[label], &sums[chunk][label]);
+          if (label < 0) continue;
+          visit(one, i, one.surface->Point(i), planes_[label], &sums[chunk][place[label]]);
         }
       });
       for (const std::vector<PlaneInWork>& chunk : sums) {
-        for (size_t k = 0; k < chunk.size(); ++k) planes_[k].Add(chunk[k]);
+        for (size_t k = 0; k < chunk.size(); ++k) planes_[present[k]].Add(chunk[k]);
       }
     }
   }
@@ -309,12 +317,10 @@ class PlaneFitter {
     return gap;
   }
 
-  // What the samples of one scan cover: marks the cells, gives the area in each, per plane.
+  // What the samples of one scan cover: marks the cells, gives the area in each, per plane; empty
+  // for a plane of which the scan shows nothing.
   std::vector<Eigen::ArrayXXf> Cover(const LabelledScan& one, std::vector<ScanPlane>* planes) {
-    std::vector<Eigen::ArrayXXf> areas;
-    for (const ScanPlane& plane : *planes) {
-      areas.push_back(Eigen::ArrayXXf::Zero(plane.covered.rows(), plane.covered.cols()));
-    }
+    std::vector<Eigen::ArrayXXf> areas(planes->size());
     const auto cover = [&](int i, int label, const Eigen::Vector3d& x) {
       ScanPlane& plane = (*planes)[label];
       const Eigen::Vector3d offset = x + (origin_ - plane.point);
@@ -324,6 +330,7 @@ class PlaneFitter {
           ((place / plane.cell_size).floor().cast<int>() - plane.min_cell.array()).max(0).min(last);
       plane.covered(cell[0], cell[1]) = 1;
       const Eigen::Vector3d foot = x - planes_[label].Distance(x) * plane.normal;
+      if (areas[label].size() == 0) areas[label].setZero(last[0] + 1, last[1] + 1);
       areas[label](cell[0], cell[1]) +=
           static_cast<float>(one.surface->Footprint(i, foot, plane.normal));
     };
@@ -344,7 +351,12 @@ class PlaneFitter {
   static double TotalArea(const std::vector<std::vector<Eigen::ArrayXXf>>& areas, size_t plane,
                           double cell_size) {
     if (areas.size() == 1) return areas[0][plane].cast<double>().sum();
-    const Eigen::Index rows = areas[0][plane].rows(), columns = areas[0][plane].cols();
+    std::vector<const Eigen::ArrayXXf*> seen;
+    for (const auto& of_scan : areas) {
+      if (of_scan[plane].size() > 0) seen.push_back(&of_scan[plane]);
+    }
+    if (seen.empty()) return 0;
+    const Eigen::Index rows = seen[0]->rows(), columns = seen[0]->cols();
     const auto full = static_cast<float>(0.8 * 9 * cell_size * cell_size);
     double total = 0;
     for (Eigen::Index i = 0; i < rows; ++i) {
@@ -352,14 +364,14 @@ class PlaneFitter {
         const Eigen::Index top = std::max<Eigen::Index>(i - 1, 0);
         const Eigen::Index left = std::max<Eigen::Index>(k - 1, 0);
         float best = 0, area = 0;
-        for (const auto& of_scan : areas) {
+        for (const Eigen::ArrayXXf* of_scan : seen) {
           const float around =
-              of_scan[plane]
-                  .block(top, left, std::min(i + 2, rows) - top, std::min(k + 2, columns) - left)
+              of_scan
+                  ->block(top, left, std::min(i + 2, rows) - top, std::min(k + 2, columns) - left)
                   .sum();
           if (std::min(around, full) <= best) continue;
           best = std::min(around, full);
-          area = of_scan[plane](i, k);
+          area = (*of_scan)(i, k);
         }
         total += area;
       }

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <set>
+#include <unordered_map>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -104,22 +107,79 @@ void MeasureOffset(const std::vector<SurfacePoint>& points, const ScanPatches& s
   pair->sigma = std::sqrt(variance / count);
 }
 
-Eigen::AlignedBox3d BoundsOf(const ScanPatches& patches) {
-  Eigen::AlignedBox3d bounds;
-  for (const ScanPatch& patch : patches.patches()) bounds.extend(patch.point);
-  return bounds;
-}
+// Which stations have surface where, by cubes, so that those which share none are never compared:
+// of stations in many rooms, nearly all pairs.
+class StationCells {
+ public:
+  explicit StationCells(const std::vector<ScanPatches>& patches) : counts_(patches.size(), 0) {
+    for (int station = 0; station < static_cast<int>(patches.size()); ++station) {
+      for (const ScanPatch& patch : patches[station].patches()) {
+        std::vector<int>& there = stations_[Key((patch.point / kCell).array().floor())];
+        if (there.empty() || there.back() != station) there.push_back(station);
+      }
+      reach_ = std::max(reach_, std::hypot(kFirstGate, patches[station].cell_size()));
+    }
+  }
 
-StationPair ComparePair(const ScanPatches& first, const ScanPatches& second) {
+  // Those before `station` that have a patch within reach of so many of its points that
+  // ComparePair() may find enough matches; it looks no farther.
+  std::vector<int> Candidates(int station, const std::vector<SurfacePoint>& points) {
+    std::fill(counts_.begin(), counts_.end(), 0);
+    std::vector<size_t> last(counts_.size(), points.size());
+    for (size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Array3d x = points[i].x_in_sparse.array();
+      const Eigen::Array3d low = ((x - reach_) / kCell).floor(),
+                           high = ((x + reach_) / kCell).floor();
+      Eigen::Array3d cell;
+      for (cell.x() = low.x(); cell.x() <= high.x(); ++cell.x()) {
+        for (cell.y() = low.y(); cell.y() <= high.y(); ++cell.y()) {
+          for (cell.z() = low.z(); cell.z() <= high.z(); ++cell.z()) {
+            const auto at = stations_.find(Key(cell));
+            if (at == stations_.end()) continue;
+            for (const int other : at->second) {
+              if (other >= station) break;  // in order
+              counts_[other] += last[other] != i;
+              last[other] = i;
+            }
+          }
+        }
+      }
+    }
+    std::vector<int> candidates;
+    for (int other = 0; other < station; ++other) {
+      if (IsEnough(static_cast<size_t>(counts_[other]), points.size())) candidates.push_back(other);
+    }
+    return candidates;
+  }
+
+  static bool IsEnough(size_t num_matches, size_t num_points) {
+    return num_matches > 0 &&
+           static_cast<double>(num_matches) >= kMinCommonShare * static_cast<double>(num_points);
+  }
+
+ private:
+  static constexpr double kCell = 0.5;  // metres
+  // 21 bits a coordinate: cells a thousand kilometres apart fall together, and then a pair is
+  // compared for nothing.
+  static uint64_t Key(const Eigen::Array3d& cell) {
+    uint64_t key = 0;
+    for (int k = 0; k < 3; ++k) {
+      key = key << 21 | (static_cast<uint64_t>(static_cast<int64_t>(cell[k])) & 0x1fffff);
+    }
+    return key;
+  }
+
+  std::unordered_map<uint64_t, std::vector<int>> stations_;
+  std::vector<int> counts_;
+  double reach_ = 0;
+};
+
+// points: PatchesAsPoints() of the second.
+StationPair ComparePair(const ScanPatches& first, const std::vector<SurfacePoint>& points) {
   StationPair pair;
-  if (BoundsOf(first).exteriorDistance(BoundsOf(second)) > kFirstGate) return pair;
-  const std::vector<SurfacePoint> points = PatchesAsPoints(second);
   Solution solution;
   solution.matches = FindMatches(points, first, Similarity(), kFirstGate, kFirstGate);
-  if (static_cast<double>(solution.matches.size()) <
-      kMinCommonShare * static_cast<double>(points.size())) {
-    return pair;
-  }
+  if (!StationCells::IsEnough(solution.matches.size(), points.size())) return pair;
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   for (const SurfaceMatch& match : solution.matches) {
     pivot += points[match.point].x_in_sparse / static_cast<double>(solution.matches.size());
@@ -171,14 +231,19 @@ std::vector<ScanPatches> PatchesOf(const std::vector<Scan>& scans) {
 
 StationCheck ComparePatches(const std::vector<ScanPatches>& patches) {
   StationCheck check;
-  for (int i = 0; i < static_cast<int>(patches.size()); ++i) {
-    for (int j = i + 1; j < static_cast<int>(patches.size()); ++j) {
-      StationPair pair = ComparePair(patches[i], patches[j]);
-      pair.first = i;
-      pair.second = j;
+  StationCells cells(patches);
+  for (int second = 1; second < static_cast<int>(patches.size()); ++second) {
+    const std::vector<SurfacePoint> points = PatchesAsPoints(patches[second]);
+    for (const int first : cells.Candidates(second, points)) {
+      StationPair pair = ComparePair(patches[first], points);
+      pair.first = first;
+      pair.second = second;
       if (pair.num_patches > 0) check.pairs.push_back(pair);
     }
   }
+  std::sort(check.pairs.begin(), check.pairs.end(), [](const StationPair& a, const StationPair& b) {
+    return std::pair(a.first, a.second) < std::pair(b.first, b.second);
+  });
   check.wrong = FindWrong(check.pairs, patches.size());
   return check;
 }
@@ -225,7 +290,8 @@ std::vector<int> RegisterStations(std::vector<Scan>* scans) {
           scan != 0 && std::count(check.wrong.begin(), check.wrong.end(), scan) > 0;
       if (scan != *worst && !doubted) others.push_back((*scans)[scan]);
     }
-    const StationPair pair = ComparePair(ScanPatches(others, ScanPatchOptions()), patches[*worst]);
+    const StationPair pair =
+        ComparePair(ScanPatches(others, ScanPatchOptions()), PatchesAsPoints(patches[*worst]));
     if (pair.num_patches == 0) break;
     Scan& scan = (*scans)[*worst];
     PlaceScan(pair.first_from_second * scan.scan_from_station, &scan);

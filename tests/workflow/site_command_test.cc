@@ -116,6 +116,66 @@ TEST_F(SiteCommand, TrustsASiteOfWhichEveryRoomIsTrusted) {
   EXPECT_THAT(Page(), HasSubstr("75\u00a0% of 160"));
 }
 
+// Of two rooms whose plans are known, the second turned to the left and ten metres to the right.
+TEST_F(SiteCommand, ShowsTheRoomsInOnePlanAndWhatLinksThem) {
+  const json identity = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const char* room : {"a", "b"}) {
+    AddStep(room, "align", StepState::kDone);
+    AddReport(room, "trusted");
+    WriteBytes(folder_ / (room + std::string("/log/plan.png")), "a picture");
+    json report = json::parse(ReadBytes(folder_ / (room + std::string("/report.json"))));
+    report["plan"] = {
+        {"picture", "log/plan.png"}, {"plan_from_scan", identity}, {"low", {0, 0, 0}}};
+    report["plan"]["size"] = room[0] == 'a' ? json({4, 3, 2.5}) : json({2, 1, 2.5});
+    WriteBytes(folder_ / (room + std::string("/report.json")), report.dump());
+  }
+  const json residual = {
+      {"offset_mm", 3.25}, {"offset_sigma_mm", 2}, {"turn_deg", 0.1}, {"turn_sigma_deg", 0.05}};
+  json joined =
+      json::parse(R"({"trusted": true, "reason": "", "reference": "a", "scene": "site.gltf",
+    "rooms": [{"name": "a", "frame": "a", "trusted": true,
+               "site_from_room": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]},
+              {"name": "b", "frame": "a", "trusted": true,
+               "site_from_room": [[0, -1, 0, 10], [1, 0, 0, 0], [0, 0, 1, 0]]},
+              {"name": "attic", "frame": "attic", "trusted": true,
+               "site_from_room": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}],
+    "links": [{"first": "a", "second": "b", "trusted": true, "reason": "", "num_photos": 3,
+               "num_scans": 0, "num_agreeing": 3, "place": [9, 1, 1.5]}],
+    "loops": [{"closes": true, "offset_mm": 4.5}]})");
+  joined["links"][0]["residual"] = residual;
+  MakeFolder(folder_ / "joined");
+  WriteBytes(folder_ / "joined/joined.json", joined.dump());
+  EXPECT_EQ(Run().exit_code, 0);
+  EXPECT_EQ(Site()["joined"]["links"][0]["num_photos"], 3);
+  const std::string page = Page();
+  for (const char* text :
+       {"href=\"b/log/plan.png\"", "M963.0,314.8 L963.0,129.6 L870.4,129.6 L870.4,314.8 Z",
+        "cx=\"870.4\" cy=\"222.2\"", "a – b", "3.2", "own frame: attic.", "joined/site.gltf",
+        "1 way around over several doorways: closed, at worst to 4.5 mm"}) {
+    EXPECT_THAT(page, HasSubstr(text));
+  }
+
+  joined["trusted"] = joined["links"][0]["trusted"] = false;
+  joined["reason"] = "a and b share <one> photo alone";
+  WriteBytes(folder_ / "joined/joined.json", joined.dump());
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_EQ(Site()["verdict"]["state"], "untrusted");
+  EXPECT_THAT(Page(), HasSubstr("a and b share &lt;one&gt; photo alone"));
+  EXPECT_THAT(Page(), HasSubstr("class=\"door doubted\""));
+
+  for (const char* list : {"rooms", "links", "loops"}) {
+    json broken = joined;
+    broken[list] = {3};
+    WriteBytes(folder_ / "joined/joined.json", broken.dump());
+    EXPECT_EQ(Run().exit_code, 4) << list;
+    EXPECT_THAT(Page(), Not(HasSubstr("<svg class=\"plan site\""))) << list;
+  }
+  WriteBytes(folder_ / "joined/joined.json", "[]");
+  EXPECT_EQ(Run().exit_code, 0);
+  EXPECT_TRUE(Site()["joined"].is_null());
+}
+
 // A killed run, another program: what is no report counts as none.
 TEST_F(SiteCommand, GetsAlongWithFilesThatAreNoReports) {
   AddStep("a", "align", StepState::kDone);

@@ -98,6 +98,7 @@ TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
            {"room,photos,scans,colour\n", "column \"colour\" is not known"},
            {"room,photos,scans\na,p,s.ptx\na,p,s.ptx\n", "line 3: room \"a\" is there already"},
            {"room,photos,scans\n../a,p,s.ptx\n", "becomes the name of a folder"},
+           {"room,photos,scans\njoined,p,s.ptx\n", "is the folder of the joined rooms"},
            {"room,photos,scans\na,q,s.ptx\n", "folder of photos \"q\" does not exist"},
            {"room,photos,scans\na,p,t.ptx;s.ptx\n", "scan \"t.ptx\" does not exist"},
            {"room,photos,scans\na,p,\n", "no scan is named"},

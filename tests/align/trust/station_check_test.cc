@@ -84,5 +84,27 @@ TEST(StationCheck, ScansOfDifferentRoomsSayNothing) {
   EXPECT_EQ(check.Sentence(scans), "");
 }
 
+// Three rooms a hundred metres from each other (1700 cells of the patches): what is compared in
+// each is what it is alone.
+TEST(StationCheck, RoomsFarFromEachOtherAreComparedEachByItself) {
+  const StationCheck alone = CheckStations(Stations(2));
+  std::vector<Scan> scans;
+  for (int station = 0; station < 2; ++station) {
+    for (int room = 0; room < 3; ++room) {
+      scans.push_back(Stations(2)[static_cast<size_t>(station)]);
+      Displace({-102 + 102. * room, 0, 0}, 0, &scans.back());
+    }
+  }
+  const StationCheck check = CheckStations(scans);
+  ASSERT_EQ(check.pairs.size(), 3u);
+  for (int room = 0; room < 3; ++room) {
+    const StationPair& pair = check.pairs[static_cast<size_t>(room)];
+    EXPECT_EQ(pair.first, room);
+    EXPECT_EQ(pair.second, room + 3);
+    EXPECT_NEAR(pair.offset, alone.pairs[0].offset, 0.001);
+    EXPECT_NEAR(pair.num_patches, alone.pairs[0].num_patches, 0.1 * alone.pairs[0].num_patches);
+  }
+}
+
 }  // namespace
 }  // namespace roomtex

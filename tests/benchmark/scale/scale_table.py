@@ -119,30 +119,49 @@ class Bench:
                 self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
                 place("aligned")], (0, 4))
 
+    def station_poses(self):
+        """Rotation and translation of the eight stations that are simulated in one room."""
+        self.simulate("site", 10, self.arguments.station_samples, 8)
+        return [line.split()[1:] for line in open(self.at("site", "scan_poses.txt")) if line.startswith("scan")]
+
+    def stations(self, name, poses):
+        """Options of a command: so many scans, those of the eight stations again and again under other names."""
+        place = lambda *parts: self.at(name, *parts)
+        os.makedirs(place(), exist_ok=True)
+        scans = ["--scan_poses", place("poses.txt"), "--max_samples", str(round(1e6 * self.arguments.held_samples))]
+        with open(place("poses.txt"), "w") as stream:
+            for k, (station, pose) in enumerate(poses):
+                stream.write(f"station{k}.rtpi {' '.join(pose)}\n")
+                if not os.path.exists(place(f"station{k}.rtpi")):
+                    os.link(self.at("site", f"scan_{station}.rtpi" if station else "scan.rtpi"), place(f"station{k}.rtpi"))
+                scans += ["--scan_path", place(f"station{k}.rtpi")]
+        return scans
+
+    def align_stations(self, curve, count, scans):
+        self.run(curve, "align", count, [
+            "roomtex-align", "--quiet", "--input_path", self.at("site", "truth"), "--picks_path",
+            self.at("site", "picks.csv"), "--output_path", self.at(f"{curve}_{count}", "aligned"), "--image_path",
+            self.at("site", "photos")] + scans, (0, 4))
+
     def station_curve(self):
-        """Beyond the eight stations that a simulated room has, they come again under other names."""
-        a = self.arguments
-        self.simulate("site", 10, a.station_samples, 8)
-        poses = [line.split(maxsplit=1)[1] for line in open(self.at("site", "scan_poses.txt"))
-                 if line.startswith("scan")]
-        for count in a.stations:
-            place = lambda *parts: self.at(f"stations_{count}", *parts)
-            os.makedirs(place(), exist_ok=True)
-            scans = ["--scan_poses", place("poses.txt"), "--max_samples", str(round(1e6 * a.held_samples))]
-            with open(place("poses.txt"), "w") as stream:
-                for k in range(count):
-                    stream.write(f"station{k}.rtpi {poses[k % 8]}")
-                    if not os.path.exists(place(f"station{k}.rtpi")):
-                        os.link(self.at("site", f"scan_{k % 8}.rtpi" if k % 8 else "scan.rtpi"), place(f"station{k}.rtpi"))
-                    scans += ["--scan_path", place(f"station{k}.rtpi")]
-            photos = ["--image_path", self.at("site", "photos")]
-            self.run("stations", "align", count, [
-                "roomtex-align", "--quiet", "--input_path", self.at("site", "truth"), "--picks_path",
-                self.at("site", "picks.csv"), "--output_path", place("aligned")] + photos + scans, (0, 4))
+        """All in one room, where each is compared with each."""
+        poses = self.station_poses()
+        for count in self.arguments.stations:
+            scans = self.stations(f"stations_{count}", [(k % 8, poses[k % 8]) for k in range(count)])
+            self.align_stations("stations", count, scans)
+            textured = self.at(f"stations_{count}", "textured")
             self.run("stations", "texture", count, [
                 "roomtex-texture", "--quiet", "--input_path", self.at("site", "truth"), "--Texture.scale", "1",
-                "--output_path", place("textured")] + photos + scans, (0, 4))
-            shutil.rmtree(place("textured"), ignore_errors=True)
+                "--output_path", textured, "--image_path", self.at("site", "photos")] + scans, (0, 4))
+            shutil.rmtree(textured, ignore_errors=True)
+
+    def row_curve(self):
+        """Rooms of two stations each, one behind the other."""
+        poses = self.station_poses()
+        for count in self.arguments.row:
+            moved = [(k % 2, poses[k % 2][:4] + [str(float(poses[k % 2][4]) + 20 * (k // 2))] + poses[k % 2][5:])
+                     for k in range(count)]
+            self.align_stations("row", count, self.stations(f"row_{count}", moved))
 
     def table(self, curve, sizes, unit, key, digits):
         steps = []
@@ -171,6 +190,7 @@ def main():
     parser.add_argument("--photos", type=int, nargs="*", default=[20, 40, 80, 160], help="numbers of photos")
     parser.add_argument("--samples", type=float, nargs="*", default=[1, 4, 10], help="millions of samples")
     parser.add_argument("--stations", type=int, nargs="*", default=[4, 8, 16], help="numbers of stations")
+    parser.add_argument("--row", type=int, nargs="*", default=[], help="numbers of stations, two in each of a row of rooms")
     parser.add_argument("--station_samples", type=float, default=0.5, help="millions, of each station")
     parser.add_argument("--held_samples", type=float, default=1, help="millions, --max_samples of the commands")
     parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
@@ -185,8 +205,11 @@ def main():
         bench.sample_curve()
     if arguments.stations:
         bench.station_curve()
+    if arguments.row:
+        bench.row_curve()
     for curve, sizes, unit in (("photos", arguments.photos, "photos"), ("samples", arguments.samples, "M samples"),
-                               ("stations", arguments.stations, "stations")):
+                               ("stations", arguments.stations, "stations"),
+                               ("row", arguments.row, "stations in rooms")):
         if not sizes:
             continue
         bench.table(curve, sizes, unit + ": CPU s", "cpu", 1)
