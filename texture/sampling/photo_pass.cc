@@ -158,7 +158,7 @@ std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
   std::vector<std::vector<size_t>> num_seen(num_photos);
   std::vector<PhotoObservations> batch(batch_size);
   std::vector<std::string> problems(num_photos);
-  const size_t probe_stride = probes ? SharpnessStride(store->num_samples(), photos.size()) : 0;
+  const size_t probe_stride = probes ? SharpnessStride(store->num_samples()) : 0;
   if (probes) probes->assign(num_photos, {});
   for (int first = 0; first < num_photos; first += batch_size) {
     const int count = std::min(batch_size, num_photos - first);
@@ -175,7 +175,10 @@ std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
       batch[i] =
           PhotoObserver(input, photos[photo], std::move(picture), occlusion, blend, probe_stride)
               .Observe(photo);
-      if (probes) (*probes)[photo] = std::move(batch[i].probes);
+      if (probes) {
+        KeepSomeProbes(photos.size(), &batch[i].probes);
+        (*probes)[photo] = std::move(batch[i].probes);
+      }
       size_t before = 0;
       for (const size_t end_tile : input.grid_ends) {
         const size_t end = end_tile == 0 ? 0 : batch[i].tile_end[end_tile - 1];

@@ -5,14 +5,14 @@
 #include <map>
 #include <utility>
 
+#include "core/random_stream.h"
 #include "core/statistics.h"
 
 namespace roomtex {
 namespace {
 
-constexpr double kProbeBytes = 24e6;
-constexpr double kShareSeen = 0.25;  // of the samples, by a photo; more only takes more room
-constexpr size_t kMostProbes = 100000;
+constexpr size_t kMostProbed = 200000;         // samples
+constexpr size_t kProbeBytes = 24'000'000;     // of all photos
 constexpr int kDarkest = 24, kLightest = 235;  // grey levels, in the mean
 // Contrasts: noise has about this, and from here on there is texture.
 constexpr double kNoiseContrast = 5e-4, kTextured = 4e-3;
@@ -55,9 +55,14 @@ std::vector<Entry> BySample(const std::vector<std::vector<SharpnessProbe>>& prob
 
 Pairs FindPairs(const std::vector<Entry>& entries, std::vector<PhotoSharpness>* photos) {
   Pairs pairs;
+  std::vector<int64_t> counted(photos->size(), -1);  // the last sample
+  const auto count = [&](const Entry& entry) {
+    if (counted[entry.photo] == entry.sample) return;
+    counted[entry.photo] = entry.sample;
+    ++(*photos)[entry.photo].num_samples;
+  };
   for (size_t i = 0; i < entries.size(); ++i) {
     const Entry& a = entries[i];
-    bool compared = false;
     for (size_t k = i + 1; k < entries.size() && k <= i + kNeighbours; ++k) {
       const Entry& b = entries[k];
       if (b.sample != a.sample || b.pixel_width > kAsLarge * a.pixel_width) break;
@@ -70,23 +75,24 @@ Pairs FindPairs(const std::vector<Entry>& entries, std::vector<PhotoSharpness>* 
       pair.log_contrast +=
           sign * std::log((a.contrast + kNoiseContrast) / (b.contrast + kNoiseContrast));
       pair.log_width += sign * std::log(a.pixel_width / b.pixel_width);
-      compared = true;
+      count(a);
+      count(b);
     }
-    if (compared) ++(*photos)[a.photo].num_samples;
   }
   return pairs;
 }
 
 // Log contrast of each photo at the same surface, as least squares have it, together with how it
-// grows with the width of the pixels. By sweeps (Gauss and Seidel).
+// grows with the width of the pixels: as that, where edges are seen. By sweeps (Jacobi, damped).
 std::vector<double> SolvePairs(const Pairs& pairs, size_t num_photos) {
-  constexpr int kSweeps = 100;
+  constexpr int kSweeps = 300;
   constexpr double kHold = 50;  // samples that say "as the others"
+  constexpr double kGrowth = 1, kHoldGrowth = 50;
   std::vector<double> logs(num_photos, 0.0);
-  double growth = 0;
+  double growth = kGrowth;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     std::vector<double> sums(num_photos, 0.0), counts(num_photos, kHold);
-    double width_square = 1, width_left = 0;
+    double width_square = kHoldGrowth, width_left = kHoldGrowth * kGrowth;
     for (const auto& [photos, pair] : pairs) {
       const auto [a, b] = photos;
       const double explained = growth * pair.log_width;
@@ -106,11 +112,21 @@ std::vector<double> SolvePairs(const Pairs& pairs, size_t num_photos) {
 
 }  // namespace
 
-size_t SharpnessStride(size_t num_slots, size_t num_photos) {
-  const double of_photo = kShareSeen * sizeof(SharpnessProbe);
-  const double most =
-      std::min<double>(kMostProbes, kProbeBytes / (of_photo * std::max<size_t>(1, num_photos)));
-  return static_cast<size_t>(static_cast<double>(num_slots) / most) + 1;
+size_t SharpnessStride(size_t num_slots) { return num_slots / kMostProbed + 1; }
+
+void KeepSomeProbes(size_t num_photos, std::vector<SharpnessProbe>* probes) {
+  const size_t most = kProbeBytes / sizeof(SharpnessProbe) / std::max<size_t>(1, num_photos);
+  if (probes->size() > most) {
+    // By a lot that is the sample's, so that photos keep the same ones.
+    const auto lot = [](const SharpnessProbe& probe) { return MixBits(561, probe.sample); };
+    std::nth_element(
+        probes->begin(), probes->begin() + static_cast<std::ptrdiff_t>(most), probes->end(),
+        [&](const SharpnessProbe& a, const SharpnessProbe& b) { return lot(a) < lot(b); });
+    probes->resize(most);
+    std::sort(probes->begin(), probes->end(),
+              [](const SharpnessProbe& a, const SharpnessProbe& b) { return a.sample < b.sample; });
+  }
+  probes->shrink_to_fit();
 }
 
 float ContrastAt(const cv::Mat& photo, float x_in_img, float y_in_img) {

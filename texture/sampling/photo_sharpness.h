@@ -25,8 +25,11 @@ struct PhotoSharpness {
   double weight = 1;  // share of its weight in the blend that it keeps
 };
 
-// Every how many slots a sample is probed, for 24 MB of probes at most.
-size_t SharpnessStride(size_t num_slots, size_t num_photos);
+// Every how many slots a sample is probed.
+size_t SharpnessStride(size_t num_slots);
+// Of one photo's probes, ordered by sample, as many as make 24 MB for all photos; those of the same
+// samples in every photo.
+void KeepSomeProbes(size_t num_photos, std::vector<SharpnessProbe>* probes);
 
 // Mean of the squared central differences of the 3 x 3 pixels around, over the squared mean of
 // their 5 x 5. 8-bit BGR; negative too near the border, or where it is too dark or too light to

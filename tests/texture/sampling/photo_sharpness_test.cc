@@ -85,15 +85,25 @@ TEST(CompareSharpness, SaysNothingOfPhotosThatCannotBeCompared) {
   EXPECT_TRUE(CompareSharpness({}).empty());
 }
 
-TEST(SharpnessStride, KeepsTheProbesBounded) {
-  EXPECT_EQ(SharpnessStride(0, 0), 1u);
-  EXPECT_EQ(SharpnessStride(50000, 10), 1u);
-  for (const size_t photos : {30, 300, 30000}) {
-    const size_t slots = 20'000'000;
-    const double bytes = 0.25 * sizeof(SharpnessProbe) * photos * slots /
-                         static_cast<double>(SharpnessStride(slots, photos));
-    EXPECT_LE(bytes, 24e6) << photos;
+TEST(SharpnessProbes, AreBoundedAndOfTheSameSamples) {
+  EXPECT_EQ(SharpnessStride(0), 1u);
+  EXPECT_LE(20'000'000 / SharpnessStride(20'000'000), 200'000u);
+  constexpr size_t kPhotos = 1000;
+  std::vector<SharpnessProbe> all, odd;
+  for (uint32_t i = 0; i < 20000; ++i) all.push_back({i, 1.0f, 1.0f});
+  for (uint32_t i = 1; i < 20000; i += 2) odd.push_back({i, 1.0f, 1.0f});
+  std::vector<SharpnessProbe> few(all.begin(), all.begin() + 100);
+  for (auto* probes : {&all, &odd, &few}) KeepSomeProbes(kPhotos, probes);
+  EXPECT_EQ(few.size(), 100u);
+  EXPECT_EQ(all.size(), 24'000'000 / sizeof(SharpnessProbe) / kPhotos);
+  EXPECT_EQ(odd.size(), all.size());
+  // Each odd one of those kept of all is kept of the odd ones, too.
+  size_t shared = 0;
+  for (size_t a = 0, b = 0; a < all.size() && b < odd.size();) {
+    if (all[a].sample == odd[b].sample) ++shared;
+    all[a].sample < odd[b].sample ? ++a : ++b;
   }
+  EXPECT_NEAR(static_cast<double>(shared) / static_cast<double>(all.size()), 0.5, 0.05);
 }
 
 }  // namespace
