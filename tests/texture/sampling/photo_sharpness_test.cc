@@ -40,8 +40,8 @@ TEST(ContrastAt, SaysNothingAtTheBorderOrInTheDark) {
   EXPECT_LT(ContrastAt(photo + cv::Scalar::all(120), 50, 50), 0);
 }
 
-// Photos of one pattern, `count` probes each; pixels of the given widths see contrast that grows
-// with them, and as much less as the photo is blurred.
+// Photos of one pattern, `count` probes each; pixels of about the given widths see contrast that
+// grows with them, and as much less as the photo is blurred.
 std::vector<std::vector<SharpnessProbe>> Probes(const std::vector<double>& sharpness,
                                                 const std::vector<double>& widths, int count) {
   std::vector<std::vector<SharpnessProbe>> probes(sharpness.size());
@@ -50,10 +50,11 @@ std::vector<std::vector<SharpnessProbe>> Probes(const std::vector<double>& sharp
       RandomStream random(MixBits(3, i));
       const double pattern = random.Uniform(0.5, 1.5);
       RandomStream own(MixBits(4, i, photo));
+      const double width = widths[photo] * own.Uniform(0.8, 1.25);
       const double contrast =
-          pattern * widths[photo] * sharpness[photo] * sharpness[photo] * own.Uniform(0.7, 1.3);
-      probes[photo].push_back({static_cast<uint32_t>(7 * i), static_cast<float>(contrast),
-                               static_cast<float>(widths[photo])});
+          pattern * width * sharpness[photo] * sharpness[photo] * own.Uniform(0.7, 1.3);
+      probes[photo].push_back(
+          {static_cast<uint32_t>(7 * i), static_cast<float>(contrast), static_cast<float>(width)});
     }
   }
   return probes;
@@ -61,7 +62,7 @@ std::vector<std::vector<SharpnessProbe>> Probes(const std::vector<double>& sharp
 
 TEST(CompareSharpness, TellsBlurFromDistance) {
   const std::vector<double> sharpness = {1, 0.5, 1, 0.7, 1, 1};
-  const auto photos = CompareSharpness(Probes(sharpness, {1, 1, 1.2, 1.4, 1.7, 2.0}, 2000));
+  const auto photos = CompareSharpness(Probes(sharpness, {1, 1, 1.2, 1.4, 1.6, 1.8}, 2000));
   for (size_t i = 0; i < sharpness.size(); ++i) {
     EXPECT_NEAR(photos[i].sharpness, sharpness[i], 0.06) << i;
     EXPECT_GT(photos[i].num_samples, 1000u) << i;
@@ -79,7 +80,7 @@ TEST(CompareSharpness, PhotosThatAreAlikeKeepTheirWeight) {
 TEST(CompareSharpness, SaysNothingOfPhotosThatCannotBeCompared) {
   // Too few samples; far away; alone; none at all.
   EXPECT_EQ(CompareSharpness(Probes({1, 0.3}, {1, 1}, 100))[1].sharpness, 1);
-  EXPECT_EQ(CompareSharpness(Probes({1, 0.3}, {1, 2}, 1000))[1].sharpness, 1);
+  EXPECT_EQ(CompareSharpness(Probes({1, 0.3}, {1, 3}, 1000))[1].sharpness, 1);
   EXPECT_EQ(CompareSharpness(Probes({0.3}, {1}, 1000))[0].sharpness, 1);
   EXPECT_EQ(CompareSharpness({{}, {}})[1].weight, 1);
   EXPECT_TRUE(CompareSharpness({}).empty());
