@@ -110,6 +110,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "how fast the hand turns while a photo is read, degrees per second, about another "
                "axis each photo")
       .Within(0, 360, "degrees per second");
+  fields->Require(photo_height <= photo_width || rolling_shutter_ms == 0,
+                  "--rolling_shutter_ms needs photos that are at least as wide as high: rows lie "
+                  "along the longer side of a sensor");
   fields->Require(projectors == 0 || rolling_shutter_ms == 0,
                   "--rolling_shutter_ms needs a hand that moves, --projectors a camera that stands "
                   "still; give one of them");

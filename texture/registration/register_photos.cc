@@ -98,6 +98,7 @@ class Registrar {
   // shifts.
   void Measure(int level, int radius) {
     Look(level);
+    radius_ = radius;
     patches_.assign(photos_.size(), {});
     median_px_.assign(photos_.size(), 0);
     ParallelFor(num_threads_, 0, num_photos(), [&](int i) { MeasurePhoto(i, radius); });
@@ -119,7 +120,8 @@ class Registrar {
     return is_free_;
   }
 
-  // Moves all photos that may at once.
+  // Moves all photos that may at once, by what was measured last and by the scan, which is searched
+  // within as many pixels.
   void Correct(bool with_warps) {
     std::vector<std::vector<MeasuredShift>> of_photo(photos_.size());
     ParallelFor(num_threads_, 0, num_photos(), [&](int i) {
@@ -290,10 +292,9 @@ class Registrar {
   // Counted only where photo and scan show the same: intensity is not brightness.
   void AddShiftsAgainstScan(int i, std::vector<MeasuredShift>* shifts) const {
     constexpr float kAlike = 0.7f;
-    constexpr int kRadius = 3;
     for (const std::vector<int>& members : GatherPatches(i)) {
       if (members.size() < kFewestOfPatch) continue;
-      const auto patch = Compare(i, members, kRadius, [this](const Sighting& s) {
+      const auto patch = Compare(i, members, radius_, [this](const Sighting& s) {
         return static_cast<float>(samples_.Intensity(s.sample));
       });
       if (!patch || patch->shift.likeness < kAlike) continue;
@@ -479,7 +480,7 @@ class Registrar {
   std::vector<RegisteredPhoto> registered_;
   std::vector<PhotoRegistration> found_;
   bool is_free_ = false;
-  int level_ = 0;
+  int level_ = 0, radius_ = 0;               // measured last
   std::vector<std::vector<Patch>> patches_;  // per photo
   std::vector<double> median_px_;
 };

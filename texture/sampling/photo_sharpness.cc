@@ -23,7 +23,7 @@ constexpr size_t kFewest = 200;    // samples that say something
 constexpr double kSharp = 0.8;
 // From here on a photo is as sharp as others, lens and focus being what they are. Below, its weight
 // falls with this power.
-constexpr double kSharpEnough = 0.85, kPower = 6;
+constexpr double kSharpEnough = 0.75, kPower = 6;
 
 struct Pair {
   double count = 0, log_contrast = 0, log_width = 0;  // sums, of the first over the second

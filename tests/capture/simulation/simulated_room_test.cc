@@ -69,6 +69,12 @@ TEST(SimulatedRoom, NamesEveryBadOption) {
   options.num_stations = 99;
   EXPECT_EQ(options.Problems().size(), 5u);
   EXPECT_THROW(SimulatedRoom{options}, UsageError);
+  SimulatedRoomOptions held;
+  held.rolling_shutter_ms = 30;
+  EXPECT_TRUE(held.Problems().empty());
+  held.projectors = 1;
+  held.photo_height = held.photo_width + 1;
+  EXPECT_EQ(held.Problems().size(), 2u);
 }
 
 TEST(SimulatedRoom, StandsUprightInItsScanFrame) {
