@@ -21,7 +21,7 @@ struct RegistrationOptions {
   // "none": photos are taken as they are. "measure": how far they are off is found, but not
   // corrected. "pose": their poses are corrected. "warp": and what poses leave, by a smooth field
   // of shifts per photo. None is the default: on a real room whose scan is off there is nothing to
-  // gain for nearly three times the time (docs/texture.md).
+  // gain for twice the time (docs/texture.md).
   std::string mode = "none";
   // How far poses may be off, one standard deviation of each axis: what the photos say of each
   // other counts against that. Larger = held less by the alignment.
