@@ -196,17 +196,17 @@ test('a photo says how far it is off the others, and where', async () => {
   assert.ok(await page.isHidden('#shift'));
   assert.ok(await page.isHidden('#no-shifts'));
   const report = JSON.parse(readFileSync(folder.path('room', 'textured', 'report.json')));
-  const {shift_px: {before}, shift_before_mm: mm, shift_map_px: map} = report.images[2];
+  const {shift_px: {before: px}, shift_before_mm: mm, shift_map_px: map} = report.images[2];
   const option = page.locator('#camera-list li').nth(2);
-  assert.equal(await option.locator('.off').textContent(), `${before.toFixed(1)} px`);
+  assert.equal(await option.locator('.off').textContent(), `${px.toFixed(1)} px`);
   await option.click();
   await page.waitForFunction(() => roomtexView.cameras.photoShown);
   assert.ok(await page.isVisible('#shift'));
   assert.match(
       await page.textContent('#shift-title'),
-      new RegExp(`by ${before.toFixed(1)} px \\(${mm.toFixed(1)} mm\\)`));
+      new RegExp(`by ${px.toFixed(1)} px \\(${mm.toFixed(1)} mm\\)`));
   // The place that is off most is the lightest one.
-  const [most] = map.flat().map((px, i) => [px ?? -1, i]).sort(([a], [b]) => b - a);
+  const [most] = map.flat().map((value, i) => [value ?? -1, i]).sort(([a], [b]) => b - a);
   const lightest = await page.evaluate(() => {
     const canvas = document.getElementById('shift-map'), context = canvas.getContext('2d');
     let best = [-1, -1];
