@@ -286,6 +286,18 @@ void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
   throw UnusablePhotos(std::move(left_out));
 }
 
+// Whether any photo has another weight now.
+bool WeighBySharpness(const std::vector<PhotoSharpness>& sharpness, const BlendOptions& blend,
+                      std::vector<PhotoView>* photos) {
+  if (!blend.sharpness_weight) return false;
+  bool any = false;
+  for (size_t i = 0; i < photos->size(); ++i) {
+    (*photos)[i].weight = static_cast<float>(sharpness[i].weight);
+    any = any || sharpness[i].weight < 1;
+  }
+  return any;
+}
+
 Scene MakeScene(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                 const ColorizeOptions& options, int num_threads) {
   Scene scene = MakeSamples(scans, photos, options, num_threads);
@@ -368,12 +380,16 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
 
   progress->Stage("photos", static_cast<int>(photos.size()));
   ObservationStore store(NumSlots(input), options.blend.max_views);
-  const auto observe = [&] {
+  const auto observe = [&](std::vector<std::vector<SharpnessProbe>>* probes) {
     result.seen_of = ObservePhotos(input, photos, options.occlusion, options.blend, num_threads,
-                                   progress, &store);
+                                   progress, &store, probes);
     result.samples_seen = SumsOf(result.seen_of);
   };
-  observe();
+  {
+    std::vector<std::vector<SharpnessProbe>> probes;
+    observe(&probes);
+    result.sharpness = CompareSharpness(probes);
+  }
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
@@ -381,6 +397,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
+  const bool reweighted = WeighBySharpness(result.sharpness, options.blend, &photos);
+  bool corrected = false;
   if (options.registration.mode != "none") {
     progress->Stage("registration");
     std::vector<std::vector<uint8_t>> intensities;
@@ -388,15 +406,15 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     result.registration =
         RegisterPhotos(input, scene.grids, intensities, store, result.exposure.gains,
                        options.registration, num_threads, &photos);
-    const bool corrected =
-        std::any_of(result.registration.begin(), result.registration.end(),
-                    [](const PhotoRegistration& photo) { return photo.corrected; });
-    if (corrected) {
-      store = ObservationStore(0, 1);  // before the next one takes its room
-      store = ObservationStore(NumSlots(input), options.blend.max_views);
-      observe();
-      result.disagreement.after = MeasureDisagreement(store, result.exposure.gains).after;
-    }
+    corrected = std::any_of(result.registration.begin(), result.registration.end(),
+                            [](const PhotoRegistration& photo) { return photo.corrected; });
+  }
+  if (corrected || reweighted) {
+    progress->Stage("photos", static_cast<int>(photos.size()));
+    store = ObservationStore(0, 1);  // before the next one takes its room
+    store = ObservationStore(NumSlots(input), options.blend.max_views);
+    observe(nullptr);
+    result.disagreement.after = MeasureDisagreement(store, result.exposure.gains).after;
   }
   Blend(scans, photos, options, num_threads, progress, &scene, &store, &result);
   if (options.keep_occluders) result.occluders = std::move(input.occluders);

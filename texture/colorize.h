@@ -13,6 +13,7 @@
 #include "texture/sampling/detail.h"
 #include "texture/sampling/grid_colors.h"
 #include "texture/sampling/photo_list.h"
+#include "texture/sampling/photo_sharpness.h"
 #include "texture/sampling/photo_view.h"
 #include "texture/sampling/smoothed_scan.h"
 #include "texture/sampling/visibility.h"
@@ -57,6 +58,7 @@ struct ColorizeResult {
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
   std::vector<PhotoAgreement> agreement;        // per photo
+  std::vector<PhotoSharpness> sharpness;        // per photo
   std::vector<PhotoRegistration> registration;  // per photo; empty without
   std::vector<size_t> samples_seen;             // per photo
   std::vector<std::vector<size_t>> seen_of;     // per photo and scan: samples that it sees

@@ -186,6 +186,7 @@ Json RegistrationReport(const std::vector<PhotoView>& photos,
          {"corrected", photo.corrected},
          {"turned_deg", rounded(photo.turned_deg)},
          {"moved_mm", rounded(1000 * photo.moved)},
+         {"row_turned_deg", rounded(photo.row_turned_deg)},
          {"warp_px", rounded(photo.warp_px)}});
   }
   return images;
@@ -236,6 +237,14 @@ void FillReport(const std::vector<PhotoView>& photos, const ColorizeOptions& opt
                                  {"num_samples", photo.num_samples}};
   }
   report["photo_agreement"] = agreement;
+  Json sharpness = Json::object();
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const PhotoSharpness& photo = result.sharpness[i];
+    sharpness[photos[i].name] = {{"sharpness", std::round(1e3 * photo.sharpness) / 1e3},
+                                 {"weight", std::round(1e3 * result.photos[i].weight) / 1e3},
+                                 {"num_samples", photo.num_samples}};
+  }
+  report["photo_sharpness"] = sharpness;
   FillToneReport(photos, result.exposure, &report);
   if (!result.registration.empty()) {
     report["images"] = RegistrationReport(photos, result.registration);

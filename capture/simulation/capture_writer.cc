@@ -173,6 +173,24 @@ void WriteProjectors(const SimulatedRoom& room, const std::string& folder) {
   WriteText(folder + "/projectors.txt", text);
 }
 
+// The motion of each camera while its photo was read.
+void WriteMotion(const SimulatedRoom& room, const std::string& folder) {
+  if (room.options().rolling_shutter_ms == 0) return;
+  std::string text = "# from the upper border to the lower one, in the camera's frame\n" +
+                     CsvLine({"image_name", "turn_x_deg", "turn_y_deg", "turn_z_deg", "move_x",
+                              "move_y", "move_z"});
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    const Rigid lower_from_upper =
+        room.CamFromRoomAt(photo, room.camera().height) * room.CamFromRoomAt(photo, 0).Inverse();
+    const Eigen::AngleAxisd turn(lower_from_upper.rotation);
+    std::vector<std::string> fields = {room.PhotoName(photo)};
+    for (const double x : turn.axis()) fields.push_back(Exact(DegFromRad(turn.angle()) * x));
+    for (const double x : lower_from_upper.translation) fields.push_back(Exact(x));
+    text += CsvLine(fields);
+  }
+  WriteText(folder + "/rolling_shutter.csv", text);
+}
+
 void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   SparseModel model;
   model.cameras[1] = room.camera();
@@ -191,6 +209,7 @@ void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   WriteSparseModelText(model, folder);
   WriteText(folder + "/exposures.csv", exposures);
   WriteProjectors(room, folder);
+  WriteMotion(room, folder);
   const Rigid scan_from_room = room.ScanFromRoom();
   WriteSimilarity(folder + "/scan_from_room.txt",
                   {1, scan_from_room.rotation, scan_from_room.translation});
@@ -272,6 +291,11 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
       << "                    of the floor) and true_colors.ply (scan points in grid order, "
          "missing\n"
       << "                    ones left out, with their true colour)\n"
+      << (options.rolling_shutter_ms > 0 ? "                    rolling_shutter.csv (the camera's "
+                                           "motion while a photo is read; "
+                                           "poses are\n"
+                                           "                    those of its middle row)\n"
+                                         : "")
       << (paired ? "                    associations.csv (which photos belong together), "
                    "pattern_N.png and\n"
                    "                    projectors.txt (what the projectors throw, from where)\n"

@@ -140,12 +140,13 @@ LinearRgb PhotoRenderer::Reflection(const SceneHit& hit, const Eigen::Vector3d& 
   return sum / (kSide * kSide);
 }
 
-cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& settings,
+cv::Mat PhotoRenderer::Render(const RowPoses& poses, const PhotoSettings& settings,
                               int num_threads) const {
-  const Pose room_from_cam = cam_from_room.Inverse().Matrix();
+  const auto room_from_row = [&](int y) -> Pose { return poses.At(y + 0.5).Inverse().Matrix(); };
   cv::Mat linear(height_, width_, CV_32FC3);
   cv::Mat place(height_, width_, CV_32S);
   ParallelFor(num_threads, 0, height_, [&](int y) {
+    const Pose room_from_cam = room_from_row(y);
     for (int x = 0; x < width_; ++x) {
       const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings);
       linear.at<cv::Vec3f>(y, x) = {shot.color.z(), shot.color.y(), shot.color.x()};
@@ -155,6 +156,7 @@ cv::Mat PhotoRenderer::Render(const Rigid& cam_from_room, const PhotoSettings& s
   // Where surfaces meet, a pixel is the mean of 3 x 3 rays; elsewhere the texture itself averages.
   constexpr int kSide = 3;
   ParallelFor(num_threads, 0, height_, [&](int y) {
+    const Pose room_from_cam = room_from_row(y);
     for (int x = 0; x < width_; ++x) {
       const int here = place.at<int>(y, x);
       bool border = false;

@@ -6,9 +6,9 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "capture/simulation/rolling_shutter.h"
 #include "capture/simulation/room_scene.h"
 #include "core/camera_model.h"
-#include "core/similarity.h"
 
 namespace roomtex {
 
@@ -33,7 +33,7 @@ class PhotoRenderer {
   PhotoRenderer(const RoomScene& scene, const CameraProjection& camera);
 
   // 8-bit BGR. Rows side by side; the same for every number of threads.
-  cv::Mat Render(const Rigid& cam_from_room, const PhotoSettings& settings, int num_threads) const;
+  cv::Mat Render(const RowPoses& poses, const PhotoSettings& settings, int num_threads) const;
 
  private:
   struct Shot {

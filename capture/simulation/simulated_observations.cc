@@ -18,12 +18,12 @@ struct SurfacePoint {
 // What a random pixel of a random photo shows; none where that is the mirror or lies outside.
 std::optional<SurfacePoint> RandomPoint(const RoomPhotos& photos, RandomStream* random) {
   const Camera& camera = photos.camera.camera();
-  const int photo = random->Index(static_cast<int>(photos.cam_from_room.size()));
+  const int photo = random->Index(static_cast<int>(photos.poses.size()));
   const Eigen::Vector2d x_in_img(random->Uniform(0, camera.width),
                                  random->Uniform(0, camera.height));
   const auto ray = photos.camera.RayFromImg(x_in_img);
   if (!ray) return std::nullopt;
-  const Rigid room_from_cam = photos.cam_from_room[photo].Inverse();
+  const Rigid room_from_cam = photos.poses[photo].At(x_in_img.y()).Inverse();
   const auto hit =
       photos.scene.Cast(room_from_cam.translation, room_from_cam.rotation * ray->normalized());
   if (!hit || photos.scene.SurfaceOf(hit->patch).kind != Surface::Kind::kOpaque)
@@ -41,9 +41,9 @@ struct Observation {
 
 std::optional<Eigen::Vector2d> RoomPhotos::See(int photo, const Eigen::Vector3d& x_in_room,
                                                const Eigen::Vector3d& normal_in_room) const {
-  const auto x_in_img = camera.ImgFromCam(cam_from_room[photo] * x_in_room);
+  const auto x_in_img = poses[photo].Project(camera, x_in_room);
   if (!x_in_img || !camera.InImage(*x_in_img)) return std::nullopt;
-  const Eigen::Vector3d centre = cam_from_room[photo].TargetOriginInSource();
+  const Eigen::Vector3d centre = poses[photo].At(x_in_img->y()).TargetOriginInSource();
   const Eigen::Vector3d view = (centre - x_in_room).normalized();
   // Flatter than 80 degrees nobody finds a feature again.
   if (std::abs(view.dot(normal_in_room)) < 0.17) return std::nullopt;
@@ -56,12 +56,12 @@ SparseModel MakeRoomSparseModel(const RoomPhotos& photos, const Similarity& spar
   SparseModel model;
   const Camera& camera = photos.camera.camera();
   model.cameras[camera.camera_id] = camera;
-  const int num_photos = static_cast<int>(photos.cam_from_room.size());
+  const int num_photos = static_cast<int>(photos.poses.size());
   for (int photo = 0; photo < num_photos; ++photo) {
     SparseImage& image = model.images[photo + 1];
     image.image_id = photo + 1;
     image.camera_id = camera.camera_id;
-    const Rigid& pose = photos.cam_from_room[photo];
+    const Rigid& pose = photos.poses[photo].cam_from_room;
     // x_in_cam = pose * sparse_from_room^-1 * x_in_sparse, its scale left out.
     image.cam_from_model.rotation = pose.rotation * sparse_from_room.rotation.conjugate();
     image.cam_from_model.translation = sparse_from_room.scale * pose.translation -
@@ -128,8 +128,9 @@ std::vector<PickCandidate> FindPickCandidates(const RoomPhotos& photos, const Ro
       if (sample.missing || sample.hit.patch != static_cast<int>(i)) continue;
       const auto x_in_img = photos.See(photo, sample.hit.point, patch.Normal());
       if (!x_in_img) continue;
-      candidates.push_back({*x_in_img, sample.x_in_station,
-                            photos.camera.Depth(photos.cam_from_room[photo] * sample.hit.point)});
+      const Rigid pose = photos.poses[photo].At(x_in_img->y());
+      candidates.push_back(
+          {*x_in_img, sample.x_in_station, photos.camera.Depth(pose * sample.hit.point)});
     }
   }
   return candidates;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "capture/simulation/rolling_shutter.h"
 #include "capture/simulation/room_scene.h"
 #include "capture/simulation/simulated_room_options.h"
 #include "capture/simulation/simulated_scan.h"
@@ -19,7 +20,7 @@ struct RoomPhotos {
   const SimulatedRoomOptions& options;
   const RoomScene& scene;
   const CameraProjection& camera;
-  const std::vector<Rigid>& cam_from_room;
+  const std::vector<RowPoses>& poses;
 
   // Position of a surface point in a photo that really sees it: in the image, from the front,
   // unoccluded.

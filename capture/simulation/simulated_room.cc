@@ -9,6 +9,7 @@
 
 #include "capture/simulation/camera_faults.h"
 #include "capture/simulation/photo_renderer.h"
+#include "capture/simulation/rolling_shutter.h"
 #include "capture/simulation/room_cameras.h"
 #include "capture/simulation/room_furniture.h"
 #include "capture/simulation/room_scene.h"
@@ -28,6 +29,11 @@ double NominalExposureTime(const SimulatedRoomOptions& options) {
   return options.projectors > 0 ? 1.0 / 4 : 1.0 / 30;
 }
 
+// Spread evenly over the photos.
+bool IsOfShare(int photo, double share) {
+  return std::floor((photo + 1) * share) > std::floor(photo * share);
+}
+
 SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
   options.bare_walls = options.bare_walls || options.bare;
   return options;
@@ -44,6 +50,7 @@ struct SimulatedRoom::Impl {
     for (const Rigid& place : room_from_projector) AddProjectorBody(place, &scene);
     scene.Finish(options.shading, options.bare, options.num_threads);
     cam_from_room = PlaceCameras(options, scene);
+    row_poses = MoveByHand(options, cam_from_room);
     room_from_station = PlaceStations(options, scene);
     exposures = ChooseExposures(options, scene, camera, cam_from_room);
     for (size_t k = 0; k < room_from_projector.size(); ++k) {
@@ -59,7 +66,7 @@ struct SimulatedRoom::Impl {
   RoomScanner Scanner(int station) const {
     return RoomScanner(options, scene, station, room_from_station.at(station));
   }
-  RoomPhotos Photos() const { return {options, scene, projection, cam_from_room}; }
+  RoomPhotos Photos() const { return {options, scene, projection, row_poses}; }
   std::vector<PickCandidate> Candidates(int photo) const {
     return FindPickCandidates(Photos(), Scanner(0), room_from_station[0], photo);
   }
@@ -75,6 +82,7 @@ struct SimulatedRoom::Impl {
   const CameraProjection projection;
   RoomScene scene;
   std::vector<Rigid> cam_from_room, room_from_station;
+  std::vector<RowPoses> row_poses;
   std::vector<double> exposures;  // per place; of the plain photos
   std::vector<Projector> projectors;
   std::unique_ptr<ProjectedLight> projected;  // if there are projectors
@@ -106,6 +114,9 @@ std::string SimulatedRoom::PhotoName(int photo) const {
 Rigid SimulatedRoom::CamFromRoom(int photo) const {
   return impl_->cam_from_room.at(PlaceOf(photo));
 }
+Rigid SimulatedRoom::CamFromRoomAt(int photo, double y_in_img) const {
+  return impl_->row_poses.at(PlaceOf(photo)).At(y_in_img);
+}
 Rigid SimulatedRoom::CamFromScan(int photo) const {
   return CamFromRoom(photo) * impl_->room_from_station[0];
 }
@@ -131,25 +142,25 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   PhotoSettings settings;
   settings.exposure_ev = ExposureEv(photo);
   settings.gloss = impl_->options.gloss;
-  settings.blur_px = impl_->options.blur_px;
+  settings.blur_px = IsBlurred(photo) ? impl_->options.blur_px : 0;
   settings.response = impl_->options.response;
   settings.vignetting = impl_->options.vignetting;
   settings.white_balance = WhiteBalance(photo);
   settings.noise = impl_->options.photo_noise;
   settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
   if (IsPatterned(photo)) settings.projected = impl_->projected.get();
-  cv::Mat image =
-      impl_->Renderer().Render(CamFromRoom(photo), settings, impl_->options.num_threads);
+  cv::Mat image = impl_->Renderer().Render(impl_->row_poses.at(PlaceOf(photo)), settings,
+                                           impl_->options.num_threads);
   if (HasStranger(photo)) {
     DrawStranger(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 521, photo), &image);
   }
   return image;
 }
 
-// Spread evenly over the photos.
+bool SimulatedRoom::IsBlurred(int photo) const { return IsOfShare(photo, impl_->options.blurred); }
+
 bool SimulatedRoom::HasStranger(int photo) const {
-  const double share = impl_->options.strangers;
-  return std::floor((photo + 1) * share) > std::floor(photo * share);
+  return IsOfShare(photo, impl_->options.strangers);
 }
 
 Scan SimulatedRoom::MakeScan(int station) const {
@@ -229,18 +240,18 @@ std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& sam
                                                           int photo) const {
   constexpr double kFlattest = 0.05;
   constexpr int kAtOnce = 4096;
-  const Rigid cam_from_room = CamFromRoom(photo);
-  const Eigen::Vector3d centre = cam_from_room.TargetOriginInSource();
+  const RowPoses& poses = impl_->row_poses.at(PlaceOf(photo));
   const int count = static_cast<int>(samples.points.size());
   std::vector<Eigen::Vector2f> sightings(
       count, Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
   ParallelFor(impl_->options.num_threads, 0, (count + kAtOnce - 1) / kAtOnce, [&](int block) {
     for (int i = block * kAtOnce; i < std::min(count, (block + 1) * kAtOnce); ++i) {
       const Eigen::Vector3d& point = samples.points[i];
+      const auto position = poses.Project(impl_->projection, point);
+      if (!position || !impl_->projection.InImage(*position)) continue;
+      const Eigen::Vector3d centre = poses.At(position->y()).TargetOriginInSource();
       const Eigen::Vector3d to_camera = (centre - point).normalized();
       if (!(to_camera.dot(samples.normals[i].cast<double>()) > kFlattest)) continue;
-      const auto position = impl_->projection.ImgFromCam(cam_from_room * point);
-      if (!position || !impl_->projection.InImage(*position)) continue;
       if (impl_->scene.IsOccluded(centre, point)) continue;
       sightings[i] = position->cast<float>();
     }

@@ -46,16 +46,19 @@ class SimulatedRoom {
   int NumPhotos() const;  // twice the places if there are projectors
   // "photo_000.jpg"; with projectors IMG_0001.jpg (patterned), IMG_0002.jpg (plain), IMG_0003.jpg
   std::string PhotoName(int photo) const;
-  bool IsPatterned(int photo) const;     // taken in the projectors' light
-  int PlaceOf(int photo) const;          // the camera has not moved between photos of one place
-  Rigid CamFromRoom(int photo) const;    // truth
-  Rigid CamFromScan(int photo) const;    // truth, frame of station 0 = THE scan frame
-  double ExposureEv(int photo) const;    // truth, 0 = nominal
-  double ExposureTime(int photo) const;  // seconds, truth
-  double NotedTime(int photo) const;     // seconds, as in EXIF
+  bool IsPatterned(int photo) const;   // taken in the projectors' light
+  int PlaceOf(int photo) const;        // the camera has not moved between photos of one place
+  Rigid CamFromRoom(int photo) const;  // truth, of the middle row
+  // Truth, when the photo's row at y in `img` was read; differs with a rolling shutter.
+  Rigid CamFromRoomAt(int photo, double y_in_img) const;
+  Rigid CamFromScan(int photo) const;             // truth, frame of station 0 = THE scan frame
+  double ExposureEv(int photo) const;             // truth, 0 = nominal
+  double ExposureTime(int photo) const;           // seconds, truth
+  double NotedTime(int photo) const;              // seconds, as in EXIF
   Eigen::Vector3f WhiteBalance(int photo) const;  // factors on red, green, blue
   // 8-bit BGR, sRGB-encoded, with distortion, exposure, blur and noise.
   cv::Mat RenderPhoto(int photo) const;
+  bool IsBlurred(int photo) const;
   bool HasStranger(int photo) const;
   const std::vector<Projector>& Projectors() const;
 

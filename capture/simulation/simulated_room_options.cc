@@ -81,6 +81,8 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "noise of the photos, standard deviation in grey levels of 255")
       .Within(0, 64, "grey levels");
   fields->Number("blur_px", &blur_px, "blur of the photos, Gaussian sigma in pixels").Within(0, 50);
+  fields->Number("blurred", &blurred, "share of the photos that --blur_px is for")
+      .Within(0, 1, "(a share of the photos)");
   fields->Choice("response", &response, ResponseTable::Names(),
                  "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
                  "shoulder");
@@ -93,6 +95,27 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Choice("wrong_exif", &wrong_exif, {"none", "one", "all"},
                  "one: the middle photo notes a quarter of its exposure time; all: every photo "
                  "notes the same");
+  fields
+      ->Number("rolling_shutter_ms", &rolling_shutter_ms,
+               "time from reading the first row of a photo to the last one, in which the hand "
+               "moves the camera on; the true pose is that of the middle row. 30 = a phone")
+      .Within(0, 1000, "ms");
+  fields
+      ->Number("hand_move", &hand_move,
+               "how fast the hand moves while a photo is read, metres per second, each photo "
+               "another way")
+      .Within(0, 10, "m/s");
+  fields
+      ->Number("hand_turn_deg", &hand_turn_deg,
+               "how fast the hand turns while a photo is read, degrees per second, about another "
+               "axis each photo")
+      .Within(0, 360, "degrees per second");
+  fields->Require(photo_height <= photo_width || rolling_shutter_ms == 0,
+                  "--rolling_shutter_ms needs photos that are at least as wide as high: rows lie "
+                  "along the longer side of a sensor");
+  fields->Require(projectors == 0 || rolling_shutter_ms == 0,
+                  "--rolling_shutter_ms needs a hand that moves, --projectors a camera that stands "
+                  "still; give one of them");
   fields
       ->Number("strangers", &strangers,
                "share of the photos in which somebody stands who is not in the scan")
@@ -108,7 +131,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "the noise is range_noise * (1 + this * range), per metre")
       .Within(0, 10, "per metre");
   fields
-      ->Number("bend", &bend, "smooth distortion of the scan: ranges wrong by up to this fraction")
+      ->Number("bend", &bend,
+               "smooth distortion of the scan, as of one that drifts: ranges wrong by up to this "
+               "fraction; 0.008 = 2 cm at 2.5 m")
       .Within(-0.2, 0.2);
   fields
       ->Number("azimuth_drift_deg", &azimuth_drift_deg,

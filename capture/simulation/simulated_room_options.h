@@ -50,13 +50,19 @@ struct SimulatedRoomOptions {
   bool exif = true;                // exposure time, aperture, ISO
   double photo_noise = 1.5;        // grey levels (of 255), standard deviation
   double blur_px = 0.0;            // Gaussian sigma
+  double blurred = 1;              // share of the photos that are blurred
   std::string response = "srgb";   // or "film", see camera_faults.h
   double vignetting = 0;           // share of the light lost in the corners
   double white_balance_ev = 0;     // red and blue vary by up to +- this from photo to photo
   // "one": the middle photo's EXIF notes a quarter of the time; "all": every photo's notes the same
   // time.
   std::string wrong_exif = "none";
-  double strangers = 0;  // share of the photos in which somebody stands who is not in the scan
+  // Time from reading the first row to the last one, in which the hand moves the camera on at these
+  // speeds, each photo another way; 0 = all rows at once.
+  double rolling_shutter_ms = 0;
+  double hand_move = 0.1;     // metres per second
+  double hand_turn_deg = 10;  // degrees per second
+  double strangers = 0;       // share of the photos in which somebody stands who is not in the scan
   // Scans.
   int num_stations = 1;
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees

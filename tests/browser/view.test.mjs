@@ -20,7 +20,7 @@ async function succeed(command, args) {
   const result = await run(command, args);
   assert.equal(result.code, 0, result.stderr);
 }
-async function simulate(name, args) {
+async function simulate(name, args, colouring = []) {
   const capture = folder.path(name);
   await succeed('roomtex-simulate', [
     '--output_path', capture, '--seed', '3', '--quiet', '1', '--exposure_range_ev', '0',
@@ -28,7 +28,7 @@ async function simulate(name, args) {
   ]);
   await succeed('roomtex-texture', [
     '--input_path', `${capture}/truth`, '--image_path', `${capture}/photos`, '--scan_path',
-    `${capture}/scan.rtpi`, '--output_path', `${capture}/textured`, '--quiet', '1'
+    `${capture}/scan.rtpi`, '--output_path', `${capture}/textured`, '--quiet', '1', ...colouring
   ]);
   return capture;
 }
@@ -40,7 +40,7 @@ before(async () => {
   const capture = await simulate('room', [
     '--num_photos', '6', '--photo_width', '800', '--photo_height', '534', '--scan_columns', '720',
     '--scan_rows', '360'
-  ]);
+  ], ['--Registration.mode', 'measure']);
   server = await serveView(
       '--input_path', `${capture}/textured`, '--aligned', `${capture}/truth`, '--image_path',
       `${capture}/photos`);
@@ -187,6 +187,39 @@ test('each way to colour the surface changes the picture and shows its legend', 
   assert.ok(await page.isHidden('#legend'));
   // Not to the byte: a slow machine may show another level.
   assert.ok(difference(await picture(page), colour) < 4);
+  assert.deepEqual(errors(), []);
+  await page.close();
+});
+
+test('a photo says how far it is off the others, and where', async () => {
+  const {page, errors} = await openView();
+  assert.ok(await page.isHidden('#shift'));
+  assert.ok(await page.isHidden('#no-shifts'));
+  const report = JSON.parse(readFileSync(folder.path('room', 'textured', 'report.json')));
+  const {shift_px: {before: px}, shift_before_mm: mm, shift_map_px: map} = report.images[2];
+  const option = page.locator('#camera-list li').nth(2);
+  assert.equal(await option.locator('.off').textContent(), `${px.toFixed(1)} px`);
+  await option.click();
+  await page.waitForFunction(() => roomtexView.cameras.photoShown);
+  assert.ok(await page.isVisible('#shift'));
+  assert.match(
+      await page.textContent('#shift-title'),
+      new RegExp(`by ${px.toFixed(1)} px \\(${mm.toFixed(1)} mm\\)`));
+  // The place that is off most is the lightest one.
+  const [most] = map.flat().map((value, i) => [value ?? -1, i]).sort(([a], [b]) => b - a);
+  const lightest = await page.evaluate(() => {
+    const canvas = document.getElementById('shift-map'), context = canvas.getContext('2d');
+    let best = [-1, -1];
+    for (let i = 0; i < 48; ++i) {
+      const x = (i % 8 + 0.5) * canvas.width / 8, y = (Math.floor(i / 8) + 0.5) * canvas.height / 6;
+      const [r, g, b] = context.getImageData(x, y, 1, 1).data;
+      if (g + r + b > best[0] && !(r === 92 && g === 98 && b === 110)) best = [g + r + b, i];
+    }
+    return best[1];
+  });
+  assert.ok(map.flat()[lightest] >= Math.min(1, most[0]) - 0.1, `${lightest} instead of ${most[1]}`);
+  await page.keyboard.press('Escape');
+  assert.ok(await page.isHidden('#shift'));
   assert.deepEqual(errors(), []);
   await page.close();
 });

@@ -190,6 +190,12 @@ TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
   for (const auto& [name, photo] : report["photo_agreement"].items()) {
     EXPECT_GT(photo["correlation"], 0.9) << name;
   }
+  ASSERT_EQ(report["photo_sharpness"].size(), report["photo_agreement"].size());
+  for (const auto& [name, photo] : report["photo_sharpness"].items()) {
+    EXPECT_GT(photo["sharpness"], 0.85) << name;
+    EXPECT_EQ(photo["weight"], 1) << name;
+    EXPECT_GT(photo["num_samples"], 0) << name;
+  }
   const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
   ASSERT_EQ(run("with_foreign", " --Blend.min_agreement 0").exit_code, 0);
   EXPECT_GT(Psnr(ReadPly(Path("without_foreign/model.ply")), truth),

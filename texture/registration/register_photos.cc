@@ -42,8 +42,17 @@ struct RegisteredPhoto {
   float gain = 1;
   std::optional<CameraProjection> camera;
   Rigid first_pose;
-  PhotoWarp warp{1, 1, 1};
+  Eigen::Vector3d row_turn = Eigen::Vector3d::Zero();  // from the first row to the last one
+  PhotoWarp warp{1, 1, 1};                             // what else is left
+  PhotoWarp shown{1, 1, 1};                            // both together
 };
+
+// When a place of a photo is read: -1/2 at the first row, 1/2 at the last one. Rows lie along the
+// longer side, also of photos that were turned.
+double RowShare(const Camera& camera, const Eigen::Vector2f& place) {
+  return camera.height > camera.width ? place.x() / camera.width - 0.5
+                                      : place.y() / camera.height - 0.5;
+}
 
 // A place at which a photo was compared with the others.
 struct Patch {
@@ -89,6 +98,7 @@ class Registrar {
   // shifts.
   void Measure(int level, int radius) {
     Look(level);
+    radius_ = radius;
     patches_.assign(photos_.size(), {});
     median_px_.assign(photos_.size(), 0);
     ParallelFor(num_threads_, 0, num_photos(), [&](int i) { MeasurePhoto(i, radius); });
@@ -110,7 +120,8 @@ class Registrar {
     return is_free_;
   }
 
-  // Moves all photos that may at once.
+  // Moves all photos that may at once, by what was measured last and by the scan, which is searched
+  // within as many pixels.
   void Correct(bool with_warps) {
     std::vector<std::vector<MeasuredShift>> of_photo(photos_.size());
     ParallelFor(num_threads_, 0, num_photos(), [&](int i) {
@@ -140,6 +151,8 @@ class Registrar {
       photos_[i].warp = nullptr;
       photo.warp =
           PhotoWarp(photos_[i].camera.width, photos_[i].camera.height, photo.warp.spacing());
+      photo.shown = photo.warp;
+      photo.row_turn.setZero();
     }
     is_free_ = false;
     Measure(0, 1);
@@ -156,7 +169,9 @@ class Registrar {
       for (int n = 0; n < photo.warp.num_nodes(); ++n) {
         found.warp_px = std::max(found.warp_px, static_cast<double>(photo.warp.Shift(n).norm()));
       }
-      found.corrected = found.moved > 0 || found.turned_deg > 0 || found.warp_px > 0;
+      found.row_turned_deg = DegFromRad(photo.row_turn.norm());
+      found.corrected =
+          found.moved > 0 || found.turned_deg > 0 || found.row_turned_deg > 0 || found.warp_px > 0;
       FindShiftBefore(i);
     }
     return found_;
@@ -220,6 +235,7 @@ class Registrar {
     const double across = std::min(kNodesAcross, std::sqrt(kMostNodes / num_photos()));
     photo.warp = PhotoWarp(view.camera.width, view.camera.height,
                            std::max(kFewestNodePx, side / across) / photo.scale);
+    photo.shown = photo.warp;
   }
 
   // Sightings around every node of the lattice, those within the cells that meet there; at a coarse
@@ -257,7 +273,7 @@ class Registrar {
     Eigen::Vector2f middle = Eigen::Vector2f::Zero();
     for (size_t k = 0; k < members.size(); k += skip) {
       const Sighting& s = sightings[members[k]];
-      const Eigen::Vector2f shown = s.place + photo.warp.At(s.place.x(), s.place.y());
+      const Eigen::Vector2f shown = s.place + photo.shown.At(s.place.x(), s.place.y());
       expected.push_back({shown * scale, grey_of(s)});
       middle += s.place;
     }
@@ -276,10 +292,9 @@ class Registrar {
   // Counted only where photo and scan show the same: intensity is not brightness.
   void AddShiftsAgainstScan(int i, std::vector<MeasuredShift>* shifts) const {
     constexpr float kAlike = 0.7f;
-    constexpr int kRadius = 3;
     for (const std::vector<int>& members : GatherPatches(i)) {
       if (members.size() < kFewestOfPatch) continue;
-      const auto patch = Compare(i, members, kRadius, [this](const Sighting& s) {
+      const auto patch = Compare(i, members, radius_, [this](const Sighting& s) {
         return static_cast<float>(samples_.Intensity(s.sample));
       });
       if (!patch || patch->shift.likeness < kAlike) continue;
@@ -341,7 +356,11 @@ class Registrar {
     seen.place.photo = i;
     Eigen::Matrix<double, 3, 6> by_step;  // of Moved()
     by_step << -CrossMatrix(view.cam_from_scan.rotation * x_in_scan), Eigen::Matrix3d::Identity();
-    seen.place.by_pose = (by_point * by_step).cast<float>();
+    seen.place.by_pose.leftCols<6>() = (by_point * by_step).cast<float>();
+    if (options_.row_turn_deg > 0) {
+      seen.place.by_pose.rightCols<3>() =
+          (RowShare(view.camera, sighting.place) * by_point * -CrossMatrix(x_in_cam)).cast<float>();
+    }
     registered_[i].warp.NodesAt(sighting.place.x(), sighting.place.y(), &seen.place.nodes,
                                 &seen.place.node_weights);
     return seen;
@@ -381,9 +400,13 @@ class Registrar {
     prior.is_free = IsFree(i);
     const Rigid& pose = photos_[i].cam_from_scan;
     const Eigen::AngleAxisd turn(pose.rotation * photo.first_pose.rotation.conjugate());
-    prior.pose << turn.angle() * turn.axis(), pose.translation - photo.first_pose.translation;
+    prior.pose << turn.angle() * turn.axis(), pose.translation - photo.first_pose.translation,
+        photo.row_turn;
+    // What moves nothing is held at 0 by any sigma.
+    const double row_turn_deg = options_.row_turn_deg > 0 ? options_.row_turn_deg : 1;
     prior.pose_sigma << Eigen::Vector3d::Constant(RadFromDeg(options_.turn_deg)),
-        Eigen::Vector3d::Constant(options_.move);
+        Eigen::Vector3d::Constant(options_.move),
+        Eigen::Vector3d::Constant(RadFromDeg(row_turn_deg));
     if (with_warp) prior.warp = &photo.warp;
     prior.warp_sigma = options_.warp_px / photo.scale;
     prior.step_sigma = options_.warp_step_px / photo.scale;
@@ -393,10 +416,28 @@ class Registrar {
   void Move(int i, const PhotoStep& step) {
     if (!IsFree(i)) return;
     RegisteredPhoto& photo = registered_[i];
-    photos_[i].cam_from_scan = Moved(photos_[i].cam_from_scan, step.pose);
-    if (step.warp.empty()) return;
-    for (int n = 0; n < photo.warp.num_nodes(); ++n) photo.warp.Shift(n) += step.warp[n];
-    photos_[i].warp = std::make_shared<const PhotoWarp>(photo.warp);
+    photos_[i].cam_from_scan = Moved(photos_[i].cam_from_scan, step.pose.head<6>());
+    photo.row_turn += step.pose.tail<3>();
+    for (size_t n = 0; n < step.warp.size(); ++n) {
+      photo.warp.Shift(static_cast<int>(n)) += step.warp[n];
+    }
+    photo.shown = photo.warp;
+    if (!photo.row_turn.isZero()) AddRowTurn(photos_[i].camera, &photo);
+    if (step.warp.empty() && photo.row_turn.isZero()) return;
+    photos_[i].warp = std::make_shared<const PhotoWarp>(photo.shown);
+  }
+
+  // A camera that turns about itself moves what it shows by as much at any distance.
+  static void AddRowTurn(const Camera& camera, RegisteredPhoto* photo) {
+    for (int n = 0; n < photo->shown.num_nodes(); ++n) {
+      const Eigen::Vector2f place = photo->shown.Place(n).cwiseMin(
+          Eigen::Vector2i(camera.width, camera.height).cast<float>());
+      const auto ray = photo->camera->RayFromImg(place.cast<double>());
+      if (!ray) continue;
+      const auto shown = photo->camera->ImgFromCam(
+          RotationFromVector(RowShare(camera, place) * photo->row_turn) * *ray);
+      if (shown) photo->shown.Shift(n) += shown->cast<float>() - place;
+    }
   }
 
   // From where the photo showed a place when it came to where it shows it now, and what was still
@@ -412,7 +453,7 @@ class Registrar {
       const Eigen::Vector3d x_in_cam = photo.first_pose * samples_.Point(s.sample);
       const auto before = photo.camera->ImgFromCam(x_in_cam);
       if (!before) continue;
-      const Eigen::Vector2f shown = s.place + photo.warp.At(s.place.x(), s.place.y());
+      const Eigen::Vector2f shown = s.place + photo.shown.At(s.place.x(), s.place.y());
       const Eigen::Vector2d shift = (shown + patch.shift.shift / scale).cast<double>() - *before;
       pixels.push_back(shift.norm());
       metres.push_back(shift.norm() * x_in_cam.norm() / photos_[i].camera.MeanFocalLength());
@@ -439,7 +480,7 @@ class Registrar {
   std::vector<RegisteredPhoto> registered_;
   std::vector<PhotoRegistration> found_;
   bool is_free_ = false;
-  int level_ = 0;
+  int level_ = 0, radius_ = 0;               // measured last
   std::vector<std::vector<Patch>> patches_;  // per photo
   std::vector<double> median_px_;
 };
@@ -496,6 +537,11 @@ void RegistrationOptions::Declare(OptionFields* fields) {
                "How far a pose may be off its place, one standard deviation, metres. Larger = "
                "held less by the alignment.")
       .Positive();
+  fields
+      ->Number("Registration.row_turn_deg", &row_turn_deg,
+               "How far a camera may turn while the rows of its photo are read (rolling shutter), "
+               "one standard deviation, degrees; 0 = not at all. Larger = held less.")
+      .Within(0, 90, "degrees");
   fields
       ->Number("Registration.warp_px", &warp_px,
                "How far a warp may shift what a photo shows, one standard deviation, pixels of a "

@@ -21,12 +21,15 @@ struct RegistrationOptions {
   // "none": photos are taken as they are. "measure": how far they are off is found, but not
   // corrected. "pose": their poses are corrected. "warp": and what poses leave, by a smooth field
   // of shifts per photo. None is the default: on a real room whose scan is off there is nothing to
-  // gain for nearly three times the time (docs/texture.md).
+  // gain for twice the time (docs/texture.md).
   std::string mode = "none";
   // How far poses may be off, one standard deviation of each axis: what the photos say of each
   // other counts against that. Larger = held less by the alignment.
   double turn_deg = 0.03;
   double move = 0.002;  // metres
+  // The same of how far a photo turned while its rows were read (rolling shutter), from the first
+  // to the last; rows along its longer side. 0 = all at once. Larger = held less.
+  double row_turn_deg = 0.1;
   // The same of a warp, pixels of a picture whose longer side has 1280 (or as many as the photo, if
   // those are fewer): shifts, and how they change over 1/28 of that side. Larger = bent more.
   double warp_px = 2;
@@ -54,7 +57,8 @@ struct PhotoRegistration {
   double share_measured = 0;  // of the places that were compared, how many had an answer
   bool corrected = false;
   double turned_deg = 0, moved = 0;  // of the pose; metres
-  double warp_px = 0;                // largest shift of the warp
+  double row_turned_deg = 0;         // while its rows were read
+  double warp_px = 0;                // largest shift of the warp, without that
 };
 
 // Moves the poses of the photos and gives them warps. Photos are decoded once more, each into a

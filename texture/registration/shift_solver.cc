@@ -10,8 +10,8 @@
 namespace roomtex {
 namespace {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+constexpr int kOfPose = PhotoMotion::RowsAtCompileTime;
+using PoseBlock = Eigen::Matrix<double, kOfPose, kOfPose>;
 
 // The least-squares problem A x = b with a prior, its unknowns photo by photo: pose, then warp.
 class ShiftProblem {
@@ -22,7 +22,7 @@ class ShiftProblem {
     for (const PhotoPrior& prior : priors) {
       first_.push_back(size);
       if (!prior.is_free) continue;
-      size += 6 + (prior.warp != nullptr ? 2 * prior.warp->num_nodes() : 0);
+      size += kOfPose + (prior.warp != nullptr ? 2 * prior.warp->num_nodes() : 0);
     }
     first_.push_back(size);
   }
@@ -53,7 +53,7 @@ class ShiftProblem {
     Eigen::VectorXd stand = Eigen::VectorXd::Zero(size());
     for (size_t p = 0; p < priors_.size(); ++p) {
       if (!priors_[p].is_free) continue;
-      stand.segment<6>(first_[p]) = priors_[p].pose;
+      stand.segment<kOfPose>(first_[p]) = priors_[p].pose;
       for (int n = 0; HasWarp(p) && n < priors_[p].warp->num_nodes(); ++n) {
         stand.segment<2>(Node(p, n)) = priors_[p].warp->Shift(n).cast<double>();
       }
@@ -72,7 +72,7 @@ class ShiftProblem {
 
   // Inverse blocks of the diagonal: poses whole, nodes by 2 x 2 numbers.
   void MakePreconditioner() {
-    pose_blocks_.assign(priors_.size(), Matrix6d::Zero());
+    pose_blocks_.assign(priors_.size(), PoseBlock::Zero());
     diagonal_ = Eigen::VectorXd::Zero(size());
     for (size_t p = 0; p < priors_.size(); ++p) {
       if (priors_[p].is_free) {
@@ -86,7 +86,7 @@ class ShiftProblem {
         if (!priors_[place.photo].is_free) continue;
         const Eigen::Matrix2d share = term.share.cast<double>();
         const Eigen::Matrix2d in_photo = share.transpose() * information * share;
-        const Eigen::Matrix<double, 2, 6> by_pose = place.by_pose.cast<double>();
+        const Eigen::Matrix<double, 2, kOfPose> by_pose = place.by_pose.cast<double>();
         pose_blocks_[place.photo] += by_pose.transpose() * in_photo * by_pose;
         for (int k = 0; HasWarp(place.photo) && k < 4; ++k) {
           const double w = place.node_weights[k];
@@ -96,7 +96,7 @@ class ShiftProblem {
     }
     for (size_t p = 0; p < priors_.size(); ++p) {
       if (!priors_[p].is_free) continue;
-      pose_blocks_[p] = pose_blocks_[p].ldlt().solve(Matrix6d::Identity()).eval();
+      pose_blocks_[p] = pose_blocks_[p].ldlt().solve(PoseBlock::Identity()).eval();
       if (!HasWarp(p)) continue;
       const double hold = 1 / Square(priors_[p].warp_sigma) + 4 / Square(priors_[p].step_sigma);
       for (int n = 0; n < priors_[p].warp->num_nodes(); ++n) {
@@ -109,8 +109,8 @@ class ShiftProblem {
     Eigen::VectorXd result = x;
     for (size_t p = 0; p < priors_.size(); ++p) {
       if (!priors_[p].is_free) continue;
-      result.segment<6>(first_[p]) = pose_blocks_[p] * x.segment<6>(first_[p]);
-      const int begin = first_[p] + 6, count = first_[p + 1] - begin;
+      result.segment<kOfPose>(first_[p]) = pose_blocks_[p] * x.segment<kOfPose>(first_[p]);
+      const int begin = first_[p] + kOfPose, count = first_[p + 1] - begin;
       result.segment(begin, count).array() /= diagonal_.segment(begin, count).array();
     }
     return result;
@@ -119,7 +119,7 @@ class ShiftProblem {
   PhotoStep StepOf(size_t p, const Eigen::VectorXd& x) const {
     PhotoStep step;
     if (!priors_[p].is_free) return step;
-    step.pose = x.segment<6>(first_[p]);
+    step.pose = x.segment<kOfPose>(first_[p]);
     for (int n = 0; HasWarp(p) && n < priors_[p].warp->num_nodes(); ++n) {
       step.warp.push_back(x.segment<2>(Node(p, n)).cast<float>());
     }
@@ -129,10 +129,10 @@ class ShiftProblem {
  private:
   static double Square(double x) { return x * x; }
   bool HasWarp(size_t p) const { return priors_[p].is_free && priors_[p].warp != nullptr; }
-  int Node(size_t p, int node) const { return first_[p] + 6 + 2 * node; }
+  int Node(size_t p, int node) const { return first_[p] + kOfPose + 2 * node; }
 
   Eigen::Vector2d MotionInPhoto(const PlaceInPhoto& place, const Eigen::VectorXd& x) const {
-    Eigen::Vector2d motion = place.by_pose.cast<double>() * x.segment<6>(first_[place.photo]);
+    Eigen::Vector2d motion = place.by_pose.cast<double>() * x.segment<kOfPose>(first_[place.photo]);
     for (int k = 0; HasWarp(place.photo) && k < 4; ++k) {
       motion += place.node_weights[k] * x.segment<2>(Node(place.photo, place.nodes[k]));
     }
@@ -146,7 +146,8 @@ class ShiftProblem {
       const PlaceInPhoto& place = term.place;
       if (!priors_[place.photo].is_free) continue;
       const Eigen::Vector2d in_photo = term.share.cast<double>().transpose() * pull;
-      sum->segment<6>(first_[place.photo]) += place.by_pose.cast<double>().transpose() * in_photo;
+      sum->segment<kOfPose>(first_[place.photo]) +=
+          place.by_pose.cast<double>().transpose() * in_photo;
       for (int k = 0; HasWarp(place.photo) && k < 4; ++k) {
         sum->segment<2>(Node(place.photo, place.nodes[k])) += place.node_weights[k] * in_photo;
       }
@@ -158,8 +159,8 @@ class ShiftProblem {
     for (size_t p = 0; p < priors_.size(); ++p) {
       const PhotoPrior& prior = priors_[p];
       if (!prior.is_free) continue;
-      sum->segment<6>(first_[p]) +=
-          x.segment<6>(first_[p]).cwiseQuotient(prior.pose_sigma.cwiseAbs2());
+      sum->segment<kOfPose>(first_[p]) +=
+          x.segment<kOfPose>(first_[p]).cwiseQuotient(prior.pose_sigma.cwiseAbs2());
       if (!HasWarp(p)) continue;
       const double hold = 1 / Square(prior.warp_sigma), smooth = 1 / Square(prior.step_sigma);
       const int columns = prior.warp->columns(), rows = prior.warp->rows();
@@ -180,7 +181,7 @@ class ShiftProblem {
   const std::vector<PhotoPrior>& priors_;
   std::vector<double> weights_;  // robust
   std::vector<int> first_;       // unknown of each photo
-  std::vector<Matrix6d> pose_blocks_;
+  std::vector<PoseBlock> pose_blocks_;
   Eigen::VectorXd diagonal_;
 };
 

@@ -11,11 +11,15 @@
 
 namespace roomtex {
 
-// How a point of the surface moves in a photo, pixels: by_pose * (turn, shift) as Moved() takes
-// them, and by the nodes of its warp.
+// Turn and shift of a photo as Moved() takes them, and how far it turned from its first row to its
+// last one while they were read: rotation vectors in `cam`, metres.
+using PhotoMotion = Eigen::Matrix<double, 9, 1>;
+
+// How a point of the surface moves in a photo, pixels: by_pose * motion, and by the nodes of its
+// warp.
 struct PlaceInPhoto {
   int photo = 0;
-  Eigen::Matrix<float, 2, 6> by_pose = Eigen::Matrix<float, 2, 6>::Zero();
+  Eigen::Matrix<float, 2, 9> by_pose = Eigen::Matrix<float, 2, 9>::Zero();
   std::array<int, 4> nodes{};
   std::array<float, 4> node_weights{};
 };
@@ -36,15 +40,15 @@ struct MeasuredShift {
 struct PhotoPrior {
   bool is_free = true;  // false: it does not move
   // Where it stands already, and how far it may be off: standard deviations.
-  Eigen::Matrix<double, 6, 1> pose = Eigen::Matrix<double, 6, 1>::Zero();
-  Eigen::Matrix<double, 6, 1> pose_sigma = Eigen::Matrix<double, 6, 1>::Ones();
+  PhotoMotion pose = PhotoMotion::Zero();
+  PhotoMotion pose_sigma = PhotoMotion::Ones();
   // Null: no warp is asked for. Sigmas in pixels: of a node, and of the step to the next one.
   const PhotoWarp* warp = nullptr;
   double warp_sigma = 1, step_sigma = 1;
 };
 
 struct PhotoStep {
-  Eigen::Matrix<double, 6, 1> pose = Eigen::Matrix<double, 6, 1>::Zero();
+  PhotoMotion pose = PhotoMotion::Zero();
   std::vector<Eigen::Vector2f> warp;  // per node; empty without
 };
 

@@ -62,6 +62,8 @@ void BlendOptions::Declare(OptionFields* fields) {
                "Less weight for photos that see a sample at a slant.");
   fields->Bool("Blend.resolution_weight", &resolution_weight,
                "More weight for photos with more pixels per sample.");
+  fields->Bool("Blend.sharpness_weight", &sharpness_weight,
+               "Less weight for photos that are blurred against the others at the same surface.");
   fields
       ->Number("Blend.outlier", &outlier,
                "Colour difference (0..1) from the other photos at which half the weight is "

@@ -28,6 +28,9 @@ struct BlendOptions {
   // A photo with more pixels per sample gets more weight: its colours are less mixed with their
   // neighbours'. Departure from the thesis.
   bool resolution_weight = true;
+  // A photo that is blurred against the others at the same surface gets less weight, see
+  // photo_sharpness.h. Departure from the thesis.
+  bool sharpness_weight = true;
   // Colours that contradict the others at a sample (people, moved chairs, shadows of the
   // photographer, reflections) lose their weight: the distance at which half of it is lost, on a
   // scale of 0..1 that is about even to the eye. Larger = more tolerant; below 0.2, shiny surfaces,

@@ -26,6 +26,7 @@ constexpr int kSeamPx = 20;
 struct PhotoObservations {
   std::vector<SlotObservation> all;
   std::vector<size_t> tile_end;
+  std::vector<SharpnessProbe> probes;
 };
 
 cv::Mat Decode(const PhotoView& view) {
@@ -38,9 +39,11 @@ cv::Mat Decode(const PhotoView& view) {
 class PhotoObserver {
  public:
   PhotoObserver(const PhotoPassInput& input, const PhotoView& view, cv::Mat picture,
-                const OcclusionOptions& occlusion, const BlendOptions& blend)
+                const OcclusionOptions& occlusion, const BlendOptions& blend, size_t probe_stride)
       : input_(input),
         blend_(blend),
+        photo_weight_(view.weight),
+        probe_stride_(probe_stride),
         projector_(view),
         warp_(view.warp),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
@@ -91,15 +94,18 @@ class PhotoObserver {
       Eigen::Vector2f shown(x, y);
       if (warp_) shown += warp_->At(x, y);
       if (!(shown.minCoeff() >= 0 && shown.x() <= width && shown.y() <= height)) continue;
+      const Eigen::Vector3f camera_direction = to_camera.normalized();
+      if (probe_stride_ > 0 && (tile.first_slot + i) % probe_stride_ == 0 && sight == Sight::kClear)
+        Probe(tile.first_slot + i, shown, to_camera.norm() / focal_length,
+              normal.dot(camera_direction), &seen->probes);
       const PhotoColor color = blend_.footprint > 0
                                    ? LookUpPhoto(image_, shown.x() + seam, shown.y(),
                                                  static_cast<float>(blend_.footprint) * spacing_px)
                                    : LookUpPhoto(image_, shown.x() + seam, shown.y());
-      const Eigen::Vector3f camera_direction = to_camera.normalized();
       // A panorama has no left and right border.
       const float from_side = seam_px_ > 0 ? 0.5f * width : x;
-      float weight =
-          ThesisWeight(from_side, y, width, height, sight != Sight::kClear) * color.reliability;
+      float weight = ThesisWeight(from_side, y, width, height, sight != Sight::kClear) *
+                     color.reliability * photo_weight_;
       if (blend_.angle_weight) {
         weight *= AngleWeight(camera_direction, to_scanner.normalized(), normal);
       }
@@ -117,8 +123,18 @@ class PhotoObserver {
     }
   }
 
+  void Probe(uint32_t slot, const Eigen::Vector2f& shown, float pixel_width, float cosine,
+             std::vector<SharpnessProbe>* probes) const {
+    constexpr float kSlant = 0.5f;  // beyond it, pixels are much wider one way than the other
+    if (cosine < kSlant) return;
+    const float contrast = ContrastAt(image_, shown.x() + static_cast<float>(seam_px_), shown.y());
+    if (contrast >= 0) probes->push_back({slot, contrast, pixel_width / std::sqrt(cosine)});
+  }
+
   const PhotoPassInput& input_;
   const BlendOptions& blend_;
+  float photo_weight_;
+  size_t probe_stride_;  // 0 = no probes
   PhotoProjector projector_;
   std::shared_ptr<const PhotoWarp> warp_;
   PhotoVisibility visibility_;
@@ -134,13 +150,16 @@ std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
                                                const std::vector<PhotoView>& photos,
                                                const OcclusionOptions& occlusion,
                                                const BlendOptions& blend, int num_threads,
-                                               Progress* progress, ObservationStore* store) {
+                                               Progress* progress, ObservationStore* store,
+                                               std::vector<std::vector<SharpnessProbe>>* probes) {
   const int num_photos = static_cast<int>(photos.size());
   const int num_tiles = static_cast<int>(input.samples.size());
   const int batch_size = EffectiveThreads(num_threads);
   std::vector<std::vector<size_t>> num_seen(num_photos);
   std::vector<PhotoObservations> batch(batch_size);
   std::vector<std::string> problems(num_photos);
+  const size_t probe_stride = probes ? SharpnessStride(store->num_samples()) : 0;
+  if (probes) probes->assign(num_photos, {});
   for (int first = 0; first < num_photos; first += batch_size) {
     const int count = std::min(batch_size, num_photos - first);
     ParallelFor(num_threads, 0, count, [&](int i) {
@@ -150,11 +169,16 @@ std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
         picture = Decode(photos[photo]);
       } catch (const InputError& error) {
         problems[photo] = error.what();
-        batch[i] = {{}, std::vector<size_t>(num_tiles, 0)};
+        batch[i] = {{}, std::vector<size_t>(num_tiles, 0), {}};
         return;
       }
       batch[i] =
-          PhotoObserver(input, photos[photo], std::move(picture), occlusion, blend).Observe(photo);
+          PhotoObserver(input, photos[photo], std::move(picture), occlusion, blend, probe_stride)
+              .Observe(photo);
+      if (probes) {
+        KeepSomeProbes(photos.size(), &batch[i].probes);
+        (*probes)[photo] = std::move(batch[i].probes);
+      }
       size_t before = 0;
       for (const size_t end_tile : input.grid_ends) {
         const size_t end = end_tile == 0 ? 0 : batch[i].tile_end[end_tile - 1];

@@ -10,6 +10,7 @@
 #include "texture/sampling/blend.h"
 #include "texture/sampling/mesh_tiles.h"
 #include "texture/sampling/observations.h"
+#include "texture/sampling/photo_sharpness.h"
 #include "texture/sampling/photo_view.h"
 #include "texture/sampling/visibility.h"
 
@@ -36,11 +37,12 @@ class UnusablePhotos : public InputError {
 };
 
 // Adds every photo's observations to the store. Returns how many samples each photo sees of each
-// grid. Throws UnusablePhotos; the store is then of no use.
-std::vector<std::vector<size_t>> ObservePhotos(const PhotoPassInput& input,
-                                               const std::vector<PhotoView>& photos,
-                                               const OcclusionOptions& occlusion,
-                                               const BlendOptions& blend, int num_threads,
-                                               Progress* progress, ObservationStore* store);
+// grid. probes: null, or what CompareSharpness() asks for, per photo. Throws UnusablePhotos; the
+// store is then of no use.
+std::vector<std::vector<size_t>> ObservePhotos(
+    const PhotoPassInput& input, const std::vector<PhotoView>& photos,
+    const OcclusionOptions& occlusion, const BlendOptions& blend, int num_threads,
+    Progress* progress, ObservationStore* store,
+    std::vector<std::vector<SharpnessProbe>>* probes = nullptr);
 
 }  // namespace roomtex

@@ -24,6 +24,7 @@ struct PhotoView {
   Camera camera;  // of the size of that picture
   Rigid cam_from_scan;
   std::shared_ptr<const PhotoTone> tone;  // how its bytes become light; none = sRGB
+  float weight = 1;  // share of its weight in the blend that it keeps, e.g. a blurred one
   std::shared_ptr<const PhotoWarp> warp;  // what camera and pose do not say; none = nothing
 
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }

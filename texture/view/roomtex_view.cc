@@ -17,6 +17,7 @@
 #include "core/output_set.h"
 #include "texture/view/view_folder.h"
 #include "texture/view/view_server.h"
+#include "texture/view/view_shifts.h"
 
 namespace roomtex {
 namespace {
@@ -131,6 +132,7 @@ ViewContent ReadContent(const ViewOptions& options, const Command::Context& cont
   ReportPhotosLeftOut(content.cameras.left_out(), context);
   const fs::path folder = fs::path(content.model.path).parent_path();
   content.tones = ReadViewTones(folder.string());
+  content.shifts = ReadViewShifts(folder.string());
   const fs::path evidence = folder / "evidence.ply";
   std::error_code error;
   if (fs::is_regular_file(evidence, error)) {

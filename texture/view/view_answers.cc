@@ -271,7 +271,14 @@ void ViewAnswers::Impl::Add() {
   };
   json["scene"] = [this](const Query&) { return Scene(); };
   json["evidence"] = [this](const Query&) { return Evidence()->ToJson(); };
-  json["cameras"] = [this](const Query&) { return content.cameras.ToJson(); };
+  json["cameras"] = [this](const Query&) {
+    Json cameras = content.cameras.ToJson();
+    for (Json& camera : cameras) {
+      const auto found = content.shifts.find(camera["name"].get<std::string>());
+      camera["shift"] = found == content.shifts.end() ? Json() : found->second;
+    }
+    return cameras;
+  };
   json["lattice"] = [this](const Query& query) {
     return content.cameras.Lattice(IntOf(query, "id"));
   };

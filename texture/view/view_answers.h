@@ -19,11 +19,12 @@ namespace roomtex {
 // What is to be seen.
 struct ViewContent {
   ViewModel model;
-  ViewCameras cameras;                // none: no cameras on the page
-  ViewTones tones;                    // of the photos of the cameras
-  std::string evidence_path;          // "" = none
-  std::string no_evidence_reason;     // a sentence, when there is none
-  std::vector<std::string> warnings;  // sentences for the user
+  ViewCameras cameras;                 // none: no cameras on the page
+  ViewTones tones;                     // of the photos of the cameras
+  std::map<std::string, Json> shifts;  // of them, as ReadViewShifts()
+  std::string evidence_path;           // "" = none
+  std::string no_evidence_reason;      // a sentence, when there is none
+  std::vector<std::string> warnings;   // sentences for the user
 };
 
 // Questions are a word and values, as in a URL. Numbers are metres, `scan` frame, unless said; ids
@@ -36,7 +37,8 @@ struct ViewContent {
 //   evidence         {available, reason, ...} of ViewEvidence::ToJson
 //   evidence_chunk?id&level   bytes of ViewEvidence::Encode, for the points of that chunk
 //   texture?page&max image of at most max x max texels, scaled if it has more
-//   cameras          [camera ...] of ViewCameras::ToJson
+//   cameras          [camera ...] of ViewCameras::ToJson, each with its `shift` of
+//                    ReadViewShifts, null = not measured
 //   lattice?id       of ViewCameras::Lattice
 //   photo?id&max     JPEG; 404 without a file
 //   lumigraph        of ViewLumigraph::ToJson

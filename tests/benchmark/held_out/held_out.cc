@@ -201,7 +201,8 @@ class HeldOutTable {
 const char kThesis[] =
     "thesis: --Registration.mode none --Occlusion.depth_tolerance 0.008 --Occlusion.shadows 0 "
     "--Blend.angle_weight 0 "
-    "--Blend.resolution_weight 0 --Blend.outlier 0 --Blend.detail 1 --Surface.reduce_range_noise 0 "
+    "--Blend.resolution_weight 0 --Blend.sharpness_weight 0 --Blend.outlier 0 --Blend.detail 1 "
+    "--Surface.reduce_range_noise 0 "
     "--Exposure.mode exif";
 
 std::vector<std::string> ReadMethods(const std::string& path) {

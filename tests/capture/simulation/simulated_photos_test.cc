@@ -241,5 +241,85 @@ TEST(SimulatedPhotos, AreSteppedInThirdsOfAnEvWithinTheRange) {
   for (int photo = 0; photo < 3; ++photo) EXPECT_EQ(even.ExposureEv(photo), 0);
 }
 
+SimulatedRoomOptions HeldByHand() {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 2;
+  options.photo_noise = 0;
+  options.range_noise = 0;
+  options.rolling_shutter_ms = 30;
+  options.hand_turn_deg = 60;
+  options.hand_move = 0.3;
+  return options;
+}
+
+// Each row is what a photo taken at once from the pose of that row shows there.
+TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) {
+  const SimulatedRoomOptions options = HeldByHand();
+  const SimulatedRoom room(options);
+  const cv::Mat photo = room.RenderPhoto(1);
+  const CameraProjection camera(room.camera());
+  const TrueSamples samples = room.MakeTrueSamples();
+  const std::vector<Eigen::Vector2f> seen = room.TrueSightings(samples, 1);
+  size_t num_seen = 0;
+  double most_turned = 0;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    if (!(seen[i].x() >= 0)) continue;
+    ++num_seen;
+    const double y = seen[i].y();
+    const auto at_row = camera.ImgFromCam(room.CamFromRoomAt(1, y) * samples.points[i]);
+    const auto at_once = camera.ImgFromCam(room.CamFromRoom(1) * samples.points[i]);
+    ASSERT_TRUE(at_row && at_once);
+    EXPECT_LT((at_row->cast<float>() - seen[i]).norm(), 1e-3);
+    most_turned = std::max(most_turned, (*at_row - *at_once).norm());
+  }
+  EXPECT_GT(num_seen, 10000u);
+  EXPECT_GT(most_turned, 4);
+  const double turn = DegFromRad(RotationAngle(room.CamFromRoomAt(1, options.photo_height).rotation,
+                                               room.CamFromRoomAt(1, 0).rotation));
+  EXPECT_NEAR(turn, 60 * 0.030, 1e-6);
+
+  // Colours of the points, in the places where the photo shows them by its rows.
+  const auto error_at = [&](const auto& place_of) {
+    const std::vector<Eigen::Vector3f> truth = room.TrueColors();
+    const double gain = std::exp2(room.ExposureEv(1));
+    std::vector<double> errors;
+    for (size_t i = 0; i < seen.size(); ++i) {
+      if (!(seen[i].x() >= 0)) continue;
+      const Eigen::Vector2d at = place_of(i);
+      if (!camera.InImage(at)) continue;
+      const auto& pixel = photo.at<cv::Vec3b>(std::min<int>(at.y(), photo.rows - 1),
+                                              std::min<int>(at.x(), photo.cols - 1));
+      for (int k = 0; k < 3; ++k) {
+        const double want = SrgbFromLinear(std::min(1.0, gain * truth[i][k]));
+        errors.push_back(std::abs(pixel[2 - k] / 255.0 - want));
+      }
+    }
+    return Median(&errors);
+  };
+  const double by_rows =
+      error_at([&](size_t i) { return Eigen::Vector2d(seen[i].cast<double>()); });
+  const double by_the_middle = error_at([&](size_t i) {
+    return Eigen::Vector2d(*camera.ImgFromCam(room.CamFromRoom(1) * samples.points[i]));
+  });
+  EXPECT_LT(by_rows, 0.035);
+  EXPECT_LT(by_rows, 0.7 * by_the_middle);
+}
+
+TEST(SimulatedPhotos, AreBlurredAsOftenAsAsked) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 2;
+  options.blur_px = 3;
+  options.blurred = 0.5;
+  const SimulatedRoom some(options);
+  options.blur_px = 0;
+  const SimulatedRoom none(options);
+  for (int photo = 0; photo < 2; ++photo) {
+    EXPECT_EQ(some.IsBlurred(photo), photo % 2 == 1);
+    const double difference =
+        cv::norm(some.RenderPhoto(photo), none.RenderPhoto(photo), cv::NORM_L1);
+    EXPECT_EQ(difference > 0, photo % 2 == 1) << photo;
+  }
+}
+
 }  // namespace
 }  // namespace roomtex

@@ -69,6 +69,13 @@ TEST(SimulatedRoom, NamesEveryBadOption) {
   options.num_stations = 99;
   EXPECT_EQ(options.Problems().size(), 5u);
   EXPECT_THROW(SimulatedRoom{options}, UsageError);
+  SimulatedRoomOptions held;
+  held.rolling_shutter_ms = 30;
+  EXPECT_TRUE(held.Problems().empty());
+  held.projectors = 1;
+  EXPECT_THAT(held.Problems(), testing::Contains(testing::HasSubstr("stands still")));
+  held.photo_height = held.photo_width + 1;
+  EXPECT_THAT(held.Problems(), testing::Contains(testing::HasSubstr("wide as high")));
 }
 
 TEST(SimulatedRoom, StandsUprightInItsScanFrame) {

@@ -32,7 +32,7 @@ export function legendOf(mode, evidence) {
   return null;
 }
 
-function paintBar(canvas, mode, steps) {
+export function paintBar(canvas, mode, steps) {
   canvas.width = 512;
   canvas.height = 14;
   const context = canvas.getContext('2d');

@@ -6,6 +6,7 @@ import {getImageUrl} from './api.js';
 import {coordinates, count, length, setUnit, unit} from './format.js';
 import {showLegend} from './legend.js';
 import {extentOf, makePlan, planRotation} from './plan.js';
+import {Shifts} from './shifts.js';
 import {kModes, needsEvidence} from './surface.js';
 
 const $ = (id) => document.getElementById(id);
@@ -44,6 +45,7 @@ export class Panel {
   constructor(viewer) {
     this.viewer = viewer;
     this.options = [];
+    this.shifts = new Shifts([]);
     this.#bind();
     this.#bindKeys();
   }
@@ -281,6 +283,7 @@ export class Panel {
     this.hint(measuring ? 'Click the first point (or Enter for the one at the cross).' : '');
   }
   showStanding(camera) {
+    this.shifts.show(camera);
     $('standing').hidden = !camera;
     if (camera) $('standing-name').textContent = camera.name;
     for (const option of this.options) {
@@ -301,12 +304,13 @@ export class Panel {
     $('camera-size').value = size;
     $('camera-size').max = Math.max(1, 2 * size);
     this.#setCameraSize(size);
+    this.shifts = new Shifts(list);
     this.options = list.map((camera) => {
       const image = make('img', {alt: '', loading: 'lazy', width: 54, height: 36});
       if (camera.photo) this.#showSmall(image, camera);
       const option = make(
           'li', {id: `camera-${camera.id}`, camera}, image,
-          make('span', {text: camera.name, title: camera.name}));
+          make('span', {text: camera.name, title: camera.name}), ...this.shifts.label(camera));
       option.setAttribute('role', 'option');
       option.setAttribute('aria-selected', 'false');
       option.addEventListener('click', () => this.viewer.standIn(camera));

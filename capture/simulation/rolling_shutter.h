@@ -1,0 +1,34 @@
+#pragma once
+// Photos whose rows are read one after the other while a hand moves the camera. Frames: `room`,
+// `cam`, `img`.
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "capture/simulation/simulated_room_options.h"
+#include "core/camera_model.h"
+#include "core/similarity.h"
+
+namespace roomtex {
+
+// Where a photo is taken from, row by row: turned and moved evenly.
+struct RowPoses {
+  Rigid cam_from_room;  // when the middle of the photo is read
+  // From the upper border to the lower one, in `cam`: rotation vector, metres. Zero = all at once.
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
+  double height = 1;  // pixels
+
+  Rigid At(double y_in_img) const;
+  // Where the photo shows a point, in the image or beyond it: the row that sees it while it is
+  // read. None where the camera gives no position, or the motion is too fast to say.
+  std::optional<Eigen::Vector2d> Project(const CameraProjection& camera,
+                                         const Eigen::Vector3d& x_in_room) const;
+};
+
+// One per pose; random directions at the speeds of the options.
+std::vector<RowPoses> MoveByHand(const SimulatedRoomOptions& options,
+                                 const std::vector<Rigid>& cam_from_room);
+
+}  // namespace roomtex
