@@ -8,6 +8,7 @@
 
 #include "core/frames.h"
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -20,7 +21,10 @@ constexpr double kNear = 0.05, kExact = 0.005;
 // seen; with few, nothing says how many directions have none.
 constexpr double kToHide = 0.5, kToFill = 4;  // points in one direction
 constexpr double kLeastSeen = 0.994;          // of the points, from a station
-constexpr double kLeastSphere = 0.15;         // of the directions, that have points
+// The share of places that may see more than this of the points if one of them is to be the
+// station.
+constexpr double kMostPlaces = 0.1, kSeenElsewhere = 0.99;
+constexpr double kLeastSphere = 0.15;  // of the directions, that have points
 constexpr size_t kLeastPoints = 20000;
 constexpr int kMaxHalvings = 4;
 
@@ -85,20 +89,25 @@ class LinesOfSight {
   int edge_ = 4;
 };
 
-// Of places evenly in the box around the points, that from which the most are seen.
-Eigen::Vector3d BestOfBox(const LinesOfSight& lines, double* step, int num_threads) {
+// Of places evenly in a box around the points, that from which the most are seen. None where many
+// places would do: one wall, or a bare room, does not say where it was seen from.
+std::optional<Eigen::Vector3d> BestOfBox(const LinesOfSight& lines, double* step, int num_threads) {
   constexpr int kPlaces = 600;
-  const Bounds& box = lines.bounds();
-  const Eigen::Vector3d size = (box.max - box.min).cwiseMax(1e-6);
+  constexpr double kFlattest = 0.5;  // of the box: beside a wall there is room, too
+  const Bounds& bounds = lines.bounds();
+  const Eigen::Vector3d extent = bounds.max - bounds.min;
+  const Eigen::Vector3d size = extent.cwiseMax(std::max(1e-6, kFlattest * extent.maxCoeff()));
+  const Eigen::Vector3d low = 0.5 * (bounds.min + bounds.max - size);
   *step = std::cbrt(size.prod() / kPlaces);
   const Eigen::Vector3i counts = (size / *step).array().floor().cwiseMax(1).cast<int>();
   const auto place = [&](int i) -> Eigen::Vector3d {
     const Eigen::Vector3d cell(i % counts.x() + 0.5, i / counts.x() % counts.y() + 0.5,
                                i / (counts.x() * counts.y()) + 0.5);
-    return box.min + cell.cwiseQuotient(counts.cast<double>()).cwiseProduct(size);
+    return low + cell.cwiseQuotient(counts.cast<double>()).cwiseProduct(size);
   };
   std::vector<double> seen(static_cast<size_t>(counts.prod()));
   ParallelFor(num_threads, 0, counts.prod(), [&](int i) { seen[i] = lines.From(place(i)).seen; });
+  if (Quantile(seen, 1 - kMostPlaces) > kSeenElsewhere) return std::nullopt;
   return place(static_cast<int>(std::max_element(seen.begin(), seen.end()) - seen.begin()));
 }
 
@@ -126,8 +135,9 @@ double Climb(const LinesOfSight& lines, double step, double least_step, int num_
 std::optional<Eigen::Vector3d> FindPlace(const Scan& cloud, size_t begin, size_t end,
                                          int num_threads) {
   double step;
-  Eigen::Vector3d place =
-      BestOfBox(LinesOfSight(cloud, begin, end, kFewPoints), &step, num_threads);
+  const auto best = BestOfBox(LinesOfSight(cloud, begin, end, kFewPoints), &step, num_threads);
+  if (!best) return std::nullopt;
+  Eigen::Vector3d place = *best;
   const LinesOfSight some(cloud, begin, end, kSomePoints);
   if (Climb(some, step / 2, kNear, num_threads, &place) < kLeastSeen) return std::nullopt;
   const LinesOfSight many(cloud, begin, end, kManyPoints);

@@ -19,9 +19,9 @@ struct CloudStation {
 // Points were measured along lines of sight: those of one station do not hide each other from where
 // it stood, and from everywhere else edges do. Merged clouds hold station after station, so that
 // parts of the file are asked: all, halves, quarters ... until a place is found from which they can
-// be seen. Parts that no place explains (a moving scanner, mixed or thinned points) are left out;
-// what is found is right to centimetres where there is
-// much to hide behind, else to some decimetres. The same for every number of threads.
+// be seen. Parts that no place explains (a moving scanner, mixed points), or many places (one wall,
+// a bare room), are left out. What is found is right to centimetres where there is much to hide
+// behind, else to some decimetres. The same for every number of threads.
 std::vector<CloudStation> FindStations(const Scan& cloud, int num_threads);
 
 }  // namespace roomtex

@@ -98,5 +98,16 @@ TEST(CloudStations, MixedOnesHaveNone) {
   EXPECT_THAT(FindStations(Scan(), 2), IsEmpty());
 }
 
+TEST(CloudStations, AWallDoesNotSayWhereItWasSeenFrom) {
+  for (const double thickness : {0.0, 0.02}) {
+    Scan cloud;
+    cloud.organised = false;
+    for (int i = 0; i < 60000; ++i) {
+      cloud.points.emplace_back(0.02 * (i % 300), 0.015 * (i / 300), thickness * (i % 7));
+    }
+    EXPECT_THAT(FindStations(cloud, 2), IsEmpty());
+  }
+}
+
 }  // namespace
 }  // namespace roomtex
