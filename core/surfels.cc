@@ -22,7 +22,7 @@ constexpr int kPointsOfWindow = 600;   // no plane rests on more
 constexpr double kMostExcess = 1.6;    // of variance over that of the finer cells: still one plane
 constexpr double kPriorPoints = 8;     // weight of the cloud's usual noise where points are few
 constexpr double kWorstNormal = 0.25;  // radians; standard deviation of a normal that is one
-constexpr double kReach = 0.7;         // of the spacing, beyond the outermost points of a leaf
+constexpr double kReach = 1.0;         // of the spacing, beyond the outermost points of a leaf
 constexpr double kStray = 4;  // noises; farther from its plane a point is not moved onto it
 
 uint64_t SpreadBits(uint64_t v) {  // 21 bits to every third
@@ -530,12 +530,13 @@ CloudSurface FindCloudSurface(const Scan& cloud, int num_threads) {
   return surface;
 }
 
-Scan GridAroundStation(const Scan& cloud, int num_rows) {
+Scan GridAroundStation(const Scan& cloud, const Eigen::Vector3d& station, size_t begin, size_t end,
+                       int num_rows) {
   Scan grid;
   grid.path = cloud.path;
   grid.name = cloud.name;
   grid.up = cloud.up;
-  grid.scan_from_station = cloud.scan_from_station;
+  grid.scan_from_station = {cloud.scan_from_station.rotation, station};
   grid.num_rows = num_rows;
   grid.num_columns = 2 * grid.num_rows;
   const size_t cells = static_cast<size_t>(grid.num_columns) * static_cast<size_t>(grid.num_rows);
@@ -543,8 +544,8 @@ Scan GridAroundStation(const Scan& cloud, int num_rows) {
   grid.intensity.assign(cells, 0.0f);
   std::vector<float> nearest(cells, 1e30f);
   const Eigen::Vector3d forward = cloud.up.unitOrthogonal(), left = cloud.up.cross(forward);
-  for (size_t i = 0; i < cloud.points.size(); ++i) {
-    const Eigen::Vector3d offset = cloud.points[i] - cloud.Station();
+  for (size_t i = begin; i < end; ++i) {
+    const Eigen::Vector3d offset = cloud.points[i] - station;
     const double range = offset.norm();
     if (!(range > 0)) continue;
     const double elevation = std::asin(std::clamp(offset.dot(cloud.up) / range, -1.0, 1.0));

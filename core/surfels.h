@@ -42,9 +42,11 @@ struct CloudSurface {
 // threads. cloud: any scan; its triangles are not looked at.
 CloudSurface FindCloudSurface(const Scan& cloud, int num_threads);
 
-// The cloud as a grid around its station: the nearest point in each cell of azimuth and elevation
-// about `up`, `num_rows` from straight up to straight down. For a cloud that was taken from there.
-Scan GridAroundStation(const Scan& cloud, int num_rows);
+// Points [begin, end) of the cloud as a grid around a station: the nearest one in each cell of
+// azimuth and elevation about `up`, `num_rows` from straight up to straight down. For those that
+// were taken from there.
+Scan GridAroundStation(const Scan& cloud, const Eigen::Vector3d& station, size_t begin, size_t end,
+                       int num_rows);
 
 // FindCloudSurface(cloud).patches in place of every cloud among the scans: what takes meshes takes
 // clouds then.

@@ -12,7 +12,9 @@
 #include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/cloud_grid.h"
+#include "importers/doubtful_unit.h"
 #include "importers/e57.h"
 #include "importers/e57_pages.h"
 #include "importers/file_reader.h"
@@ -169,18 +171,26 @@ void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
                    " is (--up_axis says another)");
 }
 
-// Formats that do not say their unit, and rooms of kilometres.
+// Formats that do not say their unit, and scans that are hardly in metres.
 void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFile* file) {
-  constexpr double kLargestInMetres = 1000;
   const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
-                         file->format == "XYZ";
+                         file->format == "PTX" || file->format == "XYZ";
   if (!is_silent || !options.units.empty()) return;
+  const std::string unit = LikelierUnit(scan);
+  if (unit.empty()) return;
   const Bounds bounds = FindBounds(scan);
-  const double size = (bounds.max - bounds.min).maxCoeff();
-  if (!(size > kLargestInMetres)) return;
-  file->notes.push_back("the file does not say its unit; in metres it is " +
-                        std::to_string(std::llround(size)) +
-                        " m large. If that are millimetres, give --units millimeters");
+  const Eigen::Vector3d size = bounds.max - bounds.min;
+  const auto text = [&size](double factor) {
+    std::string sizes;
+    for (int k = 0; k < 3; ++k) {
+      const double length = size[k] * factor;
+      sizes += (k > 0 ? " x " : "") + Number(length, length < 100 ? 1 : 0);
+    }
+    return sizes + " m";
+  };
+  file->notes.push_back("the file does not say its unit; in metres it is " + text(1) +
+                        " large. If these are " + unit + " (" + text(*MetersPerUnit(unit)) +
+                        "), give --units " + unit);
 }
 
 // What every scan goes through as soon as it is read.

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
 
 #include <fmt/core.h>
 
+#include "core/cloud_stations.h"
 #include "core/cpu_stages.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -41,17 +43,31 @@ double SpacingInPhotos(const CloudSurface& cloud, const std::vector<PhotoView>& 
   return Median(&angles);
 }
 
-// What the scanner could not see from its station, as a grid around that shows it.
-void AddShadows(const Scan& cloud, double angular_spacing, const ColorizeOptions& options,
+// What the scanner could not see from a station, as a grid around that shows it.
+void AddShadows(const Scan& cloud, const CloudStation& station, const ColorizeOptions& options,
                 int num_threads, OccluderTiles* occluder) {
   constexpr double kStep = 1.5;     // spacings; finer leaves cells empty
   constexpr double kFinest = 2e-3;  // radians; shadows need not be exact
-  const double step = std::max(kFinest, kStep * angular_spacing);
-  const Scan grid = GridAroundStation(cloud, static_cast<int>(std::lround(kPi / step)) + 1);
+  const double step = std::max(kFinest, kStep * station.angular_spacing);
+  const Scan grid = GridAroundStation(cloud, station.place, station.begin, station.end,
+                                      static_cast<int>(std::lround(kPi / step)) + 1);
   OccluderTiles tiles =
       MakeOccluderTiles(grid, MakeSmoothedScan(grid, options.mesh, options.surface, num_threads));
-  occluder->shadows = std::move(tiles.shadows);
-  occluder->fringes = std::move(tiles.fringes);
+  std::move(tiles.shadows.begin(), tiles.shadows.end(), std::back_inserter(occluder->shadows));
+  std::move(tiles.fringes.begin(), tiles.fringes.end(), std::back_inserter(occluder->fringes));
+}
+
+// The front of a surface is where it was measured from. Returns whether all points have one.
+bool TurnToStations(const std::vector<CloudStation>& stations, CloudSurface* cloud) {
+  size_t num_turned = 0;
+  for (const CloudStation& station : stations) {
+    for (size_t i = station.begin; i < station.end; ++i) {
+      const Eigen::Vector3f to_station = (station.place - cloud->points[i]).cast<float>();
+      if (cloud->normals[i].dot(to_station) < 0) cloud->normals[i] *= -1;
+    }
+    num_turned += station.end - station.begin;
+  }
+  return num_turned == cloud->points.size();
 }
 
 // The samples are the points of the cloud, what hides them are its surfels.
@@ -62,14 +78,20 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
   SmoothedScan surface;
   surface.range_noise = cloud.noise;
   surface.station_is_known = cloud.angular_spacing > 0;
-  surface.front_is_known = cloud.front_is_known;
   surface.angular_spacing =
       surface.station_is_known ? cloud.angular_spacing : SpacingInPhotos(cloud, photos);
+  cloud.spacings = {};
+  const std::vector<CloudStation> stations =
+      surface.station_is_known ? std::vector<CloudStation>{{scan.Station(), 0, scan.points.size(),
+                                                            cloud.angular_spacing}}
+                               : FindStations(scan, num_threads);
+  surface.front_is_known = cloud.front_is_known || TurnToStations(stations, &cloud);
   surface.points = std::move(cloud.patches.points);
   surface.triangles = std::move(cloud.patches.triangles);
   *occluder = MakeOccluderTiles(cloud.patches, surface);
-  if (surface.station_is_known)
-    AddShadows(scan, cloud.angular_spacing, options, num_threads, occluder);
+  for (const CloudStation& station : stations) {
+    AddShadows(scan, station, options, num_threads, occluder);
+  }
   surface.points = std::move(cloud.points);
   surface.normals = std::move(cloud.normals);
   surface.triangles = {};

@@ -137,7 +137,8 @@ TEST(Surfels, SaysWhetherTheCloudWasTakenFromItsStation) {
     const Eigen::Vector3d sight = sides.cloud.Station() - sides.cloud.points[i];
     EXPECT_GE(inside.normals[i].cast<double>().dot(sight), -1e-3);
   }
-  const Scan grid = GridAroundStation(sides.cloud, 40);
+  const Scan grid =
+      GridAroundStation(sides.cloud, sides.cloud.Station(), 0, sides.cloud.points.size(), 40);
   EXPECT_EQ(grid.num_columns, 80);
   EXPECT_LT(grid.NumMissing(), 320);  // of 3200, next to the poles
   // From outside one side hides the other, and from afar all lie in one direction.

@@ -319,6 +319,77 @@ TEST_F(ScanReader, ARoomOfKilometresIsNoticed) {
   EXPECT_THAT(ReadScanFile(path, options).notes, SizeIs(0));
 }
 
+// A room of 5.2 x 4.4 x 2.7 m as points of its six sides (without the ceiling: five), z up, in the
+// given unit and moved off the origin.
+std::string RoomAsText(double units_per_meter, bool ceiling, double size = 1) {
+  std::string text = "x y z\n";
+  const Eigen::Vector3d half = Eigen::Vector3d(2.6, 2.2, 1.35) * size * units_per_meter;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int side : {-1, 1}) {
+      if (axis == 2 && side == 1 && !ceiling) continue;
+      for (int i = 0; i < 25 * 25; ++i) {
+        Eigen::Vector3d point;
+        point[axis] = side;
+        point[(axis + 1) % 3] = (i % 25) / 12.0 - 1;
+        point[(axis + 2) % 3] = (i / 25) / 12.0 - 1;
+        point = point.cwiseProduct(half) + half * 3;
+        text += std::to_string(point.x()) + " " + std::to_string(point.y()) + " " +
+                std::to_string(point.z()) + "\n";
+      }
+    }
+  }
+  return text;
+}
+
+TEST_F(ScanReader, ARoomInCentimetresOrInchesIsNoticed) {
+  const std::pair<double, std::string> units[] = {
+      {1000, "millimeters"}, {100, "centimeters"}, {39.37, "inches"}};
+  for (const auto& [units_per_meter, name] : units) {
+    for (const bool ceiling : {true, false}) {
+      const std::string path = Write("room.xyz", RoomAsText(units_per_meter, ceiling));
+      const ScanFile file = ReadScanFile(path, {});
+      ASSERT_THAT(file.notes, SizeIs(1)) << name << ceiling;
+      EXPECT_THAT(file.notes[0], HasSubstr("--units " + name));
+      EXPECT_THAT(file.notes[0], HasSubstr("(5.2 x 4.4 x 2.7 m)"));
+      ScanReaderOptions options;
+      options.units = name;
+      EXPECT_THAT(ReadScanFile(path, options).notes, SizeIs(0));
+    }
+  }
+  for (const double size : {1.0, 20.0}) {  // a room, and a hall of 54 m height
+    EXPECT_THAT(ReadScanFile(Write("hall.xyz", RoomAsText(1, true, size)), {}).notes, SizeIs(0));
+  }
+}
+
+TEST_F(ScanReader, ALargeSiteIsLeftInMetres) {
+  std::string text = "x y z\n";  // 600 x 600 m with a hill of 120 m
+  for (int i = 0; i < 120 * 120; ++i) {
+    const double x = (i % 120) * 5 - 300, y = (i / 120) * 5 - 300;
+    text += std::to_string(x) + " " + std::to_string(y) + " " +
+            std::to_string(120 * std::exp(-(x * x + y * y) / 2e4)) + "\n";
+  }
+  EXPECT_THAT(ReadScanFile(Write("site.xyz", text), {}).notes, SizeIs(0));
+}
+
+TEST_F(ScanReader, AGridInCentimetresIsNoticedByTheHeightOfItsScanner) {
+  // Floor and walls 8 m around, without a ceiling; half of the rays end in the sky.
+  std::string text = "72\n40\n" + std::string(kPose);
+  for (int column = 0; column < 72; ++column) {
+    for (int row = 0; row < 40; ++row) {  // from the bottom up
+      const double azimuth = column * 0.0873, elevation = -1.0 + row * 0.05;
+      const double range = 100 * std::min(1.6 / -std::sin(elevation), 8 / std::cos(elevation));
+      const bool is_sky = elevation > 0;
+      const double out = is_sky ? 0 : range * std::cos(elevation);
+      text += std::to_string(out * std::cos(azimuth)) + " " +
+              std::to_string(out * std::sin(azimuth)) + " " +
+              std::to_string(is_sky ? 0 : range * std::sin(elevation)) + " 0.5\n";
+    }
+  }
+  const ScanFile file = ReadScanFile(Write("yard.ptx", text), {});
+  ASSERT_THAT(file.notes, SizeIs(1));
+  EXPECT_THAT(file.notes[0], HasSubstr("--units centimeters"));
+}
+
 TEST_F(ScanReader, EveryWriterGivesWhatTheReadersTake) {
   const Scan scan = ReadScan(WriteGoodRtpi("a.rtpi"), {});
   for (const std::string extension : {".pcd", ".ptx", ".rtpi"}) {

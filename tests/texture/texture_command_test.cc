@@ -312,8 +312,8 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   const PlyVertices truth = ReadPly(Capture() + "/truth/true_colors.ply");
   const double psnr_of_grid = Psnr(ReadPly(Path("textured/model.ply")), truth);
   Scan scan = ReadCaptureScan();
-  scan.up = Eigen::Vector3d::UnitZ();     // about it the angles show no grid
-  for (const double loss : {2.2, 4.5}) {  // dB; without the station nobody knows its shadows
+  scan.up = Eigen::Vector3d::UnitZ();  // about it the angles show no grid
+  for (int i = 0; i < 2; ++i) {        // the second time the station has to be found
     WriteScan(scan, {}, Path("cloud.ply"));
     const CommandResult result = Texture("cloud", "--output_e57 1", Path("cloud.ply"));
     ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -324,7 +324,7 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
     EXPECT_EQ(e57.points.size() - static_cast<size_t>(e57.NumMissing()), model.points.size());
     EXPECT_EQ(e57.colors.size(), e57.points.size());
     ASSERT_EQ(model.points.size(), truth.points.size());
-    EXPECT_GT(Psnr(model, truth), psnr_of_grid - loss);
+    EXPECT_GT(Psnr(model, truth), psnr_of_grid - 1.5);
     EXPECT_GT(ReadJson(Path("cloud/report.json"))["coverage"],
               0.95 * ReadJson(Path("textured/report.json"))["coverage"].get<double>());
     scan.scan_from_station.translation = {50, 0, 0};
