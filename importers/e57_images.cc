@@ -176,11 +176,8 @@ class ImageExtractor {
     camera.width = width;
     camera.height = height;
     camera.params = {static_cast<double>(width), static_cast<double>(height)};
-    if (options_.cut_panoramas) {
-      AddFaces({file, camera, cam_from_scan});
-    } else {
-      result_.posed.push_back({file, camera, cam_from_scan});
-    }
+    if (options_.cut_panoramas) return AddFaces({file, camera, cam_from_scan});
+    result_.posed.push_back({file, camera, cam_from_scan});
     return "";
   }
 
@@ -211,8 +208,13 @@ class ImageExtractor {
     return "";
   }
 
-  void AddFaces(const PosedPhoto& panorama) {
-    const cv::Mat picture = ReadPhoto((fs::path(folder_) / panorama.name).string());
+  std::string AddFaces(const PosedPhoto& panorama) {
+    cv::Mat picture;
+    try {
+      picture = ReadPhoto((fs::path(folder_) / panorama.name).string());
+    } catch (const InputError&) {
+      return "its picture cannot be decoded";
+    }
     const std::string stem = fs::path(panorama.name).stem().string();
     MakeFolder((fs::path(folder_) / stem).string());
     const Camera camera = FaceCamera(panorama.camera, options_.faces);
@@ -229,6 +231,7 @@ class ImageExtractor {
       result_.posed.push_back(
           {name, camera, Rigid{rotation, Eigen::Vector3d::Zero()} * panorama.cam_from_scan});
     }
+    return "";
   }
 
   E57ImageOptions options_;

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/resource_limits.h"
 #include "core/scan_mesh.h"
 #include "importers/e57_images.h"
@@ -242,8 +243,9 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
   images.check = options.reader.e57_check && options.output_paths.empty();  // or done already
   images.cut_panoramas = options.cut_panoramas;
   images.faces = options.faces;
-  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
-                                            options.images_path, images, &context.progress);
+  OutputSet outputs(options.images_path);
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file, outputs.aside(),
+                                            images, &context.progress);
   context.progress.Finish();
   for (const std::string& note : photos.notes) context.Warn(note);
   if (options.image_picks) {
@@ -252,10 +254,11 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
     if (picks.empty()) {
       context.Warn("no picks: no photo with a pose shows six places of the scans");
     } else {
-      WritePhotoPicks(picks, (fs::path(options.images_path) / "picks.csv").string());
+      WritePhotoPicks(picks, outputs.Path("picks.csv"));
     }
     context.report["num_picks"] = picks.size();
   }
+  outputs.Commit();
   Json json = Json::array();
   for (const E57Photos::Photo& photo : photos.photos) {
     json.push_back(
@@ -269,6 +272,10 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
 void RunImport(const ImportOptions& options, const Command::Context& context) {
   if (options.output_paths.empty() && options.images_path.empty()) {
     throw UsageError("--output_path is missing: what is to be written?");
+  }
+  if (options.images_path.empty() && (options.image_picks || options.cut_panoramas)) {
+    throw UsageError(std::string(options.image_picks ? "--E57.picks" : "--E57.cut_panoramas") +
+                     " is for the photos of an E57: give --images_path, the folder for them.");
   }
   if (IsPanoramaInput(options.input_path)) {
     CutPanoramasOf(options, context);
