@@ -196,13 +196,17 @@ class ImageExtractor {
                      image.focal_length / image.pixel_height,
                      from_corner(image.principal_point_x, camera.width),
                      from_corner(image.principal_point_y, camera.height)};
-    const std::vector<std::string> problems = camera.Problems();
+    std::vector<std::string> problems = camera.Problems();
+    const bool other_size = camera.width != width || camera.height != height;
+    if (problems.empty() && other_size) {
+      camera.Resize(width, height);
+      problems = camera.Problems();
+    }
     if (!problems.empty()) return "its camera cannot be used (" + problems[0] + ")";
     if (image.has_distortion) {
       result_.notes.push_back(file +
                               " has a lens distortion (an extension of E57), which is not read");
     }
-    if (camera.width != width || camera.height != height) camera.Resize(width, height);
     result_.posed.push_back(
         {file, camera, Rigid{kCamFromPinhole, Eigen::Vector3d::Zero()} * camera_from_scan});
     return "";

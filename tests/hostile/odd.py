@@ -355,9 +355,7 @@ def prepared(base):
     here = base.copy()
     s.write_boards(here.root / "boards")
     shutil.copy(here.root / "database.db", here.root / "part.db")
-    shutil.copy(here.root / "scan.rtpi", here.root / "other.rtpi")
-    pose = " 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"
-    (here.root / "poses.txt").write_text("scan.rtpi" + pose + "other.rtpi" + pose)
+    s.write_stations(here.root)
     (here.root / "hall").mkdir()
     (here.root / "hall/steps.json").write_text('{"steps": {}}')
     for line in (s.ALIGN + " --image_path photos --output_path room",
@@ -503,7 +501,7 @@ def later():
         "--input_path sparse ", "").replace("--port 0", "--port -1"), BAD
     for option in ("--video_frames -1", "--panoramas_path photos", "--video_path scan.rtpi",
                    "--quality best", "--output_path photos", "--output_path photos/new", "--until nowhere",
-                   "--camera_model FISHEYE", "--camera_params nan", "--scan_poses nowhere",
+                   "--camera_model FISH", "--camera_params nan", "--scan_poses nowhere",
                    "--up_axis w", "--pairs maybe", "--video_frames 2000000000"):
         yield f"auto {option}", nothing, with_options(dry, option), BAD
     for option in ("--input_path coloured/model.ply --output_path coloured/model.ply",
@@ -524,7 +522,7 @@ NUMBERS = {
            "Fusion.distance_to_scan Fusion.max_depth_difference",
     OUTLINE: "scale min_area max_range port",
     BOARDS: "square marker Model.min_gain Photos.bad_px Trust.min_tilt_deg Trust.max_sigma_px",
-    PICTURE: "width turn_deg back up",
+    PICTURE: "width",
     PICTURES: "num_photos num_ring",
     AUTO: "video_frames",
     PAIRS: "Pairs.max_ratio Pairs.max_error Pairs.num_rounds Pairs.num_by_place",
