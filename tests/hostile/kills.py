@@ -199,7 +199,10 @@ def by_signals(base):
             arguments = line.split()
             arguments[0] = str(here.programs / arguments[0])
             process = subprocess.Popen(arguments, cwd=here.root, stderr=subprocess.PIPE,
-                                       stdout=subprocess.DEVNULL, start_new_session=True)
+                                       stdout=subprocess.DEVNULL, start_new_session=True,
+                                       # A job in the background ignores it.
+                                       preexec_fn=lambda: signal.signal(signal.SIGINT,
+                                                                        signal.SIG_DFL))
             while process.poll() is None and not here.leftovers():
                 time.sleep(0.02)
             process.send_signal(what)
