@@ -164,7 +164,23 @@ OutputSet::OutputSet(const std::string& folder) : folder_(folder) {
 
 OutputSet::~OutputSet() = default;
 
+// A file of the user's does not make room for a folder.
+void OutputSet::RequireFoldersTo(const std::string& name) const {
+  fs::path below;
+  for (const fs::path& part : fs::path(name).parent_path()) {
+    below /= part;
+    const std::string path = (fs::path(folder_) / below).string();
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    if (!fs::exists(status) || fs::is_directory(status)) continue;
+    if (removed_.count(below.generic_string()) > 0) continue;
+    throw InputError(path, "", "is not a folder, and one is to be written there",
+                     "Move it away or give another folder");
+  }
+}
+
 std::string OutputSet::Path(const std::string& name) {
+  RequireFoldersTo(name);
   RequireReplaceable((fs::path(folder_) / name).string());
   const fs::path path = fs::path(aside()) / name;
   std::error_code error;
@@ -176,7 +192,10 @@ std::string OutputSet::Path(const std::string& name) {
 
 std::vector<std::string> OutputSet::Check() const {
   std::vector<std::string> files = FilesBelow(aside());
-  for (const std::string& name : files) RequireReplaceable((fs::path(folder_) / name).string());
+  for (const std::string& name : files) {
+    RequireFoldersTo(name);
+    RequireReplaceable((fs::path(folder_) / name).string());
+  }
   for (const std::string& name : removed_) {
     RefuseToReplaceInput((fs::path(folder_) / name).string());
   }

@@ -45,6 +45,7 @@ class OutputSet {
 
  private:
   std::vector<std::string> Check() const;
+  void RequireFoldersTo(const std::string& name) const;
   bool Exchange();
   void MoveOneByOne(const std::vector<std::string>& files);
 

@@ -176,11 +176,8 @@ class ImageExtractor {
     camera.width = width;
     camera.height = height;
     camera.params = {static_cast<double>(width), static_cast<double>(height)};
-    if (options_.cut_panoramas) {
-      AddFaces({file, camera, cam_from_scan});
-    } else {
-      result_.posed.push_back({file, camera, cam_from_scan});
-    }
+    if (options_.cut_panoramas) return AddFaces({file, camera, cam_from_scan});
+    result_.posed.push_back({file, camera, cam_from_scan});
     return "";
   }
 
@@ -199,20 +196,29 @@ class ImageExtractor {
                      image.focal_length / image.pixel_height,
                      from_corner(image.principal_point_x, camera.width),
                      from_corner(image.principal_point_y, camera.height)};
-    const std::vector<std::string> problems = camera.Problems();
+    std::vector<std::string> problems = camera.Problems();
+    const bool other_size = camera.width != width || camera.height != height;
+    if (problems.empty() && other_size) {
+      camera.Resize(width, height);
+      problems = camera.Problems();
+    }
     if (!problems.empty()) return "its camera cannot be used (" + problems[0] + ")";
     if (image.has_distortion) {
       result_.notes.push_back(file +
                               " has a lens distortion (an extension of E57), which is not read");
     }
-    if (camera.width != width || camera.height != height) camera.Resize(width, height);
     result_.posed.push_back(
         {file, camera, Rigid{kCamFromPinhole, Eigen::Vector3d::Zero()} * camera_from_scan});
     return "";
   }
 
-  void AddFaces(const PosedPhoto& panorama) {
-    const cv::Mat picture = ReadPhoto((fs::path(folder_) / panorama.name).string());
+  std::string AddFaces(const PosedPhoto& panorama) {
+    cv::Mat picture;
+    try {
+      picture = ReadPhoto((fs::path(folder_) / panorama.name).string());
+    } catch (const InputError&) {
+      return "its picture cannot be decoded";
+    }
     const std::string stem = fs::path(panorama.name).stem().string();
     MakeFolder((fs::path(folder_) / stem).string());
     const Camera camera = FaceCamera(panorama.camera, options_.faces);
@@ -229,6 +235,7 @@ class ImageExtractor {
       result_.posed.push_back(
           {name, camera, Rigid{rotation, Eigen::Vector3d::Zero()} * panorama.cam_from_scan});
     }
+    return "";
   }
 
   E57ImageOptions options_;

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/output_file.h"
 
 namespace roomtex {
@@ -20,6 +21,7 @@ constexpr int64_t kBlockSize = 1 << 20;
 
 FileReader::FileReader(const std::string& path) : path_(path) {
   RequireFile(path, "Give the path of a scan file");
+  NoteInput(path);
   fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat status {};
   if (fd_ < 0 || ::fstat(fd_, &status) != 0) {

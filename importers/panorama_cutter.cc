@@ -1,7 +1,6 @@
 #include "importers/panorama_cutter.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -11,8 +10,10 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/photo_files.h"
 
 namespace fs = std::filesystem;
 namespace roomtex {
@@ -22,25 +23,14 @@ constexpr int kJpegQuality = 96;
 // A picture all around is twice as wide as high, but for this share.
 constexpr double kMaxShapeError = 0.01;
 
-bool IsPhotoName(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension == ".jpg" || extension == ".jpeg" || extension == ".png" ||
-         extension == ".tif" || extension == ".tiff";
-}
-
 // Paths of the panoramas, by name.
 std::vector<fs::path> FindPanoramas(const std::string& input_path) {
-  if (!fs::is_directory(input_path)) return {input_path};
+  std::error_code error;
+  if (!fs::is_directory(input_path, error)) return {input_path};
   std::vector<fs::path> paths;
-  for (const auto& entry : fs::directory_iterator(input_path)) {
-    if (entry.is_regular_file() && IsPhotoName(entry.path())) paths.push_back(entry.path());
-  }
-  std::sort(paths.begin(), paths.end());
-  if (paths.empty()) {
-    throw InputError(input_path, "", "holds no picture (.jpg, .png, .tif)",
-                     "Give a panorama or a folder of them");
+  for (const std::string& name :
+       ListPhotoFiles(input_path, "Give a panorama or a folder of them", false)) {
+    paths.push_back(fs::path(input_path) / name);
   }
   return paths;
 }
@@ -114,19 +104,20 @@ std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
     throw InputError(path.string(), "", "has the name of another panorama, but for its ending",
                      "Give the panoramas names of their own");
   }
-  MakeFolder(output_folder);
+  OutputSet outputs(output_folder);
   progress->Stage("cut panoramas", static_cast<int>(paths.size()));
   for (size_t i = 0; i < paths.size(); ++i) {
-    WriteFaces(paths[i], panoramas[i], output_folder, num_threads);
+    WriteFaces(paths[i], panoramas[i], outputs.aside(), num_threads);
     progress->Tick();
   }
   const Camera& camera = panoramas[0].face_camera;
   const bool is_one = std::all_of(panoramas.begin(), panoramas.end(), [&](const CutPanorama& p) {
     return p.face_camera.width == camera.width && p.face_camera.params == camera.params;
   });
-  const fs::path folder = output_folder;
+  const fs::path folder = outputs.aside();
   if (is_one) WriteCameraOptions(camera, (folder / "camera_options.txt").string());
   WritePanoramaSet(panoramas, (folder / "panoramas.json").string());
+  outputs.Commit();
   return panoramas;
 }
 

@@ -7,8 +7,10 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/resource_limits.h"
 #include "core/scan_mesh.h"
+#include "importers/content_hash.h"
 #include "importers/e57_images.h"
 #include "importers/e57_writer.h"
 #include "importers/las.h"
@@ -212,7 +214,6 @@ class Importer {
 };
 
 void CutPanoramasOf(const ImportOptions& options, const Command::Context& context) {
-  ThrowIfProblems(options.faces.Problems());
   if (options.output_paths.size() != 1) {
     throw UsageError("Of panoramas one --output_path is made: the folder for their faces.");
   }
@@ -232,18 +233,33 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   std::cout << (fs::path(folder) / "panoramas.json").string() << "\n";
 }
 
+// Photos that only have the same name as one of the E57 stay: they may be somebody's originals.
+void RequireNoOtherPhotos(const E57Photos& photos, const OutputSet& outputs) {
+  for (const E57Photos::Photo& photo : photos.photos) {
+    const std::string there = outputs.folder() + "/" + photo.file;
+    std::error_code error;
+    if (!fs::exists(there, error)) continue;
+    if (fs::is_regular_file(there, error) &&
+        HashOfFile(there) == HashOfFile(outputs.aside() + "/" + photo.file)) {
+      continue;
+    }
+    throw InputError(there, "", "is another picture than the one of this name in the E57",
+                     "Give another --images_path");
+  }
+}
+
 // The photos of an E57 as files, those with a pose as a COLMAP model beside them.
 void WriteImages(const ImportOptions& options, const Command::Context& context) {
-  std::vector<std::string> problems = options.reader.Problems();
-  AppendProblems(options.faces.Problems(), &problems);
-  ThrowIfProblems(problems);
+  ThrowIfProblems(options.reader.Problems());
   E57ImageOptions images;
   images.meters_per_unit = MetersPerUnit(options.reader.units).value_or(1);
   images.check = options.reader.e57_check && options.output_paths.empty();  // or done already
   images.cut_panoramas = options.cut_panoramas;
   images.faces = options.faces;
-  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
-                                            options.images_path, images, &context.progress);
+  OutputSet outputs(options.images_path);
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file, outputs.aside(),
+                                            images, &context.progress);
+  RequireNoOtherPhotos(photos, outputs);
   context.progress.Finish();
   for (const std::string& note : photos.notes) context.Warn(note);
   if (options.image_picks) {
@@ -252,10 +268,11 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
     if (picks.empty()) {
       context.Warn("no picks: no photo with a pose shows six places of the scans");
     } else {
-      WritePhotoPicks(picks, (fs::path(options.images_path) / "picks.csv").string());
+      WritePhotoPicks(picks, outputs.Path("picks.csv"));
     }
     context.report["num_picks"] = picks.size();
   }
+  outputs.Commit();
   Json json = Json::array();
   for (const E57Photos::Photo& photo : photos.photos) {
     json.push_back(
@@ -267,8 +284,13 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
 }
 
 void RunImport(const ImportOptions& options, const Command::Context& context) {
+  ThrowIfProblems(options.faces.Problems());
   if (options.output_paths.empty() && options.images_path.empty()) {
     throw UsageError("--output_path is missing: what is to be written?");
+  }
+  if (options.images_path.empty() && (options.image_picks || options.cut_panoramas)) {
+    throw UsageError(std::string(options.image_picks ? "--E57.picks" : "--E57.cut_panoramas") +
+                     " is for the photos of an E57: give --images_path, the folder for them.");
   }
   if (IsPanoramaInput(options.input_path)) {
     CutPanoramasOf(options, context);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/camera_model.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "workflow/step.h"
@@ -42,7 +43,7 @@ void AutoOptions::Declare(OptionFields* fields) {
   fields
       ->Int("video_frames", &video_frames,
             "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")
-      .NotNegative();
+      .Within(0, 100000);
   fields->Bool("accept_untrusted", &accept_untrusted,
                "Go on behind a step whose answer is not to be trusted, with a warning; 0 = stop "
                "there with exit 4.");
@@ -55,6 +56,9 @@ std::vector<std::string> AutoOptions::Problems() const {
   const int num_sources = !image_path.empty() + !panoramas_path.empty() + !video_path.empty();
   if (num_sources != 1) {
     problems.emplace_back("give one of --image_path, --panoramas_path and --video_path");
+  }
+  if (!camera_model.empty() && !CameraModelFromName(camera_model)) {
+    problems.push_back("--camera_model " + camera_model + " is no model of COLMAP's");
   }
   if (!camera_params.empty() && camera_model.empty()) {
     problems.emplace_back("--camera_params needs --camera_model, e.g. OPENCV");

@@ -1,7 +1,6 @@
 #include "workflow/capture_facts.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -16,6 +15,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/photo_files.h"
 #include "core/statistics.h"
 #include "core/text.h"
 
@@ -26,32 +26,11 @@ namespace {
 constexpr char kColmapRemedy[] =
     "Install COLMAP (apt install colmap), or name the program with --colmap";
 
-bool IsPhotoName(const fs::path& path) {
-  static const std::set<std::string> kExtensions = {".jpg", ".jpeg", ".png",
-                                                    ".tif", ".tiff", ".bmp"};
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return kExtensions.count(extension) > 0;
-}
-
 }  // namespace
 
 std::vector<PhotoFacts> ReadPhotoFacts(const std::string& folder) {
-  RequireFolder(folder, "Check the path: the folder of the photos");
-  std::vector<std::string> names;
-  for (const auto& entry : fs::recursive_directory_iterator(
-           folder, fs::directory_options::skip_permission_denied |
-                       fs::directory_options::follow_directory_symlink)) {
-    if (!entry.is_regular_file() || !IsPhotoName(entry.path())) continue;
-    names.push_back(entry.path().lexically_relative(folder).generic_string());
-  }
-  if (names.empty()) {
-    throw InputError(folder, "", "holds no photo (.jpg, .png, .tif)", "Give the photos' folder");
-  }
-  std::sort(names.begin(), names.end());
   std::vector<PhotoFacts> photos;
-  for (const std::string& name : names) {
+  for (const std::string& name : ListPhotoFiles(folder, "Give the photos' folder")) {
     const std::string path = folder + "/" + name;
     PhotoFacts photo;
     photo.name = name;

@@ -11,12 +11,12 @@
 namespace roomtex {
 
 struct EvidencePoint {
-  Eigen::Vector3f x_in_scan;
+  Eigen::Vector3d x_in_scan;
   uint8_t views = 0;       // photos that see it
   float disagreement = 0;  // levels of 0-255; NaN = fewer than two photos
 };
 
 // Throws InputError for what is no evidence.ply.
-std::vector<EvidencePoint> ReadEvidence(const std::string& path);
+std::vector<EvidencePoint> ReadEvidencePoints(const std::string& path);
 
 }  // namespace roomtex

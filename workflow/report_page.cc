@@ -122,7 +122,7 @@ class Page {
   void Plans() {
     const std::string evidence = chain_.At("textured/evidence.ply");
     if (!IsThere(evidence) || !pictures_.is_object()) return;
-    const std::vector<EvidencePoint> points = ReadEvidence(evidence);
+    const std::vector<EvidencePoint> points = ReadEvidencePoints(evidence);
     const Json& up = pictures_["up"];
     const PlanFrame frame =
         MakePlanFrame(points, {up[0].get<double>(), up[1].get<double>(), up[2].get<double>()},

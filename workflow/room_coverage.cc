@@ -21,8 +21,11 @@ constexpr double kRoomToStand = 0.3;   // metres around a place without anything
 constexpr double kLowestThing = 0.35;  // metres above the floor: what is lower is stepped over
 constexpr double kNearest = 0.6, kFarthest = 5;  // metres between a place and what it shows
 constexpr size_t kMaxPlaces = 4, kMaxTargets = 2500;
-constexpr double kLeastGain = 0.25;   // square metres that make a place worth while
-constexpr double kOutermost = 0.005;  // share of the samples beyond the room on each side
+constexpr double kLeastGain = 0.25;      // square metres that make a place worth while
+constexpr double kOutermost = 0.005;     // share of the samples beyond the room on each side
+constexpr double kLargestRoom = 1e4;     // metres; what lies beyond is not looked at
+constexpr double kMaxCandidates = 5000;  // places that are tried
+constexpr double kInSight = 50;          // metres; nobody looks for a place farther from all photos
 
 Eigen::Vector3d ToVector(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
@@ -55,7 +58,7 @@ class CellGrid {
       counts_[axis] = static_cast<int>(std::ceil(frame.Size()[axis] / kCell)) + 1;
     }
     for (const EvidencePoint& point : points) {
-      const auto index = IndexOf(frame.InPlan(point.x_in_scan.cast<double>()));
+      const auto index = IndexOf(frame.InPlan(point.x_in_scan));
       if (!index) continue;
       Cell& cell = cells_[*index];
       ++cell.num_points;
@@ -157,9 +160,11 @@ class PlaceSearch {
       half_views.push_back(camera.half_view);
     }
     half_view_ = Median(&half_views);
-    const double height = Median(&heights);
-    for (double x = kPlaceStep / 2; x < frame.Size().x(); x += kPlaceStep) {
-      for (double y = kPlaceStep / 2; y < frame.Size().y(); y += kPlaceStep) {
+    const double height = std::clamp(Median(&heights), 0.0, frame.Size().z());
+    const double width = frame.Size().x(), depth = frame.Size().y();
+    const double place_step = std::max(kPlaceStep, std::sqrt(width * depth / kMaxCandidates));
+    for (double x = place_step / 2; x < width; x += place_step) {
+      for (double y = place_step / 2; y < depth; y += place_step) {
         const Eigen::Vector3d place(x, y, height);
         if (grid.HasRoomToStand(place) && IsReached(place)) places_.push_back(place);
       }
@@ -192,7 +197,7 @@ class PlaceSearch {
   // Where somebody has stood, or what was in sight from there.
   bool IsReached(const Eigen::Vector3d& place) const {
     return std::any_of(cameras_.begin(), cameras_.end(), [&](const PlanCamera& camera) {
-      return grid_.IsOpen(camera.centre, place);
+      return (camera.centre - place).norm() < kInSight && grid_.IsOpen(camera.centre, place);
     });
   }
   Look LookFrom(const Eigen::Vector3d& place, const std::vector<bool>& left) const {
@@ -239,12 +244,13 @@ PlanFrame MakePlanFrame(const std::vector<EvidencePoint>& points, const Eigen::V
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const EvidencePoint& point : points) {
-      values.push_back(frame.plan_from_scan.row(axis).dot(point.x_in_scan.cast<double>()));
+      values.push_back(frame.plan_from_scan.row(axis).dot(point.x_in_scan));
     }
     if (values.empty()) values.push_back(0);
     const auto rank = static_cast<size_t>(kOutermost * static_cast<double>(values.size()));
     frame.low[axis] = AtRank(&values, rank) - kCell;
     frame.high[axis] = AtRank(&values, values.size() - 1 - rank) + kCell;
+    frame.high[axis] = std::min(frame.high[axis], frame.low[axis] + kLargestRoom);
   }
   return frame;
 }

@@ -12,7 +12,8 @@
 namespace roomtex {
 namespace {
 
-constexpr double kPixel = 0.03;         // metres
+constexpr double kLeastPixel = 0.03;    // metres
+constexpr double kMaxPixels = 4e6;      // of the picture: coarser pixels in a larger room
 constexpr double kCeiling = 0.3;        // metres below it that are left out
 constexpr double kTall = 0.4;           // metres from which on something stands there
 constexpr double kMargin = 0.35;        // metres around the room
@@ -107,16 +108,19 @@ class Drawing {
 
 std::string PlanPicture(const std::vector<EvidencePoint>& points, const PlanFrame& frame,
                         PlanShows shows) {
-  const int columns = std::max(1, static_cast<int>(frame.Size().x() / kPixel));
-  const int rows = std::max(1, static_cast<int>(frame.Size().y() / kPixel));
+  const double width = frame.Size().x(), depth = frame.Size().y();
+  const double pixel = std::max(kLeastPixel, std::sqrt(width * depth / kMaxPixels));
+  const int columns = std::max(1, static_cast<int>(width / pixel));
+  const int rows = std::max(1, static_cast<int>(depth / pixel));
   std::vector<Column> grid(static_cast<size_t>(columns) * static_cast<size_t>(rows));
   for (const EvidencePoint& point : points) {
-    const Eigen::Vector3d x = frame.InPlan(point.x_in_scan.cast<double>());
-    const int column = static_cast<int>(x.x() / kPixel);
-    const int row = rows - 1 - static_cast<int>(x.y() / kPixel);
-    const bool is_shown =
-        x.minCoeff() >= 0 && x.z() < frame.Size().z() - kCeiling && column < columns && row >= 0;
-    if (!is_shown) continue;
+    const Eigen::Vector3d x = frame.InPlan(point.x_in_scan);
+    if (x.minCoeff() < 0 || x.x() >= width || x.y() >= depth ||
+        x.z() >= frame.Size().z() - kCeiling) {
+      continue;
+    }
+    const int column = std::min(static_cast<int>(x.x() / pixel), columns - 1);
+    const int row = rows - 1 - std::min(static_cast<int>(x.y() / pixel), rows - 1);
     Column& there =
         grid[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
     ++there.num_points;

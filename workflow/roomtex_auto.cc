@@ -1,5 +1,6 @@
 // roomtex-auto: from photos and a scan to a coloured room and a report, with one command.
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -117,6 +118,19 @@ void TidyUp(const std::string& output_path) {
   }
 }
 
+// Pictures that are made are not to be taken for photos the next time.
+void RequireOutside(const std::string& output_path, const std::string& photos) {
+  std::error_code error;
+  const fs::path folder = fs::weakly_canonical(photos, error);
+  const fs::path output = fs::weakly_canonical(output_path, error);
+  const auto [end, rest] =
+      std::mismatch(folder.begin(), folder.end(), output.begin(), output.end());
+  if (end == folder.end()) {
+    throw UsageError("--output_path " + output_path + " lies in the folder of the photos, " +
+                     photos + ": give one outside of it");
+  }
+}
+
 void CheckInputs(const AutoOptions& o) {
   if (!o.image_path.empty()) RequireFolder(o.image_path, "Give the folder of the photos");
   if (!o.panoramas_path.empty()) RequireFolder(o.panoramas_path, "Give the panoramas' folder");
@@ -125,6 +139,10 @@ void CheckInputs(const AutoOptions& o) {
     RequireFile(o.picks_path, "Make it with roomtex-pick, or leave --picks_path out");
   }
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
+  if (!o.scan_poses.empty()) RequireFile(o.scan_poses, "Give the file with the stations' poses");
+  for (const std::string& photos : {o.image_path, o.panoramas_path}) {
+    if (!photos.empty()) RequireOutside(o.output_path, photos);
+  }
   for (const std::string& path : o.scan_paths) {
     // room.e57#2 is one scan of a file; but a name may hold a #, too.
     const std::string file = IsThere(path) ? path : path.substr(0, path.find('#'));

@@ -5,6 +5,7 @@
 
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/output_file.h"
 #include "workflow/site_page.h"
 #include "workflow/site_rooms.h"
@@ -19,9 +20,21 @@ struct SiteOptions {
 
 void ReportSite(const SiteOptions& options, const Command::Context& context) {
   RequireFolder(options.input_path, "Give the folder that holds the rooms' output folders");
-  const Json keys = MakeSiteKeys(options.input_path, options.rooms_path.empty()
-                                                         ? FindSiteRooms(options.input_path)
-                                                         : ReadSiteRooms(options.rooms_path));
+  if (fs::path(options.output_path).extension() == ".json") {
+    throw UsageError("--output_path " + options.output_path +
+                     " is the page: give a name that ends with .html");
+  }
+  const std::vector<SiteRoom> rooms = options.rooms_path.empty()
+                                          ? FindSiteRooms(options.input_path)
+                                          : ReadSiteRooms(options.rooms_path);
+  for (const SiteRoom& room : rooms) {
+    for (const char* file : {"steps.json", "report.json", "report.html", "log/align.json"}) {
+      NoteInput((fs::path(options.input_path) / room.name / file).string());
+    }
+  }
+  const std::string copy = fs::path(options.output_path).replace_extension(".json").string();
+  RefuseToReplaceInput(copy);
+  const Json keys = MakeSiteKeys(options.input_path, rooms);
   const fs::path page = fs::absolute(options.output_path).lexically_normal();
   const std::string to_rooms = fs::absolute(options.input_path)
                                    .lexically_normal()
@@ -31,7 +44,7 @@ void ReportSite(const SiteOptions& options, const Command::Context& context) {
   file.stream() << MakeSitePage(keys, to_rooms == "." ? "" : to_rooms + "/");
   file.Commit();
   for (const auto& [key, value] : keys.items()) context.report[key] = value;
-  context.report.AddCopy(fs::path(options.output_path).replace_extension(".json").string());
+  context.report.AddCopy(copy);
 
   std::string names;
   for (const Json& room : keys["rooms"]) {

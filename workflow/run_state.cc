@@ -90,10 +90,11 @@ std::string Signature(const std::string& path) {
   }
   if (!fs::is_directory(path, error)) return "";
   std::vector<fs::path> files;
-  for (const auto& entry :
-       fs::recursive_directory_iterator(path, fs::directory_options::follow_directory_symlink |
-                                                  fs::directory_options::skip_permission_denied)) {
-    if (entry.is_regular_file(error)) files.push_back(entry.path());
+  fs::recursive_directory_iterator entry(path, fs::directory_options::skip_permission_denied,
+                                         error);
+  for (; !error && entry != fs::end(entry); entry.increment(error)) {
+    std::error_code unknown;
+    if (entry->is_regular_file(unknown)) files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());
   for (const fs::path& file : files) {

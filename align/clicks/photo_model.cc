@@ -1,7 +1,6 @@
 #include "align/clicks/photo_model.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -24,15 +23,6 @@ namespace fs = std::filesystem;
 // COLMAP's guess where nobody says: only a place to begin with, the picks decide.
 constexpr double kGuessedFocal = 1.2;
 constexpr double kMaxPrincipalShare = 0.2;  // of width and height; of crops and shifted lenses less
-
-bool IsPhotoName(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static const std::set<std::string> kExtensions = {".jpg",  ".jpeg", ".png", ".tif",
-                                                    ".tiff", ".bmp",  ".webp"};
-  return kExtensions.count(extension) > 0;
-}
 
 // A name must not lead out of the folder of the photos.
 // Parameters that were found for another photo size have their principal point elsewhere.
@@ -127,24 +117,6 @@ void PhotoCameraOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> PhotoCameraOptions::Problems() const { return ProblemsOf(*this); }
-
-std::vector<std::string> ListPhotoFiles(const std::string& image_path) {
-  RequireFolder(image_path, "Check --image_path");
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(image_path, error), end; !error && it != end;
-       it.increment(error)) {
-    if (!it->is_regular_file() || !IsPhotoName(it->path())) continue;
-    names.push_back(it->path().lexically_relative(image_path).generic_string());
-  }
-  if (error) throw InputError(image_path, "", "cannot be listed: " + error.message(), "");
-  if (names.empty()) {
-    throw InputError(image_path, "", "holds no photos",
-                     "Give the folder of the photos (.jpg, .png, .tif ...)");
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 PhotoModel MakePhotoModel(const std::string& image_path, const std::vector<std::string>& names,
                           const PhotoCameraOptions& options, UnfitPhotos unfit) {

@@ -32,9 +32,6 @@ struct PhotoModel {
   std::map<std::string, FocalSource> focal_sources;  // by name
 };
 
-// The photos of a folder and its subfolders, names relative to it, in their order.
-std::vector<std::string> ListPhotoFiles(const std::string& image_path);
-
 // Of a photo that cannot be read, or of another size than that of the given parameters.
 enum class UnfitPhotos {
   kRefused,  // InputError

@@ -10,6 +10,7 @@
 #include "colmap_ext/panorama_model.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/photo_files.h"
 #include "core/surfels.h"
 #include "importers/scan_record.h"
 
@@ -69,8 +70,9 @@ void PickScene::ReadModel(Progress* progress) {
                      "Reconstruct the photos first (roomtex-mapper)");
   }
   progress->Stage("read photos");
-  PhotoModel photos = MakePhotoModel(input_.image_path, ListPhotoFiles(input_.image_path),
-                                     input_.camera, UnfitPhotos::kTaken);
+  PhotoModel photos =
+      MakePhotoModel(input_.image_path, ListPhotoFiles(input_.image_path, "Check --image_path"),
+                     input_.camera, UnfitPhotos::kTaken);
   model_ = std::move(photos.model);
   focal_sources_ = std::move(photos.focal_sources);
 }

@@ -1,9 +1,7 @@
 #include "capture/association/associated_views.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <set>
@@ -20,12 +18,11 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/photo_files.h"
 #include "core/text.h"
 
 namespace roomtex {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr int kMeasuredSize = 1900;    // pixels: photos are measured at this size or up to twice it
 constexpr int kSearched = 5;           // most alike photos that are compared
@@ -33,29 +30,6 @@ constexpr double kClearDetail = 1.15;  // ratio of detail that tells the pattern
 constexpr double kEqualBrightness = 1.03;
 constexpr double kLeastAdvantage = 12;
 constexpr double kLargestError = 0.3;  // pixels: an offset known worse is none
-
-std::vector<std::string> ListPhotoNames(const std::string& folder) {
-  static const std::set<std::string> kExtensions = {".jpg", ".jpeg", ".png",
-                                                    ".tif", ".tiff", ".bmp"};
-  RequireFolder(folder, "Check --image_path: it is the folder with all photos");
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    const std::string file = it->path().filename().string();
-    if (!file.empty() && file[0] == '.') {
-      if (it->is_directory(error)) it.disable_recursion_pending();
-      continue;
-    }
-    std::string extension = it->path().extension().string();
-    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (kExtensions.count(extension) == 0 || !it->is_regular_file(error)) continue;
-    names.push_back(it->path().lexically_relative(folder).generic_string());
-  }
-  if (error) throw InputError(folder, "", "cannot be listed: " + error.message(), "Check it");
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 // Keypoints of the database by image name.
 class KeypointSource {
@@ -130,7 +104,8 @@ class Finder {
 
  private:
   void ReadPhotos() {
-    const auto names = ListPhotoNames(options_.image_path);
+    const auto names = ListPhotoFiles(options_.image_path,
+                                      "Give the folder with the patterned and the plain photos");
     if (names.size() < 2) {
       throw InputError(options_.image_path, "",
                        "holds " + std::to_string(names.size()) +

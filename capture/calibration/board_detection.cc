@@ -321,32 +321,6 @@ void RefineCorners(const cv::Mat& gray, const std::vector<double>& spacing_px, d
   }
 }
 
-std::vector<std::string> ListPhotos(const std::string& folder) {
-  RequireFolder(folder, "Check --image_path: the folder with photos of the board");
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    std::string extension = it->path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
-    for (const char* known : {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp"}) {
-      std::error_code ignored;
-      if (extension == known && it->is_regular_file(ignored)) {
-        names.push_back(it->path().lexically_relative(folder).generic_string());
-      }
-    }
-  }
-  if (error)
-    throw InputError(folder, "", "cannot be listed (" + error.message() + ")", "Check its rights");
-  if (names.empty()) {
-    throw InputError(folder, "", "holds no photos",
-                     "Expected JPEG, PNG, TIFF or BMP files that show the board");
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 std::vector<BoardPhoto> FindBoards(const std::string& folder, const std::vector<std::string>& names,
                                    const Board& board, int num_threads, Progress* progress) {
   const int count = static_cast<int>(names.size());

@@ -54,10 +54,6 @@ struct MarkerSighting {
 void RefineCorners(const cv::Mat& gray, const std::vector<double>& spacing_px, double share,
                    Eigen::Matrix2Xd* x_in_img);
 
-// The photos below `folder` (JPEG, PNG, TIFF, BMP; subfolders too), sorted. Throws InputError if
-// there are none.
-std::vector<std::string> ListPhotos(const std::string& folder);
-
 // Looks for the board in every photo; one BoardPhoto each, in the order of `names`. Photos are
 // decoded as they are needed, num_threads at a time; the result does not depend on it. Throws
 // InputError when the board is in none of them (and says what is there instead), when most of the

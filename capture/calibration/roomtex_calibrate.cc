@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
+#include "core/photo_files.h"
 #include "core/picture_file.h"
 
 namespace roomtex {
@@ -121,7 +122,8 @@ void Run(Arguments* a, const Command::Context& context) {
     std::printf("%s\n", a->board_path.c_str());
     return;
   }
-  const std::vector<std::string> names = ListPhotos(a->image_path);
+  const std::vector<std::string> names =
+      ListPhotoFiles(a->image_path, "Give the folder with photos of the board");
   context.progress.Stage("find boards", static_cast<int>(names.size()));
   const std::vector<BoardPhoto> photos =
       FindBoards(a->image_path, names, board, context.options.num_threads, &context.progress);

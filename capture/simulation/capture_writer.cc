@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
+#include "core/partial_path.h"
 #include "core/photo.h"
 #include "core/text.h"
 #include "importers/rtpi.h"
@@ -41,6 +42,7 @@ std::string ScanName(int station) {
 void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_folder) {
   std::set<std::string> names;
   for (int i = 0; i < room.NumPhotos(); ++i) names.insert(room.PhotoName(i));
+  RemoveLeftovers(photo_folder);
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(photo_folder, ignored)) {
     const std::string name = entry.path().filename().string();

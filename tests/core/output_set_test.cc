@@ -133,6 +133,7 @@ TEST_F(OutputSetTest, RefusesFoldersInTheWay) {
   OutputSet set(place);
   WriteBytes(set.Path("real"), "newer");
   EXPECT_INPUT_ERROR(set.Path("dir"), "is a folder");
+  EXPECT_INPUT_ERROR(set.Path("real/below"), "is not a folder");
   WriteBytes(set.aside() + "/dir", "x");
   EXPECT_INPUT_ERROR(set.Commit(), "is a folder");
   EXPECT_EQ(ReadBytes(In("real")), "old");

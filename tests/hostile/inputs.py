@@ -1,6 +1,7 @@
 """Inputs are never changed: outputs that are inputs, by every road that leads there."""
 
 import os
+import shutil
 
 import scene as s
 
@@ -90,9 +91,39 @@ def cases():
     yield ("render --output_path photo",
            "roomtex-render --ply_path truth/true_colors.ply --input_path sparse "
            "--image_path photos --output_path photos/photo_000.jpg", nothing)
+    for command, output in (("roomtex-view --input_path textured", "--output_path textured"),
+                            ("roomtex-view --input_path textured --output_path page",
+                             "--report_path textured/model.ply"),
+                            ("roomtex-view --input_path textured --aligned sparse",
+                             "--output_path page --report_path sparse/images.txt"),
+                            ("roomtex-outline --input_path scan.rtpi", "--output_path scan.rtpi"),
+                            ("roomtex-outline --input_path sparse --output_path o.json",
+                             "--model_path o.json"),
+                            ("roomtex-merge --database_path database.db --copy_path database.db",
+                             "--output_path database.db"),
+                            ("roomtex-pairs --database_path database.db --output_path p.txt",
+                             "--graph_path database.db"),
+                            ("roomtex-site --input_path rooms", "--output_path rooms/hall/report.html"),
+                            ("roomtex-site --input_path rooms", "--output_path rooms/hall/steps.html"),
+                            ("roomtex-calibrate --board 6x4 --image_path photos --output_path c.txt",
+                             "--board_path photos/photo_000.jpg"),
+                            ("roomtex-export --input_path sparse --image_path photos "
+                             "--scan_path scan.rtpi", "--output_path sparse"),
+                            ("roomtex-dense --input_path sparse --image_path photos "
+                             "--scan_path scan.rtpi", "--output_path photos")):
+        yield f"{command.split()[0][8:]} {output}", f"{command} {output}", with_results
     yield ("auto --report_path scan",
            "roomtex-auto --image_path photos --scan_path scan.rtpi --output_path result "
            "--report_path scan.rtpi", nothing)
+
+
+def with_results(root):
+    """What stands in for results of other commands: no more is needed to see that it stays."""
+    (root / "textured").mkdir()
+    shutil.copy(root / "truth/true_colors.ply", root / "textured/model.ply")
+    (root / "rooms/hall").mkdir(parents=True)
+    (root / "rooms/hall/steps.json").write_text('{"steps": {}}')
+    (root / "rooms/hall/report.html").write_text("mine")
 
 
 def with_texture_png(root):
@@ -116,7 +147,7 @@ def run(base):
         answer = here.run(line)
         after = here.state()
         changed = [name for name in before if after.get(name) != before[name]]
-        problem = answer.problem({2})
+        problem = answer.problem({2, 3} if prepare is with_results else {2})
         if changed:
             problem = f"changed {changed}; " + problem
         yield title, problem

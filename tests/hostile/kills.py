@@ -1,6 +1,8 @@
 """A command that ends at any rename, by a signal or at a full disk leaves old files or new ones."""
 
+import json
 import os
+import random
 import resource
 import shutil
 import signal
@@ -22,6 +24,9 @@ def prepared(base):
     for name in ("0", "init"):
         shutil.copytree(here.root / "sparse", here.root / "result/sparse" / name)
     shutil.copy(here.root / "database.db", here.root / "result")
+    s.write_stations(here.root)
+    coloured = here.run(s.TEXTURE + " --output_path coloured --E57.images 1")
+    assert not coloured.problem({0, 4}), coloured.err
     return here
 
 
@@ -32,6 +37,14 @@ def commands():
     yield "align into three folders", (s.ALIGN + " --output_path aligned --Plane.output_path "
                                        "planes/planes.ply --report_path reports/r.json"), "aligned"
     yield "texture", s.TEXTURE + " --output_path textured", "textured"
+    yield "texture by stations", (
+        "roomtex-texture --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
+        "--scan_path other.rtpi --scan_poses poses.txt --Texture.scale 1 --output_web 0 "
+        "--output_path textured --max_samples 9000"), None  # a set for each station
+    yield "view", ("roomtex-view --quiet --input_path coloured --aligned sparse --image_path photos "
+                   "--output_path page"), "page"
+    yield "import photos of an E57", ("roomtex-import --quiet --input_path coloured/model.e57 "
+                                      "--images_path taken --E57.picks 1"), "taken"
     yield "import", ("roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"), None
     yield "import into three folders", (
         "roomtex-import --quiet --input_path scan.rtpi --output_path meshes/room.ply "
@@ -52,9 +65,71 @@ def commands():
 
 
 # They hold times.
-VOLATILE = {"aligned/alignment.json", "textured/report.json", "alignment.json", "reports/r.json",
+VOLATILE = {"page/report.json", "aligned/alignment.json", "textured/report.json", "alignment.json", "reports/r.json",
             "mapped/roomtex-mapper.log", "mapped/0/roomtex-mapper.json", "result/aligned/alignment.json",
             "result/steps.json", "result/report.json", "result/report.html"}
+
+
+def at_random(base, num_kills=30):
+    """roomtex-auto with the real COLMAP, killed again and again: it always goes on, and ends whole."""
+    here = s.Scene(base.programs)
+    made = here.run("roomtex-simulate --quiet --output_path capture --num_photos 8 --photo_width 480 "
+                    "--photo_height 320 --scan_columns 300 --scan_rows 150")
+    assert made.code == 0, made.err
+    inputs = here.state()
+    programs = str(here.programs)
+    line = [programs + "/roomtex-auto", "--quiet", "--image_path", "capture/photos", "--scan_path",
+            "capture/scan.rtpi", "--picks_path", "capture/picks.csv", "--quality", "low",
+            "--output_path", "result", "--accept_untrusted", "1"]
+    generator = random.Random(19)
+    kills, ends, problems = {}, [], []
+
+    def check(code, err):
+        state = here.state()
+        if code not in (0, 4):
+            problems.append(f"exit {code}: {err[-300:]}")
+        for name in ("report.html", "report.json", "textured/model.ply", "aligned/images.bin",
+                     "sparse/0/images.bin"):
+            if "result/" + name not in state:
+                problems.append(f"ends without {name}")
+        if here.leftovers():
+            problems.append(f"leaves {here.leftovers()}")
+        if any(state.get(name) != content for name, content in inputs.items()):
+            problems.append("inputs changed")
+        ends.append(code)
+
+    while sum(kills.values()) < num_kills and not problems:
+        process = subprocess.Popen(line, cwd=here.root, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, start_new_session=True)
+        try:
+            _, err = process.communicate(timeout=generator.uniform(0.2, 20))
+            check(process.returncode, err.decode())
+            shutil.rmtree(here.root / "result")
+            continue
+        except subprocess.TimeoutExpired:
+            pass
+        try:
+            steps = json.loads((here.root / "result/steps.json").read_text())["steps"]
+            step = next((name for name in steps if steps[name]["state"] == "started"), "between")
+        except FileNotFoundError:
+            step = "first"
+        kills[step] = kills.get(step, 0) + 1
+        # Every other time only the command itself: what it had started has to end by itself.
+        alone = sum(kills.values()) % 2 == 0
+        process.kill() if alone else os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        time.sleep(2)
+        try:
+            os.killpg(process.pid, signal.SIGKILL)
+            problems.append(f"killed in {step}, it leaves a process")
+        except ProcessLookupError:
+            pass
+        process.stderr.close()
+    if not problems:
+        answer = here.run(" ".join(["roomtex-auto"] + line[1:]), seconds=600)
+        check(answer.code, answer.err)
+    yield (f"auto, {sum(kills.values())} kills at random moments {kills}, {len(ends)} ends {ends}",
+           "; ".join(problems))
 
 
 def below(state, folder):
@@ -115,17 +190,21 @@ def at_every_rename(base):
 
 def by_signals(base):
     slow = "roomtex-simulate --quiet --output_path new --num_photos 40"
-    cases = [("simulate", slow, 0.7), ("texture", s.TEXTURE.replace("--Texture.scale 1", "--Texture.scale 8") +
-                               " --output_path textured", 1.0)]
-    for title, line, seconds in cases:
+    cases = [("simulate", slow), ("texture", s.TEXTURE.replace("--Texture.scale 1", "--Texture.scale 8") +
+                               " --output_path textured")]
+    for title, line in cases:
         for what in (signal.SIGINT, signal.SIGTERM):
             here = base.copy()
             before = here.state()
             arguments = line.split()
             arguments[0] = str(here.programs / arguments[0])
             process = subprocess.Popen(arguments, cwd=here.root, stderr=subprocess.PIPE,
-                                       stdout=subprocess.DEVNULL, start_new_session=True)
-            time.sleep(seconds)
+                                       stdout=subprocess.DEVNULL, start_new_session=True,
+                                       # A job in the background ignores it.
+                                       preexec_fn=lambda: signal.signal(signal.SIGINT,
+                                                                        signal.SIG_DFL))
+            while process.poll() is None and not here.leftovers():
+                time.sleep(0.02)
             process.send_signal(what)
             try:
                 err = process.communicate(timeout=20)[1].decode()
@@ -166,4 +245,4 @@ def full_disk(base):
 
 
 if __name__ == "__main__":
-    s.main({"renames": at_every_rename, "signals": by_signals, "full_disk": full_disk})
+    s.main({"renames": at_every_rename, "random": at_random, "signals": by_signals, "full_disk": full_disk})

@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import shutil
 import socket
 
 import scene as s
@@ -29,6 +30,27 @@ AUTO = "roomtex-auto --quiet --image_path photos --scan_path scan.rtpi --output_
 PICK = ("roomtex-pick --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
         "--output_path p.csv --port 0")
 VIEW = "roomtex-view --quiet --input_path textured --port 0"
+# Of what prepared() adds.
+PAGE = ("roomtex-view --quiet --input_path coloured --aligned room --image_path photos "
+        "--output_path page")
+PHOTOS = "roomtex-import --quiet --input_path coloured/model.e57 --images_path taken"
+MADE = "--quiet --input_path room --image_path photos --output_path "
+SPLAT = "roomtex-export " + MADE + "exported --accept_untrusted 1"
+HOLES = "roomtex-dense " + MADE + "dense --accept_untrusted 1 --max_image_size 64"
+BOARDS = ("roomtex-calibrate --quiet --image_path boards --board 6x4 --output_path camera.txt "
+          "--Trust.min_photos 3")
+BOARD = ("roomtex-calibrate --quiet --board 6x4 --board_type charuco --marker 0.018 "
+         "--board_path board.pdf")
+STATIONS = ("roomtex-texture --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
+            "--scan_path other.rtpi --scan_poses poses.txt --Texture.scale 1 --output_path textured "
+            "--max_samples 9000")
+PICTURES = ("roomtex-render --quiet --ply_path coloured/model.ply --input_path sparse --num_photos 1 "
+            "--num_ring 1 --width 40 --folder_path pictures")
+PICTURE = ("roomtex-render --quiet --glb_path coloured/model.glb --input_path sparse --width 40 "
+           "--output_path picture.png")
+MERGE = ("roomtex-merge --quiet --database_path database.db --copy_path part.db "
+         "--output_path merged.db")
+SITE = "roomtex-site --quiet --input_path . --output_path site.html"
 FLAT = {"format": "roomtex outline", "version": 1, "metric": True,
         "outline_from_input": {"scale": 1, "rotation_wxyz": [1, 0, 0, 0], "translation": [0, 0, 0]},
         "geo_origin": None,
@@ -88,6 +110,10 @@ def unix_socket(name):
         socket.socket(socket.AF_UNIX).bind(path.name)
         os.chdir(here)
     return replaced(name, make)
+
+
+def folder_below(name):
+    return lambda root: (root / name).mkdir(parents=True)
 
 
 def moved(old, new):
@@ -324,17 +350,213 @@ def places():
            EVALUATE, {3, 4})
 
 
+def prepared(base):
+    """The scene with results of roomtex-align and roomtex-texture, boards and parts of a site."""
+    here = base.copy()
+    s.write_boards(here.root / "boards")
+    shutil.copy(here.root / "database.db", here.root / "part.db")
+    s.write_stations(here.root)
+    (here.root / "hall").mkdir()
+    (here.root / "hall/steps.json").write_text('{"steps": {}}')
+    for line in (s.ALIGN + " --image_path photos --output_path room",
+                 s.TEXTURE + " --output_path coloured --E57.images 1"):
+        answer = here.run(line)
+        assert not answer.problem({0, 4}), answer.err
+    return here
+
+
+def bad_number_cases():
+    """Numbers that no option takes, and some that only a few do."""
+    for line, names in NUMBERS.items():
+        for name in names.split():
+            for value in ("nan", "1e999", "-1e300", "", "ten"):
+                yield (f"{command_of(line)} --{name} {value!r}", nothing,
+                       shlex.split(line) + ["--" + name, value], {2})
+
+
+def later():
+    """What came after the first tables: cases for prepared()."""
+    yield "view: a page to give away", nothing, PAGE, {0}
+    yield "view: a page of a .ply", nothing, PAGE.replace("coloured ", "coloured/model.ply "), {0}
+    yield "view: a page over its model", nothing, PAGE.replace(" page", " coloured"), {2, 3}
+    yield "view: a page among the photos", nothing, PAGE.replace(" page", " photos"), {2, 3}
+    yield "view: a page over the aligned model", nothing, PAGE.replace(" page", " room"), {2, 3}
+    yield "view: a page in the folder that one works in", nothing, PAGE.replace(" page", " ."), BAD
+    yield "view: a page into a folder of others", write("page/mine.txt", "mine"), PAGE, {3}
+    yield ("view: a page into one of another command", write("page/report.json",
+           '{"command": "roomtex-texture"}'), PAGE, {3})
+    yield ("view: a page beside a report.json that is nested", write("page/report.json", DEEP),
+           PAGE, {3})
+    yield ("view: a name with everything in it", nothing,
+           shlex.split(PAGE)[:-1] + ["a b\n\u00fc'\"#2,x"], {0})
+    yield "view: a scan's name", nothing, PAGE.replace("coloured ", "scan.rtpi "), {3}
+    yield "view: without photos", folder("photos"), PAGE, {0, 3}
+    yield "view: an evidence.ply of nothing", write("coloured/evidence.ply", ""), PAGE, {0, 3}
+    yield "view: an evidence.ply of another room", moved("room", "x"), PAGE, {3}
+    yield "view: report.json is a pipe", fifo("coloured/report.json"), PAGE, {0}
+    yield "view: an aligned model without photos", folder("room"), PAGE, {3}
+
+    yield "import: photos of an E57", nothing, PHOTOS + " --E57.picks 1", {0}
+    yield "import: photos over other photos", nothing, PHOTOS.replace(" taken", " photos"), {3}
+    yield "import: photos into a file", write("taken", "mine"), PHOTOS, {3}
+    yield "import: photos into a place without rights", full("taken"), PHOTOS, {3}
+    yield "import: picks.csv is a folder", folder_below("taken/picks.csv"), PHOTOS + " --E57.picks 1", {3}
+    yield "import: sparse is a file", write("taken/sparse", "mine"), PHOTOS, {3}
+    yield "import: photos of what has none", nothing, PHOTOS.replace("coloured/model.e57", "scan.rtpi"), {3}
+    yield "import: picks without photos", nothing, IMPORT + " --E57.picks 1", {2}
+    yield ("import: an E57 cut short", lambda root: os.truncate(root / "coloured/model.e57", 5000),
+           PHOTOS, {3})
+    for kind in ("e57", "pcd", "xyz", "pts", "csv", "las", "ptx", "png", "rtpi"):
+        yield f"import: a .{kind}", nothing, IMPORT.replace("room.ply", "new." + kind), {0}
+        yield (f"import: a .{kind} twice", nothing,
+               f"{IMPORT} --output_path new.{kind} --output_path ./new.{kind}", {2})
+    for axis in ("w", "", "xy", "+z", "nan"):
+        yield (f"import --up_axis {axis!r}", nothing, shlex.split(IMPORT) + ["--up_axis", axis], {2})
+    yield "import: a panorama that is none", nothing, "roomtex-import --input_path photos --output_path faces", {3}
+    yield ("import: faces into the folder of the panoramas", nothing,
+           "roomtex-import --input_path photos --output_path photos", {2})
+
+    yield "export: a workspace", nothing, SPLAT, RAN
+    for option, codes in (("--format nope", {2}), ("--max_points 0", BAD), ("--max_image_size 1", BAD | RAN),
+                          ("--max_field_of_view 0", {2}), ("--max_field_of_view 361", {2}),
+                          ("--colors_path scan.rtpi", {3}), ("--colors_path photos", {3}),
+                          ("--colors_path coloured/evidence.ply", {3}),
+                          ("--associations_path picks.csv", {3}), ("--output_path photos", BAD),
+                          ("--output_path room", BAD), ("--output_path coloured", BAD),
+                          ("--output_path .", BAD)):
+        yield f"export {option}", nothing, with_options(SPLAT, option), codes
+    for option in ("--output_path photos", "--output_path room", "--output_path .",
+                   "--PatchMatch.num_sources 0", "--PatchMatch.num_iterations 0",
+                   "--Fusion.min_correlation 2", "--Fusion.spacing 0", "--Fusion.min_support 0",
+                   "--max_image_size -1"):
+        yield f"dense {option}", nothing, with_options(HOLES, option), BAD
+    yield "dense: a workspace", nothing, HOLES, RAN | {3}
+
+    yield "calibrate: boards", nothing, BOARDS, RAN
+    for option, codes in (("--square inf", {2}), ("--board 0x0", {2}), ("--board 6x4x2", {2}),
+                          ("--board -6x4", {2}), ("--board 6x999999999999", {2}),
+                          ("--board_type charuco", BAD), ("--Trust.min_photos -1", {2}),
+                          ("--coverage_path coverage.txt", BAD), ("--coverage_path /", BAD),
+                          ("--coverage_path camera.txt", {2}), ("--apply picks.csv", {3}),
+                          ("--image_path boards/board_0.png", {3})):
+        yield f"calibrate {option}", nothing, with_options(BOARDS, option), codes
+    yield "calibrate: a photo of nothing", write("boards/z.png", ""), BOARDS, RAN
+    yield "calibrate: a photo that is a link to itself", loop("boards/z.png"), BOARDS, RAN
+    yield "calibrate: a photo of another size", moved("photos/photo_000.jpg", "boards/z.jpg"), BOARDS, RAN | {3}
+    yield "calibrate: a board to print", nothing, BOARD, {0}
+    for option in ("--marker 0.03", "--marker nan", "--marker 0", "--dictionary DICT_9X9_1",
+                   "--board 500x500", "--square 1e9", "--square 1e-9", "--board_path boards",
+                   "--board_path no/board.pdf"):
+        yield f"calibrate: a board with {option}", nothing, with_options(BOARD, option), BAD
+
+    yield "texture: stations", nothing, STATIONS, RAN
+    yield "texture: station_0 is a file", write("textured/station_0", "mine"), STATIONS, {3}
+    yield ("texture: station_1 is a scan", replaced("textured/station_1", lambda path: path.mkdir(parents=True)),
+           STATIONS, RAN)
+    yield "texture: poses of nan", text("poses.txt", " 1 0", " nan 0"), STATIONS, {3}
+    yield "texture: poses of one scan", text("poses.txt", "other", "third"), STATIONS, {3}
+    for option in ("--max_samples 0", "--max_samples -1", "--max_samples 1e99"):
+        yield f"texture {option}", nothing, with_options(STATIONS, option), BAD
+    yield "texture --max_samples 1", nothing, with_options(STATIONS, "--max_samples 1"), BAD | RAN
+
+    yield "render: pictures", nothing, PICTURES, {0}
+    yield "render: a picture", nothing, PICTURE, {0}
+    for option in ("--width 2000000000", "--width -1", "--num_photos -1", "--num_ring -1",
+                   "--num_ring 2000000000", "--folder_path scan.rtpi", "--ply_path scan.rtpi",
+                   "--ply_path coloured/evidence.ply", "--ply_path truth", "--image_path picks.csv"):
+        yield f"render {option}", nothing, with_options(PICTURES, option), BAD
+    for option in ("--image_name no.jpg", "--glb_path scan.rtpi", "--glb_path nowhere",
+                   "--output_path photos", "--turn_deg nan", "--back 1e999"):
+        yield f"render {option}", nothing, with_options(PICTURE, option), BAD
+    for title, content in (("nested", glb('{"asset":' + "[" * 100000 + "]" * 100000 + "}")),
+                           ("empty", b""), ("of another version", b"glTF\1\0\0\0")):
+        yield f"render: a model.glb {title}", write("coloured/model.glb", content), PICTURE, {3}
+    yield ("render: a PLY of one lonely x", write("coloured/model.ply",
+           "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar red\n"
+           "property float x\nend_header\n12345"), PICTURES, {3})
+    yield ("render: a PLY with a word for a number", write("coloured/model.ply",
+           "ply\nformat binary_little_endian 1.0\nelement vertex many\nproperty float x\n"
+           "end_header\n"), PICTURES, {3})
+
+    yield "merge: a part", nothing, MERGE, RAN
+    for option in ("--copy_path picks.csv", "--copy_path photos", "--output_path photos",
+                   "--output_path part.db", "--output_path database.db"):
+        yield f"merge {option}", nothing, with_options(MERGE, option), BAD
+    yield "site: a page", nothing, SITE, RAN
+    for option in ("--output_path photos", "--output_path no/site.html", "--rooms_path picks.csv",
+                   "--rooms_path photos", "--input_path scan.rtpi", "--input_path photos",
+                   "--output_path hall/steps.json", "--output_path hall/steps.html"):
+        yield f"site {option}", nothing, with_options(SITE, option), BAD
+    yield "site: rooms that lead out", write("site.csv", "room\n../x\n"), SITE + " --rooms_path site.csv", {3}
+    for content in (DEEP, "", "[]", '{"steps": 7}', '{"steps": {"align": 7}}',
+                    '{"steps": {"align": {"state": "done", "seconds": 1e999}}}'):
+        yield (f"site: steps.json is {content[:40]}", write("hall/steps.json", content), SITE, RAN | {3})
+        yield (f"site: report.json is {content[:40]}", write("hall/report.json", content), SITE, RAN | {3})
+    dry = AUTO + " --dry_run"
+    yield "auto: the folder that one works in", nothing, with_options(dry, "--output_path ."), {0}
+    yield "auto: a photo that is a link to itself", loop("photos/photo_000.jpg"), dry, {0, 3}
+    yield ("auto: a folder of photos that holds itself", lambda root: (root / "photos/again").symlink_to("."),
+           dry, {0, 3})
+    yield "pick: a photo that is a link to itself", loop("photos/photo_000.jpg"), PICK.replace(
+        "--input_path sparse ", "").replace("--port 0", "--port -1"), BAD
+    for option in ("--video_frames -1", "--panoramas_path photos", "--video_path scan.rtpi",
+                   "--quality best", "--output_path photos", "--output_path photos/new", "--until nowhere",
+                   "--camera_model FISH", "--camera_params nan", "--scan_poses nowhere",
+                   "--up_axis w", "--pairs maybe", "--video_frames 2000000000"):
+        yield f"auto {option}", nothing, with_options(dry, option), BAD
+    for option in ("--input_path coloured/model.ply --output_path coloured/model.ply",
+                   "--model_path outline.json",
+                   "--model_path photos", "--outline_path scan.rtpi", "--up_axis w"):
+        yield f"outline {option}", nothing, with_options(OUTLINE, option), BAD
+    yield ("outline: a model twice", nothing,
+           OUTLINE + " --model_path a.obj --model_path ./a.obj", {2})
+    for option in ("--graph_path photos", "--image_path scan.rtpi", "--output_path database.db"):
+        yield f"pairs {option}", nothing, with_options(PAIRS, option), BAD
+
+
+NUMBERS = {
+    IMPORT: "max_range Mesh.max_edge_ratio Mesh.max_bend Faces.around Faces.field_of_view_deg Faces.size",
+    PAGE: "photo_size port",
+    SPLAT: "max_points max_image_size max_field_of_view Occlusion.boundary_px Blend.min_agreement",
+    HOLES: "max_image_size max_field_of_view PatchMatch.num_sources Fusion.spacing "
+           "Fusion.distance_to_scan Fusion.max_depth_difference",
+    OUTLINE: "scale min_area max_range port",
+    BOARDS: "square marker Model.min_gain Photos.bad_px Trust.min_tilt_deg Trust.max_sigma_px",
+    PICTURE: "width",
+    PICTURES: "num_photos num_ring",
+    AUTO: "video_frames",
+    PAIRS: "Pairs.max_ratio Pairs.max_error Pairs.num_rounds Pairs.num_by_place",
+}
+
+
 def cases():
     """Title, what is changed, the command line, exit codes."""
     for group in (wrong_kinds, numbers, beside, outlines, options, names, places):
         yield from group()
 
 
+def later_cases():
+    for group in (later, bad_number_cases):
+        yield from group()
+
+
+# Only the cases whose title holds this.
+ONLY = os.environ.get("ROOMTEX_CASES", "")
 VERBOSE = os.environ.get("ROOMTEX_SHOW_SENTENCES")
 
 
 def odd(base):
-    for title, change, line, codes in cases():
+    yield from run_cases(base, cases())
+
+
+def odd_later(base):
+    yield from run_cases(prepared(base), later_cases())
+
+
+def run_cases(base, all_cases):
+    for title, change, line, codes in all_cases:
+        if ONLY not in title:
+            continue
         here = base.copy()
         change(here.root)
         before = here.state()
@@ -354,4 +576,4 @@ def odd(base):
 
 
 if __name__ == "__main__":
-    s.main({"odd": odd})
+    s.main({"odd": odd, "odd_later": odd_later})

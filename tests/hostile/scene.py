@@ -273,6 +273,13 @@ def write_png(path, width, height, grey):
                      chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
+def write_stations(root):
+    """other.rtpi, a second scan, and poses.txt for both."""
+    shutil.copy(root / "scan.rtpi", root / "other.rtpi")
+    pose = " 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"
+    (root / "poses.txt").write_text("scan.rtpi" + pose + "other.rtpi" + pose)
+
+
 def write_boards(folder):
     """Photos of a checkerboard with 6x4 inner corners, for roomtex-calibrate."""
     folder.mkdir()

@@ -217,6 +217,13 @@ TEST_F(E57Images, TheCommandWritesThemBesideTheScan) {
   EXPECT_THAT(result.out, HasSubstr("1 photos, 1 with a pose"));
   EXPECT_THAT(ReadBytes(folder_ / "report.json"), HasSubstr("\"front.png\""));
   EXPECT_THAT(Model().images, SizeIs(1));
+  // The same once more; but never over a picture of somebody else.
+  const std::string again = "roomtex-import --quiet --input_path " + (folder_ / "site.e57") +
+                            " --images_path " + (folder_ / "photos");
+  EXPECT_EQ(RunCommandLine(again).exit_code, 0);
+  WriteBytes(folder_ / "photos/front.png", "mine");
+  EXPECT_THAT(RunCommandLine(again).err, HasSubstr("is another picture"));
+  EXPECT_EQ(ReadBytes(folder_ / "photos/front.png"), "mine");
   WriteBytes(folder_ / "walls.e57", E57OfWalls({"a"}));
   const CommandResult none =
       RunCommandLine("roomtex-import --input_path " + (folder_ / "walls.e57") + " --images_path " +

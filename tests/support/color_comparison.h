@@ -6,7 +6,7 @@
 
 #include "core/report.h"
 #include "core/scan.h"
-#include "texture/render/ply_vertices.h"
+#include "tests/support/ply_vertices.h"
 
 namespace roomtex {
 

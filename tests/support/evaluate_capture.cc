@@ -19,7 +19,7 @@
 #include "core/statistics.h"
 #include "importers/scan_reader.h"
 #include "tests/support/color_comparison.h"
-#include "texture/render/ply_vertices.h"
+#include "tests/support/ply_vertices.h"
 
 namespace roomtex {
 namespace {

@@ -17,11 +17,11 @@
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "importers/scan_writer.h"
+#include "tests/support/ply_vertices.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/load_glb.h"
 #include "texture/output/evidence.h"
-#include "texture/render/ply_vertices.h"
 #include "texture/sampling/blend.h"
 
 namespace roomtex {

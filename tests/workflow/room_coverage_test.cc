@@ -27,7 +27,7 @@ std::vector<EvidencePoint> Room() {
   std::vector<EvidencePoint> points;
   const auto add = [&](double x, double y, double z, int views) {
     EvidencePoint point;
-    point.x_in_scan = InScan(x, y, z).cast<float>();
+    point.x_in_scan = InScan(x, y, z);
     point.views = static_cast<uint8_t>(views);
     point.disagreement = views > 1 ? 5.f : NAN;
     points.push_back(point);
@@ -113,7 +113,7 @@ TEST(MeasureCoverage, SendsNobodyOntoATable) {
   for (double x = 0.8; x <= 2.2; x += 0.03) {
     for (double y = 0; y <= kDepth; y += 0.03) {
       EvidencePoint point;
-      point.x_in_scan = InScan(x, y, 0.8).cast<float>();
+      point.x_in_scan = InScan(x, y, 0.8);
       point.views = 2;
       points.push_back(point);
     }
@@ -149,7 +149,7 @@ TEST(DrawPlan, ShowsEveryCameraAndPlace) {
   EXPECT_NE(svg.find("data:image/png;base64,"), std::string::npos);
 }
 
-TEST(ReadEvidence, ReadsPointsAndRefusesWhatIsNone) {
+TEST(ReadEvidencePoints, ReadsPointsAndRefusesWhatIsNone) {
   const TempFolder folder;
   const std::string header =
       "ply\nformat binary_little_endian 1.0\ncomment c\nelement vertex 2\nproperty float x\n"
@@ -163,16 +163,30 @@ TEST(ReadEvidence, ReadsPointsAndRefusesWhatIsNone) {
     bytes.append(reinterpret_cast<const char*>(&disagreement), 4);
   }
   WriteBytes(folder / "evidence.ply", header + bytes);
-  const auto points = ReadEvidence(folder / "evidence.ply");
+  const auto points = ReadEvidencePoints(folder / "evidence.ply");
   ASSERT_EQ(points.size(), 2u);
-  EXPECT_EQ(points[1].x_in_scan, Eigen::Vector3f(2, 2, 3));
+  EXPECT_EQ(points[1].x_in_scan, Eigen::Vector3d(2, 2, 3));
   EXPECT_EQ(points[1].views, 5);
   EXPECT_EQ(points[1].disagreement, 7);
   WriteBytes(folder / "cut.ply", header + bytes.substr(0, 30));
-  EXPECT_INPUT_ERROR(ReadEvidence(folder / "cut.ply"), "is cut off");
+  EXPECT_INPUT_ERROR(ReadEvidencePoints(folder / "cut.ply"), "is cut off");
+  // Large coordinates are doubles; what stands beside them is not theirs.
+  const double far[3] = {691000.125, 5334000.25, 519.5};
+  const float disagreement = 3;
+  bytes = std::string(1, '\x02') + std::string(reinterpret_cast<const char*>(&disagreement), 4) +
+          std::string(reinterpret_cast<const char*>(far), 24);
+  const std::string far_header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar views\n"
+      "property float disagreement\nproperty double x\nproperty double y\nproperty double z\n"
+      "end_header\n";
+  WriteBytes(folder / "far.ply", far_header + bytes);
+  EXPECT_EQ(ReadEvidencePoints(folder / "far.ply").at(0).x_in_scan, Eigen::Vector3d(far));
+  WriteBytes(folder / "other.ply",
+             far_header.substr(0, far_header.find("property double y")) + "end_header\n" + bytes);
+  EXPECT_INPUT_ERROR(ReadEvidencePoints(folder / "other.ply"), "is no evidence.ply");
   WriteBytes(folder / "other.ply", "ply\nformat ascii 1.0\nend_header\n");
-  EXPECT_INPUT_ERROR(ReadEvidence(folder / "other.ply"), "is no evidence.ply");
-  EXPECT_INPUT_ERROR(ReadEvidence(folder / "none.ply"), "does not exist");
+  EXPECT_INPUT_ERROR(ReadEvidencePoints(folder / "other.ply"), "is no evidence.ply");
+  EXPECT_INPUT_ERROR(ReadEvidencePoints(folder / "none.ply"), "does not exist");
 }
 
 }  // namespace

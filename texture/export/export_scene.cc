@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include <opencv2/core.hpp>
+
 #include "core/error.h"
 #include "importers/ply.h"
 
@@ -102,8 +104,10 @@ ScanColors ReadScanColors(const std::vector<Scan>& scans, const std::string& mod
         throw InputError(model_ply, "vertex " + std::to_string(next),
                          "is not the sample of the scan that should stand there", remedy);
       }
-      for (int k = 0; k < 3; ++k) grid.rgb[i][k] = static_cast<uint8_t>(values.values[k][next]);
-      grid.views[i] = static_cast<uint8_t>(values.values[3][next]);
+      for (int k = 0; k < 3; ++k) {
+        grid.rgb[i][k] = cv::saturate_cast<uint8_t>(values.values[k][next]);
+      }
+      grid.views[i] = cv::saturate_cast<uint8_t>(values.values[3][next]);
       ++next;
     }
     colors.push_back(std::move(grid));

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-#include <iterator>
+#include <utility>
 
 #include "core/error.h"
-#include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
-#include "texture/render/ply_vertices.h"
+#include "importers/ply.h"
 
 namespace roomtex {
 namespace {
@@ -58,30 +55,16 @@ cv::Vec3f ColorAt(const ColoredMesh& mesh, const RayHit& hit) {
 }  // namespace
 
 ColoredMesh ReadColoredMesh(const std::string& path) {
-  RequireFile(path, "Give a model.ply of roomtex-texture");
-  std::ifstream stream(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  PlyVertices vertices = ParsePlyVertices(bytes, path);
-  if (vertices.colors.empty()) throw InputError(path, "", "has no colours", "");
-  ColoredMesh mesh;
-  for (const Eigen::Vector3f& point : vertices.points) mesh.points.push_back(point.cast<double>());
-  mesh.colors = std::move(vertices.colors);
-  // The faces are the last element: 1 + 3 * 4 bytes each.
-  const size_t at = bytes.find("element face ");
-  const size_t count = at == std::string::npos ? 0 : std::stoull(bytes.substr(at + 13, 20));
-  if (count * 13 > bytes.size()) throw InputError(path, "", "is truncated", "");
-  const char* face = bytes.data() + bytes.size() - count * 13;
-  for (size_t i = 0; i < count; ++i, face += 13) {
-    Triangle triangle;
-    std::memcpy(triangle.data(), face + 1, 12);
-    for (const int corner : triangle) {
-      if (corner < 0 || corner >= static_cast<int>(mesh.points.size())) {
-        throw InputError(path, "", "has a face that names no vertex", "");
-      }
-    }
-    mesh.triangles.push_back(triangle);
+  PlyOptions options;
+  options.colors = true;
+  Scan scan = ReadPly(path, options);
+  if (scan.colors.empty()) {
+    throw InputError(path, "", "has no colours", "Give a model.ply of roomtex-texture");
   }
-  if (mesh.triangles.empty()) throw InputError(path, "", "has no faces", "");
+  ColoredMesh mesh;
+  mesh.points = std::move(scan.points);
+  mesh.triangles = std::move(scan.triangles);
+  for (const auto& [red, green, blue] : scan.colors) mesh.colors.emplace_back(red, green, blue);
   return mesh;
 }
 
@@ -89,7 +72,10 @@ RoomBox FindRoomBox(const ColoredMesh& mesh) {
   RoomBox box;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
-    for (const Eigen::Vector3d& point : mesh.points) values.push_back(point[axis]);
+    for (const Eigen::Vector3d& point : mesh.points) {
+      if (point.allFinite()) values.push_back(point[axis]);
+    }
+    if (values.empty()) values.push_back(0);
     box.low[axis] = Quantile(&values, 0.01);
     box.high[axis] = Quantile(&values, 0.99);
   }

@@ -27,7 +27,7 @@ struct ColoredMesh {
   std::vector<cv::Mat> textures;
 };
 
-// A binary PLY as roomtex-texture writes it: vertices with colours, faces last. Throws InputError.
+// A PLY mesh with colours at the vertices. Throws InputError.
 ColoredMesh ReadColoredMesh(const std::string& path);
 
 // A model.glb of roomtex-texture. Throws InputError.

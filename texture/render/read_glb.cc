@@ -39,7 +39,7 @@ class Elements {
     stride_ = view.byteStride > 0 ? view.byteStride : packed;
     const size_t begin = view.byteOffset + accessor_.byteOffset;
     if (stride_ < packed) throw NotOurs(path);
-    if (begin > bytes.size() ||
+    if (view.byteOffset > bytes.size() || begin < view.byteOffset || begin > bytes.size() ||
         (accessor_.count > 0 &&
          (packed > bytes.size() - begin ||
           accessor_.count - 1 > (bytes.size() - begin - packed) / stride_))) {
@@ -121,7 +121,12 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
     const Elements uv(model, primitive.attributes.at("TEXCOORD_0"), 2, path);
     require_count(uv);
     for (size_t i = 0; i < count; ++i) {
-      mesh->uv[first + i] = Eigen::Vector2d(uv.At(i, 0), uv.At(i, 1)).cast<float>();
+      Eigen::Vector2f& place = mesh->uv[first + i];
+      place = Eigen::Vector2d(uv.At(i, 0), uv.At(i, 1)).cast<float>();
+      if (!place.allFinite()) {
+        throw InputError(path, "", "has a place in the texture that is no number",
+                         "Write it again");
+      }
     }
   } else if (primitive.attributes.count("COLOR_0") > 0) {
     const Elements light(model, primitive.attributes.at("COLOR_0"), 3, path);
@@ -138,6 +143,8 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
     }
   }
   if (primitive.mode == TINYGLTF_MODE_POINTS) return;
+  const int image = texture < 0 ? -1 : model.textures.at(texture).source;
+  if (image >= static_cast<int>(mesh->textures.size())) throw NotOurs(path);
   const Elements corners(model, primitive.indices, 1, path);
   for (size_t i = 0; i + 2 < corners.count(); i += 3) {
     Triangle triangle;
@@ -149,7 +156,7 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
       triangle[k] = first + static_cast<int>(corner);
     }
     mesh->triangles.push_back(triangle);
-    mesh->texture_of_triangle.push_back(texture < 0 ? -1 : model.textures.at(texture).source);
+    mesh->texture_of_triangle.push_back(image);
   }
 }
 
@@ -162,6 +169,7 @@ ColoredMesh ReadTexturedMesh(const std::string& path) {
   file << stream.rdbuf();
   const std::string bytes = UnpackGlb(path, file.str());
   tinygltf::TinyGLTF loader;
+  loader.SetFsCallbacks({});  // no other files
   tinygltf::Model model;
   std::string error, warning;
   if (bytes.size() > std::numeric_limits<unsigned int>::max() ||

@@ -25,6 +25,8 @@
 namespace roomtex {
 namespace {
 
+constexpr int kMaxPictures = 1000, kMaxWidth = 16384;
+
 struct RenderOptions {
   std::string ply_path, glb_path, input_path, image_path, output_path, folder_path, image_name;
   double turn_deg = 0, back = 0, up = 0;
@@ -290,8 +292,12 @@ void RenderModel(const RenderOptions& options, const Command::Context& context) 
   if (options.output_path.empty() == options.folder_path.empty()) {
     throw UsageError("give --output_path for one picture or --folder_path for a set of them");
   }
-  if (options.num_photos < 0 || options.num_ring < 0) {
-    throw UsageError("--num_photos and --num_ring must not be negative");
+  if (options.num_photos < 0 || options.num_ring < 0 || options.num_photos > kMaxPictures ||
+      options.num_ring > kMaxPictures) {
+    throw UsageError("--num_photos and --num_ring must be 0 to " + std::to_string(kMaxPictures));
+  }
+  if (options.width < 0 || options.width > kMaxWidth) {
+    throw UsageError("--width must be 0 to " + std::to_string(kMaxWidth) + " pixels");
   }
   context.progress.Stage("read");
   const SparseModel model = ReadSparseModel(options.input_path);

@@ -7,7 +7,7 @@
 #include <meshoptimizer.h>
 
 #include "core/error.h"
-#include "core/report.h"
+#include "core/json_text.h"
 
 namespace roomtex {
 namespace {
@@ -61,7 +61,8 @@ std::string UnpackGlb(const std::string& path, std::string bytes) {
   const size_t json_length = WordAt(bytes, kHeader);
   const size_t binary_at = kHeader + kChunkHeader + json_length;
   if (binary_at + kChunkHeader > bytes.size()) return bytes;
-  Json gltf = Json::parse(bytes.substr(kHeader + kChunkHeader, json_length), nullptr, false);
+  Json gltf = ParseJson(bytes.substr(kHeader + kChunkHeader, json_length), path,
+                        "Write it again with roomtex-texture");
   if (!gltf.is_object() || !gltf.contains("bufferViews")) return bytes;
   std::string binary = bytes.substr(binary_at + kChunkHeader);
   bool is_packed = false;
@@ -78,7 +79,7 @@ std::string UnpackGlb(const std::string& path, std::string bytes) {
     throw Broken(path, "has a compressed view without its numbers");
   }
   gltf.erase("extensionsRequired");
-  std::string json = gltf.dump();
+  std::string json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
   json.resize((json.size() + 3) / 4 * 4, ' ');
   std::string plain = bytes.substr(0, 8);
   Put(static_cast<uint32_t>(kHeader + 2 * kChunkHeader + json.size() + binary.size()), &plain);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
@@ -12,31 +11,16 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/photo_files.h"
 
 namespace roomtex {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct Bracket {
   std::vector<cv::Mat> photos;  // thinned out: a grid of their pixels
   std::vector<float> seconds;   // relative: what an aperture and ISO of 1 would need
   std::vector<bool> smooth;     // per pixel
 };
-
-std::vector<std::string> ListPhotoFiles(const std::string& folder) {
-  std::vector<std::string> paths;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::string extension = entry.path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    for (const char* known : {".jpg", ".jpeg", ".png", ".tif", ".tiff"}) {
-      if (extension == known) paths.push_back(entry.path().string());
-    }
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
 
 // Where the 5 x 5 pixels around are alike: a camera moves by a pixel between two exposures.
 cv::Mat1b SmoothPlaces(const cv::Mat& photo) {
@@ -59,8 +43,9 @@ std::vector<cv::Point> GridPlaces(const cv::Size& size) {
 }
 
 Bracket ReadBracket(const std::string& folder) {
-  RequireFolder(folder, "Give a folder of photos of one still scene, exposed differently");
-  const std::vector<std::string> paths = ListPhotoFiles(folder);
+  std::vector<std::string> paths = ListPhotoFiles(
+      folder, "Give a folder of photos of one still scene, exposed differently", false);
+  for (std::string& path : paths) path.insert(0, folder + "/");
   if (paths.size() < 3) {
     throw InputError(folder, "", "holds " + std::to_string(paths.size()) + " photos",
                      "A bracket needs at least three, from too dark to too light");

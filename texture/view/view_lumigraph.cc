@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <mutex>
 
 #include <opencv2/core.hpp>
 
+#include "core/json_text.h"
 #include "core/parallel.h"
 #include "texture/sampling/rasterizer.h"
 
@@ -104,8 +104,7 @@ cv::Mat1f WidenNearer(const cv::Mat1f& inverse) {
 }  // namespace
 
 ViewTones ReadViewTones(const std::string& folder) {
-  std::ifstream stream(std::filesystem::path(folder) / "report.json");
-  const Json report = Json::parse(stream, nullptr, false);
+  const Json report = ReadJsonIfAny((std::filesystem::path(folder) / "report.json").string());
   ViewTones tones;
   if (!report.is_object()) return tones;
   const bool by_channel = report.contains("channel_gain");

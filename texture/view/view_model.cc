@@ -4,13 +4,13 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 
 #include <Eigen/Geometry>
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/report.h"
 #include "core/surfels.h"
@@ -121,8 +121,7 @@ void ShowAsDiscs(const Scan& scan, ViewModel* model) {
 
 // Vertex of model.ply with which the supplement begins, by the report beside the model.
 std::optional<size_t> FirstSupplementVertex(const std::string& file) {
-  std::ifstream stream(fs::path(file).parent_path() / "report.json");
-  const Json report = Json::parse(stream, nullptr, false);
+  const Json report = ReadJsonIfAny((fs::path(file).parent_path() / "report.json").string());
   if (!report.is_object() || !report.contains("supplement")) return std::nullopt;
   const Json& found = report["supplement"];
   const auto number = [&found](const char* key) {

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/photo_files.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
 
@@ -53,7 +54,7 @@ TEST(PhotoModel, TakesTheCameraFromOptionsOrExifOrLeavesItToThePicks) {
   WritePhoto(folder / "b/exif.jpg", 600, 400);
   WritePhoto(folder / "none.png", 600, 400);
   SetExif(folder / "b/exif.jpg", "Exif.Photo.FocalLengthIn35mmFilm", "36");
-  const std::vector<std::string> names = ListPhotoFiles(folder.path());
+  const std::vector<std::string> names = ListPhotoFiles(folder.path(), "");
   EXPECT_THAT(names, ElementsAre("b/exif.jpg", "none.png"));
   const PhotoModel found = MakePhotoModel(folder.path(), names, {});
   EXPECT_EQ(found.focal_sources.at("b/exif.jpg"), FocalSource::kExif);

@@ -12,8 +12,8 @@
 #include "tests/align/case_folder.h"
 #include "tests/align/trust/scanned_room.h"
 #include "tests/support/matchers.h"
+#include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
-#include "texture/render/ply_vertices.h"
 
 namespace roomtex {
 namespace {

@@ -13,6 +13,7 @@
 #include "capture/calibration/calibration_uncertainty.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/photo_files.h"
 #include "tests/capture/calibration/calibration_boards.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -24,7 +25,7 @@ constexpr int kWidth = 640, kHeight = 426;
 
 std::vector<BoardPhoto> Find(const std::string& folder, const Board& board, int num_threads = -1) {
   Progress progress(true);
-  return FindBoards(folder, ListPhotos(folder), board, num_threads, &progress);
+  return FindBoards(folder, ListPhotoFiles(folder, ""), board, num_threads, &progress);
 }
 
 // Root mean square over the corners seen, of what the two cameras make of them; the turn taken out.
@@ -213,8 +214,8 @@ TEST_F(BoardFolder, RefusesPhotosOfDifferentSizes) {
 
 TEST(BoardPhotos, AreMissed) {
   const TempFolder folder;
-  EXPECT_INPUT_ERROR(ListPhotos(folder / "nowhere"), "nowhere");
-  EXPECT_INPUT_ERROR(ListPhotos(folder.path()), "holds no photos");
+  EXPECT_INPUT_ERROR(ListPhotoFiles(folder / "nowhere", ""), "nowhere");
+  EXPECT_INPUT_ERROR(ListPhotoFiles(folder.path(), ""), "holds no photos");
   WriteBytes(folder / "a.jpg", "no picture at all");
   EXPECT_INPUT_ERROR(Find(folder.path(), Checkerboard(9, 6)), "none of its 1 photos can be read");
   cv::imwrite(folder / "a.jpg", cv::Mat(200, 300, CV_8U, cv::Scalar(128)));

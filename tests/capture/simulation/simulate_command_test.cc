@@ -14,9 +14,9 @@
 #include "importers/scan_reader.h"
 #include "tests/capture/simulation/small_room.h"
 #include "tests/support/matchers.h"
+#include "tests/support/ply_vertices.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
-#include "texture/render/ply_vertices.h"
 
 namespace roomtex {
 namespace {

@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
+#include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/view/view_scene.h"
-#include "texture/render/ply_vertices.h"
 #include "texture/tone/exposure.h"
 #include "texture/view/view_evidence.h"
 

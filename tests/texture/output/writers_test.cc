@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "importers/obj.h"
 #include "importers/ply.h"
+#include "tests/support/ply_vertices.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/load_glb.h"
 #include "tests/texture/sampling/two_walls.h"
@@ -20,7 +21,6 @@
 #include "texture/output/write_texture.h"
 #include "texture/output/write_web_glb.h"
 #include "texture/render/mesh_renderer.h"
-#include "texture/render/ply_vertices.h"
 #include "texture/texels/gutters.h"
 
 namespace roomtex {

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 
@@ -46,7 +47,11 @@ inline PlyVertices ParsePlyVertices(const std::string& bytes, const std::string&
     if (first == "format") little = second == "binary_little_endian";
     if (first == "element") {
       in_vertex = second == "vertex";
-      if (in_vertex) count = std::stoull(third);
+      const double said = ParseNumber(third).value_or(-1);
+      if (!(said >= 0) || said > static_cast<double>(bytes.size())) {
+        throw fail("says " + Quoted(third) + " of " + Quoted(second));
+      }
+      if (in_vertex) count = static_cast<size_t>(said);
     }
     if (first != "property" || !in_vertex) continue;
     size_t size = 0;
@@ -61,14 +66,21 @@ inline PlyVertices ParsePlyVertices(const std::string& bytes, const std::string&
   const size_t begin = header_end + last.size();
   if (!little || stride == 0 || count > (bytes.size() - begin) / stride)
     throw fail("is truncated or not binary");
-  const auto offset_of = [&](const std::string& name) -> long {
-    for (const Property& property : properties) {
-      if (property.name == name) return static_cast<long>(property.offset);
+  // Of the first of `num` properties of that type; -1 = there is none.
+  const auto offset_of = [&](const std::string& name, const std::string& type, size_t num) {
+    for (size_t i = 0; i < properties.size(); ++i) {
+      if (properties[i].name != name) continue;
+      for (size_t k = i; k < i + num; ++k) {
+        if (k >= properties.size() || properties[k].type != type) {
+          throw fail("has vertex properties in another order");
+        }
+      }
+      return static_cast<long>(properties[i].offset);
     }
-    return -1;
+    return -1L;
   };
-  const long x = offset_of("x"), red = offset_of("red"), views = offset_of("views"),
-             cell = offset_of("cell_red");
+  const long x = offset_of("x", "float", 3), red = offset_of("red", "uchar", 3),
+             views = offset_of("views", "uchar", 1), cell = offset_of("cell_red", "uchar", 3);
   if (x < 0) throw fail("has no vertex property x");
   PlyVertices vertices;
   for (size_t i = 0; i < count; ++i) {

@@ -1,0 +1,45 @@
+#include "core/photo_files.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <set>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+
+bool IsPhotoName(const std::string& path) {
+  static const std::set<std::string> kExtensions = {".jpg",  ".jpeg", ".png", ".tif",
+                                                    ".tiff", ".bmp",  ".webp"};
+  std::string extension = fs::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return kExtensions.count(extension) > 0;
+}
+
+std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::string& remedy,
+                                        bool below) {
+  RequireFolder(folder, remedy);
+  std::vector<std::string> names;
+  std::error_code error, unknown;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string file = it->path().filename().string();
+    const bool is_hidden = file.rfind('.', 0) == 0;
+    if (is_hidden || !below) it.disable_recursion_pending();
+    if (is_hidden || !IsPhotoName(file) || !it->is_regular_file(unknown)) continue;
+    names.push_back(it->path().lexically_relative(folder).generic_string());
+  }
+  if (error)
+    throw InputError(folder, "", "cannot be listed: " + error.message(), "Check its rights");
+  if (names.empty()) {
+    throw InputError(folder, "", "holds no photos (.jpg, .png, .tif, .bmp)", remedy);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace roomtex

@@ -1,0 +1,19 @@
+#pragma once
+// Which files of a folder are photos.
+
+#include <string>
+#include <vector>
+
+namespace roomtex {
+
+// By its ending: .jpg, .jpeg, .png, .tif, .tiff, .bmp, .webp, in capitals, too.
+bool IsPhotoName(const std::string& path);
+
+// Names of the photos in a folder and, with `below`, in the folders below it, as COLMAP names them
+// (relative to the folder), in order. Hidden files and folders are left out; links to folders are
+// not followed, as COLMAP does not. Throws InputError with `remedy`: missing, cannot be listed, no
+// photos.
+std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::string& remedy,
+                                        bool below = true);
+
+}  // namespace roomtex

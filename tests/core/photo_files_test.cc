@@ -1,0 +1,29 @@
+#include "core/photo_files.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "core/error.h"
+#include "tests/support/folders.h"
+#include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+TEST(ListPhotoFiles, TakesWhatColmapTakesAndNothingHidden) {
+  const TempFolder folder;
+  for (const char* name : {"b.JPG", "a/c.png", ".d.jpg", ".roomtex-partial-1/e.jpg", "f.txt"}) {
+    std::filesystem::create_directories(std::filesystem::path(folder / name).parent_path());
+    WriteBytes(folder / name, "x");
+  }
+  std::filesystem::create_symlink(".", folder / "again");
+  std::filesystem::create_symlink("loop.jpg", folder / "loop.jpg");
+  EXPECT_THAT(ListPhotoFiles(folder.path(), ""), testing::ElementsAre("a/c.png", "b.JPG"));
+  EXPECT_THAT(ListPhotoFiles(folder.path(), "", false), testing::ElementsAre("b.JPG"));
+  EXPECT_INPUT_ERROR(ListPhotoFiles(folder / "f.txt", "Give a folder"), "Give a folder");
+}
+
+}  // namespace
+}  // namespace roomtex
