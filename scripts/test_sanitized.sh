@@ -4,7 +4,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
-corpora=(alignment_record camera database e57 http_request las outline photo picks project_file scan_reader sparse_model)
+corpora=(alignment_record camera database e57 e57_images http_request las outline photo picks project_file scan_poses
+  scan_reader sparse_model)
 # Repeated over and over for a statistic, up to half a minute each here, and tests of a command that is not built here.
 left_out='ModelCheck.*:LensCheck.*:Initializer.IsRightBeforeAWall:LensPose.AWrongPickIsFoundWithTheLens'
 left_out+=':PickReview.NamesTheOneBadPickAmong*:PickReview.Keeps*:PickReview.NamesExchangedPicks'

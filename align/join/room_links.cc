@@ -169,7 +169,8 @@ void AddScans(const std::vector<RoomRecord>& rooms, LinkMap* links,
   const auto are_in_frame = [](const ScanRecord& a, const ScanRecord& b) {
     return !AnyGiven(a) && !AnyGiven(b);
   };
-  for (const auto& [hash, scans] : by_hash) {
+  for (const auto& same_file : by_hash) {
+    const std::vector<ScanOfRoom>& scans = same_file.second;
     for (auto at = scans.begin(); at != scans.end(); ++at) {
       const ScanRecord& b = *at->scan;
       const auto first_of = [&](const auto& fits) {

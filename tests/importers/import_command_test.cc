@@ -273,7 +273,7 @@ TEST_F(ImportCommand, UnusableFilesExitWith3AndOneSentence) {
   const std::pair<std::string, std::string> cases[] = {{"cut.rtpi", "column 5 has 9 samples"},
                                                        {"empty.rtpi", "is empty"},
                                                        {"none.rtpi", "does not exist"},
-                                                       {".", "holds no picture"}};
+                                                       {".", "holds no photos"}};
   for (const auto& [name, text] : cases) {
     const CommandResult result = RunOn(name, "--quiet" + Output("out.ply"));
     EXPECT_EQ(result.exit_code, 3) << name;

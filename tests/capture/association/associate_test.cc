@@ -269,7 +269,7 @@ TEST_F(Associate, GoesOnWithoutABrokenPhoto) {
 }
 
 TEST_F(Associate, WantsTwoPhotos) {
-  EXPECT_INPUT_ERROR(Find(), "holds 0 photos");
+  EXPECT_INPUT_ERROR(Find(), "holds no photos");
   Save("a.jpg", 0, Patterned());
   EXPECT_INPUT_ERROR(Find(), "holds 1 photos");
 }
