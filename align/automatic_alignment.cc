@@ -98,7 +98,8 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
   };
   look();
-  if (found.verdict.kind == StartVerdict::Kind::kWeak) {
+  if (found.verdict.kind == StartVerdict::Kind::kWeak ||
+      found.verdict.kind == StartVerdict::Kind::kOpen) {
     // A model of the whole room fits a scan of a part of it best when it is small enough to lie in
     // that part: so many are in the way that what is best for each scale has to be asked for.
     search.geometry.num_kept_per_scale = kStartsPerScale;
