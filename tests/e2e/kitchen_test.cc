@@ -222,24 +222,47 @@ TEST_F(Kitchen, AlignsWithHurriedPicks) {
   EXPECT_EQ(report["picks"]["count"], 8);
 }
 
-// The recording's own poses are good to a few centimetres, the picks to 6 px: cameras within 10 cm.
-TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
-  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+// Metres, from where the recording has the cameras, in order. Its own poses are good to a few
+// centimetres.
+std::vector<double> DistancesFromRecording(const SparseModel& aligned) {
   const Eigen::Matrix4d reference_from_scan =
       ReadMatrix(std::string(kKitchen) + "/scan_to_world.txt");
   const auto references = ReadReferenceCentres();
   std::vector<double> distances;
-  const SparseModel aligned = ReadSparseModel(*folder_ / "aligned");
   for (const auto& [id, image] : aligned.images) {
     const Eigen::Vector3d centre_in_reference =
         (reference_from_scan * image.cam_from_model.TargetOriginInSource().homogeneous()).head<3>();
-    ASSERT_TRUE(references.count(image.name)) << image.name;
     distances.push_back((centre_in_reference - references.at(image.name)).norm());
   }
-  ASSERT_EQ(distances.size(), 36u);
   std::sort(distances.begin(), distances.end());
-  EXPECT_LT(distances[distances.size() / 2], 0.10);
+  return distances;
+}
+
+TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  const std::vector<double> distances =
+      DistancesFromRecording(ReadSparseModel(*folder_ / "aligned"));
+  ASSERT_EQ(distances.size(), 36u);
+  EXPECT_LT(distances[18], 0.10);
   EXPECT_LT(distances.back(), 0.25);
+}
+
+// The surface alone leaves the photos a few degrees off, too far for them to confirm it: they draw
+// the model to its place. Some models of COLMAP fit the mirror image of the room nearly as well
+// (1.59 times its score, 1.6 is asked): those are not trusted.
+TEST_F(Kitchen, IsFoundWithoutClicks) {
+  const std::string output = *folder_ / "found";
+  const CommandResult found =
+      RunCommandLine("roomtex-align --input_path " + (*folder_ / "sparse/0") + " --scan_path " +
+                     kKitchen + "/scan.rtpi --azimuth counterclockwise --image_path " + kKitchen +
+                     "/images --output_path " + output + " --report_path " + output + ".json");
+  const json report = ReadJson(output + ".json"), search = report["search"];
+  EXPECT_TRUE(search["best"]["photos"]["supports"]) << search["best"];
+  EXPECT_GT(search["best"]["photos"]["share"], 0.12);
+  EXPECT_GT(search["ratio"], 1.4);
+  EXPECT_EQ(found.exit_code, search["ratio"] >= 1.6 ? 0 : 4) << found.err;
+  const std::vector<double> distances = DistancesFromRecording(ReadSparseModel(output));
+  EXPECT_LT(distances[distances.size() / 2], 0.08);
 }
 
 // Blurred photos and drifting poses: far fewer corners fit than in a simulated room, but clearly
