@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <memory>
 
 #include "core/command_line.h"
@@ -384,51 +383,48 @@ void FillScansReport(const PlacedScans& placed, Report* report) {
   (*report)["scans"] = scans;
 }
 
-// Where the file `name` of the answer is to be written.
-using Place = std::function<std::string(const std::string& name)>;
-
 // Files with fewer triangles: for the web, for modelling programs.
 void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                    const TextureOptions& options, int num_threads, const Place& place,
-                    Json* report) {
+                    const TextureOptions& options, int num_threads, OutputSet* set, Json* report) {
   std::vector<std::vector<TexturedPart>> parts =
       MakeMeshParts(scans, colored, options.glb.max_texture_size);
   DecimateParts(scans, options.web.max_triangles, num_threads, &parts);
   (*report)["web_triangles"] = CountTriangles(parts);
   if (options.output_web) {
-    WriteWebGlb(scans, colored, parts, place("model_web.glb"), options.web);
+    WriteWebGlb(scans, colored, parts, set->Path("model_web.glb"), options.web);
   }
   if (options.output_obj) {
-    WriteColoredObj(scans, colored, parts, options.image_format == "jpeg", place);
+    WriteColoredObj(scans, colored, parts, options.image_format == "jpeg",
+                    [set](const std::string& name) { return set->Path(name); });
   }
 }
 
 // in_full: the scans are whole, not thinned. Fills `web_triangles`.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const std::vector<PhotoView>& photos, const TextureOptions& options, bool in_full,
-              int num_threads, const Place& place, Json* report) {
+              int num_threads, OutputSet* set, Json* report) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
-  WriteColoredPly(scans, colored, place("model.ply"), options.output_normals);
-  WriteColoredGlb(scans, colored, place("model.glb"), glb);
-  if (options.output_evidence) WriteEvidence(scans, colored, place("evidence.ply"));
+  WriteColoredPly(scans, colored, set->Path("model.ply"), options.output_normals);
+  WriteColoredGlb(scans, colored, set->Path("model.glb"), glb);
+  if (options.output_evidence) WriteEvidence(scans, colored, set->Path("evidence.ply"));
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     if (scans[s].organised) {
       const ColorGrid& grid =
           colored[s].texture.num_columns > 0 ? colored[s].texture : colored[s].samples;
-      WritePng(ImageOfGrid(grid), place("texture" + number + ".png"));
+      WritePng(ImageOfGrid(grid), set->Path("texture" + number + ".png"));
     }
     if (scans[s].is_rtpi && in_full) {
-      WriteRtpiCopy(scans[s], colored[s], place("model" + number + ".rtpi"));
+      WriteRtpiCopy(scans[s], colored[s], set->Path("model" + number + ".rtpi"));
     }
   }
   if (options.output_web || options.output_obj) {
-    WriteDecimated(scans, colored, options, num_threads, place, report);
+    WriteDecimated(scans, colored, options, num_threads, set, report);
   }
   if (options.output_e57 || options.e57_images) {
-    WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, place("model.e57"));
+    WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, set->Path("model.e57"));
   }
 }
 
@@ -455,8 +451,7 @@ void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& inde
     context.progress.Stage("write");
     // A set of its own: of fifty stations, what is finished is there when the rest is killed.
     OutputSet outputs(options.output_path + "/" + StationFolder(number));
-    const auto place = [&](const std::string& name) { return outputs.Path(name); };
-    WriteAll(station, result.scans, result.photos, options, true, num_threads, place, &one);
+    WriteAll(station, result.scans, result.photos, options, true, num_threads, &outputs, &one);
     outputs.Commit();
     context.report["stations"].push_back(std::move(one));
   });
@@ -557,9 +552,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   }
 
   context.progress.Stage("write");
-  const auto place = [&](const std::string& name) { return outputs->Path(name); };
   WriteAll(scans, result.scans, list.photos, options, !by_station, context.options.num_threads,
-           place, &context.report.keys());
+           outputs.get(), &context.report.keys());
   if (by_station) {
     // Of the thinned scans no more is needed than where they stand, and what they hide.
     result.scans.clear();

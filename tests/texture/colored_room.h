@@ -21,6 +21,27 @@
 
 namespace roomtex {
 
+// Decibels in sRGB against the truth in linear light, after one gain.
+inline double ColorPsnr(const std::vector<Eigen::Vector3f>& truth, const ColorGrid& grid) {
+  const auto& linear = LinearFromSrgbByte();
+  std::vector<double> ratios;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    if (grid.views[i] > 0 && grid.rgb[i][1] > 40) {
+      ratios.push_back(truth[i][1] / linear[grid.rgb[i][1]]);
+    }
+  }
+  const double gain = Median(&ratios);
+  double squares = 0, count = 0;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    if (grid.views[i] == 0) continue;
+    for (int k = 0; k < 3; ++k, ++count) {
+      const double have = SrgbFromLinear(std::min(1.0, gain * linear[grid.rgb[i][k]]));
+      squares += std::pow(have - SrgbFromLinear(truth[i][k]), 2);
+    }
+  }
+  return -10 * std::log10(squares / count);
+}
+
 class ColoredRoomTest : public testing::Test {
  protected:
   static SimulatedRoomOptions Options() {
@@ -77,28 +98,8 @@ class ColoredRoomTest : public testing::Test {
     return ColorizeScans({room_->MakeScan()}, photos, options, num_threads, &quiet);
   }
 
-  // Against the truth, after one gain.
   static double Psnr(const ColorizeResult& result) {
-    const auto& linear = LinearFromSrgbByte();
-    const ColorGrid& grid = result.scans[0].samples;
-    const std::vector<Eigen::Vector3f> truth = room_->TrueColors();
-    std::vector<double> ratios;
-    for (size_t i = 0; i < truth.size(); ++i) {
-      if (grid.views[i] > 0 && grid.rgb[i][1] > 40) {
-        ratios.push_back(truth[i][1] / linear[grid.rgb[i][1]]);
-      }
-    }
-    const double gain = Median(&ratios);
-    double squares = 0, count = 0;
-    for (size_t i = 0; i < truth.size(); ++i) {
-      if (grid.views[i] == 0) continue;
-      for (int k = 0; k < 3; ++k) {
-        const double have = std::min(1.0, gain * linear[grid.rgb[i][k]]);
-        squares += std::pow(SrgbFromLinear(have) - SrgbFromLinear(truth[i][k]), 2);
-        ++count;
-      }
-    }
-    return -10 * std::log10(squares / count);
+    return ColorPsnr(room_->TrueColors(), result.scans[0].samples);
   }
 
   inline static std::unique_ptr<SimulatedRoom> room_;

@@ -14,9 +14,7 @@
 #include "capture/simulation/simulated_room.h"
 #include "core/frames.h"
 #include "core/photo.h"
-#include "core/statistics.h"
-#include "tests/support/temp_folder.h"
-#include "texture/colorize.h"
+#include "tests/texture/colored_room.h"
 
 namespace roomtex {
 namespace {
@@ -64,7 +62,7 @@ class CameraFaults : public testing::Test {
     Outcome outcome;
     outcome.result = ColorizeScans({room.MakeScan()}, views, options, 2, &quiet);
     outcome.gain_rms_ev = GainError(room, numbers, outcome.result.exposure.gains);
-    outcome.psnr_db = Psnr(room.TrueColors(), outcome.result.scans[0].samples);
+    outcome.psnr_db = ColorPsnr(room.TrueColors(), outcome.result.scans[0].samples);
     return outcome;
   }
 
@@ -99,26 +97,6 @@ class CameraFaults : public testing::Test {
     double squares = 0;
     for (const double error : errors) squares += (error - mean) * (error - mean);
     return std::sqrt(squares / static_cast<double>(errors.size()));
-  }
-
-  static double Psnr(const std::vector<Eigen::Vector3f>& truth, const ColorGrid& grid) {
-    const auto& linear = LinearFromSrgbByte();
-    std::vector<double> ratios;
-    for (size_t i = 0; i < truth.size(); ++i) {
-      if (grid.views[i] > 0 && grid.rgb[i][1] > 40) {
-        ratios.push_back(truth[i][1] / linear[grid.rgb[i][1]]);
-      }
-    }
-    const double gain = Median(&ratios);
-    double squares = 0, count = 0;
-    for (size_t i = 0; i < truth.size(); ++i) {
-      if (grid.views[i] == 0) continue;
-      for (int k = 0; k < 3; ++k, ++count) {
-        const double value = SrgbFromLinear(std::min(1.0, gain * linear[grid.rgb[i][k]]));
-        squares += std::pow(value - SrgbFromLinear(truth[i][k]), 2);
-      }
-    }
-    return -10 * std::log10(squares / count);
   }
 
   static std::map<std::string, std::unique_ptr<TempFolder>> captures_;
