@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""roomtex-align without clicks, where the scan is not of the photos' room: nothing may be trusted.
+
+Takes the sets of trust_sets.py: models of the kitchen (all cases called kitchen* without picks of their own) on the
+scans of other sets and mirrored, simulated models on the kitchen's scan, and models that are blurred, bent or have a
+wrong lens on scans of rooms of the same plan and of similar size, which it simulates. Prints a line for each, and how
+many starts were drawn to the photos is not told apart: the verdict is what counts.
+
+  tests/benchmark/trust/wrong_rooms.py --bin build/bin SETS
+"""
+
+import argparse
+import json
+import os
+import subprocess
+
+from trust_table import align
+
+OTHERS = ("s2", "big", "bent", "desk", "floor")
+ON_KITCHEN = ("s2", "big", "bent", "blur")
+# Rooms of the same plan, or of similar size (the models' are 5.0 x 4.0 m).
+NEIGHBOURS = {
+    "p1": ["--random_seed", "1006"],
+    "p2": ["--random_seed", "2006"],
+    "p3": ["--random_seed", "3006", "--room_width", "5.2", "--room_depth", "4.1"],
+    "q1": ["--random_seed", "1009", "--bend", "0.005"],
+    "q2": ["--random_seed", "2009", "--bend", "0.005"],
+    "q3": ["--random_seed", "3009", "--bend", "0.008", "--room_width", "5.2"],
+}
+ON_NEIGHBOURS = {"p": ("blur", "s2_long3", "s2_each"), "q": ("bent", "blur")}
+
+
+def simulate(sets, tools):
+    scans = {}
+    for name, options in NEIGHBOURS.items():
+        folder = os.path.join(sets, "wrong", name)
+        scans[name] = os.path.join(folder, "scan.rtpi")
+        if not os.path.exists(scans[name]):
+            os.makedirs(folder, exist_ok=True)
+            subprocess.run([os.path.join(tools, "roomtex-simulate"), "--output_path", folder, "--quiet", "1",
+                            "--num_photos", "3", "--photo_width", "300", "--photo_height", "200", *options],
+                           check=True, stdout=subprocess.DEVNULL)
+    return scans
+
+
+def pairs(cases, neighbours):
+    """title, case, scans and options that are not its own."""
+    kitchens = [n for n in cases if n.startswith("kitchen") and "picks" not in n]
+    for kitchen in kitchens:
+        for other in OTHERS:
+            yield f"{kitchen} on {other}", cases[kitchen], cases[other]["scans"][:1], []
+        yield f"{kitchen} mirrored", cases[kitchen], cases[kitchen]["scans"], ["--azimuth", "clockwise"]
+    for name in ON_KITCHEN:
+        yield f"{name} on kitchen", cases[name], cases["kitchen"]["scans"], []
+    for room, scan in neighbours.items():
+        for name in ON_NEIGHBOURS[room[0]]:
+            yield f"{name} on {room}", cases[name], [scan], []
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--bin", default="build/bin")
+    parser.add_argument("--out", default="/tmp/wrong_rooms")
+    parser.add_argument("sets", help="folder of trust_sets.py")
+    args = parser.parse_args()
+    args.without_picks, args.option = True, []
+    cases = {}
+    for file in sorted(os.listdir(args.sets)):
+        if file.endswith(".case.json"):
+            case = json.load(open(os.path.join(args.sets, file)))
+            cases[case["name"]] = case
+    num, trusted = 0, 0
+    for title, case, scans, options in pairs(cases, simulate(args.sets, args.bin)):
+        out = os.path.join(args.out, title.replace(" ", "_"))
+        os.makedirs(out, exist_ok=True)
+        code, report, _, message = align({**case, "scans": scans, "options": options}, args, out)
+        search = report.get("search", {})
+        num += 1
+        trusted += code == 0
+        print(f"{title}: exit {code}, {search.get('verdict', message)}, {search.get('ratio', 0):.2f} times the next",
+              flush=True)
+    print(f"{num} wrong rooms, {trusted} trusted")
+
+
+if __name__ == "__main__":
+    main()
