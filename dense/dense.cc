@@ -97,6 +97,11 @@ class DenseRun {
       result.photos.push_back(Estimate(static_cast<int>(i), space));
       progress_->Tick();
     }
+    progress_->Stage("refinement", static_cast<int>(views_.size()));
+    for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
+      Refine(i, space);
+      progress_->Tick();
+    }
     progress_->Stage("fusion", static_cast<int>(views_.size()));
     SupplementBuilder builder(options_.fusion);
     for (size_t i = 0; i < views_.size(); ++i) {
@@ -132,26 +137,65 @@ class DenseRun {
     return picture;
   }
 
-  DenseResult::Photo Estimate(int i, const ScanSpace& space) const {
-    const StereoView& view = views_[i];
-    const StereoPicture reference = Load(i);
-    const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
+  std::vector<StereoPicture> LoadSources(const StereoView& view) const {
     std::vector<StereoPicture> sources;
     for (const int other : view.neighbours) {
       if (static_cast<int>(sources.size()) == options_.patch_match.num_sources) break;
       sources.push_back(Load(other));
     }
-    const DepthEstimate estimate = EstimateDepth(reference, sources, open, options_.patch_match,
-                                                 MixBits(seed_, i), num_threads_);
+    return sources;
+  }
+
+  bool Correlates(float score) const {
+    return score >= static_cast<float>(options_.fusion.min_correlation);
+  }
+
+  // Photo by photo.
+  DenseResult::Photo Estimate(int i, const ScanSpace& space) const {
+    const StereoView& view = views_[i];
+    const StereoPicture reference = Load(i);
+    const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
+    const DepthEstimate estimate = EstimateDepth(
+        reference, LoadSources(view), open, options_.patch_match, MixBits(seed_, i), num_threads_);
+    cv::Mat1f is_new = estimate.depth.clone();
+    for (int y = 0; y < is_new.rows; ++y) {
+      for (int x = 0; x < is_new.cols; ++x) {
+        const float scan = open.scan_depth()(y, x);
+        const bool of_scan = scan > 0 && IsSameDepth(is_new(y, x), scan);
+        if (of_scan || !Correlates(estimate.score(y, x))) is_new(y, x) = 0;
+      }
+    }
+    WriteDenseArray({estimate.depth, estimate.score, estimate.normals[0], estimate.normals[1],
+                     estimate.normals[2], is_new},
+                    Aside(i, ".first"));
+    return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
+  }
+
+  // With what the others have found.
+  void Refine(int i, const ScanSpace& space) const {
+    const StereoView& view = views_[i];
+    const StereoPicture reference = Load(i);
+    const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
+    std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
+    const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], 0};
+    std::vector<DepthOfSource> found;
+    for (const int other : view.neighbours) {
+      arrays = ReadDenseArray(Aside(other, ".first"));
+      found.push_back({views_[other].camera,
+                       views_[other].cam_from_scan,
+                       arrays[5],
+                       {arrays[2], arrays[3], arrays[4]}});
+    }
+    const DepthEstimate estimate =
+        RefineDepth(reference, LoadSources(view), open, first, found, options_.patch_match,
+                    MixBits(seed_, i, 1), num_threads_);
     // The scan's depth where only it can be, elsewhere what was found.
     cv::Mat1f depth = open.scan_depth().clone();
     cv::Mat1f is_open(depth.size(), 0.0f);
     for (int y = 0; y < depth.rows; ++y) {
       for (int x = 0; x < depth.cols; ++x) {
         if (!open.IsOpen(x, y)) continue;
-        const bool found =
-            estimate.score(y, x) >= static_cast<float>(options_.fusion.min_correlation);
-        depth(y, x) = found ? estimate.depth(y, x) : 0;
+        depth(y, x) = Correlates(estimate.score(y, x)) ? estimate.depth(y, x) : 0;
         is_open(y, x) = 1;
       }
     }
@@ -159,7 +203,6 @@ class DenseRun {
     WriteDenseArray(
         {is_open, estimate.score, estimate.normals[0], estimate.normals[1], estimate.normals[2]},
         Aside(i, ".estimate"));
-    return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
   }
 
   double Confirm(int i, const ScanSpace& space, SupplementBuilder* builder) {

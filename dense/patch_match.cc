@@ -27,7 +27,7 @@ constexpr int kBest = 2;               // sources that count: others may not see
 constexpr float kSigmaColor = 25;      // grey levels: what is of another colour is another thing
 constexpr float kMinDeviation = 2.5f;  // grey levels; flatter windows say nothing
 constexpr float kMaxSlope = 5;         // tangent of the angle to a plane that faces the camera
-constexpr float kSameDepth = 0.01f;    // share: a hypothesis is the scan's own surface
+constexpr float kSameDepth = 0.01f;    // share
 constexpr float kNoMatch = 2;          // cost of a hypothesis that no two sources see
 
 // Inverse depth at the pixel, and its change per pixel to the right and down.
@@ -195,6 +195,51 @@ class Level {
     });
   }
 
+  // Starts from what was found before.
+  void Start(const DepthEstimate& before) {
+    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+      const float depth = before.depth(y, x);
+      if (depth > 0) Try(x, y, PlaneAt(x, y, depth, before.normals), *window);
+      const Plane& scan = scan_[y * grey_.cols + x];
+      if (scan.w > 0) Try(x, y, scan, *window);
+    });
+  }
+
+  // What another photo has found is tried where it shows here, and beside it.
+  void TryFromView(const DepthOfSource& other, const Rigid& cam_from_scan) {
+    const Rigid here_from_other = cam_from_scan * other.cam_from_scan.Inverse();
+    const Eigen::Matrix3f turned = here_from_other.rotation.toRotationMatrix().cast<float>();
+    const CameraProjection projection(camera_), other_projection(other.camera);
+    std::vector<Plane> shown(grey_.total());  // the nearest of those that show at a pixel
+    for (int y = 0; y < other.depth.rows; ++y) {
+      for (int x = 0; x < other.depth.cols; ++x) {
+        const float depth = other.depth(y, x);
+        if (!(depth > 0)) continue;
+        const Eigen::Vector3d place =
+            here_from_other *
+            (*other_projection.RayFromImg({x + 0.5, y + 0.5}) * static_cast<double>(depth));
+        const auto at = projection.ImgFromCam(place);
+        if (!at || !projection.InImage(*at)) continue;
+        const int column = std::min(static_cast<int>(at->x()), grey_.cols - 1);
+        const int row = std::min(static_cast<int>(at->y()), grey_.rows - 1);
+        const int pixel = row * grey_.cols + column;
+        const auto z = static_cast<float>(place.z());
+        if (bins_[pixel] == 0 || 1 / z < shown[pixel].w) continue;
+        const Eigen::Vector3f normal(other.normals[0](y, x), other.normals[1](y, x),
+                                     other.normals[2](y, x));
+        shown[pixel] = PlaneFromNormal(z, turned * normal, camera_, static_cast<float>(at->x()),
+                                       static_cast<float>(at->y()));
+        const float dx = static_cast<float>(column) + 0.5f - static_cast<float>(at->x());
+        const float dy = static_cast<float>(row) + 0.5f - static_cast<float>(at->y());
+        shown[pixel].w = shown[pixel].At(dx, dy);
+      }
+    }
+    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+      const Plane& plane = shown[y * grey_.cols + x];
+      if (plane.w > 0) Try(x, y, plane, *window);
+    });
+  }
+
   void Iterate(int iteration, bool far) {
     for (int color = 0; color < 2; ++color) {
       ForOpenPixels(color, [&](int x, int y, Window* window) {
@@ -251,6 +296,11 @@ class Level {
  private:
   float focal() const { return static_cast<float>(camera_.params[0]); }
 
+  Plane PlaneAt(int x, int y, float depth, const std::vector<cv::Mat1f>& normals) const {
+    return PlaneFromNormal(depth, {normals[0](y, x), normals[1](y, x), normals[2](y, x)}, camera_,
+                           static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  }
+
   void FindOpenPixels() {
     const cv::Mat1f& depth = open_.scan_depth();
     ParallelFor(num_threads_, 0, grey_.rows, [&](int y) {
@@ -291,7 +341,7 @@ class Level {
       return false;
     }
     const float of_scan = scan_[pixel].w;
-    if (of_scan > 0 && std::abs(plane.w - of_scan) < kSameDepth * of_scan) return true;
+    if (of_scan > 0 && IsSameDepth(plane.w, of_scan)) return true;
     const int bin = open_.Bin(plane.w);
     return plane.w >= open_.first() && bin < OpenSpace::kBins && (bins_[pixel] >> bin & 1) != 0;
   }
@@ -392,6 +442,8 @@ class Level {
   std::vector<uint64_t> bins_;  // 0 = only the scan's surface can be there
 };
 
+int FineRounds(const PatchMatchOptions& options) { return (options.num_iterations + 1) / 2; }
+
 }  // namespace
 
 void PatchMatchOptions::Declare(OptionFields* fields) {
@@ -475,6 +527,8 @@ uint64_t OpenSpace::BinsInFront(double x_share, double y_share) const {
   return last >= kBins - 1 ? 0 : bins >> (last + 1) << (last + 1);
 }
 
+bool IsSameDepth(float a, float b) { return std::abs(a - b) < kSameDepth * b; }
+
 DepthEstimate EstimateDepth(const StereoPicture& reference,
                             const std::vector<StereoPicture>& sources, const OpenSpace& open,
                             const PatchMatchOptions& options, uint64_t seed, int num_threads) {
@@ -483,9 +537,22 @@ DepthEstimate EstimateDepth(const StereoPicture& reference,
   for (int i = 0; i < options.num_iterations; ++i) coarse.Iterate(i, true);
   Level fine(reference, sources, open, 1, MixBits(seed, 1), num_threads);
   fine.Start(&coarse);
-  const int fine_iterations = (options.num_iterations + 1) / 2;
-  for (int i = 0; i < fine_iterations; ++i) fine.Iterate(i + 1, false);
+  // Half of the rounds are left to RefineDepth.
+  for (int i = 0; i < FineRounds(options) - FineRounds(options) / 2; ++i)
+    fine.Iterate(i + 1, false);
   return fine.Result();
+}
+
+DepthEstimate RefineDepth(const StereoPicture& reference, const std::vector<StereoPicture>& sources,
+                          const OpenSpace& open, const DepthEstimate& before,
+                          const std::vector<DepthOfSource>& found, const PatchMatchOptions& options,
+                          uint64_t seed, int num_threads) {
+  Level level(reference, sources, open, 1, seed, num_threads);
+  level.Start(before);
+  for (const DepthOfSource& other : found) level.TryFromView(other, reference.cam_from_scan);
+  const int rounds = std::max(FineRounds(options) / 2, 1);
+  for (int i = 0; i < rounds; ++i) level.Iterate(i + 2, false);
+  return level.Result();
 }
 
 }  // namespace roomtex

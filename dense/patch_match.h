@@ -84,4 +84,22 @@ DepthEstimate EstimateDepth(const StereoPicture& reference,
                             const std::vector<StereoPicture>& sources, const OpenSpace& open,
                             const PatchMatchOptions& options, uint64_t seed, int num_threads);
 
+// Whether two depths, metres, are those of the same surface to PatchMatch.
+bool IsSameDepth(float a, float b);
+
+// What was found for another photo.
+struct DepthOfSource {
+  Camera camera;  // PINHOLE
+  Rigid cam_from_scan;
+  cv::Mat1f depth;                 // metres; 0 = nothing new
+  std::vector<cv::Mat1f> normals;  // as of a normal map
+};
+
+// A second look, at what other photos have found: what is right in one photo is soon right in all.
+// before: what EstimateDepth gave. Does not depend on num_threads.
+DepthEstimate RefineDepth(const StereoPicture& reference, const std::vector<StereoPicture>& sources,
+                          const OpenSpace& open, const DepthEstimate& before,
+                          const std::vector<DepthOfSource>& found, const PatchMatchOptions& options,
+                          uint64_t seed, int num_threads);
+
 }  // namespace roomtex

@@ -21,6 +21,8 @@ constexpr double kMatch_px = 0.4;       // standard deviation of a match, for th
 constexpr double kOutsideBox = 0.1;     // metres outside the scan's box
 constexpr double kSpeckleShare = 2e-4;  // of a picture: smaller islands of depth are chance
 constexpr double kDepthSteps = 4000;    // per unit of the logarithm of the depth, for 16 bits
+constexpr int kTrimPx = 4;              // half a window of the matching
+constexpr float kBehind = 0.02f;        // share of the depth: another thing
 constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
 
 uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
@@ -30,6 +32,18 @@ uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
           (static_cast<uint64_t>(static_cast<int64_t>(std::floor(x_in_scan[k] / cell))) & 0x1fffff);
   }
   return key;
+}
+
+// Inverse depth at the pixel and its change per pixel to the right and down, of the plane there.
+Eigen::Vector3f InverseDepthPlane(float depth, const Eigen::Vector3f& normal, const Camera& camera,
+                                  int x, int y) {
+  const auto f_x = static_cast<float>(camera.params[0]), f_y = static_cast<float>(camera.params[1]);
+  const Eigen::Vector3f ray(
+      (static_cast<float>(x) + 0.5f - static_cast<float>(camera.params[2])) / f_x,
+      (static_cast<float>(y) + 0.5f - static_cast<float>(camera.params[3])) / f_y, 1);
+  const float slant = normal.dot(ray);
+  if (!(slant < -0.05f * ray.norm())) return {1 / depth, 0, 0};
+  return {1 / depth, normal.x() / (depth * slant * f_x), normal.y() / (depth * slant * f_y)};
 }
 
 // Islands of few pixels, by depth: 0.
@@ -77,6 +91,35 @@ void SupplementOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> SupplementOptions::Problems() const { return ProblemsOf(*this); }
+
+// A window beside an edge shows the nearer thing, and so matches at its depth: what is new within
+// half a window of something farther behind it is taken out.
+void TrimEdges(const DepthEstimate& estimate, const cv::Mat1f& scan_only, const Camera& camera,
+               int num_threads, cv::Mat1b* is_new) {
+  const cv::Mat1b before = is_new->clone();
+  ParallelFor(num_threads, 0, before.rows, [&](int y) {
+    for (int x = 0; x < before.cols; ++x) {
+      if (before(y, x) == 0) continue;
+      const Eigen::Vector3f normal(estimate.normals[0](y, x), estimate.normals[1](y, x),
+                                   estimate.normals[2](y, x));
+      const Eigen::Vector3f plane = InverseDepthPlane(estimate.depth(y, x), normal, camera, x, y);
+      const auto is_behind = [&](int column, int row) {
+        const float depth =
+            estimate.depth(row, column) > 0 ? estimate.depth(row, column) : scan_only(row, column);
+        const float here = plane[0] + plane[1] * static_cast<float>(column - x) +
+                           plane[2] * static_cast<float>(row - y);
+        return depth > 0 && depth * here > 1 + kBehind;
+      };
+      for (int row = std::max(y - kTrimPx, 0); row <= std::min(y + kTrimPx, before.rows - 1);
+           ++row) {
+        for (int column = std::max(x - kTrimPx, 0);
+             column <= std::min(x + kTrimPx, before.cols - 1); ++column) {
+          if (is_behind(column, row)) (*is_new)(y, x) = 0;
+        }
+      }
+    }
+  });
+}
 
 ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimate,
                             const cv::Mat1f& scan_only, const std::vector<DepthOfView>& others,
@@ -148,6 +191,7 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
       result.is_new(y, x) = 255;
     }
   });
+  TrimEdges(estimate, scan_only, view.camera, num_threads, &result.is_new);
   RemoveSpeckles(&result.is_new, result.depth);
   // A depth of one's own that is neither new nor the scan's is an error.
   for (int y = 0; y < size.height; ++y) {

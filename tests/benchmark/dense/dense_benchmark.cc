@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <ctime>
+#include <set>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -116,13 +117,27 @@ void Measure(const std::string& name, const SimulatedRoomOptions& options,
   const std::string folder = output_path + "/" + name;
   Progress progress(true);
   WriteCapture(room, folder, &progress);
+  // As a user gives them: the photos of the pattern, without their plain twins.
+  SparseModel model = ReadSparseModel(folder + "/truth");
+  if (!room.Projectors().empty()) {
+    std::set<std::string> patterned;
+    for (int i = 0; i < room.NumPhotos(); ++i) {
+      if (room.IsPatterned(i)) patterned.insert(room.PhotoName(i));
+    }
+    for (auto it = model.images.begin(); it != model.images.end();) {
+      it = patterned.count(it->second.name) > 0 ? std::next(it) : model.images.erase(it);
+    }
+  }
+  model.points.clear();
+  for (auto& [id, image] : model.images) image.points2d.clear(), image.point3d_ids.clear();
+  WriteSparseModel(model, folder + "/model");
   const double before = SecondsOfChildren();
   const CommandResult result = RunCommandLine(
-      "roomtex-dense --quiet --input_path " + folder + "/truth --image_path " + folder +
+      "roomtex-dense --quiet --input_path " + folder + "/model --image_path " + folder +
       "/photos --scan_path " + folder + "/scan.rtpi --output_path " + folder + "/dense");
   const double seconds = SecondsOfChildren() - before;
   if (result.exit_code != 0) std::fprintf(stderr, "%s\n", result.err.c_str());
-  const DenseTruth truth(room, 16);
+  const DenseTruth truth(room, 4);
   const auto report = nlohmann::json::parse(ReadBytes(folder + "/dense/report.json"));
   std::vector<Eigen::Vector3d> found;
   if (report["num_vertices"] > 0) found = ReadScan(folder + "/dense/supplement.ply", {}).points;
