@@ -246,7 +246,7 @@ void OptionList::Parse(const std::vector<std::string>& arguments) const {
     passed->push_back("--" + given.name);
     passed->push_back(given.values[0]);
   }
-  std::vector<std::string> missing;
+  std::vector<std::string> problems;
   for (const Option& option : options_) {
     std::vector<std::string> values;
     std::string where;
@@ -259,19 +259,20 @@ void OptionList::Parse(const std::vector<std::string>& arguments) const {
       where = given.where;
     }
     if (values.empty()) {
-      if (option.required) missing.push_back("--" + option.name + " is required");
+      if (option.required) problems.push_back("--" + option.name + " is required");
       continue;
     }
     if (!option.may_be_empty && std::count(values.begin(), values.end(), "") > 0) {
-      throw UsageError(where + "--" + option.name + " needs a value");
+      problems.push_back(where + "--" + option.name + " needs a value");
+      continue;
     }
     try {
       option.set(values);
     } catch (const UsageError& error) {
-      throw UsageError(where + error.what());
+      problems.push_back(where + error.what());
     }
   }
-  ThrowIfProblems(missing);
+  ThrowIfProblems(problems);
 }
 
 std::string OptionList::Help() const {

@@ -218,6 +218,15 @@ TEST(CommandLine, MissingRequiredOptionIsNamed) {
   EXPECT_THAT(test.err, HasSubstr("--input_path is required"));
 }
 
+TEST(CommandLine, AllThatIsWrongWithValuesIsSaidAtOnce) {
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--count", "three", "--mode", "off", "--output_path="}), kExitUsage);
+  EXPECT_THAT(test.err, HasSubstr("--count is \"three\""));
+  EXPECT_THAT(test.err, HasSubstr("--mode is \"off\""));
+  EXPECT_THAT(test.err, HasSubstr("--output_path needs a value"));
+  EXPECT_THAT(test.err, HasSubstr("--input_path is required"));
+}
+
 TEST(CommandLine, EmptyTextIsAValue) {
   TestCommand test;
   ASSERT_EQ(test.RunWithInput({"--title", ""}), kExitDone) << test.err;
