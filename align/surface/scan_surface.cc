@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/free_vectors.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -88,9 +89,7 @@ ScanSurface::ScanSurface(const Scan& scan, const Eigen::Vector3d& origin,
 }
 
 void ScanSurface::ForgetCells() {
-  cells_ = {};
-  neighbour_begin_ = {};
-  neighbours_ = {};
+  FreeVectors(&cells_, &neighbour_begin_, &neighbours_);
 }
 
 int ScanSurface::NumSamples() const {
