@@ -88,9 +88,7 @@ ScanSurface::ScanSurface(const Scan& scan, const Eigen::Vector3d& origin,
   }
 }
 
-void ScanSurface::ForgetCells() {
-  FreeVectors(&cells_, &neighbour_begin_, &neighbours_);
-}
+void ScanSurface::ForgetCells() { FreeVectors(&cells_, &neighbour_begin_, &neighbours_); }
 
 int ScanSurface::NumSamples() const {
   return static_cast<int>(is_grid_ ? scan_.points.size() : points_.size());
