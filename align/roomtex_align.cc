@@ -38,6 +38,7 @@
 #include "core/photo_fit.h"
 #include "core/resource_limits.h"
 #include "core/surfels.h"
+#include "importers/photo_picks.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 
@@ -136,13 +137,17 @@ void AddOptions(Arguments* a, Command* command) {
   command->Add(FieldsOf(&o.mesh));
 }
 
+// Not needed for a model that lies in the scan's frame already.
+void RequirePicksOrPhotos(const Arguments& a) {
+  if (!a.picks_path.empty() || (!a.input_path.empty() && !a.image_path.empty())) return;
+  throw UsageError(
+      "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
+      "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
+      "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
+}
+
 void CheckArguments(const Arguments& a) {
-  if (a.picks_path.empty() && (a.input_path.empty() || a.image_path.empty())) {
-    throw UsageError(
-        "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
-        "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
-        "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
-  }
+  if (a.input_path.empty()) RequirePicksOrPhotos(a);
   std::vector<std::string> problems = a.scan_reader.Problems();
   AppendProblems(a.bound.Problems(), &problems);
   AppendProblems(a.alignment.Problems(), &problems);
@@ -388,10 +393,49 @@ void SearchScans(const AlignmentInput& input, const std::vector<NearHint>& near,
   TakeMirroredReading(std::move(other), reading, context);
 }
 
+// Places of the scans in the photos that roomtex-mapper holds where they are known to stand: what
+// the surface leaves open, they hold.
+std::vector<Pick> PicksOfPhotosHeld(const MapperVerdict& verdict, const SparseModel& model,
+                                    const std::vector<Scan>& scans) {
+  std::vector<PosedPhoto> photos;
+  for (const std::string& name : verdict.photos_held) {
+    const SparseImage& image = *model.FindImage(name);
+    photos.push_back({name, model.cameras.at(image.camera_id), image.cam_from_model});
+  }
+  std::vector<Pick> picks;
+  for (const PhotoPick& pick : PicksOfPosedPhotos(photos, scans)) {
+    picks.push_back({pick.image_name, pick.x_in_img, pick.x_in_scan});
+  }
+  return picks;
+}
+
+// From rough poses of photos, by which roomtex-mapper has put the model into the scan's frame and
+// which hold nothing. False: that is not to be trusted, and the place has to be searched for.
+bool AlignFromKnownPoses(const Arguments& a, const AlignmentInput& input,
+                         const AlignmentOptions& options, double known_rms, Reading* reading,
+                         const Command::Context& context) {
+  // Metres, one standard deviation: scanners know the places of their cameras to centimetres.
+  constexpr double kLeastSigma = 0.03;
+  AlignmentAttempt attempt;
+  attempt.alignment = AlignToScan(
+      input,
+      StartFromSimilarity(input.model, input.picks, Similarity(), std::max(kLeastSigma, known_rms)),
+      options, &context.progress);
+  if (!attempt.trusted() && !a.image_path.empty()) {
+    context.Warn("the model does not lie in the scan where the known poses put it (" +
+                 attempt.alignment->reasons[0] + "); its place is searched for");
+    return false;
+  }
+  reading->attempt = std::move(attempt);
+  return true;
+}
+
 // Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
 // how and there is no other format among the scans, or says so.
+// known_rms: MapperVerdict's.
 void AlignScans(const Arguments& a, const AlignmentInput& input, const std::vector<NearHint>& near,
-                Reading* reading, const Command::Context& context) {
+                const std::optional<double>& known_rms, Reading* reading,
+                const Command::Context& context) {
   const std::vector<PlacedScans::File>& files = reading->placed.files;
   const bool may_turn = a.scan_reader.azimuth == "auto" &&
                         std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
@@ -399,6 +443,10 @@ void AlignScans(const Arguments& a, const AlignmentInput& input, const std::vect
                         });
   AlignmentOptions options = a.alignment;
   options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
+  if (known_rms && input.picks.empty() && near.empty() &&
+      AlignFromKnownPoses(a, input, options, *known_rms, reading, context)) {
+    return;
+  }
   if (AreHints(input.picks)) {
     return SearchScans(input, near, options, may_turn, reading, context);
   }
@@ -497,7 +545,7 @@ LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) 
 // there are photos to confirm what is found.
 std::vector<NearHint> ReadHints(const Arguments& a, const std::vector<Pick>& picks,
                                 const SparseModel& model) {
-  if (AreHints(picks) && !a.image_path.empty()) {
+  if (a.picks_path.empty() || (AreHints(picks) && !a.image_path.empty())) {
     CheckPickNames(a.picks_path, picks, model);
   } else {
     CheckPicksAgainstModel(a.picks_path, picks, model);
@@ -518,6 +566,7 @@ void Align(const Arguments& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
+  if (!verdict.known_rms) RequirePicksOrPhotos(a);
   std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
   std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
@@ -525,13 +574,25 @@ void Align(const Arguments& a, const Command::Context& context) {
   Reading reading(a, context);
   reading.origin.MoveToLocal(&picks);
   reading.origin.MoveToLocal(&near);
+  // A model that is in the scan's frame already moves about the same origin.
+  Similarity local_from_sparse;
+  if (verdict.known_rms) {
+    local_from_sparse.translation = -reading.origin.offset();
+    TransformModel(local_from_sparse, &model);
+    if (a.picks_path.empty() && near.empty()) {
+      picks = PicksOfPhotosHeld(verdict, model, reading.surveyed->scans());
+    }
+  }
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
              {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(),
               PhotoLabels(model, a.image_path), verdict.refined, a.image_path,
               context.options.num_threads},
-             near, &reading, context);
+             near, verdict.known_rms, &reading, context);
+  if (verdict.known_rms && reading.search.is_null() && a.picks_path.empty()) {
+    reading.search = {{"method", "known_poses"}, {"position_rms_m", *verdict.known_rms}};
+  }
   context.report["search"] = reading.search;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
   if (!a.planes_path.empty()) {
@@ -539,7 +600,7 @@ void Align(const Arguments& a, const Command::Context& context) {
                     reading.origin.offset());
   }
   if (!reading.attempt.alignment) return WriteRefusal(a, reading.attempt.refusal, context);
-  const Alignment& alignment = *reading.attempt.alignment;
+  Alignment& alignment = *reading.attempt.alignment;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
   CarryMapperVerdict(verdict, alignment, context);
@@ -549,6 +610,9 @@ void Align(const Arguments& a, const Command::Context& context) {
     model = alignment.adjustment.bundle.model;
   } else {
     TransformModel(alignment.scan_from_sparse, &model);
+  }
+  for (Similarity* answer : {&alignment.scan_from_sparse, &alignment.start.scan_from_sparse}) {
+    *answer = *answer * local_from_sparse;  // from the model as it was read
   }
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);

@@ -1,6 +1,8 @@
 #include "colmap_ext/lens_plan.h"
 
 #include <algorithm>
+#include <iterator>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -92,12 +94,7 @@ LensPlan::LensPlan(const std::map<uint32_t, Camera>& cameras,
       for (const uint32_t id : groups[i].images) images_.at(id).camera_id = at->second;
     }
   }
-  // Those that another camera stands for.
-  for (const auto& [camera_id, ids] : of_camera) {
-    bool is_used = false;
-    for (const auto& [id, image] : images_) is_used |= image.camera_id == camera_id;
-    if (!is_used) cameras_.erase(camera_id);
-  }
+  EraseUnused();  // those that another camera stands for
 }
 
 bool LensPlan::IsAsInDatabase() const {
@@ -133,6 +130,21 @@ void LensPlan::Take(const LensCheck& found, const SparseModel& model) {
           before != cameras_.end() && before->second.has_prior_focal_length;
       cameras_[id] = std::move(camera);
     }
+  }
+}
+
+void LensPlan::Tell(const std::vector<uint32_t>& image_ids, Camera camera) {
+  camera.camera_id = NextId(cameras_, database_cameras_);
+  for (const uint32_t id : image_ids) images_.at(id).camera_id = camera.camera_id;
+  cameras_[camera.camera_id] = std::move(camera);
+  EraseUnused();
+}
+
+void LensPlan::EraseUnused() {
+  std::set<uint32_t> used;
+  for (const auto& [id, image] : images_) used.insert(image.camera_id);
+  for (auto at = cameras_.begin(); at != cameras_.end();) {
+    at = used.count(at->first) > 0 ? std::next(at) : cameras_.erase(at);
   }
 }
 

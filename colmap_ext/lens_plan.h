@@ -40,11 +40,16 @@ class LensPlan {
   // apart only where all else stays: beside a wrong lens single photos look wrong that are right.
   void Take(const LensCheck& found, const SparseModel& model);
 
+  // Gives some photos a camera of their own, whatever the database says of them.
+  void Tell(const std::vector<uint32_t>& image_ids, Camera camera);
+
   // A model of this plan with the database's cameras: those that were one have the same parameters;
   // of one that is several, the others keep the new ids.
   void Restore(SparseModel* model) const;
 
  private:
+  void EraseUnused();
+
   std::map<uint32_t, Camera> database_cameras_, cameras_;
   std::map<uint32_t, DatabaseImage> database_images_, images_;
   std::vector<std::string> notes_;

@@ -35,15 +35,14 @@ std::string OptionRefusal(const ColmapRun& run) {
   return "";
 }
 
-// As `colmap model_analyzer` counts: the mean over the points of their mean error.
+}  // namespace
+
 double MeanPointError(SparseModel* model) {
   UpdateReprojectionErrors(model);
   double sum = 0;
   for (const auto& [point_id, point] : model->points) sum += point.error;
   return model->points.empty() ? 0 : sum / static_cast<double>(model->points.size());
 }
-
-}  // namespace
 
 MapperRun::MapperRun(ColmapProgram* colmap, const std::string& database_path,
                      const std::string& image_path, const std::string& scratch,
@@ -181,6 +180,20 @@ MapperResult MapperRun::Adjust(const SparseModel& poses) {
   const std::string start = Folder("chained");
   WriteSparseModel(poses, start);
   return Close(start, true);
+}
+
+MapperResult MapperRun::Triangulate(const SparseModel& poses) {
+  ++num_runs_;
+  MapperResult result;
+  const std::string start = Folder("posed");
+  result.folder = Folder("triangulated");
+  WriteSparseModel(poses, start);
+  result.problem =
+      Call("point_triangulator", TriangulatorOptions(start, result.folder, true), nullptr);
+  if (!result.problem.empty()) return result;
+  result.model = ReadSparseModel(result.folder);
+  result.mean_reprojection_error_px = MeanPointError(&result.model);
+  return result;
 }
 
 std::string MapperRun::CallBundleAdjuster(const std::string& input, const std::string& output,

@@ -28,6 +28,9 @@ struct MapperResult {
   std::string problem;                    // what went wrong; "" if nothing
 };
 
+// As `colmap model_analyzer` counts: the mean over the points of their mean error. Updates those.
+double MeanPointError(SparseModel* model);
+
 class MapperRun {
  public:
   // database_path: a copy that COLMAP may write to. scratch: an existing folder for models on the
@@ -43,6 +46,9 @@ class MapperRun {
   // The last two steps for a model of poses: triangulates, also points that two views see, and
   // adjusts. `problem` tells of a failure, as in Run.
   MapperResult Adjust(const SparseModel& poses);
+
+  // Triangulation alone: the poses stay as they are.
+  MapperResult Triangulate(const SparseModel& poses);
 
   // Bundle adjustment alone, of poses, points and, if asked, focal length and distortion. Gives the
   // model as it came if COLMAP fails.

@@ -13,6 +13,15 @@ MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& mo
     return verdict;
   }
   verdict.refined = json.value("refined_intrinsics", Json()) == true;
+  const Json known = json.value("known", Json());
+  if (known.is_object() && known.value("placed", Json()) == true) {
+    const Json rms = known.value("position_rms_m", Json());
+    if (rms.is_number() && rms.get<double>() >= 0) verdict.known_rms = rms.get<double>();
+    const Json held = known.value("photos_held", Json::array());
+    for (const Json& name : held.is_array() ? held : Json::array()) {
+      if (name.is_string() && model.FindImage(name) != nullptr) verdict.photos_held.push_back(name);
+    }
+  }
   const Json reasons = json.value("reasons", Json::array());
   for (const Json& one : reasons.is_array() ? reasons : Json::array()) {
     if (!one.is_object()) continue;

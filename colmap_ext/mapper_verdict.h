@@ -2,6 +2,7 @@
 // What roomtex-mapper thought of the model it wrote: its report stands beside the model, so that
 // what is built on a model that it refused knows of it.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,11 @@ struct MapperVerdict {
   std::vector<std::string> calibration;  // the lenses
   std::vector<std::string> photos;       // single photos, or how many there are
   std::vector<std::string> motion;  // how the cameras moved: before a wall there are two answers
+  // The model lies in the frame of the scan, by photos with known poses (KnownPlacement); metres,
+  // how far these were off that as mapped.
+  std::optional<double> known_rms;
+  // Those of them that are in the model exactly where they are known to stand.
+  std::vector<std::string> photos_held;
 };
 
 // Of the model read from `folder`; empty if there is no report, or if it is of another model (other

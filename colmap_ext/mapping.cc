@@ -142,12 +142,13 @@ MappingPass BetterOf(MappingPass first, MappingPass second) {
 }  // namespace
 
 Mapping::Mapping(const MappingOptions& options, const Command::Context& context,
-                 const Database& database, const MatchedImages& images,
+                 const Database& database, const MatchedImages& images, const KnownPhotos& known,
                  const ScratchFolder& scratch)
     : options_(options),
       context_(context),
       database_(database),
       images_(images),
+      known_(known),
       scratch_(scratch),
       refine_(RefineIntrinsicsFromWord(options.refine_intrinsics)),
       colmap_(options.colmap, options.output_path + "/roomtex-mapper.log") {
@@ -155,10 +156,16 @@ Mapping::Mapping(const MappingOptions& options, const Command::Context& context,
   labels_ = ReadLensLabels(names_, options.image_path);
 }
 
-MappingPass Mapping::MapAsLensesAre() {
+LensPlan Mapping::PlanLenses() const {
   LensPlan plan = refine_ == RefineIntrinsics::kNever
                       ? LensPlan(images_.cameras(), images_.images())
                       : LensPlan(images_.cameras(), images_.images(), labels_);
+  TellCameras(known_, &plan);
+  return plan;
+}
+
+MappingPass Mapping::MapAsLensesAre() {
+  LensPlan plan = PlanLenses();
   for (const std::string& note : plan.notes()) context_.Warn(note);
   const bool calibrated =
       std::all_of(plan.cameras().begin(), plan.cameras().end(),
@@ -244,6 +251,12 @@ MappingPass Mapping::Run() {
   context_.progress.Stage("check model");
   pass.check = Check(pass);
   for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) pass.check = Check(pass);
+  if (!known_.cam_from_scan.empty()) {
+    context_.progress.Stage("known poses");
+    MappingOutcome& outcome = pass.best[0];
+    outcome.known = PlaceByKnownPhotos(known_, pass.plan.images(), pass.plan.cameras(),
+                                       scratch_ / "known", pass.mapper.get(), &outcome.result);
+  }
   return pass;
 }
 

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "colmap_ext/known_placement.h"
 #include "colmap_ext/lens_check.h"
 #include "colmap_ext/lens_labels.h"
 #include "colmap_ext/lens_plan.h"
@@ -22,6 +24,7 @@ namespace roomtex {
 
 struct MappingOptions {
   std::string database_path, image_path, output_path;
+  std::string known_path;  // model of photos with known poses; "" = none
   std::string colmap = "colmap";
   InitOptions init;
   MapperOptions mapper;
@@ -34,6 +37,7 @@ struct MappingOutcome {
   MapperResult result;
   std::map<uint32_t, ChainedView> chained;
   std::map<uint32_t, std::string> reasons;  // of photos that could not be chained, or were left out
+  std::optional<KnownPlacement> known;      // with photos of known poses
 };
 
 // The photos of one way to see the lenses, mapped.
@@ -54,12 +58,13 @@ struct MappingPass {
 
 class Mapping {
  public:
-  // All must outlive it. images: of the database, with its cameras.
+  // All must outlive it. images: of the database, with its cameras. known: may hold nothing.
   Mapping(const MappingOptions& options, const Command::Context& context, const Database& database,
-          const MatchedImages& images, const ScratchFolder& scratch);
+          const MatchedImages& images, const KnownPhotos& known, const ScratchFolder& scratch);
 
-  // With the lenses as the database has them, and, if the photos know better, once more. Photos
-  // that stand where most of their own matches do not put them are left out, if they are few.
+  // With the lenses as the database has them (those of known photos as told with their poses), and,
+  // if the photos know better, once more. Photos that stand where most of their own matches do not
+  // put them are left out, if they are few. Known photos then put the model where they stand.
   MappingPass Run();
 
  private:
@@ -68,6 +73,7 @@ class Mapping {
   bool IsContradicted(const MappingPass& pass) const;
   MappingPass Map(const LensPlan& plan, bool refine);
   MappingPass MapAsLensesAre();
+  LensPlan PlanLenses() const;
   // False: nothing was to be left out, or could be.
   bool LeaveOutDoubtful(MappingPass* pass) const;
   ModelCheck Check(const MappingPass& pass) const;
@@ -76,6 +82,7 @@ class Mapping {
   const Command::Context& context_;
   const Database& database_;
   const MatchedImages& images_;
+  const KnownPhotos& known_;
   const ScratchFolder& scratch_;
   const RefineIntrinsics refine_;
   ColmapProgram colmap_;

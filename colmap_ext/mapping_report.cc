@@ -27,10 +27,11 @@ Json ImageJson(const DatabaseImage& image, const MappingOutcome& outcome,
   Json json;
   json["name"] = image.name;
   json["registered"] = registered;
-  json["by"] = !registered                                           ? "none"
-               : chained != outcome.chained.end()                    ? "chained"
-               : outcome.seed.poses.images.count(image.image_id) > 0 ? "seed"
-                                                                     : "mapper";
+  json["by"] = !registered                                                       ? "none"
+               : chained != outcome.chained.end()                                ? "chained"
+               : outcome.known && outcome.known->added.count(image.image_id) > 0 ? "known"
+               : outcome.seed.poses.images.count(image.image_id) > 0             ? "seed"
+                                                                                 : "mapper";
   if (registered && chained != outcome.chained.end()) {
     json["neighbor"] = images.images().at(chained->second.neighbor_id).name;
     json["num_common_points"] = chained->second.num_common_points;

@@ -100,7 +100,7 @@ ScaleHold FindScaleHold(const SparseModel& model, const std::set<uint32_t>& held
 class PhotoProblem {
  public:
   PhotoProblem(const SparseModel& model, const LensSet& lenses, const ObservedPoints& observed,
-               double sigma_px)
+               double sigma_px, const std::set<uint32_t>& known_poses)
       : lenses_(lenses), loss_(kReprojectionHuber * sigma_px) {
     ceres::Problem::Options options;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -121,7 +121,11 @@ class PhotoProblem {
       for (const Observed& one : seen) Add(one, points_.back().data());
     }
     AddPriors(sigma_px);
-    HoldFrame(model, HeldImages(observed), sigma_px);
+    if (known_poses.empty()) {
+      HoldFrame(model, HeldImages(observed), sigma_px);
+    } else {
+      HoldPoses(known_poses);
+    }
   }
 
   bool Solve() {
@@ -175,6 +179,13 @@ class PhotoProblem {
     }
   }
 
+  void HoldPoses(const std::set<uint32_t>& known_poses) {
+    for (const uint32_t id : known_poses) {
+      double* const pose = poses_[pose_index_.at(id)].values;
+      if (problem_->HasParameterBlock(pose)) problem_->SetParameterBlockConstant(pose);
+    }
+  }
+
   void HoldFrame(const SparseModel& model, const std::set<uint32_t>& held, double sigma_px) {
     if (held.size() < 2) return;
     problem_->SetParameterBlockConstant(poses_[pose_index_.at(*held.begin())].values);
@@ -208,18 +219,22 @@ class PhotoProblem {
   std::unique_ptr<ceres::Problem> problem_;
 };
 
-// Sets cost and redundancy, and the covariances of the lenses. One photo and the distance of
-// another from it hold frame and scale, which no lens depends on.
+// Sets cost and redundancy, and the covariances of the lenses. Where no poses are known one photo
+// and the distance of another from it hold frame and scale, which no lens depends on.
 class PhotoNormal {
  public:
-  PhotoNormal(const ObservedPoints& observed, double sigma_px, PhotoBundle* result)
-      : observed_(observed), sigma_px_(sigma_px), result_(*result) {
+  PhotoNormal(const ObservedPoints& observed, double sigma_px,
+              const std::set<uint32_t>& known_poses, PhotoBundle* result)
+      : observed_(observed),
+        sigma_px_(sigma_px),
+        scale_is_open_(known_poses.empty()),
+        result_(*result) {
     for (const auto& [id, image] : result_.model.images) {
       poses_.emplace(id, PoseParameters(image.cam_from_model));
     }
     held_ = HeldImages(observed);
     for (const uint32_t id : held_) {
-      if (id == *held_.begin()) continue;
+      if (scale_is_open_ ? id == *held_.begin() : known_poses.count(id) > 0) continue;
       pose_offset_[id] = num_unknowns_;
       num_unknowns_ += 6;
     }
@@ -248,7 +263,8 @@ class PhotoNormal {
       }
     }
     result_.redundancy = 2.0 * static_cast<double>(num_observations) -
-                         3.0 * static_cast<double>(observed_.size()) - num_unknowns_ + 1;
+                         3.0 * static_cast<double>(observed_.size()) - num_unknowns_ +
+                         (scale_is_open_ ? 1 : 0);
     result_.covariances.assign(result_.lenses.lenses.size(), Eigen::MatrixXd());
     if (wanted) FindCovariances(&normal);
   }
@@ -284,7 +300,7 @@ class PhotoNormal {
   }
 
   void FindCovariances(ReducedNormal* normal) {
-    if (!pose_offset_.empty()) {
+    if (scale_is_open_ && !pose_offset_.empty()) {
       const ScaleHold hold = FindScaleHold(result_.model, held_);
       const auto offset = pose_offset_.find(hold.image_id);
       if (offset != pose_offset_.end()) {
@@ -307,6 +323,7 @@ class PhotoNormal {
 
   const ObservedPoints& observed_;
   const double sigma_px_;
+  const bool scale_is_open_;
   PhotoBundle& result_;
   std::map<uint32_t, PoseParameters> poses_;
   std::map<uint32_t, int> pose_offset_;
@@ -337,13 +354,14 @@ double KeypointNoise(const SparseModel& model) {
   return std::max(0.1, Median(std::move(errors)) / kMedianLengthPerSigma / std::sqrt(free_share));
 }
 
-PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px) {
+PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px,
+                         const std::set<uint32_t>& known_poses) {
   PhotoBundle result;
   result.model = model;
   result.lenses = lenses;
   const ObservedPoints observed = FindObserved(model, lenses);
   if (observed.empty() || model.images.size() < 2) return result;
-  PhotoProblem problem(model, lenses, observed, sigma_px);
+  PhotoProblem problem(model, lenses, observed, sigma_px, known_poses);
   if (problem.Solve()) {
     problem.Write(observed, &result);
     result.usable = std::all_of(result.lenses.lenses.begin(), result.lenses.lenses.end(),
@@ -353,7 +371,7 @@ PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double
       result.lenses = lenses;
     }
   }
-  PhotoNormal(observed, sigma_px, &result).Evaluate();
+  PhotoNormal(observed, sigma_px, known_poses, &result).Evaluate();
   return result;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,9 +42,11 @@ struct PhotoBundle {
 double KeypointNoise(const SparseModel& model);
 
 // Minimises Huber's cost of the reprojection errors over poses, points and the free lenses. Frame
-// and scale stay near those of the input, which fix nothing: fit a similarity afterwards. Does not
+// and scale stay near those of the input, which fix nothing: fit a similarity afterwards. With
+// known_poses, images whose poses stay as they are, those hold both (two of them apart). Does not
 // depend on the number of threads: Ceres runs on one.
-PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px);
+PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px,
+                         const std::set<uint32_t>& known_poses = {});
 
 // The adjusted model by the best similarity to the input, cameras and points: a bundle adjustment
 // by photos is free to move and grow.

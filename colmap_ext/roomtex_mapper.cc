@@ -13,6 +13,7 @@
 #include <fmt/core.h>
 
 #include "colmap_ext/calibration_check.h"
+#include "colmap_ext/known_photos.h"
 #include "colmap_ext/lens_check.h"
 #include "colmap_ext/mapper_verdict.h"
 #include "colmap_ext/mapping.h"
@@ -37,6 +38,13 @@ void AddOptions(MappingOptions* options, Command* command) {
       "COLMAP's database with verified matches (colmap exhaustive_matcher). Only read.");
   command->AddInputPath("image_path", &options->image_path,
                         "Folder of the photos, as given to colmap feature_extractor.");
+  command->AddInputPath(
+      "known_path", &options->known_path,
+      "COLMAP model of photos whose poses are known in the frame of a scan, among those of "
+      "--image_path: what roomtex-import --images_path writes for the photos of an E57 "
+      "(DIR/sparse). Two or more of them that stand apart put the model into that frame, metric, "
+      "and roomtex-align needs no picks.",
+      Command::Kind::kOptional);
   command->AddOutputPath(
       "output_path", &options->output_path,
       "Folder to write into: 0/ (the model), init/ (the two-view model it started "
@@ -105,6 +113,18 @@ void CheckDatabase(const MatchedImages& images, const MappingOptions& options,
   }
 }
 
+KnownPhotos ReadKnownPhotos(const MappingOptions& options, const MatchedImages& images,
+                            const Command::Context& context) {
+  if (options.known_path.empty()) return {};
+  KnownPhotos known = FindKnownPhotos(options.known_path, ReadSparseModel(options.known_path),
+                                      images.images(), images.cameras());
+  if (!known.unmatched.empty()) {
+    context.Warn(std::to_string(known.unmatched.size()) + " of the photos of " +
+                 options.known_path + " are not in the database, e.g. " + known.unmatched[0]);
+  }
+  return known;
+}
+
 // Not to be trusted. about: what roomtex-align goes by when it reads this (mapper_verdict.h).
 void Refuse(const std::string& about, const std::string& reason, const Command::Context& context,
             Json* reasons) {
@@ -146,6 +166,57 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
   }
   throw InputError(database_path, "", "gives no pair to start from" + reasons,
                    "Add photos from other places that overlap well, or relax --Init.*");
+}
+
+// What becomes of a model beside photos with known poses.
+void ReportKnown(const MappingOutcome& outcome, const KnownPhotos& known,
+                 const std::map<uint32_t, DatabaseImage>& images, const Command::Context& context,
+                 Json* reasons) {
+  if (!outcome.known) return;
+  const KnownPlacement& placement = *outcome.known;
+  const KnownFit& fit = placement.fit;
+  context.report["known"] = KnownToJson(placement, known, images);
+  const char by_picks[] =
+      " The model keeps a frame of its own. Align it by picks of these photos: roomtex-import "
+      "--images_path ... --E57.picks 1, roomtex-align --picks_path";
+  switch (fit.kind) {
+    case KnownFit::Kind::kTooFew:
+      context.Warn(std::string("Fewer than two of the photos with known poses could be mapped.") +
+                   by_picks);
+      return;
+    case KnownFit::Kind::kOnePlace:
+      context.Warn(std::string("The photos with known poses stand too near each other to tell the "
+                               "scale.") +
+                   by_picks);
+      return;
+    case KnownFit::Kind::kContradicts:
+      Refuse("motion",
+             "the known poses contradict the photos: no similarity brings more than half of them "
+             "to where the photos were mapped. Check --known_path, or map without it.",
+             context, reasons);
+      return;
+    case KnownFit::Kind::kPlaced:
+      break;
+  }
+  const auto names = [&images](const std::set<uint32_t>& ids) {
+    std::string list;
+    for (const uint32_t id : ids) list += (list.empty() ? "" : ", ") + images.at(id).name;
+    return list;
+  };
+  if (!fit.contradicting.empty()) {
+    context.Warn("Photos that were not taken where --known_path has them, as the others tell: " +
+                 names(fit.contradicting) + ". Their poses are those of their matches.");
+  }
+  if (placement.held) {
+    if (placement.rough.empty()) return;
+    context.Warn("Known poses that are not exact enough to be held, and were adjusted: " +
+                 names(placement.rough));
+    return;
+  }
+  context.Warn(
+      "The known poses are not exact enough to be held: most of the photos would lose most of "
+      "their "
+      "points, or the keypoints fit much worse. The model was moved to them, and no more.");
 }
 
 // The third-view test on pairs that the model was not started from.
@@ -255,6 +326,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   const Database database(options.database_path);
   const MatchedImages images(database);
   CheckDatabase(images, options, context);
+  const KnownPhotos known = ReadKnownPhotos(options, images, context);
 
   MakeFolder(options.output_path);
   const std::string model_path = options.output_path + "/0";
@@ -270,7 +342,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
     context.Warn(passed[i] + " has no effect: the first pair is chosen here, by --Init.*");
   }
 
-  Mapping mapping(options, context, database, images, scratch);
+  Mapping mapping(options, context, database, images, known, scratch);
   MappingPass pass = mapping.Run();
   context.report["pairs_tried"] = pass.trials.size();
   context.report["pair_trials"] = pass.trials;
@@ -285,6 +357,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   Json reasons = Json::array();
   JudgeTrust(outcome, *pass.images, context, &reasons);
   ReportCheck(pass, context, &reasons);
+  ReportKnown(outcome, known, images.images(), context, &reasons);
   CheckLens(pass.mapper.get(), outcome, pass.refine, context, &reasons);
   context.report["reasons"] = reasons;
 

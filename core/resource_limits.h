@@ -17,8 +17,8 @@ void RequireMemory(const std::string& path, const std::string& what, double num_
                    const std::string& remedy);
 
 // Bytes of memory that commands take per sample of a scan (docs/reliability.md says how measured).
-inline constexpr double kImportBytesPerSample = 75, kAlignBytesPerSample = 112,
-                        kTextureBytesPerSample = 228, kExportBytesPerSample = 234,
+inline constexpr double kImportBytesPerSample = 110, kAlignBytesPerSample = 112,
+                        kTextureBytesPerSample = 280, kExportBytesPerSample = 234,
                         kDenseBytesPerSample = 301;
 
 // What a command does with the samples of all scans that it reads while this lives: what they take

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "core/frames.h"
+#include "core/free_vectors.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 
@@ -476,7 +477,7 @@ Scan MeshOfSurfels(const Scan& cloud, bool station_is_known, const Eigen::Vector
         mesh.triangles.push_back({first, first + k + is_turned, first + k + !is_turned});
       }
     }
-    block = {};
+    FreeVectors(&block);
   }
   mesh.num_columns = static_cast<int>(mesh.points.size());
   mesh.num_rows = 1;

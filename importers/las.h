@@ -18,8 +18,8 @@ struct LasOptions {
 // Point formats 0 to 10: coordinates by scale and offset, all returns, without what is marked as
 // withheld. The intensity is that of the file (0 to 65535); where no point has one, the grey of the
 // colours. Records of variable length (coordinate systems, waveforms) are passed over: coordinates
-// stay as they are. The scan is a cloud (Scan::Kind), z up. Compressed files (LAZ) are refused with
-// the remedy. Throws InputError with the byte.
+// stay as they are, but for the unit (las_unit.h). The scan is a cloud (Scan::Kind), z up.
+// Compressed files (LAZ) are refused with the remedy. Throws InputError with the byte.
 Scan ReadLas(const std::string& path, const LasOptions& options);
 
 // The start of a file is that of a LAS or LAZ.

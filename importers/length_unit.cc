@@ -24,6 +24,7 @@ std::optional<double> MetersPerUnit(const std::string& name) {
                                                         {"ft", 0.3048},
                                                         {"foot", 0.3048},
                                                         {"feet", 0.3048},
+                                                        {"us_survey_feet", 1200.0 / 3937},
                                                         {"in", 0.0254},
                                                         {"inch", 0.0254},
                                                         {"inches", 0.0254}};
@@ -35,8 +36,8 @@ std::optional<double> MetersPerUnit(const std::string& name) {
 }
 
 const std::vector<std::string>& LengthUnitNames() {
-  static const std::vector<std::string> kNames = {"meters", "millimeters", "centimeters", "feet",
-                                                  "inches"};
+  static const std::vector<std::string> kNames = {"meters", "millimeters",    "centimeters",
+                                                  "feet",   "us_survey_feet", "inches"};
   return kNames;
 }
 

@@ -8,7 +8,8 @@
 namespace roomtex {
 
 // Metres per unit of the given name: "inches", "feet", "meters", "mm" ... in any case, singular,
-// plural or abbreviated. None for a name that is not known.
+// plural or abbreviated. "us_survey_feet" are 2 millionths longer than feet: a metre in the
+// coordinates of a state. None for a name that is not known.
 std::optional<double> MetersPerUnit(const std::string& name);
 
 // The values of --units.

@@ -19,6 +19,7 @@
 #include "importers/e57_pages.h"
 #include "importers/file_reader.h"
 #include "importers/las.h"
+#include "importers/las_unit.h"
 #include "importers/length_unit.h"
 #include "importers/obj.h"
 #include "importers/pcd.h"
@@ -135,8 +136,8 @@ std::string NameOrFile(const Scan& scan) {
   return scan.name.empty() ? "the file" : "the scan " + Quoted(scan.name);
 }
 
-void TakeUpAxis(const ScanReaderOptions& options, const std::string& format, Scan* scan) {
-  if (options.up_axis == "auto" || format == "RTPI") return;
+void TakeUpAxis(const ScanReaderOptions& options, Scan* scan) {
+  if (options.up_axis == "auto") return;
   scan->up = UpAxisOf(options.up_axis);
   scan->up_is_assumed = false;
 }
@@ -203,7 +204,7 @@ class ScanFinish {
     return [this, file](std::vector<Scan>* scans) {
       Scan& scan = scans->back();
       NoteInput(scan.path, "the scan");
-      TakeUpAxis(options_, file->format, &scan);
+      TakeUpAxis(options_, &scan);
       if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file->notes);
       FindUpAxisAgain(&scan, &file->notes);
       if (file->up_axis.empty()) file->up_axis = NameOfUpAxis(scan.up);
@@ -216,6 +217,26 @@ class ScanFinish {
   const ScanReaderOptions& options_;
   const ScanVisitor& visit_;
 };
+
+// As the file says it, with a note, unless the option does.
+double UnitOfLas(const std::string& path, const ScanReaderOptions& options,
+                 std::vector<std::string>* notes) {
+  if (!options.units.empty()) return *MetersPerUnit(options.units);
+  const LasUnits units = ReadLasUnits(path);
+  if (units.degrees) {
+    throw InputError(path, "", "has coordinates of longitude and latitude",
+                     "Project it (UTM, for example), by pdal translate with filters.reprojection; "
+                     "or give --units if its coordinates are lengths all the same");
+  }
+  if (!units.vertical.empty() && !units.horizontal.empty() && units.vertical != units.horizontal) {
+    notes->push_back("its heights are in " + units.vertical + ", the rest in " + units.horizontal +
+                     ": they are read as " + units.horizontal + " like the rest (export it anew)");
+  }
+  if (units.horizontal.empty() || units.horizontal == "meters") return 1;
+  notes->push_back("the file says that its unit is " + units.horizontal +
+                   "; coordinates become metres (--units says another)");
+  return *MetersPerUnit(units.horizontal);
+}
 
 ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options,
                    const ScanFinish& finish) {
@@ -270,7 +291,8 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
   } else if (LooksLikeLas(start)) {
     file.format = "LAS";
     file.byte_order = "little";
-    file.scans.push_back(ReadLas(path, {meters_per_unit, options.max_range, options.colors}));
+    file.meters_per_unit = UnitOfLas(path, options, &file.notes);
+    file.scans.push_back(ReadLas(path, {file.meters_per_unit, options.max_range, options.colors}));
   } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
     file.format = "OBJ";
     file.byte_order = "text";
@@ -318,9 +340,9 @@ void ScanReaderOptions::Declare(OptionFields* fields) {
   axes.insert(axes.begin(), "auto");
   fields->Choice(
       "up_axis", &up_axis, axes,
-      "Axis of the file's coordinates that points up. auto: as the file says it (E57: z); "
-      "where it does not (PLY, OBJ, PCD, PTX, LAS, text), y if grid, floor and walls "
-      "show it, else z. RTPI: y always.");
+      "Axis of the file's coordinates that points up. auto: as the file says it (E57: z, "
+      "RTPI: y); where it does not (PLY, OBJ, PCD, PTX, LAS, text), y if grid, floor and walls "
+      "show it, else z.");
   fields->Bool("E57.check", &e57_check,
                "Compare the checksums of an E57 file before it is read; 0 = take a damaged file as "
                "it is.");

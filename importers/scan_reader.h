@@ -20,14 +20,14 @@ struct ScanReaderOptions {
   // of real scanners are "counterclockwise"; the wrong one mirrors the room. "auto": by the header
   // where it is one of the scanner's own (AzimuthOfScanner), else clockwise.
   std::string azimuth = "auto";
-  // Unit of the coordinates in the file; "" = what the file says, metres if it does not. One of "",
-  // "meters", "millimeters", "centimeters", "feet", "inches".
+  // Unit of the coordinates in the file; "" = what the file says, metres if it does not. "" or one
+  // of LengthUnitNames() (length_unit.h).
   std::string units;
   // Metres; samples farther away count as missing. 0 = the limit that the file gives, if any.
   double max_range = 0;
   // The axis of the file's coordinates that points up (UpAxisNames(), up_axis.h). "auto": what the
   // file says, otherwise as the grid or the surface show it (FindUpAxis), with a note where that is
-  // not z. RTPI: always y.
+  // not z.
   std::string up_axis = "auto";
   // E57: compare the checksums of the whole file before anything is read from it.
   bool e57_check = true;

@@ -143,8 +143,7 @@ void CheckOptions(const AlignmentRecord& alignment, const std::vector<Found>& fo
     if (!given.units.empty() && std::abs(unit / record.meters_per_unit - 1) > 1e-9) {
       add("--units " + given.units, record, "in units of " + Metres(record.meters_per_unit));
     }
-    if (given.up_axis != "auto" && record.azimuth.empty() && !record.up_axis.empty() &&
-        given.up_axis != record.up_axis) {
+    if (given.up_axis != "auto" && !record.up_axis.empty() && given.up_axis != record.up_axis) {
       add("--up_axis " + given.up_axis, record, "with " + record.up_axis + " up");
     }
     if (given.max_range > 0 && given.max_range != record.max_range) {

@@ -13,6 +13,7 @@
 #include "core/cpu_stages.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/free_vectors.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/photo.h"
@@ -80,21 +81,20 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
   surface.station_is_known = cloud.angular_spacing > 0;
   surface.angular_spacing =
       surface.station_is_known ? cloud.angular_spacing : SpacingInPhotos(cloud, photos);
-  cloud.spacings = {};
+  surface.points = std::move(cloud.patches.points);
+  surface.triangles = std::move(cloud.patches.triangles);
+  *occluder = MakeOccluderTiles(cloud.patches, surface);
+  FreeVectors(&cloud.spacings, &cloud.patches.intensity, &surface.points, &surface.triangles);
   const std::vector<CloudStation> stations =
       surface.station_is_known ? std::vector<CloudStation>{{scan.Station(), 0, scan.points.size(),
                                                             cloud.angular_spacing}}
                                : FindStations(scan, num_threads);
   surface.front_is_known = cloud.front_is_known || TurnToStations(stations, &cloud);
-  surface.points = std::move(cloud.patches.points);
-  surface.triangles = std::move(cloud.patches.triangles);
-  *occluder = MakeOccluderTiles(cloud.patches, surface);
   for (const CloudStation& station : stations) {
     AddShadows(scan, station, options, num_threads, occluder);
   }
   surface.points = std::move(cloud.points);
   surface.normals = std::move(cloud.normals);
-  surface.triangles = {};
   surface.links = FindGridLinks(scan, {});
   return surface;
 }
@@ -137,8 +137,7 @@ Scene MakeSamples(const std::vector<Scan>& scans, const std::vector<PhotoView>& 
       input.angular_spacing = surface.angular_spacing;
     }
     if (options.texture_scale == 1 || !scan.organised) {
-      surface.points = {};
-      surface.normals = {};
+      FreeVectors(&surface.points, &surface.normals);
     }
     scene.surfaces.push_back(std::move(surface));
   }
@@ -380,7 +379,7 @@ void Blend(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                                                    1e6 * options.texture_memory_mb);
   if (result->texture_scale > 1 || scene->has_atlas) {
     *store = ObservationStore(0, 1);
-    input.samples = {};
+    FreeVectors(&input.samples);
     progress->Stage("texture");
     ColorizeTextures(scans, photos, options, num_threads, &scene->surfaces, &input,
                      choice.empty() ? nullptr : &choice, progress, result);

@@ -8,6 +8,7 @@
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
 #include "core/error.h"
+#include "core/free_vectors.h"
 #include "core/input_guard.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -557,10 +558,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   if (by_station) {
     // Of the thinned scans no more is needed than where they stand, and what they hide.
     result.scans.clear();
-    for (Scan& scan : placed.scans) {
-      scan.points = {};
-      scan.intensity = {};
-    }
+    for (Scan& scan : placed.scans) FreeVectors(&scan.points, &scan.intensity);
     colorize.debug_path.clear();
     ColorizeStations(placed, index_of, options, colorize, &result, context);
   }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/free_vectors.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -87,11 +88,7 @@ ScanSurface::ScanSurface(const Scan& scan, const Eigen::Vector3d& origin,
   }
 }
 
-void ScanSurface::ForgetCells() {
-  cells_ = {};
-  neighbour_begin_ = {};
-  neighbours_ = {};
-}
+void ScanSurface::ForgetCells() { FreeVectors(&cells_, &neighbour_begin_, &neighbours_); }
 
 int ScanSurface::NumSamples() const {
   return static_cast<int>(is_grid_ ? scan_.points.size() : points_.size());

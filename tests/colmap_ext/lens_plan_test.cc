@@ -82,6 +82,25 @@ TEST(LensPlan, PhotosOfOneCameraThatWereZoomedAreDivided) {
   EXPECT_EQ(model.images.at(1).camera_id, 1u);
 }
 
+TEST(LensPlan, PhotosAreToldACameraOfTheirOwn) {
+  const std::map<uint32_t, Camera> cameras = {{1, PlannedCamera(1, 768)}};
+  std::map<uint32_t, DatabaseImage> images;
+  for (uint32_t id = 1; id <= 3; ++id) images[id] = {id, 1, "photo_" + std::to_string(id)};
+  LensPlan plan(cameras, images);
+  plan.Tell({2, 3}, PlannedCamera(77, 500));
+  EXPECT_FALSE(plan.IsAsInDatabase());
+  EXPECT_EQ(plan.images().at(1).camera_id, 1u);
+  EXPECT_EQ(plan.images().at(3).camera_id, 2u);
+  EXPECT_EQ(plan.cameras().at(2).params[0], 500);
+  SparseModel model = ModelOf(plan);
+  plan.Restore(&model);
+  EXPECT_EQ(model.images.at(1).camera_id, 1u);
+  EXPECT_EQ(model.images.at(3).camera_id, 2u);
+  EXPECT_EQ(model.cameras.at(2).params[0], 500);
+  plan.Tell({1}, PlannedCamera(5, 400));
+  EXPECT_EQ(plan.cameras().count(1), 0u);  // nobody's any more
+}
+
 TEST(MapperVerdict, IsReadBesideItsOwnModelOnly) {
   const TempFolder folder;
   SparseModel model;

@@ -113,6 +113,88 @@ TEST_F(Las, WrittenFilesReadTheSame) {
   EXPECT_EQ(again.intensity[1], 65535);
 }
 
+// One record of a coordinate system before the points, as LasBytes leaves room for it.
+std::string WithSystem(uint16_t id, const std::string& system) {
+  LasBytes file;
+  file.vlr = static_cast<int>(54 + system.size());
+  file.Make();
+  std::memcpy(&file.bytes[227 + 2], "LASF_Projection", 15);
+  file.Put(227 + 18, id);
+  file.Put(227 + 20, static_cast<uint16_t>(system.size()));
+  std::memcpy(&file.bytes[227 + 54], system.data(), system.size());
+  return file.bytes;
+}
+
+std::string GeoKeys(const std::vector<std::pair<uint16_t, uint16_t>>& keys) {
+  std::vector<uint16_t> numbers = {1, 1, 0, static_cast<uint16_t>(keys.size())};
+  for (const auto& [key, value] : keys) numbers.insert(numbers.end(), {key, 0, 1, value});
+  return {reinterpret_cast<const char*>(numbers.data()), 2 * numbers.size()};
+}
+
+const char kStatePlane[] =
+    "PROJCS[\"NAD83 / Texas Central (ftUS)\",GEOGCS[\"NAD83\",DATUM[\"D\",SPHEROID[\"GRS 1980\","
+    "6378137,298.257]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],"
+    "PROJECTION[\"Lambert\"],PARAMETER[\"false_easting\",2296583.333],"
+    "UNIT[\"US survey foot [ftUS]\",0.3048006096012192],AXIS[\"X\",EAST]]";
+
+TEST_F(Las, UnitsOfTheCoordinateSystemCount) {
+  const auto metres = [this](const std::string& bytes) {
+    const ScanFile file = ReadScanFile(Write(bytes), {});
+    EXPECT_EQ(file.notes.size(), file.meters_per_unit == 1 ? 0u : 1u);
+    EXPECT_NEAR(file.scans[0].points[0].x(), 412001 * file.meters_per_unit, 1e-6);
+    return file.meters_per_unit;
+  };
+  EXPECT_EQ(metres(LasBytes().Make()), 1);
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{1024, 1}, {3076, 9001}}))), 1);
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{1024, 1}, {3076, 9002}}))), 0.3048);
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{1024, 1}, {3076, 9003}}))), 1200.0 / 3937);
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{3076, 9036}}))), 1);  // not known
+  EXPECT_EQ(metres(WithSystem(2112, kStatePlane)), 1200.0 / 3937);
+  EXPECT_EQ(metres(WithSystem(2112, std::string("COMPD_CS[\"both\",") + kStatePlane + "]")),
+            1200.0 / 3937);
+  const std::string whole = kStatePlane;
+  EXPECT_EQ(metres(WithSystem(2112, whole.substr(0, whole.find("US survey") + 5))), 1);  // cut
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{3076, 9003}}).substr(0, 15))), 1);
+  // The option counts more.
+  ScanReaderOptions options;
+  options.units = "meters";
+  EXPECT_EQ(ReadScanFile(Write(WithSystem(2112, kStatePlane)), options).meters_per_unit, 1);
+}
+
+TEST_F(Las, HeightsInAnotherUnitAreSaid) {
+  const ScanFile file =
+      ReadScanFile(Write(WithSystem(34735, GeoKeys({{3076, 9003}, {4099, 9001}}))), {});
+  ASSERT_EQ(file.notes.size(), 2u);
+  EXPECT_THAT(file.notes[0],
+              testing::HasSubstr("its heights are in meters, the rest in us_survey"));
+}
+
+TEST_F(Las, DegreesAreRefused) {
+  EXPECT_INPUT_ERROR(ReadScan(Write(WithSystem(34735, GeoKeys({{1024, 2}}))), {}),
+                     "has coordinates of longitude and latitude");
+  const std::string wkt = "GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174532925199433]]";
+  EXPECT_INPUT_ERROR(ReadScan(Write(WithSystem(2112, wkt)), {}), "longitude and latitude");
+}
+
+// LAS 1.4 may have its coordinate system behind the points.
+TEST_F(Las, TheCoordinateSystemMayStandBehindThePoints) {
+  LasBytes file;
+  file.minor = 4;
+  file.format = 6;
+  file.Make();
+  const size_t end = file.bytes.size();
+  file.bytes.resize(end + 60 + sizeof kStatePlane);
+  file.Put(235, static_cast<uint64_t>(end));
+  file.Put(243, uint32_t{1});
+  std::memcpy(&file.bytes[end + 2], "LASF_Projection", 15);
+  file.Put(end + 18, uint16_t{2112});
+  file.Put(end + 20, static_cast<uint64_t>(sizeof kStatePlane));
+  std::memcpy(&file.bytes[end + 60], kStatePlane, sizeof kStatePlane);
+  EXPECT_EQ(ReadScanFile(Write(file.bytes), {}).meters_per_unit, 1200.0 / 3937);
+  file.Put(end + 20, ~uint64_t{0});
+  EXPECT_EQ(ReadScanFile(Write(file.bytes), {}).meters_per_unit, 1);
+}
+
 TEST_F(Las, BrokenFilesGetASentence) {
   const auto expect = [this](LasBytes file, size_t at, uint8_t value, const std::string& text) {
     file.Make();

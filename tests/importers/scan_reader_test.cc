@@ -129,8 +129,12 @@ TEST_F(ScanReader, FindsWhichWayIsUp) {
   const ScanFile told = ReadScanFile(path, options);
   EXPECT_THAT(told.scans[0].up, IsNearMatrix(Eigen::Vector3d(0, -1, 0), 0));
   EXPECT_THAT(told.notes, SizeIs(0));
-  EXPECT_THAT(ReadScan(WriteGoodRtpi("a.rtpi"), options).up,
-              IsNearMatrix(Eigen::Vector3d(0, 1, 0), 0));
+  // Also of a format that says it: a scanner may hang from the ceiling.
+  const std::string rtpi = WriteGoodRtpi("a.rtpi");
+  EXPECT_EQ(ReadScanFile(rtpi, {}).up_axis, "y");
+  const ScanFile hanging = ReadScanFile(rtpi, options);
+  EXPECT_EQ(hanging.up_axis, "-y");
+  EXPECT_EQ(hanging.scans[0].points, ReadScanFile(rtpi, {}).scans[0].points);
 }
 
 TEST_F(ScanReader, AGridSaysWhichWayIsUp) {

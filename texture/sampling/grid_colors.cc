@@ -93,14 +93,34 @@ void GridColorizer::Choose(const GridOfSamples& grid, BlendedGrid* blended) cons
   });
 }
 
+namespace {
+
+ColorGrid EmptyColors(const GridOfSamples& grid) {
+  const size_t count = static_cast<size_t>(grid.num_columns) * grid.num_rows;
+  ColorGrid colors;
+  colors.num_columns = grid.num_columns;
+  colors.num_rows = grid.num_rows;
+  colors.rgb.assign(count, {0, 0, 0});
+  colors.views.assign(count, 0);
+  return colors;
+}
+
+void PutColor(const Eigen::Vector3f& linear, int views, const std::vector<Rgb>& unseen, int index,
+              ColorGrid* colors) {
+  colors->views[index] = static_cast<uint8_t>(std::min(views, 255));
+  if (views == 0) {
+    if (!unseen.empty()) colors->rgb[index] = unseen[index];
+    return;
+  }
+  for (int k = 0; k < 3; ++k) colors->rgb[index][k] = SrgbByteFromLinear(linear[k]);
+}
+
+}  // namespace
+
 ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& blended,
                                 const std::vector<Rgb>& unseen) const {
   const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
-  ColorGrid result;
-  result.num_columns = grid.num_columns;
-  result.num_rows = grid.num_rows;
-  result.rgb.assign(blended.blend.size(), {0, 0, 0});
-  result.views.assign(blended.blend.size(), 0);
+  ColorGrid result = EmptyColors(grid);
   const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
   ParallelFor(num_threads_, first, end, [&](int t) {
     const SampleTile& tile = input_.samples[t];
@@ -109,14 +129,26 @@ ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& bl
       const int views = blended.dominant.photo[index] < 0
                             ? 0
                             : store_.NumViews(static_cast<size_t>(tile.first_slot) + i);
-      result.views[index] = static_cast<uint8_t>(std::min(views, 255));
-      if (views == 0) {
-        if (!unseen.empty()) result.rgb[index] = unseen[index];
-        continue;
-      }
-      for (int k = 0; k < 3; ++k) {
-        result.rgb[index][k] = SrgbByteFromLinear(blended.blend[index][k]);
-      }
+      PutColor(blended.blend[index], views, unseen, index, &result);
+    }
+  });
+  return result;
+}
+
+// Without a grid no sample needs its neighbours, and what all of them have at once is not kept.
+ColorGrid GridColorizer::BlendAlone(const GridOfSamples& grid,
+                                    const std::vector<Rgb>& unseen) const {
+  const CpuTimer timer(CpuStage::kBlend, CpuTimer::Scope::kProcess);
+  ColorGrid result = EmptyColors(grid);
+  const int first = static_cast<int>(grid.first_tile), end = static_cast<int>(grid.end_tile);
+  ParallelFor(num_threads_, first, end, [&](int t) {
+    const SampleTile& tile = input_.samples[t];
+    for (int i = 0; i < tile.points.size(); ++i) {
+      const size_t slot = static_cast<size_t>(tile.first_slot) + i;
+      const BlendedSample sample =
+          BlendSample(store_.Begin(slot), store_.Count(slot), gains_, blend_.outlier);
+      PutColor(sample.blend, sample.dominant_photo < 0 ? 0 : store_.NumViews(slot), unseen,
+               tile.index[i], &result);
     }
   });
   return result;
@@ -124,9 +156,10 @@ ColorGrid GridColorizer::Encode(const GridOfSamples& grid, const BlendedGrid& bl
 
 ColorGrid GridColorizer::Colorize(const GridOfSamples& grid, const GridLinks& links,
                                   const std::vector<Rgb>& unseen) const {
+  if (grid.num_rows == 1) return BlendAlone(grid, unseen);
   BlendedGrid blended = Blend(grid);
   const bool is_chosen = choice_ != nullptr && !choice_->empty();
-  if ((blend_.detail || is_chosen) && grid.num_rows > 1) {
+  if (blend_.detail || is_chosen) {
     const CpuTimer timer(CpuStage::kDetail, CpuTimer::Scope::kProcess);
     if (is_chosen) Choose(grid, &blended);
     Scan shape;

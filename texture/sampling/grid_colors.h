@@ -70,6 +70,7 @@ class GridColorizer {
   void Choose(const GridOfSamples& grid, BlendedGrid* blended) const;
   ColorGrid Encode(const GridOfSamples& grid, const BlendedGrid& blended,
                    const std::vector<Rgb>& unseen) const;
+  ColorGrid BlendAlone(const GridOfSamples& grid, const std::vector<Rgb>& unseen) const;
 
   const PhotoPassInput& input_;
   const ObservationStore& store_;

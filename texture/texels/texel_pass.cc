@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/free_vectors.h"
+
 namespace roomtex {
 namespace {
 
@@ -59,8 +61,7 @@ ColorGrid ColorizeBand(const TexelSource& source, const Band& band,
   input.angular_spacing = scene->angular_spacing;
   const GridOfSamples grid = AddGrid(source.num_columns(), band.end_read - band.first_read,
                                      block.points, block.normals, source.station(), &input);
-  block.points = {};
-  block.normals = {};
+  FreeVectors(&block.points, &block.normals);
   std::vector<PhotoView> band_photos;
   std::vector<Eigen::Vector3f> band_gains;
   std::vector<int> numbers(photos.size(), -1);  // in the band

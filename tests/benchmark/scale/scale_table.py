@@ -13,6 +13,7 @@ import json
 import math
 import os
 import shutil
+import struct
 import subprocess
 import sys
 
@@ -106,18 +107,43 @@ class Bench:
             name = f"samples_{millions}"
             self.simulate(name, 10, millions)
             place = lambda *parts: self.at(name, *parts)
-            self.run("samples", "import", millions, [
+            self.run("samples", "RTPI to PLY", millions, [
                 "roomtex-import", "--quiet", "--input_path", place("scan.rtpi"), "--output_path", place("scan.ply")])
-            self.run("samples", "texture", millions, [
-                "roomtex-texture", "--quiet", "--input_path", place("truth"), "--image_path", place("photos"),
-                "--scan_path", place("scan.rtpi"), "--Texture.scale", "1", "--output_path", place("textured")], (0, 4))
-            model = self.at(f"photos_{min(self.arguments.photos)}", "sparse", "0")
+            self.run("samples", "RTPI to E57", millions, [
+                "roomtex-import", "--quiet", "--input_path", place("scan.rtpi"), "--output_path", place("scan.e57")])
+            self.run("samples", "E57 to PNG", millions, [
+                "roomtex-import", "--quiet", "--input_path", place("scan.e57"), "--output_path", place("scan.png")])
+            self.texture(millions, "texture, grid", place, "scan.rtpi", [])
+            self.texture(millions, "texture, cloud", place, *self.cloud(place))
+            model = self.at(f"photos_{min(self.arguments.photos or [0])}", "sparse", "0")
             if not os.path.exists(model):
                 continue
             self.run("samples", "align", millions, [
                 "roomtex-align", "--quiet", "--input_path", model, "--scan_path", place("scan.rtpi"), "--picks_path",
                 self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
                 place("aligned")], (0, 4))
+
+    def texture(self, millions, step, place, scan, options):
+        self.run("samples", step, millions, [
+            "roomtex-texture", "--quiet", "--input_path", place("truth"), "--image_path", place("photos"),
+            "--scan_path", place(scan), "--Texture.scale", "1", "--output_path", place("textured")] + options, (0, 4))
+        shutil.rmtree(place("textured"), ignore_errors=True)
+
+    def cloud(self, place):
+        """The samples as a LAS a metre off their station, so that their angles show no grid; how to put it back."""
+        if not os.path.exists(place("cloud.las")):
+            subprocess.run([self.program("roomtex-import"), "--quiet", "--input_path", place("scan.rtpi"),
+                            "--output_path", place("new.las")], check=True, stdout=subprocess.DEVNULL)
+            with open(place("new.las"), "r+b") as stream:
+                for at in (155, 179, 187):  # offset, greatest and least of x in the header
+                    stream.seek(at)
+                    (x,) = struct.unpack("<d", stream.read(8))
+                    stream.seek(at)
+                    stream.write(struct.pack("<d", x + 1))
+            os.rename(place("new.las"), place("cloud.las"))
+            with open(place("cloud.txt"), "w") as stream:
+                stream.write("cloud.las 1 0 0 0 -1 0 0\n")
+        return "cloud.las", ["--scan_poses", place("cloud.txt")]
 
     def station_poses(self):
         """Rotation and translation of the eight stations that are simulated in one room."""

@@ -1,0 +1,157 @@
+// The scanner's own photos beside the user's, as a user types it: photos out of an E57, COLMAP on
+// all, roomtex-mapper with their poses, roomtex-align without a pick. Label `e2e`.
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "colmap_ext/sparse_model.h"
+#include "core/frames.h"
+#include "tests/e2e/colmap_steps.h"
+#include "tests/support/matchers.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temp_folder.h"
+
+namespace roomtex {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+class ScannerPhotos : public testing::Test {
+ protected:
+  static constexpr int kNumPhotos = 14, kNumOfScanner = 4;
+
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+
+  // Of 14 simulated photos four, spread over the room, become the scanner's: they go with their
+  // true poses into the E57, without distortion, and nobody else has them.
+  static void SetUpTestSuite() {
+    folder_ = new TempFolder;
+    const CommandResult simulated =
+        RunCommandLine("roomtex-simulate --quiet --output_path " + Path("capture") +
+                       " --num_photos 14 --photo_width 960 --photo_height 640 --scan_columns 1000 "
+                       "--scan_rows 380");
+    ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+    truth_ = ReadSparseModel(Path("capture/truth"));
+    SparseModel of_scanner = truth_;
+    std::string mine;
+    fs::create_directories(Path("photos/mine"));
+    int k = 0;
+    for (const auto& [id, image] : truth_.images) {
+      if (k++ % 4 == 1) continue;
+      of_scanner.images.erase(id);
+      fs::rename(Path("capture/photos/" + image.name), Path("photos/mine/" + image.name));
+      mine += "mine/" + image.name + "\n";
+    }
+    ASSERT_EQ(of_scanner.images.size(), kNumOfScanner);
+    for (auto& [id, image] : of_scanner.images) image.points2d.clear(), image.point3d_ids.clear();
+    of_scanner.points.clear();
+    WriteSparseModel(of_scanner, Path("of_scanner"));
+    const CommandResult written = RunCommandLine(
+        "roomtex-texture --quiet --Texture.scale 1 --output_e57 1 --E57.images 1 --input_path " +
+        Path("of_scanner") + " --image_path " + Path("capture/photos") + " --scan_path " +
+        Path("capture/scan.rtpi") + " --output_path " + Path("site"));
+    ASSERT_EQ(written.exit_code, 0) << written.err;
+    const CommandResult extracted =
+        RunCommandLine("roomtex-import --quiet --input_path " + Path("site/model.e57") +
+                       " --images_path " + Path("photos/scanner"));
+    ASSERT_EQ(extracted.exit_code, 0) << extracted.err;
+    WriteBytes(Path("mine.txt"), mine);
+    std::string theirs;
+    for (const auto& entry : fs::directory_iterator(Path("photos/scanner"))) {
+      if (entry.is_regular_file()) theirs += "scanner/" + entry.path().filename().string() + "\n";
+    }
+    WriteBytes(Path("theirs.txt"), theirs);
+    ASSERT_EQ(Shell(ExtractLine("mine.txt") + ReadLine(Path("capture/camera_options.txt"))), 0);
+    ASSERT_EQ(Shell(ExtractLine("theirs.txt") + "--ImageReader.single_camera 1"), 0);
+    ASSERT_EQ(
+        Shell("QT_QPA_PLATFORM=offscreen colmap exhaustive_matcher --database_path " +
+              Path("database.db") + " --SiftMatching.use_gpu 0 >" + Path("colmap.log") + " 2>&1"),
+        0);
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  static std::string ReadLine(const std::string& path) {
+    const std::string text = ReadBytes(path);
+    return text.substr(0, text.find('\n'));
+  }
+  static std::string ExtractLine(const std::string& list) {
+    return "QT_QPA_PLATFORM=offscreen colmap feature_extractor --SiftExtraction.use_gpu 0 "
+           "--database_path " +
+           Path("database.db") + " --image_path " + Path("photos") + " --image_list_path " +
+           Path(list) + " >" + Path("colmap.log") + " 2>&1 ";
+  }
+
+  // Median distance of the user's photos from where they were taken, metres. An E57 has z up.
+  static double MedianError(const SparseModel& model) {
+    std::vector<double> errors;
+    for (const auto& [id, image] : truth_.images) {
+      const SparseImage* const found = model.FindImage("mine/" + image.name);
+      if (found == nullptr) continue;
+      const Eigen::Vector3d c = image.cam_from_model.TargetOriginInSource();
+      const Eigen::Vector3d in_e57(c.x(), -c.z(), c.y());
+      errors.push_back((found->cam_from_model.TargetOriginInSource() - in_e57).norm());
+    }
+    EXPECT_EQ(errors.size(), kNumPhotos - kNumOfScanner);
+    std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+    return errors[errors.size() / 2];
+  }
+
+  static TempFolder* folder_;
+  static SparseModel truth_;
+};
+
+TempFolder* ScannerPhotos::folder_ = nullptr;
+SparseModel ScannerPhotos::truth_;
+
+TEST_F(ScannerPhotos, PutModelAndAlignmentIntoTheScanWithoutAPick) {
+  const CommandResult mapped =
+      RunCommandLine("roomtex-mapper --quiet --database_path " + Path("database.db") +
+                     " --image_path " + Path("photos") + " --known_path " +
+                     Path("photos/scanner/sparse") + " --output_path " + Path("sparse"));
+  ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
+  const SparseModel model = ReadSparseModel(Path("sparse/0"));
+  EXPECT_EQ(model.images.size(), kNumPhotos);
+  // Already in the scan's frame and metric: 960 pixels across 5 m are 3 mm each.
+  EXPECT_LT(MedianError(model), 0.005);
+  const SparseModel told = ReadSparseModel(Path("photos/scanner/sparse"));
+  for (const auto& [id, image] : told.images) {
+    const SparseImage* const found = model.FindImage("scanner/" + image.name);
+    ASSERT_NE(found, nullptr) << image.name;
+    EXPECT_THAT(found->cam_from_model, IsNearRigid(image.cam_from_model, 1e-9, 1e-9));
+  }
+
+  // No picks, no search, and no photos to confirm it.
+  const CommandResult aligned =
+      RunCommandLine("roomtex-align --quiet --input_path " + Path("sparse/0") + " --scan_path " +
+                     Path("site/model.e57") + " --output_path " + Path("aligned"));
+  ASSERT_EQ(aligned.exit_code, 0) << aligned.err;
+  EXPECT_LT(MedianError(ReadSparseModel(Path("aligned"))), 0.005);
+  const json report = json::parse(ReadBytes(Path("aligned/alignment.json")));
+  EXPECT_EQ(report["search"]["method"], "known_poses");
+  EXPECT_GE(report["picks"]["num_used"],
+            12);  // the scanner's photos hold what the surface does not
+  EXPECT_LT(report["expected_error"]["at_cameras_mm"], 5);
+  EXPECT_NEAR(report["scan_from_sparse"]["scale"].get<double>(), 1, 0.005);
+}
+
+TEST_F(ScannerPhotos, WithoutTheirPosesPicksAreAskedFor) {
+  const CommandResult mapped =
+      RunCommandLine("roomtex-mapper --quiet --database_path " + Path("database.db") +
+                     " --image_path " + Path("photos") + " --output_path " + Path("unknown"));
+  ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
+  const CommandResult aligned =
+      RunCommandLine("roomtex-align --quiet --input_path " + Path("unknown/0") + " --scan_path " +
+                     Path("site/model.e57") + " --output_path " + Path("none"));
+  EXPECT_EQ(aligned.exit_code, 2);
+  EXPECT_THAT(aligned.err, HasSubstr("--picks_path is missing"));
+}
+
+}  // namespace
+}  // namespace roomtex
