@@ -8,6 +8,10 @@ namespace roomtex {
 namespace {
 
 constexpr int kPointsPerImage = 60;
+// Observations of a thinned point. What a point takes in an adjustment grows with their square, and
+// in one room every photo sees the same: without an end to it, twice the photos took four times as
+// long (tests/benchmark/scale/lens_cost.cc).
+constexpr size_t kMaxTrack = 12;
 
 // fx, fy, cx, cy, k1, k2, p1, p2; empty for models that are rich already.
 std::vector<double> OpenCvParams(const Camera& camera) {
@@ -52,20 +56,28 @@ SparseModel ThinnedModel(const SparseModel& model, int per_image) {
   SparseModel result;
   result.cameras = model.cameras;
   result.images = model.images;
+  for (auto& [image_id, image] : result.images) {
+    std::fill(image.point3d_ids.begin(), image.point3d_ids.end(), kInvalidPoint3dId);
+  }
   std::map<uint32_t, int> count;
+  const auto has_fewer = [&](const TrackElement& a, const TrackElement& b) {
+    return count[a.image_id] < count[b.image_id];
+  };
   for (const uint64_t point_id : order) {
-    const SparsePoint& point = model.points.at(point_id);
+    SparsePoint point = model.points.at(point_id);
     const bool wanted = std::any_of(
         point.track.begin(), point.track.end(),
         [&](const TrackElement& element) { return count[element.image_id] < per_image; });
     if (!wanted) continue;
-    for (const TrackElement& element : point.track) ++count[element.image_id];
-    result.points[point_id] = point;
-  }
-  for (auto& [image_id, image] : result.images) {
-    for (uint64_t& point_id : image.point3d_ids) {
-      if (result.points.count(point_id) == 0) point_id = kInvalidPoint3dId;
+    if (point.track.size() > kMaxTrack) {
+      std::stable_sort(point.track.begin(), point.track.end(), has_fewer);
+      point.track.resize(kMaxTrack);
     }
+    for (const TrackElement& element : point.track) {
+      ++count[element.image_id];
+      result.images.at(element.image_id).point3d_ids[element.point2d_index] = point_id;
+    }
+    result.points[point_id] = std::move(point);
   }
   return result;
 }

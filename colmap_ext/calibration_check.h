@@ -34,7 +34,8 @@ Camera RicherCamera(const Camera& camera);
 SparseModel WithRicherCameras(const SparseModel& model);
 
 // At least `per_image` points of every image (all of those that see fewer), those of most images
-// first: enough for a few parameters, and as fast for 300 photos as the rest.
+// first, of a point no more than a dozen observations, in the images that have fewest: enough for a
+// few parameters, and the time grows as the number of images.
 SparseModel ThinnedModel(const SparseModel& model, int per_image);
 
 // adjust: bundle adjustment of poses and points, and of the intrinsics if asked.

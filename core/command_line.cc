@@ -38,7 +38,8 @@ std::string NumberText(double value) {
 // Whether `path`, which has been written, holds this report anyway.
 bool HoldsReport(const std::string& path, const std::vector<SetWithReport>& sets) {
   return std::any_of(sets.begin(), sets.end(), [&](const SetWithReport& one) {
-    return path == (std::filesystem::path(one.set->folder()) / one.report_name).string();
+    return !one.report_name.empty() &&
+           path == (std::filesystem::path(one.set->folder()) / one.report_name).string();
   });
 }
 
@@ -160,6 +161,8 @@ struct Command::Impl {
   std::string Answer(const std::vector<std::string>& arguments) const;
   void Parse(const std::vector<std::string>& arguments) const;
   Json MakeReport(const Report& report, const Progress& progress) const;
+  [[noreturn]] void RefuseReportPath() const;
+  void CheckReportPath(const std::vector<SetWithReport>& sets) const;
   // Puts the sets and copies of a command that ran to its end in their places, and --report_path.
   void WriteReports(int exit_code, const Report& report, const Progress& progress) const;
 };
@@ -368,6 +371,23 @@ Json Command::Impl::MakeReport(const Report& report, const Progress& progress) c
   return json;
 }
 
+void Command::Impl::RefuseReportPath() const {
+  throw UsageError("--report_path " + common.report_path +
+                   " is a result of this command, which is kept. Give another --report_path");
+}
+
+// Before anything of the sets is put in its place.
+void Command::Impl::CheckReportPath(const std::vector<SetWithReport>& sets) const {
+  const std::string& path = common.report_path;
+  if (path.empty() || HoldsReport(path, sets)) return;
+  bool is_in_a_set = false;
+  for (const SetWithReport& one : sets) {
+    if (one.set->WillHold(path)) RefuseReportPath();
+    is_in_a_set |= !one.set->NameOf(path).empty();  // in a folder, perhaps, that is not there yet
+  }
+  if (!is_in_a_set) OutputFile probe(path);  // throws where nothing can be written
+}
+
 void Command::Impl::WriteReports(int exit_code, const Report& report,
                                  const Progress& progress) const {
   const bool ran = exit_code == kExitDone || exit_code == kExitUntrusted;
@@ -376,9 +396,10 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
   std::vector<SetWithReport> sets = TakeSetsWithReport();
   if (!ran) sets.clear();
   if (paths.empty() && sets.empty()) return;
+  CheckReportPath(sets);
   const Json json = MakeReport(report, progress);
   for (const SetWithReport& one : sets) {
-    WriteJson(one.set->Path(one.report_name), json);
+    if (!one.report_name.empty()) WriteJson(one.set->Path(one.report_name), json);
     one.set->Commit();
   }
   const std::vector<std::string> written = OutputsSoFar();
@@ -387,9 +408,7 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
     for (const std::string& other : written) {
       if (path != common.report_path || HoldsReport(other, sets)) continue;
       if (!std::filesystem::equivalent(path, other, error) || error) continue;
-      throw UsageError("--report_path " + path +
-                       " is a result of this command, which is kept. "
-                       "Give another --report_path");
+      RefuseReportPath();
     }
     WriteJson(path, json);
   }
@@ -409,6 +428,7 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   try {
     impl_->Parse(arguments);
     guard.emplace(impl_->PathsToGuard());
+    if (!common.report_path.empty()) RequireReplaceable(common.report_path);
   } catch (const UsageError& error) {
     std::cerr << impl_->name << ": " << error.what() << "\nSee " << impl_->name << " --help\n";
     return kExitUsage;

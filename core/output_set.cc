@@ -140,6 +140,8 @@ void CommitWithReport(const std::string& report_name, std::shared_ptr<OutputSet>
   SetsWithReport().push_back({report_name, std::move(set)});
 }
 
+void CommitAtEnd(std::shared_ptr<OutputSet> set) { CommitWithReport("", std::move(set)); }
+
 std::vector<SetWithReport> TakeSetsWithReport() { return std::exchange(SetsWithReport(), {}); }
 
 bool ChangePlaces(const std::string& finished, const std::string& target) {
@@ -188,6 +190,19 @@ std::string OutputSet::Path(const std::string& name) {
   if (error) throw CannotBeFilled(folder_, error.message());
   names_.push_back(name);
   return path.string();
+}
+
+std::string OutputSet::NameOf(const std::string& path) const {
+  std::error_code error;
+  const fs::path place = fs::weakly_canonical(fs::absolute(path, error), error);
+  const fs::path name = place.lexically_relative(place_);
+  return error || name.empty() || *name.begin() == ".." ? "" : name.string();
+}
+
+bool OutputSet::WillHold(const std::string& path) const {
+  const std::string name = NameOf(path);
+  std::error_code error;
+  return !name.empty() && fs::is_regular_file(fs::path(aside()) / name, error);
 }
 
 std::vector<std::string> OutputSet::Check() const {

@@ -36,6 +36,10 @@ class OutputSet {
   // command left there (its report.json names the command): what is not ours stays.
   void ReplaceAllOf(const std::string& command);
 
+  // How the path is called in the folder; "" = it lies elsewhere.
+  std::string NameOf(const std::string& path) const;
+  // Whether Commit() will put a file there.
+  bool WillHold(const std::string& path) const;
   // In the order of the calls of Path().
   const std::vector<std::string>& names() const { return names_; }
   const std::string& folder() const { return folder_; }
@@ -62,6 +66,8 @@ struct SetWithReport {
   std::shared_ptr<OutputSet> set;
 };
 void CommitWithReport(const std::string& report_name, std::shared_ptr<OutputSet> set);
+// The same for a set that holds no report: report_name is "".
+void CommitAtEnd(std::shared_ptr<OutputSet> set);
 // For Command::Run: all that were named since the last call.
 std::vector<SetWithReport> TakeSetsWithReport();
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "core/statistics.h"
 
@@ -51,28 +52,36 @@ Bounds FindBounds(const Scan& scan) {
   return bounds;
 }
 
+uint8_t GreyScale::operator()(float intensity) const {
+  const float range = high > low ? high - low : 1.0f;
+  return static_cast<uint8_t>(std::lround(255 * std::clamp((intensity - low) / range, 0.0f, 1.0f)));
+}
+
+GreyScale FindGreyScale(std::vector<float> intensities, double low_percentile,
+                        double high_percentile) {
+  if (intensities.empty()) return {};
+  const auto percentile = [&intensities](double percent) {
+    const size_t rank = static_cast<size_t>(percent / 100.0 * (intensities.size() - 1) + 0.5);
+    return AtRank(&intensities, rank);
+  };
+  const float low = percentile(low_percentile);
+  return {low, percentile(high_percentile)};
+}
+
 std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile,
                                      double high_percentile) {
+  const auto is_measured = [&scan](size_t i) {
+    return !scan.IsMissing(static_cast<int>(i)) && std::isfinite(scan.intensity[i]);
+  };
   std::vector<float> measured;
   measured.reserve(scan.points.size());
   for (size_t i = 0; i < scan.points.size(); ++i) {
-    if (!scan.IsMissing(static_cast<int>(i)) && std::isfinite(scan.intensity[i])) {
-      measured.push_back(scan.intensity[i]);
-    }
+    if (is_measured(i)) measured.push_back(scan.intensity[i]);
   }
+  const GreyScale scale = FindGreyScale(std::move(measured), low_percentile, high_percentile);
   std::vector<uint8_t> grey(scan.points.size(), 0);
-  if (measured.empty()) return grey;
-  const auto percentile = [&measured](double percent) {
-    const size_t rank = static_cast<size_t>(percent / 100.0 * (measured.size() - 1) + 0.5);
-    return AtRank(&measured, rank);
-  };
-  const float low = percentile(low_percentile);
-  const float high = percentile(high_percentile);
-  const float range = high > low ? high - low : 1.0f;
   for (size_t i = 0; i < grey.size(); ++i) {
-    if (scan.IsMissing(static_cast<int>(i)) || !std::isfinite(scan.intensity[i])) continue;
-    const float value = std::clamp((scan.intensity[i] - low) / range, 0.0f, 1.0f);
-    grey[i] = static_cast<uint8_t>(std::lround(255 * value));
+    if (is_measured(i)) grey[i] = scale(scan.intensity[i]);
   }
   return grey;
 }

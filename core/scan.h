@@ -83,6 +83,15 @@ struct Bounds {
 };
 Bounds FindBounds(const Scan& scan);
 
+// What of the intensities becomes black and what white.
+struct GreyScale {
+  float low = 0, high = 1;
+  uint8_t operator()(float intensity) const;
+};
+// By percentiles of the intensities, which must be finite; of none of them: 0 to 1.
+GreyScale FindGreyScale(std::vector<float> intensities, double low_percentile = 1.0,
+                        double high_percentile = 99.0);
+
 // Intensities as grey values 0..255 in grid order: the given percentiles of the measured samples
 // become black and white. Missing samples: 0.
 std::vector<uint8_t> IntensityAsGrey(const Scan& scan, double low_percentile = 1.0,

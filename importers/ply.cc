@@ -176,8 +176,8 @@ class PlyParser {
  public:
   // wanted: may be null.
   PlyParser(const FileReader& file, const PlyHeader& header, const PlyOptions& options,
-            PlyVertexValues* wanted)
-      : file_(file), header_(header), options_(options), wanted_(wanted) {
+            PlyVertexValues* wanted, PlyVisitor* visitor)
+      : file_(file), header_(header), options_(options), wanted_(wanted), visitor_(*visitor) {
     if (header.format == "ascii") {
       source_ = std::make_unique<AsciiSource>(file, header);
     } else {
@@ -185,9 +185,11 @@ class PlyParser {
     }
   }
 
-  Scan Parse() {
+  void Parse() {
     CheckElements();
     ReadComments();
+    FindProperties();
+    visitor_.Begin(facts_);
     for (const PlyElement& element : header_.elements) {
       if (element.properties.empty()) continue;
       if (&element == vertex_) {
@@ -199,8 +201,6 @@ class PlyParser {
       }
     }
     source_->EndFile();
-    (HasFaces() ? FinishMesh : FinishCloud)(file_.path(), options_.max_range, &scan_);
-    return std::move(scan_);
   }
 
  private:
@@ -246,8 +246,6 @@ class PlyParser {
 
   // What our own writer says about the scan.
   void ReadComments() {
-    scan_.up = Eigen::Vector3d::UnitZ();
-    scan_.up_is_assumed = true;
     for (const std::string& comment : header_.comments) {
       std::istringstream words(comment);
       std::string who, what;
@@ -255,10 +253,10 @@ class PlyParser {
       if (!(words >> who >> what >> v[0] >> v[1] >> v[2]) || who != "roomtex" || !v.allFinite())
         continue;
       if (what == "up" && v.norm() > 0.5) {
-        scan_.up = v.normalized();
-        scan_.up_is_assumed = false;
+        facts_.up = v.normalized();
+        facts_.up_is_assumed = false;
       }
-      if (what == "station") scan_.scan_from_station.translation = options_.meters_per_unit * v;
+      if (what == "station") facts_.station = options_.meters_per_unit * v;
     }
   }
 
@@ -330,28 +328,26 @@ class PlyParser {
     }
   }
 
+  void FindProperties() {
+    intensity_ = vertex_->Find({"intensity", "scalar_intensity", "scalar_Intensity"});
+    color_ = FindTriple({{"red", "r", "diffuse_red"},
+                         {"green", "g", "diffuse_green"},
+                         {"blue", "b", "diffuse_blue"}});
+    if (!HasFaces()) {
+      normal_ = FindTriple({{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}});
+    }
+    facts_.num_vertices = static_cast<size_t>(vertex_->count);
+    facts_.num_faces = HasFaces() ? static_cast<size_t>(face_->count) : 0;
+    facts_.has_intensity = intensity_ >= 0;
+    facts_.has_color = color_.found;
+    facts_.has_normal = normal_.found;
+    facts_.color_scale = ColorScaleOf(color_);
+  }
+
   void ReadVertices() {
-    const int intensity = vertex_->Find({"intensity", "scalar_intensity", "scalar_Intensity"});
-    const auto count = static_cast<size_t>(vertex_->count);
-    RequireMemoryForSamples(scan_.path, static_cast<double>(count));
-    scan_.points.reserve(count);
-    scan_.intensity.reserve(count);
     const std::vector<std::vector<float>*> wanted = WantedByProperty();
-    const Triple color = FindTriple({{"red", "r", "diffuse_red"},
-                                     {"green", "g", "diffuse_green"},
-                                     {"blue", "b", "diffuse_blue"}});
-    const Triple normal =
-        HasFaces() ? Triple{}
-                   : FindTriple({{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}});
-    const bool is_grey = options_.grey_as_intensity && intensity < 0;
-    ColorScale color_scale(ColorScaleOf(color));
-    if (color.found && options_.colors) scan_.colors.reserve(count);
-    if (normal.found) scan_.normals.reserve(count);
-    for (size_t i = 0; i < count; ++i) {
-      Eigen::Vector3d point = Eigen::Vector3d::Zero();
-      double value_of_intensity = 0;
-      Eigen::Vector3d value_of_color = Eigen::Vector3d::Zero();
-      Eigen::Vector3d value_of_normal = Eigen::Vector3d::Zero();
+    for (int64_t i = 0; i < vertex_->count; ++i) {
+      PlyVertex vertex;
       source_->BeginEntry();
       for (int p = 0; p < static_cast<int>(vertex_->properties.size()); ++p) {
         const PlyProperty& property = vertex_->properties[p];
@@ -361,22 +357,15 @@ class PlyParser {
         }
         const double value = source_->Next(property.type);
         for (int k = 0; k < 3; ++k) {
-          if (p == coordinate_[k]) point[k] = value;
-          if (p == color.property[k]) value_of_color[k] = value;
-          if (p == normal.property[k]) value_of_normal[k] = value;
+          if (p == coordinate_[k]) vertex.point[k] = options_.meters_per_unit * value;
+          if (p == color_.property[k]) vertex.color[k] = value;
+          if (p == normal_.property[k]) vertex.normal[k] = value;
         }
-        if (p == intensity) value_of_intensity = value;
+        if (p == intensity_) vertex.intensity = value;
         if (wanted[p] != nullptr) wanted[p]->push_back(static_cast<float>(value));
       }
       source_->EndEntry();
-      if (color.found && is_grey) value_of_intensity = GreyOf(value_of_color);
-      if (color.found && options_.colors) {
-        scan_.colors.push_back(color_scale.Bytes(value_of_color, &scan_.colors));
-      }
-      if (normal.found) scan_.normals.emplace_back(value_of_normal.cast<float>());
-      scan_.points.push_back(options_.meters_per_unit * point);
-      scan_.intensity.push_back(
-          std::isfinite(value_of_intensity) ? static_cast<float>(value_of_intensity) : 0.0f);
+      visitor_.Vertex(vertex);
     }
   }
 
@@ -415,21 +404,65 @@ class PlyParser {
       }
       fan[k < 2 ? static_cast<int>(k) : 2] = static_cast<int>(index);
       if (k < 2) continue;
-      if (fan[0] != fan[1] && fan[1] != fan[2] && fan[0] != fan[2]) scan_.triangles.push_back(fan);
+      if (fan[0] != fan[1] && fan[1] != fan[2] && fan[0] != fan[2]) visitor_.Face(fan);
       fan[1] = fan[2];
     }
   }
 
-  // Points that are not finite or too far are missing, and so are the triangles at them.
   const FileReader& file_;
   const PlyHeader& header_;
   PlyOptions options_;
   PlyVertexValues* wanted_;
+  PlyVisitor& visitor_;
+  PlyFacts facts_;
   std::unique_ptr<ValueSource> source_;
   const PlyElement* vertex_ = nullptr;
   const PlyElement* face_ = nullptr;
   int coordinate_[3] = {-1, -1, -1};
-  int list_ = -1;
+  int list_ = -1, intensity_ = -1;
+  Triple color_, normal_;
+};
+
+// All of it as a scan.
+class ScanMaker : public PlyVisitor {
+ public:
+  ScanMaker(const std::string& path, const PlyOptions& options) : path_(path), options_(options) {}
+
+  void Begin(const PlyFacts& facts) override {
+    facts_ = facts;
+    scan_.up = facts.up;
+    scan_.up_is_assumed = facts.up_is_assumed;
+    scan_.scan_from_station.translation = facts.station;
+    color_scale_ = ColorScale(facts.color_scale);
+    RequireMemoryForSamples(path_, static_cast<double>(facts.num_vertices));
+    scan_.points.reserve(facts.num_vertices);
+    scan_.intensity.reserve(facts.num_vertices);
+    if (KeepsColors()) scan_.colors.reserve(facts.num_vertices);
+    if (facts.has_normal) scan_.normals.reserve(facts.num_vertices);
+  }
+  void Vertex(const PlyVertex& vertex) override {
+    const bool is_grey = options_.grey_as_intensity && facts_.has_color && !facts_.has_intensity;
+    const double intensity = is_grey ? GreyOf(vertex.color) : vertex.intensity;
+    if (KeepsColors()) scan_.colors.push_back(color_scale_.Bytes(vertex.color, &scan_.colors));
+    if (facts_.has_normal) scan_.normals.emplace_back(vertex.normal.cast<float>());
+    scan_.points.push_back(vertex.point);
+    scan_.intensity.push_back(std::isfinite(intensity) ? static_cast<float>(intensity) : 0.0f);
+  }
+  void Face(const Triangle& triangle) override { scan_.triangles.push_back(triangle); }
+
+  // Points that are not finite or too far are missing, and so are the triangles at them.
+  Scan Finish() {
+    (facts_.num_faces > 0 ? FinishMesh : FinishCloud)(path_, options_.max_range, &scan_);
+    return std::move(scan_);
+  }
+
+ private:
+  bool KeepsColors() const { return facts_.has_color && options_.colors; }
+
+  const std::string path_;
+  const PlyOptions options_;
+  PlyFacts facts_;
+  ColorScale color_scale_{255};
   Scan scan_;
 };
 
@@ -474,7 +507,15 @@ Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* fo
   const FileReader file(path);
   const PlyHeader header = ReadPlyHeader(file);
   if (format != nullptr) *format = header.format;
-  return PlyParser(file, header, options, values).Parse();
+  ScanMaker maker(path, options);
+  PlyParser(file, header, options, values, &maker).Parse();
+  return maker.Finish();
+}
+
+void VisitPly(const std::string& path, const PlyOptions& options, PlyVisitor* visitor) {
+  const FileReader file(path);
+  const PlyHeader header = ReadPlyHeader(file);
+  PlyParser(file, header, options, nullptr, visitor).Parse();
 }
 
 void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {

@@ -36,6 +36,30 @@ struct PlyVertexValues {
 Scan ReadPly(const std::string& path, const PlyOptions& options, std::string* format = nullptr,
              PlyVertexValues* values = nullptr);
 
+// The same for those who do not hold all of it: what the file says, one after the other.
+struct PlyFacts {
+  size_t num_vertices = 0, num_faces = 0;
+  bool has_intensity = false, has_color = false, has_normal = false;
+  double color_scale = 255;  // of the colours' type: 1, 255 or 65535 (ColorScale)
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), station = Eigen::Vector3d::Zero();
+  bool up_is_assumed = true;
+};
+struct PlyVertex {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // metres, `scan` frame; as it is, also NaN
+  double intensity = 0;
+  // As in the file.
+  Eigen::Vector3d color = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+};
+class PlyVisitor {
+ public:
+  virtual ~PlyVisitor() = default;
+  virtual void Begin(const PlyFacts& facts) = 0;
+  virtual void Vertex(const PlyVertex& vertex) = 0;
+  // Each triangle of a fan; its corners are indices of vertices, which may come later.
+  virtual void Face(const Triangle& triangle) = 0;
+};
+void VisitPly(const std::string& path, const PlyOptions& options, PlyVisitor* visitor);
+
 // Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate, pcd.h), intensity
 // float, red, green, blue uchar where a scan has colours; faces. triangles index scan.points;
 // missing samples are left out. Several scans become one mesh.

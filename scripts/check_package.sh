@@ -1,24 +1,29 @@
 #!/usr/bin/env bash
-# Makes the Debian package from the build folder, installs it in a bare Debian 12 with nothing but what it declares,
-# and runs every command there, the job from a capture to a coloured scan included. Then roomtex-dev: the example of
-# docs/examples/ is built and run. Needs root and debootstrap; the packages come from where this machine's apt has
-# them. Not part of the gate: it downloads 0.7 GB.
-#   scripts/check_package.sh [--keep FOLDER] [--without-dev]
+# Makes the Debian packages from the build folder, installs roomtex in a bare Debian 12 with nothing but what it
+# declares, and there runs every command's --help, roomtex-auto from photos to report, the bare commands, and the pages.
+# Then roomtex-dev: the example of docs/examples/ is built and run. Needs root and debootstrap; Debian's packages come
+# from where this machine's apt has them. Not part of the gate (label slow): it downloads 0.7 GB.
+#   scripts/check_package.sh [--keep FOLDER] [--packages FOLDER] [--without-dev]
 # --keep: the bare Debian stays in FOLDER and is taken again next time, the packages installed anew.
+# --packages: those that lie there are tried; nothing is built.
+# Ends with 77 where it cannot be tried.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 keep=""
+packages=""
 with_dev=1
 while [ $# -gt 0 ]; do
   case "$1" in
     --keep) keep=$2; shift 2 ;;
+    --packages) packages=$2; shift 2 ;;
     --without-dev) with_dev=0; shift ;;
-    *) echo "Say: scripts/check_package.sh [--keep FOLDER] [--without-dev]" >&2; exit 2 ;;
+    *) echo "Say: scripts/check_package.sh [--keep FOLDER] [--packages FOLDER] [--without-dev]" >&2; exit 2 ;;
   esac
 done
-[ "$(id -u)" -eq 0 ] || { echo "check_package: debootstrap needs root." >&2; exit 1; }
-command -v debootstrap >/dev/null || { echo "check_package: install debootstrap first." >&2; exit 1; }
+[ "$(id -u)" -eq 0 ] || { echo "check_package: a bare Debian needs root." >&2; exit 77; }
+[ -x "$keep/usr/bin/apt-get" ] || command -v debootstrap >/dev/null ||
+  { echo "check_package: install debootstrap first." >&2; exit 77; }
 
 work=$(mktemp -d)
 root=${keep:-$work/root}
@@ -30,10 +35,15 @@ finish() {
 }
 trap finish EXIT
 
-cmake --preset release >"$work/configure.log" || { cat "$work/configure.log"; exit 1; }
-cmake --build --preset release >"$work/build.log" || { tail -n 40 "$work/build.log"; exit 1; }
-(cd build && cpack -G DEB -B "$work/packages" >"$work/cpack.log") || { cat "$work/cpack.log"; exit 1; }
-rm -rf "$work/packages/_CPack_Packages"
+if [ -n "$packages" ]; then
+  mkdir "$work/packages"
+  cp "$packages"/*.deb "$work/packages/"
+else
+  cmake --preset release >"$work/configure.log" || { cat "$work/configure.log"; exit 1; }
+  cmake --build --preset release >"$work/build.log" || { tail -n 40 "$work/build.log"; exit 1; }
+  (cd build && cpack -G DEB -B "$work/packages" >"$work/cpack.log") || { cat "$work/cpack.log"; exit 1; }
+  rm -rf "$work/packages/_CPack_Packages"
+fi
 for package in "$work"/packages/*.deb; do
   echo "== $(basename "$package"), $(du -h "$package" | cut -f 1)"
   dpkg-deb --field "$package" Depends Recommends Suggests
@@ -75,30 +85,79 @@ for command in $(dpkg-deb --contents "$work"/packages/roomtex_*.deb | sed -n 's#
     *"$version"*) echo "$said" ;;
     *) echo "check_package: $command says \"$said\", the package $version" >&2; exit 1 ;;
   esac
+  inside "$command" --help >"$work/help"
+  grep -q "^Example:" "$work/help" && grep -q -- "--report_path" "$work/help" ||
+    { echo "check_package: $command --help says nothing." >&2; exit 1; }
   count=$((count + 1))
 done
-echo "$count commands start."
+echo "$count commands start and have a help."
 
 # The main job, small. COLMAP comes with the package.
 cat >"$root/roomtex/job.sh" <<'JOB'
 set -eu
 cd /roomtex
-export QT_QPA_PLATFORM=offscreen
 roomtex-simulate --quiet --output_path capture --num_photos 14 --photo_width 960 --photo_height 640 \
   --scan_columns 1000 --scan_rows 380
+roomtex-auto --quiet --image_path capture/photos --scan_path capture/scan.rtpi --output_path result \
+  --picks_path capture/picks.csv --quality low
+for file in database.db sparse/0/points3D.bin aligned/alignment.json textured/model.glb report.html report.json; do
+  test -s result/$file || { echo "roomtex-auto left no $file" >&2; exit 1; }
+done
+JOB
+inside sh /roomtex/job.sh || { tail -n 20 "$root"/roomtex/result/log/*.log; exit 1; }
+grep -o '"headline": "[^"]*"' "$root/roomtex/result/report.json"
+echo "roomtex-auto: from photos to a report of $(du -h "$root/roomtex/result/report.html" | cut -f 1)."
+
+# The commands by hand, from what roomtex-auto has matched.
+cat >"$root/roomtex/by_hand.sh" <<'JOB'
+set -eu
+cd /roomtex
 roomtex-import --quiet --input_path capture/scan.rtpi --output_path scan.ply
-colmap feature_extractor --database_path database.db --image_path capture/photos --SiftExtraction.use_gpu 0 \
-  $(cat capture/camera_options.txt) >colmap.log 2>&1
-colmap exhaustive_matcher --database_path database.db --SiftMatching.use_gpu 0 >>colmap.log 2>&1
-roomtex-mapper --quiet --database_path database.db --image_path capture/photos --output_path sparse
+roomtex-mapper --quiet --database_path result/database.db --image_path capture/photos --output_path sparse
 roomtex-align --quiet --input_path sparse/0 --scan_path capture/scan.rtpi --picks_path capture/picks.csv \
   --output_path aligned
 roomtex-texture --quiet --input_path aligned --image_path capture/photos --scan_path capture/scan.rtpi \
   --output_path textured --report_path textured.json
 grep -E '"(coverage|trusted)"' textured.json
+roomtex-export --quiet --input_path aligned --scan_path capture/scan.rtpi --image_path capture/photos \
+  --format nerfstudio --output_path exported
+roomtex-calibrate --quiet --board 9x6 --square 0.025 --board_path board.pdf
+roomtex-pattern --quiet --output_path pattern.png --width 800 --height 600
+roomtex-view --quiet --input_path textured --aligned aligned --image_path capture/photos --output_path page
+test -s page/index.html
 JOB
-inside sh /roomtex/job.sh
-echo "roomtex: from a capture to $(du -h "$root/roomtex/textured/model.ply" | cut -f 1) of coloured scan."
+inside sh /roomtex/by_hand.sh
+
+# The pages answer. There is no browser in a bare Debian; tests/browser has one.
+cat >"$root/roomtex/pages.sh" <<'JOB'
+set -eu
+cd /roomtex
+ask() {  # COMMAND ... : starts it, and asks for its page
+  "$@" --quiet --port 0 >address &
+  server=$!
+  for _ in $(seq 200); do
+    grep -q ^http address && break
+    sleep 0.1
+  done
+  url=$(head -n 1 address)
+  port=${url#http://127.0.0.1:}
+  path=/${port#*/}
+  port=${port%%/*}
+  exec 3<>"/dev/tcp/127.0.0.1/$port"
+  printf 'GET %s HTTP/1.1\r\nHost: 127.0.0.1:%s\r\nConnection: close\r\n\r\n' "$path" "$port" >&3
+  answer=$(tr -d '\0' <&3)
+  exec 3<&-
+  kill $server
+  wait $server || true  # it says by which signal it ended
+  case "$answer" in
+    *"200 OK"*"<title>"*) echo "$1 serves its page." ;;
+    *) echo "$1 serves no page: $answer" >&2; exit 1 ;;
+  esac
+}
+ask roomtex-view --input_path textured --aligned aligned --image_path capture/photos
+ask roomtex-pick --input_path sparse/0 --image_path capture/photos --scan_path capture/scan.rtpi --output_path own.csv
+JOB
+inside bash /roomtex/pages.sh
 
 if [ $with_dev -eq 1 ]; then
   inside sh -c 'apt-get install -q -y --no-install-recommends /roomtex/roomtex-dev_*.deb g++ cmake make' \

@@ -79,6 +79,38 @@ TEST(CalibrationCheck, ThinnedModelKeepsEnoughOfEveryImage) {
   EXPECT_EQ(ThinnedModel(ModelOfTwoKinds(), 100).points.size(), 15u);
 }
 
+// Points that all images see, as in one room: what is kept grows with the images, not with their
+// square.
+TEST(CalibrationCheck, ThinnedPointsAreOfNoMoreThanADozenImages) {
+  for (const uint32_t num_images : {12u, 24u, 96u}) {
+    SparseModel model;
+    model.cameras[1] = MakeCamera(CameraModel::kPinhole, {500, 500, 320, 240});
+    constexpr uint32_t kPoints = 400;
+    for (uint32_t image_id = 1; image_id <= num_images; ++image_id) {
+      SparseImage& image = model.images[image_id];
+      image.image_id = image_id;
+      image.camera_id = 1;
+      image.points2d.assign(kPoints, Eigen::Vector2d(10, 10));
+      for (uint32_t row = 0; row < kPoints; ++row) {
+        image.point3d_ids.push_back(row + 1);
+        model.points[row + 1].track.push_back({image_id, row});
+      }
+    }
+    constexpr int kPerImage = 40;
+    const SparseModel thinned = ThinnedModel(model, kPerImage);
+    std::map<uint32_t, int> count;
+    size_t num_observations = 0;
+    for (const auto& [point_id, point] : thinned.points) {
+      EXPECT_EQ(point.track.size(), 12u);
+      num_observations += point.track.size();
+      for (const TrackElement& element : point.track) ++count[element.image_id];
+    }
+    EXPECT_EQ(count.size(), num_images);
+    for (const auto& [image_id, number] : count) EXPECT_GE(number, kPerImage);
+    EXPECT_LE(num_observations, 1.05 * kPerImage * num_images + 12);
+  }
+}
+
 TEST(CalibrationCheck, AsksForMoreOfFewObservations) {
   CalibrationCheck check;
   check.rms_fixed_px = 0.5;

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -153,12 +154,12 @@ ViewContent ReadContent(const ViewOptions& options, const Command::Context& cont
 }
 
 void Write(const ViewOptions& options, const Command::Context& context) {
-  OutputSet outputs(options.output_path);
-  outputs.ReplaceAllOf("roomtex-view");
+  const auto outputs = std::make_shared<OutputSet>(options.output_path);
+  outputs->ReplaceAllOf("roomtex-view");
   const ViewFolderSize size =
-      WriteViewFolder(ReadContent(options, context), options.folder, outputs.aside(),
+      WriteViewFolder(ReadContent(options, context), options.folder, outputs->aside(),
                       context.options.num_threads, &context.progress);
-  outputs.Commit();
+  CommitAtEnd(outputs);  // its report.json is for those who get the folder
   context.report["num_files"] = size.num_files;
   context.report["num_bytes"] = size.num_bytes;
   context.progress.Finish();

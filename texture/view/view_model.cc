@@ -9,13 +9,10 @@
 #include <Eigen/Geometry>
 
 #include "core/error.h"
-#include "core/frames.h"
 #include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/report.h"
-#include "core/surfels.h"
 #include "importers/file_reader.h"
-#include "importers/ply.h"
 #include "importers/ply_header.h"
 
 namespace roomtex {
@@ -86,39 +83,6 @@ std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes) {
 
 namespace {
 
-// A triangle on the surface around each point, as large as its share of it: in place of the points.
-void ShowAsDiscs(const Scan& scan, ViewModel* model) {
-  constexpr double kRadius =
-      1.4;  // of the corners, in spacings: the circle inside reaches half way
-  const CloudSurface cloud = FindCloudSurface(scan, -1);
-  const size_t every = scan.points.size() / kMostDiscs + 1;
-  const std::vector<std::array<uint8_t, 3>> colors = std::move(model->colors);
-  model->is_cloud = true;
-  model->points = {};
-  model->colors = {};
-  for (size_t i = 0; i < scan.points.size(); i += every) {
-    if (scan.IsMissing(static_cast<int>(i))) continue;
-    const double spacing = cloud.spacings[i] > 0 ? cloud.spacings[i] : cloud.spacing;
-    const double radius = kRadius * std::sqrt(static_cast<double>(every)) * spacing;
-    const Eigen::Vector3d normal =
-        cloud.normals[i].isZero() ? scan.up : Eigen::Vector3d(cloud.normals[i].cast<double>());
-    const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
-    const int first = static_cast<int>(model->points.size());
-    for (int k = 0; k < 3; ++k) {
-      const double angle = 2 * kPi * k / 3;
-      model->points.push_back(
-          (scan.points[i] + radius * (std::cos(angle) * u + std::sin(angle) * v) - model->origin)
-              .cast<float>());
-      model->colors.push_back(colors[i]);
-      // Both sides are shown where nobody knows the front.
-      model->normals.push_back(cloud.angular_spacing > 0 ? cloud.normals[i]
-                                                         : Eigen::Vector3f(0, 0, 0));
-    }
-    model->triangles.push_back({first, first + 1, first + 2});
-  }
-  model->page_of_triangle.assign(model->triangles.size(), -1);
-}
-
 // Vertex of model.ply with which the supplement begins, by the report beside the model.
 std::optional<size_t> FirstSupplementVertex(const std::string& file) {
   const Json report = ReadJsonIfAny((fs::path(file).parent_path() / "report.json").string());
@@ -146,44 +110,6 @@ bool IsCloud(const std::string& ply_path) {
 }
 
 }  // namespace
-
-ViewModel ReadViewPly(const std::string& path) {
-  PlyVertexValues color{{"red", "green", "blue"}, {}};
-  PlyOptions options;
-  options.clouds = true;
-  Scan scan = ReadPly(path, options, nullptr, &color);
-  const Bounds bounds = FindBounds(scan);
-  if (!(bounds.min.x() <= bounds.max.x())) {
-    throw InputError(path, "", "holds no point", "Give what roomtex-texture wrote");
-  }
-  ViewModel model;
-  model.path = path;
-  model.up = scan.up;
-  model.origin = 0.5 * (bounds.min + bounds.max);
-  const bool is_cloud = scan.kind() == Scan::Kind::kCloud;
-  model.triangles = std::move(scan.triangles);
-  model.page_of_triangle.assign(model.triangles.size(), -1);
-  model.points.reserve(scan.points.size());
-  for (const Eigen::Vector3d& p : scan.points) {
-    model.points.push_back((p - model.origin).cast<float>());
-  }
-  model.colors.assign(scan.points.size(), {200, 200, 200});
-  const auto brightest = std::max_element(scan.intensity.begin(), scan.intensity.end());
-  if (color.values[0].empty() && brightest != scan.intensity.end() && *brightest > 0) {
-    const std::vector<uint8_t> grey = IntensityAsGrey(scan);
-    for (size_t i = 0; i < grey.size(); ++i) model.colors[i] = {grey[i], grey[i], grey[i]};
-  }
-  for (int k = 0; k < 3; ++k) {
-    if (color.values[k].empty()) continue;
-    for (size_t i = 0; i < model.colors.size(); ++i) {
-      // Colours of other programs may be 0..1 as floats; a byte of 1 is as good as black.
-      const float value = color.values[k][i];
-      model.colors[i][k] = static_cast<uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f);
-    }
-  }
-  if (is_cloud) ShowAsDiscs(scan, &model);
-  return model;
-}
 
 ViewModel ReadViewModel(const std::string& path) {
   std::error_code error;

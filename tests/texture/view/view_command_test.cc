@@ -86,6 +86,32 @@ TEST_F(ViewCommand, WritesAFolderToGiveAway) {
   EXPECT_THAT(full.err, HasSubstr("Set TMPDIR"));
 }
 
+TEST_F(ViewCommand, WritesNothingWhereTheReportCannotBeWritten) {
+  const std::string out = folder_ / "given";
+  const auto refused = [&](const std::string& report_path, int code) {
+    const CommandResult result =
+        RunCommandLine("roomtex-view --input_path " + folder_.path() + " --output_path " + out +
+                       " --report_path " + report_path);
+    EXPECT_EQ(result.exit_code, code) << report_path << result.err;
+    EXPECT_THAT(result.err, HasSubstr(report_path));
+  };
+  for (const std::string earlier : {"", "an earlier page"}) {
+    refused(out + "/index.html", 2);
+    refused(out + "/report.json", 2);  // says no more than whose folder it is
+    refused(folder_ / "nowhere/report.json", 3);
+    refused(folder_.path(), 3);
+    for (const char* name : {"index.html", "view.js", "data"}) {
+      EXPECT_EQ(std::filesystem::exists(out + "/" + name),
+                !earlier.empty() && std::string(name) == "index.html");
+    }
+    if (!earlier.empty()) {
+      EXPECT_EQ(ReadBytes(out + "/index.html"), earlier);
+    }
+    WriteBytes(out + "/index.html", "an earlier page");
+    WriteBytes(out + "/report.json", R"({"command": "roomtex-view"})");
+  }
+}
+
 TEST_F(ViewCommand, PrintsItsAddressAndEndsOnCtrlC) {
   const std::string out = folder_ / "out";
   const pid_t pid = fork();

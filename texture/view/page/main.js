@@ -14,6 +14,7 @@ import {Navigation} from './navigation.js';
 import {Panel, showFailure} from './panel.js';
 import {scaleBar} from './plan.js';
 import {Room} from './room.js';
+import {SectionLine} from './section.js';
 import {needsEvidence} from './surface.js';
 
 const kSlowFrame = 60;      // milliseconds of the graphics card: coarse while moving
@@ -40,6 +41,7 @@ class Viewer {
     this.mode = 'colour';
     this.evidence = null;
     this.measuring = false;
+    this.sectioning = false;  // the line of a section is drawn
     this.scheduled = false;
     this.numPictures = 0;
     this.cost = 0;  // milliseconds that the graphics card took for the last picture
@@ -65,7 +67,8 @@ class Viewer {
     this.navigation.setBounds(box);
     this.measures = new Measures(
         {frames: this.frames, up: new THREE.Vector3(...scene.up).normalize(), invalidate});
-    this.world.add(this.measures.group);
+    this.section = new SectionLine({heading: () => this.wallHeading(), invalidate});
+    this.world.add(this.measures.group, this.section.group);
     this.cameras = new Cameras([], {frames: this.frames, invalidate, fail, maxTexture: 4096});
     this.#listen();
   }
@@ -130,11 +133,11 @@ class Viewer {
     }
   }
 
+  // Kept once all of the room is there to tell.
   floorHeight() {
-    if (this.knownFloor === undefined || !this.room.loaded) {
-      this.knownFloor = this.room.floorHeight();
-    }
-    return this.knownFloor;
+    const height = this.knownFloor ?? this.room.floorHeight();
+    if (this.room.loaded) this.knownFloor = height;
+    return height;
   }
 
   // Where the cameras stand, but for those that are far from everything.
@@ -143,10 +146,9 @@ class Viewer {
     return this.cameras.list.map(({position}) => position).filter((p) => around.containsPoint(p));
   }
   wallHeading() {
-    if (this.knownHeading === undefined || !this.room.loaded) {
-      this.knownHeading = this.room.wallHeading();
-    }
-    return this.knownHeading;
+    const heading = this.knownHeading ?? this.room.wallHeading();
+    if (this.room.loaded) this.knownHeading = heading;
+    return heading;
   }
 
   // --- pictures -------------------------------------------------------------------------------
@@ -255,6 +257,7 @@ class Viewer {
     this.navigation.resize(width, height);
     this.cameras.resize(width, height);
     this.measures.resize(width, height);
+    this.section.resize(width, height);
     // At once: a canvas of a new size is empty.
     this.draw();
   }
@@ -388,7 +391,19 @@ class Viewer {
       this.measures.cancel();
       this.measures.setHover(null);
     }
+    if (on) this.setSectioning(false);
     this.panel.showMeasuring();
+  }
+  setSectioning(on) {
+    if (on === this.sectioning) return;
+    this.sectioning = on;
+    if (on) {
+      this.setMeasuring(false);
+      if (this.navigation.mode !== 'top') this.navigation.setMode('top');
+    } else {
+      this.section.cancel();
+    }
+    this.panel.showSectioning();
   }
 
   async standIn(camera) {
@@ -437,6 +452,7 @@ class Viewer {
     });
     navigation.addEventListener('pick', ({detail}) => this.#pick(detail.x, detail.y));
     this.measures.addEventListener('change', () => this.panel.showMeasures());
+    this.section.addEventListener('change', () => this.panel.showSection());
     canvas.addEventListener('pointermove', (event) => this.#hover(event.offsetX, event.offsetY));
     canvas.addEventListener('pointerleave', () => {
       this.cameras.setHovered(null);
@@ -458,7 +474,10 @@ class Viewer {
     if (this.navigation.drag && this.navigation.pointers.size > 0) return;
     const ray = this.navigation.rayAt(x, y);
     const hit = this.room.cast(ray);
-    if (this.measuring) {
+    if (this.sectioning) {
+      this.cameras.setHovered(null);
+      this.section.setHover(this.#inPlan(ray, hit));
+    } else if (this.measuring) {
       this.cameras.setHovered(null);
       this.measures.setHover(hit?.point ?? null);
     } else {
@@ -474,8 +493,25 @@ class Viewer {
   async #pick(x, y) {
     const ray = this.navigation.rayAt(x, y);
     if (this.measuring) return this.measureAt(x, y);
+    if (this.sectioning) return this.sectionAt(x, y);
     const camera = this.#cameraAt(ray, this.room.cast(ray));
     if (camera) this.standIn(camera);
+  }
+  // Where a ray meets the plan, at the height of the floor; from above that needs no surface.
+  #inPlan(ray, hit) {
+    const point = this.navigation.mode === 'top' ? ray.origin : hit?.point;
+    return point ? point.clone().setY(this.floorHeight()) : null;
+  }
+  sectionAt(x, y) {
+    const ray = this.navigation.rayAt(x, y);
+    const point = this.#inPlan(ray, this.room.cast(ray));
+    if (!point || !this.section.add(point)) {
+      this.panel.hint('A section needs two places of the plan. Click another one.');
+    } else if (this.section.drawn) {
+      this.setSectioning(false);
+    } else {
+      this.panel.showSectioning();
+    }
   }
   async measureAt(x, y) {
     try {

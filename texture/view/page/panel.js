@@ -6,6 +6,7 @@ import {getImageUrl} from './api.js';
 import {coordinates, count, length, setUnit, unit} from './format.js';
 import {showLegend} from './legend.js';
 import {extentOf, makePlan, planRotation} from './plan.js';
+import {makeSection} from './section.js';
 import {Shifts} from './shifts.js';
 import {kModes, needsEvidence} from './surface.js';
 
@@ -106,6 +107,10 @@ export class Panel {
     }
     onRadio('unit', (name) => this.#setUnit(name));
     onClick('save-plan', () => this.savePlan());
+    onClick('section', () => viewer.setSectioning(!viewer.sectioning));
+    onClick('turn-section', () => viewer.section.turn());
+    onClick('clear-section', () => viewer.section.clear());
+    onClick('save-section', () => this.saveSection());
     this.#setUnit(keptUnit());
     onInput('eye', ({value}) => {
       viewer.navigation.setEyeHeight(Number(value));
@@ -182,21 +187,32 @@ export class Panel {
     if (!this.viewer.measures) return;  // not built yet
     this.#setCut();
     this.showMeasures();
+    this.showSection();
     this.viewer.invalidate();
   }
   async savePlan() {
-    const {viewer} = this, button = $('save-plan');
+    await this.#saveDrawing('plan', (step, progress) => makePlan(this.viewer, step, progress));
+  }
+  async saveSection() {
+    const depth = Number($('section-depth').value);
+    await this.#saveDrawing(
+        'section', (step, progress) => makeSection(this.viewer, depth, step, progress));
+  }
+  // what: plan or section. draw: with metres per pixel, and what takes the share that is done.
+  async #saveDrawing(what, draw) {
+    const {viewer} = this, button = $(`save-${what}`);
     button.disabled = true;
     try {
-      // From everywhere above at once nothing is near: the blended colours.
+      // From everywhere at once nothing is near: the blended colours.
       if (viewer.mode === 'view-dependent') await viewer.room.setMode('colour', null);
-      const {blob, world, width, height} =
-          await makePlan(viewer, Number($('plan-step').value) / 1000, (share) => {
-            this.hint(`Drawing the plan, ${Math.round(100 * share)} %`);
+      const {blob, world, dxf, width, height} =
+          await draw(Number($('plan-step').value) / 1000, (share) => {
+            this.hint(`Drawing the ${what}, ${Math.round(100 * share)} %`);
           });
-      this.#download(blob, '-plan.png');
-      this.#download(new Blob([world], {type: 'text/plain'}), '-plan.pgw');
-      this.hint(`The plan is saved, ${width} x ${height} pixels.`);
+      this.#download(blob, `-${what}.png`);
+      this.#download(new Blob([world], {type: 'text/plain'}), `-${what}.pgw`);
+      if (dxf) this.#download(new Blob([dxf], {type: 'image/vnd.dxf'}), `-${what}.dxf`);
+      this.hint(`The ${what} is saved, ${width} x ${height} pixels.`);
     } catch (error) {
       this.fail(error.message);
     }
@@ -281,6 +297,21 @@ export class Panel {
     $('stage').classList.toggle('measuring', measuring);
     $('crosshair').hidden = !measuring || !this.byKeys;
     this.hint(measuring ? 'Click the first point (or Enter for the one at the cross).' : '');
+  }
+  showSectioning() {
+    const {sectioning, section} = this.viewer;
+    $('section').setAttribute('aria-pressed', sectioning);
+    $('stage').classList.toggle('measuring', sectioning || this.viewer.measuring);
+    $('crosshair').hidden = !sectioning || !this.byKeys;
+    clearTimeout(this.hintTimer);
+    $('hint').textContent = !sectioning ? '' :
+        section.ends.length === 1       ? 'Click where the line ends.' :
+                                          'Click where the line of the cut begins; Esc ends.';
+  }
+  showSection() {
+    const {section} = this.viewer;
+    $('section-controls').hidden = !section.drawn;
+    $('section-facts').textContent = section.drawn ? length(section.length) : '';
   }
   showStanding(camera) {
     this.shifts.show(camera);
@@ -402,6 +433,10 @@ export class Panel {
         this.byKeys = true;
         viewer.setMeasuring(!viewer.measuring);
       },
+      v: () => {
+        this.byKeys = true;
+        viewer.setSectioning(!viewer.sectioning);
+      },
       f: () => toggle('show-cameras'),
       p: () => toggle('show-points'),
       j: () => toggle('show-supplement'),
@@ -419,10 +454,15 @@ export class Panel {
     }
     if (!onButton) {
       acts.Enter = () => {
-        if (!viewer.measuring) return;
+        if (!viewer.measuring && !viewer.sectioning) return;
         this.byKeys = true;
         $('crosshair').hidden = false;
-        viewer.measureAt(viewer.navigation.width / 2, viewer.navigation.height / 2);
+        const x = viewer.navigation.width / 2, y = viewer.navigation.height / 2;
+        if (viewer.measuring) {
+          viewer.measureAt(x, y);
+        } else {
+          viewer.sectionAt(x, y);
+        }
       };
     }
     kModes.forEach((mode, i) => {
@@ -449,6 +489,12 @@ export class Panel {
         viewer.setMeasuring(false);
       } else {
         this.hint('Click the first point; Esc ends.');
+      }
+    } else if (viewer.sectioning) {
+      if (!viewer.section.cancel()) {
+        viewer.setSectioning(false);
+      } else {
+        this.showSectioning();
       }
     } else if (viewer.target) {
       viewer.leaveCamera();

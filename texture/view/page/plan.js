@@ -49,18 +49,16 @@ async function drawn(viewer, camera, height) {
   }
 }
 
-// Along the walls, as the view from above. {blob (PNG), world (text of a world file: what of the scan's
-// level axes, x and y of a scan whose up is z, a pixel is), width, height}. Throws an Error whose
-// message is for the user.
-export async function makePlan(viewer, metresPerPixel, progress) {
-  const rotation = planRotation(viewer.wallHeading());
-  const {left, right, bottom, top} =
-      extentOf(viewer.room.samplePoints(), rotation.clone().invert());
+// What lies in front of a plane, seen at right angles to it, on white: a canvas. rotation: of the camera; left,
+// right, bottom, top: of the picture, metres along its sides; plane: the same along its depth, towards the eye;
+// near, far: what is seen, metres from the plane. Throws an Error whose message is for the user.
+export async function drawTrueToScale(
+    viewer, {rotation, left, right, bottom, top, plane, near, far}, metresPerPixel, progress) {
   const width = Math.ceil((right - left) / metresPerPixel);
   const height = Math.ceil((top - bottom) / metresPerPixel);
   if (Math.max(width, height) > kMaxSide) {
     const enough = Math.ceil(1000 * Math.max(right - left, top - bottom) / kMaxSide);
-    throw new Error(`The plan would be ${width} x ${height} pixels; from ${
+    throw new Error(`The picture would be ${width} x ${height} pixels; from ${
         enough} mm per pixel on it fits.`);
   }
   const canvas = document.createElement('canvas');
@@ -68,13 +66,13 @@ export async function makePlan(viewer, metresPerPixel, progress) {
   canvas.height = height;
   const context = canvas.getContext('2d');
   const camera = new THREE.OrthographicCamera();
-  camera.near = -500;
-  camera.far = 500;
+  camera.near = near;
+  camera.far = far;
   camera.quaternion.copy(rotation);
-  const {renderer, cameras, measures, room} = viewer;
+  const {renderer, cameras, measures, section, room} = viewer;
   const ratio = renderer.getPixelRatio();
   const background = renderer.getClearColor(new THREE.Color()), alpha = renderer.getClearAlpha();
-  const hidden = [cameras.group, cameras.overlay, measures.group].filter(
+  const hidden = [cameras.group, cameras.overlay, measures.group, section.group].filter(
       (group) => group?.visible);
   for (const group of hidden) group.visible = false;
   const tolerance = room.tolerance;
@@ -94,7 +92,8 @@ export async function makePlan(viewer, metresPerPixel, progress) {
         camera.bottom = -camera.top;
         camera.position
             .set(
-                left + (x + columns / 2) * metresPerPixel, top - (y + rows / 2) * metresPerPixel, 0)
+                left + (x + columns / 2) * metresPerPixel, top - (y + rows / 2) * metresPerPixel,
+                plane)
             .applyQuaternion(rotation);
         camera.updateProjectionMatrix();
         camera.updateMatrixWorld();
@@ -111,6 +110,25 @@ export async function makePlan(viewer, metresPerPixel, progress) {
     renderer.setPixelRatio(ratio);
     viewer.resize();
   }
+  return canvas;
+}
+
+export async function pngOf(canvas) {
+  const blob = await new Promise((finished) => canvas.toBlob(finished, 'image/png'));
+  if (!blob) throw new Error('The picture is too large for this browser: take more mm per pixel.');
+  return blob;
+}
+export const worldFile = (numbers) => numbers.map((value) => `${value}\n`).join('');
+
+// Along the walls, as the view from above. {blob (PNG), world (text of a world file: what of the scan's
+// level axes, x and y of a scan whose up is z, a pixel is), width, height}.
+export async function makePlan(viewer, metresPerPixel, progress) {
+  const rotation = planRotation(viewer.wallHeading());
+  const {left, right, bottom, top} =
+      extentOf(viewer.room.samplePoints(), rotation.clone().invert());
+  const canvas = await drawTrueToScale(
+      viewer, {rotation, left, right, bottom, top, plane: 0, near: -500, far: 500},
+      metresPerPixel, progress);
   const {frames} = viewer;
   const levelX = frames.turnToScan(new THREE.Vector3(1, 0, 0));
   const levelY = frames.turnToScan(new THREE.Vector3(0, 0, -1));
@@ -120,8 +138,7 @@ export async function makePlan(viewer, metresPerPixel, progress) {
   const first = frames.toScan(
       new THREE.Vector3(left + metresPerPixel / 2, top - metresPerPixel / 2, 0)
           .applyQuaternion(rotation));
-  const world = [toRight, downwards, first].flatMap((at) => [at.dot(levelX), at.dot(levelY)]);
-  const blob = await new Promise((finished) => canvas.toBlob(finished, 'image/png'));
-  if (!blob) throw new Error('The plan is too large for this browser: take more mm per pixel.');
-  return {blob, world: world.map((value) => `${value}\n`).join(''), width, height};
+  const world =
+      worldFile([toRight, downwards, first].flatMap((at) => [at.dot(levelX), at.dot(levelY)]));
+  return {blob: await pngOf(canvas), world, width: canvas.width, height: canvas.height};
 }

@@ -435,6 +435,21 @@ export class Room {
     }
     return best < Infinity ? {distance: best, point: ray.at(best, new THREE.Vector3())} : null;
   }
+  // Of the chunks whose boxes (relative to the origin) `wants` chooses, one after the other.
+  async *wholeChunks(wants) {
+    for (const chunk of this.chunks) {
+      if (!this.#isShown(chunk) || !wants(chunk.box)) continue;
+      yield parseChunk(await getBytes(`chunk?id=${chunk.id}&level=${kFull}`), chunk);
+    }
+  }
+  // Whether what is cut away leaves a point of the page.
+  isKept(point) {
+    const {axes, low, high} = this.cut;
+    return axes.every((axis, i) => {
+      const along = axis.dot(point);
+      return along >= low[i] && along <= high[i];
+    });
+  }
   #toGroup(ray) {
     return ray.clone().applyMatrix4(this.group.matrixWorld.clone().invert());
   }
@@ -456,14 +471,14 @@ export class Room {
     const positions = geometry.attributes.position.array;
     const corners = geometry.index.array;
     const normals = geometry.attributes.normal.array;
-    const at = new THREE.Vector3(), {axes, low, high} = this.cut;
+    const at = new THREE.Vector3();
     for (let i = 0; i < corners.length; i += 3) {
       const a = corners[i], b = corners[i + 1], c = corners[i + 2];
       const distance = meet(local.origin, local.direction, positions, a, b, c);
       if (distance >= best) continue;
       if (this.frontOnly && !showsFront(normals, a, b, c, local.direction)) continue;
       ray.at(distance, at);
-      if (axes.some((axis, k) => axis.dot(at) < low[k] || axis.dot(at) > high[k])) continue;
+      if (!this.isKept(at)) continue;
       best = distance;
     }
     return best;
