@@ -48,15 +48,6 @@ struct Both {
   double depth_in_sparse = 0;  // median distance to its points
 };
 
-double MedianDepth(const SparseModel& model, const SparseImage& image) {
-  std::vector<double> depths;
-  for (const uint64_t id : image.point3d_ids) {
-    if (id == kInvalidPoint3dId) continue;
-    depths.push_back((image.cam_from_model * model.points.at(id).x_in_model).norm());
-  }
-  return depths.empty() ? 0 : Median(std::move(depths));
-}
-
 std::vector<Both> InBoth(const SparseModel& model, const KnownPhotos& known) {
   std::vector<Both> photos;
   for (const auto& [id, cam_from_scan] : known.cam_from_scan) {

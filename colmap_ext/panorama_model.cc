@@ -15,7 +15,6 @@
 #include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/frames.h"
-#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -32,15 +31,6 @@ struct RegisteredFace {
   Rigid panorama_from_model;  // as its own pose says
   double depth = 0;           // median of its points
 };
-
-double MedianDepth(const SparseModel& model, const SparseImage& image) {
-  std::vector<double> depths;
-  for (const uint64_t id : image.point3d_ids) {
-    if (id == kInvalidPoint3dId) continue;
-    depths.push_back((image.cam_from_model * model.points.at(id).x_in_model).norm());
-  }
-  return Median(&depths);
-}
 
 std::vector<RegisteredFace> FindFaces(const SparseModel& model, const CutPanorama& panorama,
                                       const std::map<std::string, const SparseImage*>& by_name) {

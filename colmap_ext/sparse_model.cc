@@ -14,6 +14,7 @@
 #include "core/input_guard.h"
 #include "core/output_file.h"
 #include "core/resource_limits.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -327,6 +328,15 @@ void TransformModel(const Similarity& target_from_model, SparseModel* model) {
     image.cam_from_model = CamFromScan(image.cam_from_model, target_from_model);
   }
   for (auto& [id, point] : model->points) point.x_in_model = target_from_model * point.x_in_model;
+}
+
+double MedianDepth(const SparseModel& model, const SparseImage& image) {
+  std::vector<double> depths;
+  for (const uint64_t id : image.point3d_ids) {
+    if (id == kInvalidPoint3dId) continue;
+    depths.push_back((image.cam_from_model * model.points.at(id).x_in_model).norm());
+  }
+  return Median(&depths);
 }
 
 ReprojectionErrors UpdateReprojectionErrors(SparseModel* model) {

@@ -70,6 +70,9 @@ void WriteSparseModelText(const SparseModel& model, const std::string& folder);
 // The model in another frame: points, and poses by CamFromScan (core/similarity.h).
 void TransformModel(const Similarity& target_from_model, SparseModel* model);
 
+// Median distance of a photo's points from its centre, in units of the model; 0 if it has none.
+double MedianDepth(const SparseModel& model, const SparseImage& image);
+
 // Sets SparsePoint::error of every point and gives the mean and the root mean square over all
 // observations, pixels. Observations behind a camera, or outside the valid field of its distortion,
 // count as half the image diagonal. Points that nobody sees keep -1.

@@ -176,19 +176,16 @@ class DenseRun {
     const StereoView& view = views_[i];
     const StereoPicture reference = Load(i);
     const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
-    std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
+    const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
     const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], 0};
-    std::vector<DepthOfSource> found;
-    for (const int other : view.neighbours) {
-      arrays = ReadDenseArray(Aside(other, ".first"));
-      found.push_back({views_[other].camera,
-                       views_[other].cam_from_scan,
-                       arrays[5],
-                       {arrays[2], arrays[3], arrays[4]}});
-    }
-    const DepthEstimate estimate =
-        RefineDepth(reference, LoadSources(view), open, first, found, options_.patch_match,
-                    MixBits(seed_, i, 1), num_threads_);
+    const auto found = [&](int k) -> DepthOfSource {
+      const int other = view.neighbours[k];
+      const std::vector<cv::Mat1f> its = ReadDenseArray(Aside(other, ".first"));
+      return {views_[other].camera, views_[other].cam_from_scan, its[5], {its[2], its[3], its[4]}};
+    };
+    const DepthEstimate estimate = RefineDepth(
+        reference, LoadSources(view), open, first, static_cast<int>(view.neighbours.size()), found,
+        options_.patch_match, MixBits(seed_, i, 1), num_threads_);
     // The scan's depth where only it can be, elsewhere what was found.
     cv::Mat1f depth = open.scan_depth().clone();
     cv::Mat1f is_open(depth.size(), 0.0f);

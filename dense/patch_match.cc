@@ -544,12 +544,12 @@ DepthEstimate EstimateDepth(const StereoPicture& reference,
 }
 
 DepthEstimate RefineDepth(const StereoPicture& reference, const std::vector<StereoPicture>& sources,
-                          const OpenSpace& open, const DepthEstimate& before,
-                          const std::vector<DepthOfSource>& found, const PatchMatchOptions& options,
-                          uint64_t seed, int num_threads) {
+                          const OpenSpace& open, const DepthEstimate& before, int num_found,
+                          const std::function<DepthOfSource(int)>& found,
+                          const PatchMatchOptions& options, uint64_t seed, int num_threads) {
   Level level(reference, sources, open, 1, seed, num_threads);
   level.Start(before);
-  for (const DepthOfSource& other : found) level.TryFromView(other, reference.cam_from_scan);
+  for (int i = 0; i < num_found; ++i) level.TryFromView(found(i), reference.cam_from_scan);
   const int rounds = std::max(FineRounds(options) / 2, 1);
   for (int i = 0; i < rounds; ++i) level.Iterate(i + 2, false);
   return level.Result();

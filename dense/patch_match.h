@@ -6,6 +6,7 @@
 // beside a hole are what is tried first.
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -96,10 +97,11 @@ struct DepthOfSource {
 };
 
 // A second look, at what other photos have found: what is right in one photo is soon right in all.
-// before: what EstimateDepth gave. Does not depend on num_threads.
+// before: what EstimateDepth gave. found(0) to found(num_found - 1): asked for one after the other,
+// none is kept. Does not depend on num_threads.
 DepthEstimate RefineDepth(const StereoPicture& reference, const std::vector<StereoPicture>& sources,
-                          const OpenSpace& open, const DepthEstimate& before,
-                          const std::vector<DepthOfSource>& found, const PatchMatchOptions& options,
-                          uint64_t seed, int num_threads);
+                          const OpenSpace& open, const DepthEstimate& before, int num_found,
+                          const std::function<DepthOfSource(int)>& found,
+                          const PatchMatchOptions& options, uint64_t seed, int num_threads);
 
 }  // namespace roomtex
