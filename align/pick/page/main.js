@@ -234,11 +234,9 @@ async function mirrorScan() {
     return;
   }
   let path;
-  app.store.stop();
   try {
     ({path} = await api.mirror());
   } catch (error) {
-    app.store.resume();
     say(error.message, {seconds: 9, urgent: true});
     return;
   }

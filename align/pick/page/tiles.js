@@ -20,7 +20,6 @@ export class TileStore {
   #failed = new Map();   // url -> when to ask again, milliseconds; Infinity = never
   #listeners = new Set();
   #onRefused = () => {};
-  #stopped = false;
 
   // Called when a tile has come.
   onTile(listener) {
@@ -43,17 +42,6 @@ export class TileStore {
     for (const [url, controller] of this.#running) {
       if (!needed.has(url)) controller.abort();
     }
-    this.#next();
-  }
-
-  // Nothing is asked for until resume(): at this address there may soon be another server.
-  stop() {
-    this.#stopped = true;
-    for (const controller of this.#running.values()) controller.abort();
-  }
-
-  resume() {
-    this.#stopped = false;
     this.#next();
   }
 
@@ -96,7 +84,7 @@ export class TileStore {
   }
 
   #next() {
-    if (this.#stopped || this.#running.size >= kMaxRequests) return;
+    if (this.#running.size >= kMaxRequests) return;
     // In turns, so that the loupe of one pane does not wait for all of the other.
     const lists = [...this.#wanted.values()];
     const longest = Math.max(0, ...lists.map((list) => list.length));
