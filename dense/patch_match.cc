@@ -30,11 +30,7 @@ constexpr float kMaxSlope = 5;         // tangent of the angle to a plane that f
 constexpr float kSameDepth = 0.01f;    // share
 constexpr float kNoMatch = 2;          // cost of a hypothesis that no two sources see
 
-// Inverse depth at the pixel, and its change per pixel to the right and down.
-struct Plane {
-  float w = 0, a = 0, b = 0;
-  float At(float dx, float dy) const { return w + a * dx + b * dy; }
-};
+using Plane = InverseDepthPlane;
 
 struct Source {
   const cv::Mat1f* grey;
@@ -58,19 +54,6 @@ Source MakeSource(const StereoPicture& reference, const Camera& reference_camera
       (k * source_from_reference.rotation.toRotationMatrix() * matrix(reference_camera).inverse())
           .cast<float>(),
       (k * source_from_reference.translation).cast<float>()};
-}
-
-Plane PlaneFromNormal(float depth, const Eigen::Vector3f& normal, const Camera& camera, float x,
-                      float y) {
-  const std::vector<double>& p = camera.params;
-  const Eigen::Vector3f ray((x - static_cast<float>(p[2])) / static_cast<float>(p[0]),
-                            (y - static_cast<float>(p[3])) / static_cast<float>(p[1]), 1);
-  Plane plane{1 / depth, 0, 0};
-  const float slant = normal.dot(ray);
-  if (!(slant < -0.05f * ray.norm())) return plane;  // no normal, or a grazing one
-  plane.a = normal.x() * plane.w / slant / static_cast<float>(p[0]);
-  plane.b = normal.y() * plane.w / slant / static_cast<float>(p[1]);
-  return plane;
 }
 
 Eigen::Vector3f NormalFromPlane(const Plane& plane, const Camera& camera, float x, float y) {
@@ -525,6 +508,19 @@ uint64_t OpenSpace::BinsInFront(double x_share, double y_share) const {
   if (!(z > 0)) return bins;
   const int last = Bin(1 / z);
   return last >= kBins - 1 ? 0 : bins >> (last + 1) << (last + 1);
+}
+
+InverseDepthPlane PlaneFromNormal(float depth, const Eigen::Vector3f& normal, const Camera& camera,
+                                  float x, float y) {
+  const std::vector<double>& p = camera.params;
+  const Eigen::Vector3f ray((x - static_cast<float>(p[2])) / static_cast<float>(p[0]),
+                            (y - static_cast<float>(p[3])) / static_cast<float>(p[1]), 1);
+  InverseDepthPlane plane{1 / depth, 0, 0};
+  const float slant = normal.dot(ray);
+  if (!(slant < -0.05f * ray.norm())) return plane;  // no normal, or a grazing one
+  plane.a = normal.x() * plane.w / slant / static_cast<float>(p[0]);
+  plane.b = normal.y() * plane.w / slant / static_cast<float>(p[1]);
+  return plane;
 }
 
 bool IsSameDepth(float a, float b) { return std::abs(a - b) < kSameDepth * b; }

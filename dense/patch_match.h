@@ -38,6 +38,16 @@ struct StereoPicture {
   Rigid cam_from_scan;
 };
 
+// Inverse depth, 1/metres, at a pixel, and its change per pixel to the right and down; w = 0: none.
+struct InverseDepthPlane {
+  float w = 0, a = 0, b = 0;
+  float At(float dx, float dy) const { return w + a * dx + b * dy; }
+};
+// Of the plane with that normal (unit, towards the camera) at the position x, y. A normal that is
+// missing or grazing: one that faces the camera.
+InverseDepthPlane PlaneFromNormal(float depth, const Eigen::Vector3f& normal, const Camera& camera,
+                                  float x, float y);
+
 // Where along the rays of a photo something may be that the scan does not have.
 class OpenSpace {
  public:

@@ -34,18 +34,6 @@ uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
   return key;
 }
 
-// Inverse depth at the pixel and its change per pixel to the right and down, of the plane there.
-Eigen::Vector3f InverseDepthPlane(float depth, const Eigen::Vector3f& normal, const Camera& camera,
-                                  int x, int y) {
-  const auto f_x = static_cast<float>(camera.params[0]), f_y = static_cast<float>(camera.params[1]);
-  const Eigen::Vector3f ray(
-      (static_cast<float>(x) + 0.5f - static_cast<float>(camera.params[2])) / f_x,
-      (static_cast<float>(y) + 0.5f - static_cast<float>(camera.params[3])) / f_y, 1);
-  const float slant = normal.dot(ray);
-  if (!(slant < -0.05f * ray.norm())) return {1 / depth, 0, 0};
-  return {1 / depth, normal.x() / (depth * slant * f_x), normal.y() / (depth * slant * f_y)};
-}
-
 // Islands of few pixels, by depth: 0.
 void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {
   cv::Mat1s code(depth.size(), int16_t{0});
@@ -60,6 +48,36 @@ void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {
       std::max(40, static_cast<int>(kSpeckleShare * static_cast<double>(code.total())));
   cv::filterSpeckles(code, 0, smallest, kDepthSteps * 0.01);
   is_new->setTo(0, code == 0);
+}
+
+// A window beside an edge shows the nearer thing, and so matches at its depth: what is new within
+// half a window of something farther behind it is taken out.
+void TrimEdges(const DepthEstimate& estimate, const cv::Mat1f& scan_only, const Camera& camera,
+               int num_threads, cv::Mat1b* is_new) {
+  const cv::Mat1b before = is_new->clone();
+  const auto is_beside_farther = [&](int x, int y) {
+    const Eigen::Vector3f normal(estimate.normals[0](y, x), estimate.normals[1](y, x),
+                                 estimate.normals[2](y, x));
+    const InverseDepthPlane plane =
+        PlaneFromNormal(estimate.depth(y, x), normal, camera, static_cast<float>(x) + 0.5f,
+                        static_cast<float>(y) + 0.5f);
+    for (int dy = -kTrimPx; dy <= kTrimPx; ++dy) {
+      for (int dx = -kTrimPx; dx <= kTrimPx; ++dx) {
+        const int column = std::clamp(x + dx, 0, before.cols - 1);
+        const int row = std::clamp(y + dy, 0, before.rows - 1);
+        const float depth =
+            estimate.depth(row, column) > 0 ? estimate.depth(row, column) : scan_only(row, column);
+        const float here = plane.At(static_cast<float>(column - x), static_cast<float>(row - y));
+        if (depth > 0 && depth * here > 1 + kBehind) return true;
+      }
+    }
+    return false;
+  };
+  ParallelFor(num_threads, 0, before.rows, [&](int y) {
+    for (int x = 0; x < before.cols; ++x) {
+      if (before(y, x) != 0 && is_beside_farther(x, y)) (*is_new)(y, x) = 0;
+    }
+  });
 }
 
 }  // namespace
@@ -91,35 +109,6 @@ void SupplementOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> SupplementOptions::Problems() const { return ProblemsOf(*this); }
-
-// A window beside an edge shows the nearer thing, and so matches at its depth: what is new within
-// half a window of something farther behind it is taken out.
-void TrimEdges(const DepthEstimate& estimate, const cv::Mat1f& scan_only, const Camera& camera,
-               int num_threads, cv::Mat1b* is_new) {
-  const cv::Mat1b before = is_new->clone();
-  ParallelFor(num_threads, 0, before.rows, [&](int y) {
-    for (int x = 0; x < before.cols; ++x) {
-      if (before(y, x) == 0) continue;
-      const Eigen::Vector3f normal(estimate.normals[0](y, x), estimate.normals[1](y, x),
-                                   estimate.normals[2](y, x));
-      const Eigen::Vector3f plane = InverseDepthPlane(estimate.depth(y, x), normal, camera, x, y);
-      const auto is_behind = [&](int column, int row) {
-        const float depth =
-            estimate.depth(row, column) > 0 ? estimate.depth(row, column) : scan_only(row, column);
-        const float here = plane[0] + plane[1] * static_cast<float>(column - x) +
-                           plane[2] * static_cast<float>(row - y);
-        return depth > 0 && depth * here > 1 + kBehind;
-      };
-      for (int row = std::max(y - kTrimPx, 0); row <= std::min(y + kTrimPx, before.rows - 1);
-           ++row) {
-        for (int column = std::max(x - kTrimPx, 0);
-             column <= std::min(x + kTrimPx, before.cols - 1); ++column) {
-          if (is_behind(column, row)) (*is_new)(y, x) = 0;
-        }
-      }
-    }
-  });
-}
 
 ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimate,
                             const cv::Mat1f& scan_only, const std::vector<DepthOfView>& others,

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/free_vectors.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 
@@ -186,7 +187,7 @@ class ObjParser {
       const std::array<uint8_t, 3>& c = scan_.colors[i];
       scan_.intensity[i] = static_cast<float>(GreyOf(Eigen::Vector3d(c[0], c[1], c[2])));
     }
-    if (!options_.colors) scan_.colors = {};
+    if (!options_.colors) FreeVectors(&scan_.colors);
     FinishMesh(file_.path(), options_.max_range, &scan_);
     return std::move(scan_);
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/free_vectors.h"
 #include "core/output_file.h"
 #include "core/resource_limits.h"
 #include "importers/file_reader.h"
@@ -192,7 +193,7 @@ class XyzParser {
     }
     if (options_.colors && color.minCoeff() < 0) {  // these columns are none
       options_.colors = false;
-      scan_.colors = {};
+      FreeVectors(&scan_.colors);
     }
     const double range = point.norm();
     if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) return;

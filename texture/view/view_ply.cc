@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/free_vectors.h"
 #include "core/resource_limits.h"
 #include "core/surfels.h"
 #include "importers/mesh_scan.h"
@@ -158,7 +159,7 @@ void ShowAsDiscs(const Scan& scan, ViewModel* model) {
   constexpr double kRadius =
       1.4;  // of the corners, in spacings: the circle inside reaches half way
   CloudSurface cloud = FindCloudSurface(scan, -1);
-  cloud.points = {};
+  FreeVectors(&cloud.points);
   cloud.patches = {};
   model->is_cloud = true;
   model->points.reserve(3 * scan.points.size());
