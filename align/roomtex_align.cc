@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "align/align_command_options.h"
 #include "align/alignment.h"
 #include "align/alignment_report.h"
 #include "align/automatic_alignment.h"
@@ -32,7 +33,6 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/input_guard.h"
-#include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/photo_fit.h"
@@ -45,148 +45,8 @@
 namespace roomtex {
 namespace {
 
-struct Arguments {
-  std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
-  std::string panoramas_path;
-  std::string geo_origin;
-  std::vector<std::string> scan_paths;
-  std::string near;
-  ScanReaderOptions scan_reader;
-  ScanBound bound;
-  AlignmentOptions alignment;
-  PhotoCameraOptions camera;
-  ScanPlaneOptions planes;
-  std::string planes_path, refine_intrinsics = "auto";
-  int overlays = 0;
-  bool register_stations = false;
-  bool strict = false;
-};
-
-void AddOptions(Arguments* a, Command* command) {
-  command->AddInputPath("input_path", &a->input_path,
-                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
-                        "--image_path that have six picks are placed each by its own.",
-                        Command::Kind::kOptional);
-  command->AddInputPaths(
-      "scan_path", &a->scan_paths,
-      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
-      "an --input_path that was aligned before: it remembers its scans. " +
-          BytesPerSampleHelp(kAlignBytesPerSample, true),
-      Command::Kind::kOptional);
-  command->AddInputPath("picks_path", &a->picks_path,
-                        "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
-                        "weight: 1 = ordinary, "
-                        "more = more exact, 0 = off); six or more, in one photo or spread "
-                        "over several; pixels of the photo as taken, metres in the scan frame. "
-                        "Without picks, or with one to five as a hint, the place is searched for, "
-                        "which needs --image_path.",
-                        Command::Kind::kOptional);
-  command->AddString("near", &a->near,
-                     "PHOTO,X,Y,Z: a photo and a place of the scan that it shows (metres, scan "
-                     "frame), a hint for the search without picks.");
-  command->AddOutputPath(
-      "output_path", &a->output_path,
-      "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
-      "quaternion w x y z, translation: --transform_path of colmap model_transformer) and "
-      "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8). A trusted "
-      "result "
-      "that is there is not replaced by an untrusted one, which goes to OUTPUT.untrusted.");
-  command->AddInputPath("image_path", &a->image_path,
-                        "Folder of the photos (the plain ones where a pattern was projected); with "
-                        "it the report says how well photos and scan intensity agree, and an "
-                        "alignment that they contradict is not trusted.",
-                        Command::Kind::kOptional);
-  command->AddBool("strict", &a->strict, kStrictHelp);
-  command->AddInt("overlays", &a->overlays,
-                  "Number of photos for which overlays/NAME.jpg is written into --output_path: "
-                  "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
-                  "--image_path.");
-  command->AddInputPath("database_path", &a->database_path,
-                        "COLMAP's database; not needed for an alignment by picks.",
-                        Command::Kind::kOptional);
-  command->AddInputPath("panoramas_path", &a->panoramas_path, PanoramasHelp(),
-                        Command::Kind::kOptional);
-  command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
-  command->AddBool("register_stations", &a->register_stations,
-                   "Move scans that do not fit the others where both show the same surface; 0 = "
-                   "say so, and trust nothing that rests on them.");
-  command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
-  command->Add(FieldsOf(&a->scan_reader));
-  command->Add(FieldsOf(&a->bound));
-  command->Add(FieldsOf(&a->camera));
-  AlignmentOptions& o = a->alignment;
-  command->AddBool("plane_constrained", &o.plane_constrained,
-                   "Refine the similarity on the surface of the scan, and adjust poses and points "
-                   "to it; 0 = one similarity by the picks alone.");
-  command->AddChoice(
-      "refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
-      "Adjust focal length, principal point and distortion, one set for all photos of "
-      "a lens: auto = where photos or scan contradict what was told, which is said; "
-      "1 = always; 0 = never.");
-  command->Add(FieldsOf(&o.bundle));
-  command->Add(FieldsOf(&a->planes));
-  command->AddOutputPath("Plane.output_path", &a->planes_path,
-                         "Point cloud of the scan, a colour for each of its planes and grey where "
-                         "there is none: a .ply for CloudCompare or MeshLab.",
-                         Command::Kind::kOptional);
-  command->Add(FieldsOf(&o.picks));
-  command->Add(FieldsOf(&o.scale));
-  command->Add(FieldsOf(&o.trust));
-  command->Add(FieldsOf(&o.surface));
-  command->Add(FieldsOf(&o.fit));
-  command->Add(FieldsOf(&o.mesh));
-}
-
-// Not needed for a model that lies in the scan's frame already.
-void RequirePicksOrPhotos(const Arguments& a) {
-  if (!a.picks_path.empty() || (!a.input_path.empty() && !a.image_path.empty())) return;
-  throw UsageError(
-      "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
-      "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
-      "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
-}
-
-void CheckArguments(const Arguments& a) {
-  if (a.input_path.empty()) RequirePicksOrPhotos(a);
-  std::vector<std::string> problems = a.scan_reader.Problems();
-  AppendProblems(a.bound.Problems(), &problems);
-  AppendProblems(a.alignment.Problems(), &problems);
-  AppendProblems(a.planes.Problems(), &problems);
-  AppendProblems(a.camera.Problems(), &problems);
-  if (a.input_path.empty() && a.image_path.empty()) {
-    problems.push_back(
-        "--input_path is missing: COLMAP's sparse model, or --image_path alone for photos that "
-        "have "
-        "six picks each");
-  }
-  if (!a.input_path.empty() && !a.camera.camera_params.empty()) {
-    problems.push_back(
-        "--camera_params is for photos without a sparse model: that of --input_path "
-        "has cameras");
-  }
-  if (a.overlays < 0) problems.push_back("--overlays must not be negative");
-  if (a.overlays > 0 && a.image_path.empty()) {
-    problems.push_back("--overlays needs the photos: give --image_path");
-  }
-  ThrowIfProblems(problems);
-  RequireScans(a.scan_paths, a.input_path);
-  ParseGeoOrigin(a.geo_origin);
-  std::error_code ignored;
-  if (!a.input_path.empty() && std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
-    throw UsageError(
-        "--output_path is the same folder as --input_path: the input model is never "
-        "overwritten");
-  }
-  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "alignment.json",
-                           "scan_from_sparse.txt", "scan_from_sparse_matrix.txt"}) {
-    RequireReplaceable(a.output_path + "/" + name);
-  }
-  if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");
-  if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
-}
-
 // The model on the Earth, with --geo_origin; the report's `geo`.
-void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans& placed,
+void WriteGeo(const AlignCommandOptions& a, const SparseModel& aligned, const PlacedScans& placed,
               const std::optional<GeoReference>& geo, const OutputSet& outputs,
               const Command::Context& context) {
   const std::string folder = outputs.folder() + "/geo";
@@ -203,7 +63,7 @@ void WriteGeo(const Arguments& a, const SparseModel& aligned, const PlacedScans&
 
 // The photos that can be compared with the scan; what there is to say about the others. Returns the
 // reasons that were told.
-std::set<std::string> LookForPhotos(const Arguments& a, const SparseModel& model,
+std::set<std::string> LookForPhotos(const AlignCommandOptions& a, const SparseModel& model,
                                     const Command::Context& context) {
   std::set<std::string> told;
   if (a.image_path.empty()) return told;
@@ -225,7 +85,7 @@ std::set<std::string> LookForPhotos(const Arguments& a, const SparseModel& model
 }
 
 // Warnings "START: REASON" of photos whose reason was not told before.
-void WarnOfPhotos(const Arguments& a, const std::vector<std::string>& warnings,
+void WarnOfPhotos(const AlignCommandOptions& a, const std::vector<std::string>& warnings,
                   const std::string& start, const std::set<std::string>& told,
                   const Command::Context& context) {
   for (const std::string& warning : warnings) {
@@ -238,7 +98,7 @@ void WarnOfPhotos(const Arguments& a, const std::vector<std::string>& warnings,
 }
 
 // What photos and scan say about each other; the report's `agreement`.
-void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
+void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
                        const SurveyedScans& surveyed, const std::set<std::string>& told,
                        const Command::Context& context) {
   if (a.image_path.empty()) return;
@@ -253,7 +113,7 @@ void CompareWithPhotos(const Arguments& a, const SparseModel& aligned,
 }
 
 // The report's `overlays`.
-void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
+void WriteOverlayPictures(const AlignCommandOptions& a, const SparseModel& aligned,
                           const SurveyedScans& surveyed, const std::set<std::string>& told,
                           const OutputSet& outputs, const Command::Context& context) {
   context.report["overlays"] = Json::array();
@@ -269,7 +129,7 @@ void WriteOverlayPictures(const Arguments& a, const SparseModel& aligned,
 }
 
 // Another scan than the one that a model was aligned to before is no mistake here.
-PlacedScans ReadScansToAlign(const Arguments& a) {
+PlacedScans ReadScansToAlign(const AlignCommandOptions& a) {
   const double max_samples = a.bound.max_samples;
   const SampleWork work("aligning to", kAlignBytesPerSample, max_samples);
   if (!a.scan_paths.empty()) {
@@ -280,7 +140,8 @@ PlacedScans ReadScansToAlign(const Arguments& a) {
 }
 
 // Scans of several stations against each other; the report's `stations`.
-void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Context& context) {
+void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
+                     const Command::Context& context) {
   std::vector<Scan>* const scans = &placed->scans;
   context.report["stations"] = Json::array();
   if (scans->size() < 2) return;
@@ -304,7 +165,8 @@ void CompareStations(const Arguments& a, PlacedScans* placed, const Command::Con
 // The scans as they are read, and the alignment to them. The reading may turn out to be the other
 // one (--azimuth auto).
 struct Reading {
-  Reading(const Arguments& a, const Command::Context& context) : placed(ReadScansToAlign(a)) {
+  Reading(const AlignCommandOptions& a, const Command::Context& context)
+      : placed(ReadScansToAlign(a)) {
     for (const std::string& note : placed.notes) context.Warn(note);
     context.report["sample_stride"] = placed.stride;
     if (placed.stride > 1) {
@@ -347,7 +209,7 @@ std::string OtherAzimuth(const std::string& azimuth) {
 }
 
 // The planes of the scans (thesis 7.2), where they are asked for.
-std::vector<ScanPlane> PlanesOf(const Arguments& a, const SurveyedScans& surveyed) {
+std::vector<ScanPlane> PlanesOf(const AlignCommandOptions& a, const SurveyedScans& surveyed) {
   if (!a.alignment.plane_constrained && a.planes_path.empty()) return {};
   return surveyed.planes();
 }
@@ -411,7 +273,7 @@ std::vector<Pick> PicksOfPhotosHeld(const MapperVerdict& verdict, const SparseMo
 
 // From rough poses of photos, by which roomtex-mapper has put the model into the scan's frame and
 // which hold nothing. False: that is not to be trusted, and the place has to be searched for.
-bool AlignFromKnownPoses(const Arguments& a, const AlignmentInput& input,
+bool AlignFromKnownPoses(const AlignCommandOptions& a, const AlignmentInput& input,
                          const AlignmentOptions& options, double known_rms, Reading* reading,
                          const Command::Context& context) {
   // Metres, one standard deviation: scanners know the places of their cameras to centimetres.
@@ -433,9 +295,9 @@ bool AlignFromKnownPoses(const Arguments& a, const AlignmentInput& input,
 // Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
 // how and there is no other format among the scans, or says so.
 // known_rms: MapperVerdict's.
-void AlignScans(const Arguments& a, const AlignmentInput& input, const std::vector<NearHint>& near,
-                const std::optional<double>& known_rms, Reading* reading,
-                const Command::Context& context) {
+void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
+                const std::vector<NearHint>& near, const std::optional<double>& known_rms,
+                Reading* reading, const Command::Context& context) {
   const std::vector<PlacedScans::File>& files = reading->placed.files;
   const bool may_turn = a.scan_reader.azimuth == "auto" &&
                         std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
@@ -469,7 +331,7 @@ void AlignScans(const Arguments& a, const AlignmentInput& input, const std::vect
 }
 
 // Where the result goes: a trusted one that is there is kept.
-std::string ChooseOutput(const Arguments& a, const Command::Context& context) {
+std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& context) {
   if (context.report.trusted()) return a.output_path;
   const AlignmentRecord there = ReadAlignmentRecord(a.output_path);
   if (!there.found || !there.trusted) return a.output_path;
@@ -482,7 +344,8 @@ std::string ChooseOutput(const Arguments& a, const Command::Context& context) {
 }
 
 // Nothing but the report, which says why.
-void WriteRefusal(const Arguments& a, const std::string& refusal, const Command::Context& context) {
+void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
+                  const Command::Context& context) {
   context.report.SetUntrusted(refusal);
   context.report["scan_from_sparse"] = nullptr;
   const std::string output_path = ChooseOutput(a, context);
@@ -491,7 +354,7 @@ void WriteRefusal(const Arguments& a, const std::string& refusal, const Command:
 }
 
 // The aligned model and what belongs to it; without scan_from_sparse there was no sparse model.
-void WriteAligned(const Arguments& a, SparseModel model,
+void WriteAligned(const AlignCommandOptions& a, SparseModel model,
                   const std::optional<Similarity>& local_from_sparse, Reading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
   const std::string output_path = ChooseOutput(a, context);
@@ -543,7 +406,7 @@ LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) 
 
 // Where the photos belong, besides the picks, which are checked: fewer than six are a hint where
 // there are photos to confirm what is found.
-std::vector<NearHint> ReadHints(const Arguments& a, const std::vector<Pick>& picks,
+std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,
                                 const SparseModel& model) {
   if (a.picks_path.empty() || (AreHints(picks) && !a.image_path.empty())) {
     CheckPickNames(a.picks_path, picks, model);
@@ -559,8 +422,8 @@ std::vector<NearHint> ReadHints(const Arguments& a, const std::vector<Pick>& pic
   return {near};
 }
 
-void Align(const Arguments& a, const Command::Context& context) {
-  CheckArguments(a);
+void Align(const AlignCommandOptions& a, const Command::Context& context) {
+  CheckOptions(a);
   context.progress.Stage("read model");
   std::vector<std::string> face_warnings;
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
@@ -625,7 +488,8 @@ void Align(const Arguments& a, const Command::Context& context) {
 }
 
 // None if the files contradict each other; `refusal` then says why.
-std::optional<PhotoAlignment> FindPhotoAlignment(const Arguments& a, const AlignmentInput& input,
+std::optional<PhotoAlignment> FindPhotoAlignment(const AlignCommandOptions& a,
+                                                 const AlignmentInput& input,
                                                  const PhotoModel& photos,
                                                  const Command::Context& context,
                                                  std::string* refusal) {
@@ -638,8 +502,8 @@ std::optional<PhotoAlignment> FindPhotoAlignment(const Arguments& a, const Align
 }
 
 // One to a few photos, each by its own picks.
-void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
-  CheckArguments(a);
+void AlignPhotosAlone(const AlignCommandOptions& a, const Command::Context& context) {
+  CheckOptions(a);
   context.progress.Stage("read photos");
   std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
@@ -671,7 +535,7 @@ void AlignPhotosAlone(const Arguments& a, const Command::Context& context) {
 }  // namespace roomtex
 
 int main(int argc, char** argv) {
-  roomtex::Arguments arguments;
+  roomtex::AlignCommandOptions arguments;
   roomtex::Command command(
       "roomtex-align",
       "Brings COLMAP's sparse model into the frame of a range scan, by picks or without.",

@@ -1,0 +1,141 @@
+#include "align/align_command_options.h"
+
+#include <filesystem>
+
+#include "align/geo/geo_output.h"
+#include "colmap_ext/panorama_model.h"
+#include "core/command_line.h"
+#include "core/error.h"
+#include "core/input_guard.h"
+#include "core/option_fields.h"
+#include "core/output_file.h"
+#include "core/photo_fit.h"
+#include "core/resource_limits.h"
+
+namespace roomtex {
+
+void AddOptions(AlignCommandOptions* a, Command* command) {
+  command->AddInputPath("input_path", &a->input_path,
+                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
+                        "--image_path that have six picks are placed each by its own.",
+                        Command::Kind::kOptional);
+  command->AddInputPaths(
+      "scan_path", &a->scan_paths,
+      "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
+      "an --input_path that was aligned before: it remembers its scans. " +
+          BytesPerSampleHelp(kAlignBytesPerSample, true),
+      Command::Kind::kOptional);
+  command->AddInputPath(
+      "picks_path", &a->picks_path,
+      "Picks, a CSV file: image_name,x,y,scan_x,scan_y,scan_z (and, if wanted, "
+      "weight: 1 = ordinary, "
+      "more = more exact, 0 = off); six or more, in one photo or spread "
+      "over several; pixels of the photo as taken, metres in the scan frame. "
+      "Without picks, or with one to five as a hint, the place is searched for, "
+      "which needs --image_path; a model that roomtex-mapper --known_path has put into the "
+      "scan's frame needs neither.",
+      Command::Kind::kOptional);
+  command->AddString("near", &a->near,
+                     "PHOTO,X,Y,Z: a photo and a place of the scan that it shows (metres, scan "
+                     "frame), a hint for the search without picks.");
+  command->AddOutputPath(
+      "output_path", &a->output_path,
+      "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "
+      "quaternion w x y z, translation: --transform_path of colmap model_transformer) and "
+      "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8). A trusted "
+      "result "
+      "that is there is not replaced by an untrusted one, which goes to OUTPUT.untrusted.");
+  command->AddInputPath("image_path", &a->image_path,
+                        "Folder of the photos (the plain ones where a pattern was projected); with "
+                        "it the report says how well photos and scan intensity agree, and an "
+                        "alignment that they contradict is not trusted.",
+                        Command::Kind::kOptional);
+  command->AddBool("strict", &a->strict, kStrictHelp);
+  command->AddInt("overlays", &a->overlays,
+                  "Number of photos for which overlays/NAME.jpg is written into --output_path: "
+                  "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
+                  "--image_path.");
+  command->AddInputPath("database_path", &a->database_path,
+                        "COLMAP's database; not needed for an alignment by picks.",
+                        Command::Kind::kOptional);
+  command->AddInputPath("panoramas_path", &a->panoramas_path, PanoramasHelp(),
+                        Command::Kind::kOptional);
+  command->AddInputPath("scan_poses", &a->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
+  command->AddBool("register_stations", &a->register_stations,
+                   "Move scans that do not fit the others where both show the same surface; 0 = "
+                   "say so, and trust nothing that rests on them.");
+  command->AddString("geo_origin", &a->geo_origin, GeoOriginHelp());
+  command->Add(FieldsOf(&a->scan_reader));
+  command->Add(FieldsOf(&a->bound));
+  command->Add(FieldsOf(&a->camera));
+  AlignmentOptions& o = a->alignment;
+  command->AddBool("plane_constrained", &o.plane_constrained,
+                   "Refine the similarity on the surface of the scan, and adjust poses and points "
+                   "to it; 0 = one similarity by the picks alone.");
+  command->AddChoice(
+      "refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
+      "Adjust focal length, principal point and distortion, one set for all photos of "
+      "a lens: auto = where photos or scan contradict what was told, which is said; "
+      "1 = always; 0 = never.");
+  command->Add(FieldsOf(&o.bundle));
+  command->Add(FieldsOf(&a->planes));
+  command->AddOutputPath("Plane.output_path", &a->planes_path,
+                         "Point cloud of the scan, a colour for each of its planes and grey where "
+                         "there is none: a .ply for CloudCompare or MeshLab.",
+                         Command::Kind::kOptional);
+  command->Add(FieldsOf(&o.picks));
+  command->Add(FieldsOf(&o.scale));
+  command->Add(FieldsOf(&o.trust));
+  command->Add(FieldsOf(&o.surface));
+  command->Add(FieldsOf(&o.fit));
+  command->Add(FieldsOf(&o.mesh));
+}
+
+void RequirePicksOrPhotos(const AlignCommandOptions& a) {
+  if (!a.picks_path.empty() || (!a.input_path.empty() && !a.image_path.empty())) return;
+  throw UsageError(
+      "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
+      "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
+      "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
+}
+
+void CheckOptions(const AlignCommandOptions& a) {
+  if (a.input_path.empty()) RequirePicksOrPhotos(a);
+  std::vector<std::string> problems = a.scan_reader.Problems();
+  AppendProblems(a.bound.Problems(), &problems);
+  AppendProblems(a.alignment.Problems(), &problems);
+  AppendProblems(a.planes.Problems(), &problems);
+  AppendProblems(a.camera.Problems(), &problems);
+  if (a.input_path.empty() && a.image_path.empty()) {
+    problems.push_back(
+        "--input_path is missing: COLMAP's sparse model, or --image_path alone for photos that "
+        "have "
+        "six picks each");
+  }
+  if (!a.input_path.empty() && !a.camera.camera_params.empty()) {
+    problems.push_back(
+        "--camera_params is for photos without a sparse model: that of --input_path "
+        "has cameras");
+  }
+  if (a.overlays < 0) problems.push_back("--overlays must not be negative");
+  if (a.overlays > 0 && a.image_path.empty()) {
+    problems.push_back("--overlays needs the photos: give --image_path");
+  }
+  ThrowIfProblems(problems);
+  RequireScans(a.scan_paths, a.input_path);
+  ParseGeoOrigin(a.geo_origin);
+  std::error_code ignored;
+  if (!a.input_path.empty() && std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
+    throw UsageError(
+        "--output_path is the same folder as --input_path: the input model is never "
+        "overwritten");
+  }
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "alignment.json",
+                           "scan_from_sparse.txt", "scan_from_sparse_matrix.txt"}) {
+    RequireReplaceable(a.output_path + "/" + name);
+  }
+  if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");
+  if (!a.database_path.empty()) RequireFile(a.database_path, "Check --database_path");
+}
+
+}  // namespace roomtex
