@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 
+#include "colmap_ext/feature_cache.h"
 #include "colmap_ext/pair_check.h"
+#include "colmap_ext/pair_groups.h"
 #include "colmap_ext/photo_signature.h"
 #include "colmap_ext/view_graph.h"
 #include "core/error.h"
@@ -15,34 +18,12 @@
 namespace roomtex {
 namespace {
 
-constexpr int kNumWords = 64;
-constexpr int kMaxWordPhotos = 500, kDescriptorsPerWordPhoto = 100;
-constexpr int kMaxAxesPhotos = 512, kMaxDimensions = 256;
-constexpr int kPairsAtATime = 1000, kPhotosAtATime = 64, kMaxFeaturesInMemory = 1500000;
-// A thorough check takes so many times the features. Of the matches, and of the features in
-// between, so many obey one motion where two photos show one place. Measured on simulated rooms
-// with the same furniture: of 97 pairs of two rooms none, of 43 of one room 28 with the 1500
-// largest features of a photo, and more with all 4000.
-constexpr int kThoroughFeatures = 4;
-constexpr double kCertainShare = 0.82, kCertainDensity = 0.12, kCertainInliers = 4;
-constexpr int kThoroughAtATime = 16, kMaxFailures = 4;  // of two groups
-// Groups of fewer photos join where they fit best, whether that is certain or not.
-constexpr int kSmallGroup = 4;
+constexpr int kPairsAtATime = 1000;
+constexpr int kThoroughFeatures = 4;  // a thorough check takes so many times the features
+constexpr int kThoroughAtATime = 16;
 constexpr double kBridgeInliers = 2;  // of a pair of them, over --Pairs.min_num_inliers
 constexpr int kBridgeChecks = 20, kBridgeRounds = 2;  // per group
 constexpr int kMaxGuessGroup = 2, kGuesses = 6;
-
-using PhotoPairKey = std::pair<int, int>;  // smaller first
-
-PhotoPairKey KeyOf(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
-
-// At most `count` of 0 .. size - 1, evenly spaced.
-std::vector<int> EvenChoice(size_t size, int count) {
-  const size_t number = std::min(size, static_cast<size_t>(count));
-  std::vector<int> chosen(number);
-  for (size_t i = 0; i < number; ++i) chosen[i] = static_cast<int>(i * size / number);
-  return chosen;
-}
 
 std::string FolderOf(const std::string& name) {
   const size_t slash = name.rfind('/');
@@ -59,12 +40,12 @@ class PairSearch {
         num_threads_(num_threads),
         seed_(random_seed),
         progress_(*progress),
-        num_features_(options.num_features),
-        sets_(0) {}
+        groups_(0, options.min_num_inliers) {}
 
   PairSelection Run() {
     ReadPhotos();
-    MakeSignatures();
+    features_.emplace(database_, options_.num_features);
+    signatures_ = SignPhotos(&*features_, num_threads_, seed_, &progress_);
     ProposeFirst();
     progress_.Stage("check pairs", static_cast<int>(proposed_.size()));
     CheckProposed();
@@ -74,8 +55,7 @@ class PairSearch {
       progress_.Stage("check neighbors", static_cast<int>(proposed_.size()));
       CheckProposed();
     }
-    num_features_ = kThoroughFeatures * options_.num_features;
-    features_.clear();
+    features_.emplace(database_, kThoroughFeatures * options_.num_features);
     JoinCertain();
     JoinSmall();
     for (int round = 0; round < kBridgeRounds && CheckBridges(); ++round) {
@@ -86,19 +66,7 @@ class PairSearch {
  private:
   int NumPhotos() const { return static_cast<int>(photos_.size()); }
 
-  size_t MaxPhotosInMemory() const {
-    return static_cast<size_t>(kMaxFeaturesInMemory / num_features_);
-  }
-
   void ReadPhotos();
-  void Load(const std::set<int>& photos);
-  void MakeSignatures();
-  Eigen::VectorXf VladOf(int photo) const {
-    return AggregateDescriptors(UnitDescriptors(features_.at(photo).descriptors), words_);
-  }
-  // Of all photos, in order, by blocks.
-  template <typename Use>
-  void ForEachVlad(const std::vector<int>& photos, const Use& use);
 
   void Propose(int a, int b, PairSource source);
   void ProposeRow(const std::vector<int>& row, PairSource source, bool within_folder);
@@ -107,8 +75,6 @@ class PairSearch {
   std::vector<PairCheck> CheckAll(const std::vector<PhotoPairKey>& pairs);
   void CheckProposed();
   std::vector<PhotoPairKey> Strongest() const;
-  bool IsCertain(const PairCheck& check) const;
-  void JoinIfCertain(const PhotoPairKey& key, const PairCheck& check);
   void JoinCertain();
   void JoinSmall();
   bool CheckBridges();
@@ -126,25 +92,17 @@ class PairSearch {
   const uint64_t seed_;
   Progress& progress_;
 
-  std::map<uint32_t, Camera> cameras_;
-  std::vector<DatabaseImage> images_;
   std::vector<PairPhoto> photos_;
-  int num_features_;  // that a check compares now
-  std::map<int, ComparedFeatures> features_;
-  Eigen::MatrixXf words_, signatures_;  // signatures_: a column per photo
+  std::optional<FeatureCache> features_;  // that a check compares now
+  Eigen::MatrixXf signatures_;            // a column per photo
   std::map<PhotoPairKey, PairEdge> edges_;
   std::map<PhotoPairKey, PairSource> proposed_;
-  DisjointSets sets_;
-  // Of two sets, by their smallest photos: certain pairs and others.
-  struct Evidence {
-    int num_certain = 0, num_failed = 0;
-  };
-  std::map<PhotoPairKey, Evidence> evidence_;
+  PairGroups groups_;
   int num_checked_ = 0, num_in_database_ = 0;
 };
 
 void PairSearch::ReadPhotos() {
-  cameras_ = database_.ReadCameras();
+  const std::map<uint32_t, Camera> cameras = database_.ReadCameras();
   const std::map<uint32_t, size_t> counts = database_.CountKeypoints();
   std::map<uint32_t, int> photo_of_id;
   int num_with_features = 0;
@@ -157,9 +115,7 @@ void PairSearch::ReadPhotos() {
     num_with_features += photo.num_features > 0;
     photo_of_id[image_id] = NumPhotos();
     photos_.push_back(photo);
-    images_.push_back(image);
-    const Camera& camera = cameras_.at(image.camera_id);
-    if (camera.IsPanorama()) {
+    if (cameras.at(image.camera_id).IsPanorama()) {
       throw InputError(database_.path(), "camera " + std::to_string(image.camera_id),
                        "is EQUIRECTANGULAR: panoramas have no picture plane to compare",
                        "Cut them into faces with roomtex-import");
@@ -187,64 +143,6 @@ void PairSearch::ReadPhotos() {
     edges_[{edge.photo1, edge.photo2}] = edge;
     ++num_in_database_;
   }
-}
-
-// Features of these photos into memory; others make room.
-void PairSearch::Load(const std::set<int>& photos) {
-  if (features_.size() + photos.size() > MaxPhotosInMemory()) {
-    for (auto it = features_.begin(); it != features_.end();) {
-      it = photos.count(it->first) > 0 ? std::next(it) : features_.erase(it);
-    }
-  }
-  for (const int photo : photos) {
-    if (features_.count(photo) > 0) continue;
-    const DatabaseImage& image = images_[static_cast<size_t>(photo)];
-    features_[photo] = UndistortFeatures(
-        database_.ReadLargestFeatures(image.image_id, num_features_), cameras_.at(image.camera_id));
-  }
-}
-
-template <typename Use>
-void PairSearch::ForEachVlad(const std::vector<int>& photos, const Use& use) {
-  for (size_t first = 0; first < photos.size(); first += kPhotosAtATime) {
-    const size_t count = std::min<size_t>(kPhotosAtATime, photos.size() - first);
-    const auto begin = photos.begin() + static_cast<std::ptrdiff_t>(first);
-    Load({begin, begin + static_cast<std::ptrdiff_t>(count)});
-    ParallelFor(num_threads_, 0, static_cast<int>(count), [&](int i) {
-      const size_t at = first + static_cast<size_t>(i);
-      use(static_cast<Eigen::Index>(at), VladOf(photos[at]));
-    });
-    for (size_t i = 0; i < count; ++i) progress_.Tick();
-  }
-}
-
-void PairSearch::MakeSignatures() {
-  const std::vector<int> for_words = EvenChoice(photos_.size(), kMaxWordPhotos);
-  const std::vector<int> for_axes = EvenChoice(photos_.size(), kMaxAxesPhotos);
-  progress_.Stage("read features", static_cast<int>(for_words.size()));
-  std::vector<uint8_t> sample;
-  for (const int photo : for_words) {
-    Load({photo});
-    const std::vector<uint8_t>& bytes = features_.at(photo).descriptors;
-    for (const int row : EvenChoice(bytes.size() / kSiftSize, kDescriptorsPerWordPhoto)) {
-      const auto first = bytes.begin() + static_cast<std::ptrdiff_t>(row) * kSiftSize;
-      sample.insert(sample.end(), first, first + kSiftSize);
-    }
-    progress_.Tick();
-  }
-  progress_.Stage("signatures", static_cast<int>(for_axes.size() + photos_.size()));
-  words_ = LearnWords(UnitDescriptors(sample), kNumWords, seed_);
-  Eigen::MatrixXf vlads(words_.size(), static_cast<Eigen::Index>(for_axes.size()));
-  ForEachVlad(for_axes,
-              [&](Eigen::Index at, const Eigen::VectorXf& vlad) { vlads.col(at) = vlad; });
-  const SignatureAxes axes = LearnAxes(vlads, kMaxDimensions);
-  vlads.resize(0, 0);
-  signatures_.resize(axes.axes.rows(), NumPhotos());
-  std::vector<int> all(photos_.size());
-  std::iota(all.begin(), all.end(), 0);
-  ForEachVlad(all, [&](Eigen::Index at, const Eigen::VectorXf& vlad) {
-    signatures_.col(at) = axes.Shorten(vlad);
-  });
 }
 
 void PairSearch::Propose(int a, int b, PairSource source) {
@@ -338,15 +236,15 @@ std::vector<PairCheck> PairSearch::CheckAll(const std::vector<PhotoPairKey>& pai
   for (size_t first = 0; first < pairs.size(); first += count) {
     std::set<int> photos;
     for (count = 0; first + count < pairs.size() && count < kPairsAtATime; ++count) {
-      if (photos.size() + 2 > MaxPhotosInMemory() && count > 0) break;
+      if (photos.size() + 2 > features_->max_photos() && count > 0) break;
       photos.insert(pairs[first + count].first);
       photos.insert(pairs[first + count].second);
     }
-    Load(photos);
+    features_->Load(photos);
     ParallelFor(num_threads_, 0, static_cast<int>(count), [&](int i) {
       const size_t at = first + static_cast<size_t>(i);
-      checks[at] =
-          CheckPair(features_.at(pairs[at].first), features_.at(pairs[at].second), options_.check);
+      checks[at] = CheckPair(features_->At(pairs[at].first), features_->At(pairs[at].second),
+                             options_.check);
       progress_.Tick();
     });
   }
@@ -394,71 +292,30 @@ std::vector<PhotoPairKey> PairSearch::Strongest() const {
   return keys;
 }
 
-bool PairSearch::IsCertain(const PairCheck& check) const {
-  return check.num_inliers >= kCertainInliers * options_.min_num_inliers &&
-         check.num_inliers >= kCertainShare * check.num_matches &&
-         check.num_inliers >= kCertainDensity * check.num_in_hull;
-}
-
-// One certain pair takes a small set along; large ones join by two, or by more than speak against.
-void PairSearch::JoinIfCertain(const PhotoPairKey& key, const PairCheck& check) {
-  const int set1 = sets_.Find(key.first), set2 = sets_.Find(key.second);
-  if (set1 == set2) return;
-  Evidence& evidence = evidence_[KeyOf(set1, set2)];
-  if (!IsCertain(check)) {
-    ++evidence.num_failed;
-    return;
-  }
-  ++evidence.num_certain;
-  if (std::min(sets_.SizeOf(set1), sets_.SizeOf(set2)) < kSmallGroup ||
-      (evidence.num_certain >= 2 && evidence.num_certain > evidence.num_failed)) {
-    sets_.Join(set1, set2);
-  }
-}
-
 // A spanning forest of the strongest pairs (Kruskal), each looked at with many features.
 void PairSearch::JoinCertain() {
-  sets_ = DisjointSets(NumPhotos());
-  const std::vector<PhotoPairKey> strongest = Strongest();
+  groups_ = PairGroups(NumPhotos(), options_.min_num_inliers);
   progress_.Stage("look thoroughly");
   std::vector<PhotoPairKey> pairs;
   const auto look = [&] {
     const std::vector<PairCheck> checks = CheckAll(pairs);
-    for (size_t i = 0; i < pairs.size(); ++i) JoinIfCertain(pairs[i], checks[i]);
+    for (size_t i = 0; i < pairs.size(); ++i) groups_.JoinIfCertain(pairs[i], checks[i]);
     pairs.clear();
   };
-  for (const PhotoPairKey& key : strongest) {
+  for (const PhotoPairKey& key : Strongest()) {
     if (edges_.at(key).source == PairSource::kDatabase || options_.join_lookalikes) {
-      sets_.Join(key.first, key.second);
+      groups_.Join(key);
     }
-    const int set1 = sets_.Find(key.first), set2 = sets_.Find(key.second);
-    const auto evidence = evidence_.find(KeyOf(set1, set2));
-    if (set1 == set2 ||
-        (evidence != evidence_.end() && evidence->second.num_failed >= kMaxFailures)) {
-      continue;
-    }
+    if (!groups_.IsOpen(key)) continue;
     pairs.push_back(key);
     if (pairs.size() == kThoroughAtATime) look();
   }
   look();
-  // Sets that most of what was found speaks for, be it one pair. What was found when they were
-  // smaller counts.
-  std::map<PhotoPairKey, Evidence> all;
-  for (const auto& [sets, evidence] : evidence_) {
-    Evidence& sum = all[KeyOf(sets_.Find(sets.first), sets_.Find(sets.second))];
-    sum.num_certain += evidence.num_certain;
-    sum.num_failed += evidence.num_failed;
-  }
-  for (const auto& [sets, evidence] : all) {
-    if (evidence.num_certain > evidence.num_failed) sets_.Join(sets.first, sets.second);
-  }
+  groups_.JoinByEvidence();
 }
 
 void PairSearch::JoinSmall() {
-  for (const PhotoPairKey& key : Strongest()) {
-    const int set1 = sets_.Find(key.first), set2 = sets_.Find(key.second);
-    if (std::min(sets_.SizeOf(set1), sets_.SizeOf(set2)) < kSmallGroup) sets_.Join(set1, set2);
-  }
+  for (const PhotoPairKey& key : Strongest()) groups_.JoinIfSmall(key);
 }
 
 // The pairs that could connect a group to others, by signature.
@@ -494,7 +351,7 @@ std::vector<PhotoPairKey> PairSearch::BridgesOf(const std::vector<int>& group,
 
 // False if nothing is left to connect.
 bool PairSearch::CheckBridges() {
-  const std::vector<std::vector<int>> groups = sets_.Groups();
+  const std::vector<std::vector<int>> groups = groups_.Lists();
   if (groups.size() < 2) return false;
   std::vector<int> group_of(photos_.size());
   for (size_t group = 0; group < groups.size(); ++group) {
@@ -522,7 +379,7 @@ bool PairSearch::CheckBridges() {
     edge.agrees = edge.num_inliers >= kBridgeInliers * options_.min_num_inliers;
     if (!edge.agrees) continue;
     connects = true;
-    JoinIfCertain(pairs[i], checks[i]);
+    groups_.JoinIfCertain(pairs[i], checks[i]);
   }
   JoinSmall();
   return connects;
@@ -554,7 +411,7 @@ void PairSearch::ListGuesses(const std::vector<std::vector<int>>& groups) {
 
 PairSelection PairSearch::Select() {
   PairSelection selection;
-  selection.groups = sets_.Groups();
+  selection.groups = groups_.Lists();
   selection.num_checked = num_checked_;
   selection.num_in_database = num_in_database_;
   for (size_t group = 0; group < selection.groups.size(); ++group) {
