@@ -271,8 +271,11 @@ std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
         "Sparse model and scan differ in shape by more than a scanner's errors explain (" +
         Number(1000 * disagreement.rms, 0) +
         " mm over the room): a scan put together of drifting parts, or a sparse model bent by few "
-        "photos or a wrong lens. The scan was followed, and the expected error holds the "
-        "difference. Look at the overlays (--overlays).");
+        "photos or a wrong lens. The scan was followed" +
+        (adjustment.bend->followed < 1
+             ? " by " + Percent(adjustment.bend->followed) + ", so that the photos still agree"
+             : "") +
+        ", and the expected error holds the difference. Look at the overlays (--overlays).");
   }
   for (const uint32_t id : bundle.idle_images) {
     warnings.push_back(model.images.at(id).name +

@@ -21,6 +21,7 @@ Json BendToJson(const Alignment& alignment) {
   }
   Json json;
   json["rms_m"] = adjustment.bend->bend_rms;
+  json["followed"] = adjustment.bend->followed;
   json["max_range_share"] = range;
   json["max_azimuth_deg"] = DegFromRad(azimuth);
   return json;

@@ -67,6 +67,14 @@ struct BendFit {
   double bend_rms = 0;  // metres; of the bend at the points that lie on the surface
   double rms_straight = 0, rms_bent = 0;  // distances from the surface without and with it, metres
   int num_points = 0;
+  double followed = 1;  // `bend` is this share of what was found
+
+  // What the bend takes away of the squared distances, as a share of its own square. A scan that is
+  // bent lies beside the points by as much as it is bent across its surfaces; what is fitted to
+  // drifting parts bends far and explains little.
+  double Explained() const {
+    return (rms_straight * rms_straight - rms_bent * rms_bent) / (bend_rms * bend_rms);
+  }
 };
 
 // Similarity and bend together, from the distances of the points from the surface and from the

@@ -179,6 +179,7 @@ TEST(AlignCommand, ABentScanIsSaidAndThePhotosFollowIt) {
   ASSERT_EQ(report["warnings"].size(), 1u);
   EXPECT_THAT(report["warnings"][0].get<std::string>(), HasSubstr("The scan is bent by"));
   EXPECT_GT(report["plane_bundle"]["scan_bend"]["rms_m"], 0.005);
+  EXPECT_EQ(report["plane_bundle"]["scan_bend"]["followed"], 1);
   EXPECT_NEAR(report["plane_bundle"]["scan_bend"]["max_range_share"], 0.01, 0.002);
   // The similarity is that of the room, not of the bent walls.
   const Similarity written = ReadSimilarity(files.folder / "aligned/scan_from_sparse.txt");

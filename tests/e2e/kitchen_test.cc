@@ -222,6 +222,16 @@ TEST_F(Kitchen, AlignsWithHurriedPicks) {
   EXPECT_EQ(report["picks"]["count"], 8);
 }
 
+// The scan was put together by a tracker that drifted. Photos put onto all of that drift have 2.5
+// times the reprojection errors of the sparse model.
+TEST_F(Kitchen, PhotosStillAgreeWithEachOtherOnTheDriftedScan) {
+  ASSERT_EQ(align_.exit_code, 0) << align_.err;
+  const json report = ReadJson(*folder_ / "aligned.json");
+  EXPECT_LT(report["reprojection_rms_px"]["after"].get<double>(),
+            2 * report["reprojection_rms_px"]["before"].get<double>());
+  EXPECT_EQ(report["plane_bundle"]["scan_bend"]["followed"], 0.5);
+}
+
 // Metres, from where the recording has the cameras, in order. Its own poses are good to a few
 // centimetres.
 std::vector<double> DistancesFromRecording(const SparseModel& aligned) {
