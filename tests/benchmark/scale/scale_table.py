@@ -117,12 +117,9 @@ class Bench:
             self.texture(millions, "texture, cloud", place, *self.cloud(place))
             self.beside_texture(millions, "export", place, [])
             self.beside_texture(millions, "dense", place, ["--max_image_size", "240"])
-            model = self.at(f"photos_{min(self.arguments.photos or [0])}", "sparse", "0")
-            if not os.path.exists(model):
-                continue
             self.run("samples", "align", millions, [
-                "roomtex-align", "--quiet", "--input_path", model, "--scan_path", place("scan.rtpi"), "--picks_path",
-                self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
+                "roomtex-align", "--quiet", "--input_path", place("truth"), "--scan_path", place("scan.rtpi"),
+                "--picks_path", place("picks.csv"), "--image_path", place("photos"), "--output_path",
                 place("aligned")], (0, 4))
 
     def texture(self, millions, step, place, scan, options):
