@@ -61,8 +61,9 @@ LasHeader ReadLasHeader(const FileReader& file) {
   LasHeader header;
   if ((byte(104) & 0xc0) != 0) {
     throw InputError(file.path(), "", "is compressed (LAZ)",
-                     "Decompress it: laszip, pdal translate IN.laz OUT.las, or open it in "
-                     "CloudCompare and save it as .las");
+                     "Decompress it: laszip -i IN.laz -o OUT.las, pdal translate IN.laz OUT.las, "
+                     "or save it as .las with CloudCompare as it comes from its makers (Debian 12 "
+                     "has no package that can)");
   }
   header.format = byte(104);
   if (header.format > 10) {

@@ -1,7 +1,9 @@
 // roomtex-import: a range scan in, mesh, cloud, intensity image or another scan format out.
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <utility>
 
 #include "core/command_line.h"
 #include "core/error.h"
@@ -248,6 +250,29 @@ void RequireNoOtherPhotos(const E57Photos& photos, const OutputSet& outputs) {
   }
 }
 
+// The cameras of the photos with a pose, each with the names of its photos.
+Json CamerasOf(const std::vector<PosedPhoto>& photos) {
+  std::vector<std::pair<Json, std::vector<std::string>>> cameras;
+  for (const PosedPhoto& photo : photos) {
+    const Json camera = {{"model", CameraModelName(photo.camera.model)},
+                         {"width", photo.camera.width},
+                         {"height", photo.camera.height},
+                         {"params", photo.camera.params}};
+    auto same = std::find_if(cameras.begin(), cameras.end(),
+                             [&](const auto& one) { return one.first == camera; });
+    if (same == cameras.end()) {
+      same = cameras.insert(same, {camera, std::vector<std::string>()});
+    }
+    same->second.push_back(photo.name);
+  }
+  Json list = Json::array();
+  for (const auto& [camera, names] : cameras) {
+    list.push_back(camera);
+    list.back()["images"] = names;
+  }
+  return list;
+}
+
 // The photos of an E57 as files, those with a pose as a COLMAP model beside them.
 void WriteImages(const ImportOptions& options, const Command::Context& context) {
   ThrowIfProblems(options.reader.Problems());
@@ -279,6 +304,7 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
         {{"file", photo.file}, {"name", photo.name}, {"kind", photo.kind}, {"posed", photo.posed}});
   }
   context.report["images"] = json;
+  context.report["cameras"] = CamerasOf(photos.posed);
   std::cout << options.images_path << ": " << photos.photos.size() << " photos, "
             << photos.posed.size() << " with a pose\n";
 }

@@ -5,6 +5,7 @@
 #include "core/camera_model.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "workflow/scanner_photos.h"
 #include "workflow/step.h"
 
 namespace roomtex {
@@ -40,6 +41,12 @@ void AutoOptions::Declare(OptionFields* fields) {
       "pairs", &pairs, kAutoWords,
       "Of loose photos, match the pairs that roomtex-pairs finds; auto = of more than 60 "
       "photos; 0 = every photo with every other.");
+  fields->Choice(
+      "scanner_photos", &scanner_photos, kAutoWords,
+      "The scanner's own photos in an E57, those with a pose: beside yours, they put the model "
+      "into "
+      "the scan (roomtex-mapper --known_path); without any of yours, the colours come from them. "
+      "auto = where the scan has some.");
   fields
       ->Int("video_frames", &video_frames,
             "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")
@@ -54,8 +61,14 @@ void AutoOptions::Declare(OptionFields* fields) {
 std::vector<std::string> AutoOptions::Problems() const {
   std::vector<std::string> problems = ProblemsOf(*this);
   const int num_sources = !image_path.empty() + !panoramas_path.empty() + !video_path.empty();
-  if (num_sources != 1) {
-    problems.emplace_back("give one of --image_path, --panoramas_path and --video_path");
+  if (num_sources > 1 || (num_sources == 0 && FindScannerScan(*this).empty())) {
+    problems.emplace_back(
+        "give one of --image_path, --panoramas_path and --video_path; only an E57 that has photos "
+        "with poses needs none");
+  } else if (scanner_photos == "1" && FindScannerScan(*this).empty()) {
+    const std::string why = WhyNoScannerPhotos(*this);
+    problems.push_back("--scanner_photos is 1, but " +
+                       (why.empty() ? "no scan is an E57 that has photos with poses" : why));
   }
   if (!camera_model.empty() && !CameraModelFromName(camera_model)) {
     problems.push_back("--camera_model " + camera_model + " is no model of COLMAP's");

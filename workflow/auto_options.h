@@ -14,14 +14,14 @@ struct PassedOptions {
 };
 
 struct AutoOptions {
-  // One of the first three.
+  // One of the first three; none where the scanner's own photos are all there are.
   std::string image_path, panoramas_path, video_path;
   std::vector<std::string> scan_paths;
   std::string scan_poses, azimuth = "auto", up_axis = "auto", units;
   std::string output_path, picks_path;
   std::string camera_model, camera_params, cameras_path;
   std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";
-  std::string pairs = "auto";
+  std::string pairs = "auto", scanner_photos = "auto";
   int video_frames = 0;
   std::string from, until, only;
   bool accept_untrusted = false, dry_run = false;

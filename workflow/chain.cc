@@ -6,6 +6,7 @@
 #include "core/child_program.h"
 #include "core/json_text.h"
 #include "core/report.h"
+#include "workflow/scanner_photos.h"
 #include "workflow/step.h"
 
 namespace roomtex {
@@ -14,6 +15,10 @@ namespace fs = std::filesystem;
 bool IsThere(const std::string& path) {
   std::error_code ignored;
   return fs::exists(path, ignored);
+}
+
+std::string ScanFileOf(const std::string& path) {
+  return IsThere(path) ? path : path.substr(0, path.find('#'));
 }
 
 Json ReadJsonFile(const std::string& path) {
@@ -26,6 +31,9 @@ void AddOption(const std::string& name, const std::string& value, CommandLine* l
   line->push_back(name);
   line->push_back(value);
 }
+
+Chain::Chain(const AutoOptions& options)
+    : options_(options), scanner_scan_(FindScannerScan(options)) {}
 
 std::string Chain::PhotoFolder() const {
   if (!options_.video_path.empty()) return At("frames");
@@ -41,12 +49,36 @@ bool Chain::IsAssociated() const {
 }
 
 std::string Chain::ColmapFolder() const {
-  return IsAssociated() ? At("linked/patterned") : PhotoFolder();
+  if (IsAssociated()) return At("linked/patterned");
+  return KnownPath().empty() ? PhotoFolder() : LinkFolder();
 }
 
 std::string Chain::ColorFolder() const {
   if (!options_.panoramas_path.empty()) return options_.panoramas_path;
-  return IsAssociated() ? At("linked/plain") : PhotoFolder();
+  if (OnlyScanner()) return ScannerFolder();
+  if (IsAssociated()) return At("linked/plain");
+  return KnownPath().empty() ? PhotoFolder() : LinkFolder();
+}
+
+bool Chain::OnlyScanner() const { return !HasPhotoSource(options_); }
+
+std::string Chain::ScannerFolder() const {
+  if (OnlyScanner()) return At("scanner");
+  std::string name = "scanner";
+  while (IsThere(PhotoFolder() + "/" + name)) name += "_";  // of the user's
+  return LinkFolder() + "/" + name;
+}
+
+Json Chain::ScannerCameras() const {
+  if (!UsesScanner()) return Json::array();
+  const Json report = ReadJsonFile(ReportOf("scanner"));
+  return report.is_object() && report.contains("cameras") ? report["cameras"] : Json::array();
+}
+
+std::string Chain::KnownPath() const {
+  if (OnlyScanner() || !UsesScanner()) return "";
+  const bool has_none = IsThere(ReportOf("scanner")) && ScannerCameras().empty();
+  return has_none ? "" : ScannerFolder() + "/sparse";
 }
 
 std::string Chain::PicksPath() const {
@@ -55,6 +87,7 @@ std::string Chain::PicksPath() const {
 }
 
 std::string Chain::AlignedPath() const {
+  if (OnlyScanner()) return ScannerFolder() + "/sparse";
   std::error_code none, none_aside;
   const std::string aside = At("aligned.untrusted");
   const auto time = fs::last_write_time(At("aligned/alignment.json"), none);
@@ -128,13 +161,17 @@ CommandLine Chain::AutoCommand() const {
   if (options_.patterned != "auto") AddOption("--patterned", options_.patterned, &line);
   if (options_.use_gpu != "auto") AddOption("--use_gpu", options_.use_gpu, &line);
   if (options_.sequence != "auto") AddOption("--sequence", options_.sequence, &line);
+  if (options_.pairs != "auto") AddOption("--pairs", options_.pairs, &line);
+  if (options_.scanner_photos != "auto") {
+    AddOption("--scanner_photos", options_.scanner_photos, &line);
+  }
   if (options_.video_frames > 0) {
     AddOption("--video_frames", std::to_string(options_.video_frames), &line);
   }
   if (options_.colmap != "colmap") AddOption("--colmap", options_.colmap, &line);
   const PassedOptions& passed = options_.passed;
-  for (const auto* more :
-       {&passed.features, &passed.matches, &passed.mapper, &passed.align, &passed.texture}) {
+  for (const auto* more : {&passed.features, &passed.pairs, &passed.matches, &passed.mapper,
+                           &passed.align, &passed.texture}) {
     line.insert(line.end(), more->begin(), more->end());
   }
   return line;

@@ -63,7 +63,8 @@ class ReportMaker {
     keys["photos"] = Photos();
     keys["steps"] = Steps();
     keys["total"] = Total();
-    keys["versions"] = {{"roomtex", Version()}, {"colmap", chain_.Colmap().version}};
+    keys["versions"] = {{"roomtex", Version()}};
+    if (!chain_.OnlyScanner()) keys["versions"]["colmap"] = chain_.Colmap().version;
     keys["command_line"] = CommandText(chain_.AutoCommand());
     return keys;
   }
@@ -101,6 +102,13 @@ class ReportMaker {
     } else {
       verdict["state"] = "trusted";
       verdict["headline"] = "The room is coloured, and the result can be trusted";
+      if (chain_.OnlyScanner()) {
+        verdict["headline"] = "The room is coloured by the scanner's own photos";
+        sentences.emplace_back(
+            "They stand where the scan's file has them, which nothing here has checked: look at "
+            "the "
+            "pictures.");
+      }
       if (std::isfinite(mm)) {
         sentences.push_back("The photos stand in the scan to about " + Millimetres(mm) +
                             " (one standard deviation).");

@@ -257,8 +257,9 @@ class Page {
              "</tr></tbody></table></div>\n";
     Heading("The commands");
     const Json& versions = keys_["versions"];
-    body_ += "<p class=\"quiet\">roomtex " + HtmlText(versions["roomtex"]) + ", " +
-             HtmlText(versions["colmap"]) + ". Typed one after the other they do the same.</p>\n";
+    body_ += "<p class=\"quiet\">roomtex " + HtmlText(versions["roomtex"]) +
+             (versions.contains("colmap") ? ", " + HtmlText(versions["colmap"]) : "") +
+             ". Typed one after the other they do the same.</p>\n";
     for (const Json& step : keys_["steps"]) {
       body_ += HtmlTag("h3", step["name"]);
       for (const Json& note : step["notes"]) {

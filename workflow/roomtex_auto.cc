@@ -60,10 +60,11 @@ void AddOptions(AutoOptions* o, Command* command) {
   command->AddString("camera_params", &o->camera_params,
                      "Its parameters with commas between them, if they are known.");
   command->Add(FieldsOf(o));
-  command->AddString("from", &o->from,
-                     "Run this step and those behind it again, and take those before as they are: "
-                     "frames, faces, associate, features, matches, mapper, align, texture, "
-                     "pictures, report.");
+  command->AddString(
+      "from", &o->from,
+      "Run this step and those behind it again, and take those before as they are: "
+      "frames, faces, associate, scanner, features, matches, mapper, align, texture, "
+      "pictures, report.");
   command->AddString("until", &o->until, "Stop behind this step.");
   command->AddString("only", &o->only, "Run this step alone, again.");
   command->AddString("colmap", &o->colmap, "COLMAP's program: a path, or a name on the PATH.");
@@ -113,21 +114,30 @@ class FolderLock {
 // What commands that were killed have left of files that they had not finished.
 void TidyUp(const std::string& output_path) {
   for (const char* folder :
-       {"", "/sparse", "/aligned", "/textured", "/pictures", "/log", "/faces"}) {
+       {"", "/sparse", "/aligned", "/textured", "/pictures", "/log", "/faces", "/scanner"}) {
     RemoveLeftovers(output_path + folder);
   }
 }
 
-// Pictures that are made are not to be taken for photos the next time.
-void RequireOutside(const std::string& output_path, const std::string& photos) {
+bool LiesIn(const std::string& folder, const std::string& outer) {
   std::error_code error;
-  const fs::path folder = fs::weakly_canonical(photos, error);
-  const fs::path output = fs::weakly_canonical(output_path, error);
-  const auto [end, rest] =
-      std::mismatch(folder.begin(), folder.end(), output.begin(), output.end());
-  if (end == folder.end()) {
+  const fs::path inside = fs::weakly_canonical(folder, error);
+  const fs::path outside = fs::weakly_canonical(outer, error);
+  return std::mismatch(outside.begin(), outside.end(), inside.begin(), inside.end()).first ==
+         outside.end();
+}
+
+// Pictures that are made are not to be taken for photos the next time, and photos not to be removed
+// with a folder that is made anew.
+void RequireApart(const std::string& output_path, const std::string& photos) {
+  if (LiesIn(output_path, photos)) {
     throw UsageError("--output_path " + output_path + " lies in the folder of the photos, " +
                      photos + ": give one outside of it");
+  }
+  const std::string made = output_path + "/with_scanner";
+  if (LiesIn(photos, made)) {
+    throw UsageError("the folder of the photos, " + photos + ", lies in " + made +
+                     ", which is made anew here: put your photos elsewhere");
   }
 }
 
@@ -141,12 +151,10 @@ void CheckInputs(const AutoOptions& o) {
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
   if (!o.scan_poses.empty()) RequireFile(o.scan_poses, "Give the file with the stations' poses");
   for (const std::string& photos : {o.image_path, o.panoramas_path}) {
-    if (!photos.empty()) RequireOutside(o.output_path, photos);
+    if (!photos.empty()) RequireApart(o.output_path, photos);
   }
   for (const std::string& path : o.scan_paths) {
-    // room.e57#2 is one scan of a file; but a name may hold a #, too.
-    const std::string file = IsThere(path) ? path : path.substr(0, path.find('#'));
-    RequireFile(file, "Give the file of the range scan");
+    RequireFile(ScanFileOf(path), "Give the file of the range scan");
   }
 }
 

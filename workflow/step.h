@@ -31,7 +31,7 @@ struct Step {
 // One run: its options, the places of its files, and what has been seen so far.
 class Chain {
  public:
-  explicit Chain(const AutoOptions& options) : options_(options) {}
+  explicit Chain(const AutoOptions& options);
 
   const AutoOptions& options() const { return options_; }
   std::string At(const std::string& name) const { return options_.output_path + "/" + name; }
@@ -40,10 +40,22 @@ class Chain {
 
   // The photos as they were given, or as they were cut out of videos or panoramas.
   std::string PhotoFolder() const;
-  // The same; where a pattern was projected, those with it and those without.
+  // The same; where a pattern was projected, those with it and those without; beside the scanner's
+  // own photos, links to the user's and theirs.
   std::string ColmapFolder() const;
   std::string ColorFolder() const;
   bool IsAssociated() const;  // patterned and plain photos were told apart
+  // The scanner's own photos, in an E57. OnlyScanner: the user has none.
+  bool OnlyScanner() const;
+  bool UsesScanner() const { return !scanner_scan_.empty() && !IsAssociated(); }
+  const std::string& ScannerScan() const { return scanner_scan_; }  // FILE or FILE#PART
+  // Theirs with links to the user's, and theirs.
+  std::string LinkFolder() const { return At("with_scanner"); }
+  std::string ScannerFolder() const;
+  // cameras[] of the report of roomtex-import; empty before it has run, and without poses.
+  Json ScannerCameras() const;
+  // Their model, for roomtex-mapper, also before it is there; "" = none.
+  std::string KnownPath() const;
   // The picks; "" = there are none.
   std::string PicksPath() const;
   // The aligned model, also one that was put beside a trusted one.
@@ -62,6 +74,7 @@ class Chain {
 
  private:
   const AutoOptions& options_;
+  std::string scanner_scan_;
   std::vector<std::pair<std::string, std::vector<PhotoFacts>>> photos_;
   std::optional<ColmapFacts> colmap_;
   std::vector<std::pair<std::string, std::set<std::string>>> colmap_options_;
@@ -80,6 +93,8 @@ std::vector<std::string> StepNames();
 
 // Small things that all of it uses.
 bool IsThere(const std::string& path);
+// room.e57#2 is one scan of room.e57; but a name may hold a #, too.
+std::string ScanFileOf(const std::string& path);
 Json ReadJsonFile(const std::string& path);  // null if it is not there or no JSON object
 // Nothing if the value is empty.
 void AddOption(const std::string& name, const std::string& value, CommandLine* line);

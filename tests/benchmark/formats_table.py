@@ -4,7 +4,8 @@
     tests/benchmark/formats_table.py --bin build/bin
 
 A simulated scan is written in every format and read back: points kept, largest distance from where
-they were, intensity kept, and what the reader takes it for. Then the file is cut off at 20 places
+they were, whether in the same order (a cloud whose grid is rebuilt begins at another azimuth), intensity
+kept, and what the reader takes it for. Then the file is cut off at 20 places
 and has bytes changed, 20 times: each must be read or refused with exit 3 and a sentence.
 """
 
@@ -17,7 +18,8 @@ import sys
 import tempfile
 
 DAMAGES = 20  # of each kind
-FORMATS = ["rtpi", "ptx", "e57", "pcd", "ply", "las", "xyz", "obj"]
+FORMATS = ["rtpi", "ptx", "e57", "pcd", "ply", "las", "xyz", "pts", "csv", "obj"]
+CUBE = 0.01  # metres; a point that comes back lies in the same cube or beside it
 
 
 def run(command, *arguments):
@@ -51,23 +53,40 @@ def turned_back(points, kind):
     return [(p[0], p[2], -p[1], *p[3:]) for p in points]
 
 
+def distance(a, b):
+    return max(abs(a[k] - b[k]) for k in range(3))
+
+
+def paired(points, truth):
+    """Every point of `truth` with the one that stands for it, and whether they come in the same order."""
+    if all(distance(a, b) < CUBE for a, b in zip(points, truth)):
+        return list(zip(points, truth)), True
+    cubes = {}
+    for point in points:
+        cubes.setdefault(tuple(int(c // CUBE) for c in point[:3]), []).append(point)
+    around = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
+    pairs = []
+    for b in truth:
+        cube = [int(c // CUBE) for c in b[:3]]
+        near = [a for d in around for a in cubes.get(tuple(c + e for c, e in zip(cube, d)), [])]
+        pairs.append((min(near, key=lambda a: distance(a, b), default=points[0]), b))
+    return pairs, False
+
+
 def write(importer, scan, kind, folder):
-    """The scan as a file of that format; text formats that are only read are written here."""
+    """The scan as a file of that format; those that are only read (OBJ) are written here."""
     path = os.path.join(folder, "scan." + kind)
-    if kind in ("xyz", "obj"):
+    if kind == "obj":
         ply = os.path.join(folder, "for_" + kind + ".ply")
         run(importer, "--input_path", scan, "--output_path", ply)
         vertices, _ = read_ply(ply)
         with open(path, "w") as file:
-            if kind == "xyz":
-                file.writelines("%.6f %.6f %.6f %.4f\n" % v[:4] for v in vertices)
-            else:
-                file.writelines("v %.6f %.6f %.6f\n" % v[:3] for v in vertices)
-                data = open(ply, "rb").read()
-                at = data.index(b"end_header\n") + 11 + 16 * len(vertices)
-                for i in range((len(data) - at) // 13):
-                    a, b, c = struct.unpack_from("<iii", data, at + 13 * i + 1)
-                    file.write("f %d %d %d\n" % (a + 1, b + 1, c + 1))
+            file.writelines("v %.6f %.6f %.6f\n" % v[:3] for v in vertices)
+            data = open(ply, "rb").read()
+            at = data.index(b"end_header\n") + 11 + 16 * len(vertices)
+            for i in range((len(data) - at) // 13):
+                a, b, c = struct.unpack_from("<iii", data, at + 13 * i + 1)
+                file.write("f %d %d %d\n" % (a + 1, b + 1, c + 1))
         return path, False
     result = run(importer, "--input_path", scan, "--output_path", path)
     if result.returncode != 0:
@@ -109,8 +128,9 @@ def main():
     options = parser.parse_args()
     importer = os.path.join(options.bin, "roomtex-import")
     failed = False
-    print("| format | writes | read again | points | off by at most | intensity | damaged: refused, read, wrong |")
-    print("|---|---|---|---|---|---|---|")
+    print("| format | writes | read again | points | off by at most | order | intensity | damaged: "
+          "refused, read, wrong |")
+    print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         capture = os.path.join(folder, "capture")
         run(os.path.join(options.bin, "roomtex-simulate"), "--output_path", capture, "--seed", "1",
@@ -131,14 +151,16 @@ def main():
             points, faces = read_ply(again)
             points = turned_back(points, kind)
             off, same = 0.0, True
-            for a, b in zip(points, truth):
-                off = max(off, max(abs(a[k] - b[k]) for k in range(3)))
+            pairs, in_order = paired(points, truth)
+            for a, b in pairs:
+                off = max(off, distance(a, b))
                 same = same and abs(a[3] - b[3]) <= 1e-3 * max(1, abs(b[3]))
             refused, read, wrong = malformed(importer, path, folder, options.seed)
             failed = failed or wrong > 0 or len(points) != len(truth)
             what = "grid or mesh" if faces == num_faces else "mesh" if faces else "cloud"
             print(f"| {kind} | {'yes' if is_written else '-'} | {what} | {len(points)} of {len(truth)} | "
-                  f"{1e6 * off:.0f} µm | {'same' if same else 'other unit or none'} | {refused}, {read}, {wrong} |", flush=True)
+                  f"{1e6 * off:.0f} µm | {'same' if in_order else 'another'} | "
+                  f"{'same' if same else 'other unit or none'} | {refused}, {read}, {wrong} |", flush=True)
     return 1 if failed else 0
 
 

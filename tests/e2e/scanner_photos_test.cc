@@ -89,10 +89,10 @@ class ScannerPhotos : public testing::Test {
   }
 
   // Median distance of the user's photos from where they were taken, metres. An E57 has z up.
-  static double MedianError(const SparseModel& model) {
+  static double MedianError(const SparseModel& model, const std::string& below = "mine/") {
     std::vector<double> errors;
     for (const auto& [id, image] : truth_.images) {
-      const SparseImage* const found = model.FindImage("mine/" + image.name);
+      const SparseImage* const found = model.FindImage(below + image.name);
       if (found == nullptr) continue;
       const Eigen::Vector3d c = image.cam_from_model.TargetOriginInSource();
       const Eigen::Vector3d in_e57(c.x(), -c.z(), c.y());
@@ -139,6 +139,37 @@ TEST_F(ScannerPhotos, PutModelAndAlignmentIntoTheScanWithoutAPick) {
             12);  // the scanner's photos hold what the surface does not
   EXPECT_LT(report["expected_error"]["at_cameras_mm"], 5);
   EXPECT_NEAR(report["scan_from_sparse"]["scale"].get<double>(), 1, 0.005);
+}
+
+TEST_F(ScannerPhotos, RoomtexAutoTakesThemByItself) {
+  const std::string line = "roomtex-auto --quiet --scan_path " + Path("site/model.e57") +
+                           " --cameras_path " + Path("capture/cameras.txt") +
+                           " --quality low --SiftExtraction.max_num_features 2048 --until align "
+                           "--image_path " +
+                           Path("photos/mine") + " --output_path ";
+  const CommandResult result = RunCommandLine(line + Path("auto"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const SparseModel model = ReadSparseModel(Path("auto/aligned"));
+  EXPECT_EQ(model.images.size(), kNumPhotos);
+  EXPECT_LT(MedianError(model, ""), 0.005);
+  EXPECT_NE(model.FindImage("scanner/photo_001.jpg"), nullptr);
+  const json report = json::parse(ReadBytes(Path("auto/log/align.json")));
+  EXPECT_EQ(report["search"]["method"], "known_poses");
+  EXPECT_THAT(ReadBytes(Path("auto/report.html")),
+              HasSubstr("--known_path " + Path("auto/with_scanner/scanner/sparse")));
+}
+
+TEST_F(ScannerPhotos, RoomtexAutoColoursByThemAlone) {
+  const CommandResult result =
+      RunCommandLine("roomtex-auto --quiet --quality low --scan_path " + Path("site/model.e57") +
+                     " --output_path " + Path("alone"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("coloured by the scanner's own photos"));
+  EXPECT_FALSE(fs::exists(Path("alone/database.db")));
+  const json report = json::parse(ReadBytes(Path("alone/log/texture.json")));
+  EXPECT_GT(report["coverage"], 0.3);  // four photos
+  EXPECT_TRUE(fs::exists(Path("alone/pictures/open_1.png")));
+  EXPECT_THAT(ReadBytes(Path("alone/report.html")), HasSubstr("nothing here has checked"));
 }
 
 TEST_F(ScannerPhotos, WithoutTheirPosesPicksAreAskedFor) {

@@ -44,8 +44,8 @@ class Scene:
         self.temporary = tempfile.TemporaryDirectory(prefix="roomtex-hostile-")
         self.root = pathlib.Path(folder or self.temporary.name)
 
-    def make(self):
-        answer = self.run("roomtex-simulate --output_path . --num_photos 6 --photo_width 240 "
+    def make(self, num_photos=6):
+        answer = self.run(f"roomtex-simulate --output_path . --num_photos {num_photos} --photo_width 240 "
                           "--photo_height 160 --scan_columns 160 --scan_rows 80 --furnished 0 "
                           "--distortion 0")
         assert answer.code == 0, answer.err

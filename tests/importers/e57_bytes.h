@@ -51,6 +51,9 @@ class E57Bytes {
  public:
   static constexpr size_t kPage = 1024;
 
+  // hole: so many bytes, whole pages, lie before all of this; whoever writes the file puts them in.
+  explicit E57Bytes(uint64_t hole = 0) : hole_(hole) {}
+
   // Sections are given by their physical offset, for the XML.
   uint64_t AddBlob(const std::string& bytes) {
     const uint64_t offset = Start();
@@ -75,7 +78,7 @@ class E57Bytes {
     }
     const size_t data = logical_.size() + 32;
     logical_ += std::string("\1\0\0\0\0\0\0\0", 8) + Bytes(uint64_t{32} + packets.size()) +
-                Bytes(Physical(data)) + Bytes(uint64_t{0}) + packets;
+                Bytes(Physical(data) + hole_) + Bytes(uint64_t{0}) + packets;
     return offset;
   }
 
@@ -99,7 +102,7 @@ class E57Bytes {
     logical_.resize(num_pages * payload, ' ');
     logical_.replace(0, 48,
                      "ASTM-E57" + Bytes(uint32_t{1}) + Bytes(uint32_t{0}) +
-                         Bytes(uint64_t{num_pages * kPage}) + Bytes(offset) +
+                         Bytes(uint64_t{num_pages * kPage + hole_}) + Bytes(offset) +
                          Bytes(uint64_t{xml.size()}) + Bytes(uint64_t{kPage}));
     std::string file;
     for (size_t i = 0; i < num_pages; ++i) file += PageOf(logical_.substr(i * payload, payload));
@@ -129,9 +132,10 @@ class E57Bytes {
   }
   uint64_t Start() {
     logical_.resize((logical_.size() + 3) / 4 * 4, '\0');
-    return Physical(logical_.size());
+    return Physical(logical_.size()) + hole_;
   }
 
+  uint64_t hole_;
   std::string logical_ = std::string(48, '\0');
 };
 

@@ -53,6 +53,28 @@ TEST_F(E57, ChecksumsAreCrc32c) {
   EXPECT_EQ(Crc32c(""), 0u);
 }
 
+// Everything but the header lies behind 5 GB that take no room on the disk.
+TEST_F(E57, ReadsWhatLiesBeyondFourGigabytes) {
+  constexpr uint64_t kHole = uint64_t{5} << 30;
+  E57Bytes file(kHole);
+  const uint64_t offset = file.AddPoints(
+      {StreamOf<float>({1, 2, 3}), StreamOf<float>({4, 5, 6}), StreamOf<float>({7, 8, 9})});
+  const std::string bytes = file.Finish(E57Xml(ScanXml(offset, 3, SinglesXml())));
+  WriteBytes(folder_ / "site.e57", bytes.substr(0, E57Bytes::kPage));
+  {
+    std::fstream stream(folder_ / "site.e57", std::ios::binary | std::ios::in | std::ios::out);
+    stream.seekp(static_cast<std::streamoff>(kHole));
+    stream << bytes;
+  }
+  E57Options options;
+  options.check = false;  // the hole has no checksums
+  const std::vector<Scan> scans = ReadE57(folder_ / "site.e57", "", options, &notes_);
+  ASSERT_EQ(scans.size(), 1u);
+  ASSERT_EQ(scans[0].points.size(), 3u);
+  EXPECT_EQ(scans[0].points[2], Eigen::Vector3d(3, 6, 9));
+  EXPECT_INPUT_ERROR(ReadE57(folder_ / "site.e57", "", {}, &notes_), "checksum of page");
+}
+
 TEST_F(E57, ReadsIntegersOfEveryWidthAcrossPackets) {
   std::mt19937_64 random(7);
   for (int bits = 1; bits <= 64; ++bits) {

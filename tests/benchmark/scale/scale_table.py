@@ -115,12 +115,11 @@ class Bench:
                 "roomtex-import", "--quiet", "--input_path", place("scan.e57"), "--output_path", place("scan.png")])
             self.texture(millions, "texture, grid", place, "scan.rtpi", [])
             self.texture(millions, "texture, cloud", place, *self.cloud(place))
-            model = self.at(f"photos_{min(self.arguments.photos or [0])}", "sparse", "0")
-            if not os.path.exists(model):
-                continue
+            self.beside_texture(millions, "export", place, [])
+            self.beside_texture(millions, "dense", place, ["--max_image_size", "240"])
             self.run("samples", "align", millions, [
-                "roomtex-align", "--quiet", "--input_path", model, "--scan_path", place("scan.rtpi"), "--picks_path",
-                self.at("capture", "picks.csv"), "--image_path", self.at("capture", "photos"), "--output_path",
+                "roomtex-align", "--quiet", "--input_path", place("truth"), "--scan_path", place("scan.rtpi"),
+                "--picks_path", place("picks.csv"), "--image_path", place("photos"), "--output_path",
                 place("aligned")], (0, 4))
 
     def texture(self, millions, step, place, scan, options):
@@ -128,6 +127,13 @@ class Bench:
             "roomtex-texture", "--quiet", "--input_path", place("truth"), "--image_path", place("photos"),
             "--scan_path", place(scan), "--Texture.scale", "1", "--output_path", place("textured")] + options, (0, 4))
         shutil.rmtree(place("textured"), ignore_errors=True)
+
+    def beside_texture(self, millions, command, place, options):
+        self.run("samples", command, millions, [
+            f"roomtex-{command}", "--quiet", "--input_path", place("truth"), "--image_path", place("photos"),
+            "--scan_path", place("scan.rtpi"), "--accept_untrusted", "1", "--output_path", place(command)] + options,
+            (0, 4))
+        shutil.rmtree(place(command), ignore_errors=True)
 
     def cloud(self, place):
         """The samples as a LAS a metre off their station, so that their angles show no grid; how to put it back."""

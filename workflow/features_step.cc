@@ -1,0 +1,212 @@
+// Features of all photos: by camera, the user's and the scanner's.
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "core/error.h"
+#include "workflow/step_lines.h"
+
+namespace roomtex {
+namespace {
+
+std::vector<std::string> Words(const std::string& text) {
+  std::istringstream stream(text);
+  return {std::istream_iterator<std::string>(stream), std::istream_iterator<std::string>()};
+}
+
+std::string ReadText(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// The calibration of these photos; none if there is none of their size.
+std::optional<KnownCamera> CalibrationOf(const PhotoGroup& group, const PhotoGroup& largest,
+                                         const AutoOptions& options) {
+  if (!options.cameras_path.empty()) {
+    for (const KnownCamera& camera : ReadKnownCameras(options.cameras_path)) {
+      if (camera.width == group.width && camera.height == group.height) return camera;
+    }
+    return std::nullopt;
+  }
+  const bool is_meant = group.width == largest.width && group.height == largest.height;
+  if (options.camera_params.empty() || !is_meant) return std::nullopt;
+  return KnownCamera{options.camera_model, group.width, group.height, options.camera_params};
+}
+
+constexpr size_t kEnoughForOpencv = 10;  // photos
+
+void AddCamera(const PhotoGroup& group, const PhotoGroup& largest, const AutoOptions& options,
+               CommandLine* line, std::vector<std::string>* notes) {
+  const std::optional<KnownCamera> known = CalibrationOf(group, largest, options);
+  if (known) {
+    AddOption("--ImageReader.camera_model", known->model, line);
+    AddOption("--ImageReader.camera_params", known->params, line);
+    notes->push_back(group.Text() + ": one camera, calibrated");
+    return;
+  }
+  const std::string model = !options.camera_model.empty()            ? options.camera_model
+                            : group.names.size() >= kEnoughForOpencv ? "OPENCV"
+                                                                     : "SIMPLE_RADIAL";
+  AddOption("--ImageReader.camera_model", model, line);
+  notes->push_back(group.Text() + ": one camera, not calibrated (" + model + ")" +
+                   (options.cameras_path.empty() ? "" : "; --cameras_path has none of their size"));
+}
+
+CommandLine ExtractorLine(Chain* chain, bool uses_gpu) {
+  const AutoOptions& options = chain->options();
+  const Quality& quality = QualityOf(options);
+  const std::set<std::string>& known = chain->ColmapOptions("feature_extractor");
+  CommandLine line = {options.colmap,    "feature_extractor",
+                      "--database_path", chain->At(kPartialDatabase),
+                      "--image_path",    chain->ColmapFolder()};
+  AddSpelled(known, {"FeatureExtraction.use_gpu", "SiftExtraction.use_gpu"}, uses_gpu ? "1" : "0",
+             &line);
+  AddSpelled(known, {"FeatureExtraction.max_image_size", "SiftExtraction.max_image_size"},
+             std::to_string(quality.max_image_size), &line);
+  AddOption("--SiftExtraction.max_num_features", std::to_string(quality.max_num_features), &line);
+  if (options.num_threads >= 0) {
+    AddSpelled(known, {"FeatureExtraction.num_threads", "SiftExtraction.num_threads"},
+               std::to_string(options.num_threads), &line);
+  }
+  return line;
+}
+
+// A list of photos that one command line is for.
+void AddList(const std::vector<std::string>& names, const std::string& path, CommandLine* line,
+             Step* step) {
+  std::string list;
+  for (const std::string& name : names) list += name + "\n";
+  step->files.emplace_back(path, list);
+  AddOption("--image_list_path", path, line);
+}
+
+// The scanner's photos have the cameras of their file; where these are many, COLMAP guesses one for
+// every photo, and roomtex-mapper takes those of the file all the same.
+constexpr size_t kMostScannerCameras = 8;
+
+CommandLine ScannerLine(const CommandLine& start, const Json& camera, bool is_told) {
+  CommandLine line = start;
+  AddOption("--ImageReader.camera_model", camera["model"], &line);
+  if (!is_told) return line;
+  std::string params;
+  for (const Json& param : camera["params"]) params += (params.empty() ? "" : ",") + param.dump();
+  AddOption("--ImageReader.single_camera", "1", &line);
+  AddOption("--ImageReader.camera_params", params, &line);
+  return line;
+}
+
+// Options for the lenses of the user's photos are not for them.
+std::vector<std::string> WithoutLenses(const std::vector<std::string>& passed) {
+  std::vector<std::string> kept;
+  for (size_t i = 0; i + 1 < passed.size(); i += 2) {
+    if (passed[i].rfind("--ImageReader.", 0) == 0) continue;
+    kept.insert(kept.end(), {passed[i], passed[i + 1]});
+  }
+  return kept;
+}
+
+void AddScannerPhotos(Chain* chain, const CommandLine& start, Step* step) {
+  if (!IsThere(chain->ReportOf("scanner"))) {
+    throw InputError(chain->ReportOf("scanner"), "",
+                     "is not there: the step scanner has to run first", "Start without --from");
+  }
+  const std::string folder = chain->ScannerFolder();
+  const std::string below = folder.substr(folder.rfind('/') + 1) + "/";
+  const Json cameras = chain->ScannerCameras();
+  const bool are_told = cameras.size() <= kMostScannerCameras;
+  size_t num_photos = 0, number = 0;
+  std::vector<std::string> names;
+  for (const Json& camera : cameras) {
+    for (const Json& image : camera["images"]) names.push_back(below + image.get<std::string>());
+    if (!are_told && ++number < cameras.size()) continue;
+    num_photos += names.size();
+    CommandLine line = ScannerLine(start, camera, are_told);
+    if (are_told) ++number;
+    AddList(names, chain->At("log/photos_of_scanner_" + std::to_string(number) + ".txt"), &line,
+            step);
+    AddPassed(WithoutLenses(chain->options().passed.features), &line);
+    step->commands.push_back(line);
+    names.clear();
+  }
+  step->notes.push_back(std::to_string(num_photos) + " photos of the scanner's own" +
+                        (are_told ? ", by the cameras of their file" : ""));
+}
+
+}  // namespace
+
+Step MakeFeatures(Chain* chain) {
+  const AutoOptions& options = chain->options();
+  Step step;
+  const CommandLine start = ExtractorLine(chain, UsesGpu(chain, &step.notes));
+  const std::string folder = chain->ColmapFolder();
+  const bool has_scanner = !chain->KnownPath().empty();
+  const std::vector<PhotoFacts>& photos =
+      chain->Photos(has_scanner ? chain->PhotoFolder() : folder);
+  const std::vector<PhotoGroup> groups = GroupByCamera(photos);
+  step.inputs = {folder};
+  step.outputs = {chain->At(kPartialDatabase)};
+  if (!options.cameras_path.empty()) step.inputs.push_back(options.cameras_path);
+  const std::string of_faces =
+      HasPanoramas(chain) ? ReadText(chain->At("faces/camera_options.txt")) : "";
+  if (!of_faces.empty()) {
+    CommandLine line = start;
+    const std::vector<std::string> words = Words(of_faces);
+    line.insert(line.end(), words.begin(), words.end());
+    step.commands = {line};
+  } else if (groups.size() > std::max<size_t>(4, photos.size() / 3)) {
+    CommandLine line = start;
+    std::vector<std::string> names;
+    for (const PhotoFacts& photo : photos) names.push_back(photo.name);
+    if (has_scanner) AddList(names, chain->At("log/photos_of_the_user.txt"), &line, &step);
+    step.commands = {line};
+    step.notes.push_back(std::to_string(groups.size()) +
+                         " cameras or focal lengths: a camera for every photo");
+  } else {
+    for (size_t i = 0; i < groups.size(); ++i) {
+      CommandLine line = start;
+      if (groups.size() > 1 || has_scanner) {
+        AddList(groups[i].names,
+                chain->At("log/photos_of_camera_" + std::to_string(i + 1) + ".txt"), &line, &step);
+      }
+      AddOption("--ImageReader.single_camera", "1", &line);
+      AddCamera(groups[i], groups[0], options, &line, &step.notes);
+      step.commands.push_back(line);
+    }
+  }
+  for (CommandLine& line : step.commands) AddPassed(options.passed.features, &line);
+  if (has_scanner) AddScannerPhotos(chain, start, &step);
+  return step;
+}
+
+Step MakeScanner(Chain* chain) {
+  const AutoOptions& options = chain->options();
+  Step step;
+  CommandLine line = {"roomtex-import",          "--input_path",         chain->ScannerScan(),
+                      "--images_path",           chain->ScannerFolder(), "--report_path",
+                      chain->ReportOf("scanner")};
+  AddOption("--units", options.units, &line);
+  step.inputs = {ScanFileOf(chain->ScannerScan())};
+  if (chain->OnlyScanner()) {
+    step.outputs = {chain->ScannerFolder()};
+    step.commands = {{"rm", "-rf", step.outputs[0]}, line};
+    step.notes = {"no photos of yours: the colours come from the scanner's own"};
+    return step;
+  }
+  // Links, since COLMAP takes one folder; panoramas as faces, since it has no model for them.
+  AddOption("--E57.cut_panoramas", "1", &line);
+  const std::string photos = std::filesystem::absolute(chain->PhotoFolder()).lexically_normal();
+  step.inputs.push_back(chain->PhotoFolder());
+  step.outputs = {chain->LinkFolder()};
+  step.commands = {{"rm", "-rf", chain->LinkFolder()},
+                   {"cp", "-r", "--symbolic-link", photos + "/.", chain->LinkFolder()},
+                   line};
+  step.notes = {ScanFileOf(chain->ScannerScan()) +
+                " has photos of its own, with poses: they go beside yours (--scanner_photos 0: "
+                "without them)"};
+  return step;
+}
+
+}  // namespace roomtex
