@@ -386,6 +386,11 @@ test('all text has a contrast of 4.5 or more, at every size, light and dark', as
       await page.page.keyboard.press('Escape');
       await until(async () => !await page.page.isVisible('#help'), 'closed');
     }
+    await page.page.setViewportSize({width: 900, height: 700});
+    await page.redrawn();
+    const narrowest = await page.page.evaluate(
+        () => Math.min(...[...document.querySelectorAll('td.photo')].map((one) => one.clientWidth)));
+    assert.ok(narrowest >= 80, `${narrowest} pixels are left for the names of photos`);
   }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
