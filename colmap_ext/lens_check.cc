@@ -26,6 +26,9 @@ constexpr double kMaxDeviations = 6;
 // deviations.
 constexpr double kOwnShare = 0.01, kOwnDeviations = 5;
 constexpr size_t kMaxPhotosApart = 150;  // of more photos none is looked at on its own
+// Photos are asked for their own lenses to some tenths of a standard deviation, five of which
+// decide: twice as exact takes twice the steps.
+constexpr double kMinGainApart = 1e-4;
 constexpr size_t kMinObservationsApart = 40;
 constexpr size_t kMinPhotosOfSpread = 5;
 // By this much, in units of the noise's variance, principal point and tangential distortion must
@@ -110,7 +113,7 @@ std::vector<OwnFocalLength> OwnFocalLengths(const SparseModel& model, double sig
                                             const LensSet& lenses) {
   std::vector<OwnFocalLength> photos;
   if (model.images.size() > kMaxPhotosApart) return photos;
-  const PhotoBundle own = AdjustPhotos(model, LensPerPhoto(lenses), sigma_px);
+  const PhotoBundle own = AdjustPhotos(model, LensPerPhoto(lenses), sigma_px, {}, kMinGainApart);
   if (!own.usable) return photos;
   const double noise = std::sqrt(std::max(1.0, own.cost / std::max(1.0, own.redundancy)));
   std::map<int, std::vector<double>> focal_lengths;

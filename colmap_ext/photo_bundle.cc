@@ -23,10 +23,10 @@
 namespace roomtex {
 namespace {
 
-// More photos than this have a sparse reduced system.
-constexpr size_t kMaxDensePhotos = 80;
+// More photos than this have a sparse reduced system. In one room it is full: of 120 photos with a
+// lens each dense matrices take two thirds of the time (tests/benchmark/scale/lens_cost.cc).
+constexpr size_t kMaxDensePhotos = 200;
 constexpr int kMaxBundleSteps = 60;
-constexpr double kFunctionTolerance = 1e-7;
 // Fewer leave a photo's pose open.
 constexpr int kMinObservations = 6;
 // How exactly the scale is held, a share.
@@ -128,12 +128,12 @@ class PhotoProblem {
     }
   }
 
-  bool Solve() {
+  bool Solve(double min_gain) {
     ceres::Solver::Options o;
     o.linear_solver_type =
         poses_.size() > kMaxDensePhotos ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     o.max_num_iterations = kMaxBundleSteps;
-    o.function_tolerance = kFunctionTolerance;
+    o.function_tolerance = min_gain;
     o.parameter_tolerance = 1e-10;
     o.gradient_tolerance = 1e-12;
     o.num_threads = 1;
@@ -313,12 +313,16 @@ class PhotoNormal {
       const Eigen::MatrixXd prior = LensPrior(lens.told, lens.hold_centre);
       normal->AddInformation(lens_offset_[i], prior.transpose() * prior);
     }
-    const Eigen::MatrixXd covariance = normal->Covariance();
-    for (size_t i = 0; i < lens_offset_.size() && covariance.size() > 0; ++i) {
-      const int n = static_cast<int>(result_.lenses.lenses[i].camera.params.size());
+    std::vector<size_t> freed;
+    std::vector<UnknownBlock> blocks;
+    for (size_t i = 0; i < lens_offset_.size(); ++i) {
       if (lens_offset_[i] < 0) continue;
-      result_.covariances[i] = covariance.block(lens_offset_[i], lens_offset_[i], n, n);
+      freed.push_back(i);
+      blocks.push_back(
+          {lens_offset_[i], static_cast<int>(result_.lenses.lenses[i].camera.params.size())});
     }
+    const std::vector<Eigen::MatrixXd> covariances = normal->Covariances(blocks);
+    for (size_t k = 0; k < covariances.size(); ++k) result_.covariances[freed[k]] = covariances[k];
   }
 
   const ObservedPoints& observed_;
@@ -355,14 +359,14 @@ double KeypointNoise(const SparseModel& model) {
 }
 
 PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px,
-                         const std::set<uint32_t>& known_poses) {
+                         const std::set<uint32_t>& known_poses, double min_gain) {
   PhotoBundle result;
   result.model = model;
   result.lenses = lenses;
   const ObservedPoints observed = FindObserved(model, lenses);
   if (observed.empty() || model.images.size() < 2) return result;
   PhotoProblem problem(model, lenses, observed, sigma_px, known_poses);
-  if (problem.Solve()) {
+  if (problem.Solve(min_gain)) {
     problem.Write(observed, &result);
     result.usable = std::all_of(result.lenses.lenses.begin(), result.lenses.lenses.end(),
                                 [](const Lens& lens) { return lens.camera.Problems().empty(); });

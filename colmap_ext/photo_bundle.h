@@ -43,10 +43,11 @@ double KeypointNoise(const SparseModel& model);
 
 // Minimises Huber's cost of the reprojection errors over poses, points and the free lenses. Frame
 // and scale stay near those of the input, which fix nothing: fit a similarity afterwards. With
-// known_poses, images whose poses stay as they are, those hold both (two of them apart). Does not
-// depend on the number of threads: Ceres runs on one.
+// known_poses, images whose poses stay as they are, those hold both (two of them apart). Ends where
+// a step lowers the cost by less than the share min_gain. Does not depend on the number of threads:
+// Ceres runs on one.
 PhotoBundle AdjustPhotos(const SparseModel& model, const LensSet& lenses, double sigma_px,
-                         const std::set<uint32_t>& known_poses = {});
+                         const std::set<uint32_t>& known_poses = {}, double min_gain = 1e-7);
 
 // The adjusted model by the best similarity to the input, cameras and points: a bundle adjustment
 // by photos is free to move and grow.

@@ -18,6 +18,10 @@ struct NormalTerms {
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
 };
 
+struct UnknownBlock {
+  int offset = 0, size = 0;
+};
+
 class ReducedNormal {
  public:
   explicit ReducedNormal(int num_unknowns);
@@ -31,8 +35,9 @@ class ReducedNormal {
   // What is known of a block otherwise.
   void AddInformation(int offset, const Eigen::MatrixXd& information);
 
-  // The covariance of all unknowns; 0 x 0 where something stays open.
-  Eigen::MatrixXd Covariance() const;
+  // The covariances of these blocks of unknowns, where all the others are unknown, too; none where
+  // something stays open.
+  std::vector<Eigen::MatrixXd> Covariances(const std::vector<UnknownBlock>& blocks) const;
 
  private:
   Eigen::MatrixXd matrix_;

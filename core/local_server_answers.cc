@@ -28,11 +28,9 @@ std::string RefusalPage() {
   return "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Not this address</title>"
          "<link rel=\"icon\" href=\"data:,\"><h1>This address does not open anything</h1><p>" +
          std::string(kLacksToken) +
-         "</p><p>Every start makes a new address: a link from an earlier run has ended with it. "
-         "Start "
-         "the command again and open what it prints. What stands behind the # of an old link is "
-         "the "
-         "point of view: put it behind the new address.</p></html>";
+         "</p><p>It may be a link from an earlier run. Start the command again and open what it "
+         "prints. What stands behind the # of an old link is the point of view: put it behind the "
+         "new address.</p></html>";
 }
 
 void SetContent(const httplib::Request& request, const LocalServer::Content& content,

@@ -99,7 +99,7 @@ class StepRunner {
     outcome.name = row.name;
     outcome.does = row.does;
     if (index < First() || index > Last()) {
-      Remember(&outcome);
+      if (index < First() || IsUpToDate(row)) Remember(&outcome);
       if (index < First()) RequireMade(row);
       result_.steps.push_back(outcome);
       return true;
@@ -173,6 +173,16 @@ class StepRunner {
       if (features != nullptr) from["features"] = HashText(Json(features->made_from).dump());
     }
     return from;
+  }
+
+  // Of a step behind the last one that was asked for: whether what an earlier run left still rests
+  // on what is there now. If not, the report must not count it.
+  bool IsUpToDate(const StepRow& row) {
+    const StepRecord* const record = state_.Find(row.name);
+    if (record == nullptr) return false;
+    const Step step = MakeStep(row);
+    return std::all_of(step.inputs.begin(), step.inputs.end(), IsThere) &&
+           Differences(record->made_from, MadeFromOf(step)).empty();
   }
 
   // Why a step has to run; none if it has not.

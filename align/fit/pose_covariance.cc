@@ -61,19 +61,22 @@ class ReducedSystem {
                     hold_centre_);
       normal.AddInformation(offset, prior.transpose() * prior);
     }
-    const Eigen::MatrixXd covariance = normal.Covariance();
+    std::vector<UnknownBlock> blocks;
+    for (const auto& [id, offset] : pose_offset_) blocks.push_back({offset, 6});
+    for (const auto& [id, offset] : camera_offset_) {
+      blocks.push_back({offset, static_cast<int>(bundle_.model.cameras.at(id).params.size())});
+    }
+    const std::vector<Eigen::MatrixXd> covariances = normal.Covariances(blocks);
     BundleCovariances found;
-    if (covariance.size() == 0) return found;
+    if (covariances.empty()) return found;
+    auto next = covariances.begin();
     for (const auto& [id, offset] : pose_offset_) {
-      found.poses[id] = covariance.block<6, 6>(offset, offset);
+      found.poses[id] = *next++;
       if (bundle_.model.images.at(id).frame_id == kNoFrame) continue;
       const Eigen::Matrix<double, 6, 6> cam_by_rig = CameraByRig(id);
       found.poses[id] = cam_by_rig * found.poses[id] * cam_by_rig.transpose();
     }
-    for (const auto& [id, offset] : camera_offset_) {
-      const int n = static_cast<int>(bundle_.model.cameras.at(id).params.size());
-      found.cameras[id] = covariance.block(offset, offset, n, n);
-    }
+    for (const auto& [id, offset] : camera_offset_) found.cameras[id] = *next++;
     return found;
   }
 

@@ -2,7 +2,7 @@
 
 # roomtex_page(TARGET pick FILES...): builds the files of a web page into TARGET, which includes
 # "pick_page.h" and hands kPickPage to AddPage() (core/page.h). A file is reachable under its own
-# name without folders.
+# name without folders; theme.css, the look that all pages share, comes with them.
 function(roomtex_page target name)
   string(SUBSTRING ${name} 0 1 initial)
   string(TOUPPER ${initial} initial)
@@ -12,7 +12,7 @@ function(roomtex_page target name)
   set(symbols "")
   set(entries "")
   set(index 0)
-  foreach(file ${ARGN})
+  foreach(file ${ARGN} ${CMAKE_SOURCE_DIR}/core/page/theme.css)
     get_filename_component(path ${file} ABSOLUTE)
     get_filename_component(short ${file} NAME)
     set(symbol roomtex_${name}_page_${index})

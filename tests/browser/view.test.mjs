@@ -601,13 +601,13 @@ test('flights are smooth unless the user wants none', async () => {
   }
 });
 
-test('text stands out from its background', async () => {
+test('text stands out from its background, light and dark', async () => {
   const {page, errors} = await openView();
   await page.keyboard.press('4');
   await page.keyboard.press('.');
   await page.keyboard.press('g');
   await page.keyboard.press('m');
-  const weak = await page.evaluate(() => {
+  const findWeak = () => page.evaluate(() => {
     const parse = (text) => (text.match(/[\d.]+/g) ?? []).map(Number);
     const luminance = (rgb) => {
       const [r, g, b] =
@@ -652,7 +652,11 @@ test('text stands out from its background', async () => {
     }
     return found;
   });
-  assert.deepEqual(weak, []);
+  for (const colorScheme of ['light', 'dark']) {
+    await page.emulateMedia({colorScheme, reducedMotion: 'reduce'});
+    assert.deepEqual(await findWeak(), [], colorScheme);
+    await screenshot(page, `view-${colorScheme}`);
+  }
   assert.deepEqual(errors(), []);
   await page.close();
 });

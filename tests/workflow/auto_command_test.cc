@@ -196,6 +196,8 @@ TEST_F(AutoCommand, AChangedOptionIsRunAgainFromItsStepOn) {
   EXPECT_THAT(result.err, HasSubstr("align: done before"));
   EXPECT_EQ(TimeOf("aligned/images.bin"), aligned);
   EXPECT_NE(TimeOf("textured/model.ply"), model);
+  // The pictures are there, but of the texture before.
+  EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "unfinished");
 }
 
 TEST_F(AutoCommand, OneRunAtATime) {

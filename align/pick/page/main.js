@@ -79,7 +79,7 @@ function choosePhoto(id) {
     url: api.photoTile(id),
   });
   if (views.has(id)) [view.scale, view.centre, view.fitted] = views.get(id);
-  setText(byId('photo-name'), photo.name);
+  setText(byId('photo-name'), `\u200e${photo.name}`);
   showNotice();
   byId('photo-name').title = `${photo.name}, ${photo.width} x ${photo.height} pixels`;
   app.refresh();

@@ -28,6 +28,8 @@ export class Pane {
     new ResizeObserver(() => this.#resize()).observe(element);
     this.#watchRatio();
     store.onTile(() => this.redraw());
+    // The ground is drawn, too.
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.redraw());
     this.#listen();
     this.#resize();
   }
