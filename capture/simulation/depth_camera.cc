@@ -90,7 +90,8 @@ std::optional<DepthCamera::Echo> DepthCamera::Look(const Eigen::Vector3d& origin
   if (is_edge) {
     const double dice = random->Uniform();
     if (dice < kShareOfHoles) return std::nullopt;
-    if (dice < 2 * kShareOfHoles) echo.range = (hits[0].distance + hits[4].distance) / 2;
+    echo.mixed = dice < 2 * kShareOfHoles;
+    if (echo.mixed) echo.range = (hits[0].distance + hits[4].distance) / 2;
   }
   if (scene_.SurfaceOf(echo.hit.patch).kind != Surface::Kind::kOpaque) return std::nullopt;
   if (echo.range > kFarthest || std::abs(direction.dot(normal)) < kFlattest ||
@@ -117,9 +118,10 @@ DepthCamera::Vector6d DepthCamera::DriftAt(double theta, double phi) const {
   return drift;
 }
 
-Eigen::Vector3d DepthCamera::Drifted(const Eigen::Vector3d& x, double theta, double phi) const {
+std::pair<Eigen::Vector3d, Eigen::Vector3d> DepthCamera::Undrifted(double theta, double phi) const {
+  const Eigen::Vector3d direction = ScanGrid::Direction(theta, phi);
   const Vector6d drift = DriftAt(theta, phi) - mean_drift_;
-  return x + drift.head<3>() + drift.tail<3>().cross(x);
+  return {-drift.head<3>(), (direction - drift.tail<3>().cross(direction)).normalized()};
 }
 
 }  // namespace roomtex

@@ -4,6 +4,7 @@
 // the camera's tracking. Frames: `room`, `station` (x right, y up, z backward).
 
 #include <optional>
+#include <utility>
 
 #include <Eigen/Core>
 
@@ -20,14 +21,16 @@ class DepthCamera {
               const Rigid& room_from_station);
 
   struct Echo {
-    SceneHit hit;      // of what is shown: behind thin things the background
-    double range = 0;  // as measured
+    SceneHit hit;        // of what is shown: behind thin things the background
+    double range = 0;    // as measured
+    bool mixed = false;  // of the nearest and the farthest surface on an edge
   };
   // Along a ray of the room; nothing where the camera sees nothing.
   std::optional<Echo> Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                            double theta, double phi, RandomStream* random) const;
-  // To where the drift has put a point that was measured in this direction.
-  Eigen::Vector3d Drifted(const Eigen::Vector3d& x_in_station, double theta, double phi) const;
+  // The ray of the true room, in `station`, that shows what the drift has brought onto the ray of
+  // this direction: origin and direction.
+  std::pair<Eigen::Vector3d, Eigen::Vector3d> Undrifted(double theta, double phi) const;
 
  private:
   using Vector6d = Eigen::Matrix<double, 6, 1>;

@@ -25,14 +25,15 @@ RoomScanner::RoomScanner(const SimulatedRoomOptions& options, const RoomScene& s
 
 // Its intensity is what its own colour camera sees.
 ScanSample RoomScanner::MeasureByDepthCamera(double theta, double phi, RandomStream* random) const {
-  const Eigen::Vector3d in_station = ScanGrid::Direction(theta, phi);
+  const auto [origin, direction] = depth_camera_.Undrifted(theta, phi);
   ScanSample sample;
-  const auto echo = depth_camera_.Look(
-      room_from_station_.translation, room_from_station_.rotation * in_station, theta, phi, random);
+  const auto echo = depth_camera_.Look(room_from_station_ * origin,
+                                       room_from_station_.rotation * direction, theta, phi, random);
   if (!echo) return sample;
   sample.missing = false;
+  sample.floats = echo->mixed;
   sample.hit = echo->hit;
-  sample.x_in_station = depth_camera_.Drifted(std::max(echo->range, 0.01) * in_station, theta, phi);
+  sample.x_in_station = std::max(echo->range, 0.01) * ScanGrid::Direction(theta, phi);
   const double grey = scene_.Color(echo->hit).mean() * (1 + 0.02 * random->Gaussian());
   sample.intensity = static_cast<float>(std::clamp(std::round(4095 * grey), 1.0, 4095.0));
   return sample;

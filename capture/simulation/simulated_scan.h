@@ -14,6 +14,7 @@ namespace roomtex {
 
 struct ScanSample {
   bool missing = true;
+  bool floats = false;           // between surfaces, where nobody would click
   SceneHit hit;                  // where the ray met the room, without noise
   Eigen::Vector3d x_in_station;  // as measured
   float intensity = 0;           // 1..4095
