@@ -18,9 +18,13 @@ void Append(std::vector<std::string> more, std::vector<std::string>* all) {
 
 // Metres; model and scan that differ by less leave nothing to mend.
 constexpr double kSameShape = 0.01;
-// Where they differ by more, another lens has to bring them nearer by this factor, and to differ in
-// its focal length by so many standard deviations: distortion alone is too little to go by there.
-constexpr double kClearlyNearer = 0.95, kSameFocalDeviations = 3;
+// Where they differ by more, another lens has to differ from the one as told in its focal length by
+// so many standard deviations: distortion alone is too little to go by there. And it has to bring
+// them nearer by this factor, ...
+constexpr double kSameFocalDeviations = 3, kClearlyNearer = 0.95;
+// ... or the photos have to be this sure of its focal length. A scan that is itself off by
+// centimetres may lie a few per cent nearer to the wrong lens; it has to lie far nearer then.
+constexpr double kSureFocalDeviations = 6, kFarNearer = 0.6;
 
 double KeypointSigma(double reprojection_rms_px) {
   return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
@@ -135,18 +139,24 @@ double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& opti
 }
 
 // Photos that hardly move, or a camera model that lacks a term of the lens, let the photos find a
-// lens that is no better than the one they contradict. The scan has the last word: the better lens
-// brings the model clearly nearer to its shape.
+// lens that is no better than the one they contradict. Where model and scan differ in shape the
+// scan has a say then: the better lens brings the model nearer to it.
 bool ScanSpeaksForTold(const AlignmentInput& told, const LensCheck& lenses,
                        const AlignmentOptions& options, Progress* progress) {
   const double difference = ShapeDifference(WithLensesOf(lenses, told), options, progress);
   if (!(difference > kSameShape)) return false;
-  const bool same_focal =
-      std::all_of(lenses.lenses.begin(), lenses.lenses.end(), [](const LensFinding& lens) {
-        return !lens.used ||
-               (lens.told_alike && !lens.apart && lens.FocalDeviations() < kSameFocalDeviations);
-      });
-  return same_focal || kClearlyNearer * ShapeDifference(told, options, progress) < difference;
+  bool same_focal = true, sure_focal = false;
+  for (const LensFinding& lens : lenses.lenses) {
+    if (!lens.used) continue;
+    const bool told_otherwise = lens.told_alike && !lens.apart;
+    const double deviations = lens.FocalDeviations();
+    same_focal = same_focal && told_otherwise && deviations < kSameFocalDeviations;
+    sure_focal = sure_focal || (told_otherwise && deviations > kSureFocalDeviations);
+  }
+  if (same_focal) return true;
+  const double told_difference = ShapeDifference(told, options, progress);
+  return sure_focal ? told_difference < kFarNearer * difference
+                    : kClearlyNearer * told_difference < difference;
 }
 
 std::string KeepTold(LensCheck* lenses) {

@@ -125,7 +125,7 @@ std::vector<PickCandidate> FindPickCandidates(const RoomPhotos& photos, const Ro
       const int index = scanner.grid().Nearest(station_from_room * near_corner);
       if (index < 0) continue;
       const ScanSample sample = scanner.Measure(index);
-      if (sample.missing || sample.hit.patch != static_cast<int>(i)) continue;
+      if (sample.missing || sample.floats || sample.hit.patch != static_cast<int>(i)) continue;
       const auto x_in_img = photos.See(photo, sample.hit.point, patch.Normal());
       if (!x_in_img) continue;
       const Rigid pose = photos.poses[photo].At(x_in_img->y());

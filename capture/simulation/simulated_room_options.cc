@@ -139,6 +139,13 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       ->Number("azimuth_drift_deg", &azimuth_drift_deg,
                "error of the azimuth that grows to this over the full turn, degrees")
       .Within(-10, 10);
+  fields->Bool("depth_camera", &depth_camera,
+               "the scan is put together of the pictures of a depth camera that is carried around: "
+               "noise of range_noise * range^2, steps, holes, no thin things, drift");
+  fields
+      ->Number("depth_drift", &depth_drift,
+               "how far the tracking of a depth camera drifts, metres (rms per coordinate)")
+      .Within(0, 1, "m");
   fields->Bool("missing_samples", &missing_samples,
                "no echo from the window, the mirror and a few random samples");
   fields->Int("num_picks", &num_picks, "clicks in the photo that suits best").Within(0, 1000);

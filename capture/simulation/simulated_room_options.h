@@ -72,6 +72,10 @@ struct SimulatedRoomOptions {
   double range_noise_growth = 0;
   double bend = 0;  // ranges are too long or short by up to this fraction, smoothly changing
   double azimuth_drift_deg = 0;  // error of the azimuth that grows from 0 over the full turn
+  // The scan is put together of a depth camera's pictures (depth_camera.h); its noise is
+  // range_noise * range^2.
+  bool depth_camera = false;
+  double depth_drift = 0.02;  // metres per coordinate, rms: how far its tracking drifts
   // Picks.
   int num_picks = 6;
   double click_noise_px = 1.5;  // standard deviation per coordinate

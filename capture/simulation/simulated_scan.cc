@@ -14,39 +14,37 @@ constexpr double kFlattestEcho = 0.02;  // cosine of the flattest incidence that
 
 }  // namespace
 
-double ScanGrid::Theta(int column) const { return kPi * (2 * (column + 0.5) / num_columns - 1); }
-
-double ScanGrid::Phi(int row) const {
-  return RadFromDeg(kMaxPhiDeg - (kMaxPhiDeg - kMinPhiDeg) * (row + 0.5) / num_rows);
-}
-
-Eigen::Vector3d ScanGrid::Direction(double theta, double phi) {
-  return {std::sin(theta) * std::cos(phi), std::sin(phi), -std::cos(theta) * std::cos(phi)};
-}
-
-int ScanGrid::Nearest(const Eigen::Vector3d& x) const {
-  const double theta = std::atan2(x.x(), -x.z());
-  const double phi_deg = DegFromRad(std::atan2(x.y(), std::hypot(x.x(), x.z())));
-  const int column = static_cast<int>(std::floor((theta / kPi + 1) / 2 * num_columns));
-  const int row =
-      static_cast<int>(std::floor((kMaxPhiDeg - phi_deg) / (kMaxPhiDeg - kMinPhiDeg) * num_rows));
-  if (row < 0 || row >= num_rows) return -1;
-  return row * num_columns + std::clamp(column, 0, num_columns - 1);
-}
-
 RoomScanner::RoomScanner(const SimulatedRoomOptions& options, const RoomScene& scene, int station,
                          const Rigid& room_from_station)
     : options_(options),
       scene_(scene),
       station_(station),
       room_from_station_(room_from_station),
-      grid_{options.scan_columns, options.scan_rows} {}
+      grid_{options.scan_columns, options.scan_rows},
+      depth_camera_(options, scene, station, room_from_station) {}
+
+// Its intensity is what its own colour camera sees.
+ScanSample RoomScanner::MeasureByDepthCamera(double theta, double phi, RandomStream* random) const {
+  const auto [origin, direction] = depth_camera_.Undrifted(theta, phi);
+  ScanSample sample;
+  const auto echo = depth_camera_.Look(room_from_station_ * origin,
+                                       room_from_station_.rotation * direction, theta, phi, random);
+  if (!echo) return sample;
+  sample.missing = false;
+  sample.floats = echo->mixed;
+  sample.hit = echo->hit;
+  sample.x_in_station = std::max(echo->range, 0.01) * ScanGrid::Direction(theta, phi);
+  const double grey = scene_.Color(echo->hit).mean() * (1 + 0.02 * random->Gaussian());
+  sample.intensity = static_cast<float>(std::clamp(std::round(4095 * grey), 1.0, 4095.0));
+  return sample;
+}
 
 ScanSample RoomScanner::Measure(int index) const {
   RandomStream random(
       MixBits(MixBits(static_cast<uint64_t>(options_.random_seed), 301, station_), index));
   const double theta = grid_.Theta(index % grid_.num_columns);
   const double phi = grid_.Phi(index / grid_.num_columns);
+  if (options_.depth_camera) return MeasureByDepthCamera(theta, phi, &random);
   const Eigen::Vector3d direction = room_from_station_.rotation * ScanGrid::Direction(theta, phi);
   ScanSample sample;
   const auto hit = scene_.Cast(room_from_station_.translation, direction);

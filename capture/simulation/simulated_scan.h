@@ -4,29 +4,17 @@
 
 #include <vector>
 
+#include "capture/simulation/depth_camera.h"
 #include "capture/simulation/room_scene.h"
+#include "capture/simulation/scan_grid.h"
 #include "capture/simulation/simulated_room_options.h"
 #include "core/scan.h"
 
 namespace roomtex {
 
-// The grid of a station: theta increases with the column over the full turn, phi falls with the
-// row.
-struct ScanGrid {
-  int num_columns = 0, num_rows = 0;
-  static constexpr double kMinPhiDeg = -60, kMaxPhiDeg = 75;
-
-  double Theta(int column) const;
-  double Phi(int row) const;
-  // Thesis 5.1.1: x = sin(theta) cos(phi), y = sin(phi), z = -cos(theta) cos(phi).
-  static Eigen::Vector3d Direction(double theta, double phi);
-  // Index of the sample whose direction is nearest to that of a point in `station`, -1 outside the
-  // grid.
-  int Nearest(const Eigen::Vector3d& x_in_station) const;
-};
-
 struct ScanSample {
   bool missing = true;
+  bool floats = false;           // between surfaces, where nobody would click
   SceneHit hit;                  // where the ray met the room, without noise
   Eigen::Vector3d x_in_station;  // as measured
   float intensity = 0;           // 1..4095
@@ -42,11 +30,14 @@ class RoomScanner {
   ScanSample Measure(int index) const;
 
  private:
+  ScanSample MeasureByDepthCamera(double theta, double phi, RandomStream* random) const;
+
   const SimulatedRoomOptions& options_;
   const RoomScene& scene_;
   int station_;
   Rigid room_from_station_;
   ScanGrid grid_;
+  DepthCamera depth_camera_;
 };
 
 }  // namespace roomtex

@@ -497,6 +497,28 @@ TEST(Alignment, AWrongLensIsNoticedAndMended) {
   EXPECT_FALSE(usual.lenses.lenses[0].used);
 }
 
+// The scan of a depth camera whose tracking drifts by centimetres lies about as near to the model
+// of either lens: the photos, which are sure, are believed.
+TEST(Alignment, AScanThatDriftsDoesNotOutvoteThePhotosAboutTheirLens) {
+  SimulatedRoomOptions room = CaseOptions(1);
+  room.depth_camera = true;
+  SimulatedCase wrong = MakeCase(room, 6);
+  Camera& camera = wrong.model.cameras.begin()->second;
+  const double focal_length = camera.MeanFocalLength();
+  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.02;
+  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  const Alignment alignment = AlignCase(wrong);
+  EXPECT_GT(alignment.disagreement.rms, 0.015);
+  ASSERT_TRUE(alignment.lenses.mended) << testing::PrintToString(alignment.warnings);
+  EXPECT_NEAR(alignment.lenses.lenses[0].found.MeanFocalLength() / focal_length, 1, 0.003);
+  AlignmentOptions options;
+  options.refine_intrinsics = RefineIntrinsics::kNever;
+  const Alignment held = AlignCase(wrong, options);
+  EXPECT_LT(
+      WorstPoseErrors(*wrong.room, *alignment.lenses.mended, alignment.scan_from_sparse).position,
+      0.7 * WorstPoseErrors(*wrong.room, wrong.model, held.scan_from_sparse).position);
+}
+
 TEST(Alignment, FewFeaturesAreNotTrusted) {
   SimulatedCase one = MakeCase();
   SparseImage& image = one.model.images.at(one.model.FindImage(one.picks[0].image_name)->image_id);

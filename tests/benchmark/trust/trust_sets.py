@@ -20,11 +20,19 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from trust_table import multiply, read_truth  # noqa: E402
 
 MODELS = {"SIMPLE_RADIAL": 2, "PINHOLE": 1, "OPENCV": 4}
-SIFT = ["--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features", "4096"]
+SIFT = ["--SiftExtraction.use_gpu", "0"]
 SMALL = {"--num_photos": "16", "--photo_width": "1200", "--photo_height": "800", "--scan_columns": "1600",
          "--scan_rows": "600"}
 
-# Captures, each with a database of its own. Tuned on: those of seed 1. Never tuned on: the others.
+# Photos and scan of a depth camera that is carried around: small, blurred by the hand, in rows; a coarse scan.
+DEPTH_CAMERA = {"--num_photos": "22", "--photo_width": "640", "--photo_height": "480", "--photo_noise": "3",
+                "--blur_px": "0.6", "--rolling_shutter_ms": "15", "--scan_columns": "800", "--scan_rows": "340",
+                "--depth_camera": "1"}
+
+CLASSROOM = {"--bare_walls": "1", "--room_width": "7", "--room_depth": "6"}
+
+# Captures, each with a database of its own. Tuned on: those of seed 1, and of the depth camera those without "_twin".
+# Never tuned on: the others.
 ROOMS = {
     "s1": {"--random_seed": "1"},
     "s2": {"--random_seed": "2"},
@@ -36,7 +44,18 @@ ROOMS = {
     "bare": {"--random_seed": "8", "--bare": "1"},
     "bent": {"--random_seed": "9", "--bend": "0.005"},
     "two": {"--random_seed": "10", "--num_stations": "2"},
+    "lounge": {**DEPTH_CAMERA, "--random_seed": "21"},
+    "lounge_twin": {**DEPTH_CAMERA, "--random_seed": "22"},
+    "lounge_few": {**DEPTH_CAMERA, "--random_seed": "25", "--num_photos": "11"},
+    "lounge_few_twin": {**DEPTH_CAMERA, "--random_seed": "26", "--num_photos": "11"},
+    "lounge_rough": {**DEPTH_CAMERA, "--random_seed": "27", "--depth_drift": "0.04", "--range_noise": "0.004"},
+    "lounge_rough_twin": {**DEPTH_CAMERA, "--random_seed": "28", "--depth_drift": "0.04", "--range_noise": "0.004"},
+    "classroom": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "23"},
+    "classroom_twin": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "24"},
+    "bare_twin": {"--random_seed": "30", "--bare": "1"},
 }
+# Lenses told wrong, and held by the mapper or not.
+WRONG_LENSES = ["long1", "long2", "long3", "held2", "free"]
 
 
 def run(*command, **more):
@@ -45,7 +64,7 @@ def run(*command, **more):
                        **more)
 
 
-def make_database(photos, model, params, single):
+def make_database(photos, model, params, single, num_features=4096):
     if os.path.exists("matched"):
         return
     if os.path.exists("database.db"):
@@ -53,18 +72,19 @@ def make_database(photos, model, params, single):
     camera = ["--ImageReader.camera_model", model]
     camera += ["--ImageReader.single_camera", "1"] if single else []
     camera += ["--ImageReader.camera_params", params] if params else []
-    run("colmap", "feature_extractor", "--database_path", "database.db", "--image_path", photos, *camera, *SIFT)
+    run("colmap", "feature_extractor", "--database_path", "database.db", "--image_path", photos, *camera, *SIFT,
+        "--SiftExtraction.max_num_features", str(num_features))
     run("colmap", "exhaustive_matcher", "--database_path", "database.db", "--SiftMatching.use_gpu", "0")
     open("matched", "w").close()
 
 
-def map_photos(tools, database, photos, folder):
+def map_photos(tools, database, photos, folder, *options):
     if os.path.exists(os.path.join(folder, "0", "images.bin")):
         return
     shutil.rmtree(folder, ignore_errors=True)
     with open("log.txt", "a") as log:
         code = subprocess.run([os.path.join(tools, "roomtex-mapper"), "--database_path", database, "--image_path", photos,
-                               "--output_path", folder, "--quiet", "1"], stdout=log, stderr=log,
+                               "--output_path", folder, "--quiet", "1", *options], stdout=log, stderr=log,
                               env={**os.environ, "QT_QPA_PLATFORM": "offscreen"}).returncode
     print(os.getcwd(), folder, "mapper", code, flush=True)
 
@@ -120,31 +140,38 @@ def make_room(sets, tools, name):
     words = open("capture/camera_options.txt").read().split()
     params = words[words.index("--ImageReader.camera_params") + 1]
     model = words[words.index("--ImageReader.camera_model") + 1]
-    make_database("capture/photos", model, params, True)
+    is_small = "--depth_camera" in ROOMS[name]
+    make_database("capture/photos", model, params, True, 1500 if is_small else 4096)
     here = os.path.abspath("capture")
     scans = sorted(os.path.join(here, f) for f in os.listdir(here) if f.endswith(".rtpi"))
     common = dict(photos=here + "/photos", truth=here + "/truth/images.txt", picks=here + "/picks.csv", scans=scans)
     if os.path.exists(here + "/scan_poses.txt"):
         common["options"] = ["--scan_poses", here + "/scan_poses.txt"]
     map_photos(tools, "database.db", "capture/photos", "sparse")
-    right = {"big": 15, "blur": 15, "bent": 10, "bare": 10, "few": 6}.get(name, 6)
+    size = [int({**SMALL, **ROOMS[name]}[side]) for side in ("--photo_width", "--photo_height")]
+    right = {"big": 15, "blur": 15, "bent": 10, "bare": 10, "few": 6}.get(name, 60 if is_small else 6)
     write_case(sets, name, model=folder + "/sparse/0", right_mm=right, **common)
     variants = {
         "s1": ["long1", "long3", "long20", "each", "free"],
         "s2": ["long1", "long3", "each", "free"],
         "s3": ["long3", "each", "free"],
         "few": ["free"],
-        "bare": ["long2"],
+        "bare": ["long2", "held2"],
+        "bare_twin": ["long2", "held2"],
+        **{room: WRONG_LENSES for room in ROOMS if room.split("_")[0] in ("lounge", "classroom")},
     }
     for variant in variants.get(name, []):
-        database = variant + ".db"
+        database, options = variant + ".db", []
         if variant.startswith("long"):
             with_cameras(database, longer(float(variant[4:]) / 100))
+        elif variant.startswith("held"):
+            with_cameras(database, longer(float(variant[4:]) / 100))
+            options = ["--refine_intrinsics", "0"]
         elif variant == "each":
-            camera_per_photo(database, "SIMPLE_RADIAL", 1200, 800)
+            camera_per_photo(database, "SIMPLE_RADIAL", *size)
         else:
-            with_cameras(database, lambda p: ([1440.0, 1440.0, 600.0, 400.0, 0, 0, 0, 0], 0))
-        map_photos(tools, database, "capture/photos", "sparse_" + variant)
+            with_cameras(database, lambda p: ([1.2 * size[0]] * 2 + [size[0] / 2, size[1] / 2, 0, 0, 0, 0], 0))
+        map_photos(tools, database, "capture/photos", "sparse_" + variant, *options)
         write_case(sets, name + "_" + variant, model=folder + "/sparse_" + variant + "/0", right_mm=right, **common)
 
 
