@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 constexpr char kColmap38[] =
@@ -232,6 +233,20 @@ TEST(AutoOptions, SaysEveryProblem) {
   EXPECT_THAT(problems, Contains(HasSubstr("--camera_params needs --camera_model")));
   EXPECT_THAT(problems, Contains(HasSubstr("--only goes with neither")));
   EXPECT_THAT(problems, Contains(HasSubstr("--from is \"sparse\", expected one of frames")));
+}
+
+TEST(AutoOptions, StepsThatEndBeforeTheyBeginAndScansGivenTwiceAreSaid) {
+  AutoOptions options;
+  options.image_path = "photos";
+  options.scan_paths = {"a.e57", "b.e57"};
+  options.from = "align";
+  options.until = "align";
+  EXPECT_THAT(options.Problems(), IsEmpty());
+  options.until = "mapper";
+  options.scan_paths.push_back("a.e57");
+  const std::vector<std::string> problems = options.Problems();
+  EXPECT_THAT(problems, Contains(HasSubstr("--from align comes after --until mapper")));
+  EXPECT_THAT(problems, Contains(HasSubstr("--scan_path a.e57 is given twice")));
 }
 
 }  // namespace
