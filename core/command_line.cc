@@ -388,8 +388,8 @@ void Command::Impl::RequireReplaceableReport() const {
   if (!std::filesystem::is_regular_file(path, error)) return;
   const int first = std::ifstream(path, std::ios::binary).get();
   if (first == '{' || first == std::ifstream::traits_type::eof()) return;
-  throw InputError(path, "", "is there already and is no report",
-                   "Give another --report_path, or move the file away");
+  throw UsageError("--report_path " + path +
+                   " is there already and is no report. Give another --report_path");
 }
 
 // Before anything of the sets is put in its place.

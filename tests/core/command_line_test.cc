@@ -442,7 +442,7 @@ TEST_F(CommandReport, CopiesAreWrittenOnlyWhenTheCommandRanToItsEnd) {
 
 TEST_F(CommandReport, ReplacesAReportAndNothingElse) {
   WriteBytes(path_, "a thesis");
-  EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitInput);
+  EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitUsage);
   EXPECT_THAT(test_.err, HasSubstr("is there already and is no report"));
   EXPECT_EQ(ReadBytes(path_), "a thesis");
   for (const char* earlier : {"", "{}"}) {
