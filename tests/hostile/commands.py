@@ -13,6 +13,7 @@ class Line:
     line: str
     folder: str = None  # its files appear as a set
     unsteady: tuple = ()  # files and folders that hold times
+    again: bool = True  # over its own results; False: it replaces nothing
 
 
 ROOM = "--quiet --input_path room --image_path photos --accept_untrusted 1 "
@@ -45,7 +46,7 @@ LINES = [
     Line("merge", "roomtex-merge --quiet --database_path database.db --copy_path part.db "
          "--output_path merged.db"),
     Line("outline", "roomtex-outline --quiet --outline_path house.json --output_path outline.json "
-         "--model_path house.obj --model_path house.glb"),
+         "--model_path house.obj --model_path house.glb", again=False),
     Line("pairs", "roomtex-pairs --quiet --database_path database.db --output_path pairs.txt "
          "--graph_path graph.json"),
     Line("pattern", "roomtex-pattern --quiet --output_path pattern.png --width 320 --height 240"),

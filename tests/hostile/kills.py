@@ -114,7 +114,7 @@ def at_every_rename(base):
         if ONLY not in title:
             continue
         steady = lambda files: without(files, one.unsteady)
-        for old in (False, True):
+        for old in (False, True) if one.again else (False,):
             here = base.copy()
             inputs = here.state()
             if old:
