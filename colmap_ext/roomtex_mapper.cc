@@ -152,6 +152,11 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
 [[noreturn]] void ThrowNothingWorked(const std::string& database_path, const Json& trials) {
   std::string reasons;
   std::set<std::string> told;
+  bool colmap_fails = !trials.empty();  // no photo helps then
+  for (const Json& trial : trials) {
+    colmap_fails &=
+        trial["outcome"].get<std::string>().find("was killed by signal") != std::string::npos;
+  }
   constexpr size_t kNumShown = 3;
   for (size_t i = 0; i < trials.size() && i < kNumShown; ++i) {
     const std::string outcome = trials[i]["outcome"].get<std::string>();
@@ -165,7 +170,10 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
     reasons += "; and " + std::to_string(trials.size() - kNumShown) + " more pairs";
   }
   throw InputError(database_path, "", "gives no pair to start from" + reasons,
-                   "Add photos from other places that overlap well, or relax --Init.*");
+                   colmap_fails ? "This is COLMAP's own failure: give it more memory or threads "
+                                  "(ulimit -v, ulimit -u), or name another one with --colmap"
+                                : "Add photos from other places that overlap well, or relax "
+                                  "--Init.*");
 }
 
 // What becomes of a model beside photos with known poses.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <new>
 #include <optional>
@@ -25,6 +26,7 @@
 #include "core/parallel.h"
 #include "core/resource_limits.h"
 #include "core/signal_tidy.h"
+#include "core/standard_files.h"
 #include "core/version.h"
 
 namespace roomtex {
@@ -162,6 +164,7 @@ struct Command::Impl {
   void Parse(const std::vector<std::string>& arguments) const;
   Json MakeReport(const Report& report, const Progress& progress) const;
   [[noreturn]] void RefuseReportPath() const;
+  void RequireReplaceableReport() const;
   void CheckReportPath(const std::vector<SetWithReport>& sets) const;
   // Puts the sets and copies of a command that ran to its end in their places, and --report_path.
   void WriteReports(int exit_code, const Report& report, const Progress& progress) const;
@@ -376,6 +379,19 @@ void Command::Impl::RefuseReportPath() const {
                    " is a result of this command, which is kept. Give another --report_path");
 }
 
+// A slip of the finger must not put a report in the place of somebody's work.
+void Command::Impl::RequireReplaceableReport() const {
+  const std::string& path = common.report_path;
+  if (path.empty()) return;
+  RequireReplaceable(path);
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return;
+  const int first = std::ifstream(path, std::ios::binary).get();
+  if (first == '{' || first == std::ifstream::traits_type::eof()) return;
+  throw UsageError("--report_path " + path +
+                   " is there already and is no report. Give another --report_path");
+}
+
 // Before anything of the sets is put in its place.
 void Command::Impl::CheckReportPath(const std::vector<SetWithReport>& sets) const {
   const std::string& path = common.report_path;
@@ -415,20 +431,23 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
 }
 
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
+  OpenStandardFiles();
   CommonOptions& common = impl_->common;
   impl_->AddCommonOptions(this);
   const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   const std::string answer = impl_->Answer(arguments);
   if (!answer.empty()) {
     std::cout << answer;
-    return kExitDone;
+    return FlushAnswer(impl_->name) ? kExitDone : kExitInput;
   }
   Report report;
   std::optional<InputGuard> guard;
   try {
     impl_->Parse(arguments);
-    guard.emplace(impl_->PathsToGuard());
-    if (!common.report_path.empty()) RequireReplaceable(common.report_path);
+    const GuardedPaths paths = impl_->PathsToGuard();
+    RequireWorkingFolder(paths);
+    guard.emplace(paths);
+    impl_->RequireReplaceableReport();
   } catch (const UsageError& error) {
     std::cerr << impl_->name << ": " << error.what() << "\nSee " << impl_->name << " --help\n";
     return kExitUsage;
@@ -467,6 +486,9 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   if (written.exit_code != kExitDone) {
     std::cerr << impl_->name << ": " << written.failure << "\n";
     if (exit_code == kExitDone || exit_code == kExitUntrusted) exit_code = written.exit_code;
+  }
+  if (!FlushAnswer(impl_->name) && (exit_code == kExitDone || exit_code == kExitUntrusted)) {
+    exit_code = kExitInput;
   }
   return exit_code;
 }

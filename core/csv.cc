@@ -10,7 +10,6 @@ namespace {
 
 constexpr size_t kMaxLineLength = 64 * 1024;  // bytes; a longer line is none of a table
 constexpr int kMaxLinesOfField = 8;
-constexpr char kByteOrderMark[] = "\xef\xbb\xbf";
 
 std::string Field(const std::string& text) {
   if (text.find_first_of(",\"#\r\n") == std::string::npos && text == Trimmed(text)) return text;
@@ -37,7 +36,7 @@ bool CsvReader::NextLine(std::string* line) {
   }
   if (!std::getline(stream_, *line)) return false;
   ++lines_read_;
-  if (lines_read_ == 1 && line->rfind(kByteOrderMark, 0) == 0) line->erase(0, 3);
+  if (lines_read_ == 1) DropByteOrderMark(line);
   if (line->size() > kMaxLineLength || line->find('\0') != std::string::npos) {
     line_number_ = lines_read_;
     throw Error("is not a line of a text file", expected_);

@@ -14,6 +14,11 @@
 
 namespace roomtex {
 
+// What editors of Windows put before the first line of a text.
+inline void DropByteOrderMark(std::string* first_line) {
+  if (first_line->rfind("\xef\xbb\xbf", 0) == 0) first_line->erase(0, 3);
+}
+
 class CsvReader {
  public:
   // Throws InputError if the file cannot be opened; remedy: what to do if there is none. expected:

@@ -73,7 +73,7 @@ bool LooksLikeInput(const std::string& path) {
                                                ".ppm", ".pgm",  ".webp", ".jp2", ".exr",  ".hdr"};
   const std::string stem = fs::path(path).stem().string();
   static const std::set<std::string> models = {"cameras", "images", "points3D", "rigs", "frames"};
-  return photos.count(extension) > 0 ||
+  return photos.count(extension) > 0 || fs::path(path).filename() == "alignment.json" ||
          ((extension == ".bin" || extension == ".txt") && models.count(stem) > 0);
 }
 

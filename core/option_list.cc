@@ -13,6 +13,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/text.h"
@@ -144,6 +145,7 @@ std::vector<OptionList::Given> OptionList::ReadArguments(
   std::vector<std::string> reversed;  // CLI11 takes them from the back
   for (size_t i = arguments.size(); i-- > 0;) {
     const std::string& argument = arguments[i];
+    if (argument == "--") throw UsageError("\"--\" does not belong to an option");
     const bool is_last = i + 1 == arguments.size() || StartsWith(arguments[i + 1], "--");
     const Option* alone =
         is_last && StartsWith(argument, "--") ? Find(argument.substr(2)) : nullptr;
@@ -204,6 +206,11 @@ std::vector<OptionList::Given> OptionList::ReadProjectFile(const std::string& pa
   std::vector<Given> all;
   std::string line, section;
   for (long number = 1; std::getline(stream, line); ++number) {
+    if (number == 1) DropByteOrderMark(&line);
+    if (line.find('\0') != std::string::npos) {
+      throw InputError(path, LinePosition(number), "holds a zero byte, as text in UTF-16 does",
+                       "Save the file as UTF-8");
+    }
     line = Trimmed(line);
     if (line.empty() || line[0] == '#' || line[0] == ';') continue;
     const size_t equals = line.find('=');
@@ -218,7 +225,10 @@ std::vector<OptionList::Given> OptionList::ReadProjectFile(const std::string& pa
     }
     const std::string name = section + Trimmed(line.substr(0, equals));
     const std::string where = path + ": " + LinePosition(number) + ": ";
-    if (name == "project_path" || (Find(name) == nullptr && FindPassed("--" + name) == nullptr)) {
+    if (name == "project_path") {
+      throw UsageError(where + "project_path stands on the command line only");
+    }
+    if (Find(name) == nullptr && FindPassed("--" + name) == nullptr) {
       throw UsageError(where + Unknown(name));
     }
     all.push_back({name, {Trimmed(line.substr(equals + 1))}, where});

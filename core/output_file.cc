@@ -28,14 +28,16 @@ InputError NotWritable(const std::string& path, int error) {
 }
 
 // A link that stands for something that is already open, such as /dev/stdout, or a file that is no
-// regular one: never replaced.
+// regular one: never replaced. Not /dev/shm, which is a disk.
 bool IsDevice(const std::string& path) {
   struct stat there {};
   if (stat(path.c_str(), &there) == 0 && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode)) {
     return true;
   }
-  const std::string place = fs::absolute(path).lexically_normal().string();
-  return place.rfind("/dev/", 0) == 0 || place.rfind("/proc/", 0) == 0;
+  std::error_code error;
+  const fs::path parent = fs::path(path).parent_path();
+  const std::string folder = fs::weakly_canonical(parent.empty() ? "." : parent, error).string();
+  return folder == "/dev" || folder == "/proc" || folder.rfind("/proc/", 0) == 0;
 }
 
 // The new file is as readable as the old one was.

@@ -9,8 +9,8 @@
 namespace roomtex {
 
 // A file being written. Writes go to a file beside `path`; Commit() renames it to `path`; without
-// Commit() the file beside is removed and `path` is untouched. A link stays a link: the file it
-// leads to is replaced. What is no regular file (/dev/stdout, a pipe) is written to directly.
+// Commit() the file beside is removed and `path` is untouched. A link is replaced, not followed.
+// What is no regular file (/dev/stdout, a pipe) is written to directly.
 class OutputFile {
  public:
   // Throws InputError (path, what hinders, remedy) if the file cannot be written; makes no folders.

@@ -17,8 +17,16 @@
 namespace roomtex {
 namespace {
 
-constexpr int kTidySignals[] = {SIGINT, SIGTERM, SIGHUP};
-struct sigaction actions_before[3];
+struct TidySignal {
+  int number;
+  const char* name;
+  struct sigaction action_before;
+};
+// SIGPIPE: who read what we tell is gone.
+TidySignal tidy_signals[] = {{SIGINT, "SIGINT", {}},
+                             {SIGTERM, "SIGTERM", {}},
+                             {SIGHUP, "SIGHUP", {}},
+                             {SIGPIPE, "SIGPIPE", {}}};
 std::atomic<int> tidy_descriptor{-1};
 
 extern "C" void PassSignalOn(int signal) {
@@ -35,11 +43,11 @@ void StopBySignal(const std::string& command, int signal) {
   std::string kept = written.empty() ? "nothing was written, and what was there is unchanged"
                                      : "written to its end before that:";
   for (const std::string& path : written) kept += " " + path;
-  std::fprintf(stderr, "\n%s: stopped by %s; %s\n", command.c_str(),
-               signal == SIGINT   ? "SIGINT"
-               : signal == SIGHUP ? "SIGHUP"
-                                  : "SIGTERM",
-               kept.c_str());
+  const char* name = "a signal";
+  for (const TidySignal& one : tidy_signals) {
+    if (one.number == signal) name = one.name;
+  }
+  std::fprintf(stderr, "\n%s: stopped by %s; %s\n", command.c_str(), name, kept.c_str());
   DieBySignal(signal);
 }
 
@@ -62,16 +70,16 @@ SignalTidy::SignalTidy(const std::string& command) {
   action.sa_handler = PassSignalOn;
   action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);  // the second one kills
   sigemptyset(&action.sa_mask);
-  for (int i = 0; i < 3; ++i) {
-    sigaction(kTidySignals[i], nullptr, &actions_before[i]);
-    if (actions_before[i].sa_handler == SIG_IGN) continue;
-    sigaction(kTidySignals[i], &action, nullptr);
+  for (TidySignal& one : tidy_signals) {
+    sigaction(one.number, nullptr, &one.action_before);
+    if (one.action_before.sa_handler == SIG_IGN) continue;
+    sigaction(one.number, &action, nullptr);
   }
 }
 
 SignalTidy::~SignalTidy() {
   if (waiting_.joinable()) {
-    for (int i = 0; i < 3; ++i) sigaction(kTidySignals[i], &actions_before[i], nullptr);
+    for (const TidySignal& one : tidy_signals) sigaction(one.number, &one.action_before, nullptr);
     const unsigned char none = 0;
     (void)!write(ends_[1], &none, 1);
     waiting_.join();

@@ -1,5 +1,6 @@
 #pragma once
-// A command that SIGINT, SIGTERM or SIGHUP ends leaves nothing half done, and says what is there.
+// A command that SIGINT, SIGTERM, SIGHUP or SIGPIPE ends leaves nothing half done, and says what is
+// there.
 
 #include <string>
 #include <thread>

@@ -85,6 +85,16 @@ std::vector<std::string> AutoOptions::Problems() const {
   RequireStepName("from", from, &problems);
   RequireStepName("until", until, &problems);
   RequireStepName("only", only, &problems);
+  const std::vector<std::string> names = StepNames();
+  const auto last = std::find(names.begin(), names.end(), until);
+  if (last != names.end() && std::find(last + 1, names.end(), from) != names.end()) {
+    problems.push_back("--from " + from + " comes after --until " + until + ": nothing would run");
+  }
+  for (size_t i = 0; i < scan_paths.size(); ++i) {
+    if (std::count(scan_paths.begin(), scan_paths.begin() + static_cast<long>(i), scan_paths[i])) {
+      problems.push_back("--scan_path " + scan_paths[i] + " is given twice");
+    }
+  }
   return problems;
 }
 

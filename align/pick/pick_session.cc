@@ -2,12 +2,10 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <tuple>
 
 #include "core/error.h"
-#include "core/output_file.h"
 
 namespace roomtex {
 namespace {
@@ -49,34 +47,24 @@ void RefuseDuplicates(const std::vector<SessionPick>& picks) {
   }
 }
 
-void CopyFile(const std::string& from, const std::string& to) {
-  std::ifstream in(from, std::ios::binary);
-  if (!in) throw InputError(from, "", "cannot be read", "Check that you may read it");
-  OutputFile out(to);
-  if (in.peek() != std::ifstream::traits_type::eof()) out.stream() << in.rdbuf();
-  out.Commit();
-}
-
 }  // namespace
 
 PickSession::PickSession(const PickScene& scene, const std::string& picks_path)
-    : scene_(scene), picks_path_(picks_path), solver_(scene) {
+    : scene_(scene), file_(picks_path), solver_(scene) {
   Read();
 }
 
 void PickSession::Read() {
   Snapshot snapshot;
-  if (std::filesystem::exists(picks_path_)) {
-    const std::vector<Pick> picks = ReadPicks(picks_path_);
-    CheckPickNames(picks_path_, picks, scene_.model(),
+  if (std::filesystem::exists(picks_path())) {
+    const std::vector<Pick> picks = ReadPicks(picks_path());
+    CheckPickNames(picks_path(), picks, scene_.model(),
                    scene_.has_model() ? "in the sparse model" : "among those of --image_path");
     for (const Pick& pick : picks) {
       SessionPick one{pick.image_name, pick.x_in_img, pick.x_in_scan, {}, pick.weight, pick.label};
       one.spot = SpotOf(scene_, pick.x_in_scan);
       snapshot.picks.push_back(one);
     }
-  } else {
-    backed_up_ = true;  // there is nothing to keep
   }
   SolveInto(&snapshot);
   Publish(std::move(snapshot));
@@ -145,7 +133,7 @@ bool PickSession::SaveAgain() {
   return Publish(std::move(next))->saved;
 }
 
-// "" or why the picks could not be saved. The file that was there before this session is kept.
+// "" or why the picks could not be saved.
 std::string PickSession::Save(const std::vector<SessionPick>& picks) {
   std::vector<Pick> complete;
   for (const SessionPick& pick : picks) {
@@ -154,11 +142,7 @@ std::string PickSession::Save(const std::vector<SessionPick>& picks) {
         {pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight, pick.label});
   }
   try {
-    if (!backed_up_ && std::filesystem::exists(picks_path_)) {
-      CopyFile(picks_path_, picks_path_ + ".bak");
-    }
-    backed_up_ = true;
-    WritePicks(picks_path_, complete);
+    file_.Save([&] { WritePicks(picks_path(), complete); });
   } catch (const std::exception& error) {
     return std::string("The picks could not be saved: ") + error.what();
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "align/pick/pick_solution.h"
+#include "core/saved_file.h"
 
 namespace roomtex {
 
@@ -26,7 +27,7 @@ class PickSession {
   // not belong to the model.
   PickSession(const PickScene& scene, const std::string& picks_path);
 
-  const std::string& picks_path() const { return picks_path_; }
+  const std::string& picks_path() const { return file_.path(); }
   std::shared_ptr<const Snapshot> Now() const;
   // Solves again once what is made in the background stands; the revision stays.
   std::shared_ptr<const Snapshot> Refresh();
@@ -45,10 +46,9 @@ class PickSession {
   void SolveInto(Snapshot* snapshot);
 
   const PickScene& scene_;
-  const std::string picks_path_;
+  SavedFile file_;
   std::mutex changing_;  // one change at a time; held while solving
   PickSolver solver_;
-  bool backed_up_ = false;
   mutable std::mutex mutex_;  // of now_, held briefly
   std::shared_ptr<const Snapshot> now_;
 };

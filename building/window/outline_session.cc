@@ -35,7 +35,10 @@ Json SolidJson(const OutlineBuilding& building) {
 
 OutlineSession::OutlineSession(const OutlineWindowInput& input, OutlineCloud cloud,
                                std::vector<PlaneSegment> segments)
-    : input_(input), cloud_(std::move(cloud)), segments_(std::move(segments)) {
+    : input_(input),
+      file_(input.output_path),
+      cloud_(std::move(cloud)),
+      segments_(std::move(segments)) {
   const bool goes_on = std::filesystem::exists(input_.output_path);
   if (goes_on || !input_.outline_path.empty()) {
     outline_ = ReadOutline(goes_on ? input_.output_path : input_.outline_path);
@@ -43,7 +46,6 @@ OutlineSession::OutlineSession(const OutlineWindowInput& input, OutlineCloud clo
   } else {
     outline_ = ProposeOutline(cloud_, segments_, input_.proposal).outline;
   }
-  backed_up_ = !goes_on;
   if (!goes_on) Save(input_.outline_path.empty());
   if (!save_error_.empty()) throw InputError(input_.output_path, "", save_error_, "");
 }
@@ -225,18 +227,14 @@ Json OutlineSession::WriteModels() {
 
 OutlineProposal OutlineSession::Judged() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (!save_error_.empty()) Save(false);  // a disk that was full may have space again
   if (!save_error_.empty()) throw InputError(input_.output_path, "", save_error_, "");
   return JudgeOutline(cloud_, segments_, outline_);
 }
 
 void OutlineSession::Save(bool proposed) {
   try {
-    if (!backed_up_) {
-      std::filesystem::copy_file(input_.output_path, input_.output_path + ".bak",
-                                 std::filesystem::copy_options::overwrite_existing);
-    }
-    backed_up_ = true;
-    WriteOutline(input_.output_path, outline_, proposed);
+    file_.Save([&] { WriteOutline(input_.output_path, outline_, proposed); });
     save_error_.clear();
   } catch (const std::exception& error) {
     save_error_ = std::string("the buildings could not be saved: ") + error.what();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "building/window/outline_window.h"
+#include "core/saved_file.h"
 
 namespace roomtex {
 
@@ -41,13 +42,13 @@ class OutlineSession {
   void Save(bool proposed);
 
   const OutlineWindowInput input_;
+  SavedFile file_;
   std::mutex mutex_;
   OutlineCloud cloud_;
   std::vector<PlaneSegment> segments_;
   Outline outline_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the points as they are sent
   int revision_ = 1, points_revision_ = 1;
-  bool backed_up_ = false;
   std::string save_error_;
 };
 

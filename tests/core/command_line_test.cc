@@ -1,11 +1,17 @@
 #include "core/command_line.h"
 
+#include <cstdio>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "core/error.h"
+#include "core/output_file.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -208,6 +214,7 @@ TEST(CommandLine, WrongOptionsAreUsageErrors) {
   ExpectUsageError({"--count", "3", "--count", "4"}, "--count is given twice");
   ExpectUsageError({"--input_path", "other"}, "--input_path is given twice");
   ExpectUsageError({"--output_path="}, "--output_path needs a value");
+  ExpectUsageError({"--"}, "\"--\" does not belong to an option");
   ExpectUsageError({"--num_threads", "0"}, "--num_threads must be -1 (all) or positive");
   ExpectUsageError({"--num_threads", "-2"}, "--num_threads must be -1 (all) or positive");
 }
@@ -311,7 +318,15 @@ TEST_F(ProjectFile, MistakesAreNamedWithTheirLine) {
   EXPECT_EQ(Run("input_path=in\ncount=3\ncount=4\n"), kExitUsage);
   EXPECT_THAT(test_.err, HasSubstr("--count is given twice"));
   EXPECT_EQ(Run("input_path=in\nproject_path=other.ini\n"), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr("line 2: project_path stands on the command line only"));
+  EXPECT_EQ(Run(std::string("i\0n\0", 4)), kExitInput);
+  EXPECT_THAT(test_.err, HasSubstr("line 1: holds a zero byte, as text in UTF-16 does"));
   EXPECT_EQ(test_.num_runs, 0);
+}
+
+TEST_F(ProjectFile, MayComeFromWindows) {
+  EXPECT_EQ(Run("\xef\xbb\xbfinput_path=in\r\ncount=3\r\n"), kExitDone);
+  EXPECT_EQ(test_.count, 3);
 }
 
 TEST_F(ProjectFile, MissingFileIsAnInputError) {
@@ -425,6 +440,18 @@ TEST_F(CommandReport, CopiesAreWrittenOnlyWhenTheCommandRanToItsEnd) {
   EXPECT_EQ(ReadBytes(copy), ReadBytes(path_));
 }
 
+TEST_F(CommandReport, ReplacesAReportAndNothingElse) {
+  WriteBytes(path_, "a thesis");
+  EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitUsage);
+  EXPECT_THAT(test_.err, HasSubstr("is there already and is no report"));
+  EXPECT_EQ(ReadBytes(path_), "a thesis");
+  for (const char* earlier : {"", "{}"}) {
+    WriteBytes(path_, earlier);
+    EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitDone);
+    EXPECT_THAT(ReadBytes(path_), HasSubstr("roomtex-test"));
+  }
+}
+
 TEST_F(CommandReport, UnwritableReportIsSaid) {
   EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", folder_ / "no/such/folder.json"}),
             kExitInput);
@@ -445,6 +472,66 @@ TEST(CommandLine, QuietSaysErrorsButNothingElse) {
                      [](const Command::Context&) { throw InputError("in", "", "is odd", ""); }),
             kExitInput);
   EXPECT_EQ(test.err, "roomtex-test: in: is odd.\n");
+}
+
+// The command in a process of its own, whose standard output is what `prepare` makes of it.
+int ExitCodeWith(const std::function<void()>& prepare, const std::string& output_path = "") {
+  const pid_t child = fork();
+  if (child == 0) {
+    prepare();
+    Command command("roomtex-test", "Tests.", "roomtex-test");
+    char name[] = "roomtex-test";
+    char* arguments[] = {name};
+    const int code = command.Run(1, arguments, [&](const Command::Context&) {
+      std::printf("the answer\n");
+      if (output_path.empty()) return;
+      OutputFile file(output_path);
+      std::fflush(stdout);
+      file.stream() << "the file";
+      file.Commit();
+    });
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST(CommandLine, AnAnswerThatCannotBeWrittenIsNoEndWithZero) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  EXPECT_EQ(ExitCodeWith([] { dup2(open("/dev/full", O_WRONLY), STDOUT_FILENO); }), kExitInput);
+  EXPECT_EQ(ExitCodeWith([] { dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO); }), kExitDone);
+}
+
+TEST(CommandLine, WhatIsToldDoesNotGetIntoFilesIfStandardFilesAreClosed) {
+  const TempFolder folder;
+  const std::string path = folder / "file";
+  EXPECT_EQ(ExitCodeWith(
+                [] {
+                  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) close(file);
+                },
+                path),
+            kExitDone);
+  EXPECT_EQ(ReadBytes(path), "the file");
+}
+
+TEST(CommandLine, AFolderThatIsGoneIsSaid) {
+  const TempFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {
+    std::filesystem::create_directory(folder / "gone");
+    std::filesystem::current_path(folder / "gone");
+    std::filesystem::remove(folder / "gone");
+    TestCommand relative, absolute;
+    const bool is_said = relative.Run({"--input_path", "in"}) == kExitInput &&
+                         relative.err.find(
+                             "in: is looked for in the folder that you work in, "
+                             "which is gone") != std::string::npos;
+    _exit(is_said && absolute.Run({"--input_path", "/in"}) == kExitDone ? 0 : 1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
 }
 
 }  // namespace

@@ -54,6 +54,8 @@ TEST_F(InputGuardTest, KnowsAnInputByAnyName) {
 TEST_F(InputGuardTest, KnowsPhotosInAFolderAndLeavesTheRest) {
   EXPECT_THAT(Refusal(photos + "/sub/a.JPG", photos), HasSubstr("is a file of the input --input"));
   EXPECT_EQ(Refusal(photos + "/notes.json", photos), "");
+  WriteBytes(photos + "/alignment.json", "{}");
+  EXPECT_THAT(Refusal(photos + "/alignment.json", photos), HasSubstr("is a file of the input"));
   EXPECT_EQ(Refusal(photos + "/new.png", photos), "");
 }
 

@@ -193,6 +193,18 @@ TEST(OutputFile, DevicesAndPipesStayWhatTheyAre) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
+TEST(OutputFile, AFolderBelowDevIsADiskAsAnyOther) {
+  if (access("/dev/shm", W_OK) != 0) GTEST_SKIP() << "this system has no /dev/shm";
+  const std::string path = "/dev/shm/roomtex_output_file_test_" + std::to_string(getpid());
+  {
+    OutputFile file(path);
+    file.stream() << "new";
+    file.Commit();
+  }
+  EXPECT_EQ(ReadBytes(path), "new");
+  fs::remove(path);
+}
+
 TEST(OutputFile, FullDiskIsSaid) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
   OutputFile file("/dev/full");

@@ -4,6 +4,7 @@ import os
 import shutil
 
 import scene as s
+from commands import LINES, prepared
 
 
 def cases():
@@ -153,5 +154,43 @@ def run(base):
         yield title, problem
 
 
+def inputs_of(root, words):
+    """Values of options that are there: files, and of a folder the folder and its first file."""
+    for value in dict.fromkeys(words[1:]):
+        path = root / value
+        if value.startswith("-") or not path.exists() or value == ".":
+            continue
+        yield value
+        if path.is_dir():
+            yield os.path.relpath(next(p for p in sorted(path.rglob("*")) if p.is_file()), root)
+
+
+def every(base):
+    """Each option of every command that names an output, with each of its inputs."""
+    base = prepared(base)
+    for one in LINES:
+        words = one.line.split()
+        outputs = {name for name, value in zip(words, words[1:])
+                   if name.endswith("_path") and not (base.root / value).exists()}
+        for name in sorted(outputs | {"--report_path"}):
+            for value in inputs_of(base.root, words):
+                line = list(words)
+                if name in line:
+                    line[line.index(name) + 1] = value
+                else:
+                    line += [name, value]
+                here = base.copy()
+                before = here.state()
+                answer = here.run(line)
+                after = here.state()
+                changed = [file for file in before if after.get(file) != before[file]]
+                # A folder may get results beside what it holds.
+                is_folder = (base.root / value).is_dir()
+                problem = answer.problem({0, 2, 3, 4} if is_folder else {2, 3})
+                if changed:
+                    problem = f"changed {changed[:3]}; " + problem
+                yield f"{one.title} {name} {value} ({answer.code})", problem
+
+
 if __name__ == "__main__":
-    s.main({"inputs": run})
+    s.main({"inputs": run, "every_input": every})

@@ -10,64 +10,30 @@ import subprocess
 import time
 
 import scene as s
+from commands import LINES, Line, is_unsteady, prepared
 
 LIBRARY = os.environ.get("ROOMTEX_DIE_AT_RENAME", "")
-
-
-def prepared(base):
-    """What mapper, calibrate and auto read, too."""
-    here = base.copy()
-    s.write_matches(here.root)
-    s.write_boards(here.root / "boards")
-    for folder in ("planes", "reports", "meshes", "clouds", "cover", "copies", "result/sparse"):
-        (here.root / folder).mkdir(parents=True)
-    for name in ("0", "init"):
-        shutil.copytree(here.root / "sparse", here.root / "result/sparse" / name)
-    shutil.copy(here.root / "database.db", here.root / "result")
-    s.write_stations(here.root)
-    coloured = here.run(s.TEXTURE + " --output_path coloured --E57.images 1")
-    assert not coloured.problem({0, 4}), coloured.err
-    return here
+ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
 
 
 def commands():
-    # title, command line, the folder (or files) that appears as a set
-    yield "align", s.ALIGN + " --output_path aligned", "aligned"
-    yield "align in the folder that one works in", s.ALIGN + " --output_path .", None
-    yield "align into three folders", (s.ALIGN + " --output_path aligned --Plane.output_path "
-                                       "planes/planes.ply --report_path reports/r.json"), "aligned"
-    yield "texture", s.TEXTURE + " --output_path textured", "textured"
-    yield "texture by stations", (
+    """All of them, and further ones whose files lie in several folders."""
+    yield from LINES
+    yield Line("align in the folder that one works in", s.ALIGN + " --output_path .", None,
+               ("alignment.json",))
+    yield Line("align into three folders", (
+        s.ALIGN + " --output_path aligned --Plane.output_path planes/planes.ply --report_path "
+        "reports/r.json"), "aligned", ("aligned/alignment.json", "reports/r.json"))
+    yield Line("texture by stations", (
         "roomtex-texture --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
         "--scan_path other.rtpi --scan_poses poses.txt --Texture.scale 1 --output_web 0 "
-        "--output_path textured --max_samples 9000"), None  # a set for each station
-    yield "view", ("roomtex-view --quiet --input_path coloured --aligned sparse --image_path photos "
-                   "--output_path page"), "page"
-    yield "import photos of an E57", ("roomtex-import --quiet --input_path coloured/model.e57 "
-                                      "--images_path taken --E57.picks 1"), "taken"
-    yield "import", ("roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"), None
-    yield "import into three folders", (
+        "--output_path textured --max_samples 9000"), None,  # a set for each station
+        ("textured/report.json",))
+    yield Line("import photos of an E57", "roomtex-import --quiet --input_path coloured/model.e57 "
+               "--images_path taken --E57.picks 1", "taken")
+    yield Line("import into three folders", (
         "roomtex-import --quiet --input_path scan.rtpi --output_path meshes/room.ply "
-        "--output_path clouds/room.pcd --report_path reports/r.json"), None
-    yield "simulate", ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
-                       "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0"), None
-    yield "associate", ("roomtex-associate --quiet --database_path database.db --image_path photos "
-                        "--output_path pairs.csv --links_path links"), "links"
-    yield "mapper", ("roomtex-mapper --quiet --database_path database.db --image_path photos "
-                     "--output_path mapped"), "mapped"
-    yield "calibrate into three folders", (
-        "roomtex-calibrate --quiet --image_path boards --board 6x4 --output_path camera.txt "
-        "--coverage_path cover/coverage.png --apply database.db --apply_output copies/copy.db "
-        "--report_path reports/r.json"), None
-    yield "auto", ("roomtex-auto --quiet --image_path photos --scan_path scan.rtpi --picks_path "
-                   "picks.csv --output_path result --only align --quality low "
-                   "--accept_untrusted 1"), None
-
-
-# They hold times.
-VOLATILE = {"page/report.json", "aligned/alignment.json", "textured/report.json", "alignment.json", "reports/r.json",
-            "mapped/roomtex-mapper.log", "mapped/0/roomtex-mapper.json", "result/aligned/alignment.json",
-            "result/steps.json", "result/report.json", "result/report.html"}
+        "--output_path clouds/room.pcd --report_path reports/r.json"), None, ("reports/r.json",))
 
 
 def at_random(base, num_kills=30):
@@ -136,16 +102,19 @@ def below(state, folder):
     return {name: content for name, content in state.items() if name.startswith(folder + "/")}
 
 
-def steady(files):
-    return {name: content for name, content in files.items()
-            if name not in VOLATILE and not name.startswith("result/log/")}
+def without(files, unsteady):
+    return {name: content for name, content in files.items() if not is_unsteady(name, unsteady)}
 
 
 def at_every_rename(base):
     """First over nothing, then over the results of another run."""
     base = prepared(base)
-    for title, line, folder in commands():
-        for old in (False, True):
+    for one in commands():
+        title, line, folder = one.title, one.line, one.folder
+        if ONLY not in title:
+            continue
+        steady = lambda files: without(files, one.unsteady)
+        for old in (False, True) if one.again else (False,):
             here = base.copy()
             inputs = here.state()
             if old:
@@ -228,7 +197,10 @@ def by_signals(base):
 def full_disk(base):
     """A limit of the size of files stands for the full disk: writing fails in the same places."""
     base = prepared(base)
-    for title, line, folder in commands():
+    for one in commands():
+        title, line = one.title, one.line
+        if ONLY not in title:
+            continue
         for limit in (0, 2000, 20000):
             here = base.copy()
             before = here.state()

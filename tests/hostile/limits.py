@@ -8,27 +8,18 @@ import struct
 import time
 
 import scene as s
+from commands import LINES, prepared
 
 FEW_THREADS = os.environ.get("ROOMTEX_FEW_THREADS", "")
-
-
-def commands():
-    yield "import", "roomtex-import --quiet --input_path scan.rtpi --output_path room.ply"
-    yield "align", s.ALIGN + " --image_path photos --output_path aligned"
-    yield "texture", s.TEXTURE + " --output_path textured"
-    yield "associate", ("roomtex-associate --quiet --database_path database.db --image_path photos "
-                        "--output_path pairs.csv")
-    yield "calibrate", ("roomtex-calibrate --quiet --image_path photos --board 9x6 --square 0.025 "
-                        "--output_path camera.txt")
-    yield "pattern", "roomtex-pattern --quiet --output_path pattern.png"
-    yield "mapper", ("roomtex-mapper --quiet --database_path database.db --image_path photos "
-                     "--output_path mapped")
-    yield "simulate", ("roomtex-simulate --quiet --output_path new --num_photos 2 --photo_width 64 "
-                       "--photo_height 64 --scan_columns 40 --scan_rows 20 --furnished 0")
+ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
 
 
 def memory(base):
-    for title, line in commands():
+    base = prepared(base)
+    for one in LINES:
+        title, line = one.title, one.line
+        if ONLY not in title:
+            continue
         problem, refused = "", 0
         for megabytes in (150, 200, 250, 300, 350, 400, 500, 600, 800, 1200):
             limits = [(resource.RLIMIT_AS, megabytes << 20)]
@@ -51,14 +42,21 @@ def memory(base):
 
 
 def threads(base):
-    for title, line in commands():
+    base = prepared(base)
+    for one in LINES:
+        title, line = one.title, one.line
+        if ONLY not in title:
+            continue
         expected = base.copy()
         code = expected.run(line).code
         for at_most in (0, 1, 3):
             here = base.copy()
             answer = here.run(line + " --num_threads 8", environment={
                 "LD_PRELOAD": FEW_THREADS, "THREADS_AT_MOST": str(at_most)})
-            yield f"{title} with {at_most} threads more", answer.problem({code})
+            # COLMAP aborts without a thread; what it said is quoted.
+            is_colmap = answer.code == 3 and "COLMAP's own failure" in answer.err
+            yield (f"{title} with {at_most} threads more",
+                   "" if is_colmap else answer.problem({code}))
         here = base.copy()
         yield f"{title} --num_threads 100000", here.run(line + " --num_threads 100000").problem(
             {code})

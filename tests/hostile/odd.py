@@ -3,10 +3,10 @@
 import json
 import os
 import shlex
-import shutil
 import socket
 
 import scene as s
+from commands import FLAT, prepared
 
 ALIGN = s.ALIGN + " --output_path aligned"
 TEXTURE = s.TEXTURE + " --output_path textured"
@@ -51,12 +51,6 @@ PICTURE = ("roomtex-render --quiet --glb_path coloured/model.glb --input_path sp
 MERGE = ("roomtex-merge --quiet --database_path database.db --copy_path part.db "
          "--output_path merged.db")
 SITE = "roomtex-site --quiet --input_path . --output_path site.html"
-FLAT = {"format": "roomtex outline", "version": 1, "metric": True,
-        "outline_from_input": {"scale": 1, "rotation_wxyz": [1, 0, 0, 0], "translation": [0, 0, 0]},
-        "geo_origin": None,
-        "buildings": [{"name": "a", "ground": 0, "footprint": [[0, 0], [8, 0], [8, 5], [0, 5]],
-                       "roof": [{"point": [0, 0, 3], "slope_deg": 0, "downhill_deg": 0}]}]}
-
 
 def write(name, content):
     def change(root):
@@ -348,21 +342,6 @@ def places():
            {2})
     yield ("evaluate: photos of other names", text("sparse/images.txt", "photo_", "other_", -1),
            EVALUATE, {3, 4})
-
-
-def prepared(base):
-    """The scene with results of roomtex-align and roomtex-texture, boards and parts of a site."""
-    here = base.copy()
-    s.write_boards(here.root / "boards")
-    shutil.copy(here.root / "database.db", here.root / "part.db")
-    s.write_stations(here.root)
-    (here.root / "hall").mkdir()
-    (here.root / "hall/steps.json").write_text('{"steps": {}}')
-    for line in (s.ALIGN + " --image_path photos --output_path room",
-                 s.TEXTURE + " --output_path coloured --E57.images 1"):
-        answer = here.run(line)
-        assert not answer.problem({0, 4}), answer.err
-    return here
 
 
 def bad_number_cases():

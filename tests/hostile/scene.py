@@ -4,6 +4,7 @@ import hashlib
 import math
 import os
 import pathlib
+import random
 import resource
 import shutil
 import signal
@@ -59,13 +60,20 @@ class Scene:
         shutil.copytree(self.root, scene.root, dirs_exist_ok=True, symlinks=True)
         return scene
 
-    def run(self, line, limits=(), environment=None, seconds=SECONDS, stdin=None):
+    def run(self, line, **how):
+        """A command of ours; see run_program()."""
         arguments = line.split() if isinstance(line, str) else list(line)
         arguments[0] = str(self.programs / arguments[0])
+        return self.run_program(arguments, **how)
 
+    def run_program(self, arguments, limits=(), environment=None, seconds=SECONDS, stdin=None,
+                    prepare=None):
+        """prepare: called in the process before the program is."""
         def limit():
             for what, value in limits:
                 resource.setrlimit(what, (value, value))
+            if prepare:
+                prepare()
 
         process = subprocess.Popen(
             arguments, cwd=self.root, stdin=stdin or subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -244,10 +252,16 @@ def write_matches(root):
     ids = dict(database.execute("SELECT name, image_id FROM images"))
     seen = {}
     for fields, observed in images:
-        image = ids[fields[9]]
+        name = fields[9]
+        image = ids[name]
         data = b"".join(struct.pack("<2f", float(observed[i]), float(observed[i + 1]))
                         for i in range(0, len(observed), 3))
         database.execute("INSERT INTO keypoints VALUES (?, ?, 2, ?)",
+                         (image, len(observed) // 3, data))
+        # Of a point the same in all photos, SIFT's length.
+        data = b"".join(random.Random(f"{name if point == '-1' else ''} {i if point == '-1' else point}")
+                        .randbytes(128) for i, point in enumerate(observed[2::3]))
+        database.execute("INSERT INTO descriptors VALUES (?, ?, 128, ?)",
                          (image, len(observed) // 3, data))
         seen[image] = {observed[i + 2]: i // 3 for i in range(0, len(observed), 3)
                        if observed[i + 2] != "-1"}

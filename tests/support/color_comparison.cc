@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/picture_file.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -207,7 +208,7 @@ Json CompareColors(const PlyVertices& truth, const PlyVertices& model,
           cv::saturate_cast<uint8_t>(5 * 255 * (have - want).cwiseAbs().maxCoeff());
     }
     detail.Add(grid);
-    if (!error_path.empty() && &scan == &scans[0]) cv::imwrite(error_path, error);
+    if (!error_path.empty() && &scan == &scans[0]) WritePictureFile(error_path, error);
   }
   json["edge_share"] = static_cast<double>(edges.count) / count;
   json["edge_share_wrong"] = edges.ShareWrong();

@@ -13,6 +13,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/photo.h"
+#include "core/picture_file.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -99,7 +100,7 @@ void Evaluate(EvaluateOptions options) {
       }
     }
   }
-  cv::imwrite(options.output_path, picture);
+  WritePictureFile(options.output_path, picture);
 }
 
 }  // namespace

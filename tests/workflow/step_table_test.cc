@@ -384,5 +384,19 @@ TEST(AutoOptions, SaysEveryProblem) {
   EXPECT_THAT(problems, Contains(HasSubstr("--from is \"sparse\", expected one of frames")));
 }
 
+TEST(AutoOptions, StepsThatEndBeforeTheyBeginAndScansGivenTwiceAreSaid) {
+  AutoOptions options;
+  options.image_path = "photos";
+  options.scan_paths = {"a.e57", "b.e57"};
+  options.from = "align";
+  options.until = "align";
+  EXPECT_THAT(options.Problems(), IsEmpty());
+  options.until = "mapper";
+  options.scan_paths.push_back("a.e57");
+  const std::vector<std::string> problems = options.Problems();
+  EXPECT_THAT(problems, Contains(HasSubstr("--from align comes after --until mapper")));
+  EXPECT_THAT(problems, Contains(HasSubstr("--scan_path a.e57 is given twice")));
+}
+
 }  // namespace
 }  // namespace roomtex

@@ -15,7 +15,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
-#include "core/output_file.h"
+#include "core/output_set.h"
 #include "core/photo.h"
 #include "core/photo_fit.h"
 #include "core/picture_file.h"
@@ -101,10 +101,9 @@ Camera PlainCamera(int width, int height, double field_of_view_deg) {
 class PictureSet {
  public:
   PictureSet(const RenderOptions& options, const Command::Context& context)
-      : options_(options), context_(context) {
+      : options_(options), context_(context), outputs_(options.folder_path) {
     settings_.num_threads = context.options.num_threads;
     settings_.width = options.width > 0 ? options.width : 960;
-    MakeFolder(options.folder_path);
   }
 
   void FromPhotos(const SparseModel& model, const MeshRenderer& renderer) {
@@ -197,7 +196,7 @@ class PictureSet {
     }
   }
 
-  void WriteContactSheet() const {
+  void Finish() {  // with a contact sheet
     constexpr int kWidth = 480, kHeight = 320, kCaption = 26, kColumns = 4;
     std::vector<cv::Mat> cells;
     for (const auto& [caption, picture] : pictures_) {
@@ -222,25 +221,24 @@ class PictureSet {
     }
     cv::Mat sheet;
     cv::vconcat(rows, sheet);
-    WritePictureFile(options_.folder_path + "/contact_sheet.png", sheet);
+    WritePictureFile(outputs_.Path("contact_sheet.png"), sheet);
+    outputs_.Commit();
   }
 
  private:
-  std::string FileOf(const std::string& name) const {
-    return options_.folder_path + "/" + name + ".png";
-  }
   void Add(const std::string& file, const std::string& caption, const cv::Mat& picture) {
     Write(file, caption, picture);
     pictures_.emplace_back(caption, picture);
   }
   void Write(const std::string& file, const std::string& caption, const cv::Mat& picture) {
-    WritePictureFile(FileOf(file), picture);
+    WritePictureFile(outputs_.Path(file + ".png"), picture);
     context_.report["pictures"].push_back({{"file", file + ".png"}, {"shows", caption}});
     context_.progress.Tick();
   }
 
   const RenderOptions& options_;
   const Command::Context& context_;
+  OutputSet outputs_;  // all pictures appear together
   RenderSettings settings_;
   std::vector<std::pair<std::string, cv::Mat>> pictures_;
 };
@@ -281,7 +279,7 @@ void RenderSet(const RenderOptions& options, const SparseModel& model, const Col
     set.FromRing(model, box, up, renderer);
   }
   set.FromOutside(box, up, mesh);
-  set.WriteContactSheet();
+  set.Finish();
   std::printf("%s\n", (options.folder_path + "/contact_sheet.png").c_str());
 }
 

@@ -11,6 +11,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
 
 #include <Eigen/Geometry>
@@ -21,6 +22,7 @@
 #include "core/error.h"
 #include "core/option_list.h"
 #include "core/parallel.h"
+#include "core/resource_limits.h"
 #include "texture/view/view_chunks.h"
 
 namespace roomtex {
@@ -313,7 +315,12 @@ void ViewAnswers::Impl::Add() {
 ViewAnswers::ViewAnswers(ViewContent content, int num_threads, std::function<bool()> stop)
     : impl_(std::make_unique<Impl>(std::move(content), num_threads, std::move(stop))) {
   impl_->Add();
-  impl_->worker = std::thread([impl = impl_.get()] { impl->Prepare(); });
+  try {
+    impl_->worker = std::thread([impl = impl_.get()] { impl->Prepare(); });
+  } catch (const std::system_error&) {
+    NoteThreadNotStarted();
+    impl_->Prepare();
+  }
 }
 
 ViewAnswers::~ViewAnswers() {

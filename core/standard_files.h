@@ -1,0 +1,20 @@
+#pragma once
+// Standard input, output and error of a command, and the folder that it works in.
+
+#include <string>
+
+#include "core/input_guard.h"
+
+namespace roomtex {
+
+// Those that are closed become /dev/null: the next file that is opened would take their place, and
+// what is told would be written into it.
+void OpenStandardFiles();
+
+// Whether all that was told on standard output arrived; if not, says so on standard error.
+bool FlushAnswer(const std::string& command);
+
+// Throws InputError if the folder that one works in is gone and a path begins there.
+void RequireWorkingFolder(const GuardedPaths& paths);
+
+}  // namespace roomtex
