@@ -11,8 +11,10 @@
 namespace roomtex {
 
 struct StartPhotosOptions {
-  // Starts that have at least this share of the best score are asked about, so many at most.
-  double rival_share = 0.75;
+  // Starts that have at least this share of the best score are asked about, so many at most. What
+  // has less is no rival, even where the photos support the best one faintly
+  // (StartVerdictOptions::min_ratio_faint).
+  double rival_share = 0.6;
   int max_rivals = 3;
   // A start is drawn to where its photos show the scan so many times at most.
   int max_draws = 3;

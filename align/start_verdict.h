@@ -14,10 +14,10 @@ namespace roomtex {
 struct StartVerdictOptions {
   // Of the photos' rays (SightAgreement::Score()): what the best start needs at least, and how many
   // times as much as the next best and as the mirror image. Larger = stricter. Where the photos
-  // confirm the start; where they support it faintly, as those of a similar room do, too; and where
-  // nothing but geometry speaks for it.
+  // confirm the start; where they support it faintly, as those of a similar room do, too (less over
+  // a place that they do not support); and where nothing but geometry speaks for it.
   double min_score = 0.55, min_ratio = 1.2;
-  double min_ratio_faint = 1.6;
+  double min_ratio_faint = 1.6, min_ratio_faint_over_denied = 1.3;
   double min_score_alone = 0.7, min_ratio_alone = 1.3;
   // The scan is called a mirror image where that of the model has so many times the score.
   double min_ratio_mirrored = 1.15;
@@ -26,7 +26,11 @@ struct StartVerdictOptions {
   // Of the corners of the scan's intensity, those that the photos must have where they should be to
   // confirm a start. Larger = stricter. With fewer they support it faintly at most, and not at all
   // where sparse points and surface agree within kExactRms: then so few are those of another room.
-  double min_photo_share = 0.35;
+  // Where a coarse scan shows few corners at all, they are those of frames and furniture, which a
+  // room of the same plan has, too: more of them are asked for.
+  double min_photo_share = 0.35, min_photo_share_of_few = 0.6;
+  // Of the corners, for min_ratio_faint_over_denied.
+  double min_photo_share_over_denied = 0.2;
 };
 
 enum class PhotoSupport { kNone, kFaint, kClear };

@@ -237,6 +237,22 @@ TEST(AutomaticAlignCommand, RefusesTheScanOfASimilarRoom) {
   EXPECT_NE(report["search"]["verdict"], "trusted");
 }
 
+// Few samples show frames and furniture, which rooms of one plan have in common, and little of what
+// makes them differ.
+TEST(AutomaticAlignCommand, ACoarseScanOfTheRoomIsTrustedAndThoseOfSimilarRoomsAreRefused) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  for (const int seed : {0, 2, 3, 5}) {
+    SCOPED_TRACE(seed);
+    SimulatedRoomOptions options = FolderWithPhotos::SmallPhotos(seed);
+    options.scan_columns = 500;
+    options.scan_rows = 200;
+    const CaseFolder coarse(MakeCase(options, 6));
+    const CommandResult result = folder.Align(" --scan_path " + coarse.scan_path +
+                                              " --output_path " + (coarse.folder / "found"));
+    EXPECT_EQ(result.exit_code, seed == 0 ? 0 : 4) << result.err;
+  }
+}
+
 TEST(AutomaticAlignCommand, TheNearHintIsChecked) {
   const FolderWithPhotos& folder = FolderWithPhotos::Get();
   const CommandResult unknown =

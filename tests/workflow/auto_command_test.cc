@@ -118,7 +118,7 @@ TEST_F(AutoCommand, GoesOnWhereItWasKilled) {
   EXPECT_FALSE(fs::exists(Result("aligned")));
 }
 
-// The scan of another room, and nobody has clicked.
+// The scan of a room of the same plan, and nobody has clicked.
 TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   const CommandResult result = RunCommandLine(Arguments("other/scan.rtpi"));
   EXPECT_EQ(result.exit_code, 4) << result.err;
