@@ -5,6 +5,7 @@ import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
 import {createRequire} from 'node:module';
 import {tmpdir} from 'node:os';
 import path from 'node:path';
+import {after} from 'node:test';
 
 function fromEnvironment(name) {
   const value = process.env[name];
@@ -41,10 +42,17 @@ export function run(command, args) {
   });
 }
 
+// What a test that failed left running would keep its program waiting for ever.
+const served = new Set();
+after(() => {
+  for (const child of served) child.kill('SIGKILL');
+});
+
 // Starts a command that serves a page and waits until it has printed its URL on stdout.
 export function serve(command, args) {
   return new Promise((resolve, reject) => {
     const child = spawn(path.join(bin, command), args);
+    served.add(child);
     const server = {
       stdout: '',
       stderr: '',
@@ -56,6 +64,7 @@ export function serve(command, args) {
       },
     };
     const closed = new Promise((done) => child.on('close', done));
+    closed.then(() => served.delete(child));
     child.stderr.on('data', (data) => {
       server.stderr += data;
     });

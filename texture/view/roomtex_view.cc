@@ -140,8 +140,8 @@ ViewContent ReadContent(const ViewOptions& options, const Command::Context& cont
     content.evidence_path = evidence.string();
   } else {
     content.no_evidence_reason =
-        "There is no evidence.ply beside the model: roomtex-texture writes it, unless it is told "
-        "--output_evidence 0.";
+        "There is no evidence.ply beside the model, as roomtex-texture writes it unless it is told "
+        "--output_evidence 0. Run roomtex-texture again to have it.";
   }
 
   const bool is_cloud = content.model.is_cloud;
