@@ -42,10 +42,12 @@ export function run(command, args) {
   });
 }
 
-// What a test that failed left running would keep its program waiting for ever.
+// What a test that failed left running would keep its program waiting for ever. The tests' own hooks come first.
 const served = new Set();
 after(() => {
-  for (const child of served) child.kill('SIGKILL');
+  setTimeout(() => {
+    for (const child of served) child.kill('SIGKILL');
+  }, 10000).unref();
 });
 
 // Starts a command that serves a page and waits until it has printed its URL on stdout.
