@@ -84,6 +84,20 @@ double ChanceWrong(double score, double ratio, PhotoSupport support,
   return ratio >= options.min_ratio_faint ? kChanceFaint : std::max(kEvenOdds, guess);
 }
 
+// How much the score of the second best start counts. Of two that fit alike the photos may know
+// better: nothing where they confirm the best one clearly; less where they support it faintly and
+// deny the second.
+double WeightOfSecond(const StartSearch& search, const StartVerdict& verdict,
+                      const StartVerdictOptions& options) {
+  const bool asked = verdict.second >= 0 && search.starts[verdict.second].photos;
+  if (!asked || verdict.support == PhotoSupport::kNone) return 1;
+  if (verdict.support == PhotoSupport::kClear) return 0;
+  const double share = search.starts[verdict.best].photos->shifts.at_pose.Share();
+  const bool denied = !search.starts[verdict.second].photos->supports &&
+                      share >= options.min_photo_share_over_denied;
+  return denied ? options.min_ratio_faint_over_denied / options.min_ratio_faint : 1;
+}
+
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
 std::vector<Eigen::Vector3d> OpenSlides(const AlignmentInput& input, const StartSearch& search,
                                         const Similarity& scan_from_sparse) {
@@ -176,15 +190,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const double second = verdict.second < 0 ? 0 : search.starts[verdict.second].sights.Score();
   const bool clear = verdict.support == PhotoSupport::kClear;
   const bool alone = verdict.support == PhotoSupport::kNone;
-  // Of two that fit alike the photos may know better.
-  const bool asked = verdict.second >= 0 && search.starts[verdict.second].photos;
-  const bool denied = asked && verdict.support == PhotoSupport::kFaint &&
-                      best.photos->shifts.at_pose.Share() >= options.min_photo_share_over_denied &&
-                      !search.starts[verdict.second].photos->supports;
-  const double second_counts =
-      clear && asked ? 0
-      : denied       ? second * options.min_ratio_faint_over_denied / options.min_ratio_faint
-                     : second;
+  const double second_counts = second * WeightOfSecond(search, verdict, options);
   const double rival = std::max(second_counts, clear ? 0.0 : verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
   verdict.chance_wrong =

@@ -44,9 +44,8 @@ void AutoOptions::Declare(OptionFields* fields) {
   fields->Choice(
       "scanner_photos", &scanner_photos, kAutoWords,
       "The scanner's own photos in an E57, those with a pose: beside yours, they put the model "
-      "into "
-      "the scan (roomtex-mapper --known_path); without any of yours, the colours come from them. "
-      "auto = where the scan has some.");
+      "into the scan (roomtex-mapper --known_path); without any of yours, the colours come from "
+      "them. auto = where the scan has some.");
   fields
       ->Int("video_frames", &video_frames,
             "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")

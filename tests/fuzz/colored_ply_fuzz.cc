@@ -4,22 +4,14 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "core/error.h"
 #include "tests/fuzz/memory_file.h"
+#include "tests/fuzz/try_read.h"
 #include "texture/export/export_scene.h"
 #include "texture/output/evidence.h"
 #include "texture/render/mesh_renderer.h"
 #include "texture/view/view_model.h"
 
 namespace {
-
-template <typename Read>
-void Try(const Read& read) {
-  try {
-    read();
-  } catch (const roomtex::InputError&) {
-  }
-}
 
 // A scan whose colours the file has.
 roomtex::Scan OfTheSamePoints(const std::string& path) {
@@ -37,7 +29,7 @@ roomtex::Scan OfTheSamePoints(const std::string& path) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const roomtex::MemoryFile file(data, size);
   const std::string path = file.path();
-  Try([&] {
+  roomtex::TryRead([&] {
     const roomtex::ViewModel model = roomtex::ReadViewPly(path);
     for (const roomtex::Triangle& triangle : model.triangles) {
       for (const int corner : triangle) {
@@ -45,13 +37,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       }
     }
   });
-  Try([&] {
+  roomtex::TryRead([&] {
     const roomtex::ColoredMesh mesh = roomtex::ReadColoredMesh(path);
     if (mesh.colors.size() != mesh.points.size()) std::abort();
     roomtex::FindRoomBox(mesh);
   });
-  Try([&] { roomtex::ReadScanColors({OfTheSamePoints(path)}, path); });
-  Try([&] {
+  roomtex::TryRead([&] { roomtex::ReadScanColors({OfTheSamePoints(path)}, path); });
+  roomtex::TryRead([&] {
     const roomtex::Evidence evidence = roomtex::ReadEvidence(path);
     if (evidence.disagreement.size() != evidence.points.size()) std::abort();
   });

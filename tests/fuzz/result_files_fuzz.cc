@@ -9,23 +9,11 @@
 #include <string>
 
 #include "colmap_ext/mapper_verdict.h"
-#include "core/error.h"
 #include "core/panorama_set.h"
 #include "core/partial_path.h"
+#include "tests/fuzz/try_read.h"
 #include "texture/view/view_lumigraph.h"
 #include "texture/view/view_shifts.h"
-
-namespace {
-
-template <typename Read>
-void Try(const Read& read) {
-  try {
-    read();
-  } catch (const roomtex::InputError&) {
-  }
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const roomtex::PartialFolder folder(std::filesystem::temp_directory_path().string());
@@ -33,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     std::ofstream stream(folder / name, std::ios::binary);
     stream.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   }
-  Try([&] {
+  roomtex::TryRead([&] {
     for (const roomtex::CutPanorama& one : roomtex::ReadPanoramaSet(folder / "report.json")) {
       one.PanoramaCamera();
       for (const roomtex::CutPanorama::Face& face : one.faces) {
@@ -41,8 +29,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       }
     }
   });
-  Try([&] { roomtex::ReadMapperVerdict(folder.path(), roomtex::SparseModel()); });
-  Try([&] { roomtex::ReadViewShifts(folder.path()); });
-  Try([&] { roomtex::ReadViewTones(folder.path()); });
+  roomtex::TryRead([&] { roomtex::ReadMapperVerdict(folder.path(), roomtex::SparseModel()); });
+  roomtex::TryRead([&] { roomtex::ReadViewShifts(folder.path()); });
+  roomtex::TryRead([&] { roomtex::ReadViewTones(folder.path()); });
   return 0;
 }

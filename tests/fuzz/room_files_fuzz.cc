@@ -8,25 +8,13 @@
 #include <fstream>
 #include <string>
 
-#include "core/error.h"
 #include "core/partial_path.h"
+#include "tests/fuzz/try_read.h"
 #include "workflow/capture_facts.h"
 #include "workflow/evidence_points.h"
 #include "workflow/room_coverage.h"
 #include "workflow/site_page.h"
 #include "workflow/site_rooms.h"
-
-namespace {
-
-template <typename Read>
-void Try(const Read& read) {
-  try {
-    read();
-  } catch (const roomtex::InputError&) {
-  }
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const roomtex::PartialFolder folder(std::filesystem::temp_directory_path().string());
@@ -37,15 +25,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     stream.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   }
   const std::string path = folder / "room/report.json";
-  Try([&] { roomtex::ReadSiteRooms(path); });
-  Try([&] { roomtex::ReadKnownCameras(path); });
-  Try([&] {
+  roomtex::TryRead([&] { roomtex::ReadSiteRooms(path); });
+  roomtex::TryRead([&] { roomtex::ReadKnownCameras(path); });
+  roomtex::TryRead([&] {
     const std::vector<roomtex::EvidencePoint> points = roomtex::ReadEvidencePoints(path);
     const roomtex::PlanFrame frame =
         roomtex::MakePlanFrame(points, Eigen::Vector3d::UnitZ(), nullptr);
     roomtex::MeasureCoverage(points, frame, {});
   });
-  Try([&] {
+  roomtex::TryRead([&] {
     const roomtex::Json keys =
         roomtex::MakeSiteKeys(folder.path(), roomtex::FindSiteRooms(folder.path()));
     roomtex::MakeSitePage(keys, "");

@@ -164,14 +164,8 @@ def known(base):
         prepare(here.root)
         before = here.state(skip=("mapped/roomtex-mapper.log",))
         answer = here.run(line)
-        after = here.state(skip=("mapped/roomtex-mapper.log",))
-        problem = answer.problem(codes)
-        changed = [name for name, content in before.items() if after.get(name) != content]
-        if not problem and changed:
-            problem = f"changed {changed[:3]}"
-        elif not problem and here.leftovers():
-            problem = f"leaves {here.leftovers()}"
-        elif not problem and says not in answer.err:
+        problem = answer.problem(codes) or here.harm(before, skip=("mapped/roomtex-mapper.log",))
+        if not problem and says not in answer.err:
             problem = f"does not say \"{says}\": {answer.err.strip()[-300:]}"
         yield f"{title} ({answer.code})", problem
 

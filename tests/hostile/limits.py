@@ -30,11 +30,7 @@ def memory(base):
             before = here.state()
             answer = here.run(line, limits=limits)
             refused += answer.code == 3
-            problem = answer.problem({0, 3, 4})
-            if any(here.state().get(name) != content for name, content in before.items()):
-                problem = "inputs changed"
-            if here.leftovers():
-                problem = f"leaves {here.leftovers()}"
+            problem = answer.problem({0, 3, 4}) or here.harm(before)
             if problem:
                 problem = f"{megabytes} MB: {problem}"
                 break

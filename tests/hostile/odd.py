@@ -540,14 +540,8 @@ def run_cases(base, all_cases):
         change(here.root)
         before = here.state()
         answer = here.run(shlex.split(line) if isinstance(line, str) else line)
-        after = here.state()
-        problem = answer.problem(codes)
-        changed = [name for name, content in before.items() if after.get(name) != content]
-        if not problem and changed:
-            problem = f"changed {changed[:3]}"
-        elif not problem and here.leftovers():
-            problem = f"leaves {here.leftovers()}"
-        elif not problem and answer.code == 0 and after == before and not answer.out:
+        problem = answer.problem(codes) or here.harm(before)
+        if not problem and answer.code == 0 and not answer.out and here.state() == before:
             problem = "ends with 0, and there is nothing"
         yield f"{title} ({answer.code})", problem
         if VERBOSE:

@@ -104,6 +104,14 @@ class Scene:
     def leftovers(self):
         return [p.name for p in self.root.rglob(".roomtex-partial-*")]
 
+    def harm(self, before, skip=()):
+        """What became of the files of an earlier state(), or was left half done; or ""."""
+        after = self.state(skip)
+        changed = [name for name, content in before.items() if after.get(name) != content]
+        if changed:
+            return f"changed {changed[:3]}"
+        return f"leaves {self.leftovers()}" if self.leftovers() else ""
+
 
 def rotated(quaternion, point):
     w, x, y, z = quaternion

@@ -73,12 +73,7 @@ def ends(base):
                 before = here.state()
                 answer = with_value(here, one, name, value)
                 codes.append(answer.code)
-                problem = answer.problem({0, 2, 3, 4})
-                after = here.state()
-                if not problem and any(after.get(file) != before[file] for file in before):
-                    problem = "inputs changed"
-                if not problem and here.leftovers():
-                    problem = f"leaves {here.leftovers()}"
+                problem = answer.problem({0, 2, 3, 4}) or here.harm(before)
                 if problem:
                     problems.append(f"{value[:20]!r}: {problem}")
             if values:
