@@ -255,14 +255,23 @@ void SearchScans(const AlignmentInput& input, const std::vector<NearHint>& near,
   TakeMirroredReading(std::move(other), reading, context);
 }
 
-// Places of the scans in the photos that roomtex-mapper holds where they are known to stand: what
-// the surface leaves open, they hold.
-std::vector<Pick> PicksOfPhotosHeld(const MapperVerdict& verdict, const SparseModel& model,
-                                    const std::vector<Scan>& scans) {
+// Places of the scans in the photos that are known to stand somewhere: those that roomtex-mapper
+// holds there, in `model`, hold what the surface leaves open; those of a single standpoint, of
+// which only the poses in the file are known, put a model of any frame into the scan, its scale by
+// the depth of its points in them.
+std::vector<Pick> PicksOfKnownPhotos(const MapperVerdict& verdict, const SparseModel& model,
+                                     const Eigen::Vector3d& origin,
+                                     const std::vector<Scan>& scans) {
   std::vector<PosedPhoto> photos;
-  for (const std::string& name : verdict.photos_held) {
+  const auto add = [&](const std::string& name, const Rigid* told) {
     const SparseImage& image = *model.FindImage(name);
-    photos.push_back({name, model.cameras.at(image.camera_id), image.cam_from_model});
+    photos.push_back(
+        {name, model.cameras.at(image.camera_id), told ? *told : image.cam_from_model});
+  };
+  for (const std::string& name : verdict.photos_held) add(name, nullptr);
+  for (auto [name, cam_from_scan] : verdict.told_poses) {
+    cam_from_scan.translation += cam_from_scan.rotation * origin;
+    add(name, &cam_from_scan);
   }
   std::vector<Pick> picks;
   for (const PhotoPick& pick : PicksOfPosedPhotos(photos, scans)) {
@@ -292,12 +301,35 @@ bool AlignFromKnownPoses(const AlignCommandOptions& a, const AlignmentInput& inp
   return true;
 }
 
+// By the places of the scans in photos of a single standpoint. False: that is not to be trusted,
+// and the place has to be searched for.
+bool AlignFromOnePlace(const AlignCommandOptions& a, const AlignmentInput& input,
+                       const AlignmentOptions& options, Reading* reading,
+                       const Command::Context& context) {
+  std::string problem;
+  try {
+    reading->attempt = AttemptAlignment(input, options, &context.progress);
+    if (reading->attempt.trusted() || a.image_path.empty()) {
+      reading->search = {{"method", "known_poses"}, {"position_rms_m", nullptr}};
+      return true;
+    }
+    problem = reading->attempt.alignment ? reading->attempt.alignment->reasons[0]
+                                         : reading->attempt.refusal;
+  } catch (const InputError& error) {
+    if (a.image_path.empty()) throw;
+    problem = error.what();
+  }
+  context.Warn("the known poses do not put the model into the scan (" + problem +
+               "); its place is searched for");
+  return false;
+}
+
 // Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
 // how and there is no other format among the scans, or says so.
-// known_rms: MapperVerdict's.
+// known_rms: MapperVerdict's. one_place: the picks are those of known photos at one standpoint.
 void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
                 const std::vector<NearHint>& near, const std::optional<double>& known_rms,
-                Reading* reading, const Command::Context& context) {
+                bool one_place, Reading* reading, const Command::Context& context) {
   const std::vector<PlacedScans::File>& files = reading->placed.files;
   const bool may_turn = a.scan_reader.azimuth == "auto" &&
                         std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
@@ -308,6 +340,12 @@ void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
   if (known_rms && input.picks.empty() && near.empty() &&
       AlignFromKnownPoses(a, input, options, *known_rms, reading, context)) {
     return;
+  }
+  if (one_place) {
+    if (AlignFromOnePlace(a, input, options, reading, context)) return;
+    static const std::vector<Pick> kNone;
+    return SearchScans(input.With(input.model, input.surveyed, kNone), near, options, may_turn,
+                       reading, context);
   }
   if (AreHints(input.picks)) {
     return SearchScans(input, near, options, may_turn, reading, context);
@@ -429,7 +467,7 @@ void Align(const AlignCommandOptions& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
-  if (!verdict.known_rms) RequirePicksOrPhotos(a);
+  if (!verdict.known_rms && verdict.told_poses.empty()) RequirePicksOrPhotos(a);
   std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
   std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
@@ -442,17 +480,19 @@ void Align(const AlignCommandOptions& a, const Command::Context& context) {
   if (verdict.known_rms) {
     local_from_sparse.translation = -reading.origin.offset();
     TransformModel(local_from_sparse, &model);
-    if (a.picks_path.empty() && near.empty()) {
-      picks = PicksOfPhotosHeld(verdict, model, reading.surveyed->scans());
-    }
   }
+  if (a.picks_path.empty() && near.empty()) {
+    picks = PicksOfKnownPhotos(verdict, model, reading.origin.offset(), reading.surveyed->scans());
+  }
+  const bool one_place = !picks.empty() && !verdict.told_poses.empty() && a.picks_path.empty();
+  if (!verdict.known_rms && !one_place) RequirePicksOrPhotos(a);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
              {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(),
               PhotoLabels(model, a.image_path), verdict.refined, a.image_path,
               context.options.num_threads},
-             near, verdict.known_rms, &reading, context);
+             near, verdict.known_rms, one_place, &reading, context);
   if (verdict.known_rms && reading.search.is_null() && a.picks_path.empty()) {
     reading.search = {{"method", "known_poses"}, {"position_rms_m", *verdict.known_rms}};
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "align/start.h"
 #include "align/trust/agreement.h"
 #include "core/statistics.h"
 

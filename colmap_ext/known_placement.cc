@@ -190,6 +190,15 @@ Json KnownToJson(const KnownPlacement& placement, const KnownPhotos& known,
   std::set_difference(fit.agreeing.begin(), fit.agreeing.end(), placement.rough.begin(),
                       placement.rough.end(), std::inserter(held, held.end()));
   json["photos_held"] = names(placement.held ? held : std::set<uint32_t>());
+  // What one standpoint leaves open, the scan tells (roomtex-align), which needs the poses as told.
+  json["told"] = Json::array();
+  const bool is_open = fit.kind == KnownFit::Kind::kTooFew || fit.kind == KnownFit::Kind::kOnePlace;
+  for (const auto& [id, pose] : known.cam_from_scan) {
+    if (!is_open) break;
+    json["told"].push_back({{"name", images.at(id).name},
+                            {"rotation_wxyz", ToJson(WxyzFromQuaternion(pose.rotation))},
+                            {"translation", ToJson(pose.translation)}});
+  }
   json["position_rms_m"] = number(fit.position_rms);
   json["rotation_rms_deg"] = number(DegFromRad(fit.rotation_rms));
   json["baseline_m"] = number(fit.baseline);

@@ -1,8 +1,39 @@
 #include "colmap_ext/mapper_verdict.h"
 
+#include <cmath>
+
+#include "core/frames.h"
 #include "core/json_text.h"
 
 namespace roomtex {
+namespace {
+
+// `count` numbers, or nothing.
+std::vector<double> NumbersOf(const Json& list, size_t count) {
+  std::vector<double> numbers;
+  if (!list.is_array() || list.size() != count) return numbers;
+  for (const Json& one : list) {
+    if (one.is_number()) numbers.push_back(one.get<double>());
+  }
+  return numbers.size() == count ? numbers : std::vector<double>();
+}
+
+std::vector<std::pair<std::string, Rigid>> ToldPoses(const Json& list, const SparseModel& model) {
+  std::vector<std::pair<std::string, Rigid>> poses;
+  for (const Json& one : list.is_array() ? list : Json::array()) {
+    if (!one.is_object()) continue;
+    const Json name = one.value("name", Json());
+    const std::vector<double> q = NumbersOf(one.value("rotation_wxyz", Json()), 4);
+    const std::vector<double> t = NumbersOf(one.value("translation", Json()), 3);
+    if (!name.is_string() || model.FindImage(name) == nullptr || q.empty() || t.empty()) continue;
+    const Eigen::Quaterniond turn = QuaternionFromWxyz({q[0], q[1], q[2], q[3]});
+    if (!(std::abs(turn.norm() - 1) < 1e-3)) continue;
+    poses.push_back({name, {turn.normalized(), {t[0], t[1], t[2]}}});
+  }
+  return poses;
+}
+
+}  // namespace
 
 MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& model) {
   MapperVerdict verdict;
@@ -21,6 +52,8 @@ MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& mo
     for (const Json& name : held.is_array() ? held : Json::array()) {
       if (name.is_string() && model.FindImage(name) != nullptr) verdict.photos_held.push_back(name);
     }
+  } else if (known.is_object()) {
+    verdict.told_poses = ToldPoses(known.value("told", Json()), model);
   }
   const Json reasons = json.value("reasons", Json::array());
   for (const Json& one : reasons.is_array() ? reasons : Json::array()) {

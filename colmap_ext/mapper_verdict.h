@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/sparse_model.h"
@@ -24,6 +25,8 @@ struct MapperVerdict {
   std::optional<double> known_rms;
   // Those of them that are in the model exactly where they are known to stand.
   std::vector<std::string> photos_held;
+  // Otherwise, of photos in the model that stand at a single known place: cam_from_scan by name.
+  std::vector<std::pair<std::string, Rigid>> told_poses;
 };
 
 // Of the model read from `folder`; empty if there is no report, or if it is of another model (other

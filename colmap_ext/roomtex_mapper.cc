@@ -42,8 +42,8 @@ void AddOptions(MappingOptions* options, Command* command) {
       "known_path", &options->known_path,
       "COLMAP model of photos whose poses are known in the frame of a scan, among those of "
       "--image_path: what roomtex-import --images_path writes for the photos of an E57 "
-      "(DIR/sparse). Two or more of them that stand apart put the model into that frame, metric, "
-      "and roomtex-align needs no picks.",
+      "(DIR/sparse). Two or more of them that stand apart put the model into that frame, metric; "
+      "those of one standpoint leave that to roomtex-align. It needs no picks either way.",
       Command::Kind::kOptional);
   command->AddOutputPath(
       "output_path", &options->output_path,
@@ -184,18 +184,18 @@ void ReportKnown(const MappingOutcome& outcome, const KnownPhotos& known,
   const KnownPlacement& placement = *outcome.known;
   const KnownFit& fit = placement.fit;
   context.report["known"] = KnownToJson(placement, known, images);
-  const char by_picks[] =
-      " The model keeps a frame of its own. Align it by picks of these photos: roomtex-import "
-      "--images_path ... --E57.picks 1, roomtex-align --picks_path";
+  const char by_scan[] =
+      " The model keeps a frame of its own; roomtex-align puts it into the scan by what the scan "
+      "shows in these photos.";
   switch (fit.kind) {
     case KnownFit::Kind::kTooFew:
       context.Warn(std::string("Fewer than two of the photos with known poses could be mapped.") +
-                   by_picks);
+                   by_scan);
       return;
     case KnownFit::Kind::kOnePlace:
       context.Warn(std::string("The photos with known poses stand too near each other to tell the "
                                "scale.") +
-                   by_picks);
+                   by_scan);
       return;
     case KnownFit::Kind::kContradicts:
       Refuse("motion",

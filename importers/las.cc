@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/output_file.h"
 #include "core/resource_limits.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
@@ -112,17 +111,6 @@ LasHeader ReadLasHeader(const FileReader& file) {
   return header;
 }
 
-uint16_t LasIntensity(float value, float largest) {
-  const float factor = largest <= 1 ? 65535.0f : largest > 65535 ? 65535 / largest : 1.0f;
-  if (!(value > 0)) return 0;  // also NaN
-  return static_cast<uint16_t>(std::lround(std::min(65535.0f, factor * value)));
-}
-
-template <typename T>
-void PutAt(size_t at, T value, std::string* bytes) {
-  std::memcpy(bytes->data() + at, &value, sizeof value);
-}
-
 }  // namespace
 
 bool LooksLikeLas(std::string_view start) { return start.substr(0, 4) == "LASF"; }
@@ -185,78 +173,6 @@ Scan ReadLas(const std::string& path, const LasOptions& options) {
   scan.num_columns = static_cast<int>(scan.points.size());
   scan.num_rows = 1;
   return scan;
-}
-
-void WriteLas(const std::vector<const Scan*>& scans, const std::string& path) {
-  constexpr double kFinest = 1e-4;
-  uint64_t count = 0;
-  Bounds all;
-  float largest = 0;
-  bool has_colors = false;
-  for (const Scan* scan : scans) {
-    has_colors = has_colors || !scan->colors.empty();
-    count += scan->points.size() - static_cast<size_t>(scan->NumMissing());
-    const Bounds bounds = FindBounds(*scan);
-    all.min = all.min.cwiseMin(bounds.min);
-    all.max = all.max.cwiseMax(bounds.max);
-    for (const float value : scan->intensity) {
-      if (std::isfinite(value)) largest = std::max(largest, value);
-    }
-  }
-  if (count > std::numeric_limits<uint32_t>::max()) {
-    throw InputError(path, "", "would hold more than 4294967295 points", "Write .e57 or .ply");
-  }
-  if (count == 0) all.min = all.max = Eigen::Vector3d::Zero();
-  const Eigen::Vector3d shift = (0.5 * (all.min + all.max)).array().round();
-  double scale = kFinest;
-  while ((all.max - all.min).maxCoeff() / scale > 4e9) scale *= 10;
-
-  const int format = has_colors ? 2 : 0;
-  const auto record_size = static_cast<size_t>(kPointFormats[format].size);
-  std::string header(kLeastHeader, '\0');
-  std::memcpy(header.data(), "LASF", 4);
-  header[24] = 1;
-  header[25] = 2;
-  std::memcpy(header.data() + 58, "roomtex", 7);
-  PutAt<uint16_t>(94, kLeastHeader, &header);
-  PutAt<uint32_t>(96, kLeastHeader, &header);
-  header[104] = static_cast<char>(format);
-  PutAt(105, static_cast<uint16_t>(record_size), &header);
-  PutAt(107, static_cast<uint32_t>(count), &header);
-  PutAt(111, static_cast<uint32_t>(count), &header);  // all are first returns
-  for (size_t k = 0; k < 3; ++k) {
-    const auto axis = static_cast<Eigen::Index>(k);
-    PutAt(131 + 8 * k, scale, &header);
-    PutAt(155 + 8 * k, shift[axis], &header);
-    PutAt(179 + 16 * k, all.max[axis], &header);
-    PutAt(187 + 16 * k, all.min[axis], &header);
-  }
-  OutputFile output(path);
-  output.stream() << header;
-  std::string block;
-  for (const Scan* scan : scans) {
-    for (size_t i = 0; i < scan->points.size(); ++i) {
-      if (scan->IsMissing(static_cast<int>(i))) continue;
-      std::string record(record_size, '\0');
-      for (size_t k = 0; k < 3; ++k) {
-        const auto axis = static_cast<Eigen::Index>(k);
-        PutAt(4 * k,
-              static_cast<int32_t>(std::lround((scan->points[i][axis] - shift[axis]) / scale)),
-              &record);
-      }
-      PutAt(12, LasIntensity(scan->intensity[i], largest), &record);
-      record[14] = 9;  // return 1 of 1
-      for (size_t k = 0; k < 3 && !scan->colors.empty(); ++k) {
-        PutAt(20 + 2 * k, static_cast<uint16_t>(257 * scan->colors[i][k]), &record);
-      }
-      block += record;
-      if (static_cast<int64_t>(block.size()) < kLasBlock) continue;
-      output.stream() << block;
-      block.clear();
-    }
-  }
-  output.stream() << block;
-  output.Commit();
 }
 
 }  // namespace roomtex

@@ -25,10 +25,4 @@ Scan ReadLas(const std::string& path, const LasOptions& options);
 // The start of a file is that of a LAS or LAZ.
 bool LooksLikeLas(std::string_view start);
 
-// LAS 1.2, point format 0, or 2 where a scan has colours, of all measured points of all scans:
-// whole tenths of a millimetre about whole metres; intensities from 0 to 1 become 0 to 65535,
-// others are rounded, and scaled where they are larger than that. Throws InputError: cannot be
-// written, too many points.
-void WriteLas(const std::vector<const Scan*>& scans, const std::string& path);
-
 }  // namespace roomtex

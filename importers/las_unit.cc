@@ -79,6 +79,7 @@ void TakeWkt(std::string_view wkt, LasUnits* units) {
   if (projected != kNone) units->horizontal = UnitOfSystem(wkt, projected);
   if (vertical != kNone) units->vertical = UnitOfSystem(wkt, vertical);
   units->degrees = projected == kNone && wkt.find("GEOGCS[") != kNone;
+  units->wkt = wkt.substr(0, wkt.find('\0'));
 }
 
 struct RecordList {

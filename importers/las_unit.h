@@ -10,6 +10,7 @@ struct LasUnits {
   // Names of length_unit.h; "" = not said. Heights may have one of their own.
   std::string horizontal, vertical;
   bool degrees = false;  // longitude and latitude
+  std::string wkt;       // the system itself, "" where GeoTIFF keys say it or nothing does
 };
 
 // By the GeoTIFF keys or the WKT among the records of variable length, before the points or behind

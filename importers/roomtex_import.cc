@@ -15,7 +15,7 @@
 #include "importers/content_hash.h"
 #include "importers/e57_images.h"
 #include "importers/e57_writer.h"
-#include "importers/las.h"
+#include "importers/las_writer.h"
 #include "importers/length_unit.h"
 #include "importers/panorama_cutter.h"
 #include "importers/photo_picks.h"
@@ -38,6 +38,7 @@ struct ImportOptions {
   bool cut_panoramas = false, image_picks = false;
   ScanReaderOptions reader;
   ScanMeshOptions mesh;
+  LasWriterOptions las;
   FaceOptions faces;  // of panoramas
 };
 
@@ -54,6 +55,7 @@ void CheckOutputs(const ImportOptions& options) {
   }
   AppendProblems(options.reader.Problems(), &problems);
   AppendProblems(options.mesh.Problems(), &problems);
+  AppendProblems(options.las.Problems(), &problems);
   ThrowIfProblems(problems);
   // An output that cannot be written is better known before a large scan was read.
   for (const std::string& path : options.output_paths) OutputFile probe(path);
@@ -93,6 +95,7 @@ class Importer {
     file_ = ReadScanFile(options_.input_path, options_.reader);
     for (const std::string& note : file_.notes) context_.Warn(note);
     CheckGrid();
+    NoteLostSystem();
     context_.progress.Stage("triangulate");
     for (const Scan& scan : file_.scans) meshes_.push_back(BuildScanMesh(scan, options_.mesh));
     FillReport();
@@ -127,10 +130,20 @@ class Importer {
     }
   }
 
+  void NoteLostSystem() const {
+    if (file_.coordinate_system.empty() || options_.las.version == "1.4") return;
+    for (const std::string& path : options_.output_paths) {
+      if (ScanWriterExtension(path) != ".las") continue;
+      context_.progress.Note(path + " is without the coordinate system of the input; " +
+                             "--Las.version 1.4 keeps it");
+    }
+  }
+
   // Paths of the files written for one --output_path.
   std::vector<std::string> Write(const std::string& path) const {
     const std::string extension = ScanWriterExtension(path);
-    const ScanWriterOptions writer{options_.reader.azimuth == "counterclockwise"};
+    const ScanWriterOptions writer{options_.reader.azimuth == "counterclockwise", options_.las,
+                                   file_.coordinate_system};
     if (extension == ".rtpi" && file_.format == "RTPI") {
       CopyRtpi(options_, path);
     } else if (file_.scans.size() == 1) {
@@ -142,7 +155,8 @@ class Importer {
     } else if (const auto kind = XyzKindOf(extension); kind || extension == ".las") {
       std::vector<const Scan*> scans;
       for (const Scan& scan : file_.scans) scans.push_back(&scan);
-      kind ? WriteXyz(scans, path, *kind) : WriteLas(scans, path);
+      kind ? WriteXyz(scans, path, *kind)
+           : WriteLas(scans, path, options_.las, file_.coordinate_system);
     } else if (extension == ".ply") {
       std::vector<PlyPart> parts;
       for (size_t i = 0; i < meshes_.size(); ++i) parts.push_back({&file_.scans[i], &meshes_[i]});
@@ -373,6 +387,7 @@ int main(int argc, char** argv) {
       "(roomtex-align --picks_path) without clicks.");
   command.Add(FieldsOf(&options.reader));
   command.Add(FieldsOf(&options.mesh));
+  command.Add(FieldsOf(&options.las));
   command.Add(FieldsOf(&options.faces));
   return command.Run(argc, argv, [&options](const Command::Context& context) {
     roomtex::RunImport(options, context);

@@ -219,9 +219,11 @@ class ScanFinish {
 };
 
 // As the file says it, with a note, unless the option does.
-double UnitOfLas(const std::string& path, const ScanReaderOptions& options,
-                 std::vector<std::string>* notes) {
-  if (!options.units.empty()) return *MetersPerUnit(options.units);
+void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, ScanFile* file) {
+  if (!options.units.empty()) {
+    file->meters_per_unit = *MetersPerUnit(options.units);
+    return;
+  }
   const LasUnits units = ReadLasUnits(path);
   if (units.degrees) {
     throw InputError(path, "", "has coordinates of longitude and latitude",
@@ -229,13 +231,17 @@ double UnitOfLas(const std::string& path, const ScanReaderOptions& options,
                      "or give --units if its coordinates are lengths all the same");
   }
   if (!units.vertical.empty() && !units.horizontal.empty() && units.vertical != units.horizontal) {
-    notes->push_back("its heights are in " + units.vertical + ", the rest in " + units.horizontal +
-                     ": they are read as " + units.horizontal + " like the rest (export it anew)");
+    file->notes.push_back("its heights are in " + units.vertical + ", the rest in " +
+                          units.horizontal + ": they are read as " + units.horizontal +
+                          " like the rest (export it anew)");
   }
-  if (units.horizontal.empty() || units.horizontal == "meters") return 1;
-  notes->push_back("the file says that its unit is " + units.horizontal +
-                   "; coordinates become metres (--units says another)");
-  return *MetersPerUnit(units.horizontal);
+  if (units.horizontal.empty() || units.horizontal == "meters") {
+    file->coordinate_system = units.wkt;
+    return;
+  }
+  file->notes.push_back("the file says that its unit is " + units.horizontal +
+                        "; coordinates become metres (--units says another)");
+  file->meters_per_unit = *MetersPerUnit(units.horizontal);
 }
 
 ScanFile ReadAsE57(const ScanPath& path, const ScanReaderOptions& options,
@@ -291,7 +297,7 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
   } else if (LooksLikeLas(start)) {
     file.format = "LAS";
     file.byte_order = "little";
-    file.meters_per_unit = UnitOfLas(path, options, &file.notes);
+    TakeUnitOfLas(path, options, &file);
     file.scans.push_back(ReadLas(path, {file.meters_per_unit, options.max_range, options.colors}));
   } else if (ForeignFormat(start).empty() && LooksLikeObj(start)) {
     file.format = "OBJ";

@@ -48,6 +48,9 @@ struct ScanFile {
   // sentence or "". Other formats: "".
   std::string azimuth, azimuth_note;
   double meters_per_unit = 1;
+  // LAS: OGC WKT of the system that the coordinates are in as they were read; "" = not known, or
+  // they became metres.
+  std::string coordinate_system;
   // Of the first scan, as it was read, "" where that is none of UpAxisNames().
   std::string up_axis;
 

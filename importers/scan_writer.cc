@@ -10,7 +10,6 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "importers/e57_writer.h"
-#include "importers/las.h"
 #include "importers/pcd.h"
 #include "importers/ply.h"
 #include "importers/ptx.h"
@@ -74,7 +73,9 @@ void WriteScan(const Scan& scan, const std::vector<Triangle>& triangles, const s
   if (extension == ".rtpi") WriteRtpi(RtpiFromScan(scan, options.counterclockwise), path);
   if (extension == ".ptx") WritePtx({scan}, path);
   if (extension == ".e57") WriteE57({scan}, path);
-  if (extension == ".las") WriteLas({&scan}, path);
+  if (extension == ".las") {
+    WriteLas({&scan}, path, options.las, options.coordinate_system);
+  }
   if (const auto kind = XyzKindOf(extension)) WriteXyz({&scan}, path, *kind);
 }
 

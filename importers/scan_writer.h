@@ -6,6 +6,7 @@
 
 #include "core/scan.h"
 #include "core/scan_mesh.h"
+#include "importers/las_writer.h"
 
 namespace roomtex {
 
@@ -20,6 +21,8 @@ bool CanHold(const std::string& extension, Scan::Kind kind);
 struct ScanWriterOptions {
   // RTPI: sense of the azimuth to write; reading it with the same sense gives the same room.
   bool counterclockwise = false;
+  LasWriterOptions las;
+  std::string coordinate_system;  // for a LAS, as in ScanFile
 };
 
 //   .ply   triangle mesh (ply.h); `triangles` index scan.points, see BuildScanMesh
@@ -29,7 +32,7 @@ struct ScanWriterOptions {
 //   .rtpi  RTPI 3.0 (RtpiFromScan says how intensities are scaled)
 //   .ptx   PTX (ptx.h), intensity 0..1
 //   .e57   E57 (e57_writer.h), structured where there is a grid
-//   .las   points (las.h)
+//   .las   points (las_writer.h)
 //   .xyz, .pts, .csv   points as text (xyz.h)
 // Colours of the scan go where the format holds them: all but .png and .rtpi. Throws InputError
 // where CanHold() says no, UsageError for another extension.

@@ -123,6 +123,8 @@ bool LiesIn(const std::string& folder, const std::string& outer) {
   std::error_code error;
   const fs::path inside = fs::weakly_canonical(folder, error);
   const fs::path outside = fs::weakly_canonical(outer, error);
+  // Links in a circle lead nowhere; the first step that writes there says so.
+  if (inside.empty() || outside.empty()) return false;
   return std::mismatch(outside.begin(), outside.end(), inside.begin(), inside.end()).first ==
          outside.end();
 }

@@ -260,7 +260,9 @@ TEST(AlignCommand, RefusesAMirroredScanAndNamesTheOption) {
 
 TEST(AlignCommand, FindsTheReadingOfAScanByThePicks) {
   const CaseFolder files(MakeCase());
-  WriteScan(MakeCase().scans[0], {}, files.scan_path, {true});  // azimuths counter-clockwise
+  ScanWriterOptions options;
+  options.counterclockwise = true;
+  WriteScan(MakeCase().scans[0], {}, files.scan_path, options);
   const CommandResult result = files.Align();
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));

@@ -160,9 +160,15 @@ TEST_F(KnownPhotosCommand, OneOfThemDoesNotTellTheScale) {
   const CommandResult result = Run();
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("Fewer than two"));
-  EXPECT_THAT(result.err, HasSubstr("--E57.picks 1"));
+  EXPECT_THAT(result.err, HasSubstr("by what the scan shows in these photos"));
   EXPECT_FALSE(Report()["known"]["placed"]);
-  EXPECT_FALSE(ReadMapperVerdict(folder_ / "sparse/0", Model()).known_rms);
+  const MapperVerdict verdict = ReadMapperVerdict(folder_ / "sparse/0", Model());
+  EXPECT_FALSE(verdict.known_rms);
+  // What roomtex-align goes by.
+  const SparseImage& told = known_.images.begin()->second;
+  ASSERT_EQ(verdict.told_poses.size(), 1u);
+  EXPECT_EQ(verdict.told_poses[0].first, told.name);
+  EXPECT_THAT(verdict.told_poses[0].second, IsNearRigid(told.cam_from_model, 1e-12, 1e-6));
 }
 
 TEST_F(KnownPhotosCommand, PosesOfAnotherPlaceAreNotTrusted) {

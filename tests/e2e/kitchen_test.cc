@@ -258,8 +258,9 @@ TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
 }
 
 // The surface alone leaves the photos a few degrees off, too far for them to confirm it: they draw
-// the model to its place. Some models of COLMAP fit the mirror image of the room nearly as well
-// (1.59 times its score, 1.6 is asked): those are not trusted.
+// the model to its place. COLMAP's model differs from run to run: of some the mirror image of the
+// room, which no photo can deny, has nearly as much of the score (1.59 where 1.6 is asked), and
+// those are not trusted. Another place, which photos do deny, counts less.
 TEST_F(Kitchen, IsFoundWithoutClicks) {
   const std::string output = *folder_ / "found";
   const CommandResult found =
@@ -270,7 +271,11 @@ TEST_F(Kitchen, IsFoundWithoutClicks) {
   EXPECT_TRUE(search["best"]["photos"]["supports"]) << search["best"];
   EXPECT_GT(search["best"]["photos"]["share"], 0.12);
   EXPECT_GT(search["ratio"], 1.4);
-  EXPECT_EQ(found.exit_code, search["ratio"] >= 1.6 ? 0 : 4) << found.err;
+  const double score = search["best"]["rays"]["score"];
+  const bool mirror_comes_near = 1.6 * search["mirrored_score"].get<double>() > score;
+  if (search["ratio"] >= 1.6) EXPECT_EQ(found.exit_code, 0) << search << found.err;
+  if (mirror_comes_near) EXPECT_EQ(found.exit_code, 4) << search << found.err;
+  EXPECT_TRUE(found.exit_code == 0 || found.exit_code == 4) << found.err;
   const std::vector<double> distances = DistancesFromRecording(ReadSparseModel(output));
   EXPECT_LT(distances[distances.size() / 2], 0.08);
 }

@@ -172,6 +172,37 @@ TEST_F(ScannerPhotos, RoomtexAutoColoursByThemAlone) {
   EXPECT_THAT(ReadBytes(Path("alone/report.html")), HasSubstr("nothing here has checked"));
 }
 
+// As scanners take them: a panorama from one place. Its faces, which COLMAP maps beside the user's
+// photos, leave the scale open; the scan, seen in them, tells it.
+TEST_F(ScannerPhotos, OfOneStandpointPutTheModelIntoTheScan) {
+  const CommandResult simulated = RunCommandLine(
+      "roomtex-simulate --quiet --output_path " + Path("panorama") +
+      " --num_photos 1 --camera_model EQUIRECTANGULAR --photo_width 2400 --photo_height 1200 "
+      "--scan_columns 1000 --scan_rows 380");
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  ASSERT_EQ(ReadBytes(Path("panorama/scan.rtpi")), ReadBytes(Path("capture/scan.rtpi")));
+  const CommandResult written = RunCommandLine(
+      "roomtex-texture --quiet --Texture.scale 1 --output_e57 1 --E57.images 1 --input_path " +
+      Path("panorama/truth") + " --image_path " + Path("panorama/photos") + " --scan_path " +
+      Path("panorama/scan.rtpi") + " --output_path " + Path("one_place"));
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  const CommandResult result = RunCommandLine(
+      "roomtex-auto --quiet --scan_path " + Path("one_place/model.e57") + " --image_path " +
+      Path("photos/mine") + " --cameras_path " + Path("capture/cameras.txt") +
+      " --quality low --SiftExtraction.max_num_features 2048 --until align --output_path " +
+      Path("auto_one_place"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json known = json::parse(ReadBytes(Path("auto_one_place/log/mapper.json")))["known"];
+  EXPECT_FALSE(known["placed"]);
+  EXPECT_GT(known["told"].size(), 1u);
+  const json report = json::parse(ReadBytes(Path("auto_one_place/log/align.json")));
+  EXPECT_EQ(report["search"]["method"], "known_poses");
+  EXPECT_TRUE(report["trusted"]);
+  // Also where rays of faces meet in their own camera: such points stop no adjustment.
+  EXPECT_TRUE(report["plane_bundle"]["used"]);
+  EXPECT_LT(MedianError(ReadSparseModel(Path("auto_one_place/aligned")), ""), 0.005);
+}
+
 TEST_F(ScannerPhotos, WithoutTheirPosesPicksAreAskedFor) {
   const CommandResult mapped =
       RunCommandLine("roomtex-mapper --quiet --database_path " + Path("database.db") +

@@ -99,20 +99,6 @@ TEST_F(Las, WithheldPointsAreLeftOut) {
   EXPECT_EQ(ReadLas(Write(recent.bytes), {}).points.size(), 2u);
 }
 
-TEST_F(Las, WrittenFilesReadTheSame) {
-  Scan scan;
-  scan.organised = false;
-  scan.points = {{412345.12345, 5654321.5, 99}, Scan::MissingPoint(), {412350, 5654300, -3.25}};
-  scan.intensity = {0.25f, 0, 1};
-  WriteLas({&scan, &scan}, folder_ / "b.las");
-  const Scan again = ReadLas(folder_ / "b.las", {});
-  ASSERT_EQ(again.points.size(), 4u);
-  EXPECT_LT((again.points[0] - scan.points[0]).norm(), 6e-5);
-  EXPECT_LT((again.points[3] - scan.points[2]).norm(), 6e-5);
-  EXPECT_EQ(again.intensity[0], 16384);
-  EXPECT_EQ(again.intensity[1], 65535);
-}
-
 // One record of a coordinate system before the points, as LasBytes leaves room for it.
 std::string WithSystem(uint16_t id, const std::string& system) {
   LasBytes file;

@@ -89,6 +89,34 @@ TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
   EXPECT_THAT(third.err, Not(HasSubstr("room=hall")));
 }
 
+// An E57 that brings its own photos needs none beside it: neither in a table nor in a folder.
+TEST_F(SiteWorkflow, ARoomMayHaveNoPhotosButTheScanners) {
+  Simulate("made",
+           "--num_photos 4 --photo_width 240 --photo_height 160 --scan_columns 200 --scan_rows 80");
+  const CommandResult written = RunCommandLine(
+      "roomtex-texture --quiet --Texture.scale 1 --output_e57 1 --E57.images 1 --input_path " +
+      (folder_ / "made/truth") + " --image_path " + (folder_ / "made/photos") + " --scan_path " +
+      (folder_ / "made/scan.rtpi") + " --output_path " + (folder_ / "made/coloured"));
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  const std::string e57 = ReadBytes(folder_ / "made/coloured/model.e57");
+  fs::remove_all(folder_ / "made");
+  fs::create_directories(folder_ / "hall");
+  WriteBytes(folder_ / "hall/site.e57", e57);
+
+  const CommandResult run = RunSite();
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(ReadBytes(At("hall/log/pictures.state")), "done\n");
+  EXPECT_FALSE(fs::exists(At("hall/log/features.state")));
+  EXPECT_TRUE(fs::exists(At("hall/textured/model.glb")));
+  const json site = json::parse(ReadBytes(At("site.json")));
+  ASSERT_EQ(site["rooms"].size(), 1u);
+  EXPECT_EQ(site["rooms"][0]["name"], "hall");
+  EXPECT_EQ(site["rooms"][0]["state"], "trusted");
+
+  WriteBytes(folder_ / "site.csv", "room,photos,scans\nhall,,hall/site.e57\n");
+  EXPECT_THAT(RunSite("-n").err, HasSubstr("Nothing to be done"));
+}
+
 TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
   EXPECT_THAT(RunSite("-n").err, HasSubstr("is no site"));
   fs::create_directories(folder_ / "p");
@@ -102,7 +130,7 @@ TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
            {"room,photos,scans\na,q,s.ptx\n", "folder of photos \"q\" does not exist"},
            {"room,photos,scans\na,p,t.ptx;s.ptx\n", "scan \"t.ptx\" does not exist"},
            {"room,photos,scans\na,p,\n", "no scan is named"},
-           {"room,photos,scans\na,,s.ptx\n", "no photos are named"},
+           {"room,photos,scans\na,,s.ptx\n", "no photos are named, and no scan is an E57"},
            {"room,photos,scans,options\na,p,s.ptx,--only align\n", "--only cannot be one"},
            {"room,photos,scans,options\na,p,s.ptx,'\n", "No closing quotation"},
        }) {

@@ -58,16 +58,19 @@ LocalServer::Content Bytes(std::string bytes) {
 template <typename T>
 class Promised {
  public:
-  void Set(std::shared_ptr<const T> value) {
+  // problem: why there is no value.
+  void Set(std::shared_ptr<const T> value, std::exception_ptr problem) {
     const std::lock_guard<std::mutex> lock(mutex_);
     value_ = std::move(value);
+    problem_ = std::move(problem);
     is_set_ = true;
     changed_.notify_all();
   }
-  // Waits; null when it could not be made or `give_up` says so.
+  // Waits; null when `give_up` says so. Throws why it could not be made.
   std::shared_ptr<const T> Get(const std::function<bool()>& give_up) {
     std::unique_lock<std::mutex> lock(mutex_);
     while (!is_set_ && !give_up()) changed_.wait_for(lock, std::chrono::milliseconds(100));
+    if (problem_) std::rethrow_exception(problem_);
     return value_;
   }
 
@@ -75,6 +78,7 @@ class Promised {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::shared_ptr<const T> value_;
+  std::exception_ptr problem_;
   bool is_set_ = false;
 };
 
@@ -106,7 +110,6 @@ struct ViewAnswers::Impl {
   std::map<std::string, std::function<std::optional<LocalServer::Content>(const Query&)>> pieces;
   std::atomic<bool> stopping{false};
   Promised<ViewChunks> chunks;
-  std::exception_ptr problem;  // why there are no chunks; set before them
   Promised<ViewEvidence> evidence;
   std::mutex texture_mutex;
   std::map<std::pair<int, int>, std::shared_ptr<const std::string>> scaled;  // page, size
@@ -118,13 +121,12 @@ const ViewChunks& ViewAnswers::Impl::Chunks() {
   const auto made = chunks.Get([this] { return IsStopping(); });
   // Kept by the promise.
   if (made) return *made;
-  if (problem) std::rethrow_exception(problem);
-  throw UsageError("The room could not be prepared.");
+  throw UsageError("The viewer is ending.");
 }
 
 std::shared_ptr<const ViewEvidence> ViewAnswers::Impl::Evidence() {
   auto found = evidence.Get([this] { return IsStopping(); });
-  if (!found) throw UsageError("The evidence could not be prepared.");
+  if (!found) throw UsageError("The viewer is ending.");
   return found;
 }
 
@@ -215,19 +217,18 @@ std::optional<LocalServer::Content> ViewAnswers::Impl::Texture(const Query& quer
 }
 
 void ViewAnswers::Impl::Prepare() {
-  bool chunks_made = false;
-  const auto attempt = [this, &chunks_made](const std::function<void()>& make) {
-    if (IsStopping()) return;
+  // Returns what went wrong, memory that ran out, too: whoever asks is told.
+  const auto attempt = [this](const std::function<void()>& make) -> std::exception_ptr {
+    if (IsStopping()) return nullptr;
     try {
       make();
-    } catch (const InputError&) {
-      if (!chunks_made) problem = std::current_exception();
-    } catch (const std::exception&) {
-      // Out of memory: what asks for it is told that it is not there.
+      return nullptr;
+    } catch (...) {
+      return std::current_exception();
     }
   };
   std::shared_ptr<const ViewChunks> cut;
-  attempt([this, &cut] {
+  std::exception_ptr problem = attempt([this, &cut] {
     ViewModel whole = std::move(content.model);
     content.model = {};
     content.model.path = whole.path;
@@ -241,16 +242,16 @@ void ViewAnswers::Impl::Prepare() {
                                              [this] { return IsStopping(); });
   });
   if (IsStopping()) cut = nullptr;
-  chunks_made = cut != nullptr;
-  chunks.Set(cut);
-  if (!cut) return evidence.Set(nullptr);
+  chunks.Set(cut, problem);
+  if (!cut) return evidence.Set(nullptr, problem);
+  // Only ahead of time: what is not made now is made when it is asked for.
   attempt([this, &cut] {
     ParallelFor(num_threads, 0, static_cast<int>(cut->chunks().size()), [&](int chunk) {
       if (!IsStopping()) cut->Make(chunk, ViewChunks::kCoarse);
     });
   });
   std::shared_ptr<const ViewEvidence> found;
-  attempt([this, &found, &cut] {
+  problem = attempt([this, &found, &cut] {
     if (content.evidence_path.empty()) {
       found = std::make_shared<const ViewEvidence>(content.no_evidence_reason);
       return;
@@ -262,7 +263,7 @@ void ViewAnswers::Impl::Prepare() {
       found = std::make_shared<const ViewEvidence>(error.what());
     }
   });
-  evidence.Set(found);
+  evidence.Set(found, problem);
 }
 
 void ViewAnswers::Impl::Add() {
