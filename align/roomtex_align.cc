@@ -469,6 +469,7 @@ void Align(const AlignCommandOptions& a, const Command::Context& context) {
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
   if (!verdict.known_rms && verdict.told_poses.empty()) RequirePicksOrPhotos(a);
   std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  NamePicksAsInModel(model, &picks);
   std::vector<NearHint> near = ReadHints(a, picks, model);
   const std::set<std::string> told = LookForPhotos(a, model, context);
   context.progress.Stage("read scan");

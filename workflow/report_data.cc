@@ -57,7 +57,7 @@ class ReportMaker {
   Json Keys() {
     Json keys;
     keys["verdict"] = Verdict();
-    keys["remedies"] = result_.stop.remedies;
+    keys["remedies"] = Remedies();
     keys["facts"] = Facts();
     keys["notices"] = Notices();
     keys["photos"] = Photos();
@@ -76,6 +76,17 @@ class ReportMaker {
     });
   }
 
+  std::vector<std::string> Outdated() const {
+    std::vector<std::string> sentences;
+    for (const StepOutcome& step : result_.steps) {
+      if (!step.outdated.empty()) {
+        sentences.push_back("The step " + step.name + " was passed over, and what it left is not " +
+                            "that of these photos, scans and options (" + step.outdated + ").");
+      }
+    }
+    return sentences;
+  }
+
   Json Verdict() const {
     Json verdict;
     std::vector<std::string> sentences;
@@ -88,6 +99,10 @@ class ReportMaker {
       verdict["headline"] = untrusted ? "Not finished: " + Doubt(stop.step)
                                       : "Not finished: the step " + stop.step + " failed";
       sentences.push_back(stop.reason);
+    } else if (const std::vector<std::string> outdated = Outdated(); !outdated.empty()) {
+      verdict["state"] = "unfinished";
+      verdict["headline"] = "Not up to date: steps before were passed over that have to run again";
+      sentences = outdated;
     } else if (!result_.whole) {
       verdict["state"] = "unfinished";
       verdict["headline"] = "Not finished: only some of the steps were asked for";
@@ -120,6 +135,11 @@ class ReportMaker {
     }
     verdict["sentences"] = sentences;
     return verdict;
+  }
+
+  std::vector<std::string> Remedies() const {
+    if (result_.stop.stopped || Outdated().empty()) return result_.stop.remedies;
+    return {"Start again without --from and --only: what has not changed is not run again"};
   }
 
   static std::string Doubt(const std::string& step) {
@@ -209,7 +229,10 @@ class ReportMaker {
     Json steps = Json::array();
     for (const StepOutcome& step : result_.steps) {
       if (!step.known) continue;
-      Json json = {{"name", step.name}, {"does", step.does}, {"ran_now", step.ran}};
+      Json json = {{"name", step.name},
+                   {"does", step.does},
+                   {"ran_now", step.ran},
+                   {"outdated", step.outdated.empty() ? Json() : Json(step.outdated)}};
       json.update(RecordToJson(step.record));
       steps.push_back(json);
     }

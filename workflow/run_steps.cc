@@ -100,7 +100,10 @@ class StepRunner {
     outcome.does = row.does;
     if (index < First() || index > Last()) {
       if (index < First() || IsUpToDate(row)) Remember(&outcome);
-      if (index < First()) RequireMade(row);
+      if (index < First()) {
+        RequireMade(row);
+        outcome.outdated = WhyOutdated(row);
+      }
       result_.steps.push_back(outcome);
       return true;
     }
@@ -183,6 +186,30 @@ class StepRunner {
     const Step step = MakeStep(row);
     return std::all_of(step.inputs.begin(), step.inputs.end(), IsThere) &&
            Differences(record->made_from, MadeFromOf(step)).empty();
+  }
+
+  // Of a step that is passed over. Another version of roomtex or COLMAP is no reason: what it made
+  // is a result of the inputs that are there.
+  std::string WhyOutdated(const StepRow& row) {
+    const StepRecord* const record = state_.Find(row.name);
+    if (record == nullptr) return IsConsumed(row.name) ? "" : "it has not run";
+    if (record->state == StepState::kStarted) return "it was interrupted";
+    if (record->state == StepState::kFailed) return "it failed the last time";
+    const Step step = MakeStep(row);
+    for (const std::string& path : step.inputs) {
+      if (!IsThere(path)) return FileName(path) + " is not there any more";
+    }
+    std::vector<std::string> changed = Differences(record->made_from, MadeFromOf(step));
+    changed.erase(std::remove_if(changed.begin(), changed.end(),
+                                 [](const std::string& name) {
+                                   return name == "roomtex" || name == "COLMAP";
+                                 }),
+                  changed.end());
+    if (!changed.empty()) return "changed: " + Joined(changed, ", ");
+    if (!IsConsumed(step.name) && !OutputsAreAsLeft(*record)) {
+      return "its result was changed or removed";
+    }
+    return "";
   }
 
   // Why a step has to run; none if it has not.

@@ -15,6 +15,9 @@ struct StepOutcome {
   std::string name, does;
   bool ran = false;    // false: was done before, or is not asked for
   bool known = false;  // it has a record, of this run or an earlier one
+  // Passed over by --from or --only, and why what it left is not that of these inputs and options
+  // ("changed: picks.csv"); "" = it is, or it ran.
+  std::string outdated;
   StepRecord record;
   Json report;  // its command's own; null if there is none
 };

@@ -201,6 +201,21 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
   file.Commit();
 }
 
+void NamePicksAsInModel(const SparseModel& model, std::vector<Pick>* picks) {
+  for (Pick& pick : *picks) {
+    if (model.FindImage(pick.image_name) != nullptr) continue;
+    const std::string ending = "/" + pick.image_name;
+    std::vector<const SparseImage*> in_folders;
+    for (const auto& [id, image] : model.images) {
+      const std::string& name = image.name;
+      const bool ends_so = name.size() > ending.size() &&
+                           name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+      if (ends_so) in_folders.push_back(&image);
+    }
+    if (in_folders.size() == 1) pick.image_name = in_folders[0]->name;
+  }
+}
+
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
                     const SparseModel& model, const std::string& among) {
   for (const Pick& pick : picks) {

@@ -41,6 +41,11 @@ std::vector<Pick> ReadPicks(const std::string& path);
 // Written aside and renamed; reading it back gives the same numbers to the last bit.
 void WritePicks(const std::string& path, const std::vector<Pick>& picks);
 
+// A name that the model does not have becomes that of its one photo which has it in a folder
+// (`photo.jpg` is `scanner/photo.jpg` there): picks of roomtex-import --E57.picks in a model of
+// roomtex-auto. Of several none is taken.
+void NamePicksAsInModel(const SparseModel& model, std::vector<Pick>* picks);
+
 // Throws InputError: a name that is not in the model (with the nearest one that is), a pixel
 // outside its photo.
 // `among`: what the names are looked up in, for the message.

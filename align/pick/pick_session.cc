@@ -57,7 +57,8 @@ PickSession::PickSession(const PickScene& scene, const std::string& picks_path)
 void PickSession::Read() {
   Snapshot snapshot;
   if (std::filesystem::exists(picks_path())) {
-    const std::vector<Pick> picks = ReadPicks(picks_path());
+    std::vector<Pick> picks = ReadPicks(picks_path());
+    NamePicksAsInModel(scene_.model(), &picks);
     CheckPickNames(picks_path(), picks, scene_.model(),
                    scene_.has_model() ? "in the sparse model" : "among those of --image_path");
     for (const Pick& pick : picks) {

@@ -2,7 +2,7 @@
 // everything can be read and reached.
 
 import assert from 'node:assert/strict';
-import {writeFileSync} from 'node:fs';
+import {renameSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, makeFolder, screenshot} from './browser.mjs';
@@ -328,6 +328,29 @@ test('a server that does not answer loses nothing', async () => {
     await until(() => page.file().length === 5, 'saved once the server is back');
     assert.ok(!await page.page.isVisible('#banner'));
   }, {picksFile: fileOf(places.slice(0, 6)), allowed: [/ERR_CONNECTION_REFUSED/, /failed$/]});
+});
+
+test('why picks cannot be saved is said in full, and they are once they can', async () => {
+  await pageOn(async (page, {folder}) => {
+    await page.rowsAre(6);
+    const away = `${folder.path('')}-away`;
+    renameSync(folder.path(''), away);
+    await page.page.focus('#photo-pane');
+    await page.page.keyboard.press('n');
+    await page.page.keyboard.press('x');
+    await page.page.waitForSelector('#banner:not([hidden])');
+    const banner = await page.text('#banner');
+    assert.match(banner, /could not be saved: .*picks\.csv.*[^.]\. They are kept here/s);
+    // Nothing of it is cut off.
+    assert.ok(await page.page.$eval(
+        '#banner p', (p) => p.scrollWidth <= p.clientWidth && p.scrollHeight <= p.clientHeight));
+    assert.ok((await lowestContrast(page.page, '#banner')).ratio >= 4.5);
+    await screenshot(page.page, 'pick-not-saved');
+    renameSync(away, folder.path(''));
+    await page.saved();
+    await until(() => page.file()[0].weight === 0, 'saved once the folder is there again');
+    assert.ok(!await page.page.isVisible('#banner'));
+  }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
 test(

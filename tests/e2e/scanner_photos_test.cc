@@ -19,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 class ScannerPhotos : public testing::Test {
  protected:
@@ -201,6 +202,22 @@ TEST_F(ScannerPhotos, OfOneStandpointPutTheModelIntoTheScan) {
   // Also where rays of faces meet in their own camera: such points stop no adjustment.
   EXPECT_TRUE(report["plane_bundle"]["used"]);
   EXPECT_LT(MedianError(ReadSparseModel(Path("auto_one_place/aligned")), ""), 0.005);
+}
+
+// roomtex-auto has the scanner's photos in a folder of their own; picks of roomtex-import name them
+// as they are in the E57.
+TEST_F(ScannerPhotos, PicksInThemAreFoundInTheFolderOfRoomtexAuto) {
+  const CommandResult imported =
+      RunCommandLine("roomtex-import --quiet --input_path " + Path("one_place/model.e57") +
+                     " --images_path " + Path("own") + " --E57.cut_panoramas 1 --E57.picks 1");
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  ASSERT_THAT(ReadBytes(Path("own/picks.csv")), Not(HasSubstr("scanner/")));
+  const CommandResult aligned =
+      RunCommandLine("roomtex-align --quiet --input_path " + Path("auto_one_place/sparse/0") +
+                     " --scan_path " + Path("one_place/model.e57") + " --picks_path " +
+                     Path("own/picks.csv") + " --output_path " + Path("by_picks"));
+  ASSERT_EQ(aligned.exit_code, 0) << aligned.err;
+  EXPECT_LT(MedianError(ReadSparseModel(Path("by_picks")), ""), 0.005);
 }
 
 TEST_F(ScannerPhotos, WithoutTheirPosesPicksAreAskedFor) {

@@ -1,50 +1,15 @@
 #include "importers/e57.h"
 
-#include <filesystem>
 #include <fstream>
 #include <random>
 
-#include <gmock/gmock.h>
-
-#include "core/error.h"
 #include "core/frames.h"
-#include "importers/scan_reader.h"
-#include "tests/importers/e57_bytes.h"
-#include "tests/support/matchers.h"
-#include "tests/support/temp_folder.h"
+#include "tests/importers/e57_fixture.h"
 
 namespace roomtex {
 namespace {
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::SizeIs;
-
-class E57 : public testing::Test {
- protected:
-  std::vector<Scan> Read(const std::string& bytes, const std::string& part = "",
-                         const E57Options& options = {}) {
-    WriteBytes(folder_ / "site.e57", bytes);
-    notes_.clear();
-    return ReadE57(folder_ / "site.e57", part, options, &notes_);
-  }
-  // One scan of single floats.
-  static std::string Cloud(const std::vector<Eigen::Vector3f>& points, const std::string& more,
-                           size_t piece = 5000) {
-    std::vector<std::string> streams(3);
-    for (const Eigen::Vector3f& point : points) {
-      for (int i = 0; i < 3; ++i) streams[i] += Bytes(point[i]);
-    }
-    E57Bytes file;
-    const uint64_t offset = file.AddPoints(streams, piece);
-    return file.Finish(E57Xml(ScanXml(offset, points.size(), SinglesXml(), more)));
-  }
-  void ExpectError(const std::string& bytes, const std::string& message) {
-    EXPECT_INPUT_ERROR(Read(bytes), message);
-    EXPECT_INPUT_ERROR(Read(bytes), folder_ / "site.e57");
-  }
-  TempFolder folder_;
-  std::vector<std::string> notes_;
-};
 
 TEST_F(E57, ChecksumsAreCrc32c) {
   EXPECT_EQ(Crc32c("123456789"), 0xe3069283u);              // the check value of the algorithm
@@ -261,164 +226,34 @@ TEST_F(E57, ColoursStandInForIntensitiesThatAreNotThere) {
   EXPECT_THAT(scan.intensity, testing::ElementsAre(testing::FloatEq(1), 0, 0));
 }
 
-// A scanner in the middle of a sphere: 12 columns of 5 rows from elevation +0.4 down to -0.4.
-struct SphereScan {
-  std::vector<uint64_t> rows, columns, returns;
-  std::vector<float> xyz[3];
-
-  static Eigen::Vector3d PointAt(int column, int row) {
-    const double azimuth = 0.2 * column, elevation = 0.4 - 0.2 * row;
-    return 5 * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                               std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+TEST_F(E57, ReadsOffsetsBeyondFourGigabytes) {
+  // The pages between the header and the points are a hole in the file.
+  const std::string near = Cloud({{1, 2, 3}, {4, 5, 6}}, "");
+  const uint64_t kFar = uint64_t{5} << 30;
+  const auto far_of = [&](uint64_t offset) { return offset + kFar - E57Bytes::kPage; };
+  E57Bytes points;
+  const std::string x = StreamOf<float>({1, 4}), y = StreamOf<float>({2, 5}),
+                    z = StreamOf<float>({3, 6});
+  points.AddBlob(std::string(1020 - 48 - 16, '\0'));  // fills the first page
+  const uint64_t offset = points.AddPoints({x, y, z});
+  std::string file = points.Finish(E57Xml(ScanXml(far_of(offset), 2, SinglesXml())));
+  ASSERT_EQ(offset, E57Bytes::kPage);
+  const auto put = [&](size_t at, uint64_t number) { file.replace(at, 8, Bytes(number)); };
+  put(16, file.size() + kFar - E57Bytes::kPage);
+  put(24, far_of(LittleEndian<uint64_t>(&file[24])));
+  put(offset + 16, far_of(LittleEndian<uint64_t>(&file[offset + 16])));
+  const std::string path = folder_ / "large.e57";
+  {
+    std::ofstream stream(path, std::ios::binary);
+    stream << file.substr(0, E57Bytes::kPage);
+    stream.seekp(static_cast<std::streamoff>(kFar));
+    stream << file.substr(E57Bytes::kPage);
   }
-  void Add(int column, int row, uint64_t row_index, uint64_t column_index, uint64_t number = 0,
-           double scale = 1) {
-    for (int i = 0; i < 3; ++i) {
-      xyz[i].push_back(static_cast<float>(scale * PointAt(column, row)[i]));
-    }
-    rows.push_back(row_index);
-    columns.push_back(column_index);
-    returns.push_back(number);
-  }
-  std::string File(const std::string& bounds = "", uint64_t most = 15) const {
-    int bits = 1;
-    while (most >> bits != 0) ++bits;
-    E57Bytes file;
-    const uint64_t offset =
-        file.AddPoints({StreamOf(xyz[0]), StreamOf(xyz[1]), StreamOf(xyz[2]), BitStream(rows, bits),
-                        BitStream(columns, bits), BitStream(returns, 2)});
-    const auto highest = static_cast<int64_t>((uint64_t{1} << bits) - 1);
-    return file.Finish(
-        E57Xml(ScanXml(offset, rows.size(),
-                       SinglesXml() + IntegerXml("rowIndex", 0, highest) +
-                           IntegerXml("columnIndex", 0, highest) + IntegerXml("returnIndex", 0, 3),
-                       bounds)));
-  }
-  static std::string Bounds(int last_row, int last_column) {
-    return Element("indexBounds", "Structure",
-                   Element("rowMaximum", "Integer", std::to_string(last_row)) +
-                       Element("columnMaximum", "Integer", std::to_string(last_column)));
-  }
-};
-
-TEST_F(E57, TheGridStandsUprightWhateverTheSenseOfItsIndices) {
-  for (const bool upward : {false, true}) {
-    for (const bool transposed : {false, true}) {
-      SphereScan sphere;
-      for (int column = 0; column < 12; ++column) {
-        for (int row = 0; row < 5; ++row) {
-          if (column == 3 && row == 1) continue;
-          const uint64_t index = upward ? 4 - row : row;
-          if (transposed) sphere.Add(column, row, column, index);
-          if (!transposed) sphere.Add(column, row, index, column);
-        }
-      }
-      const std::string bounds = transposed ? SphereScan::Bounds(11, 4) : SphereScan::Bounds(4, 11);
-      const Scan scan = Read(sphere.File(bounds))[0];
-      EXPECT_EQ(scan.kind(), Scan::Kind::kGrid);
-      ASSERT_EQ(scan.num_columns, 12);
-      ASSERT_EQ(scan.num_rows, 5);
-      EXPECT_EQ(scan.NumMissing(), 1);
-      EXPECT_TRUE(scan.IsMissing(scan.Index(3, 1)));
-      EXPECT_EQ(scan.intensity[scan.Index(3, 1)], 0);
-      for (int column = 4; column < 12; ++column) {
-        for (int row = 0; row < 5; ++row) {
-          ASSERT_THAT(scan.points[scan.Index(column, row)],
-                      IsNearMatrix(SphereScan::PointAt(column, row), 1e-6));
-        }
-      }
-    }
-  }
-}
-
-// Older programs write no state; a point of a cloud may lie anywhere.
-TEST_F(E57, APointInTheScannerIsMissingFromAGrid) {
-  SphereScan sphere;
-  for (int column = 0; column < 12; ++column) {
-    for (int row = 0; row < 5; ++row) {
-      sphere.Add(column, row, row, column, 0, column == 4 && row == 2 ? 0.0 : 1.0);
-    }
-  }
-  const Scan scan = Read(sphere.File())[0];
-  EXPECT_EQ(scan.NumMissing(), 1);
-  EXPECT_TRUE(scan.IsMissing(scan.Index(4, 2)));
-  EXPECT_THAT(Read(Cloud({{0, 0, 0}, {1, 2, 3}}, ""))[0].points, SizeIs(2));
-}
-
-TEST_F(E57, OfTwoPointsInACellTheFirstReturnStays) {
-  SphereScan sphere;
-  for (int column = 0; column < 12; ++column) {
-    for (int row = 0; row < 5; ++row) {
-      sphere.Add(column, row, row, column, 1, 2.0);  // behind the first return
-      sphere.Add(column, row, row, column, 0);
-      sphere.Add(column, row, row, column, 0, 3.0);
-    }
-  }
-  const Scan scan = Read(sphere.File())[0];
-  ASSERT_THAT(scan.points, SizeIs(60));
-  for (const Eigen::Vector3d& point : scan.points) EXPECT_NEAR(point.norm(), 5, 1e-6);
-}
-
-TEST_F(E57, IndicesDecideWhereTheBoundsAreWrong) {
-  SphereScan sphere;
-  for (int column = 0; column < 12; ++column) {
-    for (int row = 0; row < 5; ++row) sphere.Add(column, row, row + 2, column + 1);
-  }
-  const Scan inside = Read(sphere.File(SphereScan::Bounds(9, 14)))[0];
-  EXPECT_EQ(inside.num_rows, 10);
-  EXPECT_EQ(inside.num_columns, 15);
-  EXPECT_THAT(inside.points[inside.Index(3, 4)], IsNearMatrix(SphereScan::PointAt(2, 2), 1e-6));
-  EXPECT_THAT(notes_, IsEmpty());
-  const Scan beyond = Read(sphere.File(SphereScan::Bounds(4, 11)))[0];
-  EXPECT_EQ(beyond.num_rows, 5);
-  EXPECT_EQ(beyond.num_columns, 12);
-  EXPECT_THAT(notes_, testing::ElementsAre(HasSubstr("beyond its indexBounds of 12 columns x 5")));
-  const Scan huge = Read(sphere.File(SphereScan::Bounds(2000000000, 2000000000)))[0];
-  EXPECT_EQ(huge.num_rows, 5);
-}
-
-TEST_F(E57, RowsAndColumnsThatAThinnedScanLostAreLeftOut) {
-  SphereScan thinned, scattered;
-  for (int column = 0; column < 12; ++column) {
-    for (int row = 0; row < 5; ++row) {
-      thinned.Add(column, row, 1000 * row, 1000 * column);
-      scattered.Add(column, row, 997 * (5 * column + row), 991 * (60 - 5 * column - row));
-    }
-  }
-  const Scan scan = Read(thinned.File("", 60000))[0];
-  ASSERT_EQ(scan.num_rows, 5);
-  ASSERT_EQ(scan.num_columns, 12);
-  EXPECT_THAT(scan.points[scan.Index(7, 3)], IsNearMatrix(SphereScan::PointAt(7, 3), 1e-6));
-  EXPECT_THAT(notes_, testing::ElementsAre(HasSubstr("without a point are left out")));
-  // 60 points in 60 rows and 60 columns are a grid: not one that says much, but a small one.
-  EXPECT_EQ(Read(scattered.File("", 60000))[0].num_rows, 60);
-}
-
-TEST_F(E57, MemoryFollowsThePointsNotTheirIndices) {
-  SphereScan sphere;
-  for (int i = 0; i < 300; ++i) sphere.Add(i % 12, i % 5, 3000000 * i, 2000000 * i);
-  const Scan scan = Read(sphere.File("", 900000000))[0];
-  EXPECT_EQ(scan.kind(), Scan::Kind::kCloud);
-  EXPECT_THAT(scan.points, SizeIs(300));
-  EXPECT_THAT(notes_, testing::ElementsAre(HasSubstr("is read as a cloud")));
-}
-
-TEST_F(E57, IndicesMayBeFloatsAndNoNumbers) {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = HUGE_VALF;
-  const auto read = [&](const std::vector<float>& rows) {
-    E57Bytes file;
-    const std::string x = StreamOf<float>({1, 2, 3, 4});
-    const uint64_t offset =
-        file.AddPoints({x, x, x, StreamOf(rows), StreamOf<float>({0, 1, 0, 1})});
-    return Read(file.Finish(
-        E57Xml(ScanXml(offset, 4,
-                       SinglesXml() + Element("rowIndex", "Float", "", "precision=\"single\"") +
-                           Element("columnIndex", "Float", "", "precision=\"single\"")))));
-  };
-  EXPECT_EQ(read({0, 0, 1, 1})[0].NumMissing(), 0);
-  EXPECT_EQ(read({0, 0, 1, nan})[0].NumMissing(), 1);
-  EXPECT_EQ(read({0, -inf, 1, inf})[0].NumMissing(), 2);
-  EXPECT_EQ(read({nan, nan, nan, nan})[0].kind(), Scan::Kind::kCloud);
+  E57Options options;
+  options.check = false;  // five million pages of zeros have no checksums
+  const Scan scan = ReadE57(path, "", options, nullptr)[0];
+  ASSERT_THAT(scan.points, SizeIs(2));
+  EXPECT_THAT(scan.points[1], IsNearMatrix(Eigen::Vector3d(4, 5, 6), 0));
 }
 
 class E57WithScans : public E57 {
@@ -452,158 +287,6 @@ TEST_F(E57WithScans, AllOrOneByNameNumberOrGuid) {
   EXPECT_INPUT_ERROR(Read(bytes, "4"), "has no scan \"4\"; it has 1 \"hall & stairs\"");
   EXPECT_INPUT_ERROR(Read(bytes, "cellar"), "has no scan \"cellar\"");
   EXPECT_INPUT_ERROR(Read(ThreeScans("2"), "2"), "has 2 scans of the name \"2\"");
-}
-
-TEST_F(E57, ReadsOffsetsBeyondFourGigabytes) {
-  // The pages between the header and the points are a hole in the file.
-  const std::string near = Cloud({{1, 2, 3}, {4, 5, 6}}, "");
-  const uint64_t kFar = uint64_t{5} << 30;
-  const auto far_of = [&](uint64_t offset) { return offset + kFar - E57Bytes::kPage; };
-  E57Bytes points;
-  const std::string x = StreamOf<float>({1, 4}), y = StreamOf<float>({2, 5}),
-                    z = StreamOf<float>({3, 6});
-  points.AddBlob(std::string(1020 - 48 - 16, '\0'));  // fills the first page
-  const uint64_t offset = points.AddPoints({x, y, z});
-  std::string file = points.Finish(E57Xml(ScanXml(far_of(offset), 2, SinglesXml())));
-  ASSERT_EQ(offset, E57Bytes::kPage);
-  const auto put = [&](size_t at, uint64_t number) { file.replace(at, 8, Bytes(number)); };
-  put(16, file.size() + kFar - E57Bytes::kPage);
-  put(24, far_of(LittleEndian<uint64_t>(&file[24])));
-  put(offset + 16, far_of(LittleEndian<uint64_t>(&file[offset + 16])));
-  const std::string path = folder_ / "large.e57";
-  {
-    std::ofstream stream(path, std::ios::binary);
-    stream << file.substr(0, E57Bytes::kPage);
-    stream.seekp(static_cast<std::streamoff>(kFar));
-    stream << file.substr(E57Bytes::kPage);
-  }
-  E57Options options;
-  options.check = false;  // five million pages of zeros have no checksums
-  const Scan scan = ReadE57(path, "", options, nullptr)[0];
-  ASSERT_THAT(scan.points, SizeIs(2));
-  EXPECT_THAT(scan.points[1], IsNearMatrix(Eigen::Vector3d(4, 5, 6), 0));
-}
-
-TEST_F(E57, AWrongChecksumIsToldWithItsPage) {
-  std::vector<Eigen::Vector3f> points(1000, Eigen::Vector3f(1, 2, 3));
-  std::string bytes = Cloud(points, "");
-  bytes[5000] = static_cast<char>(bytes[5000] ^ 4);
-  ExpectError(bytes, "byte 4096: the checksum of page 4");
-  ExpectError(bytes, "--E57.check 0");
-  E57Options options;
-  options.check = false;
-  EXPECT_THAT(Read(bytes, "", options)[0].points, SizeIs(1000));
-  ScanReaderOptions reader;
-  EXPECT_THAT(reader.Problems(), IsEmpty());
-}
-
-TEST_F(E57, IsRefusedWhereverItIsCutOff) {
-  const std::string good = Cloud(std::vector<Eigen::Vector3f>(400, {1, 2, 3}), "");
-  ASSERT_THAT(Read(good)[0].points, SizeIs(400));
-  for (size_t size = 1; size < good.size(); size += 97) {
-    EXPECT_THROW(Read(good.substr(0, size)), InputError) << "cut after byte " << size;
-  }
-}
-
-TEST_F(E57, TellsTheByteOfWhatIsWrong) {
-  const std::string good = Cloud(std::vector<Eigen::Vector3f>(400, {1, 2, 3}), "");
-  const auto with = [&](size_t at, const std::string& bytes) {
-    std::string changed = good;
-    changed.replace(at, bytes.size(), bytes);
-    return E57Bytes::Mended(changed);
-  };
-  ExpectError(with(8, Bytes(uint32_t{2})), "byte 8: says version 2");
-  ExpectError(with(16, Bytes(uint64_t{1} << 60)), "byte 16: says that the file has");
-  ExpectError(with(16, Bytes(uint64_t{1000})), "byte 16: says that the file has 1000 bytes");
-  ExpectError(with(24, Bytes(uint64_t{1021})), "byte 1021: the XML is said to lie in a checksum");
-  ExpectError(with(24, Bytes(uint64_t{1} << 62)), "behind the end of the file");
-  ExpectError(with(32, Bytes(uint64_t{1} << 40)), "byte 32: says that the XML has");
-  ExpectError(with(40, Bytes(uint64_t{0})), "byte 40: says pages of 0 bytes");
-  ExpectError(with(40, Bytes(uint64_t{1} << 40)), "byte 40: says pages of");
-  ExpectError(with(48, "\2"), "byte 48: begins with 2, expected a section of points");
-  ExpectError(with(56, Bytes(uint64_t{1} << 50)), "byte 56: says a section of");
-  ExpectError(with(64, Bytes(uint64_t{4})), "byte 64: the data of a section do not lie in it");
-  ExpectError(with(64, Bytes(uint64_t{1020})), "the data of a section is said to lie in a");
-  ExpectError(with(80, "\7"), "byte 80: is a packet of type 7");
-  ExpectError(with(82, Bytes(uint16_t{0xffff})), "byte 82: says a packet of 65536 bytes");
-  ExpectError(with(82, Bytes(uint16_t{1})), "byte 82: says a packet of 2 bytes");
-  ExpectError(with(84, Bytes(uint16_t{4})), "byte 84: says 4 streams");
-  ExpectError(with(86, Bytes(uint16_t{60000})), "byte 80: the streams of a packet");
-  ExpectError(with(86, Bytes(uint16_t{0})), "the points end here, after 0 of 400");
-}
-
-TEST_F(E57, TellsWhatIsWrongInItsXml) {
-  const auto xml_file = [](const std::string& xml) { return E57Bytes().Finish(xml); };
-  const auto scan = [&](const std::string& prototype, const std::string& attributes,
-                        const std::string& more = "") {
-    return xml_file(
-        E57Xml(Element("vectorChild", "Structure",
-                       more + Element("points", "CompressedVector",
-                                      Element("prototype", "Structure", prototype), attributes))));
-  };
-  const std::string here = "fileOffset=\"48\" recordCount=\"5\"";
-  ExpectError(xml_file("<e57Root>"), "the XML cannot be read here");
-  ExpectError(xml_file("hello"), "the XML");
-  ExpectError(xml_file("<other/>"), "no element e57Root");
-  ExpectError(xml_file(E57Xml("")), "holds no scan");
-  ExpectError(xml_file(E57Xml(Element("vectorChild", "Structure"))), "has no element points");
-  ExpectError(scan(SinglesXml(), "fileOffset=\"48\" recordCount=\"-5\""), "says -5 points");
-  ExpectError(scan(SinglesXml(), "fileOffset=\"48\" recordCount=\"many\""), "\"many\", expected");
-  ExpectError(scan(SinglesXml(), "fileOffset=\"-8\" recordCount=\"5\""), "at byte -8");
-  ExpectError(scan(SinglesXml(), "fileOffset=\"99999999\" recordCount=\"5\""), "behind the end");
-  ExpectError(scan("", here), "have no fields");
-  ExpectError(scan(Element("x", "Blob"), here), "has the type \"Blob\"");
-  ExpectError(scan(IntegerXml("x", 5, 4), here), "minimum of x is above its maximum");
-  ExpectError(scan(Element("x", "Integer", "", "minimum=\"a\""), here), "attribute minimum of x");
-  ExpectError(scan(Element("x", "ScaledInteger", "", "scale=\"nan\""), here),
-              "attribute scale of x is \"nan\"");
-  ExpectError(scan(SinglesXml(), here,
-                   Element("pose", "Structure",
-                           Element("translation", "Structure", Element("x", "Float", "1,5")))),
-              "element x is \"1,5\", expected a number");
-  // No document type, no entity of its own.
-  ExpectError(xml_file("<!DOCTYPE e57Root [<!ENTITY a SYSTEM \"file:///etc/passwd\">]><e57Root>"
-                       "<data3D>&a;</data3D></e57Root>"),
-              "holds no scan");
-}
-
-TEST_F(E57, ADeclaredNumberOfPointsIsComparedWithTheBytes) {
-  E57Bytes file;
-  const std::string x = StreamOf<float>({1, 2, 3});
-  const uint64_t offset = file.AddPoints({x, x, x});
-  ExpectError(file.Finish(E57Xml(ScanXml(offset, 1000000000000, SinglesXml()))),
-              "says 1000000000000 points, but the");
-  E57Bytes other;
-  const uint64_t at = other.AddPoints({x, x, x});
-  ExpectError(other.Finish(E57Xml(ScanXml(at, 4, SinglesXml()))),
-              "byte 128: the points end here, after 3 of 4");
-}
-
-TEST_F(E57, RecordsWithoutCoordinatesAreNoScan) {
-  E57Bytes file;
-  const uint64_t offset = file.AddPoints({std::string("\1\2\3", 3)});
-  ExpectError(file.Finish(E57Xml(ScanXml(offset, 3, IntegerXml("intensity", 0, 255)))),
-              "have neither cartesianX");
-}
-
-TEST_F(E57, ReadersOfScansTakeTheGridAndThePose) {
-  SphereScan sphere;
-  for (int column = 0; column < 12; ++column) {
-    for (int row = 0; row < 5; ++row) sphere.Add(column, row, row, column);
-  }
-  const std::string path = folder_ / "a.rtpi";  // the content counts
-  WriteBytes(path, sphere.File());
-  EXPECT_EQ(ReadScanFile(path, {}).format, "E57");
-  EXPECT_THAT(ReadScan(path + "#1", {}).points, SizeIs(60));
-  EXPECT_INPUT_ERROR(ReadScan(path + "#2", {}), "has no scan \"2\"");
-  EXPECT_INPUT_ERROR(ReadScan(folder_ / "none.e57#1", {}), "does not exist");
-  std::filesystem::copy_file(path, folder_ / "b.e57");
-  EXPECT_THAT(ReadScans({path, folder_ / "b.e57"}, "", {}), SizeIs(2));  // poses are their own
-  WriteBytes(folder_ / "c#1.ptx",
-             "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
-             "0 0 0 1\n1 2 3 0.5\n");
-  EXPECT_EQ(ReadScanFile(folder_ / "c#1.ptx", {}).format, "PTX");
-  EXPECT_INPUT_ERROR(ReadScan(folder_ / "c#1.ptx#1", {}), "is no E57");
 }
 
 }  // namespace

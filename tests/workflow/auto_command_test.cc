@@ -200,6 +200,31 @@ TEST_F(AutoCommand, AChangedOptionIsRunAgainFromItsStepOn) {
   EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "unfinished");
 }
 
+TEST_F(AutoCommand, AReportAloneSaysWhichStepsItPassedOverAreOutOfDate) {
+  const std::string arguments = Arguments() + " --Texture.unseen black";
+  const auto verdict = [&] {
+    const CommandResult result = RunCommandLine(arguments + " --only report");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadJson(Result("report.json"))["verdict"];
+  };
+  const json before = verdict();
+  EXPECT_EQ(before["state"], "unfinished");
+  EXPECT_THAT(before["sentences"].dump(), HasSubstr("The step pictures was passed over"));
+  EXPECT_THAT(before["sentences"].dump(), Not(HasSubstr("The step texture")));
+
+  ASSERT_EQ(RunCommandLine(arguments).exit_code, 0);
+  EXPECT_EQ(verdict()["state"], "trusted");
+
+  const std::string picks = ReadBytes(Result("picks.csv"));
+  WriteBytes(Result("picks.csv"), "# looked at\n" + picks);
+  const json after = verdict();
+  EXPECT_EQ(after["state"], "unfinished");
+  EXPECT_THAT(after["sentences"].dump(), HasSubstr("The step align"));
+  EXPECT_THAT(after["sentences"].dump(), HasSubstr("changed: picks.csv"));
+  WriteBytes(Result("picks.csv"), picks);
+  EXPECT_EQ(verdict()["state"], "trusted");
+}
+
 TEST_F(AutoCommand, OneRunAtATime) {
   WriteBytes(*folder_ / "lock.sh", "exec 9>" + Result("log/lock") + "\nflock 9\n" + BinFolder() +
                                        "/" + Arguments() + "\n");

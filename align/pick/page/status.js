@@ -7,7 +7,7 @@ import {byId, el, setText} from './dom.js';
 const kSaveTexts = {
   saved: () => 'saved',
   saving: () => 'saving…',
-  unsaved: (why) => `not saved: ${why}`,
+  unsaved: () => 'not saved',
   gone: (why) => `not saved: ${why}; trying again`,
   restarted: (why) => `not saved: ${why}`,
   stale: (why) => `not saved: ${why}`,
@@ -22,8 +22,10 @@ export function showSync() {
   const nothingLost = !picks.pending && ['gone', 'restarted'].includes(picks.state);
   setText(byId('save-text'), nothingLost ? picks.why : kSaveTexts[picks.state](picks.why));
   const banner = byId('banner');
-  if (banner.dataset.state === picks.state) return;
-  banner.dataset.state = picks.state;
+  // The line at the top has no room for a reason.
+  const shown = picks.state === 'unsaved' ? `unsaved ${picks.why}` : picks.state;
+  if (banner.dataset.shown === shown) return;
+  banner.dataset.shown = shown;
   const content = bannerOf(picks.state);
   banner.replaceChildren(...content);
   banner.hidden = content.length === 0;
@@ -42,6 +44,14 @@ function bannerOf(state) {
              'until you choose.'),
       el('button', {type: 'button', onclick: () => picks.keepOwn()}, 'Keep mine'),
       el('button', {type: 'button', class: 'main', onclick: reload}, 'Reload the picks'),
+    ];
+  }
+  if (state === 'unsaved') {
+    return [
+      el('p', {},
+         `${picks.why.replace(/\.*$/, '.')} They are kept here, and saved as soon as it can be ` +
+             'done; do not close this page.'),
+      copyButton(),
     ];
   }
   if (state === 'gone') {

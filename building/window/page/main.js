@@ -53,7 +53,9 @@ function take(answer) {
 
 function showSaved(error) {
   byId('save').dataset.state = error ? 'unsaved' : 'saved';
-  byId('save').textContent = error || `saved to ${app.state.output_path}`;
+  const path = app.state.output_path;
+  byId('save').textContent = error || `saved to ${path.split('/').pop()}`;
+  byId('save').title = path;
 }
 
 // One change after the other; `before`: what undo brings back.

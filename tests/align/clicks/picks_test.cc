@@ -175,6 +175,20 @@ TEST(Picks, NamesTheNearestPhotoForOneThatIsNotInTheModel) {
                      "nearest name: right/b.jpg");
 }
 
+TEST(Picks, TakeTheNameOfTheOnlyPhotoThatHasItInAFolder) {
+  const SparseModel model = ModelWith(
+      {"scanner/a.jpg", "mine/b.jpg", "scanner/b.jpg", "c.jpg", "mine/c.jpg", "mine/not-d.jpg"});
+  std::vector<Pick> picks;
+  for (const char* name : {"a.jpg", "b.jpg", "c.jpg", "d.jpg", "mine/b.jpg", "nowhere/a.jpg"}) {
+    picks.push_back(PicksOf(name, 1)[0]);
+  }
+  NamePicksAsInModel(model, &picks);
+  std::vector<std::string> names;
+  for (const Pick& pick : picks) names.push_back(pick.image_name);
+  EXPECT_EQ(names, (std::vector<std::string>{"scanner/a.jpg", "b.jpg", "c.jpg", "d.jpg",
+                                             "mine/b.jpg", "nowhere/a.jpg"}));
+}
+
 TEST(Picks, RefusesPixelOutsideThePhoto) {
   std::vector<Pick> picks = PicksOf("a.jpg", 6);
   picks[3].x_in_img.x() = 640.5;
