@@ -25,6 +25,8 @@ constexpr size_t kMinConstraints = 30;
 constexpr double kGates[] = {6, 5, 4, 3.5};
 // A round that moves no camera farther is the last.
 constexpr double kSettledMetres = 5e-5, kSettledRadians = 2e-5;
+// Metres; a point nearer to a camera that sees it is none of the room.
+constexpr double kNearest = 0.01;
 // A photo with fewer observations takes no part: its pose follows the others.
 constexpr int kMinObservations = 12;
 // The adjusted model may differ from the input by a similarity of this much ...
@@ -123,6 +125,28 @@ double Extent(const SparseModel& model, const std::vector<SurfaceConstraint>& co
   double sum = 0;
   for (const Eigen::Vector3d& x : places) sum += (x - middle).squaredNorm();
   return std::sqrt(sum / static_cast<double>(places.size()));
+}
+
+// Rays of photos that were taken at one place, as the faces of a panorama, meet in the cameras.
+// Such a point has no derivatives, and where the cameras move by a millimetre its error is that of
+// another half of the picture.
+void RemovePointsInCameras(SparseModel* model) {
+  const auto is_in_camera = [&](const SparsePoint& point) {
+    return std::any_of(point.track.begin(), point.track.end(), [&](const TrackElement& element) {
+      const Rigid& cam_from_model = model->images.at(element.image_id).cam_from_model;
+      return (cam_from_model * point.x_in_model).norm() < kNearest;
+    });
+  };
+  for (auto it = model->points.begin(); it != model->points.end();) {
+    if (!is_in_camera(it->second)) {
+      ++it;
+      continue;
+    }
+    for (const TrackElement& element : it->second.track) {
+      model->images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+    }
+    it = model->points.erase(it);
+  }
 }
 
 // Photos that took no part get the pose of the similarity between input and adjusted model, and
@@ -373,6 +397,7 @@ std::vector<std::string> PlaneBundleOptions::Problems() const { return ProblemsO
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options) {
   PlaneBundle result;
   result.model = input.model;
+  RemovePointsInCameras(&result.model);
   result.reprojection_rms_before = UpdateReprojectionErrors(&result.model).rms_px;
   result.sigma_px = input.sigma_px > 0 ? input.sigma_px : KeypointNoise(result.model);
   result.reason = RunRounds(input, options, &result);

@@ -98,6 +98,7 @@ struct PlaneBundle {
 // Minimises reprojection errors (Huber) + distances of the points from their surfaces (Cauchy) +
 // errors of the picks (Huber) over all poses and points. Points are given to surfaces anew from
 // round to round. The surfaces hold the gauge; what they leave open (one wall only) the picks hold.
+// Points within 1 cm of a camera that sees them are left out of the result.
 // A bent scan is straightened for that. In the end the points are bent like the scan and each photo
 // is fitted to them; a photo itself cannot be bent, so its reprojection errors grow.
 // Does not depend on the number of threads: Ceres runs on one thread.

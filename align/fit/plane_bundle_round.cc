@@ -25,9 +25,6 @@ constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
 // one finds.
 constexpr double kFunctionTolerance = 1e-5;
-// Metres. Rays of photos that were taken at one place meet in the camera itself; such a point has
-// no derivative and would stop the adjustment.
-constexpr double kNearest = 0.01;
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
 
@@ -137,9 +134,9 @@ class RoundProblem {
   bool Sees(uint32_t image_id, const Eigen::Vector3d& x_in_scan) const {
     if (pose_index_.count(image_id) == 0) return false;
     const SparseImage& image = model_.images.at(image_id);
-    const Eigen::Vector3d x_in_cam = image.cam_from_model * x_in_scan;
-    return x_in_cam.norm() > kNearest &&
-           projections_.at(image.camera_id).ImgFromCam(x_in_cam).has_value();
+    return projections_.at(image.camera_id)
+        .ImgFromCam(image.cam_from_model * x_in_scan)
+        .has_value();
   }
 
   void AddReprojection(uint32_t image_id, double* point, const Eigen::Vector2d& x_in_img,
