@@ -17,7 +17,7 @@ struct StartVerdictOptions {
   // confirm the start; where they support it faintly, as those of a similar room do, too (less over
   // a place that they do not support); and where nothing but geometry speaks for it.
   double min_score = 0.55, min_ratio = 1.2;
-  double min_ratio_faint = 1.6, min_ratio_faint_over_denied = 1.3;
+  double min_ratio_faint = 1.65, min_ratio_faint_over_denied = 1.3;
   double min_score_alone = 0.7, min_ratio_alone = 1.3;
   // The scan is called a mirror image where that of the model has so many times the score.
   double min_ratio_mirrored = 1.15;

@@ -18,6 +18,10 @@ constexpr double kCeiling = 0.3;        // metres below it that are left out
 constexpr double kTall = 0.4;           // metres from which on something stands there
 constexpr double kMargin = 0.35;        // metres around the room
 constexpr double kUnitsPerMetre = 100;  // of the drawing
+constexpr double kWedge = 0.42;         // metres
+// Metres beyond the room up to which the plan reaches for what stands there, as photos into a scan
+// of a part of a room; one that is lost farther away does not make the room small.
+constexpr double kPlanReach = 4;
 
 // What the samples over one pixel of the plan say.
 struct Column {
@@ -52,22 +56,38 @@ cv::Vec4b ColorOf(const Column& column, PlanShows shows) {
 
 class Drawing {
  public:
-  explicit Drawing(const PlanFrame& frame) : size_(frame.Size()) {}
+  explicit Drawing(const PlanFrame& frame) : room_(frame.Size().head<2>()), high_(room_) {}
+
+  void MakeRoomFor(const Eigen::Vector2d& x) {
+    const Eigen::Vector2d nearest = x.cwiseMax(0).cwiseMin(room_);
+    if (!((x - nearest).norm() <= kPlanReach)) return;
+    low_ = low_.cwiseMin(x);
+    high_ = high_.cwiseMax(x);
+  }
 
   // Drawn with y up.
   std::string At(const Eigen::Vector2d& x) const {
-    return Number(kUnitsPerMetre * (x.x() + kMargin), 1) + "," +
-           Number(kUnitsPerMetre * (size_.y() - x.y() + kMargin), 1);
+    return Number(kUnitsPerMetre * (x.x() - low_.x() + kMargin), 1) + "," +
+           Number(kUnitsPerMetre * (high_.y() - x.y() + kMargin), 1);
   }
-  double Width() const { return kUnitsPerMetre * (size_.x() + 2 * kMargin); }
-  double Height() const { return kUnitsPerMetre * (size_.y() + 2 * kMargin + 0.3); }
+  double Width() const { return kUnitsPerMetre * (high_.x() - low_.x() + 2 * kMargin); }
+  double Height() const { return kUnitsPerMetre * (high_.y() - low_.y() + 2 * kMargin + 0.3); }
+
+  // The picture of the room.
+  std::string Picture(const std::string& png) const {
+    return "<image " + Coordinates(At({0, room_.y()}), "x", "y") + " width=\"" +
+           Number(kUnitsPerMetre * room_.x(), 1) + "\" height=\"" +
+           Number(kUnitsPerMetre * room_.y(), 1) +
+           "\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," +
+           Base64(png.data(), png.size()) + "\"/>";
+  }
 
   std::string Wedge(const PlanCamera& camera, int number) const {
     const Eigen::Vector2d centre = camera.centre.head<2>();
     const double azimuth = std::atan2(camera.forward.y(), camera.forward.x());
     const auto arm = [&](double turn) {
       return Eigen::Vector2d(
-          centre + 0.42 * Eigen::Vector2d(std::cos(azimuth + turn), std::sin(azimuth + turn)));
+          centre + kWedge * Eigen::Vector2d(std::cos(azimuth + turn), std::sin(azimuth + turn)));
     };
     const Eigen::Vector2d label = arm(0);
     return "<g class=\"camera\"><title>" + HtmlText(camera.name) + "</title><path d=\"M" +
@@ -83,7 +103,8 @@ class Drawing {
   }
   // One metre.
   std::string Scale() const {
-    const Eigen::Vector2d left(0, -kMargin - 0.08), right(1, -kMargin - 0.08);
+    const Eigen::Vector2d left = low_ - Eigen::Vector2d(0, kMargin + 0.08);
+    const Eigen::Vector2d right = left + Eigen::Vector2d(1, 0);
     return "<g class=\"scale\"><path d=\"M" + At(left) + " L" + At(right) + "\"/>" +
            Text(right + Eigen::Vector2d(0.22, 0), "1 m") + "</g>";
   }
@@ -101,7 +122,8 @@ class Drawing {
     return "<text " + Coordinates(At(at), "x", "y") + ">" + HtmlText(text) + "</text>";
   }
 
-  Eigen::Vector3d size_;
+  Eigen::Vector2d room_;              // its size, metres; its low corner is 0, 0
+  Eigen::Vector2d low_{0, 0}, high_;  // of the drawing, without margins
 };
 
 }  // namespace
@@ -148,19 +170,19 @@ std::string PlanPicture(const std::vector<EvidencePoint>& points, const PlanFram
 std::string DrawPlan(const std::vector<EvidencePoint>& points, const PlanFrame& frame,
                      const std::vector<PlanCamera>& cameras,
                      const std::vector<ViewingPlace>& places, PlanShows shows) {
-  const Drawing drawing(frame);
-  const double margin = kUnitsPerMetre * kMargin;
+  Drawing drawing(frame);
+  for (const PlanCamera& camera : cameras) {
+    const Eigen::Vector2d centre = camera.centre.head<2>();
+    drawing.MakeRoomFor(centre);
+    drawing.MakeRoomFor(centre + kWedge * camera.forward.head<2>());
+  }
+  for (const ViewingPlace& place : places) drawing.MakeRoomFor(place.centre.head<2>());
   std::string svg = "<svg class=\"plan\" role=\"img\" viewBox=\"0 0 " + Number(drawing.Width(), 0) +
                     " " + Number(drawing.Height(), 0) + "\" aria-label=\"Plan of the room\">";
   svg +=
       "<defs><marker id=\"tip\" markerWidth=\"5\" markerHeight=\"5\" refX=\"2\" refY=\"2.5\" "
       "orient=\"auto\"><path class=\"tip\" d=\"M0,0 L5,2.5 L0,5 Z\"/></marker></defs>";
-  const std::string picture = PlanPicture(points, frame, shows);
-  svg += "<image x=\"" + Number(margin, 0) + "\" y=\"" + Number(margin, 0) + "\" width=\"" +
-         Number(kUnitsPerMetre * frame.Size().x(), 1) + "\" height=\"" +
-         Number(kUnitsPerMetre * frame.Size().y(), 1) +
-         "\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," +
-         Base64(picture.data(), picture.size()) + "\"/>";
+  svg += drawing.Picture(PlanPicture(points, frame, shows));
   for (size_t i = 0; i < cameras.size(); ++i) {
     svg += drawing.Wedge(cameras[i], static_cast<int>(i) + 1);
   }

@@ -56,7 +56,7 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Int("photo_height", &photo_height, "pixels").Within(64, 20000, "pixels");
   fields
       ->Number("field_of_view_deg", &field_of_view_deg,
-               "horizontal, degrees; beyond 100 for fisheyes; a panorama has 360")
+               "horizontal, degrees; beyond 100 for fisheyes; a panorama has 360 whatever this is")
       .Within(20, 240);
   fields->Number("roll_deg", &roll_deg, "photos lean to either side by up to this, degrees")
       .Within(0, 180);

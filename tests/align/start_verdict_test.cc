@@ -39,7 +39,8 @@ constexpr double kDrifting = 0.02, kExact = 0.005;  // metres
 
 TEST(StartVerdict, APlaceThatPhotosDenyCountsLessAgainstOneThatTheySupportFaintly) {
   const FittedStart best = Asked(Start(820, kDrifting), 800, 200, true);
-  const FittedStart second = Start(550, kDrifting);  // of which 1.6 times is more than the best has
+  const FittedStart second =
+      Start(550, kDrifting);  // of which 1.65 times is more than the best has
   EXPECT_EQ(Judge({best, Asked(second, 800, 16, false)}, 470).kind, Kind::kTrusted);
   EXPECT_EQ(Judge({best, second}, 470).kind, Kind::kAmbiguous) << "nobody asked";
   EXPECT_EQ(Judge({best, Asked(Start(650, kDrifting), 800, 16, false)}, 470).kind, Kind::kAmbiguous)

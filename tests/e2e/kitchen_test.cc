@@ -259,8 +259,8 @@ TEST_F(Kitchen, CamerasStandWhereTheRecordingSaysTheyStood) {
 
 // The surface alone leaves the photos a few degrees off, too far for them to confirm it: they draw
 // the model to its place. COLMAP's model differs from run to run: of some the mirror image of the
-// room, which no photo can deny, has nearly as much of the score (1.59 where 1.6 is asked), and
-// those are not trusted. Another place, which photos do deny, counts less.
+// room has nearly as much of the score (1.49 and 1.59 where 1.65 is asked), and those are not
+// trusted. Another place, which photos do deny, counts less.
 TEST_F(Kitchen, IsFoundWithoutClicks) {
   const std::string output = *folder_ / "found";
   const CommandResult found =
@@ -272,8 +272,8 @@ TEST_F(Kitchen, IsFoundWithoutClicks) {
   EXPECT_GT(search["best"]["photos"]["share"], 0.12);
   EXPECT_GT(search["ratio"], 1.4);
   const double score = search["best"]["rays"]["score"];
-  const bool mirror_comes_near = 1.6 * search["mirrored_score"].get<double>() > score;
-  const bool stands_out = search["ratio"] >= 1.6;
+  const bool mirror_comes_near = 1.65 * search["mirrored_score"].get<double>() > score;
+  const bool stands_out = search["ratio"] >= 1.65;
   EXPECT_TRUE(found.exit_code == 0 || (found.exit_code == 4 && !stands_out)) << search << found.err;
   EXPECT_FALSE(found.exit_code == 0 && mirror_comes_near) << search << found.err;
   const std::vector<double> distances = DistancesFromRecording(ReadSparseModel(output));

@@ -3,6 +3,7 @@
 #include "workflow/room_coverage.h"
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -134,6 +135,35 @@ TEST(MeasureCoverage, SendsNowhereWhereEverythingIsSeen) {
   EXPECT_TRUE(coverage.places.empty());
   EXPECT_DOUBLE_EQ(coverage.all, 1);
   EXPECT_DOUBLE_EQ(coverage.unseen_m2, 0);
+}
+
+TEST(DrawPlan, ReachesToCamerasBesideTheRoom) {
+  const PlanFrame frame = MakePlanFrame(Room(), Eigen::Vector3d::UnitY(), Json());
+  PlanCamera camera;
+  camera.name = "a.jpg";
+  camera.forward = {0, -1, 0};
+  const auto draw = [&](const Eigen::Vector3d& centre) {
+    camera.centre = centre;
+    return DrawPlan(Room(), frame, {camera}, {}, PlanShows::kCoverage);
+  };
+  const auto size = [](const std::string& svg) {
+    Eigen::Vector2d box(0, 0);
+    const size_t at = svg.find("viewBox=\"0 0 ");
+    EXPECT_EQ(std::sscanf(svg.c_str() + at, "viewBox=\"0 0 %lf %lf", &box.x(), &box.y()), 2);
+    return box;
+  };
+  const Eigen::Vector2d room = size(draw(frame.Size() / 2));
+  const Eigen::Vector3d above(1, frame.Size().y() + 2, 1.5), left(-1.5, 1, 1.5), lost(1, 40, 1.5);
+  EXPECT_NEAR(size(draw(above)).y(), room.y() + 200, 2);
+  EXPECT_NEAR(size(draw(left)).x(), room.x() + 150, 2);
+  EXPECT_EQ(size(draw(lost)), room);
+  for (const Eigen::Vector3d& centre : {above, left}) {
+    const std::string svg = draw(centre);
+    Eigen::Vector2d x(-1, -1);
+    const size_t at = svg.find("<path d=\"M", svg.find("class=\"camera\""));
+    ASSERT_EQ(std::sscanf(svg.c_str() + at, "<path d=\"M%lf,%lf", &x.x(), &x.y()), 2);
+    EXPECT_TRUE(x.x() > 0 && x.y() > 0 && x.x() < size(svg).x() && x.y() < size(svg).y());
+  }
 }
 
 TEST(DrawPlan, ShowsEveryCameraAndPlace) {
