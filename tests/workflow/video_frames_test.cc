@@ -1,7 +1,9 @@
 #include "workflow/video_frames.h"
 
+#include <cstring>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
@@ -62,6 +64,29 @@ TEST(WriteSharpFrames, TakesNoMoreThanThereAre) {
   const TempFolder folder;
   WriteSharpFrames(WriteVideo(folder / "video.avi", 5), folder / "frames", 100, [](double) {});
   EXPECT_EQ(Names(folder / "frames").size(), 5u);
+}
+
+// The number of frames in the headers of an AVI: dwTotalFrames and dwLength.
+void TellFrames(const std::string& path, uint32_t num_frames) {
+  std::string bytes = ReadBytes(path);
+  const std::pair<const char*, size_t> kPlaces[] = {{"avih", 16}, {"strh", 32}};
+  for (const auto& [chunk, offset] : kPlaces) {
+    const size_t at = bytes.find(chunk);
+    ASSERT_NE(at, std::string::npos);
+    std::memcpy(&bytes[at + 8 + offset], &num_frames, sizeof num_frames);
+  }
+  WriteBytes(path, bytes);
+}
+
+TEST(WriteSharpFrames, CountsTheFramesThatAreThereWhereTheHeaderIsWrong) {
+  const TempFolder folder;
+  const std::string video = WriteVideo(folder / "video.avi", 40);
+  TellFrames(video, 200);
+  WriteSharpFrames(video, folder / "frames", 8, [](double) {});
+  EXPECT_EQ(Names(folder / "frames"),
+            (std::set<std::string>{"frame_000002.jpg", "frame_000007.jpg", "frame_000012.jpg",
+                                   "frame_000017.jpg", "frame_000022.jpg", "frame_000027.jpg",
+                                   "frame_000032.jpg", "frame_000037.jpg"}));
 }
 
 TEST(WriteSharpFrames, RefusesWhatIsNoVideo) {
