@@ -187,12 +187,23 @@ class PictureSet {
     Add("above", "from above",
         renderer.Render(camera, LookAt(centre + distance * up, centre, away), settings));
     const Eigen::Vector3d side = up.cross(away);
-    for (int i = 0; i < 2; ++i) {
+    Rigid poses[4];
+    double shown[4];
+    for (int i = 0; i < 4; ++i) {
       const Eigen::Vector3d direction =
-          (up + (i == 0 ? 1 : -1) * (0.9 * away + 0.5 * side)).normalized();
-      Add("open_" + std::to_string(i + 1), "open room " + std::to_string(i + 1),
-          renderer.Render(camera, LookAt(centre + 1.1 * distance * direction, centre, up),
-                          settings));
+          (up + (i % 2 == 0 ? 1 : -1) * (0.9 * away + (i < 2 ? 0.5 : -0.5) * side)).normalized();
+      poses[i] = LookAt(centre + 1.1 * distance * direction, centre, up);
+      shown[i] = renderer.ShareInSight(camera, poses[i]);
+    }
+    // Of a scan of some of the walls opposite corners may see little but their backs.
+    int order[4] = {0, 1, 2, 3};
+    if (2 * std::min(shown[0], shown[1]) < *std::max_element(shown, shown + 4)) {
+      std::stable_sort(order, order + 4, [&](int x, int y) { return shown[x] > shown[y]; });
+    }
+    for (int i = 0; i < 2; ++i) {
+      const std::string number = std::to_string(i + 1);
+      Add("open_" + number, "open room " + number,
+          renderer.Render(camera, poses[order[i]], settings));
     }
   }
 

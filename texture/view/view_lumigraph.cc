@@ -133,7 +133,9 @@ bool ViewLumigraph::Has(int id) const {
 
 Json ViewLumigraph::ToJson() const {
   Json photos = Json::array();
+  bool any_pinhole = false;
   for (int id = 0; id < static_cast<int>(cameras_.size()); ++id) {
+    any_pinhole |= cameras_.Pinhole(id, kDepthSize).has_value();
     if (!Has(id)) continue;
     const Camera pinhole = *cameras_.Pinhole(id, kDepthSize);
     const double w = pinhole.width, h = pinhole.height;
@@ -144,11 +146,12 @@ Json ViewLumigraph::ToJson() const {
                       {"centre", {pinhole.params[2] / w, pinhole.params[3] / h}},
                       {"gain", {gain[0], gain[1], gain[2]}}});
   }
-  const char* reason = !photos.empty() ? ""
-                       : cameras_.num_photos() == 0
-                           ? "View-dependent colour needs the photos: give "
-                             "--aligned and --image_path."
-                           : "None of these photos has coloured the model.";
+  const char* reason =
+      !photos.empty()              ? ""
+      : cameras_.num_photos() == 0 ? "View-dependent colour needs the photos: give "
+                                     "--aligned and --image_path."
+      : !any_pinhole ? "View-dependent colour is drawn from photos, not from panoramas."
+                     : "None of these photos has coloured the model.";
   return {{"reason", reason}, {"photos", photos}};
 }
 
