@@ -39,8 +39,9 @@ def commands():
 def at_random(base, num_kills=30):
     """roomtex-auto with the real COLMAP, killed again and again: it always goes on, and ends whole."""
     here = s.Scene(base.programs)
-    made = here.run("roomtex-simulate --quiet --output_path capture --num_photos 8 --photo_width 480 "
-                    "--photo_height 320 --scan_columns 300 --scan_rows 150")
+    # With fewer or smaller photos COLMAP does not register that of the picks every time.
+    made = here.run("roomtex-simulate --quiet --output_path capture --num_photos 12 --photo_width 560 "
+                    "--photo_height 374 --scan_columns 300 --scan_rows 150")
     assert made.code == 0, made.err
     inputs = here.state()
     programs = str(here.programs)
