@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr char kReportStep[] = "report";
+constexpr char kResultChanged[] = "its result was changed or removed";
 
 // Without what a result does not depend on.
 std::string EssentialText(const CommandLine& line) {
@@ -143,7 +144,7 @@ class StepRunner {
       if (IsThere(path)) continue;
       throw InputError(path, "",
                        std::string("is not there: the step ") + row.name + " has to run first",
-                       "Start without --from, or with --from " + std::string(row.name));
+                       "Start without --from or --only, or with --from " + std::string(row.name));
     }
   }
 
@@ -188,13 +189,20 @@ class StepRunner {
            Differences(record->made_from, MadeFromOf(step)).empty();
   }
 
+  // Why what a record left is not what its step would give now; none if it is.
+  static std::optional<std::string> WhyStale(const StepRecord& record,
+                                             const std::vector<std::string>& changed) {
+    if (!changed.empty()) return "changed: " + Joined(changed, ", ");
+    if (record.state == StepState::kStarted) return "it was interrupted";
+    if (record.state == StepState::kFailed) return "it failed the last time";
+    return std::nullopt;
+  }
+
   // Of a step that is passed over. Another version of roomtex or COLMAP is no reason: what it made
   // is a result of the inputs that are there.
   std::string WhyOutdated(const StepRow& row) {
     const StepRecord* const record = state_.Find(row.name);
     if (record == nullptr) return IsConsumed(row.name) ? "" : "it has not run";
-    if (record->state == StepState::kStarted) return "it was interrupted";
-    if (record->state == StepState::kFailed) return "it failed the last time";
     const Step step = MakeStep(row);
     for (const std::string& path : step.inputs) {
       if (!IsThere(path)) return FileName(path) + " is not there any more";
@@ -205,11 +213,8 @@ class StepRunner {
                                    return name == "roomtex" || name == "COLMAP";
                                  }),
                   changed.end());
-    if (!changed.empty()) return "changed: " + Joined(changed, ", ");
-    if (!IsConsumed(step.name) && !OutputsAreAsLeft(*record)) {
-      return "its result was changed or removed";
-    }
-    return "";
+    if (const auto why = WhyStale(*record, changed)) return *why;
+    return IsConsumed(row.name) || OutputsAreAsLeft(*record) ? "" : kResultChanged;
   }
 
   // Why a step has to run; none if it has not.
@@ -217,17 +222,15 @@ class StepRunner {
     if (IsForced()) return "asked for";
     const StepRecord* const record = state_.Find(step.name);
     if (record == nullptr) return "for the first time";
-    const std::vector<std::string> changed = Differences(record->made_from, made_from);
-    if (!changed.empty()) return "changed: " + Joined(changed, ", ");
-    if (record->state == StepState::kStarted) return "it was interrupted";
-    if (record->state == StepState::kFailed) return "it failed the last time";
+    const auto why = WhyStale(*record, Differences(record->made_from, made_from));
+    if (why) return why;
     if (IsConsumed(step.name)) {
       if (MatchesAreDone()) return std::nullopt;
       if (!IsThere(step.outputs[0])) return "its result is not there";
       if (HoldsOtherMatches()) return "it holds matches by other options";
       return std::nullopt;
     }
-    if (!OutputsAreAsLeft(*record)) return "its result was changed or removed";
+    if (!OutputsAreAsLeft(*record)) return kResultChanged;
     return std::nullopt;
   }
 
