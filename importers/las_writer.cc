@@ -16,15 +16,20 @@ namespace {
 constexpr double kFinestScale = 1e-4;    // metres
 constexpr size_t kLasWritten = 1 << 20;  // bytes written at once, about
 constexpr size_t kRecordHead = 54;       // bytes before a record of variable length
-constexpr size_t kLongestSystem = std::numeric_limits<uint16_t>::max() - 1;  // and a zero behind it
+constexpr size_t kLongRecordHead = 60;   // and before one behind the points
+constexpr size_t kLongestSystem = std::numeric_limits<uint16_t>::max() - 1;  // before the points
 
 // Where a version and its points have what.
 struct LasLayout {
   uint8_t minor = 2;
   uint16_t header_size = 227;
   uint8_t format = 0, colored_format = 2;
-  size_t record_size = 20;    // without colours, which come last
+  uint16_t record_size = 20;  // without colours, which come last
   char returns = 1 | 1 << 3;  // return 1 of 1
+
+  uint16_t SizeOfPoint(bool has_colors) const {
+    return static_cast<uint16_t>(record_size + (has_colors ? 6 : 0));
+  }
 };
 
 LasLayout LayoutOf(const std::string& version) {
@@ -73,18 +78,26 @@ void PutAt(size_t at, T value, std::string* bytes) {  // little-endian, as this 
   std::memcpy(bytes->data() + at, &value, sizeof value);
 }
 
-// The record of a coordinate system (R15, 3.3 and 4.2).
-std::string SystemRecord(const std::string& coordinate_system) {
-  std::string record(kRecordHead, '\0');
+// The record of a coordinate system (R15, 2.7, 3.3 and 4.2); one behind the points may be longer.
+std::string SystemRecord(const std::string& coordinate_system, bool is_behind) {
+  const size_t length = coordinate_system.size() + 1;  // with a zero behind it
+  std::string record(is_behind ? kLongRecordHead : kRecordHead, '\0');
   std::memcpy(record.data() + 2, "LASF_Projection", 15);
   PutAt<uint16_t>(18, 2112, &record);
-  PutAt(20, static_cast<uint16_t>(coordinate_system.size() + 1), &record);
-  std::memcpy(record.data() + 22, "OGC WKT", 7);
+  if (is_behind) {
+    PutAt<uint64_t>(20, length, &record);
+  } else {
+    PutAt(20, static_cast<uint16_t>(length), &record);
+  }
+  std::memcpy(record.data() + record.size() - 32, "OGC WKT", 7);  // what it is, at the end of both
   return record + coordinate_system + '\0';
 }
 
+// Where the coordinate system stands.
+enum class LasSystem { kNone, kBefore, kBehind };
+
 std::string HeaderOf(const LasContent& content, const LasLayout& layout, size_t begin,
-                     bool has_system) {
+                     LasSystem system) {
   std::string header(layout.header_size, '\0');
   std::memcpy(header.data(), "LASF", 4);
   // The coordinate system is WKT: what the formats from 6 on ask for, also where there is none.
@@ -95,15 +108,19 @@ std::string HeaderOf(const LasContent& content, const LasLayout& layout, size_t 
   std::memcpy(header.data() + 58, "roomtex", 7);
   PutAt(94, layout.header_size, &header);
   PutAt(96, static_cast<uint32_t>(begin), &header);
-  PutAt<uint32_t>(100, has_system ? 1 : 0, &header);
+  PutAt<uint32_t>(100, system == LasSystem::kBefore ? 1 : 0, &header);
   header[104] = static_cast<char>(content.has_colors ? layout.colored_format : layout.format);
-  PutAt(105, static_cast<uint16_t>(layout.record_size + (content.has_colors ? 6 : 0)), &header);
+  PutAt(105, layout.SizeOfPoint(content.has_colors), &header);
   for (size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
     PutAt(131 + 8 * k, content.scale, &header);
     PutAt(155 + 8 * k, content.shift[axis], &header);
     PutAt(179 + 16 * k, content.bounds.max[axis], &header);
     PutAt(187 + 16 * k, content.bounds.min[axis], &header);
+  }
+  if (system == LasSystem::kBehind) {
+    PutAt(235, begin + content.count * layout.SizeOfPoint(content.has_colors), &header);
+    PutAt<uint32_t>(243, 1, &header);
   }
   // All are first returns. Of the formats from 6 on the counts of 32 bits are 0.
   if (layout.minor == 4) {
@@ -119,7 +136,7 @@ std::string HeaderOf(const LasContent& content, const LasLayout& layout, size_t 
 // The point `i`, which is measured.
 std::string RecordOf(const Scan& scan, size_t i, const LasContent& content,
                      const LasLayout& layout) {
-  std::string record(layout.record_size + (content.has_colors ? 6 : 0), '\0');
+  std::string record(layout.SizeOfPoint(content.has_colors), '\0');
   for (size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
     const double steps = (scan.points[i][axis] - content.shift[axis]) / content.scale;
@@ -153,12 +170,14 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path,
     throw InputError(path, "", "would hold more than 4294967295 points",
                      "Write .e57 or .ply, or LAS 1.4 (--Las.version 1.4)");
   }
-  const bool has_system =
-      layout.minor == 4 && !coordinate_system.empty() && coordinate_system.size() <= kLongestSystem;
-  const std::string system = has_system ? SystemRecord(coordinate_system) : "";
+  const LasSystem place = layout.minor < 4 || coordinate_system.empty() ? LasSystem::kNone
+                          : coordinate_system.size() <= kLongestSystem  ? LasSystem::kBefore
+                                                                        : LasSystem::kBehind;
+  const std::string system =
+      place == LasSystem::kNone ? "" : SystemRecord(coordinate_system, place == LasSystem::kBehind);
+  const std::string before = place == LasSystem::kBehind ? "" : system;
   OutputFile output(path);
-  output.stream() << HeaderOf(content, layout, layout.header_size + system.size(), has_system)
-                  << system;
+  output.stream() << HeaderOf(content, layout, layout.header_size + before.size(), place) << before;
   std::string block;
   for (const Scan* scan : scans) {
     for (size_t i = 0; i < scan->points.size(); ++i) {
@@ -170,6 +189,7 @@ void WriteLas(const std::vector<const Scan*>& scans, const std::string& path,
     }
   }
   output.stream() << block;
+  if (place == LasSystem::kBehind) output.stream() << system;
   output.Commit();
 }
 

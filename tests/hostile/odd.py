@@ -382,6 +382,9 @@ def later():
     yield "import: picks.csv is a folder", folder_below("taken/picks.csv"), PHOTOS + " --E57.picks 1", {3}
     yield "import: sparse is a file", write("taken/sparse", "mine"), PHOTOS, {3}
     yield "import: photos of what has none", nothing, PHOTOS.replace("coloured/model.e57", "scan.rtpi"), {3}
+    for version, code in (("1.3", 0), ("1.4", 0), ("1.5", 2), ("", 2), ("1.4e0", 2), ("nan", 2)):
+        yield (f"import --Las.version {version!r}", nothing,
+               shlex.split(IMPORT.replace("room.ply", "room.las")) + ["--Las.version", version], {code})
     yield "import: picks without photos", nothing, IMPORT + " --E57.picks 1", {2}
     yield ("import: an E57 cut short", lambda root: os.truncate(root / "coloured/model.e57", 5000),
            PHOTOS, {3})

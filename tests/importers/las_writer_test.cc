@@ -83,6 +83,16 @@ TEST_F(LasWriter, TheCoordinateSystemGoesIntoLas14) {
   EXPECT_THAT(again.notes, IsEmpty());
 }
 
+TEST_F(LasWriter, ALongCoordinateSystemStandsBehindThePoints) {
+  const std::string remarks(80000, 'r');  // longer than a record before the points can be
+  const std::string system = "COMPD_CS[\"" + remarks + "\"," + kSystem + "]";
+  EXPECT_THAT(Write("1.4", system),
+              HasSubstr(std::string("LASF_Projection 2112 ") + system + "\n"));
+  const ScanFile again = ReadScanFile(folder_ / "b.las", {});
+  EXPECT_EQ(again.coordinate_system, system);
+  EXPECT_EQ(again.scans[0].points.size(), 4u);
+}
+
 TEST_F(LasWriter, RoomtexImportKeepsTheCoordinateSystemWhereTheCoordinatesStay) {
   Write("1.4", kSystem);
   const auto convert = [this](const std::string& more) {

@@ -35,23 +35,30 @@ def main(path):
     encoding, begin, num_records = at("H", 6), at("I", 96), at("I", 100)
     require(minor >= 3 or encoding in (0, 1), "bits that the version does not know")
     count, by_return = at("I", 107), at("5I", 111)
+    behind = num_behind = 0
     if kind >= 6:
         require(encoding & 16, "the WKT bit is not set")
         require(count == 0 and not any(by_return), "counts of 32 bits beside new points")
-        require(at("Q", 235) == 0 and at("I", 243) == 0, "records behind the points")
+        behind, num_behind = at("Q", 235), at("I", 243)
         count, by_return = at("Q", 247), at("15Q", 255)
     require(minor < 3 or at("Q", 227) == 0, "waveforms")
-    require(len(data) == begin + count * size, "the points do not end with the file")
+    end = begin + count * size
+    require(behind == (end if num_behind else 0), "the records behind the points do not begin there")
+    require(num_behind or len(data) == end, "the points do not end with the file")
     require(by_return[0] == count and not any(by_return[1:]), "points by return")
     print(f"{major}.{minor} format {kind} wkt {encoding >> 4 & 1} points {count}")
-    place = HEADERS[minor]
-    for _ in range(num_records):
-        user, record, length = struct.unpack_from("<16sHH", data, place + 2)
-        text = data[place + 54:place + 54 + length]
-        require(text.endswith(b"\0"), "the system does not end with a zero")
-        print(user.rstrip(b"\0").decode(), record, text[:-1].decode())
-        place += 54 + length
-    require(place == begin, "the points do not begin behind the records")
+
+    def records(place, number, code, head):
+        for _ in range(number):
+            user, record, length = struct.unpack_from(code, data, place + 2)
+            text = data[place + head:place + head + length]
+            require(len(text) == length and text.endswith(b"\0"), "the system does not end with a zero")
+            print(user.rstrip(b"\0").decode(), record, text[:-1].decode())
+            place += head + length
+        return place
+
+    require(records(HEADERS[minor], num_records, "<16sHH", 54) == begin, "the points do not begin behind the records")
+    require(records(end, num_behind, "<16sHQ", 60) == len(data), "the records do not end with the file")
     scale, shift, box = at("3d", 131), at("3d", 155), at("6d", 179)
     for i in range(count):
         point = begin + i * size
