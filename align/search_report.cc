@@ -37,6 +37,18 @@ Json StartToJson(const AutomaticAlignment& found, int index) {
   json["surface_rms_m"] = start.rms;
   json["rays"] = SightsToJson(start.sights);
   json["photos"] = start.photos ? PhotosToJson(*start.photos) : Json(nullptr);
+  json["looks_alike"] = start.looks_alike;
+  return json;
+}
+
+// The best place by appearance, and how many cells of the scan the best and the next one have.
+Json AppearanceToJson(const StartSearch& search) {
+  if (!search.appearance) return nullptr;
+  const std::vector<AppearancePlace>& places = *search.appearance;
+  Json json;
+  json["num_cells"] = places.empty() ? 0 : places[0].num_cells;
+  json["num_cells_second"] = places.size() < 2 ? 0 : places[1].num_cells;
+  json["scan_from_sparse"] = places.empty() ? Json(nullptr) : ToJson(places[0].scan_from_sparse);
   return json;
 }
 
@@ -45,7 +57,7 @@ Json StartToJson(const AutomaticAlignment& found, int index) {
 Json SearchToJson(const AutomaticAlignment& found) {
   const StartVerdict& verdict = found.verdict;
   Json json;
-  json["method"] = "geometry";
+  json["method"] = verdict.looks_alike ? "geometry and appearance" : "geometry";
   json["num_hypotheses"] = found.search.num_hypotheses;
   json["up_known"] = found.search.up_known;
   json["verdict"] = NameOf(verdict.kind);
@@ -53,7 +65,8 @@ Json SearchToJson(const AutomaticAlignment& found) {
   json["second"] = verdict.second < 0 ? Json(nullptr) : StartToJson(found, verdict.second);
   json["ratio"] = verdict.ratio;
   json["mirrored_score"] = verdict.mirrored_score;
-  json["agreement"] = verdict.support != PhotoSupport::kNone;
+  json["appearance"] = AppearanceToJson(found.search);
+  json["agreement"] = verdict.looks_alike || verdict.support != PhotoSupport::kNone;
   json["chance_wrong"] = verdict.chance_wrong;
   json["hypotheses"] = Json::array();
   for (size_t i = 0; i < found.search.starts.size(); ++i) {

@@ -48,29 +48,38 @@ double CornerSigma(const std::vector<Pick>& corners, const SparseModel& model,
   return std::max(1.0, kSigmaPerMedian * Median(&distances));
 }
 
+namespace {
+
+void AskPhotosOf(const AlignmentInput& input, const AlignmentOptions& options,
+                 const StartPhotosOptions& photos, const SearchCloud& cloud, FittedStart* start) {
+  start->photos = AskAt(input, start->scan_from_sparse);
+  for (int draw = 0; draw < photos.max_draws; ++draw) {
+    const GradientAgreement& seen = *start->photos;
+    const size_t num_alike = seen.shifts.shifted_alike.size();
+    if (start->rms <= kExactRms || num_alike < kClearlyMore * seen.shifts.corners.size()) break;
+    const std::vector<Pick> corners =
+        PicksOf(seen.shifts.shifted_alike, input.model, start->scan_from_sparse, kDrawingCorners);
+    if (corners.empty()) break;
+    FittedStart drawn = *start;
+    FitStart(input, cloud, corners, CornerSigma(corners, input.model, start->scan_from_sparse),
+             kDrawingGate, options.fit, &drawn);
+    drawn.photos = AskAt(input, drawn.scan_from_sparse);
+    *start = std::move(drawn);
+  }
+}
+
+}  // namespace
+
 void AskPhotos(const AlignmentInput& input, const AlignmentOptions& options,
                const StartPhotosOptions& photos, StartSearch* search) {
   if (input.image_path.empty() || search->starts.empty()) return;
   const double most = search->starts[0].sights.Score();
-  const int num = std::min<int>(photos.max_rivals, static_cast<int>(search->starts.size()));
-  for (int i = 0; i < num; ++i) {
+  for (int i = 0; i < static_cast<int>(search->starts.size()); ++i) {
     FittedStart* const start = &search->starts[i];
-    if (start->sights.Score() < photos.rival_share * most) break;
-    start->photos = AskAt(input, start->scan_from_sparse);
-    for (int draw = 0; draw < photos.max_draws; ++draw) {
-      const GradientAgreement& seen = *start->photos;
-      const size_t num_alike = seen.shifts.shifted_alike.size();
-      if (start->rms <= kExactRms || num_alike < kClearlyMore * seen.shifts.corners.size()) break;
-      const std::vector<Pick> corners =
-          PicksOf(seen.shifts.shifted_alike, input.model, start->scan_from_sparse, kDrawingCorners);
-      if (corners.empty()) break;
-      FittedStart drawn = *start;
-      FitStart(input, search->cloud, corners,
-               CornerSigma(corners, input.model, start->scan_from_sparse), kDrawingGate,
-               options.fit, &drawn);
-      drawn.photos = AskAt(input, drawn.scan_from_sparse);
-      *start = std::move(drawn);
-    }
+    const bool is_rival =
+        i < photos.max_rivals && start->sights.Score() >= photos.rival_share * most;
+    if (start->photos || !(is_rival || start->looks_alike)) continue;
+    AskPhotosOf(input, options, photos, search->cloud, start);
   }
   // Drawn ones may have changed places, or come to one place.
   const int num_starts = static_cast<int>(search->starts.size());

@@ -20,7 +20,8 @@ struct StartPhotosOptions {
   int max_draws = 3;
 };
 
-// Fills FittedStart::photos of the best starts. Where sparse points and surface differ by
+// Fills FittedStart::photos of the best starts, and of one that looks alike, where it is not known
+// yet. Where sparse points and surface differ by
 // centimetres (kExactRms), a start that is fitted to the surface can be a few degrees off, too far
 // for photos to confirm: where each of them shows the scan's corners shifted alike, the start is
 // first drawn to there, by a fit to these corners and the surface.

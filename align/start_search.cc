@@ -20,9 +20,6 @@ constexpr double kMaxScaleChange = 0.15;
 constexpr double kSightTolerance = 0.05;  // metres
 // Metres; what a fitted start may still be off where a hint has it.
 constexpr double kHintSlack = 0.25;
-// Metres; starts that put half of the points nearer together are one.
-constexpr double kSameStart = 0.15;
-
 class Fitter {
  public:
   Fitter(const AlignmentInput& input, const AlignmentOptions& options,
@@ -34,7 +31,7 @@ class Fitter {
     const SearchCloud few = Thinned(cloud, kFirstPoints);
     std::vector<FittedStart> starts;
     for (const StartHypothesis& one : hypotheses) {
-      starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}, {}});
+      starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}, {}, false});
     }
     starts = DistinctStarts(cloud, FitEach(few, kFirstGate, kMaxScaleChange, starts),
                             search_.num_finalists);
@@ -96,10 +93,14 @@ std::vector<FittedStart> DistinctStarts(const SearchCloud& cloud, std::vector<Fi
   std::vector<FittedStart> kept;
   for (FittedStart& one : starts) {
     if (static_cast<int>(kept.size()) == most) break;
-    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const FittedStart& other) {
+    const auto same = std::find_if(kept.begin(), kept.end(), [&](const FittedStart& other) {
       return DistanceBetween(cloud, one.scan_from_sparse, other.scan_from_sparse) < kSameStart;
     });
-    if (is_new) kept.push_back(std::move(one));
+    if (same != kept.end()) {
+      same->looks_alike = same->looks_alike || one.looks_alike;
+    } else {
+      kept.push_back(std::move(one));
+    }
   }
   return kept;
 }
@@ -115,6 +116,8 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
   const UpDirections ups = FindModelUps(found.cloud);
   const UpDirections scan_ups = FindScanUps(input.surveyed.scans(), input.surveyed.patches());
   found.up_known = ups.known;
+  found.ups_in_sparse = ups.ups;
+  found.ups_in_scan = scan_ups.ups;
   std::vector<Eigen::Vector3d> mirrored_ups;
   for (const Eigen::Vector3d& up : ups.ups) mirrored_ups.emplace_back(-up.x(), up.y(), up.z());
   const std::vector<HintRay> hints = FindHintRays(input.model, input.picks, near);

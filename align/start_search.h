@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "align/alignment_input.h"
+#include "align/search/appearance_search.h"
 #include "align/search/geometry_search.h"
 #include "align/search/search_cloud.h"
 #include "align/search/search_hint.h"
@@ -28,6 +29,7 @@ struct FittedStart {
   double rms = 0;               // metres, their distances
   SightAgreement sights;
   std::optional<GradientAgreement> photos;  // of the best starts (start_photos.h)
+  bool looks_alike = false;                 // photos and scan there (start_appearance.h)
 };
 
 // Metres; where sparse points and surface agree within this, photos of this room do so, too.
@@ -35,13 +37,20 @@ inline constexpr double kExactRms = 0.01;
 
 struct StartSearch {
   int num_hypotheses = 0;
-  bool up_known = false;  // in the model, by the photos
+  bool up_known = false;                       // in the model, by the photos
+  std::vector<Eigen::Vector3d> ups_in_sparse;  // the likeliest first
+  std::vector<Eigen::Vector3d> ups_in_scan;
   SearchCloud cloud;
   // Clearly different ones, those first that the photos' rays agree with most.
   std::vector<FittedStart> starts;
   // The same for the mirror image of the model, which is nowhere: how well a wrong start fits here.
   std::vector<FittedStart> mirrored;
+  // Where photos and scan look alike, if they were asked (start_appearance.h); may be of nowhere.
+  std::optional<std::vector<AppearancePlace>> appearance;
 };
+
+// Metres; starts that put half of the points nearer together are one.
+inline constexpr double kSameStart = 0.15;
 
 // Fits a start to the surface and to picks (noise sigma_px), and asks the rays again.
 // gate: metres, FitToSurface().

@@ -41,9 +41,17 @@ PhotoSupport SupportOf(const FittedStart& start, const StartVerdictOptions& opti
   return start.rms > kExactRms ? PhotoSupport::kFaint : PhotoSupport::kNone;
 }
 
-// The best by its rays; of several that they agree with about as much, the only one that the photos
-// support most.
+// The one where photos and scan look alike. Else the best by its rays; of several that they agree
+// with about as much, the only one that the photos support most.
 void Choose(const StartSearch& search, const StartVerdictOptions& options, StartVerdict* verdict) {
+  for (size_t i = 0; i < search.starts.size(); ++i) {
+    if (!search.starts[i].looks_alike) continue;
+    verdict->best = static_cast<int>(i);
+    verdict->second = search.starts.size() < 2 ? -1 : i == 0 ? 1 : 0;
+    verdict->support = SupportOf(search.starts[i], options);
+    verdict->looks_alike = true;
+    return;
+  }
   verdict->best = 0;
   bool is_only = true;
   for (int i = 0; i < static_cast<int>(search.starts.size()); ++i) {
@@ -84,14 +92,12 @@ double ChanceWrong(double score, double ratio, PhotoSupport support,
   return ratio >= options.min_ratio_faint ? kChanceFaint : std::max(kEvenOdds, guess);
 }
 
-// How much the score of the second best start counts. Of two that fit alike the photos may know
-// better: nothing where they confirm the best one clearly; less where they support it faintly and
-// deny the second.
+// How much the score of the second best start counts: less where the photos support the best one
+// faintly and deny the second. Where they confirm it clearly, nothing.
 double WeightOfSecond(const StartSearch& search, const StartVerdict& verdict,
                       const StartVerdictOptions& options) {
   const bool asked = verdict.second >= 0 && search.starts[verdict.second].photos;
   if (!asked || verdict.support == PhotoSupport::kNone) return 1;
-  if (verdict.support == PhotoSupport::kClear) return 0;
   const double share = search.starts[verdict.best].photos->shifts.at_pose.Share();
   const bool denied = !search.starts[verdict.second].photos->supports &&
                       share >= options.min_photo_share_over_denied;
@@ -189,16 +195,17 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   if (!search.mirrored.empty()) verdict.mirrored_score = search.mirrored[0].sights.Score();
   const double second = verdict.second < 0 ? 0 : search.starts[verdict.second].sights.Score();
   const bool clear = verdict.support == PhotoSupport::kClear;
-  const bool alone = verdict.support == PhotoSupport::kNone;
-  const double second_counts = second * WeightOfSecond(search, verdict, options);
-  const double rival = std::max(second_counts, clear ? 0.0 : verdict.mirrored_score);
+  const bool confirmed = clear || verdict.looks_alike;
+  const bool alone = !confirmed && verdict.support == PhotoSupport::kNone;
+  const double second_counts = confirmed ? 0 : second * WeightOfSecond(search, verdict, options);
+  const double rival = confirmed ? 0 : std::max(second_counts, verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
-  verdict.chance_wrong =
-      ChanceWrong(score, score / std::max(rival, 1e-6), verdict.support, options);
+  verdict.chance_wrong = ChanceWrong(score, score / std::max(rival, 1e-6),
+                                     confirmed ? PhotoSupport::kClear : verdict.support, options);
   const double min_score = alone ? options.min_score_alone : options.min_score;
-  const double min_ratio = alone   ? options.min_ratio_alone
-                           : clear ? options.min_ratio
-                                   : options.min_ratio_faint;
+  const double min_ratio = alone       ? options.min_ratio_alone
+                           : confirmed ? options.min_ratio
+                                       : options.min_ratio_faint;
   if (alone && verdict.mirrored_score >= min_score &&
       verdict.mirrored_score >= options.min_ratio_mirrored * score) {
     verdict.kind = Kind::kMirrored;

@@ -1,7 +1,8 @@
 #pragma once
 // Whether a start that was found without clicks is the right one, by evidence that the search did
-// not use: the next best start, the mirror image of the model (which is nowhere), and whether the
-// photos show the scan's intensity where it is.
+// not use: the next best start, the mirror image of the model (which is nowhere), whether the
+// photos show the scan's intensity where it is, and whether features that photos and scan have in
+// common lead there, too.
 
 #include <string>
 #include <vector>
@@ -53,6 +54,7 @@ struct StartVerdict {
   Kind kind = Kind::kNone;
   int best = -1, second = -1;  // indices into StartSearch::starts; -1 = there is none
   PhotoSupport support = PhotoSupport::kNone;  // of the best one, and of no other
+  bool looks_alike = false;   // the best one: as good as clear support, but where it lies exactly
   double ratio = 0;           // best score over the larger of second's and the mirror image's
   double mirrored_score = 0;  // of the best start of the mirror image
   // How many of 1000 answers with evidence like this are wrong at most, over 1000. Where the photos

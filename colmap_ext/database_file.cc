@@ -9,12 +9,14 @@
 
 #include "core/output_file.h"
 #include "core/partial_path.h"
+#include "core/resource_limits.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr int kBusyMilliseconds = 3000;
+constexpr int64_t kMuchMemory = int64_t{1} << 30;  // bytes; no database needs as much at once
 
 // What the first 100 bytes of an SQLite file say (sqlite.org/fileformat.html, section 1.3).
 struct SqliteHeader {
@@ -178,6 +180,12 @@ InputError DatabaseFile::ErrorFromSqlite(const SQLite::Exception& error) const {
                             said,
                         kDatabaseRemedy);
     case SQLITE_NOMEM:
+      // SQLite says so of some damaged headers, too.
+      if (AvailableMemory() > kMuchMemory) {
+        return InputError(path_, "",
+                          "is damaged: to read it SQLite asks for more memory than there is",
+                          kDatabaseRemedy);
+      }
       throw std::bad_alloc();
     default:
       return InputError(path_, "", "cannot be read as COLMAP's database" + said, kDatabaseRemedy);

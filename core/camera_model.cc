@@ -77,34 +77,37 @@ bool IsDistorted(CameraModel model) {
   return model != CameraModel::kSimplePinhole && model != CameraModel::kPinhole;
 }
 
-// The angle from the optical axis up to which the distortion is one-to-one: along each of 16
-// directions the first one where its Jacobian is no longer positive definite enough to be inverted;
-// the smallest over the directions. Steps are equal in angle: of a perspective camera up to 89.5
-// degrees, else up to 179.
+// The steps of angle and the directions in which the distortion is looked at.
+constexpr int kNumDirections = 16;
+int NumSteps(const Camera& camera) { return camera.IsPerspective() ? 900 : 1800; }
+double AngleOfStep(const Camera& camera, int step) {
+  return RadFromDeg(camera.IsPerspective() ? 89.5 : 179) * step / NumSteps(camera);
+}
+
+// Whether the Jacobian of the distortion is positive definite enough to be inverted there.
+bool IsOneToOne(const Camera& camera, int direction, int step) {
+  const double turn = 2 * kPi * direction / kNumDirections;
+  const Eigen::Vector2d unit(std::cos(turn), std::sin(turn));
+  const double angle = AngleOfStep(camera, step);
+  const double radius = camera.IsPerspective() ? std::tan(angle) : angle;
+  const double by_angle = camera.IsPerspective() ? 1 + radius * radius : 1;
+  const Eigen::Matrix2d jacobian = DistortionJacobian(camera, radius * unit);
+  const double radial_gain = unit.dot(jacobian * unit) * by_angle;
+  // Beyond a pole of the formula (EUCM) positions come back from the other side.
+  const bool outward = unit.dot(DistortPoint(camera, radius * unit)) > 0;
+  return jacobian.determinant() > 0 && radial_gain > 0.02 && outward;
+}
+
+// The angle from the optical axis up to which the distortion is one-to-one, the smallest over the
+// directions: of a perspective camera up to 89.5 degrees, else up to 179.
 double MaxAngle(const Camera& camera) {
-  constexpr int kNumDirections = 16;
-  const bool perspective = camera.IsPerspective();
-  const int num_steps = perspective ? 900 : 1800;
-  const double max_angle = RadFromDeg(perspective ? 89.5 : 179);
-  int last_valid = num_steps;
-  for (int d = 0; d < kNumDirections; ++d) {
-    const double direction = 2 * kPi * d / kNumDirections;
-    const Eigen::Vector2d unit(std::cos(direction), std::sin(direction));
+  int last_valid = NumSteps(camera);
+  for (int direction = 0; direction < kNumDirections; ++direction) {
     for (int step = 1; step <= last_valid; ++step) {
-      const double angle = max_angle * step / num_steps;
-      const double radius = perspective ? std::tan(angle) : angle;
-      const double by_angle = perspective ? 1 + radius * radius : 1;
-      const Eigen::Matrix2d jacobian = DistortionJacobian(camera, radius * unit);
-      const double radial_gain = unit.dot(jacobian * unit) * by_angle;
-      // Beyond a pole of the formula (EUCM) positions come back from the other side.
-      const bool outward = unit.dot(DistortPoint(camera, radius * unit)) > 0;
-      if (!(jacobian.determinant() > 0) || !(radial_gain > 0.02) || !outward) {
-        last_valid = step - 1;
-        break;
-      }
+      if (!IsOneToOne(camera, direction, step)) last_valid = step - 1;
     }
   }
-  return max_angle * last_valid / num_steps;
+  return AngleOfStep(camera, last_valid);
 }
 
 }  // namespace
@@ -197,6 +200,17 @@ std::vector<std::string> Camera::Problems() const {
   if (model == CameraModel::kEucm && !(params[4] >= 0 && params[4] <= 1 && params[5] > 0)) {
     problems.push_back(who + " (EUCM) has alpha " + std::to_string(params[4]) + " and beta " +
                        std::to_string(params[5]) + ", expected 0 <= alpha <= 1 and beta > 0");
+  }
+  if (problems.empty() && !IsPanorama() && IsDistorted(model)) {
+    int folded = 0;
+    for (int direction = 0; direction < kNumDirections; ++direction) {
+      folded += !IsOneToOne(*this, direction, 1);
+    }
+    if (folded > 0) {
+      problems.push_back(who + " (" + CameraModelName(model) +
+                         ") has distortion parameters that fold the picture over in its middle, "
+                         "expected those of a lens");
+    }
   }
   return problems;
 }

@@ -22,7 +22,7 @@ while [ $# -gt 0 ]; do
   esac
 done
 [ "$(id -u)" -eq 0 ] || { echo "check_package: a bare Debian needs root." >&2; exit 77; }
-[ -x "$keep/usr/bin/apt-get" ] || command -v debootstrap >/dev/null ||
+[ -x "${keep:-/none}/usr/bin/apt-get" ] || command -v debootstrap >/dev/null ||
   { echo "check_package: install debootstrap first." >&2; exit 77; }
 
 work=$(mktemp -d)

@@ -52,6 +52,25 @@ TEST(StartVerdict, APlaceThatPhotosDenyCountsLessAgainstOneThatTheySupportFaintl
       << "as a room of the same plan has them";
 }
 
+TEST(StartVerdict, WherePhotosAndScanLookAlikeNoRivalCounts) {
+  FittedStart best = Asked(Start(820, kDrifting), 800, 120, true);
+  const FittedStart second = Asked(Start(840, kDrifting), 800, 16, false);
+  EXPECT_EQ(Judge({second, best}, 700).kind, Kind::kAmbiguous);
+  best.looks_alike = true;
+  const StartVerdict verdict = Judge({second, best}, 700);
+  EXPECT_EQ(verdict.kind, Kind::kTrusted);
+  EXPECT_EQ(verdict.best, 1);
+  EXPECT_EQ(verdict.second, 0);
+  EXPECT_EQ(verdict.chance_wrong, kChanceClear);
+  // The surface still has to be there.
+  FittedStart off = Start(500, kDrifting);
+  off.looks_alike = true;
+  EXPECT_EQ(Judge({off}, 100).kind, Kind::kWeak);
+  FittedStart moving = best;
+  moving.settled = false;
+  EXPECT_EQ(Judge({moving}, 100).kind, Kind::kWeak);
+}
+
 TEST(StartVerdict, FewCornersConfirmOnlyWhereMostOfThemFit) {
   const FittedStart second = Start(500, kExact);
   EXPECT_EQ(Judge({Asked(Start(970, kExact), 300, 120, true), second}, 600).kind, Kind::kTrusted);

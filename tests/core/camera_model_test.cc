@@ -522,6 +522,9 @@ TEST(Camera, ProblemsAreNamed) {
   EXPECT_THAT(problem(CameraModel::kPinhole, {500, 500, 320, 240}, 0), HasSubstr("0 x 480"));
   EXPECT_THAT(problem(static_cast<CameraModel>(18), {500, 500, 320, 240}),
               HasSubstr("model id 18"));
+  EXPECT_EQ(problem(CameraModel::kOpenCv, {500, 500, 320, 240, -0.5, 0.2, 0.02, 0.02}), "");
+  EXPECT_THAT(problem(CameraModel::kOpenCv, {500, 500, 320, 240, 0.1, -0.85, 10001, 0.002}),
+              HasSubstr("fold the picture over in its middle"));
   EXPECT_EQ(NumCameraParams(-1), -1);
   EXPECT_EQ(NumCameraParams(18), -1);
   EXPECT_FALSE(CameraModelFromName("simple_radial"));

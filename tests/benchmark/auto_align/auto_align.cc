@@ -327,7 +327,7 @@ const char kHeader[] =
     "clear,"
     "contradicts,"
     "second_share,chance_wrong,cpu_s,make_s,peak_mb,points,photos,stations,scanned,reflectance,"
-    "range_noise_m,reason\n";
+    "range_noise_m,looks_alike,cells,cells_second,reason\n";
 
 class Line {
  public:
@@ -423,6 +423,12 @@ std::string LineOfRoom(uint64_t seed) {
   line.Add(room.scanned_share, 2);
   line.Add(room.reflectance, 0);
   line.Add(room.one.room->options().range_noise, 4);
+  // By appearance; nothing where it was not asked.
+  const auto& places = found.search.appearance;
+  line.Add(found.verdict.looks_alike, 0);
+  for (const size_t k : {0, 1}) {
+    line.Add(places ? std::to_string(k < places->size() ? (*places)[k].num_cells : 0) : "");
+  }
   const auto& alignment = found.attempt.alignment;
   line.Add(alignment && !alignment->reasons.empty() ? alignment->reasons[0]
                                                     : found.attempt.refusal);

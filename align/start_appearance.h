@@ -1,0 +1,28 @@
+#pragma once
+// What appearance says of the starts: an own search by features that photos and scan have in common
+// (align/search/appearance_search.h). Geometry has no part in it, so that a start where both lead
+// is no room of the same plan.
+
+#include "align/alignment_input.h"
+#include "align/start_search.h"
+
+namespace roomtex {
+
+struct StartAppearanceOptions {
+  // Places of the scan, in cells of 15 cm, that photos show and that agree: at least so many, and
+  // so many times those of the next best place. Larger = stricter. Counted: docs/automatic.md.
+  int min_cells = 25;
+  double min_ratio = 2;
+};
+
+// Whether the best place has what the options ask for.
+bool StandsOut(const std::vector<AppearancePlace>& places, const StartAppearanceOptions& options);
+
+// Fills StartSearch::appearance, unless it is known already. Where the best place stands out it is
+// fitted to the surface, and becomes a start, or one that is there already is marked
+// (FittedStart::looks_alike). Does nothing without photos, or where nothing says which way the
+// model is up.
+void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
+                   const StartAppearanceOptions& appearance, StartSearch* search);
+
+}  // namespace roomtex
