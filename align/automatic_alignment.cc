@@ -33,7 +33,7 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
 
 // What leaves the photos' corners as exact as they are: half a step between the scan's samples is
 // not known of any, and neighbouring ones are off together.
-constexpr size_t kMostCorners = 200;
+constexpr size_t kMostCorners = 200, kFewCorners = 30;
 
 // The surface leaves something open, so that it does not hold the model there, or it drew the model
 // away from where the photos confirmed the start.
@@ -55,9 +55,14 @@ Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& 
   const Similarity& best = start.scan_from_sparse;
   Alignment alignment = AlignToScan(
       input, StartFromSimilarity(input.model, input.picks, best, kStartSigma), options, progress);
-  if (found.verdict.support == PhotoSupport::kNone || !start.photos) return alignment;
-  std::vector<Pick> corners =
-      PicksOf(start.photos->shifts.corners, input.model, best, kMostCorners);
+  std::vector<Pick> corners;
+  if (found.verdict.support != PhotoSupport::kNone && start.photos) {
+    corners = PicksOf(start.photos->shifts.corners, input.model, best, kMostCorners);
+  }
+  // Features are less exact.
+  if (start.looks_alike && corners.size() < kFewCorners) {
+    corners = found.search.appearance->agreeing;
+  }
   if (corners.empty()) return alignment;
   const double sigma_px = CornerSigma(corners, input.model, best);
   if (!NeedsCorners(alignment, corners, sigma_px, input.model)) return alignment;

@@ -44,7 +44,7 @@ Json StartToJson(const AutomaticAlignment& found, int index) {
 // The best place by appearance, and how many cells of the scan the best and the next one have.
 Json AppearanceToJson(const StartSearch& search) {
   if (!search.appearance) return nullptr;
-  const std::vector<AppearancePlace>& places = *search.appearance;
+  const std::vector<AppearancePlace>& places = search.appearance->places;
   Json json;
   json["num_cells"] = places.empty() ? 0 : places[0].num_cells;
   json["num_cells_second"] = places.size() < 2 ? 0 : places[1].num_cells;

@@ -33,7 +33,7 @@ struct AlignmentStart {
   // Metres, of the cameras: how far off the surface is looked for.
   double position_sigma = 0;
   std::vector<PickOutcome> picks;  // those that there are, also of a start that is not from them
-  // So many of `picks`, the last ones, are no clicks but corners of the scan's intensity that the
+  // So many of `picks`, the last ones, are no clicks but places of the scan's intensity that the
   // photos show where they should (automatic_alignment.cc).
   int num_corners = 0;
   double pick_sigma_px = 1.5;  // click noise, per coordinate

@@ -4,17 +4,33 @@
 #include <optional>
 #include <utility>
 
-#include "align/search/appearance_matches.h"
+#include "align/start_photos.h"
+#include "align/trust/appearance_matches.h"
 
 namespace roomtex {
 namespace {
 
-constexpr double kPickSigma = 3;  // pixels; a hint may be hurried
 constexpr size_t kMostUps = 3;
+constexpr size_t kMostPicks = 400;
 constexpr double kSurfaceGate = 0.15;  // metres; features are matched to some centimetres
 
+// The matches that agree with a place, evenly taken.
+std::vector<Pick> AgreeingPicks(const std::vector<AppearanceMatch>& matches,
+                                const Similarity& scan_from_sparse, const SparseModel& model) {
+  std::vector<Pick> picks;
+  for (const AppearanceMatch& one : matches) {
+    const double off = (scan_from_sparse * one.x_in_sparse - one.x_in_scan).norm();
+    if (off > AppearanceSearchOptions().tolerance) continue;
+    picks.push_back({model.images.at(one.image_id).name, one.x_in_img, one.x_in_scan});
+  }
+  const size_t stride = 1 + picks.size() / kMostPicks;
+  std::vector<Pick> some;
+  for (size_t i = 0; i < picks.size(); i += stride) some.push_back(picks[i]);
+  return some;
+}
+
 // With all directions that may be up; where the photos do not say it, also without any.
-std::vector<AppearancePlace> LookForPlaces(const AlignmentInput& input, const StartSearch& search) {
+AppearanceEvidence LookForPlaces(const AlignmentInput& input, const StartSearch& search) {
   std::vector<std::optional<Eigen::Vector3d>> ups(search.ups_in_sparse.begin(),
                                                   search.ups_in_sparse.end());
   if (search.up_known) {
@@ -23,7 +39,7 @@ std::vector<AppearancePlace> LookForPlaces(const AlignmentInput& input, const St
     if (ups.size() > kMostUps) ups.resize(kMostUps);
     ups.push_back(std::nullopt);
   }
-  std::vector<AppearancePlace> best;
+  AppearanceEvidence best;
   for (const Eigen::Vector3d& up_in_scan : search.ups_in_scan) {
     for (const std::optional<Eigen::Vector3d>& up_in_sparse : ups) {
       const std::vector<AppearanceMatch> matches =
@@ -32,7 +48,9 @@ std::vector<AppearancePlace> LookForPlaces(const AlignmentInput& input, const St
       std::vector<AppearancePlace> places = SearchByAppearance(
           matches, up_in_sparse, up_in_scan, AppearanceSearchOptions(), input.num_threads);
       if (places.empty()) continue;
-      if (best.empty() || places[0].num_cells > best[0].num_cells) best = std::move(places);
+      if (!best.places.empty() && places[0].num_cells <= best.places[0].num_cells) continue;
+      best.agreeing = AgreeingPicks(matches, places[0].scan_from_sparse, input.model);
+      best.places = std::move(places);
     }
   }
   return best;
@@ -49,15 +67,18 @@ void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
                    const StartAppearanceOptions& appearance, StartSearch* search) {
   if (input.image_path.empty()) return;
   if (!search->appearance) search->appearance = LookForPlaces(input, *search);
-  if (!StandsOut(*search->appearance, appearance)) return;
+  if (!StandsOut(search->appearance->places, appearance)) return;
+  const Similarity& place = search->appearance->places[0].scan_from_sparse;
+  const std::vector<Pick>& agreeing = search->appearance->agreeing;
+  SimilarityFitOptions fit_options = options.fit;
+  fit_options.max_scale_change = kMaxStartScaleChange;
   FittedStart start;
-  start.scan_from_sparse = search->appearance->front().scan_from_sparse;
-  FitStart(input, search->cloud, input.picks, kPickSigma, kSurfaceGate, options.fit, &start);
-  const auto is_near = [&](const Similarity& place) {
-    return DistanceBetween(search->cloud, search->appearance->front().scan_from_sparse, place) <
-           kSameStart;
-  };
-  if (!is_near(start.scan_from_sparse)) return;  // the surface is elsewhere
+  start.scan_from_sparse = place;
+  FitStart(input, search->cloud, agreeing, CornerSigma(agreeing, input.model, place), kSurfaceGate,
+           fit_options, &start);
+  if (DistanceBetween(search->cloud, place, start.scan_from_sparse) > kSameStart) {
+    return;  // the surface is elsewhere
+  }
   start.looks_alike = true;
   // A start that is there already stays, unless it came to rest less well.
   const auto same =

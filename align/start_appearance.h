@@ -1,6 +1,6 @@
 #pragma once
 // What appearance says of the starts: an own search by features that photos and scan have in common
-// (align/search/appearance_search.h). Geometry has no part in it, so that a start where both lead
+// (align/trust/appearance_search.h). Geometry has no part in it, so that a start where both lead
 // is no room of the same plan.
 
 #include "align/alignment_input.h"

@@ -15,9 +15,7 @@ constexpr double kLeastKeypointNoise = 0.3;
 constexpr size_t kCloudPoints = 4000;                // that finalists are fitted with
 constexpr size_t kFirstPoints = 700;                 // that every hypothesis is fitted with
 constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
-// The turns and scales that were searched are this coarse.
-constexpr double kMaxScaleChange = 0.15;
-constexpr double kSightTolerance = 0.05;  // metres
+constexpr double kSightTolerance = 0.05;             // metres
 // Metres; what a fitted start may still be off where a hint has it.
 constexpr double kHintSlack = 0.25;
 class Fitter {
@@ -33,7 +31,7 @@ class Fitter {
     for (const StartHypothesis& one : hypotheses) {
       starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}, {}, false});
     }
-    starts = DistinctStarts(cloud, FitEach(few, kFirstGate, kMaxScaleChange, starts),
+    starts = DistinctStarts(cloud, FitEach(few, kFirstGate, kMaxStartScaleChange, starts),
                             search_.num_finalists);
     return DistinctStarts(cloud, FitEach(cloud, kLastGate, options_.fit.max_scale_change, starts),
                           search_.num_finalists);

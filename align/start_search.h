@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "align/alignment_input.h"
-#include "align/search/appearance_search.h"
 #include "align/search/geometry_search.h"
 #include "align/search/search_cloud.h"
 #include "align/search/search_hint.h"
+#include "align/trust/appearance_search.h"
 #include "align/trust/gradient_shift.h"
 #include "align/trust/sight_agreement.h"
 
@@ -35,6 +35,12 @@ struct FittedStart {
 // Metres; where sparse points and surface agree within this, photos of this room do so, too.
 inline constexpr double kExactRms = 0.01;
 
+// Where photos and scan look alike (start_appearance.h), the best first; may be nowhere.
+struct AppearanceEvidence {
+  std::vector<AppearancePlace> places;
+  std::vector<Pick> agreeing;  // what photos show of the scan at the first of them, weight 1
+};
+
 struct StartSearch {
   int num_hypotheses = 0;
   bool up_known = false;                       // in the model, by the photos
@@ -45,9 +51,11 @@ struct StartSearch {
   std::vector<FittedStart> starts;
   // The same for the mirror image of the model, which is nowhere: how well a wrong start fits here.
   std::vector<FittedStart> mirrored;
-  // Where photos and scan look alike, if they were asked (start_appearance.h); may be of nowhere.
-  std::optional<std::vector<AppearancePlace>> appearance;
+  std::optional<AppearanceEvidence> appearance;  // if photos and scan were asked
 };
+
+// The scales that are searched are this coarse.
+inline constexpr double kMaxStartScaleChange = 0.15;
 
 // Metres; starts that put half of the points nearer together are one.
 inline constexpr double kSameStart = 0.15;

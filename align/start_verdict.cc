@@ -217,7 +217,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   // What the surface leaves open the photos hold where they clearly confirm the place.
   const auto open =
-      clear ? std::vector<Eigen::Vector3d>() : OpenSlides(input, search, best.scan_from_sparse);
+      confirmed ? std::vector<Eigen::Vector3d>() : OpenSlides(input, search, best.scan_from_sparse);
   if (!open.empty()) {
     verdict.kind = Kind::kOpen;
     verdict.reason = OpenReason(open) + kRemedy;

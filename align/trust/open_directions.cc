@@ -87,7 +87,7 @@ std::string OpenDirections::Sentence(bool by_photos) const {
       num_facings == 1   ? "faces one way only (one wall, or walls opposite each other)"
       : num_facings == 2 ? "faces two ways only"
                          : "is too small or too round",
-      open, by_photos ? "the photos, by corners of the scan's intensity," : "the picks",
+      open, by_photos ? "the photos, by what they show of the scan's intensity," : "the picks",
       slides.empty()
           ? ""
           : ", to " + Number(1000 * slide_sigma, 1) + " mm at the photos (one standard deviation)");

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "align/search/appearance_search.h"
 #include "align/start_appearance.h"
 #include "align/trust/agreement.h"
+#include "align/trust/appearance_search.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
 #include "core/frames.h"

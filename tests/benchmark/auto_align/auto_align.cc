@@ -424,10 +424,11 @@ std::string LineOfRoom(uint64_t seed) {
   line.Add(room.reflectance, 0);
   line.Add(room.one.room->options().range_noise, 4);
   // By appearance; nothing where it was not asked.
-  const auto& places = found.search.appearance;
+  const auto& appearance = found.search.appearance;
   line.Add(found.verdict.looks_alike, 0);
   for (const size_t k : {0, 1}) {
-    line.Add(places ? std::to_string(k < places->size() ? (*places)[k].num_cells : 0) : "");
+    const auto& places = appearance ? appearance->places : std::vector<AppearancePlace>();
+    line.Add(appearance ? std::to_string(k < places.size() ? places[k].num_cells : 0) : "");
   }
   const auto& alignment = found.attempt.alignment;
   line.Add(alignment && !alignment->reasons.empty() ? alignment->reasons[0]

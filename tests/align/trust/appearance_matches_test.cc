@@ -1,12 +1,12 @@
-#include "align/search/appearance_matches.h"
+#include "align/trust/appearance_matches.h"
 
 #include <filesystem>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "align/search/appearance_search.h"
 #include "align/start_search.h"
+#include "align/trust/appearance_search.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/support/temp_folder.h"
 

@@ -1,4 +1,4 @@
-#include "align/search/appearance_search.h"
+#include "align/trust/appearance_search.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "align/search/appearance_matches.h"
+#include "align/trust/appearance_matches.h"
 
 #include <algorithm>
 #include <array>
@@ -30,6 +30,8 @@ constexpr double kElsewhere = 0.3;  // metres
 // Features of several pictures: a row of `sift` each, unit length.
 struct Features {
   std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector2d> in_img;  // of a photo: in the photo as it is
+  std::vector<uint32_t> image_ids;
   std::vector<float> responses;
   cv::Mat1f sift;
 };
@@ -91,6 +93,7 @@ cv::Mat1f Folded(const cv::Mat1f& root_sift) {
 struct Place {
   Eigen::Vector3d x;
   std::optional<Eigen::Vector2d> down;
+  Eigen::Vector2d in_img;
 };
 template <typename PlaceOf>
 Features Describe(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright, int most,
@@ -112,6 +115,7 @@ Features Describe(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright
     used.push_back(one);
     if (place->down) used.back().angle = KeypointAngle(*place->down);
     features.places.push_back(place->x);
+    features.in_img.push_back(place->in_img);
     features.responses.push_back(one.response);
   }
   cv::Mat descriptors;
@@ -121,7 +125,8 @@ Features Describe(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright
   return features;
 }
 
-Features Joined(std::vector<Features> parts, size_t most) {
+// part_ids: of the photos, or none.
+Features Joined(std::vector<Features> parts, const std::vector<uint32_t>& part_ids, size_t most) {
   std::vector<std::tuple<float, size_t, size_t>> order;
   for (size_t i = 0; i < parts.size(); ++i) {
     for (size_t k = 0; k < parts[i].places.size(); ++k) {
@@ -137,6 +142,8 @@ Features Joined(std::vector<Features> parts, size_t most) {
         .sift.row(static_cast<int>(k))
         .copyTo(all.sift.row(static_cast<int>(all.places.size())));
     all.places.push_back(parts[i].places[k]);
+    all.in_img.push_back(parts[i].in_img[k]);
+    all.image_ids.push_back(part_ids.empty() ? 0 : part_ids[i]);
   }
   return all;
 }
@@ -176,7 +183,7 @@ Features FeaturesOfView(const ScanViewer& viewer, const Scan& scan, const Eigen:
                     if (!(depth > 0)) return std::nullopt;
                     const Eigen::Vector2d ray((at.x() - 0.5 * size) / f, (at.y() - 0.5 * size) / f);
                     const Eigen::Vector3d x_in_cam = depth * ray.homogeneous();
-                    return Place{scan_from_cam * x_in_cam, down.head<2>() - ray * down.z()};
+                    return Place{scan_from_cam * x_in_cam, down.head<2>() - ray * down.z(), at};
                   });
 }
 
@@ -239,7 +246,7 @@ Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
         if (!ray) return std::nullopt;
         const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
         if (!lower) return std::nullopt;
-        return Place{model.points.at(image.point3d_ids[nearest]).x_in_model, *lower - at};
+        return Place{model.points.at(image.point3d_ids[nearest]).x_in_model, *lower - at, at};
       });
 }
 
@@ -289,13 +296,15 @@ std::vector<AppearanceMatch> MatchAppearance(const SparseModel& model,
   });
   const std::vector<const SparseImage*> images = SpreadImages(model, options.max_photos);
   std::vector<Features> of_photos(images.size());
+  std::vector<uint32_t> image_ids;
+  for (const SparseImage* image : images) image_ids.push_back(image->image_id);
   ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int i) {
     of_photos[i] =
         FeaturesOfPhoto(model, *images[i], image_path, pixel, up_in_sparse,
                         2 * options.max_photo_features / static_cast<int>(images.size()));
   });
-  const Features scan = Joined(std::move(of_views), options.max_scan_features);
-  const Features photos = Joined(std::move(of_photos), options.max_photo_features);
+  const Features scan = Joined(std::move(of_views), {}, options.max_scan_features);
+  const Features photos = Joined(std::move(of_photos), image_ids, options.max_photo_features);
   std::vector<std::pair<int, int>> pairs;
   if (scan.places.empty() || photos.places.empty()) return {};
   AddMatches(photos.sift, scan.sift, scan.places, options.max_ratio, &pairs);
@@ -304,7 +313,8 @@ std::vector<AppearanceMatch> MatchAppearance(const SparseModel& model,
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   std::vector<AppearanceMatch> matches;
   for (const auto& [photo, view] : pairs) {
-    matches.push_back({photos.places[photo], scan.places[view]});
+    matches.push_back(
+        {photos.places[photo], scan.places[view], photos.image_ids[photo], photos.in_img[photo]});
   }
   return matches;
 }

@@ -5,6 +5,7 @@
 // they are and once with opposite gradients counted as one, since intensity and brightness differ
 // in sign. Frames: `sparse`, `scan`.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,8 @@ namespace roomtex {
 
 struct AppearanceMatch {
   Eigen::Vector3d x_in_sparse, x_in_scan;
+  uint32_t image_id = 0;  // the photo that shows it, and where
+  Eigen::Vector2d x_in_img = Eigen::Vector2d::Zero();
 };
 
 struct AppearanceOptions {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "align/search/appearance_matches.h"
+#include "align/trust/appearance_matches.h"
 #include "core/similarity.h"
 
 namespace roomtex {
