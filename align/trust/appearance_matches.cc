@@ -24,6 +24,9 @@ constexpr double kFinestPixel = 0.08, kCoarsestPixel = 0.35;  // degrees, of vie
 constexpr double kNormalised = 0.9;  // degrees, standard deviation of the neighbourhood
 constexpr double kPointReach = 0.6;  // degrees from a keypoint to the sparse point it stands for
 
+constexpr double kLeastSide = 32;    // pixels, of a photo as it is described
+constexpr double kMostCells = 1000;  // across a photo
+
 constexpr int kNearest = 5;         // that may be one place, seen in several views
 constexpr double kElsewhere = 0.3;  // metres
 
@@ -183,7 +186,9 @@ Features FeaturesOfView(const ScanViewer& viewer, const Scan& scan, const Eigen:
                     if (!(depth > 0)) return std::nullopt;
                     const Eigen::Vector2d ray((at.x() - 0.5 * size) / f, (at.y() - 0.5 * size) / f);
                     const Eigen::Vector3d x_in_cam = depth * ray.homogeneous();
-                    return Place{scan_from_cam * x_in_cam, down.head<2>() - ray * down.z(), at};
+                    Place place = {scan_from_cam * x_in_cam, {}, at};
+                    if (upright) place.down = down.head<2>() - ray * down.z();
+                    return place;
                   });
 }
 
@@ -198,6 +203,7 @@ Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
   cv::cvtColor(*photo, grey, cv::COLOR_BGR2GRAY);
   const double scale =
       std::min(1.0, 1 / (RadFromDeg(pixel) * camera.MeanFocalLength()));  // of the picture
+  if (scale * std::min(camera.width, camera.height) < kLeastSide) return {};
   if (scale < 1) cv::resize(grey, grey, {}, scale, scale, cv::INTER_AREA);
   const Eigen::Vector2d size(camera.width, camera.height), small(grey.cols, grey.rows);
   cv::Mat1f values;
@@ -206,7 +212,8 @@ Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
   const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength() * small.x() / size.x();
   const cv::Mat1b picture = LocallyNormalised(values, everywhere, kNormalised * px_per_deg);
   // Sparse points by cells of the picture, to find the nearest one.
-  const double reach = kPointReach * RadFromDeg(1.0) * camera.MeanFocalLength();
+  const double reach = std::max(kPointReach * RadFromDeg(1.0) * camera.MeanFocalLength(),
+                                std::max(camera.width, camera.height) / kMostCells);
   const int columns = static_cast<int>(camera.width / reach) + 1;
   const int rows = static_cast<int>(camera.height / reach) + 1;
   std::vector<std::vector<int>> cells(static_cast<size_t>(columns) * rows);
@@ -220,34 +227,35 @@ Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
         .push_back(static_cast<int>(i));
   }
   const CameraProjection projection(camera);
-  const Eigen::Vector3d down = up_in_sparse
-                                   ? Eigen::Vector3d(image.cam_from_model.rotation * -*up_in_sparse)
-                                   : Eigen::Vector3d(Eigen::Vector3d::UnitY());
-  return Describe(
-      picture, everywhere, up_in_sparse.has_value(), most,
-      [&](const Eigen::Vector2d& small_at) -> std::optional<Place> {
-        const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
-        int nearest = -1;
-        double least = reach * reach;
-        const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
-        for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
-          for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1); ++c) {
-            for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
-              const double distance = (image.points2d[i] - at).squaredNorm();
-              if (distance < least) {
-                least = distance;
-                nearest = i;
-              }
-            }
-          }
-        }
-        if (nearest < 0) return std::nullopt;
-        const auto ray = projection.RayFromImg(at);
-        if (!ray) return std::nullopt;
-        const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
-        if (!lower) return std::nullopt;
-        return Place{model.points.at(image.point3d_ids[nearest]).x_in_model, *lower - at, at};
-      });
+  return Describe(picture, everywhere, up_in_sparse.has_value(), most,
+                  [&](const Eigen::Vector2d& small_at) -> std::optional<Place> {
+                    const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
+                    int nearest = -1;
+                    double least = reach * reach;
+                    const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
+                    for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
+                      for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1);
+                           ++c) {
+                        for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
+                          const double distance = (image.points2d[i] - at).squaredNorm();
+                          if (distance < least) {
+                            least = distance;
+                            nearest = i;
+                          }
+                        }
+                      }
+                    }
+                    if (nearest < 0) return std::nullopt;
+                    Place place = {model.points.at(image.point3d_ids[nearest]).x_in_model, {}, at};
+                    if (!up_in_sparse) return place;
+                    const auto ray = projection.RayFromImg(at);
+                    if (!ray) return std::nullopt;
+                    const Eigen::Vector3d down = image.cam_from_model.rotation * -*up_in_sparse;
+                    const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
+                    if (!lower) return std::nullopt;
+                    place.down = *lower - at;
+                    return place;
+                  });
 }
 
 // Pairs (feature of a photo, feature of the scan). Views overlap, so that the next best may be the
