@@ -186,11 +186,9 @@ TEST_F(Kitchen, EachOfItsLargePlanesAloneGivesTheSamePosesOrARefusal) {
   EXPECT_GE(num_trusted, 3);
 }
 
-// COLMAP 3.8's own mapper registers none of these sixteen. It numbers photos as their features are
-// ready, and a few descriptors in ten thousand differ from run to run, so that its verified matches
-// do, too (54 775 to 54 827 in three runs; the same for one database of features). A chain is as
-// strong as its weakest link: of four one may end early (seen: 9 of 16 photos). What is registered
-// is right in every one.
+// COLMAP 3.8's own mapper registers none of these sixteen. Its verified matches differ from run to
+// run (54 775 to 54 827 in three; colmap_steps.h says why). A chain is as strong as its weakest
+// link: of four one may end early (seen: 9 of 16 photos). What is registered is right in every one.
 TEST_F(Kitchen, AChainOfNeighboursWithFewCommonPointsIsRegisteredPhotoByPhoto) {
   ASSERT_EQ(mapper_.exit_code, 0) << mapper_.err;
   int num_whole = 0;

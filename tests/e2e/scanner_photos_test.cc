@@ -68,9 +68,10 @@ class ScannerPhotos : public testing::Test {
     WriteBytes(Path("theirs.txt"), theirs);
     ASSERT_EQ(Shell(ExtractLine("mine.txt") + ReadLine(Path("capture/camera_options.txt"))), 0);
     ASSERT_EQ(Shell(ExtractLine("theirs.txt") + "--ImageReader.single_camera 1"), 0);
-    ASSERT_EQ(Shell(ColmapMatches() + "--database_path " + Path("database.db") + " >" +
-                    Path("colmap.log") + " 2>&1"),
-              0);
+    ASSERT_EQ(
+        Shell("QT_QPA_PLATFORM=offscreen colmap exhaustive_matcher --database_path " +
+              Path("database.db") + " --SiftMatching.use_gpu 0 >" + Path("colmap.log") + " 2>&1"),
+        0);
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -82,7 +83,8 @@ class ScannerPhotos : public testing::Test {
     return text.substr(0, text.find('\n'));
   }
   static std::string ExtractLine(const std::string& list) {
-    return ColmapFeatures() + "--SiftExtraction.max_num_features 2048 --database_path " +
+    return "QT_QPA_PLATFORM=offscreen colmap feature_extractor --SiftExtraction.use_gpu 0 "
+           "--SiftExtraction.max_num_features 2048 --database_path " +
            Path("database.db") + " --image_path " + Path("photos") + " --image_list_path " +
            Path(list) + " >" + Path("colmap.log") + " 2>&1 ";
   }
