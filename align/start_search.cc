@@ -11,7 +11,7 @@ namespace roomtex {
 namespace {
 
 // Pixels per coordinate, as in alignment.cc.
-constexpr double kLeastKeypointNoise = 0.3;
+constexpr double kLeastSearchNoise = 0.3;
 constexpr size_t kCloudPoints = 4000;                // that finalists are fitted with
 constexpr size_t kFirstPoints = 700;                 // that every hypothesis is fitted with
 constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
@@ -108,7 +108,7 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
   StartSearch found;
   SparseModel copy = input.model;
   const double sigma_px =
-      std::max(kLeastKeypointNoise, UpdateReprojectionErrors(&copy).rms_px / std::sqrt(2.0));
+      std::max(kLeastSearchNoise, UpdateReprojectionErrors(&copy).rms_px / std::sqrt(2.0));
   found.cloud = MakeSearchCloud(input.model, sigma_px, kCloudPoints);
   const SearchCloud mirror_image = Mirrored(found.cloud);
   const UpDirections ups = FindModelUps(found.cloud);
