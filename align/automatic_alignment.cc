@@ -96,32 +96,30 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
   const bool hinted = !near.empty() || !input.picks.empty();
   StartSearchOptions search;
   search.num_threads = input.num_threads;
+  const auto judge = [&] {
+    AskPhotos(input, options, StartPhotosOptions(), &found.search);
+    found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
+  };
   const auto look = [&] {
     progress->Stage("search");
     StartSearch next = SearchStarts(input, near, options, search);
     next.appearance.swap(found.search.appearance);  // is known from a first look
     found.search = std::move(next);
     progress->Stage("search verdict");
-    AskPhotos(input, options, StartPhotosOptions(), &found.search);
-    found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
-  };
-  const auto look_closer = [&] {
+    judge();
+    // What geometry and corners decide was counted by itself; features are asked about the rest.
+    if (found.verdict.kind == StartVerdict::Kind::kTrusted) return;
     progress->Stage("search by appearance");
     AskAppearance(input, options, StartAppearanceOptions(), &found.search);
-    AskPhotos(input, options, StartPhotosOptions(), &found.search);
-    found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
+    judge();
   };
   look();
-  // Where geometry and corners decide, they have been counted; features are asked where they do
-  // not.
-  if (found.verdict.kind != StartVerdict::Kind::kTrusted) look_closer();
   if (found.verdict.kind == StartVerdict::Kind::kWeak ||
       found.verdict.kind == StartVerdict::Kind::kOpen) {
     // A model of the whole room fits a scan of a part of it best when it is small enough to lie in
     // that part: so many are in the way that what is best for each scale has to be asked for.
     search.geometry.num_kept_per_scale = kStartsPerScale;
     look();
-    if (found.verdict.kind != StartVerdict::Kind::kTrusted) look_closer();
   }
   if (!IsWorthALook(found.verdict.kind)) {
     found.attempt.refusal = found.verdict.reason;

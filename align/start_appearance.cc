@@ -79,6 +79,7 @@ void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
   if (DistanceBetween(search->cloud, place, start.scan_from_sparse) > kSameStart) {
     return;  // the surface is elsewhere
   }
+  if (!Agrees(search->hints, start.scan_from_sparse, kHintSlack)) return;
   start.looks_alike = true;
   // A start that is there already stays, unless it came to rest less well.
   const auto same =

@@ -20,8 +20,7 @@ bool StandsOut(const std::vector<AppearancePlace>& places, const StartAppearance
 
 // Fills StartSearch::appearance, unless it is known already. Where the best place stands out it is
 // fitted to the surface, and becomes a start, or one that is there already is marked
-// (FittedStart::looks_alike). Does nothing without photos, or where nothing says which way the
-// model is up.
+// (FittedStart::looks_alike), unless a hint of the user contradicts. Does nothing without photos.
 void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
                    const StartAppearanceOptions& appearance, StartSearch* search);
 

@@ -16,8 +16,6 @@ constexpr size_t kCloudPoints = 4000;                // that finalists are fitte
 constexpr size_t kFirstPoints = 700;                 // that every hypothesis is fitted with
 constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
 constexpr double kSightTolerance = 0.05;             // metres
-// Metres; what a fitted start may still be off where a hint has it.
-constexpr double kHintSlack = 0.25;
 class Fitter {
  public:
   Fitter(const AlignmentInput& input, const AlignmentOptions& options,
@@ -118,7 +116,7 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
   found.ups_in_scan = scan_ups.ups;
   std::vector<Eigen::Vector3d> mirrored_ups;
   for (const Eigen::Vector3d& up : ups.ups) mirrored_ups.emplace_back(-up.x(), up.y(), up.z());
-  const std::vector<HintRay> hints = FindHintRays(input.model, input.picks, near);
+  found.hints = FindHintRays(input.model, input.picks, near);
   std::vector<StartHypothesis> as_is, mirrored;
   for (const Eigen::Vector3d& scan_up : scan_ups.ups) {
     const ScanVolume volume(input.surveyed.scans(), scan_up, search.geometry.volume);
@@ -128,14 +126,14 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
           SearchByGeometry(cloud, cloud_ups, volume, rays, search.geometry, search.num_threads);
       all->insert(all->end(), some.begin(), some.end());
     };
-    add(found.cloud, ups.ups, hints, &as_is);
+    add(found.cloud, ups.ups, found.hints, &as_is);
     add(mirror_image, mirrored_ups, {}, &mirrored);
   }
   found.num_hypotheses = static_cast<int>(as_is.size());
   const Fitter fitter(input, options, search);
   found.starts = fitter.FitAll(found.cloud, as_is);
-  const auto contradicts = [&hints](const FittedStart& start) {
-    return !Agrees(hints, start.scan_from_sparse, kHintSlack);
+  const auto contradicts = [&found](const FittedStart& start) {
+    return !Agrees(found.hints, start.scan_from_sparse, kHintSlack);
   };
   found.starts.erase(std::remove_if(found.starts.begin(), found.starts.end(), contradicts),
                      found.starts.end());

@@ -43,6 +43,7 @@ struct AppearanceEvidence {
 
 struct StartSearch {
   int num_hypotheses = 0;
+  std::vector<HintRay> hints;                  // of the user; none of the starts contradicts them
   bool up_known = false;                       // in the model, by the photos
   std::vector<Eigen::Vector3d> ups_in_sparse;  // the likeliest first
   std::vector<Eigen::Vector3d> ups_in_scan;
@@ -53,6 +54,9 @@ struct StartSearch {
   std::vector<FittedStart> mirrored;
   std::optional<AppearanceEvidence> appearance;  // if photos and scan were asked
 };
+
+// Metres; what a fitted start may still be off where a hint has it.
+inline constexpr double kHintSlack = 0.25;
 
 // The scales that are searched are this coarse.
 inline constexpr double kMaxStartScaleChange = 0.15;

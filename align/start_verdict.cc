@@ -200,8 +200,9 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const double second_counts = confirmed ? 0 : second * WeightOfSecond(search, verdict, options);
   const double rival = confirmed ? 0 : std::max(second_counts, verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
-  verdict.chance_wrong = ChanceWrong(score, score / std::max(rival, 1e-6),
-                                     confirmed ? PhotoSupport::kClear : verdict.support, options);
+  verdict.chance_wrong =
+      ChanceWrong(score, score / std::max(rival, 1e-6),
+                  verdict.looks_alike && !clear ? PhotoSupport::kFaint : verdict.support, options);
   const double min_score = alone ? options.min_score_alone : options.min_score;
   const double min_ratio = alone       ? options.min_ratio_alone
                            : confirmed ? options.min_ratio

@@ -98,6 +98,14 @@ bool IsOneToOne(const Camera& camera, int direction, int step) {
   return jacobian.determinant() > 0 && radial_gain > 0.02 && outward;
 }
 
+bool FoldsInTheMiddle(const Camera& camera) {
+  if (camera.IsPanorama() || !IsDistorted(camera.model)) return false;
+  for (int direction = 0; direction < kNumDirections; ++direction) {
+    if (!IsOneToOne(camera, direction, 1)) return true;
+  }
+  return false;
+}
+
 // The angle from the optical axis up to which the distortion is one-to-one, the smallest over the
 // directions: of a perspective camera up to 89.5 degrees, else up to 179.
 double MaxAngle(const Camera& camera) {
@@ -201,16 +209,10 @@ std::vector<std::string> Camera::Problems() const {
     problems.push_back(who + " (EUCM) has alpha " + std::to_string(params[4]) + " and beta " +
                        std::to_string(params[5]) + ", expected 0 <= alpha <= 1 and beta > 0");
   }
-  if (problems.empty() && !IsPanorama() && IsDistorted(model)) {
-    int folded = 0;
-    for (int direction = 0; direction < kNumDirections; ++direction) {
-      folded += !IsOneToOne(*this, direction, 1);
-    }
-    if (folded > 0) {
-      problems.push_back(who + " (" + CameraModelName(model) +
-                         ") has distortion parameters that fold the picture over in its middle, "
-                         "expected those of a lens");
-    }
+  if (problems.empty() && FoldsInTheMiddle(*this)) {
+    problems.push_back(who + " (" + CameraModelName(model) +
+                       ") has distortion parameters that fold the picture over in its middle, "
+                       "expected those of a lens");
   }
   return problems;
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "align/start_appearance.h"
 #include "align/start_photos.h"
 #include "align/trust/scan_view.h"
 #include "core/frames.h"
@@ -187,6 +188,36 @@ TEST(AutomaticAlignment, PhotosDrawAStartToItsPlaceWhereSurfaceAndModelDiffer) {
   EXPECT_GT(search.starts[0].photos->shifts.at_pose.Share(), 0.35);
   EXPECT_LT(DistanceBetween(search.cloud, room.ScanFromSparse(), search.starts[0].scan_from_sparse),
             0.005);
+}
+
+// Features lead to the place; what they lead to is a start, unless a user says otherwise.
+TEST(AutomaticAlignment, APlaceByAppearanceIsAStartUnlessAHintContradicts) {
+  const SimulatedCase& one = MakeCase();
+  AlignmentInput input{one.model, Survey(one.scans), {}, "", one.azimuth};
+  input.image_path = "photos";  // nobody reads them: the evidence is known
+  const Similarity truth = one.room->ScanFromSparse();
+  StartSearch known;
+  known.cloud = MakeSearchCloud(input.model, 1, 1000);
+  known.appearance = AppearanceEvidence{{{truth, 60}}, one.picks};
+  StartSearch search = known;
+  AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
+  ASSERT_EQ(search.starts.size(), 1u);
+  EXPECT_TRUE(search.starts[0].looks_alike);
+  EXPECT_TRUE(search.starts[0].settled);
+  EXPECT_LT(DistanceBetween(search.cloud, truth, search.starts[0].scan_from_sparse), 0.02);
+
+  search = known;
+  const SparseImage& image = one.model.images.begin()->second;
+  const Eigen::Vector3d behind =
+      CamFromScan(image.cam_from_model, truth).Inverse() * Eigen::Vector3d(0, 0, -2);
+  search.hints = FindHintRays(one.model, {}, {{image.name, behind}});
+  AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
+  EXPECT_TRUE(search.starts.empty());
+
+  search = known;
+  search.appearance->places[0].num_cells = 18;  // as rooms of the same plan have
+  AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
+  EXPECT_TRUE(search.starts.empty());
 }
 
 TEST(AutomaticAlignCommand, PhotosHoldTheHeightThatWallsLeaveOpen) {

@@ -61,7 +61,7 @@ TEST(StartVerdict, WherePhotosAndScanLookAlikeNoRivalCounts) {
   EXPECT_EQ(verdict.kind, Kind::kTrusted);
   EXPECT_EQ(verdict.best, 1);
   EXPECT_EQ(verdict.second, 0);
-  EXPECT_EQ(verdict.chance_wrong, kChanceClear);
+  EXPECT_EQ(verdict.chance_wrong, kChanceFaint);
   // The surface still has to be there.
   FittedStart off = Start(500, kDrifting);
   off.looks_alike = true;
