@@ -39,12 +39,12 @@ AppearanceEvidence LookForPlaces(const AlignmentInput& input, const StartSearch&
     if (ups.size() > kMostUps) ups.resize(kMostUps);
     ups.push_back(std::nullopt);
   }
+  const AppearanceMatcher matcher(input.model, input.image_path, input.surveyed.viewer(),
+                                  AppearanceOptions(), input.num_threads);
   AppearanceEvidence best;
   for (const Eigen::Vector3d& up_in_scan : search.ups_in_scan) {
     for (const std::optional<Eigen::Vector3d>& up_in_sparse : ups) {
-      const std::vector<AppearanceMatch> matches =
-          MatchAppearance(input.model, input.image_path, input.surveyed.viewer(), up_in_sparse,
-                          up_in_scan, AppearanceOptions(), input.num_threads);
+      const std::vector<AppearanceMatch> matches = matcher.Match(up_in_sparse, up_in_scan);
       std::vector<AppearancePlace> places = SearchByAppearance(
           matches, up_in_sparse, up_in_scan, AppearanceSearchOptions(), input.num_threads);
       if (places.empty()) continue;

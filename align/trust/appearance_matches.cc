@@ -192,25 +192,30 @@ Features FeaturesOfView(const ScanViewer& viewer, const Scan& scan, const Eigen:
                   });
 }
 
-Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
-                         const std::string& image_path, double pixel,
-                         const std::optional<Eigen::Vector3d>& up_in_sparse, int most) {
-  const Camera& camera = model.cameras.at(image.camera_id);
-  std::string ignored;
+// As it is described; empty if it cannot be read, or is too small.
+cv::Mat1b ReadPicture(const SparseImage& image, const Camera& camera, const std::string& image_path,
+                      double pixel) {
+  const double scale = std::min(1.0, 1 / (RadFromDeg(pixel) * camera.MeanFocalLength()));
+  if (scale * std::min(camera.width, camera.height) < kLeastSide) return {};
+  std::string ignored;  // comes again when the result is compared
   const std::optional<cv::Mat> photo = ReadPhotoOf(image, camera, image_path, &ignored);
   if (!photo) return {};
   cv::Mat grey;
   cv::cvtColor(*photo, grey, cv::COLOR_BGR2GRAY);
-  const double scale =
-      std::min(1.0, 1 / (RadFromDeg(pixel) * camera.MeanFocalLength()));  // of the picture
-  if (scale * std::min(camera.width, camera.height) < kLeastSide) return {};
   if (scale < 1) cv::resize(grey, grey, {}, scale, scale, cv::INTER_AREA);
-  const Eigen::Vector2d size(camera.width, camera.height), small(grey.cols, grey.rows);
   cv::Mat1f values;
   grey.convertTo(values, CV_32F);
-  const cv::Mat1b everywhere(grey.size(), static_cast<uchar>(255));
-  const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength() * small.x() / size.x();
-  const cv::Mat1b picture = LocallyNormalised(values, everywhere, kNormalised * px_per_deg);
+  const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength() * grey.cols / camera.width;
+  return LocallyNormalised(values, cv::Mat1b(grey.size(), static_cast<uchar>(255)),
+                           kNormalised * px_per_deg);
+}
+
+Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
+                         const cv::Mat1b& picture,
+                         const std::optional<Eigen::Vector3d>& up_in_sparse, int most) {
+  if (picture.empty()) return {};
+  const Camera& camera = model.cameras.at(image.camera_id);
+  const Eigen::Vector2d size(camera.width, camera.height), small(picture.cols, picture.rows);
   // Sparse points by cells of the picture, to find the nearest one.
   const double reach = std::max(kPointReach * RadFromDeg(1.0) * camera.MeanFocalLength(),
                                 std::max(camera.width, camera.height) / kMostCells);
@@ -227,7 +232,7 @@ Features FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
         .push_back(static_cast<int>(i));
   }
   const CameraProjection projection(camera);
-  return Describe(picture, everywhere, up_in_sparse.has_value(), most,
+  return Describe(picture, cv::Mat1b(), up_in_sparse.has_value(), most,
                   [&](const Eigen::Vector2d& small_at) -> std::optional<Place> {
                     const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
                     int nearest = -1;
@@ -277,46 +282,54 @@ void AddMatches(const cv::Mat1f& photos, const cv::Mat1f& scan,
 
 }  // namespace
 
-std::vector<AppearanceMatch> MatchAppearance(const SparseModel& model,
-                                             const std::string& image_path,
-                                             const ScanViewer& viewer,
-                                             const std::optional<Eigen::Vector3d>& up_in_sparse,
-                                             const Eigen::Vector3d& up_in_scan,
-                                             const AppearanceOptions& options, int num_threads) {
-  const double pixel = PixelAngle(viewer);
+AppearanceMatcher::AppearanceMatcher(const SparseModel& model, const std::string& image_path,
+                                     const ScanViewer& viewer, const AppearanceOptions& options,
+                                     int num_threads)
+    : model_(model),
+      viewer_(viewer),
+      options_(options),
+      num_threads_(num_threads),
+      images_(SpreadImages(model, options.max_photos)),
+      photos_(images_.size()) {
+  ParallelFor(num_threads, 0, static_cast<int>(images_.size()), [&](int i) {
+    photos_[i] = ReadPicture(*images_[i], model.cameras.at(images_[i]->camera_id), image_path,
+                             PixelAngle(viewer));
+  });
+}
+
+std::vector<AppearanceMatch> AppearanceMatcher::Match(
+    const std::optional<Eigen::Vector3d>& up_in_sparse, const Eigen::Vector3d& up_in_scan) const {
   std::vector<const Scan*> stations;
-  for (const Scan& scan : viewer.scans()) {
+  for (const Scan& scan : viewer_.scans()) {
     if (scan.organised) stations.push_back(&scan);
   }
   if (stations.empty()) return {};
   const int per_turn = static_cast<int>(std::lround(360 / kViewTurn));
-  const int num_stations = std::min<int>(options.max_stations, static_cast<int>(stations.size()));
+  const int num_stations = std::min<int>(options_.max_stations, static_cast<int>(stations.size()));
   const int per_station = per_turn * static_cast<int>(kViewLean.size());
   const int num_views = num_stations * per_station;
-  std::vector<Features> of_views(num_views);
-  ParallelFor(num_threads, 0, num_views, [&](int i) {
+  std::vector<Features> of_views(num_views), of_photos(images_.size());
+  ParallelFor(num_threads_, 0, num_views, [&](int i) {
     const Scan& scan = *stations[static_cast<size_t>(i / per_station) * stations.size() /
                                  static_cast<size_t>(num_stations)];
     const int k = i % per_station;
     of_views[i] =
-        FeaturesOfView(viewer, scan, up_in_scan, up_in_sparse.has_value(), kViewTurn * (k / 2),
-                       kViewLean[k % 2], 2 * options.max_scan_features / num_views);
+        FeaturesOfView(viewer_, scan, up_in_scan, up_in_sparse.has_value(), kViewTurn * (k / 2),
+                       kViewLean[k % 2], 2 * options_.max_scan_features / num_views);
   });
-  const std::vector<const SparseImage*> images = SpreadImages(model, options.max_photos);
-  std::vector<Features> of_photos(images.size());
   std::vector<uint32_t> image_ids;
-  for (const SparseImage* image : images) image_ids.push_back(image->image_id);
-  ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int i) {
+  for (const SparseImage* image : images_) image_ids.push_back(image->image_id);
+  ParallelFor(num_threads_, 0, static_cast<int>(images_.size()), [&](int i) {
     of_photos[i] =
-        FeaturesOfPhoto(model, *images[i], image_path, pixel, up_in_sparse,
-                        2 * options.max_photo_features / static_cast<int>(images.size()));
+        FeaturesOfPhoto(model_, *images_[i], photos_[i], up_in_sparse,
+                        2 * options_.max_photo_features / static_cast<int>(images_.size()));
   });
-  const Features scan = Joined(std::move(of_views), {}, options.max_scan_features);
-  const Features photos = Joined(std::move(of_photos), image_ids, options.max_photo_features);
+  const Features scan = Joined(std::move(of_views), {}, options_.max_scan_features);
+  const Features photos = Joined(std::move(of_photos), image_ids, options_.max_photo_features);
   std::vector<std::pair<int, int>> pairs;
   if (scan.places.empty() || photos.places.empty()) return {};
-  AddMatches(photos.sift, scan.sift, scan.places, options.max_ratio, &pairs);
-  AddMatches(Folded(photos.sift), Folded(scan.sift), scan.places, options.max_ratio, &pairs);
+  AddMatches(photos.sift, scan.sift, scan.places, options_.max_ratio, &pairs);
+  AddMatches(Folded(photos.sift), Folded(scan.sift), scan.places, options_.max_ratio, &pairs);
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   std::vector<AppearanceMatch> matches;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
 
 #include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
@@ -34,15 +35,26 @@ struct AppearanceOptions {
   double max_ratio = 0.8;
 };
 
-// up_in_sparse, up_in_scan: unit vectors; without the first, which photos held any way may leave
-// unknown, features are turned as their own gradients say. Scans without a grid have no station to
-// look from, and count for nothing; photos that cannot be read are passed over. The same for every
-// number of threads.
-std::vector<AppearanceMatch> MatchAppearance(const SparseModel& model,
-                                             const std::string& image_path,
-                                             const ScanViewer& viewer,
-                                             const std::optional<Eigen::Vector3d>& up_in_sparse,
-                                             const Eigen::Vector3d& up_in_scan,
-                                             const AppearanceOptions& options, int num_threads);
+class AppearanceMatcher {
+ public:
+  // Reads the photos, and keeps them small; those that cannot be read are passed over. Model and
+  // viewer must outlive it.
+  AppearanceMatcher(const SparseModel& model, const std::string& image_path,
+                    const ScanViewer& viewer, const AppearanceOptions& options, int num_threads);
+
+  // up_in_sparse, up_in_scan: unit vectors; without the first, which photos held any way may leave
+  // unknown, features are turned as their own gradients say. Scans without a grid have no station
+  // to look from, and count for nothing. The same for every number of threads.
+  std::vector<AppearanceMatch> Match(const std::optional<Eigen::Vector3d>& up_in_sparse,
+                                     const Eigen::Vector3d& up_in_scan) const;
+
+ private:
+  const SparseModel& model_;
+  const ScanViewer& viewer_;
+  const AppearanceOptions options_;
+  const int num_threads_;
+  std::vector<const SparseImage*> images_;
+  std::vector<cv::Mat1b> photos_;  // locally normalised, a pixel of the views or larger
+};
 
 }  // namespace roomtex

@@ -10,6 +10,7 @@
 
 #include "align/start_appearance.h"
 #include "align/trust/agreement.h"
+#include "align/trust/appearance_matches.h"
 #include "align/trust/appearance_search.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
@@ -301,10 +302,11 @@ TEST_F(Kitchen, AppearanceAloneFindsThePlaceAndNotInTheMirrorImage) {
     const std::vector<Scan> scans = {ReadScan(std::string(kKitchen) + "/scan.rtpi", reader)};
     const FreeSpace free_space(scans, 300000);
     const ScanViewer viewer(scans, free_space);
+    const AppearanceMatcher matcher(model, std::string(kKitchen) + "/images", viewer,
+                                    AppearanceOptions(), -1);
     const std::vector<AppearancePlace> places =
-        SearchByAppearance(MatchAppearance(model, std::string(kKitchen) + "/images", viewer,
-                                           std::nullopt, scans[0].up, AppearanceOptions(), -1),
-                           std::nullopt, scans[0].up, AppearanceSearchOptions(), -1);
+        SearchByAppearance(matcher.Match(std::nullopt, scans[0].up), std::nullopt, scans[0].up,
+                           AppearanceSearchOptions(), -1);
     const bool is_right = std::string(azimuth) == "counterclockwise";
     EXPECT_EQ(StandsOut(places, StartAppearanceOptions()), is_right);
     if (is_right && !places.empty()) {

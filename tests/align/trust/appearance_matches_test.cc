@@ -35,8 +35,8 @@ struct ScannedByADepthCamera {
     const SurveyedScans surveyed(scans);
     const Eigen::Vector3d up_in_sparse =
         one.room->ScanFromSparse().rotation.conjugate() * scans[0].up;
-    return MatchAppearance(one.model, folder.path(), surveyed.viewer(), up_in_sparse, scans[0].up,
-                           {}, num_threads);
+    return AppearanceMatcher(one.model, folder.path(), surveyed.viewer(), {}, num_threads)
+        .Match(up_in_sparse, scans[0].up);
   }
 
   SimulatedCase one;
