@@ -17,7 +17,8 @@ namespace roomtex {
 void AddOptions(AlignCommandOptions* a, Command* command) {
   command->AddInputPath("input_path", &a->input_path,
                         "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
-                        "--image_path that have six picks are placed each by its own.",
+                        "--image_path that have six picks are placed each by its own; without "
+                        "picks, too, every photo by what it shows of the scan's intensity.",
                         Command::Kind::kOptional);
   command->AddInputPaths(
       "scan_path", &a->scan_paths,
@@ -92,9 +93,9 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
 }
 
 void RequirePicksOrPhotos(const AlignCommandOptions& a) {
-  if (!a.picks_path.empty() || (!a.input_path.empty() && !a.image_path.empty())) return;
+  if (!a.picks_path.empty() || !a.image_path.empty()) return;
   throw UsageError(
-      "--picks_path is missing: aligning without picks needs --input_path and --image_path, "
+      "--picks_path is missing: aligning without picks needs --image_path, "
       "since the photos must confirm what is found. Or make a picks file, a CSV with the header "
       "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
 }
@@ -116,6 +117,9 @@ void CheckOptions(const AlignCommandOptions& a) {
     problems.push_back(
         "--camera_params is for photos without a sparse model: that of --input_path "
         "has cameras");
+  }
+  if (a.input_path.empty() && !a.near.empty()) {
+    problems.push_back("--near is a hint for a search with --input_path");
   }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {

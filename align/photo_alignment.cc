@@ -128,12 +128,12 @@ std::vector<std::string> JudgePhoto(const AlignmentInput& input, const PlacedPho
   return reasons;
 }
 
-// What was found of a lens.
+// What was found of a lens. by: picks or features.
 std::string LensSentence(const std::string& name, const ViewPose& pose, FocalSource source,
-                         double told) {
+                         double told, const std::string& by) {
   const double focal = pose.lens->MeanFocalLength();
   std::string sentence = "The focal length of " + name +
-                         " was found by its picks: " + Number(focal, 0) + " pixels, known to " +
+                         " was found by its " + by + ": " + Number(focal, 0) + " pixels, known to " +
                          Number(100 * pose.focal_sigma, 1) + " %";
   if (source == FocalSource::kExif) sentence += " (its EXIF data: " + Number(told, 0) + ")";
   return sentence + (pose.focal_sigma > kFocalToName
@@ -214,6 +214,40 @@ void WarnOfFewPicks(const AlignmentInput& input, const std::vector<PickView>& vi
   }
 }
 
+// What there is to say of the photos that have a pose. by: picks or features.
+void FillIn(const AlignmentInput& input, const PhotoModel& photos,
+            const std::vector<PlacedPhoto>& placed, const std::string& by,
+            const TrustOptions& trust, PhotoAlignment* result) {
+  Alignment& alignment = result->alignment;
+  std::vector<double> positions, rotations;
+  for (const PlacedPhoto& photo : placed) {
+    const ViewPose& pose = photo.pose;
+    const SparseImage& image = *photo.view->image;
+    const FocalSource source = photos.focal_sources.at(image.name);
+    PhotoAlignment::Lens lens{source};
+    if (pose.lens) {
+      const double told = input.model.cameras.at(image.camera_id).MeanFocalLength();
+      std::vector<std::string>* const said =
+          source == FocalSource::kPicks && pose.focal_sigma > kFocalToName ? &alignment.warnings
+                                                                           : &result->notes;
+      said->push_back(LensSentence(image.name, pose, source, told, by));
+      lens.focal_sigma = pose.focal_sigma * pose.lens->MeanFocalLength();
+      lens.radial_sigma = pose.radial_sigma;
+    }
+    result->lenses[image.image_id] = lens;
+    positions.push_back(pose.PositionSigma());
+    rotations.push_back(RotationSigma(pose));
+    alignment.photo_sigmas[image.image_id] = {positions.back(), rotations.back()};
+    alignment.placement.num_cameras += 1;
+    alignment.placement.num_cameras_free += IsCameraFree(input, pose.cam_from_scan, trust);
+  }
+  alignment.start = StartOf(input, placed);
+  alignment.refined_pick_px.assign(input.picks.size(), std::numeric_limits<double>::quiet_NaN());
+  alignment.expected_error.at_cameras = Median(&positions);
+  alignment.expected_error.rotation = Median(&rotations);
+  result->model = ModelOf(input, placed);
+}
+
 }  // namespace
 
 PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos,
@@ -231,38 +265,38 @@ PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos
 
   progress->Stage("trust");
   std::vector<PlacedPhoto> placed;
-  std::vector<double> positions, rotations;
   for (const PickView& view : views) {
     if (!view.HasPose()) continue;
     placed.push_back(Place(input, view, options.trust));
-    const ViewPose& pose = placed.back().pose;
     const FocalSource source = photos.focal_sources.at(view.image_name);
     const int min_picks = source == FocalSource::kPicks ? kMinPicksForFocal : kMinPicksPerPhoto;
     for (std::string& reason : JudgePhoto(input, placed.back(), min_picks, options.trust)) {
       alignment.reasons.push_back(std::move(reason));
     }
-    PhotoAlignment::Lens lens{source};
-    if (pose.lens) {
-      const double told = input.model.cameras.at(view.image->camera_id).MeanFocalLength();
-      std::vector<std::string>* const said =
-          source == FocalSource::kPicks && pose.focal_sigma > kFocalToName ? &alignment.warnings
-                                                                           : &result.notes;
-      said->push_back(LensSentence(view.image_name, pose, source, told));
-      lens.focal_sigma = pose.focal_sigma * pose.lens->MeanFocalLength();
-      lens.radial_sigma = pose.radial_sigma;
-    }
-    result.lenses[view.image->image_id] = lens;
-    positions.push_back(pose.PositionSigma());
-    rotations.push_back(RotationSigma(pose));
-    alignment.photo_sigmas[view.image->image_id] = {positions.back(), rotations.back()};
-    alignment.placement.num_cameras += 1;
-    alignment.placement.num_cameras_free += IsCameraFree(input, pose.cam_from_scan, options.trust);
   }
-  alignment.start = StartOf(input, placed);
-  alignment.refined_pick_px.assign(input.picks.size(), std::numeric_limits<double>::quiet_NaN());
-  alignment.expected_error.at_cameras = Median(&positions);
-  alignment.expected_error.rotation = Median(&rotations);
-  result.model = ModelOf(input, placed);
+  FillIn(input, photos, placed, "picks", options.trust, &result);
+  return result;
+}
+
+PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& photos,
+                                const FoundPhotos& found, const TrustOptions& trust) {
+  PhotoAlignment result;
+  std::vector<PlacedPhoto> placed;
+  for (const PickView& view : found.views) placed.push_back({&view, view.review.pose()});
+  std::string first_problem;
+  for (const PhotoEvidence& photo : found.photos) {
+    if (photo.problem.empty()) continue;
+    if (first_problem.empty()) first_problem = photo.image_name + ": " + photo.problem;
+    result.alignment.warnings.push_back(photo.image_name + " is left out: " + photo.problem + ".");
+  }
+  if (placed.empty()) {
+    result.alignment.reasons.push_back(
+        "None of the photos could be placed by what it shows of the scan's intensity (" +
+        first_problem +
+        "). Pick six points in one of them (roomtex-pick), or give the sparse model of more photos "
+        "(--input_path).");
+  }
+  FillIn(input, photos, placed, "features", trust, &result);
   return result;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// One to a few photos into the scan without a sparse model: each by its own picks.
+// One to a few photos into the scan without a sparse model: each by its own picks, or by what it
+// shows of the scan's intensity.
 
 #include <map>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "align/alignment.h"
 #include "align/clicks/photo_model.h"
+#include "align/found_photos.h"
 
 namespace roomtex {
 
@@ -30,6 +32,10 @@ struct PhotoAlignment {
 // that are exchanged, not on the scan, or show that the scan is mirrored.
 PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos,
                            const AlignmentOptions& options, Progress* progress);
+
+// input.model: photos.model, input.picks: found.picks.
+PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& photos,
+                                const FoundPhotos& found, const TrustOptions& trust);
 
 // Each point of the model takes the colour of a photo that sees it.
 void ColorPoints(const std::string& image_path, SparseModel* model);

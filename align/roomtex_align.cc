@@ -13,6 +13,7 @@
 #include "align/alignment.h"
 #include "align/alignment_report.h"
 #include "align/automatic_alignment.h"
+#include "align/found_photos.h"
 #include "align/geo/geo_output.h"
 #include "align/lens_report.h"
 #include "align/local_origin.h"
@@ -35,6 +36,7 @@
 #include "core/input_guard.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/photo_files.h"
 #include "core/photo_fit.h"
 #include "core/resource_limits.h"
 #include "core/surfels.h"
@@ -132,11 +134,13 @@ void WriteOverlayPictures(const AlignCommandOptions& a, const SparseModel& align
 PlacedScans ReadScansToAlign(const AlignCommandOptions& a) {
   const double max_samples = a.bound.max_samples;
   const SampleWork work("aligning to", kAlignBytesPerSample, max_samples);
+  ScanReaderOptions reader = a.scan_reader;
+  reader.colors_as_intensity = !a.image_path.empty();
   if (!a.scan_paths.empty()) {
-    return ReadPlacedScans(a.scan_paths, a.scan_poses, a.scan_reader, max_samples);
+    return ReadPlacedScans(a.scan_paths, a.scan_poses, reader, max_samples);
   }
   return ReadScansOfModel(ReadAlignmentRecord(a.input_path),
-                          {a.scan_paths, a.scan_poses, a.scan_reader, max_samples});
+                          {a.scan_paths, a.scan_poses, reader, max_samples});
 }
 
 // Scans of several stations against each other; the report's `stations`.
@@ -206,6 +210,14 @@ struct Reading {
 
 std::string OtherAzimuth(const std::string& azimuth) {
   return azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+}
+
+// Nobody said how the scans are to be read, and all of them could be mirrored.
+bool MayTurn(const AlignCommandOptions& a, const Reading& reading) {
+  const std::vector<PlacedScans::File>& files = reading.placed.files;
+  return a.scan_reader.azimuth == "auto" &&
+         std::all_of(files.begin(), files.end(),
+                     [](const PlacedScans::File& file) { return !file.azimuth.empty(); });
 }
 
 // The planes of the scans (thesis 7.2), where they are asked for.
@@ -331,10 +343,7 @@ void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
                 const std::vector<NearHint>& near, const std::optional<double>& known_rms,
                 bool one_place, Reading* reading, const Command::Context& context) {
   const std::vector<PlacedScans::File>& files = reading->placed.files;
-  const bool may_turn = a.scan_reader.azimuth == "auto" &&
-                        std::all_of(files.begin(), files.end(), [](const PlacedScans::File& file) {
-                          return !file.azimuth.empty();
-                        });
+  const bool may_turn = MayTurn(a, *reading);
   AlignmentOptions options = a.alignment;
   options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
   if (known_rms && input.picks.empty() && near.empty() &&
@@ -461,7 +470,6 @@ std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<
 }
 
 void Align(const AlignCommandOptions& a, const Command::Context& context) {
-  CheckOptions(a);
   context.progress.Stage("read model");
   std::vector<std::string> face_warnings;
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
@@ -542,9 +550,25 @@ std::optional<PhotoAlignment> FindPhotoAlignment(const AlignCommandOptions& a,
   }
 }
 
+// The report of photos that were placed, and the model of them.
+void WritePlacedPhotos(const AlignCommandOptions& a, PhotoAlignment* found, Reading* reading,
+                       const std::set<std::string>& told, const Command::Context& context) {
+  for (const std::string& note : found->notes) context.progress.Note(note);
+  for (const std::string& warning : found->alignment.warnings) context.Warn(warning);
+  for (const std::string& reason : found->alignment.reasons) context.report.SetUntrusted(reason);
+
+  ColorPoints(a.image_path, &found->model);
+  const ReprojectionErrors after = UpdateReprojectionErrors(&found->model);
+  FillReport(found->alignment, after.rms_px, &context.report);
+  NullWithoutModel(&context.report);
+  context.report["images"] = PhotosToJson(found->alignment, found->model);
+  AddLenses(*found, &context.report["images"]);
+  CompareWithPhotos(a, found->model, *reading->surveyed, told, context);
+  WriteAligned(a, found->model, std::nullopt, reading, told, context);
+}
+
 // One to a few photos, each by its own picks.
-void AlignPhotosAlone(const AlignCommandOptions& a, const Command::Context& context) {
-  CheckOptions(a);
+void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& context) {
   context.progress.Stage("read photos");
   std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
@@ -558,18 +582,49 @@ void AlignPhotosAlone(const AlignCommandOptions& a, const Command::Context& cont
   std::string refusal;
   std::optional<PhotoAlignment> found = FindPhotoAlignment(a, input, photos, context, &refusal);
   if (!found) return WriteRefusal(a, refusal, context);
-  for (const std::string& note : found->notes) context.progress.Note(note);
-  for (const std::string& warning : found->alignment.warnings) context.Warn(warning);
-  for (const std::string& reason : found->alignment.reasons) context.report.SetUntrusted(reason);
+  WritePlacedPhotos(a, &*found, &reading, told, context);
+}
 
-  ColorPoints(a.image_path, &found->model);
-  const ReprojectionErrors after = UpdateReprojectionErrors(&found->model);
-  FillReport(found->alignment, after.rms_px, &context.report);
-  NullWithoutModel(&context.report);
-  context.report["images"] = PhotosToJson(found->alignment, found->model);
-  AddLenses(*found, &context.report["images"]);
-  CompareWithPhotos(a, found->model, *reading.surveyed, told, context);
-  WriteAligned(a, found->model, std::nullopt, &reading, told, context);
+// Photos each by itself, without picks. Of RTPI scans the other reading, too, where in this one
+// none of them is found and nobody said how to read.
+FoundPhotos SearchPhotos(const AlignCommandOptions& a, const PhotoModel& photos, Reading* reading,
+                         const Command::Context& context) {
+  const auto find = [&](const SurveyedScans& surveyed) {
+    return FindPhotos(photos, surveyed, a.image_path, FoundPhotoOptions(), a.alignment.trust,
+                      context.options.num_threads, &context.progress);
+  };
+  FoundPhotos found = find(*reading->surveyed);
+  if (!found.views.empty() || !MayTurn(a, *reading)) return found;
+  MirroredReading other;
+  other.scans =
+      std::make_unique<const std::vector<Scan>>(MirrorScans(reading->surveyed->scans()));
+  other.surveyed =
+      std::make_unique<const SurveyedScans>(*other.scans, reading->surveyed->options());
+  FoundPhotos again = find(*other.surveyed);
+  if (again.views.empty()) return found;
+  other.evidence = "only in the other reading the photos show what the scan shows";
+  TakeMirroredReading(std::move(other), reading, context);
+  return again;
+}
+
+// Photos each by itself, by what it shows of the scan's intensity.
+void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context& context) {
+  context.progress.Stage("read photos");
+  const std::vector<std::string> names =
+      ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
+  const PhotoModel photos = MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken);
+  const std::set<std::string> told = LookForPhotos(a, photos.model, context);
+  context.progress.Stage("read scan");
+  Reading reading(a, context);
+  const FoundPhotos found = SearchPhotos(a, photos, &reading, context);
+  context.report["search"] = FoundPhotosToJson(found);
+  const AlignmentInput input{photos.model, *reading.surveyed, found.picks, "", reading.azimuth()};
+  PhotoAlignment placed = AlignFoundPhotos(input, photos, found, a.alignment.trust);
+  if (found.views.empty()) {
+    for (const std::string& warning : placed.alignment.warnings) context.Warn(warning);
+    return WriteRefusal(a, placed.alignment.reasons[0], context);
+  }
+  WritePlacedPhotos(a, &placed, &reading, told, context);
 }
 
 }  // namespace
@@ -584,10 +639,13 @@ int main(int argc, char** argv) {
       "--output_path aligned");
   roomtex::AddOptions(&arguments, &command);
   return command.Run(argc, argv, [&arguments](const roomtex::Command::Context& context) {
-    if (arguments.input_path.empty()) {
-      roomtex::AlignPhotosAlone(arguments, context);
-    } else {
+    roomtex::CheckOptions(arguments);
+    if (!arguments.input_path.empty()) {
       roomtex::Align(arguments, context);
+    } else if (!arguments.picks_path.empty()) {
+      roomtex::AlignPickedPhotos(arguments, context);
+    } else {
+      roomtex::AlignFoundPhotosAlone(arguments, context);
     }
   });
 }

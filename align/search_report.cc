@@ -5,6 +5,10 @@
 namespace roomtex {
 namespace {
 
+// Of photos that were placed alone, at most so many were wrong (95 %; docs/automatic.md); without
+// one there is no answer that could be right.
+constexpr double kChanceFoundPhoto = 0.02, kChanceNone = 1;
+
 Json SightsToJson(const SightAgreement& sights) {
   Json json;
   json["score"] = sights.Score();
@@ -71,6 +75,26 @@ Json SearchToJson(const AutomaticAlignment& found) {
   json["hypotheses"] = Json::array();
   for (size_t i = 0; i < found.search.starts.size(); ++i) {
     json["hypotheses"].push_back(StartToJson(found, static_cast<int>(i)));
+  }
+  return json;
+}
+
+Json FoundPhotosToJson(const FoundPhotos& found) {
+  Json json;
+  json["method"] = "appearance of each photo";
+  json["num_hypotheses"] = found.num_places;
+  // Each photo has its own.
+  json["best"] = json["second"] = nullptr;
+  json["agreement"] = !found.views.empty();
+  json["chance_wrong"] = found.views.empty() ? kChanceNone : kChanceFoundPhoto;
+  json["photos"] = Json::array();
+  for (const PhotoEvidence& photo : found.photos) {
+    Json one;
+    one["name"] = photo.image_name;
+    one["num_cells"] = photo.num_cells;
+    one["num_cells_second"] = photo.num_cells_second;
+    one["placed"] = photo.problem.empty();
+    json["photos"].push_back(one);
   }
   return json;
 }

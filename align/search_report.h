@@ -3,10 +3,13 @@
 // for it.
 
 #include "align/automatic_alignment.h"
+#include "align/found_photos.h"
 #include "core/report.h"
 
 namespace roomtex {
 
 Json SearchToJson(const AutomaticAlignment& found);
+// Of photos without a sparse model.
+Json FoundPhotosToJson(const FoundPhotos& found);
 
 }  // namespace roomtex

@@ -194,6 +194,30 @@ void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFi
                         "), give --units " + unit);
 }
 
+// Rec. 709, of sRGB values as they are.
+float LumaOf(const std::array<uint8_t, 3>& color) {
+  return 0.2126f * color[0] + 0.7152f * color[1] + 0.0722f * color[2];
+}
+
+// A scanner's camera has not seen what is black.
+void TakeColorsAsIntensity(Scan* scan, std::vector<std::string>* notes) {
+  size_t num_measured = 0, num_colored = 0;
+  for (size_t i = 0; i < scan->colors.size(); ++i) {
+    if (scan->IsMissing(static_cast<int>(i))) continue;
+    ++num_measured;
+    num_colored += LumaOf(scan->colors[i]) > 0;
+  }
+  constexpr double kMostSamples = 0.8;
+  if (num_measured > 0 && num_colored >= kMostSamples * num_measured) {
+    for (size_t i = 0; i < scan->colors.size(); ++i) {
+      if (!scan->IsMissing(static_cast<int>(i))) scan->intensity[i] = LumaOf(scan->colors[i]);
+    }
+    notes->push_back(NameOrFile(*scan) +
+                     " has colours of its own: these, not its intensity, are compared with photos");
+  }
+  CellColors().swap(scan->colors);
+}
+
 // What every scan goes through as soon as it is read.
 class ScanFinish {
  public:
@@ -209,6 +233,7 @@ class ScanFinish {
       FindUpAxisAgain(&scan, &file->notes);
       if (file->up_axis.empty()) file->up_axis = NameOfUpAxis(scan.up);
       NoteDoubtfulUnit(options_, scan, file);
+      if (options_.colors_as_intensity) TakeColorsAsIntensity(&scan, &file->notes);
       if (visit_) visit_(scans);
     };
   }
@@ -358,7 +383,9 @@ std::vector<std::string> ScanReaderOptions::Problems() const { return ProblemsOf
 
 ScanFile ReadScanFile(const std::string& path, const ScanReaderOptions& options,
                       const ScanVisitor& visit) {
-  return ReadWith(path, options, ScanFinish(options, visit));
+  ScanReaderOptions wanted = options;
+  wanted.colors = options.colors || options.colors_as_intensity;
+  return ReadWith(path, wanted, ScanFinish(wanted, visit));
 }
 
 Scan ReadScan(const std::string& path, const ScanReaderOptions& options) {

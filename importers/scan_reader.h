@@ -33,6 +33,9 @@ struct ScanReaderOptions {
   bool e57_check = true;
   // Keep the colours of the file (Scan::colors), no option of the command line.
   bool colors = false;
+  // Where the file has colours of most samples, their luma becomes the intensity, no option of the
+  // command line either: it is what photos show.
+  bool colors_as_intensity = false;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;

@@ -215,6 +215,7 @@ ScanRecord RecordFromJson(const Json& json) {
 
 ScanReaderOptions OptionsOf(const ScanRecord& record, const ScanReaderOptions& given) {
   ScanReaderOptions options;
+  options.colors_as_intensity = given.colors_as_intensity;
   options.e57_check = given.e57_check;
   if (!record.azimuth.empty()) options.azimuth = record.azimuth;
   options.units = record.units;

@@ -1,0 +1,113 @@
+#include "align/found_photos.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Geometry>
+
+#include "align/search/up_directions.h"
+#include "core/frames.h"
+#include "core/text.h"
+
+namespace roomtex {
+namespace {
+
+// The pose with all that it may be off by: FoundPhotoOptions.
+ViewPose WithScanError(ViewPose pose, const FoundPhotoOptions& options) {
+  pose.covariance *= options.formal_times * options.formal_times;
+  // Turns about the camera's centre move it not: the translation takes them up.
+  const Eigen::Vector3d& t = pose.cam_from_scan.translation;
+  Eigen::Matrix3d across;
+  across << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
+  const double turn2 = std::pow(RadFromDeg(options.scan_sigma_deg), 2) / 3;
+  const double move2 = options.scan_sigma * options.scan_sigma / 3;
+  Matrix6d more;
+  more << turn2 * Eigen::Matrix3d::Identity(), turn2 * across, -turn2 * across,
+      move2 * Eigen::Matrix3d::Identity() - turn2 * across * across;
+  pose.covariance += more;
+  return pose;
+}
+
+// Why a photo has no pose, a clause; "" if it has one.
+std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const ViewPose& pose,
+                      const FoundPhotoOptions& options, const TrustOptions& trust) {
+  const int num = sighting.places.empty() ? 0 : sighting.places[0].num_cells;
+  if (num < options.min_cells) {
+    return "it shows too little that the scan's intensity shows, too (" + std::to_string(num) +
+           " places of the scan, " + std::to_string(options.min_cells) + " are asked for)";
+  }
+  if (sighting.places.size() > 1 &&
+      num < options.min_ratio * sighting.places[1].num_cells) {
+    return "it could have been taken from two places, or with two focal lengths (" +
+           std::to_string(num) + " and " + std::to_string(sighting.places[1].num_cells) +
+           " places of the scan agree)";
+  }
+  if (source == FocalSource::kPicks && !(pose.focal_sigma > 0)) {
+    return "nothing says its focal length, and what it shows of the scan, one plane, does not tell "
+           "it";
+  }
+  if (source == FocalSource::kPicks && !(pose.focal_sigma <= options.max_focal_sigma)) {
+    return "nothing says its focal length, and what it shows of the scan tells it to no more than " +
+           Number(100 * pose.focal_sigma, 1) + " %";
+  }
+  if (!(pose.PositionSigma() <= trust.max_position_sigma)) {
+    return "what it shows of the scan leaves open where it was taken";
+  }
+  return "";
+}
+
+// The photo's features as picks, and its pose, which they have given already.
+void AddView(const SparseImage& image, const SeenPlace& place, const ViewPose& pose,
+             FoundPhotos* found) {
+  PickView view;
+  view.image_name = image.name;
+  view.image = &image;
+  view.pairs = place.pairs;
+  for (int i = 0; i < place.pairs.size(); ++i) {
+    view.picks.push_back(static_cast<int>(found->picks.size()));
+    found->picks.push_back(
+        {image.name, place.pairs.x_in_img.col(i), place.pairs.x_in_scan.col(i)});
+  }
+  view.review.poses = {pose};
+  view.review.used.assign(place.pairs.size(), true);
+  view.review.residual_px = pose.residual_px;
+  view.review.leave_one_out_px = view.review.without_px2 =
+      Eigen::VectorXd::Constant(place.pairs.size(), std::numeric_limits<double>::quiet_NaN());
+  found->views.push_back(std::move(view));
+}
+
+}  // namespace
+
+FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
+                       const std::string& image_path, const FoundPhotoOptions& options,
+                       const TrustOptions& trust, int num_threads, Progress* progress) {
+  FoundPhotos found;
+  const UpDirections ups = FindScanUps(surveyed.scans(), surveyed.patches());
+  progress->Stage("features of the scan");
+  const PhotoFinder finder(surveyed.viewer(), ups.ups[0], options.finder, num_threads);
+  progress->Stage("features of the photos", static_cast<int>(photos.model.images.size()));
+  for (const auto& [id, image] : photos.model.images) {
+    const Camera& camera = photos.model.cameras.at(image.camera_id);
+    const FocalSource source = photos.focal_sources.at(image.name);
+    const PhotoSighting sighting = finder.Find(image, camera, source, image_path);
+    progress->Tick();
+    if (!sighting.is_read) continue;
+    PhotoEvidence evidence;
+    evidence.image_name = image.name;
+    found.num_places += static_cast<int>(sighting.places.size());
+    ViewPose pose;
+    if (!sighting.places.empty()) {
+      evidence.num_cells = sighting.places[0].num_cells;
+      pose = WithScanError(sighting.places[0].pose, options);
+    }
+    if (sighting.places.size() > 1) evidence.num_cells_second = sighting.places[1].num_cells;
+    evidence.problem = ProblemOf(sighting, source, pose, options, trust);
+    if (evidence.problem.empty()) AddView(image, sighting.places[0], pose, &found);
+    found.photos.push_back(std::move(evidence));
+  }
+  return found;
+}
+
+}  // namespace roomtex

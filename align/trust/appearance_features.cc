@@ -1,0 +1,330 @@
+#include "align/trust/appearance_features.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/camera_model.h"
+#include "core/frames.h"
+#include "core/parallel.h"
+
+namespace roomtex {
+namespace {
+
+constexpr double kViewField = 65;                             // degrees across and down
+constexpr double kViewTurn = 45;                              // degrees from view to view
+constexpr std::array<double, 2> kViewLean = {-25, 20};        // degrees above the horizon
+constexpr double kFinestPixel = 0.08, kCoarsestPixel = 0.35;  // degrees, of views and photos
+constexpr double kNormalised = 0.9;  // degrees, standard deviation of the neighbourhood
+
+constexpr double kLeastSide = 32;    // pixels, of a photo as it is described
+
+constexpr double kNeighbour = 2;  // pixels, of a view: for the side of a surface that it shows
+
+constexpr int kNearest = 5;         // that may be one place, seen in several views
+constexpr double kElsewhere = 0.3;  // metres
+constexpr double kElsewhereNear = 0.25;  // of the reach
+
+// (x - local mean) / local deviation as 8 bits; where invalid, the mean.
+cv::Mat1b LocallyNormalised(const cv::Mat1f& grey, const cv::Mat1b& valid, double sigma) {
+  cv::Mat1f weight, mean, square;
+  cv::Mat1f used;
+  valid.convertTo(used, CV_32F, 1 / 255.0);
+  const cv::Mat1f masked = grey.mul(used);
+  cv::GaussianBlur(used, weight, {}, sigma);
+  cv::GaussianBlur(masked, mean, {}, sigma);
+  cv::GaussianBlur(masked.mul(masked), square, {}, sigma);
+  cv::Mat1b out(grey.size(), static_cast<uchar>(128));
+  constexpr float kNoise = 4, kContrast = 48;  // of 255
+  for (int y = 0; y < grey.rows; ++y) {
+    for (int x = 0; x < grey.cols; ++x) {
+      if (!valid(y, x) || weight(y, x) < 0.05f) continue;
+      const float m = mean(y, x) / weight(y, x);
+      const float variance = std::max(0.0f, square(y, x) / weight(y, x) - m * m);
+      const float value = 128 + kContrast * (grey(y, x) - m) / (std::sqrt(variance) + kNoise);
+      out(y, x) = cv::saturate_cast<uchar>(value);
+    }
+  }
+  return out;
+}
+
+// Degrees, as cv::KeyPoint has them, of the direction (dx, dy).
+float KeypointAngle(const Eigen::Vector2d& direction) {
+  const double angle = DegFromRad(std::atan2(direction.y(), direction.x()));
+  return static_cast<float>(angle < 0 ? angle + 360 : angle);
+}
+
+// RootSIFT (Arandjelovic and Zisserman 2012).
+void TakeRoots(cv::Mat1f* sift) {
+  for (int i = 0; i < sift->rows; ++i) {
+    float* const row = sift->ptr<float>(i);
+    float sum = 0;
+    for (int k = 0; k < sift->cols; ++k) sum += row[k];
+    for (int k = 0; k < sift->cols; ++k) row[k] = std::sqrt(row[k] / std::max(sum, 1e-6f));
+  }
+}
+
+// Opposite gradients as one: half of the eight directions of each cell.
+cv::Mat1f Folded(const cv::Mat1f& root_sift) {
+  cv::Mat1f folded(root_sift.rows, 64);
+  for (int i = 0; i < root_sift.rows; ++i) {
+    for (int cell = 0; cell < 16; ++cell) {
+      for (int k = 0; k < 4; ++k) {
+        const float a = root_sift(i, 8 * cell + k), b = root_sift(i, 8 * cell + k + 4);
+        folded(i, 4 * cell + k) = std::sqrt(a * a + b * b);
+      }
+    }
+  }
+  return folded;
+}
+
+double PixelAngle(const ScanViewer& viewer) {
+  return std::clamp(DegFromRad(viewer.sample_angle()), kFinestPixel, kCoarsestPixel);
+}
+
+// Views overlap, so that the next best may be the
+// same place of the scan.
+void AddMatches(const cv::Mat1f& photos, const cv::Mat1f& scan,
+                const std::vector<Eigen::Vector3d>& places, double max_ratio,
+                std::vector<std::pair<int, int>>* pairs) {
+  std::vector<std::vector<cv::DMatch>> nearest;
+  cv::BFMatcher(cv::NORM_L2).knnMatch(photos, scan, nearest, kNearest);
+  for (const std::vector<cv::DMatch>& near : nearest) {
+    const auto elsewhere = std::find_if(near.begin(), near.end(), [&](const cv::DMatch& one) {
+      return (places[one.trainIdx] - places[near[0].trainIdx]).norm() > kElsewhere;
+    });
+    const cv::DMatch* const other = elsewhere == near.end() ? nullptr : &*elsewhere;
+    if (other == nullptr || near[0].distance > max_ratio * other->distance) continue;
+    pairs->emplace_back(near[0].queryIdx, near[0].trainIdx);
+  }
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> DirectionInImg(const CameraProjection& projection,
+                                              const Eigen::Vector2d& plane,
+                                              const Eigen::Vector3d& direction_in_cam) {
+  const Eigen::Vector3d ray = plane.homogeneous();
+  const auto at = projection.ImgFromCam(ray), moved = projection.ImgFromCam(ray + 1e-3 * direction_in_cam);
+  if (!at || !moved) return std::nullopt;
+  return *moved - *at;
+}
+
+AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright,
+                                    int most, const PlaceOfKeypoint& place_of) {
+  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, 0.02, 12, 1.6);
+  std::vector<cv::KeyPoint> found, used;
+  sift->detect(picture, found, valid);
+  std::sort(found.begin(), found.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    return std::make_tuple(-a.response, a.pt.x, a.pt.y, a.size) <
+           std::make_tuple(-b.response, b.pt.x, b.pt.y, b.size);
+  });
+  AppearanceFeatures features;
+  for (const cv::KeyPoint& one : found) {
+    if (static_cast<int>(used.size()) == most) break;
+    const bool is_again = !used.empty() && used.back().pt == one.pt && used.back().size == one.size;
+    if (upright && is_again) continue;  // several directions of its gradients
+    const std::optional<FeaturePlace> place = place_of(Eigen::Vector2d(one.pt.x + 0.5, one.pt.y + 0.5));
+    if (!place) continue;
+    used.push_back(one);
+    if (place->down) used.back().angle = KeypointAngle(*place->down);
+    features.places.push_back(place->x);
+    features.in_img.push_back(place->in_img);
+    features.responses.push_back(one.response);
+  }
+  cv::Mat descriptors;
+  if (!used.empty()) sift->compute(picture, used, descriptors);
+  features.sift = descriptors;
+  TakeRoots(&features.sift);
+  return features;
+}
+
+AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,
+                                const std::vector<uint32_t>& part_ids, size_t most) {
+  std::vector<std::tuple<float, size_t, size_t>> order;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    for (size_t k = 0; k < parts[i].places.size(); ++k) {
+      order.emplace_back(-parts[i].responses[k], i, k);
+    }
+  }
+  std::sort(order.begin(), order.end());
+  if (order.size() > most) order.resize(most);
+  AppearanceFeatures all;
+  all.sift = cv::Mat1f(static_cast<int>(order.size()), 128);
+  for (const auto& [response, i, k] : order) {
+    parts[i]
+        .sift.row(static_cast<int>(k))
+        .copyTo(all.sift.row(static_cast<int>(all.places.size())));
+    all.places.push_back(parts[i].places[k]);
+    all.in_img.push_back(parts[i].in_img[k]);
+    all.image_ids.push_back(part_ids.empty() ? 0 : part_ids[i]);
+  }
+  return all;
+}
+
+namespace {
+
+// The camera of a view, looking `lean` above the horizon.
+Rigid ViewPose(const Scan& scan, const Eigen::Vector3d& up, double azimuth, double lean) {
+  const Eigen::Vector3d level = Eigen::AngleAxisd(RadFromDeg(azimuth), up) * up.unitOrthogonal();
+  const Eigen::Vector3d z = std::cos(RadFromDeg(lean)) * level + std::sin(RadFromDeg(lean)) * up;
+  const Eigen::Vector3d x = z.cross(up).normalized(), y = z.cross(x);
+  Eigen::Matrix3d cam_from_scan;
+  cam_from_scan << x.transpose(), y.transpose(), z.transpose();
+  Rigid pose;
+  pose.rotation = Eigen::Quaterniond(cam_from_scan);
+  pose.translation = -(pose.rotation * scan.Station());
+  return pose;
+}
+
+Camera ViewCamera(double pixel) {
+  Camera camera;
+  const int size = static_cast<int>(kViewField / pixel) / 8 * 8;
+  const double f = 0.5 * size / std::tan(RadFromDeg(0.5 * kViewField));
+  camera.model = CameraModel::kPinhole;
+  camera.width = camera.height = size;
+  camera.params = {f, f, 0.5 * size, 0.5 * size};
+  return camera;
+}
+
+}  // namespace
+
+AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera,
+                                  const Rigid& cam_from_scan,
+                                  const std::optional<Eigen::Vector3d>& up_in_scan, int most) {
+  const CameraProjection projection(camera);
+  const int cell = viewer.has_mesh() ? 1 : 4;
+  const ScanView view = viewer.Look(RayLattice(projection, cell), camera, cam_from_scan, 1);
+  const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength();
+  const cv::Mat1b picture = LocallyNormalised(view.grey, view.valid, kNormalised * px_per_deg);
+  const Rigid scan_from_cam = cam_from_scan.Inverse();
+  const auto place_at = [&](const Eigen::Vector2d& at) -> std::optional<Eigen::Vector3d> {
+    if (!projection.InImage(at)) return std::nullopt;
+    const float depth = view.depth(std::min(static_cast<int>(at.y()), camera.height - 1),
+                                   std::min(static_cast<int>(at.x()), camera.width - 1));
+    const auto plane = projection.CamFromImg(at);
+    if (!(depth > 0) || !plane) return std::nullopt;
+    return scan_from_cam * (depth * plane->homogeneous());
+  };
+  // From behind, the mirror image of a wall looks like the wall.
+  const auto is_seen_from_behind = [&](const Eigen::Vector2d& at, const Eigen::Vector3d& x) {
+    const auto right = place_at(at + Eigen::Vector2d(kNeighbour, 0)),
+               left = place_at(at - Eigen::Vector2d(kNeighbour, 0)),
+               below = place_at(at + Eigen::Vector2d(0, kNeighbour)),
+               above = place_at(at - Eigen::Vector2d(0, kNeighbour));
+    if (!right || !left || !below || !above) return true;  // an edge: no side at all
+    const Eigen::Vector3d normal = (*right - *left).cross(*below - *above);
+    const int scan = view.scan(std::min(static_cast<int>(at.y()), camera.height - 1),
+                               std::min(static_cast<int>(at.x()), camera.width - 1));
+    const Eigen::Vector3d station = viewer.scans()[scan].Station();
+    return normal.dot(station - x) * normal.dot(cam_from_scan.TargetOriginInSource() - x) < 0;
+  };
+  return DescribeFeatures(
+      picture, view.valid, up_in_scan.has_value(), most,
+      [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
+        const auto plane = projection.CamFromImg(at);
+        const auto x = place_at(at);
+        if (!plane || !x) return std::nullopt;
+        if (!viewer.has_mesh() && is_seen_from_behind(at, *x)) return std::nullopt;
+        FeaturePlace place = {*x, {}, at};
+        if (up_in_scan) {
+          place.down = DirectionInImg(projection, *plane, cam_from_scan.rotation * -*up_in_scan);
+          if (!place.down) return std::nullopt;
+        }
+        return place;
+      });
+}
+
+AppearanceFeatures FeaturesOfScan(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
+                                  bool upright, int max_stations, int most, int num_threads) {
+  std::vector<const Scan*> stations;
+  for (const Scan& scan : viewer.scans()) {
+    if (scan.organised) stations.push_back(&scan);
+  }
+  if (stations.empty()) return {};
+  const int per_turn = static_cast<int>(std::lround(360 / kViewTurn));
+  const int num_stations = std::min<int>(max_stations, static_cast<int>(stations.size()));
+  const int per_station = per_turn * static_cast<int>(kViewLean.size());
+  const int num_views = num_stations * per_station;
+  const Camera camera = ViewCamera(PixelAngle(viewer));
+  std::vector<AppearanceFeatures> of_views(num_views);
+  ParallelFor(num_threads, 0, num_views, [&](int i) {
+    const Scan& scan = *stations[static_cast<size_t>(i / per_station) * stations.size() /
+                                 static_cast<size_t>(num_stations)];
+    const int k = i % per_station;
+    of_views[i] = FeaturesOfView(
+        viewer, camera, ViewPose(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]),
+        upright ? std::optional<Eigen::Vector3d>(up_in_scan) : std::nullopt, 2 * most / num_views);
+  });
+  return JoinFeatures(std::move(of_views), {}, most);
+}
+
+cv::Mat1b ReadPictureOf(const SparseImage& image, const Camera& camera,
+                        const std::string& image_path, const ScanViewer& viewer) {
+  const double pixel = PixelAngle(viewer);
+  const double scale = std::min(1.0, 1 / (RadFromDeg(pixel) * camera.MeanFocalLength()));
+  if (scale * std::min(camera.width, camera.height) < kLeastSide) return {};
+  std::string ignored;  // comes again when the result is compared
+  const std::optional<cv::Mat> photo = ReadPhotoOf(image, camera, image_path, &ignored);
+  if (!photo) return {};
+  cv::Mat grey;
+  cv::cvtColor(*photo, grey, cv::COLOR_BGR2GRAY);
+  if (scale < 1) cv::resize(grey, grey, {}, scale, scale, cv::INTER_AREA);
+  cv::Mat1f values;
+  grey.convertTo(values, CV_32F);
+  const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength() * grey.cols / camera.width;
+  return LocallyNormalised(values, cv::Mat1b(grey.size(), static_cast<uchar>(255)),
+                           kNormalised * px_per_deg);
+}
+
+std::vector<std::pair<int, int>> MatchNear(const AppearanceFeatures& photo,
+                                           const AppearanceFeatures& view, double reach,
+                                           double max_ratio) {
+  const cv::Mat1f folded[2] = {Folded(photo.sift), Folded(view.sift)};
+  std::vector<std::pair<int, int>> pairs;
+  const double elsewhere = kElsewhereNear * reach;
+  for (int i = 0; i < photo.sift.rows; ++i) {
+    for (const bool fold : {false, true}) {
+      const cv::Mat1f& of_photo = fold ? folded[0] : photo.sift;
+      const cv::Mat1f& of_view = fold ? folded[1] : view.sift;
+      const Eigen::Map<const Eigen::VectorXf> a(of_photo.ptr<float>(i), of_photo.cols);
+      std::vector<std::pair<float, int>> near;
+      for (int k = 0; k < view.sift.rows; ++k) {
+        if ((view.in_img[k] - photo.in_img[i]).squaredNorm() > reach * reach) continue;
+        const Eigen::Map<const Eigen::VectorXf> b(of_view.ptr<float>(k), of_view.cols);
+        near.emplace_back((a - b).norm(), k);
+      }
+      if (near.empty()) continue;
+      const auto best = *std::min_element(near.begin(), near.end());
+      float other = std::numeric_limits<float>::infinity();
+      for (const auto& [distance, k] : near) {
+        if ((view.in_img[k] - view.in_img[best.second]).norm() > elsewhere) {
+          other = std::min(other, distance);
+        }
+      }
+      if (best.first <= max_ratio * other && std::isfinite(other)) pairs.emplace_back(i, best.second);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+std::vector<std::pair<int, int>> MatchFeatures(const AppearanceFeatures& photos,
+                                               const AppearanceFeatures& scan, double max_ratio) {
+  std::vector<std::pair<int, int>> pairs;
+  if (scan.places.empty() || photos.places.empty()) return {};
+  AddMatches(photos.sift, scan.sift, scan.places, max_ratio, &pairs);
+  AddMatches(Folded(photos.sift), Folded(scan.sift), scan.places, max_ratio, &pairs);
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+}  // namespace roomtex

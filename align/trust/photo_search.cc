@@ -1,0 +1,249 @@
+#include "align/trust/photo_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <opencv2/calib3d.hpp>
+
+#include "core/frames.h"
+#include "core/parallel.h"
+#include "core/random_stream.h"
+
+namespace roomtex {
+namespace {
+
+constexpr int kParts = 32, kKeptOfPart = 4;      // of the samples: fixed, whatever the threads
+constexpr double kFirstReach = 1.5;              // times the tolerance, before a sample is refined
+constexpr double kLeastLength = 0.2;             // metres between the places of a sample
+constexpr double kLeastAngle = 2, kMost = 150;   // degrees between its rays
+constexpr double kLeastDepth = 0.1;              // metres
+
+Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
+  const Eigen::Vector3d turn(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
+  Rigid pose;
+  pose.rotation = turn.norm() > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
+                                  : Eigen::Quaterniond::Identity();
+  pose.translation = {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)};
+  return pose;
+}
+
+// The matches under one focal length, in the order of the scan's cells.
+class PhotoRays {
+ public:
+  PhotoRays(const std::vector<PhotoMatch>& matches, const Camera& camera,
+            const PhotoSearchOptions& options)
+      : options_(options) {
+    const CameraProjection projection(camera);
+    std::map<std::tuple<int, int, int>, std::vector<int>> by_cell;
+    for (size_t i = 0; i < matches.size(); ++i) {
+      const Eigen::Vector3d& x = matches[i].x_in_scan;
+      const auto key = [&](double v) { return static_cast<int>(std::floor(v / options.cell)); };
+      by_cell[{key(x.x()), key(x.y()), key(x.z())}].push_back(static_cast<int>(i));
+    }
+    const double px = camera.MeanFocalLength() * RadFromDeg(options.photo_cell_deg);
+    std::map<std::pair<int, int>, int> photo_cells;
+    for (const auto& entry : by_cell) {
+      firsts_.push_back(static_cast<int>(which_.size()));
+      for (const int i : entry.second) {
+        const auto plane = projection.CamFromImg(matches[i].x_in_img);
+        if (!plane) continue;
+        const std::pair<int, int> at(static_cast<int>(matches[i].x_in_img.x() / px),
+                                     static_cast<int>(matches[i].x_in_img.y() / px));
+        photo_cells_.push_back(
+            photo_cells.try_emplace(at, static_cast<int>(photo_cells.size())).first->second);
+        which_.push_back(i);
+        planes_.push_back(*plane);
+        rays_.push_back(plane->homogeneous().normalized());
+        places_.push_back(matches[i].x_in_scan);
+      }
+      if (firsts_.back() == static_cast<int>(which_.size())) firsts_.pop_back();
+    }
+    firsts_.push_back(static_cast<int>(which_.size()));
+    num_photo_cells_ = static_cast<int>(photo_cells.size());
+  }
+
+  int num_cells() const { return static_cast<int>(firsts_.size()) - 1; }
+
+  // Up to four poses of three matches; mostly none.
+  std::vector<Rigid> Sample(RandomStream* random) const {
+    std::array<int, 3> one;
+    for (int& i : one) {  // any cell: some have many matches, of a poster, say
+      const int cell = random->Index(num_cells());
+      i = firsts_[cell] + random->Index(firsts_[cell + 1] - firsts_[cell]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int i = one[k], j = one[(k + 1) % 3];
+      if ((places_[i] - places_[j]).norm() < kLeastLength) return {};
+      const double angle = AngleBetween(rays_[i], rays_[j]);
+      if (angle < RadFromDeg(kLeastAngle) || angle > RadFromDeg(kMost)) return {};
+    }
+    cv::Mat1d places(3, 3), planes(3, 2);
+    for (int k = 0; k < 3; ++k) {
+      for (int c = 0; c < 3; ++c) places(k, c) = places_[one[k]][c];
+      for (int c = 0; c < 2; ++c) planes(k, c) = planes_[one[k]][c];
+    }
+    std::vector<cv::Mat> turns, moves;
+    cv::solveP3P(places, planes, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turns, moves,
+                 cv::SOLVEPNP_AP3P);
+    std::vector<Rigid> poses;
+    for (size_t k = 0; k < turns.size(); ++k) {
+      const Rigid pose = RigidOf(turns[k], moves[k]);
+      if (pose.rotation.coeffs().allFinite() && pose.translation.allFinite()) poses.push_back(pose);
+    }
+    return poses;
+  }
+
+  // Matches within the tolerance.
+  std::vector<int> Within(const Rigid& pose, double tolerance) const {
+    const double least = std::cos(tolerance);
+    const Eigen::Matrix3d turn = pose.rotation.toRotationMatrix();
+    std::vector<int> within;
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      const Eigen::Vector3d x = turn * places_[i] + pose.translation;
+      if (x.z() > kLeastDepth && x.dot(rays_[i]) > least * x.norm()) {
+        within.push_back(static_cast<int>(i));
+      }
+    }
+    return within;
+  }
+
+  // Cells of the scan, or of the photo if these are fewer; and one match of each of the scan's.
+  int CountCells(const std::vector<int>& within, std::vector<int>* of_cells) const {
+    std::vector<uint8_t> seen(num_photo_cells_, 0);
+    int num = 0, num_in_photo = 0;
+    size_t cell = 0;
+    int last = -1;
+    for (const int i : within) {
+      while (firsts_[cell + 1] <= i) ++cell;
+      num_in_photo += seen[photo_cells_[i]] == 0;
+      seen[photo_cells_[i]] = 1;
+      if (static_cast<int>(cell) == last) continue;
+      last = static_cast<int>(cell);
+      ++num;
+      if (of_cells != nullptr) of_cells->push_back(which_[i]);
+    }
+    return std::min(num, num_in_photo);
+  }
+
+  int CellsWithin(const Rigid& pose, double tolerance) const {
+    return CountCells(Within(pose, tolerance), nullptr);
+  }
+
+  // Least squares over what agrees, at first within twice the tolerance; the best on the way.
+  PhotoPlace Refined(const Rigid& guess) const {
+    const double tolerance = RadFromDeg(options_.tolerance_deg);
+    PhotoPlace best;
+    best.cam_from_scan = guess;
+    best.num_cells = CellsWithin(guess, tolerance);
+    Rigid now = guess;
+    for (const double wider : {2.0, 2.0, 1.5, 1.5, 1.0, 1.0}) {
+      const std::vector<int> within = Within(now, wider * tolerance);
+      if (within.size() < 5) break;
+      now = Fitted(now, within);
+      if (!now.rotation.coeffs().allFinite() || !now.translation.allFinite()) break;
+      const int num_cells = CellsWithin(now, tolerance);
+      if (num_cells <= best.num_cells) continue;
+      best.cam_from_scan = now;
+      best.num_cells = num_cells;
+    }
+    CountCells(Within(best.cam_from_scan, tolerance), &best.agreeing);
+    return best;
+  }
+
+ private:
+  Rigid Fitted(const Rigid& start, const std::vector<int>& matches) const {
+    cv::Mat1d places(static_cast<int>(matches.size()), 3), planes(places.rows, 2);
+    for (int k = 0; k < places.rows; ++k) {
+      for (int c = 0; c < 3; ++c) places(k, c) = places_[matches[k]][c];
+      for (int c = 0; c < 2; ++c) planes(k, c) = planes_[matches[k]][c];
+    }
+    const Eigen::AngleAxisd turn(start.rotation);
+    const Eigen::Vector3d w = turn.angle() * turn.axis();
+    cv::Mat1d rvec = (cv::Mat1d(3, 1) << w.x(), w.y(), w.z());
+    cv::Mat1d tvec = (cv::Mat1d(3, 1) << start.translation.x(), start.translation.y(),
+                      start.translation.z());
+    cv::solvePnPRefineLM(places, planes, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec, tvec);
+    return RigidOf(rvec, tvec);
+  }
+
+  const PhotoSearchOptions& options_;
+  std::vector<int> which_;               // of the matches
+  std::vector<Eigen::Vector2d> planes_;  // x/z, y/z
+  std::vector<Eigen::Vector3d> rays_, places_;
+  std::vector<int> photo_cells_;  // of each match
+  std::vector<int> firsts_;       // of each cell its first match, and where the last one ends
+  int num_photo_cells_ = 0;
+};
+
+bool IsBetter(const PhotoPlace& a, const PhotoPlace& b) { return a.num_cells > b.num_cells; }
+
+}  // namespace
+
+bool AreDistinct(const Rigid& a, const Rigid& b, const PhotoSearchOptions& options) {
+  return (a.TargetOriginInSource() - b.TargetOriginInSource()).norm() > options.distinct ||
+         RotationAngle(a.rotation, b.rotation) > RadFromDeg(options.distinct_deg);
+}
+
+Camera WithFocalScale(Camera camera, double scale) {
+  camera.params[0] *= scale;
+  const std::set<CameraModel> with_one = {
+      CameraModel::kSimplePinhole,       CameraModel::kSimpleRadial,   CameraModel::kRadial,
+      CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye,  CameraModel::kSimpleDivision,
+      CameraModel::kSimpleFisheye};
+  if (with_one.count(camera.model) == 0) camera.params[1] *= scale;
+  return camera;
+}
+
+std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches,
+                                          const Camera& camera, const PhotoSearchOptions& options,
+                                          int num_threads) {
+  std::vector<PhotoRays> rays;
+  for (const double scale : options.focal_scales) {
+    rays.emplace_back(matches, WithFocalScale(camera, scale), options);
+  }
+  const int num_scales = static_cast<int>(rays.size());
+  std::vector<std::vector<PhotoPlace>> of_parts(static_cast<size_t>(kParts) * num_scales);
+  ParallelFor(num_threads, 0, static_cast<int>(of_parts.size()), [&](int part) {
+    const PhotoRays& one = rays[part / kParts];
+    if (one.num_cells() < 4) return;
+    RandomStream random(MixBits(0x9b070, static_cast<uint64_t>(part)));
+    std::vector<PhotoPlace>& best = of_parts[part];
+    const double reach = kFirstReach * RadFromDeg(options.tolerance_deg);
+    for (int k = 0; k < options.num_samples / kParts; ++k) {
+      for (const Rigid& pose : one.Sample(&random)) {
+        PhotoPlace place;
+        place.cam_from_scan = pose;
+        place.num_cells = one.CellsWithin(pose, reach);
+        const auto at = std::upper_bound(best.begin(), best.end(), place, IsBetter);
+        if (at - best.begin() >= kKeptOfPart) continue;
+        best.insert(at, place);
+        if (best.size() > kKeptOfPart) best.pop_back();
+      }
+    }
+    for (PhotoPlace& place : best) {
+      place = one.Refined(place.cam_from_scan);
+      place.focal_scale = options.focal_scales[part / kParts];
+    }
+  });
+  std::vector<PhotoPlace> all, kept;
+  for (const auto& part : of_parts) all.insert(all.end(), part.begin(), part.end());
+  std::stable_sort(all.begin(), all.end(), IsBetter);
+  for (const PhotoPlace& one : all) {
+    if (static_cast<int>(kept.size()) == options.num_kept) break;
+    const bool is_new = std::all_of(kept.begin(), kept.end(), [&](const PhotoPlace& other) {
+      return AreDistinct(one.cam_from_scan, other.cam_from_scan, options);
+    });
+    if (is_new) kept.push_back(one);
+  }
+  return kept;
+}
+
+}  // namespace roomtex
