@@ -46,7 +46,7 @@ void Progress::Tick() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
   if (terminal_) {
-    if (SecondsSince(redrawn_) > 0.1) Redraw();
+    if (SecondsSince(redrawn_) > 0.1 || done_ == total_) Redraw();
   } else if (!quiet_ && total_ > 0 && SecondsSince(said_) > kSecondsBetweenLines) {
     said_ = std::chrono::steady_clock::now();
     std::fprintf(stderr, "  %s: %d of %d%s\n", stage_.c_str(), done_, total_,

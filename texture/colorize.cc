@@ -267,6 +267,19 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
   // A mesh has no spacing of samples that says how fine a depth map must be.
   TexelPassOptions on_mesh = texels;
   on_mesh.occlusion.depth_map_size = std::max(texels.occlusion.depth_map_size, 2048);
+  size_t num_bands = 0;
+  for (size_t s = 0; s < scans.size(); ++s) {
+    const ColoredScan& colored = result->scans[s];
+    for (int page = 0; page < colored.atlas.num_pages; ++page) {
+      num_bands += NumBands(
+          AtlasTexels(scans[s].points, colored.triangles, colored.atlas, colored.samples.rgb, page),
+          on_mesh);
+    }
+    if (!scans[s].organised || result->texture_scale == 1) continue;
+    num_bands += NumBands(
+        ScanTexels(scans[s], (*surfaces)[s], colored.samples, result->texture_scale), texels);
+  }
+  progress->Stage("texture", static_cast<int>(num_bands * photos.size()));
   for (size_t s = 0; s < scans.size(); ++s) {
     MeshAtlas& atlas = result->scans[s].atlas;
     for (int page = 0; page < atlas.num_pages; ++page) {
@@ -380,7 +393,6 @@ void Blend(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
   if (result->texture_scale > 1 || scene->has_atlas) {
     *store = ObservationStore(0, 1);
     FreeVectors(&input.samples);
-    progress->Stage("texture");
     ColorizeTextures(scans, photos, options, num_threads, &scene->surfaces, &input,
                      choice.empty() ? nullptr : &choice, progress, result);
   }

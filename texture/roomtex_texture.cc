@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "core/command_line.h"
@@ -204,32 +205,70 @@ void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredSca
   }
 }
 
-// in_full: the scans are whole, not thinned. Fills `web_triangles`.
+// Of the stage `write`. steps: of its progress; seconds with a scan of 16 M samples.
+struct FileWriter {
+  int steps;
+  std::function<void()> write;
+};
+using FileWriters = std::vector<FileWriter>;
+
+// in_full: the scans are whole, not thinned.
+FileWriters GridWriters(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
+                        bool in_full, OutputSet* set) {
+  FileWriters files;
+  for (size_t s = 0; s < scans.size(); ++s) {
+    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
+    const Scan& scan = scans[s];
+    const ColoredScan& colors = colored[s];
+    if (scan.organised) {
+      files.push_back({1, [&colors, set, number] {
+                         const ColorGrid& grid =
+                             colors.texture.num_columns > 0 ? colors.texture : colors.samples;
+                         WritePng(ImageOfGrid(grid), set->Path("texture" + number + ".png"));
+                       }});
+    }
+    if (scan.is_rtpi && in_full) {
+      files.push_back({1, [&scan, &colors, set, number] {
+                         WriteRtpiCopy(scan, colors, set->Path("model" + number + ".rtpi"));
+                       }});
+    }
+  }
+  return files;
+}
+
+// Fills `web_triangles`.
 void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
               const std::vector<PhotoView>& photos, const TextureOptions& options, bool in_full,
-              int num_threads, OutputSet* set, Json* report) {
+              const Command::Context& context, OutputSet* set, Json* report) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
-  WriteColoredPly(scans, colored, set->Path("model.ply"), options.output_normals);
-  WriteColoredGlb(scans, colored, set->Path("model.glb"), glb);
-  if (options.output_evidence) WriteEvidence(scans, colored, set->Path("evidence.ply"));
-  for (size_t s = 0; s < scans.size(); ++s) {
-    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
-    if (scans[s].organised) {
-      const ColorGrid& grid =
-          colored[s].texture.num_columns > 0 ? colored[s].texture : colored[s].samples;
-      WritePng(ImageOfGrid(grid), set->Path("texture" + number + ".png"));
-    }
-    if (scans[s].is_rtpi && in_full) {
-      WriteRtpiCopy(scans[s], colored[s], set->Path("model" + number + ".rtpi"));
-    }
+  FileWriters files = {
+      {4, [&] { WriteColoredPly(scans, colored, set->Path("model.ply"), options.output_normals); }},
+      {4, [&] { WriteColoredGlb(scans, colored, set->Path("model.glb"), glb); }},
+  };
+  if (options.output_evidence) {
+    files.push_back({1, [&] { WriteEvidence(scans, colored, set->Path("evidence.ply")); }});
   }
+  for (auto& file : GridWriters(scans, colored, in_full, set)) files.push_back(std::move(file));
   if (options.output_web || options.output_obj) {
-    WriteDecimated(scans, colored, options, num_threads, set, report);
+    files.push_back({30, [&] {
+                       WriteDecimated(scans, colored, options, context.options.num_threads, set,
+                                      report);
+                     }});
   }
   if (options.output_e57 || options.e57_images) {
-    WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr, set->Path("model.e57"));
+    files.push_back({4, [&] {
+                       WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr,
+                                       set->Path("model.e57"));
+                     }});
+  }
+  int num_steps = 0;
+  for (const FileWriter& file : files) num_steps += file.steps;
+  context.progress.Stage("write", num_steps);
+  for (const FileWriter& file : files) {
+    file.write();
+    for (int i = 0; i < file.steps; ++i) context.progress.Tick();
   }
 }
 
@@ -253,10 +292,9 @@ void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& inde
                 {"num_vertices", result.num_vertices},
                 {"num_colored", result.num_colored},
                 {"texture_scale", result.texture_scale}};
-    context.progress.Stage("write");
     // A set of its own: of fifty stations, what is finished is there when the rest is killed.
     OutputSet outputs(options.output_path + "/" + StationFolder(number));
-    WriteAll(station, result.scans, result.photos, options, true, num_threads, &outputs, &one);
+    WriteAll(station, result.scans, result.photos, options, true, context, &outputs, &one);
     outputs.Commit();
     context.report["stations"].push_back(std::move(one));
   });
@@ -343,9 +381,8 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     result.exposure.tones[0]->response.Write(outputs->Path("response.txt"));
   }
 
-  context.progress.Stage("write");
-  WriteAll(scans, result.scans, list.photos, options, !by_station, context.options.num_threads,
-           outputs.get(), &context.report.keys());
+  WriteAll(scans, result.scans, list.photos, options, !by_station, context, outputs.get(),
+           &context.report.keys());
   if (by_station) {
     // Of the thinned scans no more is needed than where they stand, and what they hide.
     result.scans.clear();

@@ -16,12 +16,21 @@ constexpr double kMinRoundness = 0.05;
 constexpr double kMinGradient = 4;      // grey levels per pixel, rms over the window, across
 constexpr double kMaxDisagreement = 1;  // pixels between a window and one of half its size
 
+constexpr double kMaxAstray = 0.25;  // pixels, when it is looked for from beside it
+
 // By cornerSubPix, in its coordinates: whole numbers are pixel centres.
 cv::Point2f Refined(const cv::Mat1b& photo, cv::Point2f at, int half) {
   std::vector<cv::Point2f> points = {at};
   cv::cornerSubPix(photo, points, {half, half}, {-1, -1},
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-3});
   return points[0];
+}
+
+// Where cornerSubPix runs away it gives the place that it began at, which looks like a corner
+// found.
+bool IsFoundFromBeside(const cv::Mat1b& photo, cv::Point2f corner, int half) {
+  const cv::Point2f again = Refined(photo, corner + cv::Point2f(0.5F, -0.5F), half);
+  return std::hypot(again.x - corner.x, again.y - corner.y) <= kMaxAstray;
 }
 
 bool IsCorner(const cv::Mat1b& photo, cv::Point2f at, int half) {
@@ -51,10 +60,12 @@ std::optional<Eigen::Vector2d> FindCorner(const cv::Mat1b& photo, const Eigen::V
   };
   if (!fits(click)) return std::nullopt;
   const cv::Point2f wide = Refined(photo, click, half);
-  const cv::Point2f corner = Refined(photo, wide, std::max(kMinReach, half / 2));
+  const int narrow = std::max(kMinReach, half / 2);
+  const cv::Point2f corner = Refined(photo, wide, narrow);
   const bool agree = std::hypot(corner.x - wide.x, corner.y - wide.y) <= kMaxDisagreement;
   const bool near = std::hypot(corner.x - click.x, corner.y - click.y) <= half;
   if (!agree || !near || !fits(corner) || !IsCorner(photo, corner, half)) return std::nullopt;
+  if (!IsFoundFromBeside(photo, corner, narrow)) return std::nullopt;
   return Eigen::Vector2d(corner.x + 0.5, corner.y + 0.5);
 }
 

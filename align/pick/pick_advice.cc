@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "align/pick/mirror_picks.h"
 #include "align/pick_findings.h"
 #include "core/text.h"
 
@@ -21,8 +20,7 @@ constexpr double kModelFactor = 3, kModelPx = 4;
 std::string NumberOf(int index) { return std::to_string(index + 1); }
 
 std::string HowToMirror(const std::string& azimuth) {
-  if (azimuth.empty()) return "";
-  return " Press Mirror above the scan to read it with --azimuth " + OtherAzimuth(azimuth) + ".";
+  return azimuth.empty() ? "" : " Press Mirror above the scan to read it the other way round.";
 }
 
 std::string MirrorWarning(double rms_px, double mirrored_rms_px, const std::string& azimuth) {

@@ -572,6 +572,14 @@ test('Mirror reads the scan the other way round and keeps the picks', async () =
   await pageOn(async (page) => {
     await until(async () => /mirror image/.test(await page.text('#dock')), 'the warning');
     await screenshot(page.page, 'pick-mirror');
+    // What it advises can be done here, without options of a command line.
+    assert.doesNotMatch(await page.text('#dock'), /--[a-z]/);
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    const advice = (await page.page.locator('#align .sentences li').allInnerTexts()).join(' ');
+    assert.match(advice, /Press Mirror/);
+    assert.doesNotMatch(advice, /--[a-z]/);
+    await page.page.keyboard.press('Escape');
     await mirror(page);  // to the room that the picks were made in
     await until(
         async () => (await page.rows()).every(({status, px}) => status === 'used' && px < 2.5),

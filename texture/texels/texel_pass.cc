@@ -74,6 +74,7 @@ ColorGrid ColorizeBand(const TexelSource& source, const Band& band,
   input.occluders.swap(scene->occluders);
   ObservePhotos(input, band_photos, options.occlusion, options.blend, num_threads, progress,
                 &store);
+  for (size_t i = band_photos.size(); i < photos.size(); ++i) progress->Tick();
   input.occluders.swap(scene->occluders);
   GridColorizer colorizer(input, store, band_gains, options.blend, options.detail, num_threads);
   colorizer.SetChoice(options.choice, std::move(numbers));
@@ -95,6 +96,11 @@ double BytesPerTexel(const BlendOptions& blend) {
   // The block's and the tiles' places and normals, what one photo sees, blend and detail, beside
   // the observations.
   return 110 + 8.0 * blend.max_views + (blend.mode == "average" ? 0 : 4);
+}
+
+int NumBands(const TexelSource& source, const TexelPassOptions& options) {
+  const TexelPassOptions in_texels = InTexels(options, source.texels_per_sample());
+  return static_cast<int>(SplitIntoBands(source, in_texels).size());
 }
 
 ColorGrid ColorizeTexels(const TexelSource& source, const std::vector<PhotoView>& photos,

@@ -45,8 +45,12 @@ struct TexelPassOptions {
 // Working memory per texel of a band, bytes.
 double BytesPerTexel(const BlendOptions& blend);
 
+// How many times ColorizeTexels goes over the photos.
+int NumBands(const TexelSource& source, const TexelPassOptions& options);
+
 // scene: what hides the texels; its samples are left out. gains: one per photo. Photos are decoded
-// once per band that they may see something of. The result does not depend on the bands.
+// once per band that they may see something of. The result does not depend on the bands. progress:
+// a tick for each photo and band.
 ColorGrid ColorizeTexels(const TexelSource& source, const std::vector<PhotoView>& photos,
                          const std::vector<Eigen::Vector3f>& gains, const TexelPassOptions& options,
                          int num_threads, PhotoPassInput* scene, Progress* progress);

@@ -18,14 +18,26 @@ function withoutVerdict(headline) {
 
 // The reasons come as one paragraph; a line each is easier to work through.
 function lines(sentences) {
-  return sentences.flatMap((one) => one.split(/(?<=\S\S[.!]) (?=[A-Z])/)).map(withoutOptions);
+  return sentences.flatMap((one) => one.split(/(?<=\S\S[.!]) (?=[A-Z])/))
+      .map(withoutOptions)
+      .filter(Boolean);
 }
-// Options of the command line help nobody here.
+// Options of the command line help nobody here: what the page has instead, or nothing.
+const kInstead = [
+  [
+    /^Say where the photos belong: --near .*/,
+    'Set six pairs: then the place need not be searched for.',
+  ],
+  [
+    /^Read it with --azimuth .*/,
+    'Press Mirror above the scan: it is read the other way round then, and the picks stay.',
+  ],
+  [/^If the scan is coarse, .*/, ''],
+  [/; give --camera_params [^.]*/, ''],
+  [/ \(--[^)]*\)/g, ''],
+];
 function withoutOptions(sentence) {
-  if (/^Say where the photos belong: --near/.test(sentence)) {
-    return 'Set six pairs: then the place need not be searched for.';
-  }
-  return sentence.replace(/ \(--[^)]*\)/g, '');
+  return kInstead.reduce((text, [from, to]) => text.replace(from, to), sentence);
 }
 
 export class AlignDialog {

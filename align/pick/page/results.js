@@ -87,8 +87,9 @@ export class Results {
         },
         el('td', {}, cells.number), el('td', {class: 'actions'}, cells.label), cells.photo,
         el('td', {class: 'right value'}, cells.bar, cells.px), cells.mm, cells.leftOut, cells.state,
-        el('td', {class: 'actions'}, el('label', {title: 'Unticked it is a check point: its error is shown, nothing rests on it (X)'},
-              cells.on, ' counts'),
+        el('td', {class: 'actions'},
+           el('label', {title: 'Unticked it is a check point: its error is shown, nothing rests on it (X)'},
+              cells.on),
            cells.remove));
     this.#rows.set(uid, cells);
     return cells;

@@ -55,5 +55,26 @@ TEST(PhotoCorner, IsNoneOnAnEdgeInNoiseOnNothingAndAtTheBorder) {
   EXPECT_FALSE(FindCorner(photo, {60, 40}, 3)) << "out of reach";
 }
 
+// Blobs without order: from many places the search runs away, and gives what it began with.
+TEST(PhotoCorner, IsTheSameFromBesideOrNone) {
+  cv::Mat1b photo(100, 120);
+  cv::RNG(5).fill(photo, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(photo, photo, {}, 1.5);
+  int found = 0, astray = 0;
+  for (double y = 20; y < 80; y += 3.7) {
+    for (double x = 20; x < 100; x += 3.7) {
+      for (const double reach : {3.0, 8.0}) {
+        const auto corner = FindCorner(photo, {x, y}, reach);
+        if (!corner) continue;
+        ++found;
+        const auto again = FindCorner(photo, *corner + Eigen::Vector2d(-0.4, 0.2), reach);
+        if (!again || (*again - *corner).norm() > 0.3) ++astray;
+      }
+    }
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_LT(astray, found / 20) << found;
+}
+
 }  // namespace
 }  // namespace roomtex

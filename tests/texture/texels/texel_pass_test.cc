@@ -193,7 +193,9 @@ TEST_F(TexelPass, BandsDoNotShow) {
   const std::vector<Eigen::Vector3f> gains(photos_.size(), Eigen::Vector3f::Ones());
   Progress progress(true);
   const ColorGrid whole = ColorizeTexels(source, photos_, gains, options, 2, &scene, &progress);
+  EXPECT_EQ(NumBands(source, options), 1);
   options.max_bytes = 1;
+  EXPECT_GT(NumBands(source, options), 1);
   const ColorGrid banded = ColorizeTexels(source, photos_, gains, options, 2, &scene, &progress);
   EXPECT_EQ(whole.num_rows, banded.num_rows);
   EXPECT_EQ(whole.rgb, banded.rgb);
