@@ -38,6 +38,12 @@ std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const V
     return "it shows too little that the scan's intensity shows, too (" + std::to_string(num) +
            " places of the scan, " + std::to_string(options.min_cells) + " are asked for)";
   }
+  const double share = sighting.places[0].share;
+  if (share < options.min_share) {
+    return "only " + Number(100 * share, 0) +
+           " % of what it and the scan have at about the same place agrees, as in a room that is "
+           "alike (" + Number(100 * options.min_share, 0) + " % are asked for)";
+  }
   if (sighting.places.size() > 1 &&
       num < options.min_ratio * sighting.places[1].num_cells) {
     return "it could have been taken from two places, or with two focal lengths (" +
@@ -100,6 +106,7 @@ FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
     ViewPose pose;
     if (!sighting.places.empty()) {
       evidence.num_cells = sighting.places[0].num_cells;
+    evidence.share = sighting.places[0].share;
       pose = WithScanError(sighting.places[0].pose, options);
     }
     if (sighting.places.size() > 1) evidence.num_cells_second = sighting.places[1].num_cells;

@@ -93,6 +93,7 @@ Json FoundPhotosToJson(const FoundPhotos& found) {
     one["name"] = photo.image_name;
     one["num_cells"] = photo.num_cells;
     one["num_cells_second"] = photo.num_cells_second;
+    one["share"] = photo.share;
     one["placed"] = photo.problem.empty();
     json["photos"].push_back(one);
   }

@@ -21,6 +21,10 @@ struct CloserLook {
   double reach, tolerance;
 };
 constexpr CloserLook kLooks[] = {{5, 0.6}, {3, 0.6}, {3, 0.4}, {3, 0.4}};
+// Of the places that come of the views so many at least, and those with so many of the cells of the
+// best one.
+constexpr size_t kFewestLooks = 2;
+constexpr double kRivalShare = 0.5;
 constexpr int kCloserSamples = 3200;
 constexpr int kMostFeatures = 2500;   // of a photo and of a view that are compared closely
 constexpr int kFewestMatches = 8;     // that are worth another look
@@ -154,6 +158,8 @@ SeenPlace PhotoFinder::LookCloser(const cv::Mat1b& picture, const Camera& camera
         SearchPhotoPlaces(matches, lens, search, num_threads_);
     if (found.empty()) return {};
     seen.num_cells = found[0].num_cells;
+    seen.share = static_cast<double>(found[0].agreeing.size()) /
+                 std::max(1, CountCells(matches, search.cell));
     seen.pairs = PairsOf(matches, found[0].agreeing);
     const auto solved = SolveWithout(lens, source, found[0].cam_from_scan, &seen.pairs);
     if (!solved) return {};
@@ -174,8 +180,11 @@ PhotoSighting PhotoFinder::Find(const SparseImage& image, const Camera& camera, 
       image, WithFocalScale(camera, search.focal_scales[0]), image_path, viewer_);
   sighting.is_read = !picture.empty();
   if (!sighting.is_read) return sighting;
-  for (const PhotoPlace& place :
-       SearchPhotoPlaces(MatchPicture(picture, camera), camera, search, num_threads_)) {
+  const std::vector<PhotoPlace> found =
+      SearchPhotoPlaces(MatchPicture(picture, camera), camera, search, num_threads_);
+  for (size_t k = 0; k < found.size(); ++k) {
+    const PhotoPlace& place = found[k];
+    if (k >= kFewestLooks && place.num_cells < kRivalShare * found[0].num_cells) break;
     SeenPlace seen = LookCloser(picture, camera, source, place);
     const Eigen::Vector3d centre = seen.pose.cam_from_scan.TargetOriginInSource();
     // From behind, a mirrored wall looks like the wall.

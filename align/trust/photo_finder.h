@@ -19,7 +19,7 @@
 namespace roomtex {
 
 struct PhotoFinderOptions {
-  int max_photo_features = 3000;
+  int max_photo_features = 2000;
   int max_scan_features = 9000;  // of all views together
   int max_stations = 8;          // views are made from, evenly taken
   double max_ratio = 0.8;        // Lowe's; larger = more matches, more of them wrong
@@ -32,6 +32,7 @@ struct SeenPlace {
   ViewPose pose;
   PointPairs pairs;  // those features, one of each cell of the scan
   int num_cells = 0;
+  double share = 0;  // of the cells in which anything was matched
 };
 
 struct PhotoSighting {

@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -35,6 +34,14 @@ Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
   return pose;
 }
 
+using Cell = std::array<int, 3>;
+
+Cell CellOf(const Eigen::Vector3d& x, double cell) {
+  Cell key;
+  for (int k = 0; k < 3; ++k) key[k] = static_cast<int>(std::floor(x[k] / cell));
+  return key;
+}
+
 // The matches under one focal length, in the order of the scan's cells.
 class PhotoRays {
  public:
@@ -42,11 +49,9 @@ class PhotoRays {
             const PhotoSearchOptions& options)
       : options_(options) {
     const CameraProjection projection(camera);
-    std::map<std::tuple<int, int, int>, std::vector<int>> by_cell;
+    std::map<Cell, std::vector<int>> by_cell;
     for (size_t i = 0; i < matches.size(); ++i) {
-      const Eigen::Vector3d& x = matches[i].x_in_scan;
-      const auto key = [&](double v) { return static_cast<int>(std::floor(v / options.cell)); };
-      by_cell[{key(x.x()), key(x.y()), key(x.z())}].push_back(static_cast<int>(i));
+      by_cell[CellOf(matches[i].x_in_scan, options.cell)].push_back(static_cast<int>(i));
     }
     const double px = camera.MeanFocalLength() * RadFromDeg(options.photo_cell_deg);
     std::map<std::pair<int, int>, int> photo_cells;
@@ -116,7 +121,7 @@ class PhotoRays {
   }
 
   // Cells of the scan, or of the photo if these are fewer; and one match of each of the scan's.
-  int CountCells(const std::vector<int>& within, std::vector<int>* of_cells) const {
+  int CellsOf(const std::vector<int>& within, std::vector<int>* of_cells) const {
     std::vector<uint8_t> seen(num_photo_cells_, 0);
     int num = 0, num_in_photo = 0;
     size_t cell = 0;
@@ -134,7 +139,7 @@ class PhotoRays {
   }
 
   int CellsWithin(const Rigid& pose, double tolerance) const {
-    return CountCells(Within(pose, tolerance), nullptr);
+    return CellsOf(Within(pose, tolerance), nullptr);
   }
 
   // Least squares over what agrees, at first within twice the tolerance; the best on the way.
@@ -154,7 +159,7 @@ class PhotoRays {
       best.cam_from_scan = now;
       best.num_cells = num_cells;
     }
-    CountCells(Within(best.cam_from_scan, tolerance), &best.agreeing);
+    CellsOf(Within(best.cam_from_scan, tolerance), &best.agreeing);
     return best;
   }
 
@@ -186,6 +191,12 @@ class PhotoRays {
 bool IsBetter(const PhotoPlace& a, const PhotoPlace& b) { return a.num_cells > b.num_cells; }
 
 }  // namespace
+
+int CountCells(const std::vector<PhotoMatch>& matches, double cell) {
+  std::set<Cell> cells;
+  for (const PhotoMatch& match : matches) cells.insert(CellOf(match.x_in_scan, cell));
+  return static_cast<int>(cells.size());
+}
 
 bool AreDistinct(const Rigid& a, const Rigid& b, const PhotoSearchOptions& options) {
   return (a.TargetOriginInSource() - b.TargetOriginInSource()).norm() > options.distinct ||

@@ -43,6 +43,9 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
                                           const Camera& camera, const PhotoSearchOptions& options,
                                           int num_threads);
 
+// Cells of the scan with matches, whether they agree on anything or not.
+int CountCells(const std::vector<PhotoMatch>& matches, double cell);
+
 // Poses of cameras at clearly different places.
 bool AreDistinct(const Rigid& a, const Rigid& b, const PhotoSearchOptions& options);
 

@@ -67,6 +67,56 @@ TEST(PhotosAloneCommand, WritesAModelOfThePhotosAndAReportWithTheUsualKeys) {
   EXPECT_FALSE(std::filesystem::exists(alone.files.folder / "aligned/scan_from_sparse.txt"));
 }
 
+TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
+  const TempFolder folder;
+  const std::string room = folder / "room", output = folder / "aligned";
+  ASSERT_EQ(RunCommandLine("roomtex-simulate --quiet --random_seed 171 --num_photos 2 --photo_width 640 "
+                           "--photo_height 480 --scan_columns 1600 --scan_rows 600 --output_path " +
+                           room)
+                .exit_code,
+            0);
+  const SparseModel truth = ReadSparseModel(room + "/truth");
+  const Camera& camera = truth.cameras.begin()->second;
+  std::string params;
+  for (const double param : camera.params) params += (params.empty() ? "" : ",") + Exact(param);
+  cv::Mat3b stranger(camera.height, camera.width);
+  cv::randu(stranger, 0, 255);
+  cv::imwrite(room + "/photos/stranger.png", stranger);
+  const std::string command = "roomtex-align --quiet --image_path " + room + "/photos --scan_path " +
+                              room + "/scan.rtpi --camera_model " +
+                              CameraModelName(camera.model) + " --camera_params " + params +
+                              " --output_path " + output;
+  const CommandResult result = RunCommandLine(command);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const SparseModel aligned = ReadSparseModel(output);
+  ASSERT_EQ(aligned.images.size(), 2u);
+  const Json report = Json::parse(ReadBytes(output + "/alignment.json"));
+  for (const auto& [id, image] : aligned.images) {
+    const double off = (image.cam_from_model.TargetOriginInSource() -
+                        truth.FindImage(image.name)->cam_from_model.TargetOriginInSource())
+                           .norm();
+    EXPECT_LT(1000 * off, 2 * report["expected_error"]["at_cameras_mm"].get<double>());
+  }
+  EXPECT_THAT(report["warnings"].dump(),
+              HasSubstr("stranger.png is left out: it shows too little"));
+  EXPECT_EQ(report["search"]["method"], "appearance of each photo");
+  ASSERT_EQ(report["search"]["photos"].size(), 3u);
+  EXPECT_EQ(report["search"]["photos"][0]["placed"], true);
+  EXPECT_GE(report["search"]["photos"][0]["num_cells"], 25);
+  EXPECT_EQ(report["search"]["photos"][2]["placed"], false);
+  EXPECT_EQ(report["images"][0]["focal_length_from"], "params");
+  EXPECT_EQ(report["agreement"]["gradient_shift"]["contradicts"], false);
+
+  // The trusted result stays.
+  for (const auto& [id, image] : truth.images) std::filesystem::remove(room + "/photos/" + image.name);
+  const CommandResult none = RunCommandLine(command);
+  EXPECT_EQ(none.exit_code, 4);
+  EXPECT_THAT(none.err, HasSubstr("None of the photos could be placed"));
+  EXPECT_THAT(none.err, HasSubstr("roomtex-pick"));
+  EXPECT_EQ(ReadSparseModel(output).images.size(), 2u);
+  EXPECT_EQ(RunCommandLine(command + " --near stranger.png,1,1,1").exit_code, 2);
+}
+
 TEST(PhotosAloneCommand, SaysInASentenceWhatIsMissing) {
   const PhotosAlone alone;
   const auto expect = [](const CommandResult& result, int exit_code, const std::string& text) {

@@ -150,7 +150,7 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
     Triangle triangle;
     for (int k = 0; k < 3; ++k) {
       const double corner = corners.At(i + k, 0);
-      if (!(corner < static_cast<double>(count))) {
+      if (!(corner >= 0 && corner < static_cast<double>(count))) {
         throw InputError(path, "", "has a face that names no vertex", "Write it again");
       }
       triangle[k] = first + static_cast<int>(corner);

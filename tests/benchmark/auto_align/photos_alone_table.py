@@ -70,8 +70,9 @@ def align(args, name, case, scan=None, azimuth=None, camera=True):
 def row(args, name, case, **how):
     code, report, out = align(args, name, case, **how)
     photos = report["search"]["photos"]
-    cells = sorted((p["num_cells"] for p in photos), reverse=True)
-    others = sorted((p["num_cells"] for p in photos if not p["placed"]), reverse=True)
+    others = sorted((p for p in photos if not p["placed"]), key=lambda p: -p["num_cells"])
+    least = min((p["share"] for p in photos if p["placed"]), default=None)
+    fewest = min((p["num_cells"] for p in photos if p["placed"]), default=None)
     placed = [p["name"] for p in photos if p["placed"]]
     off, turn, said = [], [], []
     if placed and not how.get("scan") and not how.get("azimuth"):
@@ -85,7 +86,8 @@ def row(args, name, case, **how):
                 said.append(sigma[photo])
     below = [sum(o < k * s for o, s in zip(off, said)) for k in (1, 2, 3)]
     print("| {} | {} of {} | {} | {} | {:.0f} / {:.0f} | {:.1f} | {:.0f} | {} | {} |".format(
-        name, len(placed), len(photos), cells[len(placed) - 1] if placed else "", others[0] if others else "",
+        name, len(placed), len(photos), f"{fewest}, {100 * least:.0f} %" if placed else "",
+        ", ".join(f"{p['num_cells']} ({100 * p['share']:.0f} %)" for p in others[:2]),
         median(off), max(off, default=float("nan")), median(turn), median(said), ", ".join(map(str, below)), code))
     sys.stdout.flush()
     return len(placed), len(photos)
@@ -99,7 +101,7 @@ def main():
     parser.add_argument("--first", type=int, default=171)
     parser.add_argument("--rooms", type=int, default=3)
     args = parser.parse_args()
-    print("| case | placed | fewest cells placed | most cells left out | off, median / worst, mm | degrees | said, mm "
+    print("| case | placed | fewest cells, least share | most cells left out | off, median / worst, mm | degrees | said, mm "
           "| < 1, 2, 3 x | exit |")
     print("|---|---|---|---|---|---|---|---|---|")
     for name, case in real_cases(args.data):
