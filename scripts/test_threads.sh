@@ -7,7 +7,8 @@ tests=("$@")
 if [ ${#tests[@]} = 0 ]; then
   tests=(core_test server_test importers_test colmap_ext_test texture_test view_test align_pick_server_test)
 fi
-# Libraries that are not built for it synchronise by what it does not see.
+# Libraries that are not built for it synchronise by what it does not see. (Embree compares strings of its own by
+# libstdc++, and what is below that on the stack cannot be told.)
 mkdir -p build-tsan
 cat >build-tsan/suppressions.txt <<'END'
 called_from_lib:libembree
@@ -15,6 +16,7 @@ called_from_lib:libtbb.so
 called_from_lib:libopencv_core
 called_from_lib:libceres
 race:libembree
+race:std::allocator<char> >::compare(char const
 race:libtbb
 race:libcpp-httplib
 deadlock:libgdal
