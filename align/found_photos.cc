@@ -42,10 +42,10 @@ std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const V
   if (share < options.min_share) {
     return "only " + Number(100 * share, 0) +
            " % of what it and the scan have at about the same place agrees, as in a room that is "
-           "alike (" + Number(100 * options.min_share, 0) + " % are asked for)";
+           "alike (" +
+           Number(100 * options.min_share, 0) + " % are asked for)";
   }
-  if (sighting.places.size() > 1 &&
-      num < options.min_ratio * sighting.places[1].num_cells) {
+  if (sighting.places.size() > 1 && num < options.min_ratio * sighting.places[1].num_cells) {
     return "it could have been taken from two places, or with two focal lengths (" +
            std::to_string(num) + " and " + std::to_string(sighting.places[1].num_cells) +
            " places of the scan agree)";
@@ -55,7 +55,8 @@ std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const V
            "it";
   }
   if (source == FocalSource::kPicks && !(pose.focal_sigma <= options.max_focal_sigma)) {
-    return "nothing says its focal length, and what it shows of the scan tells it to no more than " +
+    return "nothing says its focal length, and what it shows of the scan tells it to no more "
+           "than " +
            Number(100 * pose.focal_sigma, 1) + " %";
   }
   if (!(pose.PositionSigma() <= trust.max_position_sigma)) {
@@ -73,8 +74,7 @@ void AddView(const SparseImage& image, const SeenPlace& place, const ViewPose& p
   view.pairs = place.pairs;
   for (int i = 0; i < place.pairs.size(); ++i) {
     view.picks.push_back(static_cast<int>(found->picks.size()));
-    found->picks.push_back(
-        {image.name, place.pairs.x_in_img.col(i), place.pairs.x_in_scan.col(i)});
+    found->picks.push_back({image.name, place.pairs.x_in_img.col(i), place.pairs.x_in_scan.col(i)});
   }
   view.review.poses = {pose};
   view.review.used.assign(place.pairs.size(), true);
@@ -106,7 +106,7 @@ FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
     ViewPose pose;
     if (!sighting.places.empty()) {
       evidence.num_cells = sighting.places[0].num_cells;
-    evidence.share = sighting.places[0].share;
+      evidence.share = sighting.places[0].share;
       pose = WithScanError(sighting.places[0].pose, options);
     }
     if (sighting.places.size() > 1) evidence.num_cells_second = sighting.places[1].num_cells;

@@ -16,12 +16,12 @@ namespace roomtex {
 
 struct FoundPhotoOptions {
   PhotoFinderOptions finder;
-  // Places of the scan, in cells of 15 cm, that photo and scan have in common: at least so many, and
-  // so many times those of the next best place. Larger = stricter. Counted: docs/automatic.md.
+  // Places of the scan, in cells of 15 cm, that photo and scan have in common: at least so many,
+  // and so many times those of the next best place. Larger = stricter. Counted: docs/automatic.md.
   int min_cells = 25;
   double min_ratio = 2;
-  // Of the cells in which anything could be compared, the share that agrees: a room of the same plan
-  // has some of the same furniture. Larger = stricter.
+  // Of the cells in which anything could be compared, the share that agrees: a room of the same
+  // plan has some of the same furniture. Larger = stricter.
   double min_share = 0.4;
   // One standard deviation, as a share: a focal length that is less certain (nobody says it) is as
   // good as another one, with the photo taken from elsewhere.
@@ -36,7 +36,7 @@ struct PhotoEvidence {
   std::string image_name;
   int num_cells = 0, num_cells_second = 0;  // at the best place and at the next one
   double share = 0;                         // SeenPlace::share of the best place
-  std::string problem;  // why it has no pose, a clause; "" if it has one
+  std::string problem;                      // why it has no pose, a clause; "" if it has one
 };
 struct FoundPhotos {
   std::vector<PhotoEvidence> photos;  // all, in the order of their names

@@ -132,8 +132,8 @@ std::vector<std::string> JudgePhoto(const AlignmentInput& input, const PlacedPho
 std::string LensSentence(const std::string& name, const ViewPose& pose, FocalSource source,
                          double told, const std::string& by) {
   const double focal = pose.lens->MeanFocalLength();
-  std::string sentence = "The focal length of " + name +
-                         " was found by its " + by + ": " + Number(focal, 0) + " pixels, known to " +
+  std::string sentence = "The focal length of " + name + " was found by its " + by + ": " +
+                         Number(focal, 0) + " pixels, known to " +
                          Number(100 * pose.focal_sigma, 1) + " %";
   if (source == FocalSource::kExif) sentence += " (its EXIF data: " + Number(told, 0) + ")";
   return sentence + (pose.focal_sigma > kFocalToName

@@ -596,8 +596,7 @@ FoundPhotos SearchPhotos(const AlignCommandOptions& a, const PhotoModel& photos,
   FoundPhotos found = find(*reading->surveyed);
   if (!found.views.empty() || !MayTurn(a, *reading)) return found;
   MirroredReading other;
-  other.scans =
-      std::make_unique<const std::vector<Scan>>(MirrorScans(reading->surveyed->scans()));
+  other.scans = std::make_unique<const std::vector<Scan>>(MirrorScans(reading->surveyed->scans()));
   other.surveyed =
       std::make_unique<const SurveyedScans>(*other.scans, reading->surveyed->options());
   FoundPhotos again = find(*other.surveyed);

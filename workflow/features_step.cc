@@ -137,6 +137,30 @@ void AddScannerPhotos(Chain* chain, const CommandLine& start, Step* step) {
 
 }  // namespace
 
+bool PhotosStandAlone(Chain* chain) {
+  const AutoOptions& options = chain->options();
+  if (options.image_path.empty() || HasPanoramas(chain) || chain->UsesScanner()) return false;
+  const size_t count = chain->Photos(options.image_path).size();
+  // Of two, picks in one may have to do for both: by a model.
+  return count == 1 || (count == 2 && chain->PicksPath().empty());
+}
+
+void AddLensOfPhotosAlone(Chain* chain, CommandLine* line) {
+  const std::vector<PhotoFacts>& photos = chain->Photos(chain->options().image_path);
+  PhotoGroup group;
+  group.width = photos[0].width;
+  group.height = photos[0].height;
+  const bool same_size = photos.back().width == group.width && photos.back().height == group.height;
+  const auto known =
+      same_size ? CalibrationOf(group, group, chain->options()) : std::optional<KnownCamera>();
+  if (known) {
+    AddOption("--camera_model", known->model, line);
+    AddOption("--camera_params", known->params, line);
+  } else {
+    AddOption("--camera_model", chain->options().camera_model, line);
+  }
+}
+
 Step MakeFeatures(Chain* chain) {
   const AutoOptions& options = chain->options();
   Step step;

@@ -33,6 +33,11 @@ bool UsesGpu(Chain* chain, std::vector<std::string>* notes);
 
 bool HasPanoramas(Chain* chain);
 bool HasOwnPhotos(Chain* chain);  // the user's, not only the scanner's
+// So few photos that COLMAP makes no model of them: each is placed by itself, by picks or by what
+// it shows of the scan.
+bool PhotosStandAlone(Chain* chain);
+// The lens of these photos for roomtex-align, where it was told.
+void AddLensOfPhotosAlone(Chain* chain, CommandLine* line);
 Step MakeFeatures(Chain* chain);
 Step MakeScanner(Chain* chain);
 

@@ -10,6 +10,7 @@ namespace {
 
 bool Always(Chain*) { return true; }
 bool UsesScanner(Chain* chain) { return chain->UsesScanner(); }
+bool IsReconstructed(Chain* chain) { return HasOwnPhotos(chain) && !PhotosStandAlone(chain); }
 
 // ---- frames, faces, associate
 
@@ -187,8 +188,15 @@ constexpr char kNumOverlays[] = "4";
 Step MakeAlign(Chain* chain) {
   const AutoOptions& options = chain->options();
   Step step;
-  CommandLine line = {"roomtex-align", "--input_path", chain->At("sparse/0")};
-  step.inputs = {chain->At("sparse/0"), chain->ColorFolder()};
+  CommandLine line = {"roomtex-align"};
+  if (PhotosStandAlone(chain)) {
+    AddLensOfPhotosAlone(chain, &line);
+    step.notes.emplace_back("so few photos make no sparse model: each is placed by itself");
+  } else {
+    AddOption("--input_path", chain->At("sparse/0"), &line);
+    step.inputs.push_back(chain->At("sparse/0"));
+  }
+  step.inputs.push_back(chain->ColorFolder());
   AddScans(options, &line, &step.inputs);
   const std::string picks = chain->PicksPath();
   if (picks.empty() && !chain->KnownPath().empty()) {
@@ -268,9 +276,9 @@ const std::vector<StepRow>& StepTable() {
       {"faces", "faces cut out of the panoramas", HasPanoramas, MakeFaces},
       {"associate", "photos with the pattern, and without", MayBePatterned, MakeAssociate},
       {"scanner", "the scanner's own photos, out of the scan's file", UsesScanner, MakeScanner},
-      {"features", "features of every photo (COLMAP)", HasOwnPhotos, MakeFeatures},
-      {"matches", "which photos see the same (COLMAP)", HasOwnPhotos, MakeMatches},
-      {"mapper", "where the photos stand to each other", HasOwnPhotos, MakeMapper},
+      {"features", "features of every photo (COLMAP)", IsReconstructed, MakeFeatures},
+      {"matches", "which photos see the same (COLMAP)", IsReconstructed, MakeMatches},
+      {"mapper", "where the photos stand to each other", IsReconstructed, MakeMapper},
       {"align", "where they stand in the scan", HasOwnPhotos, MakeAlign},
       {"texture", "the scan in the photos' colours", Always, MakeTexture},
       {"pictures", "pictures of the coloured scan", Always, MakePictures},

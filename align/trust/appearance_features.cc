@@ -23,12 +23,12 @@ constexpr std::array<double, 2> kViewLean = {-25, 20};        // degrees above t
 constexpr double kFinestPixel = 0.08, kCoarsestPixel = 0.35;  // degrees, of views and photos
 constexpr double kNormalised = 0.9;  // degrees, standard deviation of the neighbourhood
 
-constexpr double kLeastSide = 32;    // pixels, of a photo as it is described
+constexpr double kLeastSide = 32;  // pixels, of a photo as it is described
 
 constexpr double kNeighbour = 2;  // pixels, of a view: for the side of a surface that it shows
 
-constexpr int kNearest = 5;         // that may be one place, seen in several views
-constexpr double kElsewhere = 0.3;  // metres
+constexpr int kNearest = 5;              // that may be one place, seen in several views
+constexpr double kElsewhere = 0.3;       // metres
 constexpr double kElsewhereNear = 0.25;  // of the reach
 
 // (x - local mean) / local deviation as 8 bits; where invalid, the mean.
@@ -111,7 +111,8 @@ std::optional<Eigen::Vector2d> DirectionInImg(const CameraProjection& projection
                                               const Eigen::Vector2d& plane,
                                               const Eigen::Vector3d& direction_in_cam) {
   const Eigen::Vector3d ray = plane.homogeneous();
-  const auto at = projection.ImgFromCam(ray), moved = projection.ImgFromCam(ray + 1e-3 * direction_in_cam);
+  const auto at = projection.ImgFromCam(ray),
+             moved = projection.ImgFromCam(ray + 1e-3 * direction_in_cam);
   if (!at || !moved) return std::nullopt;
   return *moved - *at;
 }
@@ -130,7 +131,8 @@ AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture, const cv::Mat1b& v
     if (static_cast<int>(used.size()) == most) break;
     const bool is_again = !used.empty() && used.back().pt == one.pt && used.back().size == one.size;
     if (upright && is_again) continue;  // several directions of its gradients
-    const std::optional<FeaturePlace> place = place_of(Eigen::Vector2d(one.pt.x + 0.5, one.pt.y + 0.5));
+    const std::optional<FeaturePlace> place =
+        place_of(Eigen::Vector2d(one.pt.x + 0.5, one.pt.y + 0.5));
     if (!place) continue;
     used.push_back(one);
     if (place->down) used.back().angle = KeypointAngle(*place->down);
@@ -225,20 +227,21 @@ AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera
     const Eigen::Vector3d station = viewer.scans()[scan].Station();
     return normal.dot(station - x) * normal.dot(cam_from_scan.TargetOriginInSource() - x) < 0;
   };
-  return DescribeFeatures(
-      picture, view.valid, up_in_scan.has_value(), most,
-      [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
-        const auto plane = projection.CamFromImg(at);
-        const auto x = place_at(at);
-        if (!plane || !x) return std::nullopt;
-        if (!viewer.has_mesh() && is_seen_from_behind(at, *x)) return std::nullopt;
-        FeaturePlace place = {*x, {}, at};
-        if (up_in_scan) {
-          place.down = DirectionInImg(projection, *plane, cam_from_scan.rotation * -*up_in_scan);
-          if (!place.down) return std::nullopt;
-        }
-        return place;
-      });
+  return DescribeFeatures(picture, view.valid, up_in_scan.has_value(), most,
+                          [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
+                            const auto plane = projection.CamFromImg(at);
+                            const auto x = place_at(at);
+                            if (!plane || !x) return std::nullopt;
+                            if (!viewer.has_mesh() && is_seen_from_behind(at, *x))
+                              return std::nullopt;
+                            FeaturePlace place = {*x, {}, at};
+                            if (up_in_scan) {
+                              place.down = DirectionInImg(projection, *plane,
+                                                          cam_from_scan.rotation * -*up_in_scan);
+                              if (!place.down) return std::nullopt;
+                            }
+                            return place;
+                          });
 }
 
 AppearanceFeatures FeaturesOfScan(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
@@ -308,7 +311,8 @@ std::vector<std::pair<int, int>> MatchNear(const AppearanceFeatures& photo,
           other = std::min(other, distance);
         }
       }
-      if (best.first <= max_ratio * other && std::isfinite(other)) pairs.emplace_back(i, best.second);
+      if (best.first <= max_ratio * other && std::isfinite(other))
+        pairs.emplace_back(i, best.second);
     }
   }
   std::sort(pairs.begin(), pairs.end());

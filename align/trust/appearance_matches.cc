@@ -17,8 +17,8 @@ constexpr double kPointReach = 0.6;  // degrees from a keypoint to the sparse po
 constexpr double kMostCells = 1000;  // across a photo
 
 AppearanceFeatures FeaturesOfPhoto(const SparseModel& model, const SparseImage& image,
-                         const cv::Mat1b& picture,
-                         const std::optional<Eigen::Vector3d>& up_in_sparse, int most) {
+                                   const cv::Mat1b& picture,
+                                   const std::optional<Eigen::Vector3d>& up_in_sparse, int most) {
   if (picture.empty()) return {};
   const Camera& camera = model.cameras.at(image.camera_id);
   const Eigen::Vector2d size(camera.width, camera.height), small(picture.cols, picture.rows);
@@ -38,35 +38,35 @@ AppearanceFeatures FeaturesOfPhoto(const SparseModel& model, const SparseImage& 
         .push_back(static_cast<int>(i));
   }
   const CameraProjection projection(camera);
-  return DescribeFeatures(picture, cv::Mat1b(), up_in_sparse.has_value(), most,
-                  [&](const Eigen::Vector2d& small_at) -> std::optional<FeaturePlace> {
-                    const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
-                    int nearest = -1;
-                    double least = reach * reach;
-                    const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
-                    for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
-                      for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1);
-                           ++c) {
-                        for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
-                          const double distance = (image.points2d[i] - at).squaredNorm();
-                          if (distance < least) {
-                            least = distance;
-                            nearest = i;
-                          }
-                        }
-                      }
-                    }
-                    if (nearest < 0) return std::nullopt;
-                    FeaturePlace place = {model.points.at(image.point3d_ids[nearest]).x_in_model, {}, at};
-                    if (!up_in_sparse) return place;
-                    const auto ray = projection.RayFromImg(at);
-                    if (!ray) return std::nullopt;
-                    const Eigen::Vector3d down = image.cam_from_model.rotation * -*up_in_sparse;
-                    const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
-                    if (!lower) return std::nullopt;
-                    place.down = *lower - at;
-                    return place;
-                  });
+  return DescribeFeatures(
+      picture, cv::Mat1b(), up_in_sparse.has_value(), most,
+      [&](const Eigen::Vector2d& small_at) -> std::optional<FeaturePlace> {
+        const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
+        int nearest = -1;
+        double least = reach * reach;
+        const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
+        for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
+          for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1); ++c) {
+            for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
+              const double distance = (image.points2d[i] - at).squaredNorm();
+              if (distance < least) {
+                least = distance;
+                nearest = i;
+              }
+            }
+          }
+        }
+        if (nearest < 0) return std::nullopt;
+        FeaturePlace place = {model.points.at(image.point3d_ids[nearest]).x_in_model, {}, at};
+        if (!up_in_sparse) return place;
+        const auto ray = projection.RayFromImg(at);
+        if (!ray) return std::nullopt;
+        const Eigen::Vector3d down = image.cam_from_model.rotation * -*up_in_sparse;
+        const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
+        if (!lower) return std::nullopt;
+        place.down = *lower - at;
+        return place;
+      });
 }
 
 }  // namespace

@@ -26,10 +26,10 @@ constexpr CloserLook kLooks[] = {{5, 0.6}, {3, 0.6}, {3, 0.4}, {3, 0.4}};
 constexpr size_t kFewestLooks = 2;
 constexpr double kRivalShare = 0.5;
 constexpr int kCloserSamples = 3200;
-constexpr int kMostFeatures = 2500;   // of a photo and of a view that are compared closely
-constexpr int kFewestMatches = 8;     // that are worth another look
-constexpr double kMostMedians = 3;    // times the median residual: what misses by more is left out
-constexpr double kHiddenBy = 0.05;    // metres, as TrustOptions::surface_tolerance
+constexpr int kMostFeatures = 2500;  // of a photo and of a view that are compared closely
+constexpr int kFewestMatches = 8;    // that are worth another look
+constexpr double kMostMedians = 3;   // times the median residual: what misses by more is left out
+constexpr double kHiddenBy = 0.05;   // metres, as TrustOptions::surface_tolerance
 
 std::vector<double> FocalScales(FocalSource source) {
   if (source == FocalSource::kGiven) return {1};
@@ -81,8 +81,8 @@ std::optional<ViewPose> SolveWithout(const Camera& camera, FocalSource source,
     const std::vector<ViewPose> poses = solver->Solve(*pairs, pose);
     if (poses.empty()) return std::nullopt;
     pose = poses[0];
-    const double most = kMostMedians * Median(std::vector<double>(
-                                           pose.residual_px.begin(), pose.residual_px.end()));
+    const double most = kMostMedians * Median(std::vector<double>(pose.residual_px.begin(),
+                                                                  pose.residual_px.end()));
     if (pose.residual_px.maxCoeff() <= most || round == 2) break;
     *pairs = Near(*pairs, pose.residual_px, most);
   }
@@ -108,12 +108,12 @@ std::vector<PhotoMatch> PhotoFinder::MatchPicture(const cv::Mat1b& picture,
   std::vector<PhotoMatch> matches;
   for (const AppearanceFeatures* scan : {&natural_, &upright_}) {
     // Photos are mostly held level or upright.
-    const AppearanceFeatures photo = DescribeFeatures(
-        picture, cv::Mat1b(), scan == &upright_, options_.max_photo_features,
-        [&](const Eigen::Vector2d& at) {
-          return FeaturePlace{Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 1),
-                              at.cwiseProduct(size.cwiseQuotient(small))};
-        });
+    const AppearanceFeatures photo =
+        DescribeFeatures(picture, cv::Mat1b(), scan == &upright_, options_.max_photo_features,
+                         [&](const Eigen::Vector2d& at) {
+                           return FeaturePlace{Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 1),
+                                               at.cwiseProduct(size.cwiseQuotient(small))};
+                         });
     for (const auto& [i, k] : MatchFeatures(photo, *scan, options_.max_ratio)) {
       matches.push_back({photo.in_img[i], scan->places[k]});
     }
@@ -139,23 +139,23 @@ SeenPlace PhotoFinder::LookCloser(const cv::Mat1b& picture, const Camera& camera
     const Rigid now = seen.pose.cam_from_scan;
     const Eigen::Vector3d down = now.rotation * -up_in_scan_;
     const AppearanceFeatures view = FeaturesOfView(viewer_, small, now, up_in_scan_, kMostFeatures);
-    const AppearanceFeatures photo = DescribeFeatures(
-        picture, cv::Mat1b(), true, kMostFeatures,
-        [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
-          const auto plane = projection.CamFromImg(at);
-          if (!plane) return std::nullopt;
-          FeaturePlace one = {Eigen::Vector3d::Zero(), DirectionInImg(projection, *plane, down), at};
-          if (!one.down) return std::nullopt;
-          return one;
-        });
+    const AppearanceFeatures photo =
+        DescribeFeatures(picture, cv::Mat1b(), true, kMostFeatures,
+                         [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
+                           const auto plane = projection.CamFromImg(at);
+                           if (!plane) return std::nullopt;
+                           FeaturePlace one = {Eigen::Vector3d::Zero(),
+                                               DirectionInImg(projection, *plane, down), at};
+                           if (!one.down) return std::nullopt;
+                           return one;
+                         });
     const double reach = look.reach * RadFromDeg(1.0) * small.MeanFocalLength();
     std::vector<PhotoMatch> matches;
     for (const auto& [i, k] : MatchNear(photo, view, reach, options_.max_ratio_near)) {
       matches.push_back({photo.in_img[i].cwiseProduct(grow), view.places[k]});
     }
     search.tolerance_deg = look.tolerance;
-    const std::vector<PhotoPlace> found =
-        SearchPhotoPlaces(matches, lens, search, num_threads_);
+    const std::vector<PhotoPlace> found = SearchPhotoPlaces(matches, lens, search, num_threads_);
     if (found.empty()) return {};
     seen.num_cells = found[0].num_cells;
     seen.share = static_cast<double>(found[0].agreeing.size()) /
@@ -176,8 +176,8 @@ PhotoSighting PhotoFinder::Find(const SparseImage& image, const Camera& camera, 
   PhotoSearchOptions search = options_.search;
   search.focal_scales = FocalScales(source);
   // Of the shortest focal length: as fine as the views.
-  const cv::Mat1b picture = ReadPictureOf(
-      image, WithFocalScale(camera, search.focal_scales[0]), image_path, viewer_);
+  const cv::Mat1b picture =
+      ReadPictureOf(image, WithFocalScale(camera, search.focal_scales[0]), image_path, viewer_);
   sighting.is_read = !picture.empty();
   if (!sighting.is_read) return sighting;
   const std::vector<PhotoPlace> found =
@@ -199,10 +199,9 @@ PhotoSighting PhotoFinder::Find(const SparseImage& image, const Camera& camera, 
       [](const SeenPlace& a, const SeenPlace& b) { return a.num_cells > b.num_cells; });
   std::vector<SeenPlace> distinct;
   for (SeenPlace& place : sighting.places) {
-    const bool is_new =
-        std::all_of(distinct.begin(), distinct.end(), [&](const SeenPlace& other) {
-          return AreDistinct(place.pose.cam_from_scan, other.pose.cam_from_scan, search);
-        });
+    const bool is_new = std::all_of(distinct.begin(), distinct.end(), [&](const SeenPlace& other) {
+      return AreDistinct(place.pose.cam_from_scan, other.pose.cam_from_scan, search);
+    });
     if (is_new) distinct.push_back(std::move(place));
   }
   sighting.places = std::move(distinct);

@@ -1,8 +1,8 @@
 #pragma once
 // Where one photo was taken, without a sparse model and without a click: its features against those
-// of views of the scan (photo_search.h), then a closer look at every place that comes of it, against
-// a view of the scan from there. Of the right place this finds many more features that agree, of a
-// wrong one hardly any. Frames: `scan`, `cam`, `img`.
+// of views of the scan (photo_search.h), then a closer look at every place that comes of it,
+// against a view of the scan from there. Of the right place this finds many more features that
+// agree, of a wrong one hardly any. Frames: `scan`, `cam`, `img`.
 
 #include <optional>
 #include <string>

@@ -19,17 +19,18 @@
 namespace roomtex {
 namespace {
 
-constexpr int kParts = 32, kKeptOfPart = 4;      // of the samples: fixed, whatever the threads
-constexpr double kFirstReach = 1.5;              // times the tolerance, before a sample is refined
-constexpr double kLeastLength = 0.2;             // metres between the places of a sample
-constexpr double kLeastAngle = 2, kMost = 150;   // degrees between its rays
-constexpr double kLeastDepth = 0.1;              // metres
+constexpr int kParts = 32, kKeptOfPart = 4;     // of the samples: fixed, whatever the threads
+constexpr double kFirstReach = 1.5;             // times the tolerance, before a sample is refined
+constexpr double kLeastLength = 0.2;            // metres between the places of a sample
+constexpr double kLeastAngle = 2, kMost = 150;  // degrees between its rays
+constexpr double kLeastDepth = 0.1;             // metres
 
 Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
   const Eigen::Vector3d turn(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
   Rigid pose;
-  pose.rotation = turn.norm() > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
-                                  : Eigen::Quaterniond::Identity();
+  pose.rotation = turn.norm() > 0
+                      ? Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
+                      : Eigen::Quaterniond::Identity();
   pose.translation = {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)};
   return pose;
 }
@@ -173,8 +174,8 @@ class PhotoRays {
     const Eigen::AngleAxisd turn(start.rotation);
     const Eigen::Vector3d w = turn.angle() * turn.axis();
     cv::Mat1d rvec = (cv::Mat1d(3, 1) << w.x(), w.y(), w.z());
-    cv::Mat1d tvec = (cv::Mat1d(3, 1) << start.translation.x(), start.translation.y(),
-                      start.translation.z());
+    cv::Mat1d tvec =
+        (cv::Mat1d(3, 1) << start.translation.x(), start.translation.y(), start.translation.z());
     cv::solvePnPRefineLM(places, planes, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec, tvec);
     return RigidOf(rvec, tvec);
   }
@@ -206,8 +207,8 @@ bool AreDistinct(const Rigid& a, const Rigid& b, const PhotoSearchOptions& optio
 Camera WithFocalScale(Camera camera, double scale) {
   camera.params[0] *= scale;
   const std::set<CameraModel> with_one = {
-      CameraModel::kSimplePinhole,       CameraModel::kSimpleRadial,   CameraModel::kRadial,
-      CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye,  CameraModel::kSimpleDivision,
+      CameraModel::kSimplePinhole,       CameraModel::kSimpleRadial,  CameraModel::kRadial,
+      CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye, CameraModel::kSimpleDivision,
       CameraModel::kSimpleFisheye};
   if (with_one.count(camera.model) == 0) camera.params[1] *= scale;
   return camera;

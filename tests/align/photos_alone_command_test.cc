@@ -70,11 +70,12 @@ TEST(PhotosAloneCommand, WritesAModelOfThePhotosAndAReportWithTheUsualKeys) {
 TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   const TempFolder folder;
   const std::string room = folder / "room", output = folder / "aligned";
-  ASSERT_EQ(RunCommandLine("roomtex-simulate --quiet --random_seed 171 --num_photos 2 --photo_width 640 "
-                           "--photo_height 480 --scan_columns 1600 --scan_rows 600 --output_path " +
-                           room)
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      RunCommandLine("roomtex-simulate --quiet --random_seed 171 --num_photos 2 --photo_width 640 "
+                     "--photo_height 480 --scan_columns 1600 --scan_rows 600 --output_path " +
+                     room)
+          .exit_code,
+      0);
   const SparseModel truth = ReadSparseModel(room + "/truth");
   const Camera& camera = truth.cameras.begin()->second;
   std::string params;
@@ -82,8 +83,8 @@ TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   cv::Mat3b stranger(camera.height, camera.width);
   cv::randu(stranger, 0, 255);
   cv::imwrite(room + "/photos/stranger.png", stranger);
-  const std::string command = "roomtex-align --quiet --image_path " + room + "/photos --scan_path " +
-                              room + "/scan.rtpi --camera_model " +
+  const std::string command = "roomtex-align --quiet --image_path " + room +
+                              "/photos --scan_path " + room + "/scan.rtpi --camera_model " +
                               CameraModelName(camera.model) + " --camera_params " + params +
                               " --output_path " + output;
   const CommandResult result = RunCommandLine(command);
@@ -108,7 +109,8 @@ TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   EXPECT_EQ(report["agreement"]["gradient_shift"]["contradicts"], false);
 
   // The trusted result stays.
-  for (const auto& [id, image] : truth.images) std::filesystem::remove(room + "/photos/" + image.name);
+  for (const auto& [id, image] : truth.images)
+    std::filesystem::remove(room + "/photos/" + image.name);
   const CommandResult none = RunCommandLine(command);
   EXPECT_EQ(none.exit_code, 4);
   EXPECT_THAT(none.err, HasSubstr("None of the photos could be placed"));

@@ -15,6 +15,7 @@
 
 namespace roomtex {
 namespace {
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
@@ -43,6 +44,24 @@ class ScanReader : public testing::Test {
   }
   TempFolder folder_;
 };
+
+TEST_F(ScanReader, ColoursStandInForIntensityWhereMostSamplesHaveOne) {
+  ScanReaderOptions options;
+  options.colors_as_intensity = true;
+  const std::string start = std::string("1\n4\n") + kPose;
+  const std::string grey = "1 2 3 0.5 100 100 100\n1 2 4 0.25 0 255 0\n1 3 4 0.1 255 255 255\n";
+  const ScanFile colored = ReadScanFile(Write("a.ptx", start + grey + "0 0 0 0 0 0 0\n"), options);
+  EXPECT_TRUE(colored.scans[0].colors.empty());
+  // Rec. 709; the rows of a PTX go upwards, so the last one is missing and on top.
+  EXPECT_THAT(colored.scans[0].intensity,
+              ElementsAre(0, testing::FloatNear(255, 0.01f), testing::FloatNear(182.376f, 0.01f),
+                          testing::FloatNear(100, 0.01f)));
+  EXPECT_THAT(colored.notes, Contains(HasSubstr("colours of its own")));
+  // A camera that saw half of it.
+  const ScanFile half = ReadScanFile(Write("b.ptx", start + grey + "1 4 4 0.7 0 0 0\n"), options);
+  EXPECT_THAT(half.scans[0].intensity, ElementsAre(0.7f, 0.1f, 0.25f, 0.5f));
+  EXPECT_THAT(half.notes, testing::Not(Contains(HasSubstr("colours of its own"))));
+}
 
 TEST_F(ScanReader, TheContentDecidesNotTheName) {
   const ScanFile rtpi = ReadScanFile(WriteGoodRtpi("a.ply"), {});

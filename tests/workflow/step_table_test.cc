@@ -192,12 +192,28 @@ TEST_F(StepTableTest, OfManyPhotosThePairsWorthMatchingAreMatched) {
 }
 
 TEST_F(StepTableTest, ThePicksThatAreThereAreUsed) {
+  AddPhotos("a", 3, 64);
   fs::create_directories(folder_ / "result");
   EXPECT_THAT(Line("align"), Not(HasSubstr("picks_path")));
   WriteBytes(folder_ / "result/picks.csv", "");
   EXPECT_THAT(Line("align"), HasSubstr("--picks_path " + (folder_ / "result/picks.csv")));
   options_.picks_path = "mine.csv";
   EXPECT_THAT(Line("align"), HasSubstr("--picks_path mine.csv"));
+}
+
+TEST_F(StepTableTest, OnePhotoIsPlacedByItselfWithoutAModel) {
+  AddPhotos("a", 1, 64);
+  options_.camera_model = "OPENCV";
+  options_.camera_params = "70,70,32,20,0,0,0,0";
+  EXPECT_THAT(Applying(), ElementsAre("align", "texture", "pictures", "report"));
+  EXPECT_THAT(Line("align"), Not(HasSubstr("--input_path")));
+  EXPECT_THAT(Line("align"), HasSubstr("--camera_model OPENCV --camera_params 70,70,32,20"));
+  // Two, and picks in one of them: by a model, which picks in one photo place.
+  AddPhotos("b", 1, 64);
+  EXPECT_THAT(Applying(), Not(Contains("mapper")));
+  options_.picks_path = "mine.csv";
+  EXPECT_THAT(Applying(), Contains("mapper"));
+  EXPECT_THAT(Line("align"), HasSubstr("--input_path"));
 }
 
 TEST_F(StepTableTest, FramesOfAVideoAndFacesOfPanoramasComeFirst) {
