@@ -46,9 +46,10 @@ std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const V
            Number(100 * options.min_share, 0) + " % are asked for)";
   }
   if (sighting.places.size() > 1 && num < options.min_ratio * sighting.places[1].num_cells) {
-    return "it could have been taken from two places, or with two focal lengths (" +
-           std::to_string(num) + " and " + std::to_string(sighting.places[1].num_cells) +
-           " places of the scan agree)";
+    const bool given = source == FocalSource::kGiven;
+    return std::string("it could have been taken from two places") +
+           (given ? "" : ", or with two focal lengths") + " (" + std::to_string(num) + " and " +
+           std::to_string(sighting.places[1].num_cells) + " places of the scan agree)";
   }
   if (source == FocalSource::kPicks && !(pose.focal_sigma > 0)) {
     return "nothing says its focal length, and what it shows of the scan, one plane, does not tell "
