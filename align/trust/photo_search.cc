@@ -20,6 +20,7 @@ namespace roomtex {
 namespace {
 
 constexpr int kParts = 32, kKeptOfPart = 4;     // of the samples: fixed, whatever the threads
+constexpr size_t kRefined = 30;                 // of each focal length
 constexpr double kFirstReach = 1.5;             // times the tolerance, before a sample is refined
 constexpr double kLeastLength = 0.2;            // metres between the places of a sample
 constexpr double kLeastAngle = 2, kMost = 150;  // degrees between its rays
@@ -240,13 +241,27 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
         if (best.size() > kKeptOfPart) best.pop_back();
       }
     }
-    for (PhotoPlace& place : best) {
-      place = one.Refined(place.cam_from_scan);
-      place.focal_scale = options.focal_scales[part / kParts];
-    }
   });
+  // The best of every focal length, whatever the others have.
   std::vector<PhotoPlace> all, kept;
-  for (const auto& part : of_parts) all.insert(all.end(), part.begin(), part.end());
+  for (int scale = 0; scale < num_scales; ++scale) {
+    std::vector<PhotoPlace> of_scale;
+    for (int part = scale * kParts; part < (scale + 1) * kParts; ++part) {
+      for (PhotoPlace& place : of_parts[part]) {
+        place.focal_scale = options.focal_scales[scale];
+        of_scale.push_back(std::move(place));
+      }
+    }
+    std::stable_sort(of_scale.begin(), of_scale.end(), IsBetter);
+    if (of_scale.size() > kRefined) of_scale.resize(kRefined);
+    const size_t first = all.size();
+    all.insert(all.end(), of_scale.begin(), of_scale.end());
+    ParallelFor(num_threads, static_cast<int>(first), static_cast<int>(all.size()), [&](int i) {
+      const double focal_scale = all[i].focal_scale;
+      all[i] = rays[scale].Refined(all[i].cam_from_scan);
+      all[i].focal_scale = focal_scale;
+    });
+  }
   std::stable_sort(all.begin(), all.end(), IsBetter);
   for (const PhotoPlace& one : all) {
     if (static_cast<int>(kept.size()) == options.num_kept) break;
