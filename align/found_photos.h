@@ -19,7 +19,7 @@ struct FoundPhotoOptions {
   // Places of the scan, in cells of 15 cm, that photo and scan have in common: at least so many,
   // and so many times those of the next best place. Larger = stricter. Counted: docs/automatic.md.
   int min_cells = 25;
-  double min_ratio = 2;
+  double min_ratio = 1.5;
   // Of the cells in which anything could be compared, the share that agrees: a room of the same
   // plan has some of the same furniture. Larger = stricter.
   double min_share = 0.4;

@@ -25,7 +25,7 @@ constexpr double kNormalised = 0.9;  // degrees, standard deviation of the neigh
 
 constexpr double kLeastSide = 32;  // pixels, of a photo as it is described
 
-constexpr double kNeighbour = 2;  // pixels, of a view: for the side of a surface that it shows
+constexpr double kBeside = 2;  // pixels, of a view: for the side of a surface that it shows
 
 constexpr int kNearest = 5;              // that may be one place, seen in several views
 constexpr double kElsewhere = 0.3;       // metres
@@ -173,7 +173,7 @@ AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,
 namespace {
 
 // The camera of a view, looking `lean` above the horizon.
-Rigid ViewPose(const Scan& scan, const Eigen::Vector3d& up, double azimuth, double lean) {
+Rigid PoseOfView(const Scan& scan, const Eigen::Vector3d& up, double azimuth, double lean) {
   const Eigen::Vector3d level = Eigen::AngleAxisd(RadFromDeg(azimuth), up) * up.unitOrthogonal();
   const Eigen::Vector3d z = std::cos(RadFromDeg(lean)) * level + std::sin(RadFromDeg(lean)) * up;
   const Eigen::Vector3d x = z.cross(up).normalized(), y = z.cross(x);
@@ -216,10 +216,10 @@ AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera
   };
   // From behind, the mirror image of a wall looks like the wall.
   const auto is_seen_from_behind = [&](const Eigen::Vector2d& at, const Eigen::Vector3d& x) {
-    const auto right = place_at(at + Eigen::Vector2d(kNeighbour, 0)),
-               left = place_at(at - Eigen::Vector2d(kNeighbour, 0)),
-               below = place_at(at + Eigen::Vector2d(0, kNeighbour)),
-               above = place_at(at - Eigen::Vector2d(0, kNeighbour));
+    const auto right = place_at(at + Eigen::Vector2d(kBeside, 0)),
+               left = place_at(at - Eigen::Vector2d(kBeside, 0)),
+               below = place_at(at + Eigen::Vector2d(0, kBeside)),
+               above = place_at(at - Eigen::Vector2d(0, kBeside));
     if (!right || !left || !below || !above) return true;  // an edge: no side at all
     const Eigen::Vector3d normal = (*right - *left).cross(*below - *above);
     const int scan = view.scan(std::min(static_cast<int>(at.y()), camera.height - 1),
@@ -262,7 +262,7 @@ AppearanceFeatures FeaturesOfScan(const ScanViewer& viewer, const Eigen::Vector3
                                  static_cast<size_t>(num_stations)];
     const int k = i % per_station;
     of_views[i] = FeaturesOfView(
-        viewer, camera, ViewPose(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]),
+        viewer, camera, PoseOfView(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]),
         upright ? std::optional<Eigen::Vector3d>(up_in_scan) : std::nullopt, 2 * most / num_views);
   });
   return JoinFeatures(std::move(of_views), {}, most);

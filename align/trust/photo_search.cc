@@ -19,8 +19,10 @@
 namespace roomtex {
 namespace {
 
-constexpr int kParts = 32, kKeptOfPart = 4;     // of the samples: fixed, whatever the threads
-constexpr size_t kRefined = 30;                 // of each focal length
+constexpr int kParts = 32, kKeptOfPart = 6;  // of the samples: fixed, whatever the threads
+constexpr size_t kRefined = 30;              // of each focal length
+// Of what makes two places: between those that are refined.
+constexpr double kApart = 0.2;
 constexpr double kFirstReach = 1.5;             // times the tolerance, before a sample is refined
 constexpr double kLeastLength = 0.2;            // metres between the places of a sample
 constexpr double kLeastAngle = 2, kMost = 150;  // degrees between its rays
@@ -242,7 +244,10 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
       }
     }
   });
-  // The best of every focal length, whatever the others have.
+  // The best of every focal length, whatever the others have, and not all of one place.
+  PhotoSearchOptions apart = options;
+  apart.distinct *= kApart;
+  apart.distinct_deg *= kApart;
   std::vector<PhotoPlace> all, kept;
   for (int scale = 0; scale < num_scales; ++scale) {
     std::vector<PhotoPlace> of_scale;
@@ -253,9 +258,15 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
       }
     }
     std::stable_sort(of_scale.begin(), of_scale.end(), IsBetter);
-    if (of_scale.size() > kRefined) of_scale.resize(kRefined);
     const size_t first = all.size();
-    all.insert(all.end(), of_scale.begin(), of_scale.end());
+    for (PhotoPlace& place : of_scale) {
+      if (all.size() == first + kRefined) break;
+      const bool is_new = std::all_of(
+          all.begin() + static_cast<long>(first), all.end(), [&](const PhotoPlace& other) {
+            return AreDistinct(place.cam_from_scan, other.cam_from_scan, apart);
+          });
+      if (is_new) all.push_back(std::move(place));
+    }
     ParallelFor(num_threads, static_cast<int>(first), static_cast<int>(all.size()), [&](int i) {
       const double focal_scale = all[i].focal_scale;
       all[i] = rays[scale].Refined(all[i].cam_from_scan);
