@@ -19,14 +19,14 @@
 namespace roomtex {
 namespace {
 
-constexpr int kParts = 32, kKeptOfPart = 6;  // of the samples: fixed, whatever the threads
-constexpr size_t kRefined = 30;              // of each focal length
+constexpr int kSampleParts = 32, kKeptOfSamples = 6;  // of the samples: fixed, whatever the threads
+constexpr size_t kRefined = 30;                       // of each focal length
 // Of what makes two places: between those that are refined.
 constexpr double kApart = 0.2;
-constexpr double kFirstReach = 1.5;             // times the tolerance, before a sample is refined
-constexpr double kLeastLength = 0.2;            // metres between the places of a sample
-constexpr double kLeastAngle = 2, kMost = 150;  // degrees between its rays
-constexpr double kLeastDepth = 0.1;             // metres
+constexpr double kSampleReach = 1.5;  // times the tolerance, before a sample is refined
+constexpr double kLeastLength = 0.2;  // metres between the places of a sample
+constexpr double kLeastAngle = 2, kMostAngle = 150;  // degrees between its rays
+constexpr double kLeastDepth = 0.1;                  // metres
 
 Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
   const Eigen::Vector3d turn(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
@@ -38,10 +38,10 @@ Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
   return pose;
 }
 
-using Cell = std::array<int, 3>;
+using ScanCell = std::array<int, 3>;
 
-Cell CellOf(const Eigen::Vector3d& x, double cell) {
-  Cell key;
+ScanCell ScanCellOf(const Eigen::Vector3d& x, double cell) {
+  ScanCell key;
   for (int k = 0; k < 3; ++k) key[k] = static_cast<int>(std::floor(x[k] / cell));
   return key;
 }
@@ -53,9 +53,9 @@ class PhotoRays {
             const PhotoSearchOptions& options)
       : options_(options) {
     const CameraProjection projection(camera);
-    std::map<Cell, std::vector<int>> by_cell;
+    std::map<ScanCell, std::vector<int>> by_cell;
     for (size_t i = 0; i < matches.size(); ++i) {
-      by_cell[CellOf(matches[i].x_in_scan, options.cell)].push_back(static_cast<int>(i));
+      by_cell[ScanCellOf(matches[i].x_in_scan, options.cell)].push_back(static_cast<int>(i));
     }
     const double px = camera.MeanFocalLength() * RadFromDeg(options.photo_cell_deg);
     std::map<std::pair<int, int>, int> photo_cells;
@@ -92,7 +92,7 @@ class PhotoRays {
       const int i = one[k], j = one[(k + 1) % 3];
       if ((places_[i] - places_[j]).norm() < kLeastLength) return {};
       const double angle = AngleBetween(rays_[i], rays_[j]);
-      if (angle < RadFromDeg(kLeastAngle) || angle > RadFromDeg(kMost)) return {};
+      if (angle < RadFromDeg(kLeastAngle) || angle > RadFromDeg(kMostAngle)) return {};
     }
     cv::Mat1d places(3, 3), planes(3, 2);
     for (int k = 0; k < 3; ++k) {
@@ -197,8 +197,8 @@ bool IsBetter(const PhotoPlace& a, const PhotoPlace& b) { return a.num_cells > b
 }  // namespace
 
 int CountCells(const std::vector<PhotoMatch>& matches, double cell) {
-  std::set<Cell> cells;
-  for (const PhotoMatch& match : matches) cells.insert(CellOf(match.x_in_scan, cell));
+  std::set<ScanCell> cells;
+  for (const PhotoMatch& match : matches) cells.insert(ScanCellOf(match.x_in_scan, cell));
   return static_cast<int>(cells.size());
 }
 
@@ -225,22 +225,22 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
     rays.emplace_back(matches, WithFocalScale(camera, scale), options);
   }
   const int num_scales = static_cast<int>(rays.size());
-  std::vector<std::vector<PhotoPlace>> of_parts(static_cast<size_t>(kParts) * num_scales);
+  std::vector<std::vector<PhotoPlace>> of_parts(static_cast<size_t>(kSampleParts) * num_scales);
   ParallelFor(num_threads, 0, static_cast<int>(of_parts.size()), [&](int part) {
-    const PhotoRays& one = rays[part / kParts];
+    const PhotoRays& one = rays[part / kSampleParts];
     if (one.num_cells() < 4) return;
     RandomStream random(MixBits(0x9b070, static_cast<uint64_t>(part)));
     std::vector<PhotoPlace>& best = of_parts[part];
-    const double reach = kFirstReach * RadFromDeg(options.tolerance_deg);
-    for (int k = 0; k < options.num_samples / kParts; ++k) {
+    const double reach = kSampleReach * RadFromDeg(options.tolerance_deg);
+    for (int k = 0; k < options.num_samples / kSampleParts; ++k) {
       for (const Rigid& pose : one.Sample(&random)) {
         PhotoPlace place;
         place.cam_from_scan = pose;
         place.num_cells = one.CellsWithin(pose, reach);
         const auto at = std::upper_bound(best.begin(), best.end(), place, IsBetter);
-        if (at - best.begin() >= kKeptOfPart) continue;
+        if (at - best.begin() >= kKeptOfSamples) continue;
         best.insert(at, place);
-        if (best.size() > kKeptOfPart) best.pop_back();
+        if (best.size() > kKeptOfSamples) best.pop_back();
       }
     }
   });
@@ -251,7 +251,7 @@ std::vector<PhotoPlace> SearchPhotoPlaces(const std::vector<PhotoMatch>& matches
   std::vector<PhotoPlace> all, kept;
   for (int scale = 0; scale < num_scales; ++scale) {
     std::vector<PhotoPlace> of_scale;
-    for (int part = scale * kParts; part < (scale + 1) * kParts; ++part) {
+    for (int part = scale * kSampleParts; part < (scale + 1) * kSampleParts; ++part) {
       for (PhotoPlace& place : of_parts[part]) {
         place.focal_scale = options.focal_scales[scale];
         of_scale.push_back(std::move(place));

@@ -56,7 +56,7 @@ TEST(PhotoSearch, FindsThePoseAmongFiveTimesAsManyWrongMatches) {
     EXPECT_LT(photo.Error(places[0]), 0.02);
     EXPECT_GE(places[0].num_cells, 25);
     if (places.size() > 1) {
-      EXPECT_LT(places[1].num_cells, 10);
+      EXPECT_LT(places[1].num_cells, places[0].num_cells / 2);  // some of the same matches, askew
     }
     for (const int i : places[0].agreeing) EXPECT_LT(i, 40);  // hardly a wrong one
   }
