@@ -107,9 +107,9 @@ class CellGrid {
   std::optional<int64_t> IndexOf(const Eigen::Vector3d& x) const {
     int64_t index = 0;
     for (int axis = 2; axis >= 0; --axis) {
-      const auto i = static_cast<int64_t>(std::floor(x[axis] / kCell));
-      if (i < 0 || i >= counts_[axis]) return std::nullopt;
-      index = index * counts_[axis] + i;
+      const double i = std::floor(x[axis] / kCell);
+      if (!(i >= 0 && i < counts_[axis])) return std::nullopt;
+      index = index * counts_[axis] + static_cast<int64_t>(i);
     }
     return index;
   }
