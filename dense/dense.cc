@@ -21,9 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
-constexpr int kMaxNeighbours = 8;  // photos that may confirm a depth
-constexpr int kSmallestSide = 32;  // pixels of a picture: smaller ones hold no window
-constexpr int kPointColumns = 48;  // of the raster of a photo's points
+constexpr int kMaxNeighbours = 12;  // photos that may confirm a depth, or deny it
+constexpr int kAsked = 8;           // photos whose depth is tried in another
+constexpr int kSmallestSide = 32;   // pixels of a picture: smaller ones hold no window
+constexpr int kPointColumns = 48;   // of the raster of a photo's points
 
 class DenseRun {
  public:
@@ -165,8 +166,10 @@ class DenseRun {
         if (of_scan || !Correlates(estimate.score(y, x))) is_new(y, x) = 0;
       }
     }
+    cv::Mat1f compared;
+    estimate.compared.convertTo(compared, CV_32F);  // 20 bits at most: exact
     WriteDenseArray({estimate.depth, estimate.score, estimate.normals[0], estimate.normals[1],
-                     estimate.normals[2], is_new},
+                     estimate.normals[2], is_new, compared},
                     Aside(i, ".first"));
     return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
   }
@@ -177,15 +180,18 @@ class DenseRun {
     const StereoPicture reference = Load(i);
     const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
-    const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], 0};
+    cv::Mat1i compared;
+    arrays[6].convertTo(compared, CV_32S);
+    const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], compared, 0};
     const auto found = [&](int k) -> DepthOfSource {
       const int other = view.neighbours[k];
       const std::vector<cv::Mat1f> its = ReadDenseArray(Aside(other, ".first"));
       return {views_[other].camera, views_[other].cam_from_scan, its[5], {its[2], its[3], its[4]}};
     };
-    const DepthEstimate estimate = RefineDepth(
-        reference, LoadSources(view), open, first, static_cast<int>(view.neighbours.size()), found,
-        options_.patch_match, MixBits(seed_, i, 1), num_threads_);
+    const int num_found = std::min(static_cast<int>(view.neighbours.size()), kAsked);
+    const DepthEstimate estimate =
+        RefineDepth(reference, LoadSources(view), open, first, num_found, found,
+                    options_.patch_match, MixBits(seed_, i, 1), num_threads_);
     // The scan's depth where only it can be, elsewhere what was found.
     cv::Mat1f depth = open.scan_depth().clone();
     cv::Mat1f is_open(depth.size(), 0.0f);
@@ -207,7 +213,7 @@ class DenseRun {
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".estimate"));
     const cv::Mat1f depth = ReadDenseArray(Aside(i, ".depth"))[0];
     const cv::Mat1b is_open = arrays[0] > 0;
-    DepthEstimate estimate{depth.clone(), {arrays[2], arrays[3], arrays[4]}, arrays[1], 0};
+    DepthEstimate estimate{depth.clone(), {arrays[2], arrays[3], arrays[4]}, arrays[1], {}, 0};
     estimate.depth.setTo(0, is_open == 0);
     cv::Mat1f scan_only = depth.clone();
     scan_only.setTo(0, is_open);

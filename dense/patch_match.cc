@@ -23,12 +23,17 @@ constexpr int kNormalRadiusPx = 3;   // of the scan's normals
 constexpr int kSide = 5;             // samples of a window, each way ...
 constexpr int kStep = 2;             // ... so many pixels apart
 constexpr int kSamples = kSide * kSide;
-constexpr int kBest = 2;               // sources that count: others may not see the place
-constexpr float kSigmaColor = 25;      // grey levels: what is of another colour is another thing
-constexpr float kMinDeviation = 2.5f;  // grey levels; flatter windows say nothing
-constexpr float kMaxSlope = 5;         // tangent of the angle to a plane that faces the camera
-constexpr float kSameDepth = 0.01f;    // share
-constexpr float kNoMatch = 2;          // cost of a hypothesis that no two sources see
+constexpr int kLanes = 4;  // that the processor takes at a time
+constexpr int kPadded = (kSamples + kLanes - 1) / kLanes * kLanes;
+constexpr int kMaxSources = 20;
+constexpr int kCompared = 4;             // sources at the full resolution, pixel by pixel
+constexpr int kBest = 2;                 // sources that count: others may not see the place
+constexpr float kSigmaColor = 25;        // grey levels: what is of another colour is another thing
+constexpr float kMinDeviation = 2.5f;    // grey levels; flatter windows say nothing
+constexpr float kMaxSlope = 5;           // tangent of the angle to a plane that faces the camera
+constexpr float kSameDepth = 0.01f;      // share
+constexpr float kAlreadyThere = 0.002f;  // share
+constexpr float kNoMatch = 2;            // cost of a hypothesis that no two sources see
 
 using Plane = InverseDepthPlane;
 
@@ -64,6 +69,20 @@ Eigen::Vector3f NormalFromPlane(const Plane& plane, const Camera& camera, float 
   return -away.normalized();
 }
 
+constexpr int Dx(int k) { return (k % kSide - kSide / 2) * kStep; }
+constexpr int Dy(int k) { return (k / kSide - kSide / 2) * kStep; }
+
+struct WindowOffsets {
+  std::array<float, kPadded> dx{}, dy{};
+  constexpr WindowOffsets() {
+    for (int k = 0; k < kSamples; ++k) {
+      dx[k] = static_cast<float>(Dx(k));
+      dy[k] = static_cast<float>(Dy(k));
+    }
+  }
+};
+constexpr WindowOffsets kOffsets;
+
 // The window of the reference around one pixel, with bilateral weights.
 class Window {
  public:
@@ -97,25 +116,48 @@ class Window {
     const Eigen::Vector3f right = source.turned.col(0) + source.moved * plane.a;
     const Eigen::Vector3f down = source.turned.col(1) + source.moved * plane.b;
     const auto max_x = static_cast<float>(grey.cols - 1), max_y = static_cast<float>(grey.rows - 1);
-    float sum = 0, square = 0, cross = 0;
+    // The window is a convex quadrilateral there: in the picture if its corners are.
+    constexpr auto kReach = static_cast<float>(kSide / 2 * kStep);
+    for (const float dy : {-kReach, kReach}) {
+      for (const float dx : {-kReach, kReach}) {
+        const Eigen::Vector3f corner = at + dx * right + dy * down;
+        if (!(corner.z() > 1e-6f)) return kNoMatch;
+        const float u = corner.x() / corner.z() - 0.5f, v = corner.y() / corner.z() - 0.5f;
+        // By a hair more than an edge: the samples are rounded otherwise.
+        if (!(u > 1e-3f && v > 1e-3f && u < max_x - 1e-3f && v < max_y - 1e-3f)) return kNoMatch;
+      }
+    }
+    // Without a branch, four or eight samples at a time.
+    alignas(32) std::array<float, kPadded> us, vs, values;
+    for (int k = 0; k < kPadded; ++k) {
+      const float inverse = 1 / (at.z() + kOffsets.dx[k] * right.z() + kOffsets.dy[k] * down.z());
+      us[k] = (at.x() + kOffsets.dx[k] * right.x() + kOffsets.dy[k] * down.x()) * inverse - 0.5f;
+      vs[k] = (at.y() + kOffsets.dx[k] * right.y() + kOffsets.dy[k] * down.y()) * inverse - 0.5f;
+    }
+    const float* const pixels = grey[0];
+    const auto stride = static_cast<int>(grey.step1());
     for (int k = 0; k < kSamples; ++k) {
-      const auto dx = static_cast<float>(Dx(k)), dy = static_cast<float>(Dy(k));
-      const float z = at.z() + dx * right.z() + dy * down.z();
-      if (!(z > 1e-6f)) return kNoMatch;
-      const float inverse = 1 / z;
-      const float u = (at.x() + dx * right.x() + dy * down.x()) * inverse - 0.5f;
-      const float v = (at.y() + dx * right.y() + dy * down.y()) * inverse - 0.5f;
-      if (!(u >= 0 && v >= 0 && u < max_x && v < max_y)) return kNoMatch;
-      const int column = static_cast<int>(u), row = static_cast<int>(v);
-      const float s = u - static_cast<float>(column), t = v - static_cast<float>(row);
-      const float* above = grey[row] + column;
-      const float* below = grey[row + 1] + column;
-      const float value =
-          (1 - t) * ((1 - s) * above[0] + s * above[1]) + t * ((1 - s) * below[0] + s * below[1]);
-      const float weighted = weight_[k] * value;
-      sum += weighted;
-      square += weighted * value;
-      cross += weighted * value_[k];
+      const int column = static_cast<int>(us[k]), row = static_cast<int>(vs[k]);
+      const float s = us[k] - static_cast<float>(column), t = vs[k] - static_cast<float>(row);
+      const float* above = pixels + static_cast<ptrdiff_t>(row) * stride + column;
+      const float* below = above + stride;
+      const float top = above[0] + s * (above[1] - above[0]);
+      const float bottom = below[0] + s * (below[1] - below[0]);
+      values[k] = top + t * (bottom - top);
+    }
+    for (int k = kSamples; k < kPadded; ++k) values[k] = 0;
+    std::array<float, kLanes> sums{}, squares{}, crosses{};
+    for (int k = 0; k < kPadded; k += kLanes) {
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const float weighted = weight_[k + lane] * values[k + lane];
+        sums[lane] += weighted;
+        squares[lane] += weighted * values[k + lane];
+        crosses[lane] += weighted * value_[k + lane];
+      }
+    }
+    float sum = 0, square = 0, cross = 0;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      sum += sums[lane], square += squares[lane], cross += crosses[lane];
     }
     const float mean = sum / sum_;
     const float variance = square / sum_ - mean * mean;
@@ -124,10 +166,7 @@ class Window {
   }
 
  private:
-  static constexpr int Dx(int k) { return (k % kSide - kSide / 2) * kStep; }
-  static constexpr int Dy(int k) { return (k / kSide - kSide / 2) * kStep; }
-
-  std::array<float, kSamples> value_, weight_;
+  alignas(32) std::array<float, kPadded> value_{}, weight_{};  // 0 beyond kSamples
   float sum_ = 0, mean_ = 0, variance_ = 0;
 };
 
@@ -154,6 +193,8 @@ class Level {
     }
     planes_.resize(grey_.total());
     costs_.assign(grey_.total(), kNoMatch);
+    all_sources_ = (uint32_t{1} << sources_.size()) - 1;
+    compared_.assign(grey_.total(), all_sources_);
     scan_.resize(grey_.total());
     bins_.assign(grey_.total(), 0);
     FindOpenPixels();
@@ -167,6 +208,8 @@ class Level {
       const int pixel = y * grey_.cols + x;
       RandomStream random(MixBits(seed_, pixel, 0));
       if (coarser != nullptr) {
+        const int there = coarser->PixelForFiner(x, y, grey_.size());
+        compared_[pixel] = coarser->compared_[there];
         Try(x, y, coarser->PlaneForFiner(x, y, grey_.size()), *window);
       } else {
         for (const int other : beside[pixel]) {
@@ -182,6 +225,7 @@ class Level {
   void Start(const DepthEstimate& before) {
     ForOpenPixels(-1, [&](int x, int y, Window* window) {
       const float depth = before.depth(y, x);
+      compared_[y * grey_.cols + x] = static_cast<uint32_t>(before.compared(y, x));
       if (depth > 0) Try(x, y, PlaneAt(x, y, depth, before.normals), *window);
       const Plane& scan = scan_[y * grey_.cols + x];
       if (scan.w > 0) Try(x, y, scan, *window);
@@ -218,8 +262,14 @@ class Level {
       }
     }
     ForOpenPixels(-1, [&](int x, int y, Window* window) {
-      const Plane& plane = shown[y * grey_.cols + x];
-      if (plane.w > 0) Try(x, y, plane, *window);
+      const int pixel = y * grey_.cols + x;
+      const Plane& plane = shown[pixel];
+      // What is there already is refined anyway.
+      if (!(plane.w > 0) || std::abs(plane.w - planes_[pixel].w) < kAlreadyThere * plane.w) return;
+      const uint32_t compared = compared_[pixel];
+      compared_[pixel] = all_sources_;  // these were the best for something else
+      Try(x, y, plane, *window);
+      compared_[pixel] = planes_[pixel].w == plane.w ? BestSources(x, y, *window) : compared;
     });
   }
 
@@ -254,8 +304,16 @@ class Level {
     }
   }
 
+  // What is found from now on, and by a finer level, is compared with fewer sources.
+  void ChooseSources() {
+    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+      compared_[y * grey_.cols + x] = BestSources(x, y, *window);
+    });
+  }
+
   DepthEstimate Result() const {
     DepthEstimate result;
+    result.compared = cv::Mat1i(grey_.size());
     result.depth = cv::Mat1f::zeros(grey_.size());
     result.score = cv::Mat1f::zeros(grey_.size());
     for (int k = 0; k < 3; ++k) result.normals.emplace_back(cv::Mat1f::zeros(grey_.size()));
@@ -263,6 +321,7 @@ class Level {
     for (int y = 0; y < grey_.rows; ++y) {
       for (int x = 0; x < grey_.cols; ++x) {
         const int pixel = y * grey_.cols + x;
+        result.compared(y, x) = static_cast<int>(compared_[pixel]);
         num_open += bins_[pixel] != 0;
         if (bins_[pixel] == 0 || !(planes_[pixel].w > 0)) continue;
         result.depth(y, x) = 1 / planes_[pixel].w;
@@ -282,6 +341,23 @@ class Level {
   Plane PlaneAt(int x, int y, float depth, const std::vector<cv::Mat1f>& normals) const {
     return PlaneFromNormal(depth, {normals[0](y, x), normals[1](y, x), normals[2](y, x)}, camera_,
                            static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  }
+
+  // The sources that correlate best with what was found at a pixel.
+  uint32_t BestSources(int x, int y, const Window& window) const {
+    const Plane& plane = planes_[y * grey_.cols + x];
+    if (!(plane.w > 0) || sources_.size() <= kCompared) return all_sources_;
+    std::array<std::pair<float, int>, kMaxSources> costs;
+    for (size_t i = 0; i < sources_.size(); ++i) {
+      costs[i] = {window.Cost(sources_[i], static_cast<float>(x) + 0.5f,
+                              static_cast<float>(y) + 0.5f, plane),
+                  static_cast<int>(i)};
+    }
+    std::partial_sort(costs.begin(), costs.begin() + kCompared,
+                      costs.begin() + static_cast<ptrdiff_t>(sources_.size()));
+    uint32_t best = 0;
+    for (int k = 0; k < kCompared; ++k) best |= uint32_t{1} << costs[k].second;
+    return best;
   }
 
   void FindOpenPixels() {
@@ -307,7 +383,7 @@ class Level {
 
   // color: 0, 1 = of the chequerboard; -1 = all. Rows side by side.
   template <typename Body>
-  void ForOpenPixels(int color, const Body& body) {
+  void ForOpenPixels(int color, const Body& body) const {
     ParallelFor(num_threads_, 0, grey_.rows, [&](int y) {
       Window window;
       for (int x = 0; x < grey_.cols; ++x) {
@@ -334,9 +410,10 @@ class Level {
     if (!IsAllowed(pixel, plane)) return;
     std::array<float, kBest> best;
     best.fill(kNoMatch);
-    for (const Source& source : sources_) {
-      const float cost =
-          window.Cost(source, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, plane);
+    for (size_t i = 0; i < sources_.size(); ++i) {
+      if ((compared_[pixel] >> i & 1) == 0) continue;
+      const float cost = window.Cost(sources_[i], static_cast<float>(x) + 0.5f,
+                                     static_cast<float>(y) + 0.5f, plane);
       if (cost < best[0]) {
         best[1] = best[0];
         best[0] = cost;
@@ -400,6 +477,12 @@ class Level {
     return beside;
   }
 
+  int PixelForFiner(int x, int y, const cv::Size& size) const {
+    const int column = static_cast<int>((x + 0.5) * grey_.cols / size.width);
+    const int row = static_cast<int>((y + 0.5) * grey_.rows / size.height);
+    return std::min(row, grey_.rows - 1) * grey_.cols + std::min(column, grey_.cols - 1);
+  }
+
   Plane PlaneForFiner(int x, int y, const cv::Size& size) const {
     const float scale_x = static_cast<float>(grey_.cols) / static_cast<float>(size.width);
     const float scale_y = static_cast<float>(grey_.rows) / static_cast<float>(size.height);
@@ -422,6 +505,8 @@ class Level {
   std::vector<Source> sources_;
   std::vector<Plane> planes_, scan_;  // w = 0: none
   std::vector<float> costs_;
+  std::vector<uint32_t> compared_;  // sources, one bit each
+  uint32_t all_sources_ = 0;
   std::vector<uint64_t> bins_;  // 0 = only the scan's surface can be there
 };
 
@@ -431,9 +516,11 @@ int FineRounds(const PatchMatchOptions& options) { return (options.num_iteration
 
 void PatchMatchOptions::Declare(OptionFields* fields) {
   fields
-      ->Int("PatchMatch.num_sources", &num_sources,
-            "Photos that each photo is compared with. More = surer, slower.")
-      .Within(2, 20, "photos");
+      ->Int(
+          "PatchMatch.num_sources", &num_sources,
+          "Photos that each photo is compared with: at half the resolution with all of them, then, "
+          "place by place, with the four that correlate best. More = more complete, slower.")
+      .Within(2, kMaxSources, "photos");
   fields
       ->Int("PatchMatch.num_iterations", &num_iterations,
             "Rounds of propagation and refinement at each of two resolutions. More = slower, and "
@@ -531,6 +618,7 @@ DepthEstimate EstimateDepth(const StereoPicture& reference,
   Level coarse(reference, sources, open, 2, MixBits(seed, 2), num_threads);
   coarse.Start(nullptr);
   for (int i = 0; i < options.num_iterations; ++i) coarse.Iterate(i, true);
+  coarse.ChooseSources();
   Level fine(reference, sources, open, 1, MixBits(seed, 1), num_threads);
   fine.Start(&coarse);
   // Half of the rounds are left to RefineDepth.

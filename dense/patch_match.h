@@ -22,8 +22,9 @@ namespace roomtex {
 class OptionFields;
 
 struct PatchMatchOptions {
-  // Photos that each photo is compared with. More = surer, slower.
-  int num_sources = 4;
+  // Photos that each photo is compared with: at half the resolution with all of them, then, place
+  // by place, with the four that correlate best. More = more complete, slower.
+  int num_sources = 8;
   // Rounds of propagation and refinement per level of resolution. More = slower.
   int num_iterations = 3;
 
@@ -87,6 +88,7 @@ struct DepthEstimate {
   cv::Mat1f depth;                 // metres, 0 = none: where open space was searched
   std::vector<cv::Mat1f> normals;  // as of a normal map
   cv::Mat1f score;                 // normalised cross-correlation with the best two sources, 0..1
+  cv::Mat1i compared;              // the sources that show most, pixel by pixel: one bit each
   double share_open = 0;           // of the pixels
 };
 

@@ -22,6 +22,7 @@ constexpr double kOutsideBox = 0.1;     // metres outside the scan's box
 constexpr double kSpeckleShare = 2e-4;  // of a picture: smaller islands of depth are chance
 constexpr double kDepthSteps = 4000;    // per unit of the logarithm of the depth, for 16 bits
 constexpr int kTrimPx = 4;              // half a window of the matching
+constexpr int kThroughPx = 2;           // around a position that a photo sees through
 constexpr float kBehind = 0.02f;        // share of the depth: another thing
 constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
 
@@ -80,6 +81,19 @@ void TrimEdges(const DepthEstimate& estimate, const cv::Mat1f& scan_only, const 
   });
 }
 
+// Whether everything around that position is farther than `depth`.
+bool SeesThrough(const cv::Mat1f& seen, const Eigen::Vector2d& at, double depth) {
+  const auto farther = static_cast<float>((1 + kBehind) * depth);
+  for (int dy = -kThroughPx; dy <= kThroughPx; dy += kThroughPx) {
+    for (int dx = -kThroughPx; dx <= kThroughPx; dx += kThroughPx) {
+      const int column = std::clamp(static_cast<int>(at.x()) + dx, 0, seen.cols - 1);
+      const int row = std::clamp(static_cast<int>(at.y()) + dy, 0, seen.rows - 1);
+      if (!(seen(row, column) > farther)) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 void SupplementOptions::Declare(OptionFields* fields) {
@@ -92,6 +106,11 @@ void SupplementOptions::Declare(OptionFields* fields) {
       ->Int("Fusion.min_support", &min_support,
             "Photos that a place must be found from. Larger = stricter.")
       .Within(2, 50, "photos");
+  fields
+      ->Number("Fusion.min_pair_correlation", &min_pair_correlation,
+               "Normalised cross-correlation with which two photos are enough, 0 to 1 (1 = never). "
+               "Larger = stricter.")
+      .Within(0, 1);
   fields
       ->Number("Fusion.max_depth_difference", &max_depth_difference,
                "Depths of two photos agree within this share of the depth. Larger = more tolerant.")
@@ -140,10 +159,15 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
       const Eigen::Vector3d place = scan_from_cam * (ray * depth);
       depths.assign(1, depth);
       double baselines2 = 0;
+      bool is_seen_through = false;
       for (size_t k = 0; k < others.size(); ++k) {
         const Eigen::Vector3d in_other = others[k].view->cam_from_scan * place;
         const auto there = other_projections[k].ImgFromCam(in_other);
         if (!there || !other_projections[k].InImage(*there)) continue;
+        if (SeesThrough(others[k].depth, *there, in_other.z())) {
+          is_seen_through = true;
+          break;
+        }
         const int column = std::min(static_cast<int>(there->x()), others[k].depth.cols - 1);
         const int row = std::min(static_cast<int>(there->y()), others[k].depth.rows - 1);
         const double seen = others[k].depth(row, column);
@@ -165,7 +189,9 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
         baselines2 += (baseline - direction.dot(baseline) * direction).squaredNorm();
       }
       const int support = static_cast<int>(depths.size());
-      if (support < options.min_support) continue;
+      const bool is_pair = support == 2 && options.min_pair_correlation < 1 &&
+                           estimate.score(y, x) >= options.min_pair_correlation;
+      if (is_seen_through || (support < options.min_support && !is_pair)) continue;
       const double fused = MidpointMedian(depths);
       const Eigen::Vector3d fused_place = scan_from_cam * (ray * fused);
       result.depth(y, x) = static_cast<float>(fused);

@@ -24,9 +24,11 @@ struct SupplementOptions {
   double min_correlation = 0.7;
   // Photos that a place must be found from, the one itself included. Larger = stricter.
   int min_support = 3;
+  // With this correlation two photos are enough; 1 = never. Larger = stricter.
+  double min_pair_correlation = 0.85;
   // Depths of two photos agree within this share of the depth, and within two pixels. Larger = more
   // tolerant.
-  double max_depth_difference = 0.01;
+  double max_depth_difference = 0.005;
   // Metres; what is nearer to the scan's surface, or to what the scanner saw empty, is not added.
   double distance_to_scan = 0.025;
   // Metres between vertices, about. Smaller = finer, at most one per pixel.
@@ -65,6 +67,7 @@ struct DepthOfView {
   cv::Mat1f depth;  // of the scan where only it can be, else the estimate if it correlates
 };
 
+// What another photo sees through is not confirmed, however many others agree.
 // estimate: of `view`. scan_only: the scan's depth where only it can be, else 0.
 ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimate,
                             const cv::Mat1f& scan_only, const std::vector<DepthOfView>& others,

@@ -17,6 +17,7 @@ struct DenseScore {
   // Shares of the points within 5 and 20 mm of a true surface; of what the scan missed (2.5 cm and
   // more from it) and three photos see, with a point within 5 and 20 mm.
   double accurate_5mm = 0, accurate_20mm = 0, complete_5mm = 0, complete_20mm = 0;
+  double in_free_space = 0;  // of the points: 5 cm and more from any surface
 };
 
 class DenseTruth {
@@ -50,6 +51,7 @@ class DenseTruth {
       const auto distance = surface_->DistanceTo(point, 0.02);
       score.accurate_20mm += distance.has_value();
       score.accurate_5mm += distance && *distance <= 0.005;
+      score.in_free_space += !surface_->DistanceTo(point, 0.05);
     }
     // Points as triangles without an extent.
     std::vector<Triangle> triangles;
@@ -62,7 +64,7 @@ class DenseTruth {
     }
     const auto count = static_cast<double>(std::max<size_t>(points.size(), 1));
     const auto missed = static_cast<double>(std::max<size_t>(missed_.size(), 1));
-    score.accurate_5mm /= count, score.accurate_20mm /= count;
+    score.accurate_5mm /= count, score.accurate_20mm /= count, score.in_free_space /= count;
     score.complete_5mm /= missed, score.complete_20mm /= missed;
     return score;
   }
