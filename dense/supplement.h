@@ -24,8 +24,9 @@ struct SupplementOptions {
   double min_correlation = 0.7;
   // Photos that a place must be found from, the one itself included. Larger = stricter.
   int min_support = 3;
-  // With this correlation two photos are enough; 1 = never. Larger = stricter.
-  double min_pair_correlation = 0.85;
+  // With this correlation two photos are enough; 1 = never. 0.85 finds a fifth more, and in some
+  // rooms an island that is wrong. Larger = stricter.
+  double min_pair_correlation = 1;
   // Depths of two photos agree within this share of the depth, and within two pixels. Larger = more
   // tolerant.
   double max_depth_difference = 0.005;

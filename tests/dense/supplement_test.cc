@@ -30,15 +30,18 @@ class ConfirmDepthTest : public testing::Test {
   static cv::Mat1f Everywhere(float value) { return cv::Mat1f(48, 64, value); }
 
   // Support in the middle of the first photo, which finds 3 m.
-  int Support(float score, const std::vector<float>& depths_of_others) const {
+  int Support(float score, const std::vector<float>& depths_of_others,
+              double min_pair_correlation = 0.85) const {
     const DepthEstimate estimate{
         Everywhere(3), {Everywhere(0), Everywhere(0), Everywhere(-1)}, Everywhere(score), {}, 0};
     std::vector<DepthOfView> others;
     for (size_t i = 0; i < depths_of_others.size(); ++i) {
       others.push_back({&views_[i + 1], Everywhere(depths_of_others[i])});
     }
+    SupplementOptions options;
+    options.min_pair_correlation = min_pair_correlation;
     const ConfirmedDepth confirmed =
-        ConfirmDepth(views_[0], estimate, Everywhere(0), others, *space_, {}, 1);
+        ConfirmDepth(views_[0], estimate, Everywhere(0), others, *space_, options, 1);
     EXPECT_EQ(confirmed.is_new(24, 32) != 0, confirmed.support(24, 32) > 0);
     return confirmed.support(24, 32);
   }
@@ -58,6 +61,7 @@ TEST_F(ConfirmDepthTest, TwoAreEnoughWhereTheyCorrelateWell) {
   EXPECT_EQ(Support(0.8f, {3}), 0);
   EXPECT_EQ(Support(0.9f, {3, 0}), 2);  // the third knows nothing
   EXPECT_EQ(Support(0.9f, {0, 0}), 0);
+  EXPECT_EQ(Support(1, {3}, 1), 0);  // never
 }
 
 TEST_F(ConfirmDepthTest, WhatAnotherPhotoSeesThroughIsNot) {
