@@ -67,7 +67,8 @@ TEST_F(DenseCommand, AddsWhatTheStationMissedAndLittleElse) {
   std::printf("%zu points, %.3f within 20 mm; %.3f of what was missed\n", score.num_points,
               score.accurate_20mm, score.complete_20mm);
   EXPECT_GT(score.num_points, 1500);
-  EXPECT_GT(score.accurate_20mm, 0.85);
+  EXPECT_GT(score.accurate_20mm, 0.93);
+  EXPECT_LE(score.in_free_space, 0.005);
   EXPECT_GT(score.complete_20mm, 0.05);
 }
 
