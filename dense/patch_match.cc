@@ -30,9 +30,10 @@ constexpr int kCompared = 4;             // sources at the full resolution, pixe
 constexpr int kBest = 2;                 // sources that count: others may not see the place
 constexpr float kSigmaColor = 25;        // grey levels: what is of another colour is another thing
 constexpr float kMinDeviation = 2.5f;    // grey levels; flatter windows say nothing
+constexpr float kLeastDepth = 1e-3f;     // share: a window that reaches beside the camera
 constexpr float kMaxSlope = 5;           // tangent of the angle to a plane that faces the camera
 constexpr float kSameDepth = 0.01f;      // share
-constexpr float kAlreadyThere = 0.002f;  // share
+constexpr float kAlreadyThere = 0.002f;  // share: what is there already is only refined
 constexpr float kNoMatch = 2;            // cost of a hypothesis that no two sources see
 
 using Plane = InverseDepthPlane;
@@ -121,13 +122,12 @@ class Window {
     for (const float dy : {-kReach, kReach}) {
       for (const float dx : {-kReach, kReach}) {
         const Eigen::Vector3f corner = at + dx * right + dy * down;
-        if (!(corner.z() > 1e-6f)) return kNoMatch;
+        if (!(corner.z() > kLeastDepth)) return kNoMatch;
         const float u = corner.x() / corner.z() - 0.5f, v = corner.y() / corner.z() - 0.5f;
-        // By a hair more than an edge: the samples are rounded otherwise.
-        if (!(u > 1e-3f && v > 1e-3f && u < max_x - 1e-3f && v < max_y - 1e-3f)) return kNoMatch;
+        if (!(u >= 0 && v >= 0 && u < max_x && v < max_y)) return kNoMatch;
       }
     }
-    // Without a branch, four or eight samples at a time.
+    // Without a branch, four samples at a time.
     alignas(32) std::array<float, kPadded> us, vs, values;
     for (int k = 0; k < kPadded; ++k) {
       const float inverse = 1 / (at.z() + kOffsets.dx[k] * right.z() + kOffsets.dy[k] * down.z());
@@ -137,7 +137,9 @@ class Window {
     const float* const pixels = grey[0];
     const auto stride = static_cast<int>(grey.step1());
     for (int k = 0; k < kSamples; ++k) {
-      const int column = static_cast<int>(us[k]), row = static_cast<int>(vs[k]);
+      // Rounding may lead over the edge, and far where a corner is almost beside the camera.
+      const int column = std::clamp(static_cast<int>(us[k]), 0, grey.cols - 2);
+      const int row = std::clamp(static_cast<int>(vs[k]), 0, grey.rows - 2);
       const float s = us[k] - static_cast<float>(column), t = vs[k] - static_cast<float>(row);
       const float* above = pixels + static_cast<ptrdiff_t>(row) * stride + column;
       const float* below = above + stride;

@@ -24,8 +24,8 @@ struct SupplementOptions {
   double min_correlation = 0.7;
   // Photos that a place must be found from, the one itself included. Larger = stricter.
   int min_support = 3;
-  // With this correlation two photos are enough; 1 = never. 0.85 finds a fifth more, and in some
-  // rooms an island that is wrong. Larger = stricter.
+  // With this correlation two photos are enough; 1 = never. 0.85 finds more, and in some rooms
+  // an island that is wrong (docs/dense.md). Larger = stricter.
   double min_pair_correlation = 1;
   // Depths of two photos agree within this share of the depth, and within two pixels. Larger = more
   // tolerant.
