@@ -59,7 +59,7 @@ struct ColorizeResult {
   Disagreement disagreement;
   std::vector<PhotoAgreement> agreement;        // per photo
   std::vector<PhotoSharpness> sharpness;        // per photo
-  std::vector<PhotoRegistration> registration;  // per photo; empty without
+  Registration registration;
   std::vector<size_t> samples_seen;             // per photo
   std::vector<std::vector<size_t>> seen_of;     // per photo and scan: samples that it sees
   std::vector<PhotoView> photos;                // with the tones, poses and warps that were found

@@ -62,9 +62,9 @@ TEST_F(RollingShutterTest, IsFoundAndTakenBack) {
   EXPECT_GT(Psnr(with), without + 3);
   EXPECT_GT(Psnr(with), Psnr(by_pose_alone) + 2.5);
   for (size_t i = 0; i < photos.size(); ++i) {
-    EXPECT_NEAR(with.registration[i].row_turned_deg, 30 * 0.030, 0.25) << i;
-    EXPECT_LT(with.registration[i].turned_deg, 0.15) << i;
-    EXPECT_EQ(by_pose_alone.registration[i].row_turned_deg, 0);
+    EXPECT_NEAR(with.registration.photos[i].row_turned_deg, 30 * 0.030, 0.25) << i;
+    EXPECT_LT(with.registration.photos[i].turned_deg, 0.15) << i;
+    EXPECT_EQ(by_pose_alone.registration.photos[i].row_turned_deg, 0);
   }
 }
 
