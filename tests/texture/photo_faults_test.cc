@@ -54,7 +54,11 @@ class RollingShutterTest : public ColoredRoomTest {
 TEST_F(RollingShutterTest, IsFoundAndTakenBack) {
   const std::vector<PhotoView> photos = Photos(0, 0);
   ColorizeOptions options;
+  // By default.
+  const double unasked = Psnr(Colorize(photos, options));
+  options.registration.mode = "none";
   const double without = Psnr(Colorize(photos, options));
+  EXPECT_GT(unasked, without + 3);
   options.registration.mode = "pose";
   const ColorizeResult with = Colorize(photos, options);
   options.registration.row_turn_deg = 0;

@@ -117,8 +117,8 @@ class Registrar {
     constexpr double kMuch = 3;
     return sum > options_.least_px * num_photos() || most > kMuch * options_.least_px;
   }
-  // If so, from then on all of them may move: what holds still is a measure of the others, and would
-  // bend them.
+  // If so, from then on all of them may move: what holds still is a measure of the others, and
+  // would bend them.
   bool FreeIfOff() {
     is_free_ = is_free_ || AreOff();
     return is_free_;
@@ -203,8 +203,7 @@ class Registrar {
     std::vector<double> widths;  // of a patch
     for (int i = 0; i < num_photos(); ++i) {
       constexpr size_t kStride = 1000;
-      const double angle =
-          2 * registered_[i].warp.spacing() / photos_[i].camera.MeanFocalLength();
+      const double angle = 2 * registered_[i].warp.spacing() / photos_[i].camera.MeanFocalLength();
       for (size_t k = 0; k < samples_.Of(i).size(); k += kStride) {
         const Eigen::Vector3d x_in_scan = samples_.Point(samples_.Of(i)[k].sample);
         widths.push_back(angle * (photos_[i].cam_from_scan * x_in_scan).norm());
@@ -631,8 +630,8 @@ class TrialRun {
     registrar_.KeepAside();
     stand_ = registrar_.Here();
     likeness_ = registrar_.Judge();
-    // What photos say of each other first: the scan, which nothing was fitted to then, is a witness.
-    // If it says that they slid along it, it has to hold them.
+    // What photos say of each other first: the scan, which nothing was fitted to then, is a
+    // witness. If it says that they slid along it, it has to hold them.
     const Registrar::Stand first = stand_;
     MovePoses(level, false);
     const bool by_photos = Keep("pose");
@@ -640,8 +639,7 @@ class TrialRun {
     if (by_photos) {
       // They were off each by itself: what they still have in common is the mean of that.
       const double most_px =
-          kCommon * registrar_.MotionFrom(first) / std::sqrt(registrar_.num_photos()) +
-          kCommonPx;
+          kCommon * registrar_.MotionFrom(first) / std::sqrt(registrar_.num_photos()) + kCommonPx;
       for (int i = 0; i < kScanRounds; ++i) {
         registrar_.Measure(0, kLastRadius);
         registrar_.Correct(true, false);

@@ -5,8 +5,8 @@
 
 namespace roomtex {
 
-LikenessChange FindLikenessChange(const std::vector<float>& before,
-                                  const std::vector<float>& after, float least) {
+LikenessChange FindLikenessChange(const std::vector<float>& before, const std::vector<float>& after,
+                                  float least) {
   LikenessChange change;
   double sum = 0, squares = 0;
   for (size_t i = 0; i < std::min(before.size(), after.size()); ++i) {
@@ -42,8 +42,8 @@ RegistrationTrial JudgeTrial(const std::string& mode, const std::vector<Registra
   const LikenessChange& scan = trial.with_scan;
   if (photos.num_places < kFewestPlaces) return trial;
   const bool knows_scan = scan.num_places >= kFewestPlaces;
-  const double along_scan = knows_scan ? (scan.after - scan.before) / scan.sigma : 0;
-  const double among_photos = (photos.after - photos.before) / photos.sigma;
+  const double along_scan = knows_scan ? (scan.after - scan.before) / std::max(scan.sigma, 1e-9) : 0;
+  const double among_photos = (photos.after - photos.before) / std::max(photos.sigma, 1e-9);
   const double left = (1 - photos.after) / (1 - photos.before);
   const bool any_kept = std::any_of(earlier.begin(), earlier.end(),
                                     [](const RegistrationTrial& one) { return one.kept; });
@@ -53,8 +53,8 @@ RegistrationTrial JudgeTrial(const std::string& mode, const std::vector<Registra
   if (any_kept && mode == "pose_by_scan") {
     trial.kept = along_scan > kLikely && left < kByScan;
   } else {
-    trial.kept = along_scan > -kSure && among_photos > kSure &&
-                 left < (mode == "warp" ? kWarps : kPoses);
+    trial.kept =
+        along_scan > -kSure && among_photos > kSure && left < (mode == "warp" ? kWarps : kPoses);
   }
   return trial;
 }

@@ -20,8 +20,8 @@ struct LikenessChange {
   int num_places = 0;
 };
 
-LikenessChange FindLikenessChange(const std::vector<float>& before,
-                                  const std::vector<float>& after, float least);
+LikenessChange FindLikenessChange(const std::vector<float>& before, const std::vector<float>& after,
+                                  float least);
 
 // A correction and what became of it.
 struct RegistrationTrial {

@@ -46,7 +46,8 @@ TEST_F(RegisterPhotosTest, PosesThatAreOffAreBroughtTogether) {
   for (size_t i = 0; i < photos.size(); ++i) {
     EXPECT_TRUE(with.registration.photos[i].corrected);
     EXPECT_FALSE(measured.registration.photos[i].corrected);
-    EXPECT_EQ(measured.registration.photos[i].shift_before_px, with.registration.photos[i].shift_before_px);
+    EXPECT_EQ(measured.registration.photos[i].shift_before_px,
+              with.registration.photos[i].shift_before_px);
     before += with.registration.photos[i].shift_before_px;
     after += with.registration.photos[i].shift_after_px;
   }
@@ -63,7 +64,8 @@ TEST_F(RegisterPhotosTest, OnePhotoAmongManyIsPutRight) {
   EXPECT_LT(Psnr(without), best - 0.5);
   EXPECT_GT(Psnr(with), best - 0.5 * (best - Psnr(without)));
   EXPECT_NEAR(with.registration.photos[4].turned_deg, 0.8, 0.2);
-  EXPECT_GT(with.registration.photos[4].shift_before_px, 3 * with.registration.photos[4].shift_after_px);
+  EXPECT_GT(with.registration.photos[4].shift_before_px,
+            3 * with.registration.photos[4].shift_after_px);
 }
 
 TEST_F(RegisterPhotosTest, AWarpSaysWhatTheCameraDoesNot) {

@@ -51,9 +51,9 @@ class RegistrationCommandTest : public testing::Test {
   static json Texture(const std::string& capture, const std::string& model,
                       const std::string& output, const std::string& more = "") {
     const CommandResult result = RunCommandLine(
-        "roomtex-texture --quiet --Texture.scale 1 --input_path " + Path(model) +
-        " --image_path " + Path(capture + "/photos") + " --scan_path " +
-        Path(capture + "/scan.rtpi") + " --output_path " + Path(output) + " " + more);
+        "roomtex-texture --quiet --Texture.scale 1 --input_path " + Path(model) + " --image_path " +
+        Path(capture + "/photos") + " --scan_path " + Path(capture + "/scan.rtpi") +
+        " --output_path " + Path(output) + " " + more);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return ReadJson(Path(output + "/report.json"));
   }
