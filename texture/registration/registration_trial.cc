@@ -42,7 +42,8 @@ RegistrationTrial JudgeTrial(const std::string& mode, const std::vector<Registra
   const LikenessChange& scan = trial.with_scan;
   if (photos.num_places < kFewestPlaces) return trial;
   const bool knows_scan = scan.num_places >= kFewestPlaces;
-  const double along_scan = knows_scan ? (scan.after - scan.before) / std::max(scan.sigma, 1e-9) : 0;
+  const double along_scan =
+      knows_scan ? (scan.after - scan.before) / std::max(scan.sigma, 1e-9) : 0;
   const double among_photos = (photos.after - photos.before) / std::max(photos.sigma, 1e-9);
   const double left = (1 - photos.after) / (1 - photos.before);
   const bool any_kept = std::any_of(earlier.begin(), earlier.end(),
