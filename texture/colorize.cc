@@ -439,7 +439,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     result.registration =
         RegisterPhotos(input, scene.grids, intensities, store, result.exposure.gains,
                        options.registration, num_threads, &photos);
-    corrected = std::any_of(result.registration.begin(), result.registration.end(),
+    const std::vector<PhotoRegistration>& found = result.registration.photos;
+    corrected = std::any_of(found.begin(), found.end(),
                             [](const PhotoRegistration& photo) { return photo.corrected; });
   }
   if (corrected || reweighted) {

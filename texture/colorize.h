@@ -57,13 +57,13 @@ struct ColorizeResult {
   double views_mean = 0;      // of the coloured ones
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
-  std::vector<PhotoAgreement> agreement;        // per photo
-  std::vector<PhotoSharpness> sharpness;        // per photo
-  std::vector<PhotoRegistration> registration;  // per photo; empty without
-  std::vector<size_t> samples_seen;             // per photo
-  std::vector<std::vector<size_t>> seen_of;     // per photo and scan: samples that it sees
-  std::vector<PhotoView> photos;                // with the tones, poses and warps that were found
-  std::vector<OccluderTiles> occluders;         // per scan; empty without keep_occluders
+  std::vector<PhotoAgreement> agreement;  // per photo
+  std::vector<PhotoSharpness> sharpness;  // per photo
+  Registration registration;
+  std::vector<size_t> samples_seen;          // per photo
+  std::vector<std::vector<size_t>> seen_of;  // per photo and scan: samples that it sees
+  std::vector<PhotoView> photos;             // with the tones, poses and warps that were found
+  std::vector<OccluderTiles> occluders;      // per scan; empty without keep_occluders
   // Photo pixels per sample and direction, median over the samples; 0 = not known.
   double pixels_per_sample = 0;
   int texture_scale = 1;  // in effect

@@ -58,6 +58,27 @@ Json RegistrationReport(const std::vector<PhotoView>& photos,
   return images;
 }
 
+// Which corrections were tried, what spoke for them, and which were kept.
+Json TrialsReport(const std::vector<RegistrationTrial>& trials) {
+  const auto rounded = [](double value) { return std::round(1e4 * value) / 1e4; };
+  const auto change = [&](const LikenessChange& found) {
+    return Json{{"before", rounded(found.before)},
+                {"after", rounded(found.after)},
+                {"sigma", rounded(found.sigma)},
+                {"num_places", found.num_places}};
+  };
+  Json list = Json::array();
+  std::string applied = "none";
+  for (const RegistrationTrial& trial : trials) {
+    if (trial.kept) applied = trial.mode;
+    list.push_back({{"mode", trial.mode},
+                    {"kept", trial.kept},
+                    {"among_photos", change(trial.among_photos)},
+                    {"with_scan", change(trial.with_scan)}});
+  }
+  return {{"applied", applied}, {"trials", list}};
+}
+
 std::string NameList(const std::vector<PhotoView>& photos, const std::vector<int>& numbers) {
   std::string list;
   for (size_t i = 0; i < numbers.size() && i < 5; ++i) {
@@ -123,8 +144,11 @@ void FillColorReport(const std::vector<PhotoView>& photos, const ColorizeOptions
   }
   report["photo_sharpness"] = sharpness;
   FillToneReport(photos, result.exposure, &report);
-  if (!result.registration.empty()) {
-    report["images"] = RegistrationReport(photos, result.registration);
+  if (!result.registration.photos.empty()) {
+    report["images"] = RegistrationReport(photos, result.registration.photos);
+    if (options.registration.mode == "auto") {
+      report["registration"] = TrialsReport(result.registration.trials);
+    }
   }
   report["disagreement"] = {{"before", result.disagreement.before},
                             {"after", result.disagreement.after},

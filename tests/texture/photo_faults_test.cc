@@ -54,7 +54,11 @@ class RollingShutterTest : public ColoredRoomTest {
 TEST_F(RollingShutterTest, IsFoundAndTakenBack) {
   const std::vector<PhotoView> photos = Photos(0, 0);
   ColorizeOptions options;
+  // By default.
+  const double unasked = Psnr(Colorize(photos, options));
+  options.registration.mode = "none";
   const double without = Psnr(Colorize(photos, options));
+  EXPECT_GT(unasked, without + 3);
   options.registration.mode = "pose";
   const ColorizeResult with = Colorize(photos, options);
   options.registration.row_turn_deg = 0;
@@ -62,9 +66,9 @@ TEST_F(RollingShutterTest, IsFoundAndTakenBack) {
   EXPECT_GT(Psnr(with), without + 3);
   EXPECT_GT(Psnr(with), Psnr(by_pose_alone) + 2.5);
   for (size_t i = 0; i < photos.size(); ++i) {
-    EXPECT_NEAR(with.registration[i].row_turned_deg, 30 * 0.030, 0.25) << i;
-    EXPECT_LT(with.registration[i].turned_deg, 0.15) << i;
-    EXPECT_EQ(by_pose_alone.registration[i].row_turned_deg, 0);
+    EXPECT_NEAR(with.registration.photos[i].row_turned_deg, 30 * 0.030, 0.25) << i;
+    EXPECT_LT(with.registration.photos[i].turned_deg, 0.15) << i;
+    EXPECT_EQ(by_pose_alone.registration.photos[i].row_turned_deg, 0);
   }
 }
 

@@ -30,7 +30,7 @@ constexpr double kPictureBytes = 256e6;  // of all pictures
 constexpr double kNodesAcross = 28;      // of the longer side
 constexpr double kFewestNodePx = 20;
 constexpr double kMostNodes = 150000;  // of all photos
-constexpr int kMostPixels = 160;       // of a patch
+constexpr int kMostPixels = 120;       // of a patch
 constexpr size_t kFewestPatches = 6;
 constexpr size_t kFewestOfPatch = 40;  // sightings
 constexpr double kNoShift = std::numeric_limits<double>::quiet_NaN();
@@ -105,31 +105,35 @@ class Registrar {
   }
 
   bool is_free() const { return is_free_; }
+  int num_photos() const { return static_cast<int>(photos_.size()); }
 
-  // Whether the photos are off by more than noise, on the whole or one of them by much. From then
-  // on all of them may move: what holds still is a measure of the others, and would bend them.
-  bool FreeIfOff() {
+  // Whether the photos are off by more than noise, on the whole or one of them by much.
+  bool AreOff() const {
     double sum = 0, most = 0;
     for (const double median : median_px_) {
       sum += median;
       most = std::max(most, median);
     }
     constexpr double kMuch = 3;
-    is_free_ =
-        is_free_ || sum > options_.least_px * num_photos() || most > kMuch * options_.least_px;
+    return sum > options_.least_px * num_photos() || most > kMuch * options_.least_px;
+  }
+  // If so, from then on all of them may move: what holds still is a measure of the others, and
+  // would bend them.
+  bool FreeIfOff() {
+    is_free_ = is_free_ || AreOff();
     return is_free_;
   }
 
-  // Moves all photos that may at once, by what was measured last and by the scan, which is searched
-  // within as many pixels.
-  void Correct(bool with_warps) {
+  // Moves all photos that may at once, by what was measured last and, if asked for, by the scan,
+  // which is searched within as many pixels.
+  void Correct(bool by_scan, bool with_warps) {
     std::vector<std::vector<MeasuredShift>> of_photo(photos_.size());
     ParallelFor(num_threads_, 0, num_photos(), [&](int i) {
       for (const Patch& patch : patches_[i]) {
         std::optional<MeasuredShift> shift = ShiftAt(i, patch);
         if (shift) of_photo[i].push_back(std::move(*shift));
       }
-      AddShiftsAgainstScan(i, &of_photo[i]);
+      if (by_scan) AddShiftsAgainstScan(i, &of_photo[i]);
     });
     std::vector<MeasuredShift> shifts;
     for (std::vector<MeasuredShift>& some : of_photo) {
@@ -143,19 +147,84 @@ class Registrar {
     for (int i = 0; i < num_photos(); ++i) Move(i, steps[i]);
   }
 
-  // Puts all photos back to where they came from.
-  void Restore() {
+  // Where all photos stand.
+  struct Stand {
+    std::vector<Rigid> poses;
+    std::vector<std::shared_ptr<const PhotoWarp>> shown;
+    std::vector<Eigen::Vector3d> row_turns;
+    std::vector<PhotoWarp> warps;
+  };
+  Stand Here() const {
+    Stand stand;
+    for (int i = 0; i < num_photos(); ++i) {
+      stand.poses.push_back(photos_[i].cam_from_scan);
+      stand.shown.push_back(photos_[i].warp);
+      stand.row_turns.push_back(registered_[i].row_turn);
+      stand.warps.push_back(registered_[i].warp);
+    }
+    return stand;
+  }
+  void Return(const Stand& stand) {
     for (int i = 0; i < num_photos(); ++i) {
       RegisteredPhoto& photo = registered_[i];
-      photos_[i].cam_from_scan = photo.first_pose;
-      photos_[i].warp = nullptr;
-      photo.warp =
-          PhotoWarp(photos_[i].camera.width, photos_[i].camera.height, photo.warp.spacing());
-      photo.shown = photo.warp;
-      photo.row_turn.setZero();
+      photos_[i].cam_from_scan = stand.poses[i];
+      photos_[i].warp = stand.shown[i];
+      photo.row_turn = stand.row_turns[i];
+      photo.warp = stand.warps[i];
+      photo.shown = stand.shown[i] ? *stand.shown[i] : photo.warp;
     }
-    is_free_ = false;
-    Measure(0, 1);
+  }
+
+  // How far the pixels of the photos have moved from there, median, pixels of the pictures.
+  double MotionFrom(const Stand& stand) const {
+    std::vector<double> lengths;
+    for (int i = 0; i < num_photos(); ++i) {
+      const RegisteredPhoto& photo = registered_[i];
+      for (const Patch& patch : patches_[i]) {
+        const Sighting& s = samples_.Of(i)[patch.middle];
+        const Eigen::Vector3d x_in_scan = samples_.Point(s.sample);
+        const auto show = [&](const Rigid& pose,
+                              const PhotoWarp* warp) -> std::optional<Eigen::Vector2d> {
+          const auto place = photo.camera->ImgFromCam(pose * x_in_scan);
+          if (!place || warp == nullptr) return place;
+          const Eigen::Vector2f at = place->cast<float>();
+          return *place + warp->At(at.x(), at.y()).cast<double>();
+        };
+        const auto here = show(photos_[i].cam_from_scan, photos_[i].warp.get());
+        const auto there = show(stand.poses[i], stand.shown[i].get());
+        if (here && there) lengths.push_back((*here - *there).norm() * photo.scale);
+      }
+    }
+    return Median(&lengths);
+  }
+
+  // A part of the surface is kept aside from Measure() and Correct().
+  void KeepAside() {
+    std::vector<double> widths;  // of a patch
+    for (int i = 0; i < num_photos(); ++i) {
+      constexpr size_t kStride = 1000;
+      const double angle = 2 * registered_[i].warp.spacing() / photos_[i].camera.MeanFocalLength();
+      for (size_t k = 0; k < samples_.Of(i).size(); k += kStride) {
+        const Eigen::Vector3d x_in_scan = samples_.Point(samples_.Of(i)[k].sample);
+        widths.push_back(angle * (photos_[i].cam_from_scan * x_in_scan).norm());
+      }
+    }
+    samples_.KeepAside(Median(&widths));
+  }
+  void KeepNothingAside() { samples_.KeepAside(0); }
+
+  // How alike photos are there, in the finest pictures.
+  KeptAsideLikeness Judge() {
+    Look(0);
+    std::vector<KeptAsideLikeness> of_photo(photos_.size());
+    ParallelFor(num_threads_, 0, num_photos(), [&](int i) { JudgePhoto(i, &of_photo[i]); });
+    KeptAsideLikeness all;
+    for (const KeptAsideLikeness& some : of_photo) {
+      std::copy(some.among_photos.begin(), some.among_photos.end(),
+                std::back_inserter(all.among_photos));
+      std::copy(some.with_scan.begin(), some.with_scan.end(), std::back_inserter(all.with_scan));
+    }
+    return all;
   }
 
   std::vector<PhotoRegistration> Report() {
@@ -178,7 +247,6 @@ class Registrar {
   }
 
  private:
-  int num_photos() const { return static_cast<int>(photos_.size()); }
   double MeanScale() const {
     double sum = 0;
     for (const RegisteredPhoto& photo : registered_) sum += photo.scale;
@@ -240,7 +308,7 @@ class Registrar {
 
   // Sightings around every node of the lattice, those within the cells that meet there; at a coarse
   // level of every second or fourth node.
-  std::vector<std::vector<int>> GatherPatches(int i) const {
+  std::vector<std::vector<int>> GatherPatches(int i, bool kept_aside = false) const {
     const PhotoWarp& warp = registered_[i].warp;
     const int step = 1 << level_;
     const double pitch = warp.spacing() * step;
@@ -248,7 +316,7 @@ class Registrar {
     const std::vector<Sighting>& sightings = samples_.Of(i);
     for (size_t k = 0; k < sightings.size(); ++k) {
       const Sighting& s = sightings[k];
-      if (!IsCompared(s)) continue;
+      if (!IsCompared(s) || samples_.IsKeptAside(s.sample) != kept_aside) continue;
       const int column = static_cast<int>(s.place.x() / pitch) * step;
       const int row = static_cast<int>(s.place.y() / pitch) * step;
       for (const int r : {row, row + step}) {
@@ -261,23 +329,33 @@ class Registrar {
     return members;
   }
 
-  // The photo around a node against what `grey` says of its sightings.
+  // What `grey` says that the photo shows around a node, and the middle of that.
   template <typename GreyOf>
-  std::optional<Patch> Compare(int i, const std::vector<int>& members, int radius,
-                               const GreyOf& grey_of) const {
+  std::vector<ExpectedPixel> Expect(int i, const std::vector<int>& members, const GreyOf& grey_of,
+                                    Eigen::Vector2f* middle) const {
     const RegisteredPhoto& photo = registered_[i];
     const std::vector<Sighting>& sightings = samples_.Of(i);
     const auto scale = static_cast<float>(photo.scale / (1 << level_));
     const size_t skip = std::max<size_t>(1, members.size() / kMostPixels);
     std::vector<ExpectedPixel> expected;
-    Eigen::Vector2f middle = Eigen::Vector2f::Zero();
+    middle->setZero();
     for (size_t k = 0; k < members.size(); k += skip) {
       const Sighting& s = sightings[members[k]];
       const Eigen::Vector2f shown = s.place + photo.shown.At(s.place.x(), s.place.y());
       expected.push_back({shown * scale, grey_of(s)});
-      middle += s.place;
+      *middle += s.place;
     }
-    middle /= static_cast<float>(expected.size());
+    *middle /= static_cast<float>(expected.size());
+    return expected;
+  }
+
+  template <typename GreyOf>
+  std::optional<Patch> Compare(int i, const std::vector<int>& members, int radius,
+                               const GreyOf& grey_of) const {
+    const RegisteredPhoto& photo = registered_[i];
+    const std::vector<Sighting>& sightings = samples_.Of(i);
+    Eigen::Vector2f middle;
+    const std::vector<ExpectedPixel> expected = Expect(i, members, grey_of, &middle);
     Patch patch;
     patch.shift = FindPatchShift(photo.levels[level_], expected, radius);
     if (!patch.shift.is_found()) return std::nullopt;
@@ -315,6 +393,22 @@ class Registrar {
     const double most = 2 / (kBestPx * kBestPx), trace = patch.shift.information.trace();
     const double certain = std::min(1.0, most / trace) * scale * scale;
     shift->information = patch.shift.information * static_cast<float>(certain);
+  }
+
+  void JudgePhoto(int i, KeptAsideLikeness* likeness) const {
+    const auto look = [&](const std::vector<int>& members, const auto& grey_of) {
+      if (members.size() < kFewestOfPatch) return std::numeric_limits<float>::quiet_NaN();
+      Eigen::Vector2f middle;
+      return PatchLikeness(registered_[i].levels[0], Expect(i, members, grey_of, &middle))
+          .value_or(std::numeric_limits<float>::quiet_NaN());
+    };
+    for (const std::vector<int>& members : GatherPatches(i, true)) {
+      likeness->among_photos.push_back(
+          look(members, [this](const Sighting& s) { return samples_.OthersGrey(s); }));
+      likeness->with_scan.push_back(look(members, [this](const Sighting& s) {
+        return static_cast<float>(samples_.Intensity(s.sample));
+      }));
+    }
   }
 
   void MeasurePhoto(int i, int radius) {
@@ -497,19 +591,22 @@ bool AgreeBetter(const std::vector<double>& before, const std::vector<double>& a
   return false;
 }
 
+// Pixels of the level: the first search finds what is off by much, the others what it left.
+constexpr int kCoarseRadius = 3, kFineRadius = 2, kLastRadius = 1;
+constexpr int kFineRounds = 3;
+
 // Coarse to fine, until the photos agree. False if they agree no better than before.
 bool BringTogether(bool with_warps, Registrar* registrar) {
-  // Pixels of the level: the first search finds what is off by much, the others what it left.
-  constexpr int kCoarseRadius = 3, kRadius = 2, kLastRadius = 1;
-  constexpr int kFineRounds = 3;
   const std::vector<double> before = registrar->Disagreement();
   for (int level = kNumLevels - 1; level >= 0; --level) {
     const int rounds = level > 0 ? 1 : kFineRounds;
     for (int i = 0; i < rounds; ++i) {
-      const int radius = level == kNumLevels - 1 ? kCoarseRadius : i == 0 ? kRadius : kLastRadius;
+      const int radius = level == kNumLevels - 1 ? kCoarseRadius
+                         : i == 0                ? kFineRadius
+                                                 : kLastRadius;
       registrar->Measure(level, radius);
       if (!registrar->FreeIfOff()) break;
-      registrar->Correct(with_warps && level == 0);
+      registrar->Correct(true, with_warps && level == 0);
     }
   }
   if (!registrar->is_free()) return true;
@@ -517,14 +614,102 @@ bool BringTogether(bool with_warps, Registrar* registrar) {
   return AgreeBetter(before, registrar->Disagreement());
 }
 
+// Tries one correction after the other, and takes back those for which nothing speaks but what they
+// were fitted to.
+class TrialRun {
+ public:
+  explicit TrialRun(Registrar* registrar) : registrar_(*registrar) {}
+
+  std::vector<RegistrationTrial> Run() {
+    int level = kNumLevels - 1;
+    for (; level >= 0; --level) {
+      registrar_.Measure(level, RadiusAt(level, 0));
+      if (registrar_.FreeIfOff()) break;
+    }
+    if (!registrar_.is_free()) return {};
+    registrar_.KeepAside();
+    stand_ = registrar_.Here();
+    likeness_ = registrar_.Judge();
+    // What photos say of each other first: the scan, which nothing was fitted to then, is a
+    // witness. If it says that they slid along it, it has to hold them.
+    const Registrar::Stand first = stand_;
+    MovePoses(level, false);
+    const bool by_photos = Keep("pose");
+    bool by_scan = false;
+    if (by_photos) {
+      // They were off each by itself: what they still have in common is the mean of that.
+      const double most_px =
+          kCommon * registrar_.MotionFrom(first) / std::sqrt(registrar_.num_photos()) + kCommonPx;
+      for (int i = 0; i < kScanRounds; ++i) {
+        registrar_.Measure(0, kLastRadius);
+        registrar_.Correct(true, false);
+      }
+      by_scan = registrar_.MotionFrom(stand_) < most_px && Keep("pose_by_scan");
+      if (!by_scan) registrar_.Return(stand_);
+    } else {
+      MovePoses(level, true);
+      by_scan = Keep("pose_by_scan");
+    }
+    // Photos that agree with each other or with the scan, but not with both, see another shape.
+    const bool is_bent = by_scan && !by_photos;
+    registrar_.Measure(0, kLastRadius);
+    if ((by_photos || by_scan) && (is_bent || registrar_.AreOff())) {
+      for (int i = 0; i < kWarpRounds; ++i) {
+        if (i > 0) registrar_.Measure(0, kLastRadius);
+        registrar_.Correct(by_scan, true);
+      }
+      Keep("warp");
+    }
+    registrar_.KeepNothingAside();
+    registrar_.Measure(0, kLastRadius);
+    return std::move(trials_);
+  }
+
+ private:
+  static constexpr int kScanRounds = 2, kWarpRounds = 2;
+  static constexpr double kCommon = 2, kCommonPx = 0.25;  // standard errors; pixels
+
+  static int RadiusAt(int level, int round) {
+    return level == kNumLevels - 1 ? kCoarseRadius : round == 0 ? kFineRadius : kLastRadius;
+  }
+
+  void MovePoses(int level, bool by_scan) {
+    for (; level >= 0; --level) {
+      for (int i = 0; i < (level > 0 ? 1 : kFineRounds); ++i) {
+        registrar_.Measure(level, RadiusAt(level, i));
+        registrar_.Correct(by_scan, false);
+      }
+    }
+  }
+
+  // Whether the photos stay where they are now; they go back otherwise.
+  bool Keep(const char* mode) {
+    const KeptAsideLikeness now = registrar_.Judge();
+    trials_.push_back(JudgeTrial(mode, trials_, likeness_, now));
+    if (!trials_.back().kept) {
+      registrar_.Return(stand_);
+      return false;
+    }
+    stand_ = registrar_.Here();
+    likeness_ = now;
+    return true;
+  }
+
+  Registrar& registrar_;
+  Registrar::Stand stand_;
+  KeptAsideLikeness likeness_;
+  std::vector<RegistrationTrial> trials_;
+};
+
 }  // namespace
 
 void RegistrationOptions::Declare(OptionFields* fields) {
-  fields->Choice("Registration.mode", &mode, {"pose", "warp", "measure", "none"},
+  fields->Choice("Registration.mode", &mode, {"auto", "pose", "warp", "measure", "none"},
                  "Photos that show the same surface in different places are brought together: by "
-                 "their poses, or by a smooth warp of each photo as well; measure: the report says "
-                 "how far they are off, and the colours are made without. Photos that agree stay "
-                 "as they are.");
+                 "their poses, or by a smooth warp of each photo as well; auto: by whichever of "
+                 "these makes them agree where nothing was fitted, or not at all; measure: the "
+                 "report says how far they are off, and the colours are made without. Photos that "
+                 "agree stay as they are.");
   fields
       ->Number("Registration.turn_deg", &turn_deg,
                "How far a pose may be turned wrongly, one standard deviation, degrees. Larger = "
@@ -561,28 +746,36 @@ void RegistrationOptions::Declare(OptionFields* fields) {
 
 std::vector<std::string> RegistrationOptions::Problems() const { return ProblemsOf(*this); }
 
-std::vector<PhotoRegistration> RegisterPhotos(const PhotoPassInput& input,
-                                              const std::vector<GridOfSamples>& grids,
-                                              const std::vector<std::vector<uint8_t>>& intensities,
-                                              const ObservationStore& store,
-                                              const std::vector<Eigen::Vector3f>& gains,
-                                              const RegistrationOptions& options, int num_threads,
-                                              std::vector<PhotoView>* photos) {
-  if (options.mode == "none" || photos->empty()) return {};
+Registration RegisterPhotos(const PhotoPassInput& input, const std::vector<GridOfSamples>& grids,
+                            const std::vector<std::vector<uint8_t>>& intensities,
+                            const ObservationStore& store,
+                            const std::vector<Eigen::Vector3f>& gains,
+                            const RegistrationOptions& options, int num_threads,
+                            std::vector<PhotoView>* photos) {
+  Registration result;
+  if (options.mode == "none" || photos->empty()) return result;
   SharedSamples samples(input, grids, intensities, store, static_cast<int>(photos->size()));
   std::vector<PhotoView> moved = *photos;
   Registrar registrar(&samples, gains, options, num_threads, &moved);
-  if (!BringTogether(options.mode == "warp", &registrar)) registrar.Restore();
-  std::vector<PhotoRegistration> report = registrar.Report();
+  if (options.mode == "auto") {
+    result.trials = TrialRun(&registrar).Run();
+  } else {
+    const Registrar::Stand first = registrar.Here();
+    if (!BringTogether(options.mode == "warp", &registrar)) {
+      registrar.Return(first);
+      registrar.Measure(0, kLastRadius);
+    }
+  }
+  result.photos = registrar.Report();
   if (options.mode == "measure") {
-    for (PhotoRegistration& photo : report) {
+    for (PhotoRegistration& photo : result.photos) {
       photo.corrected = false;
       photo.shift_after_px = photo.shift_before_px;
     }
   } else {
     *photos = std::move(moved);
   }
-  return report;
+  return result;
 }
 
 }  // namespace roomtex

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "texture/registration/registration_trial.h"
 #include "texture/sampling/grid_colors.h"
 #include "texture/sampling/observations.h"
 #include "texture/sampling/photo_pass.h"
@@ -20,9 +21,9 @@ class OptionFields;
 struct RegistrationOptions {
   // "none": photos are taken as they are. "measure": how far they are off is found, but not
   // corrected. "pose": their poses are corrected. "warp": and what poses leave, by a smooth field
-  // of shifts per photo. None is the default: on a real room whose scan is off there is nothing to
-  // gain for twice the time (docs/texture.md).
-  std::string mode = "none";
+  // of shifts per photo. "auto": first the poses, then warps, each kept only if photos agree better
+  // on a part of the surface that was kept aside, and are no less like the scan there.
+  std::string mode = "auto";
   // How far poses may be off, one standard deviation of each axis: what the photos say of each
   // other counts against that. Larger = held less by the alignment.
   double turn_deg = 0.03;
@@ -61,16 +62,20 @@ struct PhotoRegistration {
   double warp_px = 0;                // largest shift of the warp, without that
 };
 
+struct Registration {
+  std::vector<PhotoRegistration> photos;  // one per photo; none for "none"
+  std::vector<RegistrationTrial> trials;  // of "auto", as they were made
+};
+
 // Moves the poses of the photos and gives them warps. Photos are decoded once more, each into a
-// small grey picture; these take 256 MB at most. Returns one entry per photo, nothing for "none".
+// small grey picture; these take 256 MB at most.
 // intensities: what the scanner measured at every cell of each grid, 0..255 (IntensityAsGrey).
 // The result does not depend on num_threads.
-std::vector<PhotoRegistration> RegisterPhotos(const PhotoPassInput& input,
-                                              const std::vector<GridOfSamples>& grids,
-                                              const std::vector<std::vector<uint8_t>>& intensities,
-                                              const ObservationStore& store,
-                                              const std::vector<Eigen::Vector3f>& gains,
-                                              const RegistrationOptions& options, int num_threads,
-                                              std::vector<PhotoView>* photos);
+Registration RegisterPhotos(const PhotoPassInput& input, const std::vector<GridOfSamples>& grids,
+                            const std::vector<std::vector<uint8_t>>& intensities,
+                            const ObservationStore& store,
+                            const std::vector<Eigen::Vector3f>& gains,
+                            const RegistrationOptions& options, int num_threads,
+                            std::vector<PhotoView>* photos);
 
 }  // namespace roomtex

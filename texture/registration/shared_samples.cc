@@ -106,6 +106,22 @@ void SharedSamples::Look(const std::vector<PhotoView>& photos,
   }
 }
 
+void SharedSamples::KeepAside(double edge) {
+  kept_aside_.clear();
+  if (!(edge > 0)) return;
+  kept_aside_.reserve(normals_.size());
+  for (const PointBlock& block : blocks_) {
+    for (int i = 0; i < block.size(); ++i) {
+      const Eigen::Vector3d point =
+          block.origin + Eigen::Vector3d(block.x[i], block.y[i], block.z[i]);
+      const Eigen::Array3d cube = (point / edge).array().floor();
+      // Apart from each other on walls along all three axes, like a knight's moves.
+      const double number = cube.x() + 2 * cube.y() + 4 * cube.z();
+      kept_aside_.push_back(number - 7 * std::floor(number / 7) == 0 ? 1 : 0);
+    }
+  }
+}
+
 Eigen::Vector3d SharedSamples::Point(int sample) const {
   const auto after = std::upper_bound(first_of_block_.begin(), first_of_block_.end(), sample);
   const auto b = static_cast<size_t>(after - first_of_block_.begin() - 1);

@@ -52,6 +52,11 @@ class SharedSamples {
   const SightingOfPhoto* Begin(int sample) const { return &of_sample_[first_of_sample_[sample]]; }
   const SightingOfPhoto* End(int sample) const { return &of_sample_[first_of_sample_[sample + 1]]; }
 
+  // From now on one in seven of the cubes of that edge that space is cut into is kept aside: what
+  // is seen there judges what was found from the rest. 0 = none.
+  void KeepAside(double edge);
+  bool IsKeptAside(int sample) const { return !kept_aside_.empty() && kept_aside_[sample] != 0; }
+
   Eigen::Vector3d Point(int sample) const;  // `scan` frame
   const Eigen::Vector3f& Normal(int sample) const { return normals_[sample]; }
   uint8_t Intensity(int sample) const { return intensities_[sample]; }
@@ -65,6 +70,7 @@ class SharedSamples {
   std::vector<int> first_of_block_;  // sample; one more at the end
   std::vector<Eigen::Vector3f> normals_;
   std::vector<uint8_t> intensities_;
+  std::vector<uint8_t> kept_aside_;               // empty = none
   std::vector<std::vector<Sighting>> sightings_;  // per photo
   std::vector<SightingOfPhoto> of_sample_;
   std::vector<int> first_of_sample_;

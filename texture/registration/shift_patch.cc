@@ -83,6 +83,13 @@ float GreyAt(const cv::Mat1b& grey, const Eigen::Vector2f& place) {
   return upper + t * (lower - upper);
 }
 
+std::optional<float> PatchLikeness(const cv::Mat1b& grey,
+                                   const std::vector<ExpectedPixel>& expected) {
+  const Likeness here = Compare(grey, expected, Eigen::Vector2f::Zero());
+  if (!(here.correlation > -1)) return std::nullopt;
+  return here.correlation;
+}
+
 PatchShift FindPatchShift(const cv::Mat1b& grey, const std::vector<ExpectedPixel>& expected,
                           int radius) {
   PatchShift result;

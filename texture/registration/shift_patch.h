@@ -1,6 +1,7 @@
 #pragma once
 // How far a photo is shifted, locally, against what the other photos say of the same surface.
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,11 @@ struct PatchShift {
 // Application to Stereo Vision"). grey: 8-bit.
 PatchShift FindPatchShift(const cv::Mat1b& grey, const std::vector<ExpectedPixel>& expected,
                           int radius);
+
+// Normalised cross-correlation between picture and what is expected, as it stands; none where too
+// few of it lie in the picture, or where either is bare.
+std::optional<float> PatchLikeness(const cv::Mat1b& grey,
+                                   const std::vector<ExpectedPixel>& expected);
 
 // Linear between the four pixels around; negative outside.
 float GreyAt(const cv::Mat1b& grey, const Eigen::Vector2f& place);

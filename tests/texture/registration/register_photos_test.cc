@@ -23,9 +23,9 @@ TEST_F(RegisterPhotosTest, PhotosThatAgreeStayAsTheyAre) {
   const std::vector<PhotoView> photos = Photos(0, 0);
   const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose");
   EXPECT_EQ(with.scans[0].samples.rgb, without.scans[0].samples.rgb);
-  EXPECT_TRUE(without.registration.empty());
-  ASSERT_EQ(with.registration.size(), photos.size());
-  for (const PhotoRegistration& photo : with.registration) {
+  EXPECT_TRUE(without.registration.photos.empty());
+  ASSERT_EQ(with.registration.photos.size(), photos.size());
+  for (const PhotoRegistration& photo : with.registration.photos) {
     EXPECT_FALSE(photo.corrected);
     EXPECT_LT(photo.shift_before_px, 0.5);
     EXPECT_GT(photo.share_measured, 0.5);
@@ -44,11 +44,12 @@ TEST_F(RegisterPhotosTest, PosesThatAreOffAreBroughtTogether) {
   EXPECT_EQ(measured.scans[0].samples.rgb, without.scans[0].samples.rgb);
   double before = 0, after = 0;
   for (size_t i = 0; i < photos.size(); ++i) {
-    EXPECT_TRUE(with.registration[i].corrected);
-    EXPECT_FALSE(measured.registration[i].corrected);
-    EXPECT_EQ(measured.registration[i].shift_before_px, with.registration[i].shift_before_px);
-    before += with.registration[i].shift_before_px;
-    after += with.registration[i].shift_after_px;
+    EXPECT_TRUE(with.registration.photos[i].corrected);
+    EXPECT_FALSE(measured.registration.photos[i].corrected);
+    EXPECT_EQ(measured.registration.photos[i].shift_before_px,
+              with.registration.photos[i].shift_before_px);
+    before += with.registration.photos[i].shift_before_px;
+    after += with.registration.photos[i].shift_after_px;
   }
   EXPECT_LT(after, 0.3 * before);
 }
@@ -62,8 +63,9 @@ TEST_F(RegisterPhotosTest, OnePhotoAmongManyIsPutRight) {
   const ColorizeResult without = Colorize(photos, "none"), with = Colorize(photos, "pose");
   EXPECT_LT(Psnr(without), best - 0.5);
   EXPECT_GT(Psnr(with), best - 0.5 * (best - Psnr(without)));
-  EXPECT_NEAR(with.registration[4].turned_deg, 0.8, 0.2);
-  EXPECT_GT(with.registration[4].shift_before_px, 3 * with.registration[4].shift_after_px);
+  EXPECT_NEAR(with.registration.photos[4].turned_deg, 0.8, 0.2);
+  EXPECT_GT(with.registration.photos[4].shift_before_px,
+            3 * with.registration.photos[4].shift_after_px);
 }
 
 TEST_F(RegisterPhotosTest, AWarpSaysWhatTheCameraDoesNot) {
@@ -90,10 +92,10 @@ TEST_F(RegisterPhotosTest, OnePhotoOrNoneIsNoProblem) {
   std::vector<PhotoView> photos = Photos(0, 0);
   photos.resize(1);
   const ColorizeResult alone = Colorize(photos, "pose");
-  ASSERT_EQ(alone.registration.size(), 1u);
-  EXPECT_FALSE(alone.registration[0].corrected);
-  EXPECT_EQ(alone.registration[0].share_measured, 0);
-  for (const double px : alone.registration[0].map_px) EXPECT_TRUE(std::isnan(px));
+  ASSERT_EQ(alone.registration.photos.size(), 1u);
+  EXPECT_FALSE(alone.registration.photos[0].corrected);
+  EXPECT_EQ(alone.registration.photos[0].share_measured, 0);
+  for (const double px : alone.registration.photos[0].map_px) EXPECT_TRUE(std::isnan(px));
 }
 
 }  // namespace

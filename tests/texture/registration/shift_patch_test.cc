@@ -73,5 +73,15 @@ TEST(ShiftPatch, GreysAreLinearBetweenPixelsAndNegativeOutside) {
   EXPECT_LT(GreyAt(picture, {std::nanf(""), 1.0f}), 0);
 }
 
+TEST(PatchShift, LikenessIsThatOfWhereItStands) {
+  const cv::Mat1b picture = Draw(Pattern);
+  const auto here = PatchLikeness(picture, Expect(Pattern, {0, 0}));
+  const auto beside = PatchLikeness(picture, Expect(Pattern, {2, 1}));
+  ASSERT_TRUE(here && beside);
+  EXPECT_GT(*here, 0.99);
+  EXPECT_LT(*beside, 0.95);
+  EXPECT_FALSE(PatchLikeness(Draw(Plain), Expect(Pattern, {0, 0})));
+}
+
 }  // namespace
 }  // namespace roomtex
