@@ -9,6 +9,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <sys/resource.h>
 
 #include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
@@ -90,17 +91,40 @@ void WriteModelWithout(const SparseModel& model, const std::set<std::string>& le
   }
 }
 
+// Of all programs that were started and have ended.
+double SecondsOfChildren() {
+  rusage usage{};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// A line of the file of methods.
+struct Method {
+  std::string name;
+  std::string program;  // empty = roomtex-texture
+  std::string options;
+};
+
+// "NAME: OPTIONS of roomtex-texture", or "NAME! PROGRAM OPTIONS".
+Method ReadMethod(const std::string& line) {
+  const size_t end = line.find_first_of(":!");
+  Method method;
+  method.name = line.substr(0, end);
+  if (end == std::string::npos) return method;
+  (line[end] == '!' ? method.program : method.options) = line.substr(end + 1);
+  return method;
+}
+
 class HeldOutTable {
  public:
   HeldOutTable(const HeldOutOptions& options, const SparseModel& model,
                const Command::Context& context)
       : options_(options), model_(model), context_(context) {}
 
-  // Name of the method and its options, as "name: --Blend.detail 1".
-  void AddMethod(const std::string& method, const std::vector<std::string>& names) {
-    const size_t colon = method.find(':');
-    const std::string name = method.substr(0, colon);
-    const std::string words = colon == std::string::npos ? "" : method.substr(colon + 1);
+  void AddMethod(const Method& method, const std::vector<std::string>& names) {
     Json photos = Json::array();
     double cpu = 0;
     std::vector<std::vector<std::string>> groups;
@@ -108,32 +132,36 @@ class HeldOutTable {
       if (groups.empty() || options_.one_by_one) groups.emplace_back();
       groups.back().push_back(photo);
     }
-    for (const auto& group : groups) cpu += AddGroup(name, words, group, &photos);
-    PrintRow(name, photos, cpu);
-    Json entry = {{"name", name}, {"options", words}, {"cpu_seconds", cpu}, {"photos", photos}};
+    for (const auto& group : groups) cpu += AddGroup(method, group, &photos);
+    PrintRow(method.name, photos, cpu);
+    Json entry = {{"name", method.name},
+                  {"options", method.program + method.options},
+                  {"cpu_seconds", cpu},
+                  {"photos", photos}};
     context_.report["methods"].push_back(entry);
   }
 
  private:
-  // Returns the CPU seconds of roomtex-texture.
-  double AddGroup(const std::string& name, const std::string& words,
-                  const std::vector<std::string>& group, Json* photos) {
+  // Returns the CPU seconds of the program that colours.
+  double AddGroup(const Method& method, const std::vector<std::string>& group, Json* photos) {
     const TempFolder folder;
     WriteModelWithout(model_, {group.begin(), group.end()}, options_.input_path, folder / "model");
-    std::string line = "roomtex-texture --quiet --input_path '" + (folder / "model") +
-                       "' --image_path '" + options_.image_path + "' --output_path '" +
-                       (folder / "textured") + "' --output_evidence 0 " + words;
+    const bool is_ours = method.program.empty();
+    const std::string output = folder / "textured";
+    std::string line = is_ours ? "roomtex-texture --quiet --output_evidence 0" : method.program;
+    line += " --input_path '" + (folder / "model") + "' --image_path '" + options_.image_path +
+            "' --output_path '" + output + "' " + method.options;
     if (!options_.scan_path.empty()) line += " --scan_path '" + options_.scan_path + "'";
-    const CommandResult run = RunCommandLine(line);
-    if (run.exit_code != 0 && run.exit_code != kExitUntrusted) {
-      throw std::runtime_error(name + ": roomtex-texture failed: " + run.err);
+    const double before = SecondsOfChildren();
+    const CommandResult run = is_ours ? RunCommandLine(line) : RunProgram(line);
+    const double cpu = SecondsOfChildren() - before;
+    if (run.exit_code != 0 && !(is_ours && run.exit_code == kExitUntrusted)) {
+      throw std::runtime_error(method.name + " failed: " + run.err);
     }
-    const Json report = Json::parse(ReadBytes(folder / "textured/report.json"));
-    const ColoredMesh mesh = ReadTexturedMesh(folder / "textured/model.glb");
+    const ColoredMesh mesh =
+        is_ours ? ReadTexturedMesh(output + "/model.glb") : ReadColoredMesh(output + "/model.ply");
     const PhotoPredictor predictor(mesh, context_.options.num_threads);
-    for (const std::string& photo : group) photos->push_back(Judge(name, photo, predictor));
-    double cpu = 0;
-    for (const auto& [stage, seconds] : report["cpu_seconds"].items()) cpu += seconds.get<double>();
+    for (const std::string& photo : group) photos->push_back(Judge(method.name, photo, predictor));
     return cpu;
   }
 
@@ -227,7 +255,7 @@ void HoldOut(const HeldOutOptions& options, const Command::Context& context) {
   context.progress.Stage("methods", static_cast<int>(methods.size()));
   HeldOutTable table(options, model, context);
   for (const std::string& method : methods) {
-    table.AddMethod(method, names);
+    table.AddMethod(ReadMethod(method), names);
     context.progress.Tick();
   }
 }
@@ -249,10 +277,12 @@ int main(int argc, char** argv) {
   command.AddBool("one_by_one", &o.one_by_one, "hold out one at a time, not all of them at once");
   command.AddBool("refine_pose", &o.refine_pose,
                   "fit the pose of what is held out to the prediction before it is judged");
-  command.AddInputPath("methods_path", &o.methods_path,
-                       "text file, a method a line: its name, a colon, options of roomtex-texture; "
-                       "none = default and thesis",
-                       Command::Kind::kOptional);
+  command.AddInputPath(
+      "methods_path", &o.methods_path,
+      "text file, a method a line: its name, a colon, options of roomtex-texture; or "
+      "its name, an exclamation mark, a program that colours (README.md); "
+      "none = default and thesis",
+      Command::Kind::kOptional);
   command.AddDouble("turn_deg", &o.turn_deg,
                     "turns every pose at random, standard deviation of each axis, degrees");
   command.AddDouble("move", &o.move,

@@ -9,6 +9,7 @@
 #include "core/random_stream.h"
 #include "core/twist.h"
 #include "tests/benchmark/held_out/held_out_score.h"
+#include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 
@@ -96,7 +97,10 @@ TEST(HeldOut, PrintsARowForEveryMethod) {
       "--scan_columns 400 --scan_rows 150 --output_path " +
       (folder / "capture"));
   ASSERT_EQ(capture.exit_code, 0) << capture.err;
-  WriteBytes(folder / "methods", "# name: options\ndefault:\nblurred: --Blend.footprint 4\n");
+  // The last is another program, which writes colours at the vertices.
+  WriteBytes(folder / "methods",
+             "# name: options\ndefault:\nblurred: --Blend.footprint 4\nother! '" + BinFolder() +
+                 "/roomtex-texture' --quiet\n");
   const CommandResult result =
       RunCommandLine("held_out --quiet --input_path " + (folder / "capture/truth") +
                      " --image_path " + (folder / "capture/photos") + " --scan_path " +
@@ -105,9 +109,10 @@ TEST(HeldOut, PrintsARowForEveryMethod) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("| default |"), std::string::npos) << result.out;
   const auto report = nlohmann::json::parse(ReadBytes(folder / "report.json"));
-  ASSERT_EQ(report["methods"].size(), 2u);
+  ASSERT_EQ(report["methods"].size(), 3u);
   for (const auto& method : report["methods"]) {
     ASSERT_EQ(method["photos"].size(), 2u);
+    EXPECT_GT(method["cpu_seconds"].get<double>(), 0);
     for (const auto& photo : method["photos"]) EXPECT_GT(photo["psnr"].get<double>(), 10);
   }
   EXPECT_GT(report["methods"][0]["photos"][0]["gradient_energy"].get<double>(),
