@@ -41,6 +41,7 @@ class PhotoChoiceTest : public ::testing::Test {
   ColorizeResult Run(const std::string& mode, int num_threads = 2, int scale = 1,
                      double memory_mb = 2000) const {
     ColorizeOptions options;
+    options.registration.mode = "none";  // it would bring them together
     options.blend.mode = mode;
     options.texture_scale = scale;
     options.texture_memory_mb = memory_mb;
