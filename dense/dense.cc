@@ -122,7 +122,7 @@ class DenseRun {
     return aside_ + "/" + std::to_string(view) + what;
   }
   std::string GreyPath(const std::string& name) const {
-    return PathInside(aside_ + "/grey", name + ".png");
+    return PathInside(aside_ + "/grey", name + ".pgm");
   }
   static void WriteLossless(const cv::Mat& picture, const std::string& path) {
     if (cv::imwrite(path, picture)) return;
@@ -133,8 +133,7 @@ class DenseRun {
     StereoPicture picture;
     picture.camera = views_[view].camera;
     picture.cam_from_scan = views_[view].cam_from_scan;
-    const cv::Mat grey = cv::imread(GreyPath(views_[view].name), cv::IMREAD_GRAYSCALE);
-    grey.convertTo(picture.grey, CV_32F);
+    picture.grey = cv::imread(GreyPath(views_[view].name), cv::IMREAD_GRAYSCALE);
     return picture;
   }
 
@@ -169,8 +168,10 @@ class DenseRun {
     cv::Mat1f compared;
     estimate.compared.convertTo(compared, CV_32F);  // 20 bits at most: exact
     WriteDenseArray({estimate.depth, estimate.score, estimate.normals[0], estimate.normals[1],
-                     estimate.normals[2], is_new, compared},
+                     estimate.normals[2], compared},
                     Aside(i, ".first"));
+    WriteDenseArray({is_new, estimate.normals[0], estimate.normals[1], estimate.normals[2]},
+                    Aside(i, ".new"));
     return {view.name, static_cast<int>(view.neighbours.size()), estimate.share_open, 0};
   }
 
@@ -181,12 +182,12 @@ class DenseRun {
     const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
     cv::Mat1i compared;
-    arrays[6].convertTo(compared, CV_32S);
+    arrays[5].convertTo(compared, CV_32S);
     const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], compared, 0};
     const auto found = [&](int k) -> DepthOfSource {
       const int other = view.neighbours[k];
-      const std::vector<cv::Mat1f> its = ReadDenseArray(Aside(other, ".first"));
-      return {views_[other].camera, views_[other].cam_from_scan, its[5], {its[2], its[3], its[4]}};
+      const std::vector<cv::Mat1f> its = ReadDenseArray(Aside(other, ".new"));
+      return {views_[other].camera, views_[other].cam_from_scan, its[0], {its[1], its[2], its[3]}};
     };
     const int num_found = std::min(static_cast<int>(view.neighbours.size()), kAsked);
     const DepthEstimate estimate =

@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
-#include "colmap_ext/dense_workspace.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -16,161 +15,17 @@
 namespace roomtex {
 namespace {
 
-constexpr int kBlockPx = 4;          // of the raster of open space
-constexpr double kNearest = 0.35;    // metres: nearer than any thing that is photographed sharply
-constexpr double kBeyondRoom = 0.1;  // metres that surfaces may lie outside the scan's box
-constexpr int kNormalRadiusPx = 3;   // of the scan's normals
-constexpr int kSide = 5;             // samples of a window, each way ...
-constexpr int kStep = 2;             // ... so many pixels apart
-constexpr int kSamples = kSide * kSide;
-constexpr int kLanes = 4;  // that the processor takes at a time
-constexpr int kPadded = (kSamples + kLanes - 1) / kLanes * kLanes;
 constexpr int kMaxSources = 20;
 constexpr int kCompared = 4;             // sources at the full resolution, pixel by pixel
-constexpr int kBest = 2;                 // sources that count: others may not see the place
-constexpr float kSigmaColor = 25;        // grey levels: what is of another colour is another thing
-constexpr float kMinDeviation = 2.5f;    // grey levels; flatter windows say nothing
-constexpr float kLeastDepth = 1e-3f;     // share: a window that reaches beside the camera
 constexpr float kMaxSlope = 5;           // tangent of the angle to a plane that faces the camera
 constexpr float kSameDepth = 0.01f;      // share
 constexpr float kAlreadyThere = 0.002f;  // share: what is there already is only refined
-constexpr float kNoMatch = 2;            // cost of a hypothesis that no two sources see
+
+constexpr float kAlike_px = 0.02f;  // in the source that shows most of a difference
+constexpr float kHopeless = 0.35f;  // of the cost: most sources are so much worse
+constexpr float kFits = 0.1f;       // cost
 
 using Plane = InverseDepthPlane;
-
-struct Source {
-  const cv::Mat1f* grey;
-  Eigen::Matrix3f turned;  // pixel of the reference, at infinity, to that of the source
-  Eigen::Vector3f moved;   // times the inverse depth
-};
-
-// `img` to `img`, homogeneous: turned * x + moved * w.
-Source MakeSource(const StereoPicture& reference, const Camera& reference_camera,
-                  const StereoPicture& source, const Camera& source_camera, const cv::Mat1f* grey) {
-  const auto matrix = [](const Camera& camera) {
-    Eigen::Matrix3d k = Eigen::Matrix3d::Identity();
-    k(0, 0) = camera.params[0], k(1, 1) = camera.params[1];
-    k(0, 2) = camera.params[2], k(1, 2) = camera.params[3];
-    return k;
-  };
-  const Rigid source_from_reference = source.cam_from_scan * reference.cam_from_scan.Inverse();
-  const Eigen::Matrix3d k = matrix(source_camera);
-  return {
-      grey,
-      (k * source_from_reference.rotation.toRotationMatrix() * matrix(reference_camera).inverse())
-          .cast<float>(),
-      (k * source_from_reference.translation).cast<float>()};
-}
-
-Eigen::Vector3f NormalFromPlane(const Plane& plane, const Camera& camera, float x, float y) {
-  const std::vector<double>& p = camera.params;
-  const Eigen::Vector3f away(static_cast<float>(p[0]) * plane.a, static_cast<float>(p[1]) * plane.b,
-                             plane.w - (x - static_cast<float>(p[2])) * plane.a -
-                                 (y - static_cast<float>(p[3])) * plane.b);
-  return -away.normalized();
-}
-
-constexpr int Dx(int k) { return (k % kSide - kSide / 2) * kStep; }
-constexpr int Dy(int k) { return (k / kSide - kSide / 2) * kStep; }
-
-struct WindowOffsets {
-  std::array<float, kPadded> dx{}, dy{};
-  constexpr WindowOffsets() {
-    for (int k = 0; k < kSamples; ++k) {
-      dx[k] = static_cast<float>(Dx(k));
-      dy[k] = static_cast<float>(Dy(k));
-    }
-  }
-};
-constexpr WindowOffsets kOffsets;
-
-// The window of the reference around one pixel, with bilateral weights.
-class Window {
- public:
-  // False if it is too flat.
-  bool Set(const cv::Mat1f& grey, int x, int y) {
-    const float centre = grey(y, x);
-    sum_ = mean_ = 0;
-    for (int k = 0; k < kSamples; ++k) {
-      const int column = std::clamp(x + Dx(k), 0, grey.cols - 1);
-      const int row = std::clamp(y + Dy(k), 0, grey.rows - 1);
-      value_[k] = grey(row, column);
-      const float difference = (value_[k] - centre) / kSigmaColor;
-      weight_[k] = 1 / (1 + difference * difference);
-      sum_ += weight_[k];
-      mean_ += weight_[k] * value_[k];
-    }
-    mean_ /= sum_;
-    variance_ = 0;
-    for (int k = 0; k < kSamples; ++k) {
-      value_[k] -= mean_;
-      variance_ += weight_[k] * value_[k] * value_[k];
-    }
-    variance_ /= sum_;
-    return variance_ > kMinDeviation * kMinDeviation;
-  }
-
-  // 1 - normalised cross-correlation, 0..2.
-  float Cost(const Source& source, float x, float y, const Plane& plane) const {
-    const cv::Mat1f& grey = *source.grey;
-    const Eigen::Vector3f at = source.turned * Eigen::Vector3f(x, y, 1) + source.moved * plane.w;
-    const Eigen::Vector3f right = source.turned.col(0) + source.moved * plane.a;
-    const Eigen::Vector3f down = source.turned.col(1) + source.moved * plane.b;
-    const auto max_x = static_cast<float>(grey.cols - 1), max_y = static_cast<float>(grey.rows - 1);
-    // The window is a convex quadrilateral there: in the picture if its corners are.
-    constexpr auto kReach = static_cast<float>(kSide / 2 * kStep);
-    for (const float dy : {-kReach, kReach}) {
-      for (const float dx : {-kReach, kReach}) {
-        const Eigen::Vector3f corner = at + dx * right + dy * down;
-        if (!(corner.z() > kLeastDepth)) return kNoMatch;
-        const float u = corner.x() / corner.z() - 0.5f, v = corner.y() / corner.z() - 0.5f;
-        if (!(u >= 0 && v >= 0 && u < max_x && v < max_y)) return kNoMatch;
-      }
-    }
-    // Without a branch, four samples at a time.
-    alignas(32) std::array<float, kPadded> us, vs, values;
-    for (int k = 0; k < kPadded; ++k) {
-      const float inverse = 1 / (at.z() + kOffsets.dx[k] * right.z() + kOffsets.dy[k] * down.z());
-      us[k] = (at.x() + kOffsets.dx[k] * right.x() + kOffsets.dy[k] * down.x()) * inverse - 0.5f;
-      vs[k] = (at.y() + kOffsets.dx[k] * right.y() + kOffsets.dy[k] * down.y()) * inverse - 0.5f;
-    }
-    const float* const pixels = grey[0];
-    const auto stride = static_cast<int>(grey.step1());
-    for (int k = 0; k < kSamples; ++k) {
-      // Rounding may lead over the edge, and far where a corner is almost beside the camera.
-      const int column = std::clamp(static_cast<int>(us[k]), 0, grey.cols - 2);
-      const int row = std::clamp(static_cast<int>(vs[k]), 0, grey.rows - 2);
-      const float s = us[k] - static_cast<float>(column), t = vs[k] - static_cast<float>(row);
-      const float* above = pixels + static_cast<ptrdiff_t>(row) * stride + column;
-      const float* below = above + stride;
-      const float top = above[0] + s * (above[1] - above[0]);
-      const float bottom = below[0] + s * (below[1] - below[0]);
-      values[k] = top + t * (bottom - top);
-    }
-    for (int k = kSamples; k < kPadded; ++k) values[k] = 0;
-    std::array<float, kLanes> sums{}, squares{}, crosses{};
-    for (int k = 0; k < kPadded; k += kLanes) {
-      for (int lane = 0; lane < kLanes; ++lane) {
-        const float weighted = weight_[k + lane] * values[k + lane];
-        sums[lane] += weighted;
-        squares[lane] += weighted * values[k + lane];
-        crosses[lane] += weighted * value_[k + lane];
-      }
-    }
-    float sum = 0, square = 0, cross = 0;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      sum += sums[lane], square += squares[lane], cross += crosses[lane];
-    }
-    const float mean = sum / sum_;
-    const float variance = square / sum_ - mean * mean;
-    if (!(variance > 0.25f * kMinDeviation * kMinDeviation)) return kNoMatch;
-    return 1 - cross / sum_ / std::sqrt(variance * variance_);
-  }
-
- private:
-  alignas(32) std::array<float, kPadded> value_{}, weight_{};  // 0 beyond kSamples
-  float sum_ = 0, mean_ = 0, variance_ = 0;
-};
 
 // One level of resolution.
 class Level {
@@ -179,7 +34,7 @@ class Level {
         const OpenSpace& open, int shrink, uint64_t seed, int num_threads)
       : open_(open), camera_(reference.camera), seed_(seed), num_threads_(num_threads) {
     const auto shrunk = [shrink](const StereoPicture& picture, Camera* camera) {
-      cv::Mat1f grey = picture.grey;
+      cv::Mat1b grey = picture.grey;
       if (shrink > 1) {
         camera->Resize(picture.camera.width / shrink, picture.camera.height / shrink);
         cv::resize(picture.grey, grey, {camera->width, camera->height}, 0, 0, cv::INTER_AREA);
@@ -187,14 +42,18 @@ class Level {
       return grey;
     };
     grey_ = shrunk(reference, &camera_);
-    greys_.reserve(sources.size());
     for (const StereoPicture& source : sources) {
       Camera camera = source.camera;
-      greys_.push_back(shrunk(source, &camera));
-      sources_.push_back(MakeSource(reference, camera_, source, camera, &greys_.back()));
+      const cv::Mat1b grey = shrunk(source, &camera);
+      sources_.emplace_back(camera_, reference.cam_from_scan, camera, source.cam_from_scan, grey);
     }
+    float most_pixels = 1;
+    for (const StereoSource& source : sources_) {
+      most_pixels = std::max(most_pixels, source.PixelsPerInverseDepth());
+    }
+    alike_inverse_depth_ = kAlike_px / most_pixels;
     planes_.resize(grey_.total());
-    costs_.assign(grey_.total(), kNoMatch);
+    costs_.assign(grey_.total(), StereoWindow::kNoMatch);
     all_sources_ = (uint32_t{1} << sources_.size()) - 1;
     compared_.assign(grey_.total(), all_sources_);
     scan_.resize(grey_.total());
@@ -206,7 +65,7 @@ class Level {
   void Start(const Level* coarser) {
     const std::vector<std::array<int, 4>> beside =
         coarser == nullptr ? FixedBeside() : std::vector<std::array<int, 4>>();
-    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+    ForOpenPixels(-1, [&](int x, int y, StereoWindow* window) {
       const int pixel = y * grey_.cols + x;
       RandomStream random(MixBits(seed_, pixel, 0));
       if (coarser != nullptr) {
@@ -215,7 +74,7 @@ class Level {
         Try(x, y, coarser->PlaneForFiner(x, y, grey_.size()), *window);
       } else {
         for (const int other : beside[pixel]) {
-          if (other >= 0) TryFrom(x, y, other, scan_[other], *window);
+          if (other >= 0) Try(x, y, Moved(scan_[other], x, y, other), *window);
         }
         for (int k = 0; k < 4; ++k) Try(x, y, RandomPlane(pixel, &random), *window);
       }
@@ -225,7 +84,7 @@ class Level {
 
   // Starts from what was found before.
   void Start(const DepthEstimate& before) {
-    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+    ForOpenPixels(-1, [&](int x, int y, StereoWindow* window) {
       const float depth = before.depth(y, x);
       compared_[y * grey_.cols + x] = static_cast<uint32_t>(before.compared(y, x));
       if (depth > 0) Try(x, y, PlaneAt(x, y, depth, before.normals), *window);
@@ -263,22 +122,34 @@ class Level {
         shown[pixel].w = shown[pixel].At(dx, dy);
       }
     }
-    ForOpenPixels(-1, [&](int x, int y, Window* window) {
+    // What is there already is refined anyway.
+    const auto is_news = [&](int pixel) {
+      const Plane& plane = shown[pixel];
+      return plane.w > 0 && !(std::abs(plane.w - planes_[pixel].w) < kAlreadyThere * plane.w) &&
+             IsAllowed(pixel, plane);
+    };
+    ForOpenPixelsThat(is_news, [&](int x, int y, StereoWindow* window) {
       const int pixel = y * grey_.cols + x;
       const Plane& plane = shown[pixel];
-      // What is there already is refined anyway.
-      if (!(plane.w > 0) || std::abs(plane.w - planes_[pixel].w) < kAlreadyThere * plane.w) return;
-      const uint32_t compared = compared_[pixel];
-      compared_[pixel] = all_sources_;  // these were the best for something else
-      Try(x, y, plane, *window);
-      compared_[pixel] = planes_[pixel].w == plane.w ? BestSources(x, y, *window) : compared;
+      // Those that were compared were the best for something else.
+      Costs costs = Compare(*window, plane, all_sources_, costs_[pixel]);
+      const float cost = costs.Mean();
+      if (!(cost < costs_[pixel])) return;
+      costs_[pixel] = cost;
+      planes_[pixel] = plane;
+      compared_[pixel] = costs.Best();
     });
   }
 
   void Iterate(int iteration, bool far) {
     for (int color = 0; color < 2; ++color) {
-      ForOpenPixels(color, [&](int x, int y, Window* window) {
+      ForOpenPixels(color, [&](int x, int y, StereoWindow* window) {
         const int pixel = y * grey_.cols + x;
+        const auto try_plane = [&](const Plane& plane) {
+          // The scan's surface need not be found more exactly.
+          if (IsScans(pixel) && IsSameDepth(plane.w, scan_[pixel].w)) return;
+          Try(x, y, plane, *window);
+        };
         // An odd number of pixels away: of the other colour, which stays as it is meanwhile.
         for (const int distance : {1, 5, 15}) {
           if (!far && distance > 1) break;
@@ -287,11 +158,11 @@ class Level {
             if (ox < 0 || oy < 0 || ox >= grey_.cols || oy >= grey_.rows) continue;
             const int other = oy * grey_.cols + ox;
             const Plane& plane = bins_[other] != 0 ? planes_[other] : scan_[other];
-            if (plane.w > 0) TryFrom(x, y, other, plane, *window);
+            if (plane.w > 0) try_plane(Moved(plane, x, y, other));
           }
         }
         RandomStream random(MixBits(seed_, pixel, 2 + 2 * iteration + color));
-        if (far) Try(x, y, RandomPlane(pixel, &random), *window);
+        if (far) try_plane(RandomPlane(pixel, &random));
         float size = std::ldexp(0.04f, -iteration);
         for (int k = 0; k < 3; ++k, size /= 4) {
           Plane plane = planes_[pixel];
@@ -300,7 +171,7 @@ class Level {
           plane.w *= 1 + change();
           plane.a += 15 * change() * plane.w / focal();
           plane.b += 15 * change() * plane.w / focal();
-          Try(x, y, plane, *window);
+          try_plane(plane);
         }
       });
     }
@@ -308,8 +179,12 @@ class Level {
 
   // What is found from now on, and by a finer level, is compared with fewer sources.
   void ChooseSources() {
-    ForOpenPixels(-1, [&](int x, int y, Window* window) {
-      compared_[y * grey_.cols + x] = BestSources(x, y, *window);
+    if (sources_.size() <= kCompared) return;
+    ForOpenPixels(-1, [&](int x, int y, StereoWindow* window) {
+      const int pixel = y * grey_.cols + x;
+      const Plane& plane = planes_[pixel];
+      if (!(plane.w > 0)) return;
+      compared_[pixel] = Compare(*window, plane, all_sources_, StereoWindow::kNoMatch).Best();
     });
   }
 
@@ -345,21 +220,47 @@ class Level {
                            static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   }
 
-  // The sources that correlate best with what was found at a pixel.
-  uint32_t BestSources(int x, int y, const Window& window) const {
-    const Plane& plane = planes_[y * grey_.cols + x];
-    if (!(plane.w > 0) || sources_.size() <= kCompared) return all_sources_;
-    std::array<std::pair<float, int>, kMaxSources> costs;
-    for (size_t i = 0; i < sources_.size(); ++i) {
-      costs[i] = {window.Cost(sources_[i], static_cast<float>(x) + 0.5f,
-                              static_cast<float>(y) + 0.5f, plane),
-                  static_cast<int>(i)};
+  // Of the sources with a bit in `which`.
+  struct Costs {
+    std::array<std::pair<float, int>, kMaxSources> of_source;
+    size_t count = 0;
+
+    float Mean() const {  // of the best
+      float best = StereoWindow::kNoMatch, second = StereoWindow::kNoMatch;
+      for (size_t i = 0; i < count; ++i) {
+        const float cost = of_source[i].first;
+        if (cost < best) {
+          second = best;
+          best = cost;
+        } else {
+          second = std::min(second, cost);
+        }
+      }
+      return 0.5f * (best + second);
     }
-    std::partial_sort(costs.begin(), costs.begin() + kCompared,
-                      costs.begin() + static_cast<ptrdiff_t>(sources_.size()));
-    uint32_t best = 0;
-    for (int k = 0; k < kCompared; ++k) best |= uint32_t{1} << costs[k].second;
-    return best;
+    // The sources that correlate best.
+    uint32_t Best() {
+      const size_t kept = std::min<size_t>(kCompared, count);
+      std::partial_sort(of_source.begin(), of_source.begin() + kept, of_source.begin() + count);
+      uint32_t best = 0;
+      for (size_t k = 0; k < kept; ++k) best |= uint32_t{1} << of_source[k].second;
+      return best;
+    }
+  };
+  // Gives up, with costs that are too large, where all but the last quarter of the sources are far
+  // worse than `bound`.
+  Costs Compare(const StereoWindow& window, const Plane& plane, uint32_t which, float bound) const {
+    const int count = __builtin_popcount(which), most = count - count / 4;
+    Costs costs;
+    float best = StereoWindow::kNoMatch;
+    for (size_t i = 0; i < sources_.size(); ++i) {
+      if ((which >> i & 1) == 0) continue;
+      const float cost = window.Cost(sources_[i], plane);
+      costs.of_source[costs.count++] = {cost, static_cast<int>(i)};
+      best = std::min(best, cost);
+      if (static_cast<int>(costs.count) == most && best > bound + kHopeless) break;
+    }
+    return costs;
   }
 
   void FindOpenPixels() {
@@ -383,14 +284,23 @@ class Level {
     });
   }
 
-  // color: 0, 1 = of the chequerboard; -1 = all. Rows side by side.
+  // color: 0, 1 = of the chequerboard; -1 = all.
   template <typename Body>
   void ForOpenPixels(int color, const Body& body) const {
+    ForOpenPixelsThat(
+        [&](int pixel) {
+          return color < 0 || (pixel % grey_.cols + pixel / grey_.cols) % 2 == color;
+        },
+        body);
+  }
+  // Rows side by side.
+  template <typename Wanted, typename Body>
+  void ForOpenPixelsThat(const Wanted& is_wanted, const Body& body) const {
     ParallelFor(num_threads_, 0, grey_.rows, [&](int y) {
-      Window window;
+      StereoWindow window;
       for (int x = 0; x < grey_.cols; ++x) {
-        if (color >= 0 && (x + y) % 2 != color) continue;
-        if (bins_[y * grey_.cols + x] == 0 || !window.Set(grey_, x, y)) continue;
+        const int pixel = y * grey_.cols + x;
+        if (bins_[pixel] == 0 || !is_wanted(pixel) || !window.Set(grey_, x, y)) continue;
         body(x, y, &window);
       }
     });
@@ -407,34 +317,34 @@ class Level {
     return plane.w >= open_.first() && bin < OpenSpace::kBins && (bins_[pixel] >> bin & 1) != 0;
   }
 
-  void Try(int x, int y, const Plane& plane, const Window& window) {
+  // Whether no source could tell them from each other.
+  bool IsAlike(const Plane& a, const Plane& b) const {
+    constexpr float kReach = StereoWindow::kReachPx;
+    return std::abs(a.w - b.w) + kReach * (std::abs(a.a - b.a) + std::abs(a.b - b.b)) <
+           alike_inverse_depth_;
+  }
+
+  // Whether what was found is the scan's surface, and fits.
+  bool IsScans(int pixel) const {
+    const float of_scan = scan_[pixel].w;
+    return of_scan > 0 && costs_[pixel] < kFits && IsSameDepth(planes_[pixel].w, of_scan);
+  }
+
+  void Try(int x, int y, const Plane& plane, const StereoWindow& window) {
     const int pixel = y * grey_.cols + x;
-    if (!IsAllowed(pixel, plane)) return;
-    std::array<float, kBest> best;
-    best.fill(kNoMatch);
-    for (size_t i = 0; i < sources_.size(); ++i) {
-      if ((compared_[pixel] >> i & 1) == 0) continue;
-      const float cost = window.Cost(sources_[i], static_cast<float>(x) + 0.5f,
-                                     static_cast<float>(y) + 0.5f, plane);
-      if (cost < best[0]) {
-        best[1] = best[0];
-        best[0] = cost;
-      } else if (cost < best[1]) {
-        best[1] = cost;
-      }
-    }
-    const float cost = 0.5f * (best[0] + best[1]);
+    if (!IsAllowed(pixel, plane) || IsAlike(plane, planes_[pixel])) return;
+    const float cost = Compare(window, plane, compared_[pixel], costs_[pixel]).Mean();
     if (cost < costs_[pixel]) {
       costs_[pixel] = cost;
       planes_[pixel] = plane;
     }
   }
 
-  void TryFrom(int x, int y, int other, const Plane& plane, const Window& window) {
-    Plane moved = plane;
-    moved.w = plane.At(static_cast<float>(x - other % grey_.cols),
-                       static_cast<float>(y - other / grey_.cols));
-    Try(x, y, moved, window);
+  // A plane of another pixel, at this one.
+  Plane Moved(const Plane& plane, int x, int y, int other) const {
+    return {plane.At(static_cast<float>(x - other % grey_.cols),
+                     static_cast<float>(y - other / grey_.cols)),
+            plane.a, plane.b};
   }
 
   Plane RandomPlane(int pixel, RandomStream* random) const {
@@ -502,14 +412,14 @@ class Level {
   Camera camera_;
   uint64_t seed_;
   int num_threads_;
-  cv::Mat1f grey_;
-  std::vector<cv::Mat1f> greys_;
-  std::vector<Source> sources_;
+  cv::Mat1b grey_;
+  std::vector<StereoSource> sources_;
   std::vector<Plane> planes_, scan_;  // w = 0: none
   std::vector<float> costs_;
   std::vector<uint32_t> compared_;  // sources, one bit each
   uint32_t all_sources_ = 0;
-  std::vector<uint64_t> bins_;  // 0 = only the scan's surface can be there
+  float alike_inverse_depth_ = 0;  // 1/metres: differences that no source shows
+  std::vector<uint64_t> bins_;     // 0 = only the scan's surface can be there
 };
 
 int FineRounds(const PatchMatchOptions& options) { return (options.num_iterations + 1) / 2; }
@@ -531,86 +441,6 @@ void PatchMatchOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> PatchMatchOptions::Problems() const { return ProblemsOf(*this); }
-
-OpenSpace::OpenSpace(const ScanSpace& space, const StereoPicture& picture, double margin,
-                     int num_threads)
-    : scan_depth_(
-          DepthOfSurface(space.surface(), picture.camera, picture.cam_from_scan, num_threads)),
-      scan_normals_(NormalsOfDepth(scan_depth_, picture.camera.params, kNormalRadiusPx)),
-      columns_((picture.camera.width + kBlockPx - 1) / kBlockPx),
-      rows_((picture.camera.height + kBlockPx - 1) / kBlockPx) {
-  const Eigen::Vector3d centre = picture.cam_from_scan.TargetOriginInSource();
-  const Eigen::Vector3d size = space.bounds().max - space.bounds().min;
-  const Eigen::Vector3d middle = 0.5 * (space.bounds().max + space.bounds().min);
-  const double farthest = (centre - middle).norm() + 0.5 * size.norm() + kBeyondRoom;
-  first_ = static_cast<float>(1 / farthest);
-  last_ = static_cast<float>(1 / kNearest);
-  const CameraProjection projection(picture.camera);
-  const Rigid scan_from_cam = picture.cam_from_scan.Inverse();
-  std::vector<uint64_t> raw(static_cast<size_t>(columns_) * rows_, 0);
-  ParallelFor(num_threads, 0, rows_, [&](int row) {
-    for (int column = 0; column < columns_; ++column) {
-      const int x = std::min(column * kBlockPx + kBlockPx / 2, picture.camera.width - 1);
-      const int y = std::min(row * kBlockPx + kBlockPx / 2, picture.camera.height - 1);
-      const Eigen::Vector3d ray = *projection.RayFromImg({x + 0.5, y + 0.5});
-      const double scan = scan_depth_(y, x) > 0 ? scan_depth_(y, x) - margin : farthest;
-      uint64_t bins = 0;
-      for (int bin = 0; bin < kBins; ++bin) {
-        const double depth = 1 / (first_ + (last_ - first_) * (bin + 0.5) / kBins);
-        if (depth > scan) continue;
-        const Eigen::Vector3d place = scan_from_cam * (ray * depth);
-        // A ray that nears a wall passes through what no scanner could see empty: nothing is there.
-        if (space.IsInRoom(place, kBeyondRoom) && !space.IsSeenEmpty(place, margin) &&
-            !space.surface().DistanceTo(place, 2 * margin)) {
-          bins |= uint64_t{1} << bin;
-        }
-      }
-      raw[static_cast<size_t>(row) * columns_ + column] = bins;
-    }
-  });
-  // What is open beside a block or a bin may be open here: places are looked at one by one later.
-  bins_ = raw;
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      uint64_t bins = 0;
-      for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
-        for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-          bins |= raw[static_cast<size_t>(r) * columns_ + c];
-        }
-      }
-      bins_[static_cast<size_t>(row) * columns_ + column] = bins | bins << 1 | bins >> 1;
-    }
-  }
-}
-
-uint64_t OpenSpace::BinsAt(double x_share, double y_share) const {
-  const int column =
-      std::clamp(static_cast<int>(x_share * scan_depth_.cols) / kBlockPx, 0, columns_ - 1);
-  const int row = std::clamp(static_cast<int>(y_share * scan_depth_.rows) / kBlockPx, 0, rows_ - 1);
-  return bins_[static_cast<size_t>(row) * columns_ + column];
-}
-
-uint64_t OpenSpace::BinsInFront(double x_share, double y_share) const {
-  const float z = scan_depth_(static_cast<int>(y_share * scan_depth_.rows),
-                              static_cast<int>(x_share * scan_depth_.cols));
-  const uint64_t bins = BinsAt(x_share, y_share);
-  if (!(z > 0)) return bins;
-  const int last = Bin(1 / z);
-  return last >= kBins - 1 ? 0 : bins >> (last + 1) << (last + 1);
-}
-
-InverseDepthPlane PlaneFromNormal(float depth, const Eigen::Vector3f& normal, const Camera& camera,
-                                  float x, float y) {
-  const std::vector<double>& p = camera.params;
-  const Eigen::Vector3f ray((x - static_cast<float>(p[2])) / static_cast<float>(p[0]),
-                            (y - static_cast<float>(p[3])) / static_cast<float>(p[1]), 1);
-  InverseDepthPlane plane{1 / depth, 0, 0};
-  const float slant = normal.dot(ray);
-  if (!(slant < -0.05f * ray.norm())) return plane;  // no normal, or a grazing one
-  plane.a = normal.x() * plane.w / slant / static_cast<float>(p[0]);
-  plane.b = normal.y() * plane.w / slant / static_cast<float>(p[1]);
-  return plane;
-}
 
 bool IsSameDepth(float a, float b) { return std::abs(a - b) < kSameDepth * b; }
 

@@ -296,8 +296,13 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
     record.trusted = json.value("trusted", true);
     record.reason = json.value("reason", std::string());
     const Json expected = json.value("expected_error", Json());
-    const Json far = expected.is_object() ? expected.value("at_far_corner_mm", Json()) : Json();
-    if (far.is_number()) record.expected_error = far.get<double>() / 1000;
+    // Photos that were placed one by one have no common error at the room's far corner.
+    for (const char* key : {"at_far_corner_mm", "at_cameras_mm"}) {
+      const Json found = expected.is_object() ? expected.value(key, Json()) : Json();
+      if (!found.is_number()) continue;
+      record.expected_error = found.get<double>() / 1000;
+      break;
+    }
     if (!json.contains("scans")) return record;
     for (const Json& scan : json.at("scans")) record.scans.push_back(RecordFromJson(scan));
   } catch (const std::exception&) {

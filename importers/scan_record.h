@@ -45,7 +45,9 @@ struct AlignmentRecord {
   bool found = false;        // false: the model was not made by roomtex-align
   bool trusted = true;
   std::string reason;
-  double expected_error = 0;      // metres, at the far corner of the room; 0 = not known
+  // Metres, at the far corner of the room, or at the photos where each was placed by itself; 0 =
+  // not known.
+  double expected_error = 0;
   std::vector<ScanRecord> scans;  // empty: not remembered
 };
 // Throws InputError for a file that is there and cannot be understood.

@@ -217,6 +217,10 @@ TEST_F(ScanRecords, SaysHowFarTheAlignmentIsOff) {
   Write("aligned/alignment.json",
         "{\"trusted\": true, \"expected_error\": {\"at_far_corner_mm\": 45.5}}");
   EXPECT_NEAR(ReadAlignmentRecord(folder_ / "aligned").expected_error, 0.0455, 1e-9);
+  // Photos placed one by one: no room moves as a whole.
+  Write("aligned/alignment.json",
+        "{\"expected_error\": {\"at_far_corner_mm\": null, \"at_cameras_mm\": 27}}");
+  EXPECT_NEAR(ReadAlignmentRecord(folder_ / "aligned").expected_error, 0.027, 1e-9);
   Write("aligned/alignment.json", "{\"trusted\": true, \"expected_error\": null}");
   EXPECT_EQ(ReadAlignmentRecord(folder_ / "aligned").expected_error, 0);
 }
