@@ -60,6 +60,9 @@ LINES = [
     Line("view", "roomtex-view --quiet --input_path coloured --aligned sparse --image_path photos "
          "--output_path page", "page", ("page/report.json",)),
 ]
+# Without a model and picks: each photo is placed by itself, or refused.
+ALONE = Line("align photos alone", "roomtex-align --quiet --image_path photos --scan_path scan.rtpi --output_path alone",
+             "alone", ("alone/alignment.json",))
 # A server has tables of its own (servers), and tools of the developers are not installed.
 WITHOUT = {"roomtex-pick", "roomtex-evaluate-texture"}
 

@@ -1,9 +1,10 @@
 """Every command writes the same bytes with one thread and with four, and when it runs again."""
 
 import scene as s
-from commands import LINES, Line, outputs, prepared, without_line
+from commands import ALONE, LINES, Line, outputs, prepared, without_line
 
 MORE = [
+    ALONE,
     Line("import to E57", "roomtex-import --quiet --input_path scan.rtpi --output_path room.e57"),
     Line("align with photos", s.ALIGN + " --image_path photos --overlays 2 --output_path aligned"),
     Line("texture with OBJ", s.TEXTURE + " --output_path textured --output_obj 1"),

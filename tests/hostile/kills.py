@@ -10,7 +10,7 @@ import subprocess
 import time
 
 import scene as s
-from commands import LINES, Line, is_unsteady, prepared
+from commands import ALONE, LINES, Line, is_unsteady, prepared
 
 LIBRARY = os.environ.get("ROOMTEX_DIE_AT_RENAME", "")
 ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
@@ -19,6 +19,7 @@ ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
 def commands():
     """All of them, and further ones whose files lie in several folders."""
     yield from LINES
+    yield ALONE
     yield Line("align in the folder that one works in", s.ALIGN + " --output_path .", None,
                ("alignment.json",))
     yield Line("align into three folders", (
