@@ -594,17 +594,17 @@ bool AgreeBetter(const std::vector<double>& before, const std::vector<double>& a
 // Pixels of the level: the first search finds what is off by much, the others what it left.
 constexpr int kCoarseRadius = 3, kFineRadius = 2, kLastRadius = 1;
 constexpr int kFineRounds = 3;
+int RadiusAt(int level, int round) {
+  return level == kNumLevels - 1 ? kCoarseRadius : round == 0 ? kFineRadius : kLastRadius;
+}
+int RoundsAt(int level) { return level > 0 ? 1 : kFineRounds; }
 
 // Coarse to fine, until the photos agree. False if they agree no better than before.
 bool BringTogether(bool with_warps, Registrar* registrar) {
   const std::vector<double> before = registrar->Disagreement();
   for (int level = kNumLevels - 1; level >= 0; --level) {
-    const int rounds = level > 0 ? 1 : kFineRounds;
-    for (int i = 0; i < rounds; ++i) {
-      const int radius = level == kNumLevels - 1 ? kCoarseRadius
-                         : i == 0                ? kFineRadius
-                                                 : kLastRadius;
-      registrar->Measure(level, radius);
+    for (int i = 0; i < RoundsAt(level); ++i) {
+      registrar->Measure(level, RadiusAt(level, i));
       if (!registrar->FreeIfOff()) break;
       registrar->Correct(true, with_warps && level == 0);
     }
@@ -652,8 +652,8 @@ class TrialRun {
     }
     // Photos that agree with each other or with the scan, but not with both, see another shape.
     const bool is_bent = by_scan && !by_photos;
-    registrar_.Measure(0, kLastRadius);
-    if ((by_photos || by_scan) && (is_bent || registrar_.AreOff())) {
+    if (by_photos || by_scan) registrar_.Measure(0, kLastRadius);
+    if (is_bent || (by_photos && registrar_.AreOff())) {
       for (int i = 0; i < kWarpRounds; ++i) {
         if (i > 0) registrar_.Measure(0, kLastRadius);
         registrar_.Correct(by_scan, true);
@@ -669,13 +669,9 @@ class TrialRun {
   static constexpr int kScanRounds = 2, kWarpRounds = 2;
   static constexpr double kCommon = 2, kCommonPx = 0.25;  // standard errors; pixels
 
-  static int RadiusAt(int level, int round) {
-    return level == kNumLevels - 1 ? kCoarseRadius : round == 0 ? kFineRadius : kLastRadius;
-  }
-
   void MovePoses(int level, bool by_scan) {
     for (; level >= 0; --level) {
-      for (int i = 0; i < (level > 0 ? 1 : kFineRounds); ++i) {
+      for (int i = 0; i < RoundsAt(level); ++i) {
         registrar_.Measure(level, RadiusAt(level, i));
         registrar_.Correct(by_scan, false);
       }
