@@ -254,7 +254,7 @@ void OutputSet::MoveOneByOne(const std::vector<std::string>& files) {
     // What could not be linked to its end is no part of the set.
     if (fs::path(aside()).parent_path() != fs::path(place_)) aside_->MoveInto(place_);
     WriteSetJournal(journal, aside());
-    failure = FinishMovedSet(aside());
+    failure = FinishMovedSet(aside(), JournalOrigin::kOurs);
   } catch (const std::system_error& error) {
     failure = error.code().value();
   }

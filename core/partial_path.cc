@@ -138,8 +138,9 @@ void RemoveLeftovers(const std::string& folder) {
     const int descriptor = OpenToLock(path);
     if (descriptor < 0) continue;
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && IsStill(descriptor, path)) {
-      if (fs::is_directory(path, error)) FinishMovedSet(path);
-      fs::remove_all(path, error);
+      const bool is_set = fs::is_directory(path, error);
+      const bool is_of_another = is_set && FinishMovedSet(path, JournalOrigin::kFound) == EPERM;
+      if (!is_of_another) fs::remove_all(path, error);
     }
     close(descriptor);
   }

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace roomtex {
@@ -15,6 +16,27 @@ namespace {
 
 // No file of a command has this name.
 constexpr char kJournalName[] = ".roomtex-journal";
+
+bool LeadsOut(const fs::path& path) {
+  const fs::path name = path.lexically_normal();
+  return name.empty() || name.is_absolute() || *name.begin() == "..";
+}
+
+bool IsOfAnother(const std::string& path) {
+  struct stat there {};
+  return lstat(path.c_str(), &there) == 0 && there.st_uid != geteuid();
+}
+
+// A folder on the way from `folder` to the file is a link.
+bool LeadsThroughLinks(const fs::path& folder, const fs::path& path) {
+  fs::path way = folder;
+  std::error_code ignored;
+  for (const fs::path& part : path.lexically_normal().parent_path()) {
+    way /= part;
+    if (fs::is_symlink(way, ignored)) return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -34,8 +56,10 @@ void WriteSetJournal(const SetJournal& journal, const std::string& set) {
   if (!written) throw std::system_error(error, std::generic_category());
 }
 
-int FinishMovedSet(const std::string& set) {
-  std::ifstream stream(set + "/" + kJournalName, std::ios::binary);
+int FinishMovedSet(const std::string& set, JournalOrigin origin) {
+  const std::string list = set + "/" + kJournalName;
+  if (origin == JournalOrigin::kFound && IsOfAnother(list)) return EPERM;
+  std::ifstream stream(list, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   if (text.empty() || text.back() != 'e') return 0;
   const fs::path from(set), to = from.parent_path();
@@ -45,7 +69,11 @@ int FinishMovedSet(const std::string& set) {
     if (end == std::string::npos) break;
     const std::string path = text.substr(begin + 1, end - begin - 1);
     std::error_code error, ignored;
-    if (text[begin] == 'r') {
+    const bool through_links = origin == JournalOrigin::kFound &&
+                               (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
+    if (LeadsOut(path) || through_links) {
+      // Whoever wrote this wants to reach other files.
+    } else if (text[begin] == 'r') {
       fs::remove(to / path, error);
     } else if (fs::exists(fs::symlink_status(from / path, ignored))) {
       fs::create_directories((to / path).parent_path(), ignored);

@@ -16,7 +16,10 @@ struct SetJournal {
 void WriteSetJournal(const SetJournal& journal, const std::string& set);
 
 // Moves what the list of the set names and is still there; does nothing without a list. Gives the
-// first error, 0 without one.
-int FinishMovedSet(const std::string& set);
+// first error, 0 without one. Names that lead out of the upper folder are passed over. A list that
+// was found may have come with somebody's folder: there links lead out, too, and that of another
+// user is not followed (EPERM).
+enum class JournalOrigin { kOurs, kFound };
+int FinishMovedSet(const std::string& set, JournalOrigin origin);
 
 }  // namespace roomtex

@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # What reads files that somebody else wrote, under the address and undefined behaviour sanitizers: the unit tests of
 # core, importers, colmap_ext and picks, and the fuzz corpora.
-# Usage: scripts/test_sanitized.sh [--all | TEST...]    --all: the unit tests of all folders, before a release; half an
-# hour of two cores from nothing
+# Usage: scripts/test_sanitized.sh [--all | TEST...]    --all: the unit tests of all folders and the corpora of their
+# readers, before a release; half an hour of two cores from nothing
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
+corpora=(alignment_record camera database e57 e57_images http_request las outline photo picks project_file room_files
+  scan_poses scan_reader sparse_model)
 if [ "${1:-}" = --all ]; then
+  # These need align, texture and view built: minutes, to read a few small files.
+  corpora+=(associations colored_ply glb pick_json result_files)
   mapfile -t tests < <(sed -n '/LABEL/d; s/^ *roomtex_test(\([a-z_]\+\).*/\1/p' tests/*/CMakeLists.txt)
 elif [ $# -gt 0 ]; then
   tests=("$@")
 fi
-corpora=(alignment_record camera database e57 e57_images http_request las outline photo picks project_file scan_poses
-  scan_reader sparse_model)
 # Repeated over and over for a statistic, up to half a minute each here, and tests of a command that is not built here.
 left_out='ModelCheck.*:LensCheck.*:Initializer.IsRightBeforeAWall:LensPose.AWrongPickIsFoundWithTheLens'
 left_out+=':PickReview.NamesTheOneBadPickAmong*:PickReview.Keeps*:PickReview.NamesExchangedPicks'

@@ -127,6 +127,41 @@ TEST_F(OutputSetTest, FinishesWhatAKilledRunWasMoving) {
   EXPECT_EQ(NumEntries(place), 3u);
 }
 
+// A folder that somebody gives away may hold a list of what a run of theirs had to move.
+TEST_F(OutputSetTest, AListThatWasFoundReachesNoFileOutsideItsFolder) {
+  fs::create_directory(place);
+  fs::create_directory(folder / "home");
+  fs::create_directory_symlink(folder / "home", In("link"));
+  for (const char* name : {"home/a", "home/b", "home/c"}) WriteBytes(folder / name, "mine");
+  const std::string set = In(std::string(kPartialPrefix) + "0");
+  fs::create_directories(set + "/link");
+  fs::create_directory_symlink(folder / "home", set + "/taken");
+  for (const char* name : {"link/a", "b", "whole"}) WriteBytes(set + "/" + name, "theirs");
+  WriteSetJournal({{"link/a", "../home/b", "taken/c", "whole"},
+                   {"../home/a", folder / "home/b", "link/c", "whole/../../home/c"}},
+                  set);
+  RemoveLeftovers(place);
+  for (const char* name : {"home/a", "home/b", "home/c"}) {
+    EXPECT_EQ(ReadBytes(folder / name), "mine") << name;
+  }
+  EXPECT_EQ(ReadBytes(In("whole")), "theirs");
+  EXPECT_FALSE(fs::exists(In("taken")));
+  EXPECT_FALSE(fs::exists(set));
+}
+
+TEST_F(OutputSetTest, TheListOfAnotherUserIsNotFollowed) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root makes files of others";
+  fs::create_directory(place);
+  WriteBytes(In("a"), "mine");
+  const std::string set = In(std::string(kPartialPrefix) + "0");
+  fs::create_directory(set);
+  WriteBytes(set + "/a", "theirs");
+  WriteSetJournal({{"a"}, {}}, set);
+  ASSERT_EQ(lchown((set + "/.roomtex-journal").c_str(), 65534, 65534), 0);
+  RemoveLeftovers(place);
+  EXPECT_EQ(ReadBytes(In("a")), "mine");
+}
+
 TEST_F(OutputSetTest, RefusesFoldersInTheWay) {
   fs::create_directories(In("dir"));
   WriteBytes(In("real"), "old");

@@ -14,6 +14,7 @@ class Line:
     folder: str = None  # its files appear as a set
     unsteady: tuple = ()  # files and folders that hold times
     again: bool = True  # over its own results; False: it replaces nothing
+    old: str = " --random_seed 7"  # options of the run that left those results
 
 
 ROOM = "--quiet --input_path room --image_path photos --accept_untrusted 1 "

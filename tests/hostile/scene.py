@@ -45,10 +45,10 @@ class Scene:
         self.temporary = tempfile.TemporaryDirectory(prefix="roomtex-hostile-")
         self.root = pathlib.Path(folder or self.temporary.name)
 
-    def make(self, num_photos=6):
+    def make(self, num_photos=6, scan_columns=160):
         answer = self.run(f"roomtex-simulate --output_path . --num_photos {num_photos} --photo_width 240 "
-                          "--photo_height 160 --scan_columns 160 --scan_rows 80 --furnished 0 "
-                          "--distortion 0")
+                          f"--photo_height 160 --scan_columns {scan_columns} "
+                          f"--scan_rows {scan_columns // 2} --furnished 0 --distortion 0")
         assert answer.code == 0, answer.err
         write_sparse_model(self.root)
         write_database(self.root / "database.db", self.root)
