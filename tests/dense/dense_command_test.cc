@@ -9,6 +9,7 @@
 #include "colmap_ext/dense_workspace.h"
 #include "core/option_fields.h"
 #include "dense/dense.h"
+#include "dense/scan_space.h"
 #include "importers/scan_reader.h"
 #include "tests/dense/dense_truth.h"
 #include "tests/support/option_check.h"
@@ -98,6 +99,40 @@ TEST_F(DenseCommand, TheSupplementIsColouredBehindTheScan) {
   EXPECT_EQ(supplement["first_vertex"].get<size_t>() + supplement["num_vertices"].get<size_t>(),
             report["num_vertices"].get<size_t>());
   EXPECT_GT(supplement["num_colored"], 0.8 * supplement["num_vertices"].get<double>());
+}
+
+// The smallest distance of a vertex from the scan's own surface, metres; `most` if none is as near.
+double NearestToScan(const std::string& supplement, const std::string& scan, double most) {
+  const ScanSpace space({ReadScan(scan, {})}, 1);
+  double nearest = most;
+  for (const Eigen::Vector3d& vertex : ReadScan(supplement, {}).points) {
+    nearest = std::min(nearest, space.surface().DistanceTo(vertex, most).value_or(most));
+  }
+  return nearest;
+}
+
+TEST_F(DenseCommand, KeepsTwiceWhatPhotosPlacedOneByOneMayBeOff) {
+  ASSERT_EQ(result_.exit_code, 0) << result_.err;
+  // As roomtex-align writes it without a model: no room moves as a whole.
+  fs::copy(Path("capture/truth"), Path("one_by_one"), fs::copy_options::recursive);
+  WriteBytes(Path("one_by_one/alignment.json"),
+             R"({"trusted": true,
+                 "expected_error": {"at_far_corner_mm": null, "at_cameras_mm": 16}})");
+  const CommandResult result =
+      RunCommandLine("roomtex-dense --quiet --input_path " + Path("one_by_one") + " --image_path " +
+                     Path("capture/photos") + " --scan_path " + Path("capture/scan.rtpi") +
+                     " --output_path " + Path("one_by_one_dense"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = json::parse(ReadBytes(Path("one_by_one_dense/report.json")));
+  EXPECT_DOUBLE_EQ(report["distance_to_scan"].get<double>(), 0.032);
+  EXPECT_NE(report["warnings"].dump().find("only what is 32 mm and more away"), std::string::npos)
+      << report["warnings"];
+  ASSERT_GT(report["num_vertices"], 300);
+  // The positions are written in single precision.
+  const std::string scan = Path("capture/scan.rtpi");
+  EXPECT_GE(NearestToScan(Path("one_by_one_dense/supplement.ply"), scan, 0.1), 0.032 - 1e-5);
+  // At their true places they are believed nearer to the scan.
+  EXPECT_LT(NearestToScan(Path("dense/supplement.ply"), scan, 0.1), 0.03);
 }
 
 TEST_F(DenseCommand, SameBytesForAnyNumberOfThreads) {

@@ -17,6 +17,7 @@ const kChooseEvery = 250;  // milliseconds, at most
 const kRays = [6, 4];      // looked along to find out what is seen
 const kPerPlace = 6;       // photos that matter at a place
 const kMaxPenalty = 1;     // radians, about: photos farther off than this say nothing
+const kReach = 0.25;       // the penalty at which a photo's share has fallen to 1/e
 
 // Defines vec3 lumigraph(point, normal, blended): page frame, metres; linear light.
 export const kLumigraph = `
@@ -77,11 +78,14 @@ vec3 lumigraph(vec3 point, vec3 normal, vec3 blended) {
     }
   }
   float limit = penalty[kNearest];
-  float weights = 0.5;  // of the blended colour, which is all where no photo near enough sees
+  float weights = 0.7;  // of the blended colour, which is all where no photo near enough sees
   vec3 sum = weights * blended;
   for (int k = 0; k < kNearest; ++k) {
     if (penalty[k] >= limit) break;
-    float weight = (1.0 - penalty[k] / limit) / penalty[k];
+    // A mirror image moves with who looks: a photo from farther aside has another one. What is
+    // nearest of all counts many times, since mixing blurs.
+    float off = penalty[k] / ${kReach}, near = 0.05 / penalty[k];
+    float weight = exp(-off * off) * (1.0 + near * near) * (1.0 - penalty[k] / limit);
     int i = int(place[k].z);
     vec3 light = textureLod(lumiPhotos, place[k].xyz, place[k].w).rgb;
     // Near white a photo no longer says how light it is.
@@ -210,7 +214,7 @@ export class Lumigraph {
       }
       able.sort((a, b) => a.penalty - b.penalty);
       for (const {photo, penalty} of able.slice(0, kPerPlace)) {
-        scores.set(photo, scores.get(photo) + Math.exp(-4 * penalty));
+        scores.set(photo, scores.get(photo) + Math.exp(-((penalty / kReach) ** 2)));
       }
     }
     this.wanted = [...scores.entries()]
