@@ -338,12 +338,12 @@ test('photos near the point of view predict those that were left out', {skip: !i
     const gains = {};
     for (const [what, {photo, blended, mixed}, isMeant] of [
            ['matt', matt, everywhere], ['glossy', glossy, everywhere], ['shining', glossy, shines]]) {
-      const before = misses(photo, blended, isMeant), now = misses(photo, mixed, isMeant);
-      (off[what] ??= {blended: [], mixed: []}).blended.push(before);
+      const then = misses(photo, blended, isMeant), now = misses(photo, mixed, isMeant);
+      (off[what] ??= {blended: [], mixed: []}).blended.push(then);
       off[what].mixed.push(now);
-      gains[what] = psnr([now]) - psnr([before]);
+      gains[what] = psnr([now]) - psnr([then]);
       t.diagnostic(
-          `${file}, ${what}: ${psnr([before]).toFixed(2)} -> ${psnr([now]).toFixed(2)} dB, ` +
+          `${file}, ${what}: ${psnr([then]).toFixed(2)} -> ${psnr([now]).toFixed(2)} dB, ` +
           `${now.count / 3} pixels`);
     }
     assert.ok(gains.matt > -0.1, `${file}: ${gains.matt} dB, matt`);
