@@ -132,6 +132,7 @@ def without(files, unsteady):
 
 def at_every_rename(base):
     """First over nothing, then over the results of another run."""
+    assert LIBRARY, "ROOMTEX_DIE_AT_RENAME names no library: nothing would be killed"
     whole = prepared(base)
     cases = itertools.chain(((whole, one, {0, 4}) for one in commands()), trusted_commands(base))
     for scene, one, codes in cases:
