@@ -10,17 +10,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/photo_fit.h"
+
 namespace roomtex {
 namespace fs = std::filesystem;
 namespace {
 
 // No file of a command has this name.
 constexpr char kJournalName[] = ".roomtex-journal";
-
-bool LeadsOut(const fs::path& path) {
-  const fs::path name = path.lexically_normal();
-  return name.empty() || name.is_absolute() || *name.begin() == "..";
-}
 
 bool IsOfAnother(const std::string& path) {
   struct stat there {};
@@ -71,7 +68,7 @@ int FinishMovedSet(const std::string& set, JournalOrigin origin) {
     std::error_code error, ignored;
     const bool through_links = origin == JournalOrigin::kFound &&
                                (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
-    if (LeadsOut(path) || through_links) {
+    if (path.empty() || !StaysInside(path) || through_links) {
       // Whoever wrote this wants to reach other files.
     } else if (text[begin] == 'r') {
       fs::remove(to / path, error);
