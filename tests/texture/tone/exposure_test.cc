@@ -20,14 +20,16 @@ struct Capture {
       : exposure(exposures), exif(exposures.size()), store(num_samples, 6) {
     std::mt19937 random(7);
     std::uniform_real_distribution<float> light(0.04f, 0.4f);
-    std::normal_distribution<float> spread(0, static_cast<float>(noise));
+    // Of a deviation of 0 the library makes no promise.
+    const auto sigma = static_cast<float>(noise);
+    std::normal_distribution<float> spread;
     for (size_t p = 0; p < exposures.size(); ++p) exif[p].exposure_time = exposures[p] / 60;
     for (int i = 0; i < num_samples; ++i) {
       const Eigen::Vector3f truth(light(random), light(random), light(random));
       for (size_t p = 0; p < exposures.size(); ++p) {
         if (!sees(static_cast<int>(p), i)) continue;
         Observation o;
-        o.color = PackColor(truth * static_cast<float>(exposures[p]) * std::exp(spread(random)));
+        o.color = PackColor(truth * static_cast<float>(exposures[p]) * std::exp(sigma * spread(random)));
         o.weight = PackWeight(0.5f);
         o.photo = static_cast<uint16_t>(p);
         store.Add(i, o);
