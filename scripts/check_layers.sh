@@ -19,6 +19,7 @@ declare -A allowed=(
   [align/clicks]="$below"
   [align/surface]="$below"
   [align/join]="$below"
+  [align/command]="$below align align/geo align/trust align/search align/fit align/clicks align/surface"
   [align/pick]="$below align align/trust align/search align/fit align/clicks align/surface"
 
   [texture]="$below texture/output texture/texels texture/tone texture/registration texture/sampling"

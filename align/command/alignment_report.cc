@@ -1,8 +1,8 @@
-#include "align/alignment_report.h"
+#include "align/command/alignment_report.h"
 
 #include <cmath>
 
-#include "align/plane_bundle_report.h"
+#include "align/command/plane_bundle_report.h"
 #include "core/frames.h"
 
 namespace roomtex {

@@ -1,4 +1,4 @@
-#include "align/search_report.h"
+#include "align/command/search_report.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "align/local_origin.h"
+#include "align/command/local_origin.h"
 
 namespace roomtex {
 namespace {

@@ -1,4 +1,4 @@
-#include "align/plane_bundle_report.h"
+#include "align/command/plane_bundle_report.h"
 
 #include <algorithm>
 #include <cmath>

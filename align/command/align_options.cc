@@ -1,4 +1,4 @@
-#include "align/align_command_options.h"
+#include "align/command/align_options.h"
 
 #include <filesystem>
 

@@ -1,4 +1,4 @@
-#include "align/lens_report.h"
+#include "align/command/lens_report.h"
 
 #include <cmath>
 

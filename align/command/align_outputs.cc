@@ -1,0 +1,155 @@
+#include "align/command/align_outputs.h"
+
+#include <filesystem>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "align/geo/geo_output.h"
+#include "align/trust/agreement.h"
+#include "align/trust/agreement_report.h"
+#include "align/trust/overlay.h"
+#include "align/trust/scan_view.h"
+#include "colmap_ext/model_output.h"
+#include "core/output_file.h"
+#include "core/output_set.h"
+#include "core/photo_fit.h"
+#include "importers/scan_record.h"
+
+namespace roomtex {
+namespace {
+
+// The model on the Earth, with --geo_origin; the report's `geo`.
+void WriteGeo(const AlignCommandOptions& a, const SparseModel& aligned, const PlacedScans& placed,
+              const std::optional<GeoReference>& geo, const OutputSet& outputs,
+              const Command::Context& context) {
+  const std::string folder = outputs.folder() + "/geo";
+  context.report["geo"] = nullptr;
+  if (a.geo_origin.empty() && std::filesystem::exists(folder + "/geo.json")) {
+    context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
+  }
+  if (!geo) return;
+  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, outputs.aside() + "/geo");
+  const GpsCheck gps = CheckGps(aligned, *geo, a.image_path);
+  context.report["geo"] = GeoToJson(*geo, placed, gps);
+  for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
+}
+
+// Warnings "START: REASON" of photos whose reason was not told before.
+void WarnOfPhotos(const AlignCommandOptions& a, const std::vector<std::string>& warnings,
+                  const std::string& start, const std::set<std::string>& told,
+                  const Command::Context& context) {
+  for (const std::string& warning : warnings) {
+    const std::string reason =
+        warning.compare(0, start.size(), start) == 0 ? warning.substr(start.size()) : warning;
+    if (told.count(reason) > 0) continue;
+    if (a.strict) ThrowIfAnyLeftOut({{"", reason}}, a.image_path);
+    context.Warn(warning);
+  }
+}
+
+// The report's `overlays`.
+void WriteOverlayPictures(const AlignCommandOptions& a, const SparseModel& aligned,
+                          const SurveyedScans& surveyed, const std::set<std::string>& told,
+                          const OutputSet& outputs, const Command::Context& context) {
+  context.report["overlays"] = Json::array();
+  if (a.overlays == 0) return;
+  context.progress.Stage("overlays");
+  std::vector<std::string> warnings;
+  for (const std::string& path :
+       WriteOverlays(aligned, a.image_path, outputs.aside() + "/overlays", surveyed.viewer(),
+                     a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
+    context.report["overlays"].push_back(outputs.folder() + path.substr(outputs.aside().size()));
+  }
+  WarnOfPhotos(a, warnings, "Overlay: ", told, context);
+}
+
+// Where the result goes: a trusted one that is there is kept.
+std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& context) {
+  if (context.report.trusted()) return a.output_path;
+  const AlignmentRecord there = ReadAlignmentRecord(a.output_path);
+  if (!there.found || !there.trusted) return a.output_path;
+  std::string output_path = a.output_path;
+  while (output_path.size() > 1 && output_path.back() == '/') output_path.pop_back();
+  output_path += ".untrusted";
+  context.Warn("The trusted result in " + a.output_path + " is kept; this one is in " +
+               output_path + ".");
+  return output_path;
+}
+
+}  // namespace
+
+std::set<std::string> LookForPhotos(const AlignCommandOptions& a, const SparseModel& model,
+                                    const Command::Context& context) {
+  std::set<std::string> told;
+  if (a.image_path.empty()) return told;
+  std::vector<PhotoLeftOut> left_out;
+  std::vector<std::string> notes;
+  for (const SparseImage* image : SpreadImages(model, static_cast<int>(model.images.size()))) {
+    const Camera& camera = model.cameras.at(image->camera_id);
+    const PhotoFit fit = FitPhotoToCamera(a.image_path + "/" + image->name, image->name,
+                                          camera.width, camera.height);
+    if (!fit.note.empty()) notes.push_back(fit.note);
+    if (fit.usable()) continue;
+    left_out.push_back({image->name, fit.problem});
+    told.insert(fit.problem);
+  }
+  if (a.strict) ThrowIfAnyLeftOut(left_out, a.image_path);
+  ReportPhotosLeftOut(left_out, context);
+  for (const std::string& note : FirstNotes(notes)) context.Warn(note);
+  return told;
+}
+
+void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+                       const SurveyedScans& surveyed, const std::set<std::string>& told,
+                       const Command::Context& context) {
+  if (a.image_path.empty()) return;
+  context.progress.Stage("agreement");
+  std::vector<std::string> warnings;
+  const AgreementOptions options;
+  const Agreement agreement = MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options,
+                                               context.options.num_threads, &warnings);
+  context.report["agreement"] = AgreementToJson(agreement, options);
+  if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
+  WarnOfPhotos(a, warnings, "Agreement: ", told, context);
+}
+
+void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
+                  const Command::Context& context) {
+  context.report.SetUntrusted(refusal);
+  context.report["scan_from_sparse"] = nullptr;
+  const std::string output_path = ChooseOutput(a, context);
+  MakeFolder(output_path);
+  context.report.AddCopy(output_path + "/alignment.json");
+}
+
+void WriteAligned(const AlignCommandOptions& a, SparseModel model,
+                  const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
+                  const std::set<std::string>& told, const Command::Context& context) {
+  const std::string output_path = ChooseOutput(a, context);
+  const char transform_name[] = "scan_from_sparse.txt",
+             matrix_name[] = "scan_from_sparse_matrix.txt";
+  RequireNoRigs(output_path);
+  const auto outputs = std::make_shared<OutputSet>(output_path);
+  WriteOverlayPictures(a, model, *reading->surveyed, told, *outputs, context);
+  context.progress.Stage("write");
+  reading->origin.MoveBack(&model);
+  reading->origin.MoveBack(&reading->placed.scans);
+  reading->placed.Reorder(reading->as_named);
+  reading->origin.MoveBack(&context.report.keys());
+  WriteSparseModel(model, outputs->aside());
+  if (local_from_sparse) {
+    const Similarity scan_from_sparse = reading->origin.MovedBack(*local_from_sparse);
+    WriteSimilarity(outputs->Path(transform_name), scan_from_sparse);
+    WriteSimilarityMatrix(outputs->Path(matrix_name), scan_from_sparse);
+  } else {
+    // One of an earlier run would contradict.
+    outputs->Remove(transform_name);
+    outputs->Remove(matrix_name);
+  }
+  WriteGeo(a, model, reading->placed, reading->geo, *outputs, context);
+  context.report["scans"] = ToJson(RecordScans(reading->placed, a.scan_reader, output_path));
+  CommitWithReport("alignment.json", outputs);
+}
+
+}  // namespace roomtex

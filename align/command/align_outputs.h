@@ -1,0 +1,33 @@
+#pragma once
+// What roomtex-align says and writes, however the photos were aligned.
+
+#include <optional>
+#include <set>
+#include <string>
+
+#include "align/command/align_options.h"
+#include "align/command/scan_reading.h"
+#include "colmap_ext/sparse_model.h"
+#include "core/command_line.h"
+#include "core/similarity.h"
+
+namespace roomtex {
+
+// The photos that can be compared with the scan; what there is to say about the others. Returns the
+// reasons that were told. Throws InputError with --strict 1.
+std::set<std::string> LookForPhotos(const AlignCommandOptions& a, const SparseModel& model,
+                                    const Command::Context& context);
+// What photos and scan say about each other; the report's `agreement`. told: of LookForPhotos().
+void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+                       const SurveyedScans& surveyed, const std::set<std::string>& told,
+                       const Command::Context& context);
+// Nothing but the report, which says why.
+void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
+                  const Command::Context& context);
+// The aligned model and what belongs to it: overlays, similarity, `geo`. Without local_from_sparse
+// there was no sparse model. Model and scans are moved back to where the files have them.
+void WriteAligned(const AlignCommandOptions& a, SparseModel model,
+                  const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
+                  const std::set<std::string>& told, const Command::Context& context);
+
+}  // namespace roomtex

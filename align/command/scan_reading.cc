@@ -1,0 +1,102 @@
+#include "align/command/scan_reading.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "align/trust/station_check.h"
+#include "core/resource_limits.h"
+#include "core/surfels.h"
+#include "importers/scan_reader.h"
+
+namespace roomtex {
+namespace {
+
+// Another scan than the one that a model was aligned to before is no mistake here.
+PlacedScans ReadScansToAlign(const AlignCommandOptions& a) {
+  const double max_samples = a.bound.max_samples;
+  const SampleWork work("aligning to", kAlignBytesPerSample, max_samples);
+  ScanReaderOptions reader = a.scan_reader;
+  reader.colors_as_intensity = !a.image_path.empty();
+  if (!a.scan_paths.empty()) {
+    return ReadPlacedScans(a.scan_paths, a.scan_poses, reader, max_samples);
+  }
+  return ReadScansOfModel(ReadAlignmentRecord(a.input_path),
+                          {a.scan_paths, a.scan_poses, reader, max_samples});
+}
+
+// Scans of several stations against each other; the report's `stations`.
+void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
+                     const Command::Context& context) {
+  std::vector<Scan>* const scans = &placed->scans;
+  context.report["stations"] = Json::array();
+  if (scans->size() < 2) return;
+  context.progress.Stage("stations");
+  if (a.register_stations) {
+    for (const int moved : RegisterStations(scans)) {
+      context.Warn((*scans)[moved].path + " was moved onto the other scans");
+      int scan = 0;
+      for (PlacedScans::File& file : placed->files) {
+        for (size_t k = 0; k < file.placed.size(); ++k, ++scan) {
+          if (scan == moved) file.placed[k] = true;  // the aligned model remembers where it is now
+        }
+      }
+    }
+  }
+  const StationCheck check = CheckStations(*scans);
+  context.report["stations"] = StationsToJson(check, *scans);
+  if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
+}
+
+std::string OtherAzimuth(const std::string& azimuth) {
+  return azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+}
+
+}  // namespace
+
+ScanReading::ScanReading(const AlignCommandOptions& a, const Command::Context& context)
+    : placed(ReadScansToAlign(a)) {
+  for (const std::string& note : placed.notes) context.Warn(note);
+  context.report["sample_stride"] = placed.stride;
+  if (placed.stride > 1) {
+    context.progress.Note("The scans have more than --max_samples: of every " +
+                          std::to_string(placed.stride) + " columns and rows one is held.");
+  }
+  ReplaceClouds(&placed.scans, context.options.num_threads);
+  CompareStations(a, &placed, context);
+  as_named = placed.SortByPath();
+  geo = FindGeoReference(placed, ParseGeoOrigin(a.geo_origin));
+  origin = LocalOrigin(placed.scans);
+  origin.MoveToLocal(&placed.scans);
+  SurveyOptions options{a.alignment.surface, a.planes, a.alignment.mesh};
+  options.num_threads = context.options.num_threads;
+  surveyed = std::make_unique<const SurveyedScans>(placed.scans, options);
+}
+
+std::string ScanReading::azimuth() const {
+  for (const PlacedScans::File& file : placed.files) {
+    if (!file.azimuth.empty()) return file.azimuth;
+  }
+  return "";
+}
+
+bool MayTurn(const AlignCommandOptions& a, const ScanReading& reading) {
+  const std::vector<PlacedScans::File>& files = reading.placed.files;
+  return a.scan_reader.azimuth == "auto" &&
+         std::all_of(files.begin(), files.end(),
+                     [](const PlacedScans::File& file) { return !file.azimuth.empty(); });
+}
+
+void TakeMirroredReading(MirroredReading found, ScanReading* reading,
+                         const Command::Context& context) {
+  for (PlacedScans::File& file : reading->placed.files) {
+    if (file.azimuth.empty()) continue;
+    context.Warn(file.path + " is read " + OtherAzimuth(file.azimuth) + " (--azimuth auto): read " +
+                 file.azimuth + " it is a mirror image of the room; " + found.evidence + ".");
+    file.azimuth = OtherAzimuth(file.azimuth);
+  }
+  reading->mirrored = std::move(found.scans);
+  reading->surveyed = std::move(found.surveyed);
+  reading->attempt = std::move(found.attempt);
+}
+
+}  // namespace roomtex
