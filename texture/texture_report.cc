@@ -73,6 +73,7 @@ Json TrialsReport(const std::vector<RegistrationTrial>& trials) {
     if (trial.kept) applied = trial.mode;
     list.push_back({{"mode", trial.mode},
                     {"kept", trial.kept},
+                    {"moved_too_far", trial.moved_too_far},
                     {"among_photos", change(trial.among_photos)},
                     {"with_scan", change(trial.with_scan)}});
   }

@@ -30,6 +30,9 @@ struct RegistrationTrial {
   std::string mode;
   LikenessChange among_photos, with_scan;
   bool kept = false;
+  // Whatever the likeness: the photos went farther than what each of them was off can have left in
+  // common. Not judged by JudgeTrial().
+  bool moved_too_far = false;
 };
 
 // Against what was kept last. earlier: the trials before.
