@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/photo.h"
-#include "core/photo_fit.h"
+#include "core/stays_inside.h"
 #include "core/text.h"
 
 namespace roomtex {

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/stays_inside.h"
 
 namespace roomtex {
 namespace {
@@ -63,12 +64,6 @@ std::string ShapeProblem(const std::string& name, int width, int height, int cam
 }
 
 }  // namespace
-
-bool StaysInside(const std::string& name) {
-  const std::filesystem::path path(name);
-  return !path.is_absolute() &&
-         std::none_of(path.begin(), path.end(), [](const auto& part) { return part == ".."; });
-}
 
 PhotoFit FitPhotoToCamera(const std::string& path, const std::string& name, int camera_width,
                           int camera_height) {

@@ -23,8 +23,6 @@ struct PhotoFit {
 
   bool usable() const { return problem.empty(); }
 };
-// Photos lie in --image_path: a name that a file gives must not be a road out of it.
-bool StaysInside(const std::string& name);
 
 // name: of the photo below --image_path, for the sentences and for StaysInside(). camera_width,
 // camera_height: of the model's camera.

@@ -10,7 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/photo_fit.h"
+#include "core/stays_inside.h"
+
 
 namespace roomtex {
 namespace fs = std::filesystem;

@@ -12,7 +12,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"
-#include "core/photo_fit.h"
+#include "core/stays_inside.h"
 #include "core/text.h"
 
 namespace roomtex {

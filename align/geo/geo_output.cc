@@ -12,8 +12,8 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
-#include "core/photo_fit.h"
 #include "core/statistics.h"
+#include "core/stays_inside.h"
 #include "core/text.h"
 
 namespace roomtex {

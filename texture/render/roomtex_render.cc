@@ -17,9 +17,9 @@
 #include "core/frames.h"
 #include "core/output_set.h"
 #include "core/photo.h"
-#include "core/photo_fit.h"
 #include "core/picture_file.h"
 #include "core/statistics.h"
+#include "core/stays_inside.h"
 #include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
