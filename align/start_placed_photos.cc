@@ -121,7 +121,9 @@ void AskPhotosAlone(const AlignmentInput& input, const AlignmentOptions& options
     FindPhotos(photos, input.surveyed, input.image_path, placed.photo, options.trust,
                input.num_threads, progress, [&](const FoundPhotos& found) {
                  evidence = Agree(found, input, options, placed);
-                 return StandsOut(evidence, placed);
+                 const bool hopeless =
+                     evidence.num_asked == placed.num_first && evidence.num_placed == 0;
+                 return hopeless || StandsOut(evidence, placed);
                });
     search->placed_photos = std::move(evidence);
   }

@@ -12,7 +12,7 @@ namespace roomtex {
 
 struct PlacedPhotoOptions {
   // Photos that are asked one after the other until they are enough, all of them over all of the
-  // model, and the first ones, too.
+  // model, and the first ones, too; if none of these has a place, no more are asked.
   int num_first = 8, num_all = 24;
   // So many must agree, and at most this share of them may be placed elsewhere. Larger = stricter;
   // larger = more tolerant.
