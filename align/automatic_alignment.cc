@@ -5,6 +5,7 @@
 
 #include "align/start_appearance.h"
 #include "align/start_photos.h"
+#include "align/start_placed_photos.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -56,12 +57,13 @@ Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& 
   Alignment alignment = AlignToScan(
       input, StartFromSimilarity(input.model, input.picks, best, kStartSigma), options, progress);
   std::vector<Pick> corners;
-  if (found.verdict.support != PhotoSupport::kNone && start.photos) {
+  const bool is_confirmed = found.verdict.support != PhotoSupport::kNone || start.looks_alike;
+  if (is_confirmed && start.photos) {
     corners = PicksOf(start.photos->shifts.corners, input.model, best, kMostCorners);
   }
   // Features are less exact.
   if (start.looks_alike && corners.size() < kFewCorners) {
-    corners = found.search.appearance->agreeing;
+    corners = found.search.alike_picks;
   }
   if (corners.empty()) return alignment;
   const double sigma_px = CornerSigma(corners, input.model, best);
@@ -103,7 +105,8 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
   const auto look = [&] {
     progress->Stage("search");
     StartSearch next = SearchStarts(input, near, options, search);
-    next.appearance.swap(found.search.appearance);  // is known from a first look
+    next.appearance.swap(found.search.appearance);  // are known from a first look
+    next.placed_photos.swap(found.search.placed_photos);
     found.search = std::move(next);
     progress->Stage("search verdict");
     judge();
@@ -111,6 +114,9 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     if (found.verdict.kind == StartVerdict::Kind::kTrusted) return;
     progress->Stage("search by appearance");
     AskAppearance(input, options, StartAppearanceOptions(), &found.search);
+    judge();
+    if (found.verdict.kind == StartVerdict::Kind::kTrusted) return;
+    AskPhotosAlone(input, options, PlacedPhotoOptions(), progress, &found.search);
     judge();
   };
   look();

@@ -89,7 +89,8 @@ void AddView(const SparseImage& image, const SeenPlace& place, const ViewPose& p
 
 FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
                        const std::string& image_path, const FoundPhotoOptions& options,
-                       const TrustOptions& trust, int num_threads, Progress* progress) {
+                       const TrustOptions& trust, int num_threads, Progress* progress,
+                       const std::function<bool(const FoundPhotos&)>& enough) {
   FoundPhotos found;
   const UpDirections ups = FindScanUps(surveyed.scans(), surveyed.patches());
   progress->Stage("features of the scan");
@@ -114,6 +115,7 @@ FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
     evidence.problem = ProblemOf(sighting, source, pose, options, trust);
     if (evidence.problem.empty()) AddView(image, sighting.places[0], pose, &found);
     found.photos.push_back(std::move(evidence));
+    if (enough && enough(found)) break;
   }
   return found;
 }

@@ -2,6 +2,7 @@
 // Where photos were taken that have neither a sparse model nor picks: each alone, by what it shows
 // of the scan's intensity (align/trust/photo_finder.h), and whether that is to be believed.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,16 +40,18 @@ struct PhotoEvidence {
   std::string problem;                      // why it has no pose, a clause; "" if it has one
 };
 struct FoundPhotos {
-  std::vector<PhotoEvidence> photos;  // all, in the order of their names
+  std::vector<PhotoEvidence> photos;  // all that were asked, in the order of their ids
   int num_places = 0;                 // that were looked at
   // Of those that have a pose: what they have in common with the scan, and their poses.
   std::vector<Pick> picks;
   std::vector<PickView> views;
 };
-// photos: those of image_path. Photos that are not read (PhotoModel, UnfitPhotos::kTaken) are left
-// out without a word.
+// photos: those of image_path, asked in the order of their ids, until `enough` says so of what was
+// found up to there. Photos that are not read (PhotoModel, UnfitPhotos::kTaken) are left out
+// without a word.
 FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
                        const std::string& image_path, const FoundPhotoOptions& options,
-                       const TrustOptions& trust, int num_threads, Progress* progress);
+                       const TrustOptions& trust, int num_threads, Progress* progress,
+                       const std::function<bool(const FoundPhotos&)>& enough = {});
 
 }  // namespace roomtex

@@ -63,13 +63,9 @@ bool StandsOut(const std::vector<AppearancePlace>& places, const StartAppearance
   return places.size() < 2 || places[0].num_cells >= options.min_ratio * places[1].num_cells;
 }
 
-void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
-                   const StartAppearanceOptions& appearance, StartSearch* search) {
-  if (input.image_path.empty()) return;
-  if (!search->appearance) search->appearance = LookForPlaces(input, *search);
-  if (!StandsOut(search->appearance->places, appearance)) return;
-  const Similarity& place = search->appearance->places[0].scan_from_sparse;
-  const std::vector<Pick>& agreeing = search->appearance->agreeing;
+void AddStartThatLooksAlike(const AlignmentInput& input, const AlignmentOptions& options,
+                            const Similarity& place, const std::vector<Pick>& agreeing,
+                            StartSearch* search) {
   SimilarityFitOptions fit_options = options.fit;
   fit_options.max_scale_change = kMaxStartScaleChange;
   FittedStart start;
@@ -81,6 +77,7 @@ void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
   }
   if (!Agrees(search->hints, start.scan_from_sparse, kHintSlack)) return;
   start.looks_alike = true;
+  search->alike_picks = agreeing;
   // A start that is there already stays, unless it came to rest less well.
   const auto same =
       std::find_if(search->starts.begin(), search->starts.end(), [&](const FittedStart& other) {
@@ -96,6 +93,15 @@ void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
   }
   const int num_starts = static_cast<int>(search->starts.size());
   search->starts = DistinctStarts(search->cloud, std::move(search->starts), num_starts);
+}
+
+void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
+                   const StartAppearanceOptions& appearance, StartSearch* search) {
+  if (input.image_path.empty()) return;
+  if (!search->appearance) search->appearance = LookForPlaces(input, *search);
+  if (!StandsOut(search->appearance->places, appearance)) return;
+  AddStartThatLooksAlike(input, options, search->appearance->places[0].scan_from_sparse,
+                         search->appearance->agreeing, search);
 }
 
 }  // namespace roomtex

@@ -3,6 +3,8 @@
 // (align/trust/appearance_search.h). Geometry has no part in it, so that a start where both lead
 // is no room of the same plan.
 
+#include <vector>
+
 #include "align/alignment_input.h"
 #include "align/start_search.h"
 
@@ -18,9 +20,15 @@ struct StartAppearanceOptions {
 // Whether the best place has what the options ask for.
 bool StandsOut(const std::vector<AppearancePlace>& places, const StartAppearanceOptions& options);
 
-// Fills StartSearch::appearance, unless it is known already. Where the best place stands out it is
-// fitted to the surface, and becomes a start, or one that is there already is marked
-// (FittedStart::looks_alike), unless a hint of the user contradicts. Does nothing without photos.
+// A place where photos and scan look alike, by evidence of its own: it is fitted to the surface,
+// and becomes a start, or one that is there already is marked (FittedStart::looks_alike), unless a
+// hint of the user contradicts. agreeing: what the photos show of the scan there, weight 1.
+void AddStartThatLooksAlike(const AlignmentInput& input, const AlignmentOptions& options,
+                            const Similarity& scan_from_sparse, const std::vector<Pick>& agreeing,
+                            StartSearch* search);
+
+// Fills StartSearch::appearance, unless it is known already, and adds a start where the best place
+// stands out. Does nothing without photos.
 void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
                    const StartAppearanceOptions& appearance, StartSearch* search);
 

@@ -12,8 +12,7 @@ namespace roomtex {
 
 struct StartPhotosOptions {
   // Starts that have at least this share of the best score are asked about, so many at most. What
-  // has less is no rival, even where the photos support the best one faintly
-  // (StartVerdictOptions::min_ratio_faint).
+  // has less is no rival (StartVerdictOptions::min_ratio).
   double rival_share = 0.6;
   int max_rivals = 3;
   // A start is drawn to where its photos show the scan so many times at most.

@@ -29,7 +29,7 @@ struct FittedStart {
   double rms = 0;               // metres, their distances
   SightAgreement sights;
   std::optional<GradientAgreement> photos;  // of the best starts (start_photos.h)
-  bool looks_alike = false;                 // photos and scan there (start_appearance.h)
+  bool looks_alike = false;                 // photos and scan there (AddStartThatLooksAlike)
 };
 
 // Metres; where sparse points and surface agree within this, photos of this room do so, too.
@@ -39,6 +39,14 @@ inline constexpr double kExactRms = 0.01;
 struct AppearanceEvidence {
   std::vector<AppearancePlace> places;
   std::vector<Pick> agreeing;  // what photos show of the scan at the first of them, weight 1
+};
+
+// Photos that were each placed alone (start_placed_photos.h), and where those of them that agree
+// with each other put the model.
+struct PlacedPhotoEvidence {
+  int num_asked = 0, num_placed = 0, num_agreeing = 0;
+  std::optional<Similarity> scan_from_sparse;
+  std::vector<Pick> agreeing;  // what the photos that agree show of the scan, weight 1
 };
 
 struct StartSearch {
@@ -52,7 +60,10 @@ struct StartSearch {
   std::vector<FittedStart> starts;
   // The same for the mirror image of the model, which is nowhere: how well a wrong start fits here.
   std::vector<FittedStart> mirrored;
-  std::optional<AppearanceEvidence> appearance;  // if photos and scan were asked
+  std::optional<AppearanceEvidence> appearance;      // if photos and scan were asked
+  std::optional<PlacedPhotoEvidence> placed_photos;  // if each photo was
+  // What photos show of the scan at the start that looks alike, weight 1.
+  std::vector<Pick> alike_picks;
 };
 
 // Metres; what a fitted start may still be off where a hint has it.

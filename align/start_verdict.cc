@@ -81,27 +81,13 @@ std::string Where(const StartSearch& search, int start) {
                      middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
 }
 
-// Where photos support a start, as counted. Else a logistic curve, set by hand: even odds where a
-// start fits little better than any other, and never less than where photos say something.
-double ChanceWrong(double score, double ratio, PhotoSupport support,
-                   const StartVerdictOptions& options) {
-  const double evidence = 12 * (score - 0.5) + 14 * std::log(std::max(ratio, 0.1)) - 3.5;
-  const double guess = std::max(kChanceFaint, 1 / (1 + std::exp(evidence)));
-  if (support == PhotoSupport::kNone) return guess;
-  if (support == PhotoSupport::kClear) return score >= options.min_score ? kChanceClear : guess;
-  return ratio >= options.min_ratio_faint ? kChanceFaint : std::max(kEvenOdds, guess);
-}
-
-// How much the score of the second best start counts: less where the photos support the best one
-// faintly and deny the second. Where they confirm it clearly, nothing.
-double WeightOfSecond(const StartSearch& search, const StartVerdict& verdict,
-                      const StartVerdictOptions& options) {
-  const bool asked = verdict.second >= 0 && search.starts[verdict.second].photos;
-  if (!asked || verdict.support == PhotoSupport::kNone) return 1;
-  const double share = search.starts[verdict.best].photos->shifts.at_pose.Share();
-  const bool denied = !search.starts[verdict.second].photos->supports &&
-                      share >= options.min_photo_share_over_denied;
-  return denied ? options.min_ratio_faint_over_denied / options.min_ratio_faint : 1;
+// Where photos confirm a start, as counted. Else a logistic curve, set by hand: even odds where a
+// start fits little better than any other.
+double ChanceWrong(const StartVerdict& verdict, double score, double min_score) {
+  const double evidence = 12 * (score - 0.5) + 14 * std::log(std::max(verdict.ratio, 0.1)) - 3.5;
+  const double guess = std::max(kChanceAlike, 1 / (1 + std::exp(evidence)));
+  if (verdict.support == PhotoSupport::kClear && score >= min_score) return kChanceClear;
+  return verdict.looks_alike ? kChanceAlike : guess;
 }
 
 // Directions that the surface leaves open: nothing that the points lie on faces that way.
@@ -146,6 +132,17 @@ std::string UnconfirmedReason(const GradientShifts& shifts) {
       "Photos and scan do not confirm the place that fits best: of {} corners of the scan's "
       "intensity, {:.1f} % lie where the photos have them, and {:.1f} % do so by chance.",
       shifts.clear.num, 100 * shifts.clear.Share(), 100 * shifts.elsewhere.Share());
+}
+
+const char kAloneReason[] =
+    "Only geometry speaks for the place that was found, since the photos show too little that the "
+    "scan's intensity shows, too: a room of the same shape would fit as well.";
+
+std::string FaintReason(const GradientShifts& shifts) {
+  return fmt::format(
+      "Photos and scan confirm the place that was found too little: of {} corners of the scan's "
+      "intensity, {:.1f} % lie where the photos have them, as in a room with the same furniture.",
+      shifts.at_pose.num, 100 * shifts.at_pose.Share());
 }
 
 std::string WeakReason(const FittedStart& best, const StartVerdictOptions& options) {
@@ -194,19 +191,11 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   const double score = best.sights.Score();
   if (!search.mirrored.empty()) verdict.mirrored_score = search.mirrored[0].sights.Score();
   const double second = verdict.second < 0 ? 0 : search.starts[verdict.second].sights.Score();
-  const bool clear = verdict.support == PhotoSupport::kClear;
-  const bool confirmed = clear || verdict.looks_alike;
+  const bool confirmed = verdict.support == PhotoSupport::kClear || verdict.looks_alike;
   const bool alone = !confirmed && verdict.support == PhotoSupport::kNone;
-  const double second_counts = confirmed ? 0 : second * WeightOfSecond(search, verdict, options);
-  const double rival = confirmed ? 0 : std::max(second_counts, verdict.mirrored_score);
   verdict.ratio = score / std::max({second, verdict.mirrored_score, 1e-6});
-  verdict.chance_wrong =
-      ChanceWrong(score, score / std::max(rival, 1e-6),
-                  verdict.looks_alike && !clear ? PhotoSupport::kFaint : verdict.support, options);
   const double min_score = alone ? options.min_score_alone : options.min_score;
-  const double min_ratio = alone       ? options.min_ratio_alone
-                           : confirmed ? options.min_ratio
-                                       : options.min_ratio_faint;
+  verdict.chance_wrong = ChanceWrong(verdict, score, options.min_score);
   if (alone && verdict.mirrored_score >= min_score &&
       verdict.mirrored_score >= options.min_ratio_mirrored * score) {
     verdict.kind = Kind::kMirrored;
@@ -230,9 +219,9 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.reason = WeakReason(best, options) + kRemedy;
     return verdict;
   }
-  if (score < min_ratio * rival) {
+  if (!confirmed && verdict.ratio < options.min_ratio) {
     verdict.kind = Kind::kAmbiguous;
-    verdict.reason = score < min_ratio * second_counts
+    verdict.reason = score < options.min_ratio * second
                          ? "The sparse model fits the scan in more than one place: " +
                                Where(search, verdict.best) + "; or " +
                                Where(search, verdict.second) + "."
@@ -251,15 +240,10 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.reason += kRemedy;
     return verdict;
   }
-  if (alone && !hinted) {
+  if (!confirmed && !hinted) {
     verdict.kind = Kind::kUnconfirmed;
     verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
-    verdict.reason =
-        std::string(
-            "Only geometry speaks for the place that was found, since the photos show too "
-            "little that the scan's intensity shows, too: a room of the same shape would "
-            "fit as well.") +
-        kRemedy;
+    verdict.reason = (alone ? kAloneReason : FaintReason(best.photos->shifts)) + kRemedy;
     return verdict;
   }
   verdict.kind = Kind::kTrusted;

@@ -15,11 +15,10 @@ namespace roomtex {
 struct StartVerdictOptions {
   // Of the photos' rays (SightAgreement::Score()): what the best start needs at least, and how many
   // times as much as the next best and as the mirror image. Larger = stricter. Where the photos
-  // confirm the start; where they support it faintly, as those of a similar room do, too (less over
-  // a place that they do not support); and where nothing but geometry speaks for it.
-  double min_score = 0.55, min_ratio = 1.2;
-  double min_ratio_faint = 1.65, min_ratio_faint_over_denied = 1.3;
-  double min_score_alone = 0.7, min_ratio_alone = 1.3;
+  // confirm the start, no other counts; where they support it faintly, as those of a similar room
+  // do, too, and where nothing but geometry speaks for it (min_score_alone), a user must have said
+  // that it is this room.
+  double min_score = 0.55, min_score_alone = 0.7, min_ratio = 1.3;
   // The scan is called a mirror image where that of the model has so many times the score.
   double min_ratio_mirrored = 1.15;
   // Of the rays, those that may pass through the surface. Larger = more tolerant.
@@ -30,20 +29,18 @@ struct StartVerdictOptions {
   // Where a coarse scan shows few corners at all, they are those of frames and furniture, which a
   // room of the same plan has, too: more of them are asked for.
   double min_photo_share = 0.35, min_photo_share_of_few = 0.6;
-  // Of the corners, for min_ratio_faint_over_denied.
-  double min_photo_share_over_denied = 0.2;
 };
 
 enum class PhotoSupport { kNone, kFaint, kClear };
 
 // Of simulated rooms, what the counted ones leave possible (95 %): none of the answers with clear
-// support was wrong, and no wrong one had faint support and stood out by min_ratio_faint.
-inline constexpr double kChanceClear = 0.055, kChanceFaint = 0.13;
+// support was wrong, and none where photos and scan look alike.
+inline constexpr double kChanceClear = 0.055, kChanceAlike = 0.13;
 
 struct StartVerdict {
   enum class Kind {
     kTrusted,
-    kUnconfirmed,  // only geometry speaks for it: no photo could be asked, and no user said so
+    kUnconfirmed,  // little but geometry speaks for it, and no user said so
     kNone,         // there is no start at all
     kWeak,         // the best one fits too badly
     kOpen,         // the surface does not hold the model in some direction

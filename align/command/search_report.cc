@@ -56,6 +56,19 @@ Json AppearanceToJson(const StartSearch& search) {
   return json;
 }
 
+// How many photos were each placed alone, and where those that agree put the model.
+Json PlacedPhotosToJson(const StartSearch& search) {
+  if (!search.placed_photos) return nullptr;
+  const PlacedPhotoEvidence& evidence = *search.placed_photos;
+  Json json;
+  json["num_asked"] = evidence.num_asked;
+  json["num_placed"] = evidence.num_placed;
+  json["num_agreeing"] = evidence.num_agreeing;
+  json["scan_from_sparse"] =
+      evidence.scan_from_sparse ? ToJson(*evidence.scan_from_sparse) : Json(nullptr);
+  return json;
+}
+
 }  // namespace
 
 Json SearchToJson(const AutomaticAlignment& found) {
@@ -70,6 +83,7 @@ Json SearchToJson(const AutomaticAlignment& found) {
   json["ratio"] = verdict.ratio;
   json["mirrored_score"] = verdict.mirrored_score;
   json["appearance"] = AppearanceToJson(found.search);
+  json["placed_photos"] = PlacedPhotosToJson(found.search);
   json["agreement"] = verdict.looks_alike || verdict.support != PhotoSupport::kNone;
   json["chance_wrong"] = verdict.chance_wrong;
   json["hypotheses"] = Json::array();

@@ -2,11 +2,13 @@
 // wrong places are believed: simulated rooms with known truth, in memory, the whole way of the
 // command (search, verdict, fit, adjustment).
 //   build/bin/auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED]
+//     [--walls plain|pattern] [--fine 1]
 // A line of rooms.csv for each room, written when it is done; rooms that have one already are left
 // out, so that a run that was ended goes on where it was, and several may write side by side to
 // files of their own. tests/benchmark/auto_align/auto_align_table.py makes tables of them. Ten of
-// sixteen rooms have an answer, six must be refused. Constants were only ever chosen on the set
-// `tuning`.
+// sixteen rooms have an answer, six must be refused. With --walls all rooms but the empty one have
+// plain walls, or nothing but a projected pattern: those to be refused, too. Constants were only
+// ever chosen on the set `tuning`.
 
 #include <cmath>
 #include <cstdio>
@@ -36,7 +38,7 @@ namespace {
 
 constexpr uint64_t kTuning = 16000, kCheck = 800000;  // first seeds
 constexpr double kSightTolerance = 0.05;              // metres, as the search has it
-constexpr int kFirstPhotos = 8, kAllPhotos = 24;      // that are asked (AgreementOptions)
+constexpr int kAllPhotos = 24;                        // that are asked (AgreementOptions)
 
 enum class Kind {
   kFurnished,
@@ -90,13 +92,18 @@ bool HasAnswer(Kind kind) {
          kind != Kind::kMirrored;
 }
 
+// Of all rooms of a run.
+enum class Walls { kAsTheKindHasThem, kPlain, kPattern };
+
 struct Settings {
   uint64_t first = kTuning;
+  Walls walls = Walls::kAsTheKindHasThem;
+  bool fine = false;  // scans of 2 million samples, photos of 1200 x 800
   int num_rooms = 16;
   std::string output_path;
 };
 
-SimulatedRoomOptions RoomOptions(uint64_t seed, Kind kind) {
+SimulatedRoomOptions RoomOptions(uint64_t seed, Kind kind, const Settings& settings) {
   RandomStream random(MixBits(seed, 11, 0));
   SimulatedRoomOptions options;
   options.random_seed = static_cast<int>(seed);
@@ -104,17 +111,19 @@ SimulatedRoomOptions RoomOptions(uint64_t seed, Kind kind) {
   options.depth = random.Uniform(3.8, 6.5);
   options.height = random.Uniform(2.5, 3.4);
   options.furnished = kind != Kind::kEmpty;
-  options.bare_walls = kind == Kind::kBareWalls;
-  options.bare = kind == Kind::kBare;
+  // Nothing would tell the ends of an empty room apart.
+  const Walls walls = kind == Kind::kEmpty ? Walls::kAsTheKindHasThem : settings.walls;
+  options.bare_walls = kind == Kind::kBareWalls || walls == Walls::kPlain;
+  options.bare = kind == Kind::kBare || walls == Walls::kPattern;
   options.num_photos = static_cast<int>(random.Uniform(8, 61));
   if (kind == Kind::kFew) options.num_photos = 8;
-  options.photo_width = 720;
-  options.photo_height = 480;
+  options.photo_width = settings.fine ? 1200 : 720;
+  options.photo_height = settings.fine ? 800 : 480;
   options.field_of_view_deg = random.Uniform(55, 80);
   if (kind == Kind::kTilted) options.roll_deg = 40;
   options.num_stations = random.Uniform() < 0.2 ? 2 : 1;
-  options.scan_columns = 800;
-  options.scan_rows = 400;
+  options.scan_columns = settings.fine ? 2000 : 800;
+  options.scan_rows = settings.fine ? 1000 : 400;
   options.range_noise = random.Uniform(0.001, 0.005);
   return options;
 }
@@ -239,18 +248,18 @@ struct Room {
   int reflectance = 0;
 };
 
-Room MakeRoom(uint64_t seed) {
+Room MakeRoom(uint64_t seed, const Settings& settings) {
   Room room;
   room.kind = kKinds[seed % 16];
   RandomStream random(MixBits(seed, 13, 0));
-  const SimulatedRoomOptions options = RoomOptions(seed, room.kind);
+  const SimulatedRoomOptions options = RoomOptions(seed, room.kind, settings);
   SimulatedCase& one = room.one;
   one.room = std::make_shared<SimulatedRoom>(options);
   const double noise_px = random.Uniform(0.4, 1.0);
   const int num_points =
       room.kind == Kind::kFew ? 300 : static_cast<int>(random.Uniform(500, 4000));
   one.model = one.room->MakeSparseModel(num_points, noise_px);
-  if (room.kind == Kind::kBareWalls) ThinWalls(*one.room, &random, &one.model);
+  if (options.bare_walls) ThinWalls(*one.room, &random, &one.model);
   SimulatedRoomOptions scanned = options;
   if (!HasAnswer(room.kind)) scanned.num_stations = 1;
   if (room.kind == Kind::kSamePlan || room.kind == Kind::kSimilar) scanned.random_seed += 7919;
@@ -258,7 +267,9 @@ Room MakeRoom(uint64_t seed) {
     scanned.width = std::max(4.6, options.width * random.Uniform(0.95, 1.05));
     scanned.depth = std::max(3.8, options.depth * random.Uniform(0.95, 1.05));
   }
-  if (room.kind == Kind::kOther) scanned = RoomOptions(seed + 7919 * 16, Kind::kFurnished);
+  if (room.kind == Kind::kOther) {
+    scanned = RoomOptions(seed + 7919 * 16, Kind::kFurnished, settings);
+  }
   const bool is_other = scanned.random_seed != options.random_seed;
   room.reflectance = random.Index(3);
   if (room.kind == Kind::kPart) room.scanned_share = random.Uniform(0.4, 0.9);
@@ -304,18 +315,16 @@ Error ErrorOf(const SimulatedRoom& room, const SparseModel& aligned) {
   return {Median(&positions), Median(&turns)};
 }
 
-// Those that are asked first, and where little is to be seen those that are asked then
-// (MeasureAgreement); drawing takes most time here.
+// Those that may be asked, also one by one; drawing takes most time here.
 void DrawPhotos(const Room& room, const std::string& folder) {
   const SimulatedRoom& of = *room.one.room;
-  const std::vector<const SparseImage*> images = SpreadImages(room.one.model, kAllPhotos);
-  const size_t num_sets = (images.size() + kFirstPhotos - 1) / kFirstPhotos;
-  const bool all = room.kind == Kind::kBare || room.kind == Kind::kEmpty;
+  std::set<std::string> names;
+  for (const SparseImage* image : SpreadImages(room.one.model, kAllPhotos)) {
+    names.insert(image->name);
+  }
   for (int photo = 0; photo < of.NumPhotos(); ++photo) {
-    for (size_t i = all ? 0 : num_sets / 2; i < images.size(); i += all ? 1 : num_sets) {
-      if (images[i]->name != of.PhotoName(photo)) continue;
-      cv::imwrite(folder + "/" + of.PhotoName(photo), of.RenderPhoto(photo));
-    }
+    if (names.count(of.PhotoName(photo)) == 0) continue;
+    cv::imwrite(folder + "/" + of.PhotoName(photo), of.RenderPhoto(photo));
   }
 }
 
@@ -327,7 +336,7 @@ const char kHeader[] =
     "clear,"
     "contradicts,"
     "second_share,chance_wrong,cpu_s,make_s,peak_mb,points,photos,stations,scanned,reflectance,"
-    "range_noise_m,looks_alike,cells,cells_second,reason\n";
+    "range_noise_m,looks_alike,cells,cells_second,asked,placed,agreeing,reason\n";
 
 class Line {
  public:
@@ -390,9 +399,9 @@ void AddEvidence(const Room& room, const SurveyedScans& surveyed, const Automati
   line->Add(v.chance_wrong, 4);
 }
 
-std::string LineOfRoom(uint64_t seed) {
+std::string LineOfRoom(uint64_t seed, const Settings& settings) {
   const double before_making = CpuSeconds();
-  const Room room = MakeRoom(seed);
+  const Room room = MakeRoom(seed, settings);
   const TempFolder folder;
   DrawPhotos(room, folder.path());
   const double before = CpuSeconds();
@@ -430,6 +439,10 @@ std::string LineOfRoom(uint64_t seed) {
     const auto& places = appearance ? appearance->places : std::vector<AppearancePlace>();
     line.Add(appearance ? std::to_string(k < places.size() ? places[k].num_cells : 0) : "");
   }
+  const auto& alone = found.search.placed_photos;
+  line.Add(alone ? std::to_string(alone->num_asked) : "");
+  line.Add(alone ? std::to_string(alone->num_placed) : "");
+  line.Add(alone ? std::to_string(alone->num_agreeing) : "");
   const auto& alignment = found.attempt.alignment;
   line.Add(alignment && !alignment->reasons.empty() ? alignment->reasons[0]
                                                     : found.attempt.refusal);
@@ -450,7 +463,7 @@ void Run(const Settings& settings) {
   for (int i = 0; i < settings.num_rooms; ++i) {
     const uint64_t seed = settings.first + i;
     if (done.count(std::to_string(seed)) > 0) continue;
-    const std::string line = LineOfRoom(seed);
+    const std::string line = LineOfRoom(seed, settings);
     stream << line << std::flush;
     std::fputs(line.c_str(), stdout);
     std::fflush(stdout);
@@ -464,6 +477,12 @@ bool Parse(int argc, char** argv, Settings* settings) {
       settings->first = kTuning;
     else if (option == "--set" && value == "check")
       settings->first = kCheck;
+    else if (option == "--walls" && value == "plain")
+      settings->walls = Walls::kPlain;
+    else if (option == "--walls" && value == "pattern")
+      settings->walls = Walls::kPattern;
+    else if (option == "--fine")
+      settings->fine = value == "1";
     else if (option == "--first")
       settings->first = std::strtoull(argv[i + 1], nullptr, 10);
     else if (option == "--rooms")
@@ -482,9 +501,9 @@ bool Parse(int argc, char** argv, Settings* settings) {
 int main(int argc, char** argv) {
   roomtex::Settings settings;
   if (!roomtex::Parse(argc, argv, &settings)) {
-    std::fprintf(
-        stderr,
-        "auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED]\n");
+    std::fprintf(stderr,
+                 "auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED] "
+                 "[--walls plain|pattern] [--fine 1]\n");
     return 2;
   }
   roomtex::Run(settings);
