@@ -37,7 +37,16 @@ class Running {
                              "/out 2>" + folder + "/err </dev/null";
     std::string shell = "/bin/sh", c = "-c", text = line;
     char* arguments[] = {shell.data(), c.data(), text.data(), nullptr};
-    EXPECT_EQ(posix_spawn(&pid_, "/bin/sh", nullptr, nullptr, arguments, environ), 0);
+    // SIGINT is ignored when the tests run in the background.
+    posix_spawnattr_t attributes;
+    sigset_t interrupt;
+    sigemptyset(&interrupt);
+    sigaddset(&interrupt, SIGINT);
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setsigdefault(&attributes, &interrupt);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    EXPECT_EQ(posix_spawn(&pid_, "/bin/sh", nullptr, &attributes, arguments, environ), 0);
+    posix_spawnattr_destroy(&attributes);
     for (int i = 0; i < 400 && Lines() < 2; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(25));
     }

@@ -117,6 +117,7 @@ TEST_F(ViewCommand, PrintsItsAddressAndEndsOnCtrlC) {
   const pid_t pid = fork();
   ASSERT_GE(pid, 0);
   if (pid == 0) {
+    std::signal(SIGINT, SIG_DFL);  // ignored when the tests run in the background
     (void)!freopen(out.c_str(), "w", stdout);
     (void)!freopen("/dev/null", "w", stderr);
     const std::string command = BinFolder() + "/roomtex-view";
