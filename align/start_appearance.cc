@@ -50,6 +50,7 @@ AppearanceEvidence LookForPlaces(const AlignmentInput& input, const StartSearch&
       if (places.empty()) continue;
       if (!best.places.empty() && places[0].num_cells <= best.places[0].num_cells) continue;
       best.agreeing = AgreeingPicks(matches, places[0].scan_from_sparse, input.model);
+      best.spread = FindCellSpread(best.agreeing);
       best.places = std::move(places);
     }
   }
@@ -100,6 +101,7 @@ void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
   if (input.image_path.empty()) return;
   if (!search->appearance) search->appearance = LookForPlaces(input, *search);
   if (!StandsOut(search->appearance->places, appearance)) return;
+  if (search->appearance->spread.num_apart < kFewestApart) return;
   AddStartThatLooksAlike(input, options, search->appearance->places[0].scan_from_sparse,
                          search->appearance->agreeing, search);
 }

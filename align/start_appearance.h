@@ -28,7 +28,7 @@ void AddStartThatLooksAlike(const AlignmentInput& input, const AlignmentOptions&
                             StartSearch* search);
 
 // Fills StartSearch::appearance, unless it is known already, and adds a start where the best place
-// stands out. Does nothing without photos.
+// stands out and shows more than one object (CellSpread). Does nothing without photos.
 void AskAppearance(const AlignmentInput& input, const AlignmentOptions& options,
                    const StartAppearanceOptions& appearance, StartSearch* search);
 

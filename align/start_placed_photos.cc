@@ -95,6 +95,7 @@ PlacedPhotoEvidence Agree(const FoundPhotos& found, const AlignmentInput& input,
   for (const PickView* view : best) {
     for (const int pick : view->picks) evidence.agreeing.push_back(found.picks[pick]);
   }
+  evidence.spread = FindCellSpread(evidence.agreeing);
   if (evidence.num_agreeing < placed.min_agreeing) return evidence;
   const JointPickFit joint = FitPicksJointly(
       input.model, evidence.agreeing, std::vector<bool>(evidence.agreeing.size(), true),
@@ -109,6 +110,7 @@ PlacedPhotoEvidence Agree(const FoundPhotos& found, const AlignmentInput& input,
 bool StandsOut(const PlacedPhotoEvidence& evidence, const PlacedPhotoOptions& options) {
   const int elsewhere = evidence.num_placed - evidence.num_agreeing;
   return evidence.num_agreeing >= options.min_agreeing &&
+         evidence.spread.num_apart >= kFewestApart &&
          elsewhere <= options.max_share_elsewhere * evidence.num_agreeing;
 }
 

@@ -24,7 +24,7 @@ struct PlacedPhotoOptions {
   FoundPhotoOptions photo;
 };
 
-// Whether the photos that agree are enough.
+// Whether the photos that agree are enough, and show more than one object.
 bool StandsOut(const PlacedPhotoEvidence& evidence, const PlacedPhotoOptions& options);
 
 // Fills StartSearch::placed_photos, unless it is known already, and adds a start where they agree

@@ -1,7 +1,9 @@
 #include "align/start_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 
 #include "align/search/up_directions.h"
 #include "core/parallel.h"
@@ -71,6 +73,27 @@ void FitStart(const AlignmentInput& input, const SearchCloud& cloud, const std::
   start->sights =
       CheckSights(cloud, fit.scan_from_sparse, input.surveyed.free_space(), kSightTolerance);
   start->scan_from_sparse = fit.scan_from_sparse;
+}
+
+CellSpread FindCellSpread(const std::vector<Pick>& picks) {
+  constexpr double kCell = 0.15;
+  std::set<std::array<int, 3>> cells;
+  for (const Pick& pick : picks) {
+    const Eigen::Vector3d at = pick.x_in_scan / kCell;
+    cells.insert({static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())),
+                  static_cast<int>(std::floor(at.z()))});
+  }
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& cell : cells) places.emplace_back(cell[0], cell[1], cell[2]);
+  CellSpread spread;
+  spread.num_cells = spread.num_apart = static_cast<int>(places.size());
+  for (const Eigen::Vector3d& middle : places) {
+    const auto apart = std::count_if(places.begin(), places.end(), [&](const auto& place) {
+      return (place - middle).norm() * kCell > kObjectReach;
+    });
+    spread.num_apart = std::min(spread.num_apart, static_cast<int>(apart));
+  }
+  return spread;
 }
 
 double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b) {

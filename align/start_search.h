@@ -35,10 +35,23 @@ struct FittedStart {
 // Metres; where sparse points and surface agree within this, photos of this room do so, too.
 inline constexpr double kExactRms = 0.01;
 
+// Where on the scan photos show what it shows, in cells of 15 cm: all, and those farther than
+// kObjectReach from whatever place has most of them around it. One rug or shelf may stand in
+// another room, too, and whatever photos show of it agrees.
+struct CellSpread {
+  int num_cells = 0, num_apart = 0;
+};
+inline constexpr double kObjectReach = 1.5;  // metres
+// So many apart are more than one object: 0 of a rug that another room had, too; 19 to 46 where
+// places were right (docs/automatic.md).
+inline constexpr int kFewestApart = 10;
+CellSpread FindCellSpread(const std::vector<Pick>& picks);
+
 // Where photos and scan look alike (start_appearance.h), the best first; may be nowhere.
 struct AppearanceEvidence {
   std::vector<AppearancePlace> places;
   std::vector<Pick> agreeing;  // what photos show of the scan at the first of them, weight 1
+  CellSpread spread;           // of these
 };
 
 // Photos that were each placed alone (start_placed_photos.h), and where those of them that agree
@@ -47,6 +60,7 @@ struct PlacedPhotoEvidence {
   int num_asked = 0, num_placed = 0, num_agreeing = 0;
   std::optional<Similarity> scan_from_sparse;
   std::vector<Pick> agreeing;  // what the photos that agree show of the scan, weight 1
+  CellSpread spread;           // of these
 };
 
 struct StartSearch {

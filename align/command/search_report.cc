@@ -52,6 +52,7 @@ Json AppearanceToJson(const StartSearch& search) {
   Json json;
   json["num_cells"] = places.empty() ? 0 : places[0].num_cells;
   json["num_cells_second"] = places.size() < 2 ? 0 : places[1].num_cells;
+  json["num_cells_apart"] = search.appearance->spread.num_apart;
   json["scan_from_sparse"] = places.empty() ? Json(nullptr) : ToJson(places[0].scan_from_sparse);
   return json;
 }
@@ -64,6 +65,8 @@ Json PlacedPhotosToJson(const StartSearch& search) {
   json["num_asked"] = evidence.num_asked;
   json["num_placed"] = evidence.num_placed;
   json["num_agreeing"] = evidence.num_agreeing;
+  json["num_cells"] = evidence.spread.num_cells;
+  json["num_cells_apart"] = evidence.spread.num_apart;
   json["scan_from_sparse"] =
       evidence.scan_from_sparse ? ToJson(*evidence.scan_from_sparse) : Json(nullptr);
   return json;

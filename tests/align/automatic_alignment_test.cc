@@ -200,7 +200,7 @@ TEST(AutomaticAlignment, APlaceByAppearanceIsAStartUnlessAHintContradicts) {
   const Similarity truth = one.room->ScanFromSparse();
   StartSearch known;
   known.cloud = MakeSearchCloud(input.model, 1, 1000);
-  known.appearance = AppearanceEvidence{{{truth, 60}}, one.picks};
+  known.appearance = AppearanceEvidence{{{truth, 60}}, one.picks, {60, 20}};
   StartSearch search = known;
   AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
   ASSERT_EQ(search.starts.size(), 1u);
@@ -218,6 +218,11 @@ TEST(AutomaticAlignment, APlaceByAppearanceIsAStartUnlessAHintContradicts) {
 
   search = known;
   search.appearance->places[0].num_cells = 18;  // as rooms of the same plan have
+  AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
+  EXPECT_TRUE(search.starts.empty());
+
+  search = known;
+  search.appearance->spread.num_apart = 0;  // a rug that stands in another room, too
   AskAppearance(input, AlignmentOptions(), StartAppearanceOptions(), &search);
   EXPECT_TRUE(search.starts.empty());
 }
@@ -261,12 +266,32 @@ TEST(AutomaticAlignment, PhotosThatArePlacedAloneAndAgreeAreAStart) {
   EXPECT_TRUE(shifted.starts.empty());
 }
 
+TEST(AutomaticAlignment, WhatLiesAroundOnePlaceIsNotApart) {
+  std::vector<Pick> picks;
+  for (int i = 0; i < 20; ++i) {  // a rug of 2 m
+    for (int k = 0; k < 3; ++k) {
+      picks.push_back({"a.jpg", {0, 0}, {0.1 * i + 0.05, 0.6 * k + 0.05, 0.02}});
+    }
+  }
+  const CellSpread rug = FindCellSpread(picks);
+  EXPECT_EQ(rug.num_apart, 0);
+  EXPECT_GT(rug.num_cells, 30);
+  for (int i = 0; i < 12; ++i) picks.push_back({"b.jpg", {0, 0}, {4.0, 0.3 * i + 0.05, 1.02}});
+  const CellSpread both = FindCellSpread(picks);
+  EXPECT_EQ(both.num_cells, rug.num_cells + 12);
+  EXPECT_EQ(both.num_apart, 12);
+}
+
 TEST(AutomaticAlignment, PhotosThatArePlacedElsewhereSpeakAgainstThoseThatAgree) {
   const PlacedPhotoOptions options;
   PlacedPhotoEvidence evidence;
   evidence.num_asked = 12;
   evidence.num_placed = evidence.num_agreeing = options.min_agreeing;
+  evidence.spread = {90, 30};
   EXPECT_TRUE(StandsOut(evidence, options));
+  evidence.spread = {90, 0};  // all of them show one rug
+  EXPECT_FALSE(StandsOut(evidence, options));
+  evidence.spread = {90, 30};
   evidence.num_placed = 2 * options.min_agreeing;
   EXPECT_FALSE(StandsOut(evidence, options));
   evidence.num_placed = evidence.num_agreeing = options.min_agreeing - 1;

@@ -336,7 +336,8 @@ const char kHeader[] =
     "clear,"
     "contradicts,"
     "second_share,chance_wrong,cpu_s,make_s,peak_mb,points,photos,stations,scanned,reflectance,"
-    "range_noise_m,looks_alike,cells,cells_second,asked,placed,agreeing,reason\n";
+    "range_noise_m,looks_alike,cells,cells_second,cells_apart,asked,placed,agreeing,placed_cells,"
+    "placed_cells_apart,reason\n";
 
 class Line {
  public:
@@ -439,10 +440,13 @@ std::string LineOfRoom(uint64_t seed, const Settings& settings) {
     const auto& places = appearance ? appearance->places : std::vector<AppearancePlace>();
     line.Add(appearance ? std::to_string(k < places.size() ? places[k].num_cells : 0) : "");
   }
+  line.Add(appearance ? std::to_string(appearance->spread.num_apart) : "");
   const auto& alone = found.search.placed_photos;
   line.Add(alone ? std::to_string(alone->num_asked) : "");
   line.Add(alone ? std::to_string(alone->num_placed) : "");
   line.Add(alone ? std::to_string(alone->num_agreeing) : "");
+  line.Add(alone ? std::to_string(alone->spread.num_cells) : "");
+  line.Add(alone ? std::to_string(alone->spread.num_apart) : "");
   const auto& alignment = found.attempt.alignment;
   line.Add(alignment && !alignment->reasons.empty() ? alignment->reasons[0]
                                                     : found.attempt.refusal);
