@@ -29,7 +29,8 @@ struct Capture {
       for (size_t p = 0; p < exposures.size(); ++p) {
         if (!sees(static_cast<int>(p), i)) continue;
         Observation o;
-        o.color = PackColor(truth * static_cast<float>(exposures[p]) * std::exp(sigma * spread(random)));
+        o.color =
+            PackColor(truth * static_cast<float>(exposures[p]) * std::exp(sigma * spread(random)));
         o.weight = PackWeight(0.5f);
         o.photo = static_cast<uint16_t>(p);
         store.Add(i, o);
