@@ -12,7 +12,6 @@
 
 #include "core/stays_inside.h"
 
-
 namespace roomtex {
 namespace fs = std::filesystem;
 namespace {
