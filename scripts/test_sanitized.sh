@@ -2,7 +2,7 @@
 # What reads files that somebody else wrote, under the address and undefined behaviour sanitizers: the unit tests of
 # core, importers, colmap_ext and picks, and the fuzz corpora.
 # Usage: scripts/test_sanitized.sh [--all | TEST...]    --all: the unit tests of all folders and the corpora of their
-# readers, before a release; half an hour of two cores from nothing
+# readers, before a release; hours of two cores: every alignment takes minutes here
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
