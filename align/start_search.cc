@@ -76,10 +76,10 @@ void FitStart(const AlignmentInput& input, const SearchCloud& cloud, const std::
 }
 
 CellSpread FindCellSpread(const std::vector<Pick>& picks) {
-  constexpr double kCell = 0.15;
+  const double cell_size = AppearanceSearchOptions().cell;
   std::set<std::array<int, 3>> cells;
   for (const Pick& pick : picks) {
-    const Eigen::Vector3d at = pick.x_in_scan / kCell;
+    const Eigen::Vector3d at = pick.x_in_scan / cell_size;
     cells.insert({static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())),
                   static_cast<int>(std::floor(at.z()))});
   }
@@ -89,7 +89,7 @@ CellSpread FindCellSpread(const std::vector<Pick>& picks) {
   spread.num_cells = spread.num_apart = static_cast<int>(places.size());
   for (const Eigen::Vector3d& middle : places) {
     const auto apart = std::count_if(places.begin(), places.end(), [&](const auto& place) {
-      return (place - middle).norm() * kCell > kObjectReach;
+      return (place - middle).norm() * cell_size > kObjectReach;
     });
     spread.num_apart = std::min(spread.num_apart, static_cast<int>(apart));
   }
