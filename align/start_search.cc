@@ -1,11 +1,11 @@
 #include "align/start_search.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
 
 #include "align/search/up_directions.h"
+#include "align/trust/scan_cells.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 
@@ -77,14 +77,10 @@ void FitStart(const AlignmentInput& input, const SearchCloud& cloud, const std::
 
 CellSpread FindCellSpread(const std::vector<Pick>& picks) {
   const double cell_size = AppearanceSearchOptions().cell;
-  std::set<std::array<int, 3>> cells;
-  for (const Pick& pick : picks) {
-    const Eigen::Vector3d at = pick.x_in_scan / cell_size;
-    cells.insert({static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())),
-                  static_cast<int>(std::floor(at.z()))});
-  }
+  std::set<ScanCell> cells;
+  for (const Pick& pick : picks) cells.insert(ScanCellOf(pick.x_in_scan, cell_size));
   std::vector<Eigen::Vector3d> places;
-  for (const auto& cell : cells) places.emplace_back(cell[0], cell[1], cell[2]);
+  for (const ScanCell& cell : cells) places.emplace_back(cell[0], cell[1], cell[2]);
   CellSpread spread;
   spread.num_cells = spread.num_apart = static_cast<int>(places.size());
   for (const Eigen::Vector3d& middle : places) {

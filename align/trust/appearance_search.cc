@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
 
+#include "align/trust/scan_cells.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -17,13 +17,6 @@ namespace {
 
 constexpr int kParts = 64, kKeptOfPart = 6;  // of the samples: fixed, whatever the threads
 constexpr double kFirstReach = 2;            // times the tolerance, before a sample is refined
-
-uint64_t CellOf(const Eigen::Vector3d& x, double cell) {
-  const auto key = [cell](double v) {
-    return static_cast<uint64_t>(static_cast<int64_t>(std::floor(v / cell)) + (1 << 20)) & 0x1fffff;
-  };
-  return key(x.x()) << 42 | key(x.y()) << 21 | key(x.z());
-}
 
 // Median distance from the median point.
 double RadiusOf(const std::vector<Eigen::Vector3d>& points) {
@@ -44,9 +37,9 @@ class MatchedCells {
                const std::optional<Eigen::Vector3d>& up_in_sparse,
                const Eigen::Vector3d& up_in_scan, const AppearanceSearchOptions& options)
       : up_in_sparse_(up_in_sparse), up_in_scan_(up_in_scan), options_(options) {
-    std::vector<std::pair<uint64_t, size_t>> by_cell;
+    std::vector<std::pair<ScanCell, size_t>> by_cell;
     for (size_t i = 0; i < matches.size(); ++i) {
-      by_cell.emplace_back(CellOf(matches[i].x_in_scan, options.cell), i);
+      by_cell.emplace_back(ScanCellOf(matches[i].x_in_scan, options.cell), i);
     }
     std::sort(by_cell.begin(), by_cell.end());
     for (size_t k = 0; k < by_cell.size(); ++k) {

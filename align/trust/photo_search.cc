@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/calib3d.hpp>
 
+#include "align/trust/scan_cells.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -36,14 +37,6 @@ Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
                       : Eigen::Quaterniond::Identity();
   pose.translation = {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)};
   return pose;
-}
-
-using ScanCell = std::array<int, 3>;
-
-ScanCell ScanCellOf(const Eigen::Vector3d& x, double cell) {
-  ScanCell key;
-  for (int k = 0; k < 3; ++k) key[k] = static_cast<int>(std::floor(x[k] / cell));
-  return key;
 }
 
 // The matches under one focal length, in the order of the scan's cells.
