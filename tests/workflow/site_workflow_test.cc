@@ -1,9 +1,12 @@
 // A site of two rooms on Snakemake, as docs/site.md has it: one that can be trusted, with its
-// matches made in parts, and one whose photos show nothing in common. Label `slow`.
+// matches made in parts, and one whose photos show nothing in common; and of two rooms that share
+// photos. Label `slow`.
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -44,6 +47,42 @@ class SiteWorkflow : public testing::Test {
 
   TempFolder folder_;
 };
+
+// A PTX file whose station stands in the identity, moved: its lines 3 to 10 are the station and its
+// axes, and the same as a matrix of rows.
+std::string TurnedPtx(const std::string& ptx, const Eigen::Isometry3d& moved) {
+  std::istringstream in(ptx);
+  std::ostringstream out;
+  out.precision(12);
+  std::string line;
+  for (int i = 0; i < 2; ++i) out << (std::getline(in, line), line) << "\n";
+  for (int i = 0; i < 8; ++i) std::getline(in, line);
+  const Eigen::Matrix4d rows = moved.matrix().transpose();
+  for (const int row : {3, 0, 1, 2}) out << rows.row(row).head<3>() << "\n";
+  out << rows << "\n" << in.rdbuf();
+  return out.str();
+}
+
+// The picks with their places in the scan moved; `picked`: the photo of the last one.
+std::string TurnedPicks(const std::string& picks, const Eigen::Isometry3d& moved,
+                        std::string* picked) {
+  std::istringstream in(picks);
+  std::ostringstream out;
+  for (std::string line; std::getline(in, line);) {
+    double x, y;
+    Eigen::Vector3d p;
+    char name[64];
+    if (std::sscanf(line.c_str(), "%63[^,],%lf,%lf,%lf,%lf,%lf", name, &x, &y, &p.x(), &p.y(),
+                    &p.z()) != 6) {
+      out << line << "\n";
+      continue;
+    }
+    *picked = name;
+    p = moved * p;
+    out << name << "," << x << "," << y << "," << p.x() << "," << p.y() << "," << p.z() << "\n";
+  }
+  return out.str();
+}
 
 TEST_F(SiteWorkflow, GoesOnWithTheOtherRoomsAndDoesNothingTwice) {
   Simulate(
@@ -115,6 +154,59 @@ TEST_F(SiteWorkflow, ARoomMayHaveNoPhotosButTheScanners) {
 
   WriteBytes(folder_ / "site.csv", "room,photos,scans\nhall,,hall/site.e57\n");
   EXPECT_THAT(RunSite("-n").err, HasSubstr("Nothing to be done"));
+}
+
+// What one scanner saw, taken for two rooms: the second has its scan in a frame of its own, which
+// is known, and every third photo in common with the first.
+TEST_F(SiteWorkflow, JoinsTwoRoomsByThePhotosThatTheyShare) {
+  Simulate(
+      "a",
+      "--random_seed 1 --num_photos 18 --photo_width 640 --photo_height 427 --scan_columns 500 "
+      "--scan_rows 200");
+  const Eigen::Isometry3d b_from_a =
+      Eigen::Translation3d(3, -2, 0.5) * Eigen::AngleAxisd(0.6, Eigen::Vector3d::UnitY());
+  ASSERT_EQ(RunCommandLine("roomtex-import --quiet --input_path " + (folder_ / "a/scan.rtpi") +
+                           " --output_path " + (folder_ / "a.ptx"))
+                .exit_code,
+            0);
+  fs::create_directories(folder_ / "b/photos");
+  WriteBytes(folder_ / "b/scan.ptx", TurnedPtx(ReadBytes(folder_ / "a.ptx"), b_from_a));
+  std::string picked;
+  WriteBytes(folder_ / "b/picks.csv",
+             TurnedPicks(ReadBytes(folder_ / "a/picks.csv"), b_from_a, &picked));
+  const int shared = std::stoi(picked.substr(6, 3)) % 3;  // photo_007.jpg
+  for (int i = 0; i < 18; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "photo_%03d.jpg", i);
+    const fs::path photo = folder_ / ("a/photos/" + std::string(name));
+    if (i % 3 != (shared + 1) % 3)
+      fs::copy_file(photo, folder_ / ("b/photos/" + std::string(name)));
+    if (i % 3 == (shared + 2) % 3) fs::remove(photo);
+  }
+  WriteBytes(folder_ / "site.csv",
+             "room,photos,scans,picks,cameras\n"
+             "hall,a/photos,a/scan.rtpi,a/picks.csv,a/cameras.txt\n"
+             "library,b/photos,b/scan.ptx,b/picks.csv,a/cameras.txt\n");
+  const CommandResult run = RunSite();
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json joined = json::parse(ReadBytes(At("joined/joined.json")));
+  EXPECT_EQ(joined["trusted"], true) << joined["reason"];
+  ASSERT_EQ(joined["links"].size(), 1u);
+  EXPECT_GE(joined["links"][0]["num_agreeing"], 4);
+  EXPECT_EQ(joined["rooms"][1]["name"], "library");
+  const json& rows = joined["rooms"][1]["site_from_room"];
+  Eigen::Isometry3d a_from_b = Eigen::Isometry3d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      a_from_b(row, column) = rows[row][column].get<double>();
+    }
+  }
+  // Where the second room's photos are: within a few metres of its station.
+  const Eigen::Isometry3d off = a_from_b * b_from_a;
+  EXPECT_LT((off * Eigen::Vector3d(1, 1, 1) - Eigen::Vector3d(1, 1, 1)).norm(), 0.015);
+  EXPECT_LT(Eigen::AngleAxisd(off.rotation()).angle(), 0.003);
+  const json site = json::parse(ReadBytes(At("site.json")));
+  EXPECT_EQ(site["counts"]["trusted"], 2);
 }
 
 TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
