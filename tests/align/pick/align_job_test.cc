@@ -26,7 +26,7 @@ class AlignButton : public PickPage {
   // Presses the button and waits for the end.
   Json Align() {
     EXPECT_EQ(Post("align").status, 200);
-    for (int i = 0; i < 1200; ++i) {
+    for (int i = 0; i < 6000; ++i) {  // five minutes: a sanitizer takes one
       const Json state = Get("align").json();
       if (state["state"] == "done") return state;
       EXPECT_EQ(state["state"], "running");
