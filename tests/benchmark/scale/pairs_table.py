@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+"""What the list of roomtex-pairs loses and saves on photos of several rooms, as a Markdown table (docs/pairs.md).
+
+  tests/benchmark/scale/pairs_table.py --bin build/bin FOLDER --photos 100 200 400 --exhaustive 100
+
+25 simulated photos in each room, all rooms with the same furniture at the same places; the smaller sets are the first
+rooms of the largest. Beside the list: the photos of each room with each other, which only the truth can tell (all that
+matching all pairs could find there), and, up to --exhaustive photos, all with all. COLMAP's mapper makes its models of
+the first two; a photo counts where most photos of its model are of its room. What was measured before
+(FOLDER/pairs.json) is not run again.
+"""
+
+import argparse
+import collections
+import json
+import os
+import shutil
+import sqlite3
+import statistics
+import subprocess
+import sys
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+PHOTOS_OF_A_ROOM = 25
+FIXED_LENS = [f"--Mapper.ba_refine_{part}" for part in ("focal_length", "principal_point", "extra_params")]
+
+
+def room_of(name):
+    return name.split("_")[0]
+
+
+def read_names(model):
+    """Names of the photos of a model in COLMAP's text format."""
+    with open(os.path.join(model, "images.txt")) as stream:
+        lines = [line for line in stream if not line.startswith("#")]
+    return [line.split()[9] for line in lines[::2] if line.strip()]
+
+
+class Bench:
+    def __init__(self, arguments):
+        self.arguments = arguments
+        self.folder = os.path.abspath(arguments.folder)
+        os.makedirs(self.folder, exist_ok=True)
+        self.path = self.at("pairs.json")
+        self.measured = json.load(open(self.path)) if os.path.exists(self.path) else {}
+
+    def at(self, *names):
+        return os.path.join(self.folder, *names)
+
+    def call(self, program, *line):
+        if program != "colmap":
+            program = os.path.join(self.arguments.bin, program)
+        with open(self.at("log.txt"), "a") as log:
+            log.write(" ".join((program,) + line) + "\n")
+            log.flush()
+            process = subprocess.Popen((program,) + line, stdout=log, stderr=log)
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode != 0:
+            sys.exit(f"{' '.join(line)}: exit code {process.returncode}, see {self.at('log.txt')}")
+        return usage.ru_utime + usage.ru_stime
+
+    def once(self, photos, key, measure):
+        """Keeps what `measure` returns."""
+        known = self.measured.setdefault(str(photos), {})
+        if key not in known:
+            print(f"{photos} photos: {key}", file=sys.stderr, flush=True)
+            known[key] = measure()
+            with open(self.path + ".new", "w") as stream:
+                json.dump(self.measured, stream, indent=1)
+            os.replace(self.path + ".new", self.path)
+        return known[key]
+
+    def rooms(self, photos):
+        return [f"room{seed}" for seed in range(101, 101 + photos // PHOTOS_OF_A_ROOM)]
+
+    def simulate(self, photos):
+        """Every room by itself, and the photos of all under names of their own in one folder."""
+        a = self.arguments
+        os.makedirs(self.at("photos"), exist_ok=True)
+        for room in self.rooms(photos):
+            if not os.path.exists(self.at(room, "README.txt")):
+                self.call("roomtex-simulate", "--quiet", "1", "--seed", room[4:], "--num_photos", str(PHOTOS_OF_A_ROOM),
+                          "--photo_width", str(a.width), "--photo_height", str(a.width * 2 // 3), "--scan_columns",
+                          "400", "--scan_rows", "150", "--output_path", self.at(room))
+                truth = self.at(room, "truth", "images.txt")
+                with open(truth) as stream:
+                    text = stream.read()
+                with open(truth, "w") as stream:
+                    stream.write(text.replace(" photo_", f" {room}_photo_"))
+            for name in os.listdir(self.at(room, "photos")):
+                link = self.at("photos", f"{room}_{name}")
+                if not os.path.exists(link):
+                    os.link(self.at(room, "photos", name), link)
+
+    def match(self, photos, kind, pairs):
+        """CPU seconds of COLMAP for the pairs of a file on a copy of the features, or for all pairs."""
+        threads = ["--SiftMatching.num_threads", "2", "--SiftMatching.use_gpu", "0"]
+        database = self.at(f"{kind}_{photos}.db")
+
+        def run():
+            shutil.copy(self.at(f"features_{photos}.db"), database)
+            if pairs is None:
+                return self.call("colmap", "exhaustive_matcher", "--database_path", database, *threads)
+            return self.call("colmap", "matches_importer", "--database_path", database, "--match_list_path", pairs,
+                             "--match_type", "pairs", *threads)
+
+        return self.once(photos, f"matches of {kind}", run)
+
+    def models(self, photos, kind):
+        """COLMAP's models: the room of most photos, how many are of it, how many are not, how far they are off."""
+        def run():
+            sparse = self.at(f"{kind}_{photos}")
+            shutil.rmtree(sparse, ignore_errors=True)
+            os.makedirs(sparse)
+            lens = [word for option in FIXED_LENS for word in (option, "0")]
+            found = {"cpu": self.call("colmap", "mapper", "--database_path", self.at(f"{kind}_{photos}.db"),
+                                      "--image_path", self.at("photos"), "--output_path", sparse, *lens), "models": []}
+            for number in sorted(os.listdir(sparse), key=int):
+                model = os.path.join(sparse, number)
+                self.call("colmap", "model_converter", "--input_path", model, "--output_path", model, "--output_type",
+                          "TXT")
+                names = read_names(model)
+                room, own = collections.Counter(map(room_of, names)).most_common(1)[0]
+                off = None
+                if own == len(names):  # of others the truth knows nothing
+                    report = os.path.join(model, "evaluate.json")
+                    self.call("roomtex-evaluate", "--quiet", "1", "--truth_path", self.at(room, "truth"),
+                              "--input_path", model, "--fit_similarity", "1", "--report_path", report)
+                    off = json.load(open(report))["poses"]["position_median_mm"]
+                found["models"].append({"room": room, "own": own, "others": len(names) - own, "off_mm": off})
+            return found
+
+        return self.once(photos, f"models of {kind}", run)
+
+    def features(self, photos):
+        """Of the largest set by COLMAP, of the others copies of theirs."""
+        most, features = max(self.arguments.photos), self.at(f"features_{photos}.db")
+        if photos == most:
+            camera = open(self.at(self.rooms(most)[0], "camera_options.txt")).read().split()
+            self.once(most, "features", lambda: self.call(
+                "colmap", "feature_extractor", "--database_path", features, "--image_path", self.at("photos"),
+                "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features", str(self.arguments.features),
+                *camera))
+        elif not os.path.exists(features):
+            shutil.copy(self.at(f"features_{most}.db"), features + ".new")
+            database = sqlite3.connect(features + ".new")
+            with database:
+                database.execute("DELETE FROM images WHERE substr(name, 1, instr(name, '_') - 1) NOT IN (%s)" %
+                                 ", ".join(f"'{room}'" for room in self.rooms(photos)))
+                for table in ("keypoints", "descriptors"):
+                    database.execute(f"DELETE FROM {table} WHERE image_id NOT IN (SELECT image_id FROM images)")
+            database.close()
+            os.rename(features + ".new", features)
+
+    def measure(self, photos):
+        self.features(photos)
+        pairs = self.at(f"pairs_{photos}.txt")
+        self.once(photos, "the list", lambda: self.call(
+            "roomtex-pairs", "--quiet", "1", "--database_path", self.at(f"features_{photos}.db"), "--output_path",
+            pairs))
+        self.once(photos, "pairs listed", lambda: sum(1 for line in open(pairs) if line.strip()))
+        self.match(photos, "list", pairs)
+        self.models(photos, "list")
+        if photos <= self.arguments.exhaustive:
+            self.match(photos, "all", None)
+
+    def measure_rooms(self, photos):
+        rooms, names = self.at("rooms.txt"), sorted(os.listdir(self.at("photos")))
+        with open(rooms, "w") as stream:
+            for i, first in enumerate(names):
+                for second in names[i + 1:]:
+                    if room_of(first) == room_of(second):
+                        stream.write(f"{first} {second}\n")
+        self.match(photos, "rooms", rooms)
+        self.models(photos, "rooms")
+
+    def table(self):
+        sizes = self.arguments.photos
+        of_rooms = self.measured[str(max(sizes))].get("models of rooms", {"models": []})["models"]
+        row = lambda name, value: print(
+            f"| {name} | " + " | ".join(value(self.measured[str(size)], size) for size in sizes) + " |")
+        cpu = lambda m, key: f"{m[key]:.0f}" if key in m else ""
+        row("photos (rooms)", lambda m, s: f"{s} ({s // PHOTOS_OF_A_ROOM})")
+        print("|---" * (len(sizes) + 1) + "|")
+        row("pairs, all", lambda m, s: str(s * (s - 1) // 2))
+        row("listed", lambda m, s: str(m["pairs listed"]))
+        row("CPU s: the list", lambda m, s: cpu(m, "the list"))
+        row("CPU s: matching the list", lambda m, s: cpu(m, "matches of list"))
+        row("CPU s: matching all", lambda m, s: cpu(m, "matches of all"))
+        row("both, of matching all", lambda m, s: "" if "matches of all" not in m else
+            f"{100 * (m['the list'] + m['matches of list']) / m['matches of all']:.0f} %")
+        for kind, models in (("list", lambda m, s: m["models of list"]["models"]),
+                             ("rooms", lambda m, s: [x for x in of_rooms if x["room"] in self.rooms(s)])):
+            off = lambda m, s: [x["off_mm"] for x in models(m, s) if x["off_mm"] is not None] or [float("nan")]
+            if kind == "rooms" and not of_rooms:
+                continue
+            row(f"{kind}: models", lambda m, s: str(len(models(m, s))))
+            row(f"{kind}: photos registered", lambda m, s: str(sum(x["own"] for x in models(m, s))))
+            row(f"{kind}: photos in another room's model", lambda m, s: str(sum(x["others"] for x in models(m, s))))
+            row(f"{kind}: off, mean and worst of the rooms, mm", lambda m, s: "%.2f, %.2f" % (
+                statistics.mean(off(m, s)), max(off(m, s))))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("--bin", default="build/bin")
+    parser.add_argument("--photos", type=int, nargs="*", default=[100, 200, 400], help="numbers of photos, 25 a room")
+    parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
+    parser.add_argument("--features", type=int, default=1500, help="per photo, for COLMAP")
+    parser.add_argument("--exhaustive", type=int, default=100, help="all pairs are matched, too, up to so many photos")
+    parser.add_argument("--rooms", type=int, default=1, help="0 = not the pairs of each room beside the list")
+    bench = Bench(parser.parse_args())
+    most = max(bench.arguments.photos)
+    bench.simulate(most)
+    bench.features(most)
+    for photos in bench.arguments.photos:
+        bench.measure(photos)
+    if bench.arguments.rooms:
+        bench.measure_rooms(most)
+    bench.table()
+
+
+if __name__ == "__main__":
+    main()
