@@ -187,6 +187,7 @@ class Bench:
         row("listed", lambda m, s: str(m["pairs listed"]))
         row("CPU s: the list", lambda m, s: cpu(m, "the list"))
         row("CPU s: matching the list", lambda m, s: cpu(m, "matches of list"))
+        row("CPU s: colmap mapper", lambda m, s: cpu(m["models of list"], "cpu"))
         row("CPU s: matching all", lambda m, s: cpu(m, "matches of all"))
         row("both, of matching all", lambda m, s: "" if "matches of all" not in m else
             f"{100 * (m['the list'] + m['matches of list']) / m['matches of all']:.0f} %")
