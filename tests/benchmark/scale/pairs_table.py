@@ -17,10 +17,9 @@ import os
 import shutil
 import sqlite3
 import statistics
-import subprocess
-import sys
 
-os.environ["QT_QPA_PLATFORM"] = "offscreen"
+from measurements import Measurements
+
 PHOTOS_OF_A_ROOM = 25
 FIXED_LENS = [f"--Mapper.ba_refine_{part}" for part in ("focal_length", "principal_point", "extra_params")]
 
@@ -36,40 +35,13 @@ def read_names(model):
     return [line.split()[9] for line in lines[::2] if line.strip()]
 
 
-class Bench:
+class Bench(Measurements):
     def __init__(self, arguments):
+        super().__init__(arguments.folder, arguments.bin, "pairs.json")
         self.arguments = arguments
-        self.folder = os.path.abspath(arguments.folder)
-        os.makedirs(self.folder, exist_ok=True)
-        self.path = self.at("pairs.json")
-        self.measured = json.load(open(self.path)) if os.path.exists(self.path) else {}
 
-    def at(self, *names):
-        return os.path.join(self.folder, *names)
-
-    def call(self, program, *line):
-        if program != "colmap":
-            program = os.path.join(self.arguments.bin, program)
-        with open(self.at("log.txt"), "a") as log:
-            log.write(" ".join((program,) + line) + "\n")
-            log.flush()
-            process = subprocess.Popen((program,) + line, stdout=log, stderr=log)
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode != 0:
-            sys.exit(f"{' '.join(line)}: exit code {process.returncode}, see {self.at('log.txt')}")
-        return usage.ru_utime + usage.ru_stime
-
-    def once(self, photos, key, measure):
-        """Keeps what `measure` returns."""
-        known = self.measured.setdefault(str(photos), {})
-        if key not in known:
-            print(f"{photos} photos: {key}", file=sys.stderr, flush=True)
-            known[key] = measure()
-            with open(self.path + ".new", "w") as stream:
-                json.dump(self.measured, stream, indent=1)
-            os.replace(self.path + ".new", self.path)
-        return known[key]
+    def seconds(self, *line):
+        return self.call(list(line))["cpu"]
 
     def rooms(self, photos):
         return [f"room{seed}" for seed in range(101, 101 + photos // PHOTOS_OF_A_ROOM)]
@@ -80,9 +52,10 @@ class Bench:
         os.makedirs(self.at("photos"), exist_ok=True)
         for room in self.rooms(photos):
             if not os.path.exists(self.at(room, "README.txt")):
-                self.call("roomtex-simulate", "--quiet", "1", "--seed", room[4:], "--num_photos", str(PHOTOS_OF_A_ROOM),
-                          "--photo_width", str(a.width), "--photo_height", str(a.width * 2 // 3), "--scan_columns",
-                          "400", "--scan_rows", "150", "--output_path", self.at(room))
+                self.seconds("roomtex-simulate", "--quiet", "1", "--seed", room[4:], "--num_photos",
+                             str(PHOTOS_OF_A_ROOM), "--photo_width", str(a.width), "--photo_height",
+                             str(a.width * 2 // 3), "--scan_columns", "400", "--scan_rows", "150", "--output_path",
+                             self.at(room))
                 truth = self.at(room, "truth", "images.txt")
                 with open(truth) as stream:
                     text = stream.read()
@@ -101,11 +74,11 @@ class Bench:
         def run():
             shutil.copy(self.at(f"features_{photos}.db"), database)
             if pairs is None:
-                return self.call("colmap", "exhaustive_matcher", "--database_path", database, *threads)
-            return self.call("colmap", "matches_importer", "--database_path", database, "--match_list_path", pairs,
-                             "--match_type", "pairs", *threads)
+                return self.seconds("colmap", "exhaustive_matcher", "--database_path", database, *threads)
+            return self.seconds("colmap", "matches_importer", "--database_path", database, "--match_list_path", pairs,
+                                "--match_type", "pairs", *threads)
 
-        return self.once(photos, f"matches of {kind}", run)
+        return self.once(f"matches of {kind} {photos}", run)
 
     def models(self, photos, kind):
         """COLMAP's models: the room of most photos, how many are of it, how many are not, how far they are off."""
@@ -114,31 +87,32 @@ class Bench:
             shutil.rmtree(sparse, ignore_errors=True)
             os.makedirs(sparse)
             lens = [word for option in FIXED_LENS for word in (option, "0")]
-            found = {"cpu": self.call("colmap", "mapper", "--database_path", self.at(f"{kind}_{photos}.db"),
-                                      "--image_path", self.at("photos"), "--output_path", sparse, *lens), "models": []}
+            cpu = self.seconds("colmap", "mapper", "--database_path", self.at(f"{kind}_{photos}.db"), "--image_path",
+                               self.at("photos"), "--output_path", sparse, *lens)
+            found = {"cpu": cpu, "models": []}
             for number in sorted(os.listdir(sparse), key=int):
                 model = os.path.join(sparse, number)
-                self.call("colmap", "model_converter", "--input_path", model, "--output_path", model, "--output_type",
-                          "TXT")
+                self.seconds("colmap", "model_converter", "--input_path", model, "--output_path", model,
+                             "--output_type", "TXT")
                 names = read_names(model)
                 room, own = collections.Counter(map(room_of, names)).most_common(1)[0]
                 off = None
                 if own == len(names):  # of others the truth knows nothing
                     report = os.path.join(model, "evaluate.json")
-                    self.call("roomtex-evaluate", "--quiet", "1", "--truth_path", self.at(room, "truth"),
-                              "--input_path", model, "--fit_similarity", "1", "--report_path", report)
+                    self.seconds("roomtex-evaluate", "--quiet", "1", "--truth_path", self.at(room, "truth"),
+                                 "--input_path", model, "--fit_similarity", "1", "--report_path", report)
                     off = json.load(open(report))["poses"]["position_median_mm"]
                 found["models"].append({"room": room, "own": own, "others": len(names) - own, "off_mm": off})
             return found
 
-        return self.once(photos, f"models of {kind}", run)
+        return self.once(f"models of {kind} {photos}", run)
 
     def features(self, photos):
         """Of the largest set by COLMAP, of the others copies of theirs."""
         most, features = max(self.arguments.photos), self.at(f"features_{photos}.db")
         if photos == most:
             camera = open(self.at(self.rooms(most)[0], "camera_options.txt")).read().split()
-            self.once(most, "features", lambda: self.call(
+            self.once(f"features {most}", lambda: self.seconds(
                 "colmap", "feature_extractor", "--database_path", features, "--image_path", self.at("photos"),
                 "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features", str(self.arguments.features),
                 *camera))
@@ -156,10 +130,10 @@ class Bench:
     def measure(self, photos):
         self.features(photos)
         pairs = self.at(f"pairs_{photos}.txt")
-        self.once(photos, "the list", lambda: self.call(
+        self.once(f"the list {photos}", lambda: self.seconds(
             "roomtex-pairs", "--quiet", "1", "--database_path", self.at(f"features_{photos}.db"), "--output_path",
             pairs))
-        self.once(photos, "pairs listed", lambda: sum(1 for line in open(pairs) if line.strip()))
+        self.once(f"pairs listed {photos}", lambda: sum(1 for line in open(pairs) if line.strip()))
         self.match(photos, "list", pairs)
         self.models(photos, "list")
         if photos <= self.arguments.exhaustive:
@@ -177,30 +151,31 @@ class Bench:
 
     def table(self):
         sizes = self.arguments.photos
-        of_rooms = self.measured[str(max(sizes))].get("models of rooms", {"models": []})["models"]
-        row = lambda name, value: print(
-            f"| {name} | " + " | ".join(value(self.measured[str(size)], size) for size in sizes) + " |")
-        cpu = lambda m, key: f"{m[key]:.0f}" if key in m else ""
-        row("photos (rooms)", lambda m, s: f"{s} ({s // PHOTOS_OF_A_ROOM})")
+        known = lambda what, size: self.known.get(f"{what} {size}")
+        of_rooms = (known("models of rooms", max(sizes)) or {"models": []})["models"]
+        row = lambda name, value: print(f"| {name} | " + " | ".join(value(size) for size in sizes) + " |")
+        cpu = lambda what: lambda size: "" if known(what, size) is None else f"{known(what, size):.0f}"
+        share = lambda size: 100 * (known("the list", size) + known("matches of list", size)) / known(
+            "matches of all", size)
+        row("photos (rooms)", lambda size: f"{size} ({size // PHOTOS_OF_A_ROOM})")
         print("|---" * (len(sizes) + 1) + "|")
-        row("pairs, all", lambda m, s: str(s * (s - 1) // 2))
-        row("listed", lambda m, s: str(m["pairs listed"]))
-        row("CPU s: the list", lambda m, s: cpu(m, "the list"))
-        row("CPU s: matching the list", lambda m, s: cpu(m, "matches of list"))
-        row("CPU s: colmap mapper", lambda m, s: cpu(m["models of list"], "cpu"))
-        row("CPU s: matching all", lambda m, s: cpu(m, "matches of all"))
-        row("both, of matching all", lambda m, s: "" if "matches of all" not in m else
-            f"{100 * (m['the list'] + m['matches of list']) / m['matches of all']:.0f} %")
-        for kind, models in (("list", lambda m, s: m["models of list"]["models"]),
-                             ("rooms", lambda m, s: [x for x in of_rooms if x["room"] in self.rooms(s)])):
-            off = lambda m, s: [x["off_mm"] for x in models(m, s) if x["off_mm"] is not None] or [float("nan")]
+        row("pairs, all", lambda size: str(size * (size - 1) // 2))
+        row("listed", lambda size: str(known("pairs listed", size)))
+        row("CPU s: the list", cpu("the list"))
+        row("CPU s: matching the list", cpu("matches of list"))
+        row("CPU s: colmap mapper", lambda size: f"{known('models of list', size)['cpu']:.0f}")
+        row("CPU s: matching all", cpu("matches of all"))
+        row("both, of matching all", lambda size: f"{share(size):.0f} %" if known("matches of all", size) else "")
+        for kind, models in (("list", lambda size: known("models of list", size)["models"]),
+                             ("rooms", lambda size: [x for x in of_rooms if x["room"] in self.rooms(size)])):
+            off = lambda size: [x["off_mm"] for x in models(size) if x["off_mm"] is not None] or [float("nan")]
             if kind == "rooms" and not of_rooms:
                 continue
-            row(f"{kind}: models", lambda m, s: str(len(models(m, s))))
-            row(f"{kind}: photos registered", lambda m, s: str(sum(x["own"] for x in models(m, s))))
-            row(f"{kind}: photos in another room's model", lambda m, s: str(sum(x["others"] for x in models(m, s))))
-            row(f"{kind}: off, mean and worst of the rooms, mm", lambda m, s: "%.2f, %.2f" % (
-                statistics.mean(off(m, s)), max(off(m, s))))
+            row(f"{kind}: models", lambda size: str(len(models(size))))
+            row(f"{kind}: photos registered", lambda size: str(sum(x["own"] for x in models(size))))
+            row(f"{kind}: photos in another room's model", lambda size: str(sum(x["others"] for x in models(size))))
+            row(f"{kind}: off, mean and worst of the rooms, mm", lambda size: "%.2f, %.2f" % (
+                statistics.mean(off(size)), max(off(size))))
 
 
 def main():

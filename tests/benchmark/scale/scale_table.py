@@ -9,59 +9,30 @@ measured before (FOLDER/measured.json) are not run again.
 """
 
 import argparse
-import json
 import math
 import os
 import shutil
 import struct
-import subprocess
-import sys
 
-os.environ["QT_QPA_PLATFORM"] = "offscreen"
+from measurements import Measurements
 
 
-class Bench:
+class Bench(Measurements):
     def __init__(self, arguments):
+        super().__init__(arguments.folder, arguments.bin, "measured.json")
         self.arguments = arguments
-        self.folder = os.path.abspath(arguments.folder)
-        os.makedirs(self.folder, exist_ok=True)
-        self.path = os.path.join(self.folder, "measured.json")
-        self.measured = json.load(open(self.path)) if os.path.exists(self.path) else {}
-
-    def at(self, *names):
-        return os.path.join(self.folder, *names)
-
-    def program(self, name):
-        return name if name == "colmap" else os.path.join(self.arguments.bin, name)
 
     def run(self, curve, step, size, line, fine=(0,)):
-        """Runs a program unless it was measured; its CPU seconds and peak memory, with those of what it starts."""
-        key = f"{curve} {step} {size}"
-        if key in self.measured:
-            return
-        print(f"{curve} {size}: {step}", file=sys.stderr, flush=True)
-        with open(self.at("log.txt"), "a") as log:
-            log.write(" ".join(line) + "\n")
-            log.flush()
-            process = subprocess.Popen([self.program(line[0])] + line[1:], stdout=log, stderr=log)
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode not in fine:
-            sys.exit(f"{' '.join(line)}: exit code {process.returncode}, see {self.at('log.txt')}")
-        self.measured[key] = {"cpu": usage.ru_utime + usage.ru_stime, "peak": usage.ru_maxrss / 1024}
-        with open(self.path + ".new", "w") as stream:
-            json.dump(self.measured, stream, indent=1)
-        os.replace(self.path + ".new", self.path)
+        """Runs a program unless it was measured."""
+        self.once(f"{curve} {step} {size}", lambda: self.call(line, fine))
 
     def simulate(self, name, photos, samples, stations=1):
         a = self.arguments
         rows = round(1000 * math.sqrt(samples / 2))
         if not os.path.exists(self.at(name, "README.txt")):
-            subprocess.run([self.program("roomtex-simulate"), "--quiet", "--seed", "7", "--output_path", self.at(name),
-                            "--num_photos", str(photos), "--photo_width", str(a.width), "--photo_height",
-                            str(a.width * 2 // 3), "--scan_columns", str(2 * rows), "--scan_rows", str(rows),
-                            "--num_stations", str(stations)],
-                           check=True, stdout=subprocess.DEVNULL)
+            self.call(["roomtex-simulate", "--quiet", "--seed", "7", "--output_path", self.at(name), "--num_photos",
+                       str(photos), "--photo_width", str(a.width), "--photo_height", str(a.width * 2 // 3),
+                       "--scan_columns", str(2 * rows), "--scan_rows", str(rows), "--num_stations", str(stations)])
 
     def photo_curve(self):
         a = self.arguments
@@ -138,8 +109,8 @@ class Bench:
     def cloud(self, place):
         """The samples as a LAS a metre off their station, so that their angles show no grid; how to put it back."""
         if not os.path.exists(place("cloud.las")):
-            subprocess.run([self.program("roomtex-import"), "--quiet", "--input_path", place("scan.rtpi"),
-                            "--output_path", place("new.las")], check=True, stdout=subprocess.DEVNULL)
+            self.call(["roomtex-import", "--quiet", "--input_path", place("scan.rtpi"), "--output_path",
+                       place("new.las")])
             with open(place("new.las"), "r+b") as stream:
                 for at in (155, 179, 187):  # offset, greatest and least of x in the header
                     stream.seek(at)
@@ -152,8 +123,18 @@ class Bench:
         return "cloud.las", ["--scan_poses", place("cloud.txt")]
 
     def station_poses(self):
-        """Rotation and translation of the eight stations that are simulated in one room."""
-        self.simulate("site", 10, self.arguments.station_samples, 8)
+        """Rotation and translation of eight stations simulated in one room; COLMAP's model of its photos."""
+        self.simulate("site", 16, self.arguments.station_samples, 8)
+        if not os.path.exists(self.at("site", "sparse", "0")):
+            place = lambda *parts: self.at("site", *parts)
+            camera = open(place("camera_options.txt")).read().split()
+            self.call(["colmap", "feature_extractor", "--database_path", place("database.db"), "--image_path",
+                       place("photos"), "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_num_features",
+                       str(self.arguments.features)] + camera)
+            self.call(["colmap", "exhaustive_matcher", "--database_path", place("database.db"),
+                       "--SiftMatching.use_gpu", "0"])
+            self.call(["roomtex-mapper", "--quiet", "--database_path", place("database.db"), "--image_path",
+                       place("photos"), "--output_path", place("sparse")], (0, 4))
         return [line.split()[1:] for line in open(self.at("site", "scan_poses.txt")) if line.startswith("scan")]
 
     def stations(self, name, poses):
@@ -165,15 +146,16 @@ class Bench:
             for k, (station, pose) in enumerate(poses):
                 stream.write(f"station{k}.rtpi {' '.join(pose)}\n")
                 if not os.path.exists(place(f"station{k}.rtpi")):
-                    os.link(self.at("site", f"scan_{station}.rtpi" if station else "scan.rtpi"), place(f"station{k}.rtpi"))
+                    scan = f"scan_{station}.rtpi" if station else "scan.rtpi"
+                    os.link(self.at("site", scan), place(f"station{k}.rtpi"))
                 scans += ["--scan_path", place(f"station{k}.rtpi")]
         return scans
 
     def align_stations(self, curve, count, scans):
         self.run(curve, "align", count, [
-            "roomtex-align", "--quiet", "--input_path", self.at("site", "truth"), "--picks_path",
+            "roomtex-align", "--quiet", "--input_path", self.at("site", "sparse", "0"), "--picks_path",
             self.at("site", "picks.csv"), "--output_path", self.at(f"{curve}_{count}", "aligned"), "--image_path",
-            self.at("site", "photos")] + scans, (0, 4))
+            self.at("site", "photos"), "--report_path", self.at(f"{curve}_{count}", "align.json")] + scans, (0, 4))
 
     def station_curve(self):
         """All in one room, where each is compared with each."""
@@ -197,7 +179,7 @@ class Bench:
 
     def table(self, curve, sizes, unit, key, digits):
         steps = []
-        for name in self.measured:
+        for name in self.known:
             kind, rest = name.split(" ", 1)
             step = rest.rsplit(" ", 1)[0]
             if kind == curve and step not in steps:
@@ -205,8 +187,8 @@ class Bench:
         print(f"| {unit} | " + " | ".join(str(size) for size in sizes) + " | slope |")
         print("|---" * (len(sizes) + 2) + "|")
         for step in steps:
-            found = [(size, self.measured[f"{curve} {step} {size}"][key]) for size in sizes
-                     if f"{curve} {step} {size}" in self.measured]
+            found = [(size, self.known[f"{curve} {step} {size}"][key]) for size in sizes
+                     if f"{curve} {step} {size}" in self.known]
             values = dict(found)
             slope = "" if len(found) < 2 else "%.1f" % (
                 math.log(found[-1][1] / found[0][1]) / math.log(found[-1][0] / found[0][0]))
@@ -222,7 +204,8 @@ def main():
     parser.add_argument("--photos", type=int, nargs="*", default=[20, 40, 80, 160], help="numbers of photos")
     parser.add_argument("--samples", type=float, nargs="*", default=[1, 4, 10], help="millions of samples")
     parser.add_argument("--stations", type=int, nargs="*", default=[4, 8, 16], help="numbers of stations")
-    parser.add_argument("--row", type=int, nargs="*", default=[], help="numbers of stations, two in each of a row of rooms")
+    parser.add_argument("--row", type=int, nargs="*", default=[],
+                        help="numbers of stations, two in each of a row of rooms")
     parser.add_argument("--station_samples", type=float, default=0.5, help="millions, of each station")
     parser.add_argument("--held_samples", type=float, default=1, help="millions, --max_samples of the commands")
     parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
