@@ -1,6 +1,7 @@
 // roomtex-simulate: a simulated capture with known truth. Parses, calls, reports.
 
 #include <cstdio>
+#include <memory>
 
 #include "capture/pattern/pattern.h"
 #include "capture/simulation/capture_writer.h"
@@ -8,6 +9,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "core/output_set.h"
 
 namespace {
 
@@ -74,7 +76,9 @@ int main(int argc, char** argv) {
     ThrowIfProblems(options.Problems());
     context.progress.Stage("room");
     const SimulatedRoom room(options);
-    const CaptureSummary summary = WriteCapture(room, output_path, &context.progress, reachable);
+    const auto outputs = std::make_shared<OutputSet>(output_path);
+    const CaptureSummary summary = MakeCapture(room, &context.progress, reachable, outputs.get());
+    CommitAtEnd(outputs);
     Describe(room, summary, &context.report);
     if (options.num_picks > 0 && summary.num_picks < options.num_picks) {
       context.Warn("only " + std::to_string(summary.num_picks) + " places to click were found");

@@ -7,6 +7,7 @@
 
 #include "colmap_ext/pair_selection.h"
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
@@ -168,6 +169,7 @@ void FindPairs(const PairsCommandOptions& options, const Command::Context& conte
       SelectPairs(database, hints, options.pairs, EffectiveThreads(context.options.num_threads),
                   static_cast<uint64_t>(context.options.random_seed), &context.progress);
   context.progress.Stage("write pairs");
+  CommitFilesAtEnd();
   WritePairs(selection, options.output_path);
   if (!options.graph_path.empty()) WriteJson(options.graph_path, GraphJson(selection));
 

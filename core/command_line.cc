@@ -17,6 +17,7 @@
 #include <sys/resource.h>
 
 #include "core/child_program.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/option_fields.h"
@@ -43,6 +44,16 @@ bool HoldsReport(const std::string& path, const std::vector<SetWithReport>& sets
     return !one.report_name.empty() &&
            path == (std::filesystem::path(one.set->folder()) / one.report_name).string();
   });
+}
+
+// In the set whose folder it belongs into, which may not be there yet.
+std::string PlaceToWrite(const std::string& path,
+                         const std::vector<std::shared_ptr<OutputSet>>& sets) {
+  for (const auto& set : sets) {
+    const std::string name = set->NameOf(path);
+    if (!name.empty()) return set->Path(name);
+  }
+  return path;
 }
 
 constexpr char kOutOfMemory[] = "out of memory";
@@ -165,7 +176,7 @@ struct Command::Impl {
   Json MakeReport(const Report& report, const Progress& progress) const;
   [[noreturn]] void RefuseReportPath() const;
   void RequireReplaceableReport() const;
-  void CheckReportPath(const std::vector<SetWithReport>& sets) const;
+  void CheckReportPath(const std::vector<SetWithReport>& sets, const CommitTogether& files) const;
   // Puts the sets and copies of a command that ran to its end in their places, and --report_path.
   void WriteReports(int exit_code, const Report& report, const Progress& progress) const;
 };
@@ -392,42 +403,44 @@ void Command::Impl::RequireReplaceableReport() const {
                    " is there already and is no report. Give another --report_path");
 }
 
-// Before anything of the sets is put in its place.
-void Command::Impl::CheckReportPath(const std::vector<SetWithReport>& sets) const {
+// Before anything is put in its place.
+void Command::Impl::CheckReportPath(const std::vector<SetWithReport>& sets,
+                                    const CommitTogether& files) const {
   const std::string& path = common.report_path;
   if (path.empty() || HoldsReport(path, sets)) return;
-  bool is_in_a_set = false;
   for (const SetWithReport& one : sets) {
     if (one.set->WillHold(path)) RefuseReportPath();
-    is_in_a_set |= !one.set->NameOf(path).empty();  // in a folder, perhaps, that is not there yet
   }
-  if (!is_in_a_set) OutputFile probe(path);  // throws where nothing can be written
+  if (files.Holds(path)) RefuseReportPath();
+  for (const std::string& other : OutputsSoFar()) {
+    std::error_code error;
+    if (std::filesystem::equivalent(path, other, error) && !error) RefuseReportPath();
+  }
 }
 
 void Command::Impl::WriteReports(int exit_code, const Report& report,
                                  const Progress& progress) const {
   const bool ran = exit_code == kExitDone || exit_code == kExitUntrusted;
-  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
-  if (!common.report_path.empty()) paths.push_back(common.report_path);
   std::vector<SetWithReport> sets = TakeSetsWithReport();
+  std::unique_ptr<CommitTogether> files = TakeFilesAtEnd();
   if (!ran) sets.clear();
-  if (paths.empty() && sets.empty()) return;
-  CheckReportPath(sets);
+  if (!ran || files == nullptr) {
+    files.reset();  // what waited in vain goes before another is made
+    files = std::make_unique<CommitTogether>();
+  }
+  CheckReportPath(sets, *files);
   const Json json = MakeReport(report, progress);
+  std::vector<std::shared_ptr<OutputSet>> folders;
   for (const SetWithReport& one : sets) {
     if (!one.report_name.empty()) WriteJson(one.set->Path(one.report_name), json);
-    one.set->Commit();
+    folders.push_back(one.set);
   }
-  const std::vector<std::string> written = OutputsSoFar();
+  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
+  if (!common.report_path.empty()) paths.push_back(common.report_path);
   for (const std::string& path : paths) {
-    std::error_code error;
-    for (const std::string& other : written) {
-      if (path != common.report_path || HoldsReport(other, sets)) continue;
-      if (!std::filesystem::equivalent(path, other, error) || error) continue;
-      RefuseReportPath();
-    }
-    WriteJson(path, json);
+    if (!HoldsReport(path, sets)) WriteJson(PlaceToWrite(path, folders), json);
   }
+  files->Finish(folders);
 }
 
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {

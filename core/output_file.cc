@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/partial_path.h"
@@ -98,20 +99,6 @@ void CopyToDevice(const std::string& from, const std::string& path) {
   }
 }
 
-// path: the target as the user named it.
-void MoveToPlace(const std::string& partial, const std::string& target, const std::string& path) {
-  std::error_code error;
-  fs::rename(partial, target, error);
-  if (error) {
-    throw InputError(path, "", "cannot be replaced (" + error.message() + ")",
-                     "Check that you may write this file");
-  }
-  ReleasePartial(partial);
-  NoteOutput(path);
-}
-
-CommitTogether* together = nullptr;
-
 }  // namespace
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {
@@ -152,28 +139,9 @@ void OutputFile::Commit() {
   }
   if (direct_) return CopyToDevice(partial_path_, path_);
   RefuseToReplaceInput(path_);
-  if (together != nullptr) {
-    together->whole_.push_back({path_, target_, partial_path_});
-    partial_path_.clear();
-    return;
-  }
-  const CommitLock lock;
-  MoveToPlace(partial_path_, target_, path_);
+  const WholeFile file = {path_, target_, partial_path_};
+  if (!CommitTogether::Take(file)) MoveToPlace(file);
   partial_path_.clear();
-}
-
-CommitTogether::CommitTogether() { together = this; }
-
-CommitTogether::~CommitTogether() {
-  together = nullptr;
-  for (const Whole& file : whole_) RemovePartial(file.partial_path);
-}
-
-void CommitTogether::Finish() {
-  const CommitLock lock;
-  for (; !whole_.empty(); whole_.erase(whole_.begin())) {
-    MoveToPlace(whole_.front().partial_path, whole_.front().target, whole_.front().path);
-  }
 }
 
 void MakeFolder(const std::string& path) {

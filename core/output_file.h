@@ -4,7 +4,6 @@
 
 #include <fstream>
 #include <string>
-#include <vector>
 
 namespace roomtex {
 
@@ -31,27 +30,6 @@ class OutputFile {
   std::string path_, target_, partial_path_;
   bool direct_ = false;
   std::ofstream stream_;
-};
-
-// Outputs of one answer in several folders. While this lives, Commit() makes files whole beside
-// their places and leaves them there; Finish() moves all to their places at once, without it none
-// is. One at a time; a device is written to as before.
-class CommitTogether {
- public:
-  CommitTogether();
-  ~CommitTogether();
-  CommitTogether(const CommitTogether&) = delete;
-  CommitTogether& operator=(const CommitTogether&) = delete;
-
-  // Throws InputError for a file that cannot be replaced any more.
-  void Finish();
-
- private:
-  friend class OutputFile;
-  struct Whole {
-    std::string path, target, partial_path;
-  };
-  std::vector<Whole> whole_;
 };
 
 // Makes the folder and its parents. Throws InputError if that is not possible or a file is in the

@@ -151,7 +151,7 @@ bool ChangePlaces(const std::string& finished, const std::string& target) {
   return errno == ENOENT && std::rename(finished.c_str(), target.c_str()) == 0;
 }
 
-OutputSet::OutputSet(const std::string& folder) : folder_(folder) {
+OutputSet::OutputSet(const std::string& folder) : folder_(folder), record_(PartialName()) {
   MakeFolder(folder);
   try {
     place_ = fs::canonical(folder).string();
@@ -194,8 +194,10 @@ std::string OutputSet::Path(const std::string& name) {
 
 std::string OutputSet::NameOf(const std::string& path) const {
   std::error_code error;
-  const fs::path place = fs::weakly_canonical(fs::absolute(path, error), error);
-  const fs::path name = place.lexically_relative(place_);
+  const fs::path absolute = fs::absolute(path, error);
+  // A link at the end would be replaced, not followed.
+  const fs::path parent = fs::weakly_canonical(absolute.parent_path(), error);
+  const fs::path name = (parent / absolute.filename()).lexically_relative(place_);
   return error || name.empty() || *name.begin() == ".." ? "" : name.string();
 }
 
@@ -261,7 +263,12 @@ void OutputSet::MoveOneByOne(const std::vector<std::string>& files) {
   if (failure != 0) throw CannotBeFilled(folder_, std::strerror(failure));
 }
 
-void OutputSet::Commit() {
+void OutputSet::Commit(const std::vector<std::string>& waiting) {
+  try {
+    if (!waiting.empty()) WriteCommitRecord(waiting, aside() + "/" + record_);
+  } catch (const std::system_error& error) {
+    throw CannotBeFilled(folder_, error.code().message());
+  }
   const std::vector<std::string> files = Check();
   {
     const CommitLock lock;

@@ -44,8 +44,11 @@ class OutputSet {
   const std::vector<std::string>& names() const { return names_; }
   const std::string& folder() const { return folder_; }
 
-  // Throws InputError or UsageError, before anything is moved, if a file cannot be replaced.
-  void Commit();
+  // Throws InputError or UsageError, before anything is moved, if a file cannot be replaced. With
+  // `waiting`, folders of files elsewhere that belong to this set (CommitTogether), a commit record
+  // of them at RecordPath() comes with it; the caller moves them and removes it.
+  void Commit(const std::vector<std::string>& waiting = {});
+  std::string RecordPath() const { return place_ + "/" + record_; }
 
  private:
   std::vector<std::string> Check() const;
@@ -54,6 +57,7 @@ class OutputSet {
   void MoveOneByOne(const std::vector<std::string>& files);
 
   std::string folder_, place_;  // place_: the folder without links
+  const std::string record_;    // its name
   std::unique_ptr<PartialFolder> aside_;
   std::vector<std::string> names_;
   std::set<std::string> replaced_, removed_;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <vector>
@@ -68,7 +69,40 @@ void Lock(int descriptor) {
   }
 }
 
+// Removes what a killed process left, once finish() has moved what is to be kept of it and says so.
+// False if it belongs to a living process.
+template <typename Finish>
+bool TidyUp(const std::string& path, const Finish& finish) {
+  const int descriptor = OpenToLock(path);
+  if (descriptor < 0) return true;
+  const bool is_left = flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  if (is_left && IsStill(descriptor, path) && finish()) {
+    std::error_code error;
+    fs::remove_all(path, error);
+  }
+  close(descriptor);
+  return is_left;
+}
+
+// Moves the sets that wait for this file, if it is a commit record; whether it may go then.
+bool FinishSetsOf(const std::string& path) {
+  const auto sets = ReadCommitRecord(path);
+  if (!sets) return true;
+  std::error_code error;
+  const std::string record = fs::canonical(path, error).string();
+  bool may_go = true;
+  for (const std::string& set : *sets) {
+    const std::optional<SetJournal> journal = ReadSetJournal(set);
+    const bool waits = journal && journal->waits_for == record;
+    if (!waits || fs::path(set).filename().string().rfind(kPartialPrefix, 0) != 0) continue;
+    may_go &= TidyUp(set, [&] { return FinishMovedSet(set, JournalOrigin::kFound) != EPERM; });
+  }
+  return may_go;
+}
+
 }  // namespace
+
+std::string PartialName() { return kPartialPrefix + RandomDigits(); }
 
 std::string MakePartial(const std::string& parent, PartialKind kind, const std::string& extension) {
   const std::string folder = parent.empty() ? "." : parent;
@@ -80,8 +114,8 @@ std::string MakePartial(const std::string& parent, PartialKind kind, const std::
   }
   const std::string start = folder == "." ? "" : folder.back() == '/' ? folder : folder + "/";
   for (;;) {
-    const std::string path = start + kPartialPrefix + RandomDigits() +
-                             (extension.size() > kLongestExtension ? "" : extension);
+    const std::string path =
+        start + PartialName() + (extension.size() > kLongestExtension ? "" : extension);
     int descriptor = -1;
     if (kind == PartialKind::kFile) {
       descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -135,14 +169,12 @@ void RemoveLeftovers(const std::string& folder) {
     if (name.rfind(kPartialPrefix, 0) == 0) candidates.push_back(entry->path().string());
   }
   for (const std::string& path : candidates) {
-    const int descriptor = OpenToLock(path);
-    if (descriptor < 0) continue;
-    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && IsStill(descriptor, path)) {
-      const bool is_set = fs::is_directory(path, error);
-      const bool is_of_another = is_set && FinishMovedSet(path, JournalOrigin::kFound) == EPERM;
-      if (!is_of_another) fs::remove_all(path, error);
-    }
-    close(descriptor);
+    TidyUp(path, [&] {
+      if (fs::is_directory(path, error)) {
+        return FinishMovedSet(path, JournalOrigin::kFound) != EPERM;
+      }
+      return FinishSetsOf(path);
+    });
   }
 }
 

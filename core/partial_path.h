@@ -9,6 +9,8 @@ namespace roomtex {
 
 // Every name of such a file or folder begins with this.
 inline constexpr char kPartialPrefix[] = ".roomtex-partial-";
+// Such a name, which nobody can foresee. Throws std::system_error.
+std::string PartialName();
 
 // Makes an empty file or folder of a name that nobody can foresee, and gives its path; `extension`
 // with its dot. Removes what killed processes left in `parent`. Throws std::system_error (the
@@ -42,8 +44,9 @@ class PartialFolder {
 // Whether the path lies in such a folder or is such a file.
 bool IsPartial(const std::string& path);
 
-// Removes from the folder what killed processes left there; where one was killed while it moved a
-// finished set into this folder (OutputSet), the set is moved to its end. Never throws.
+// Removes from the folder what killed processes left there; where one was killed while it moved
+// finished files into this folder (OutputSet, CommitTogether), all are moved to their places, also
+// those in other folders that belong to them. Never throws.
 void RemoveLeftovers(const std::string& folder);
 
 // For a process that a signal ends: removes all that it is making. From any thread; nothing can be

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -18,6 +19,47 @@ namespace {
 
 // No file of a command has this name.
 constexpr char kJournalName[] = ".roomtex-journal";
+constexpr char kRecordHead[] = "roomtex commit record\n";
+
+// An entry of a list or record: what it is ('m', 'r', 'w'; 's' = a set), the path, a zero byte.
+// Behind the last one stands an 'e'.
+using Entry = std::pair<char, std::string>;
+
+void WriteEntries(const std::vector<Entry>& entries, std::string text, const std::string& path,
+                  int flags) {
+  for (const auto& [kind, name] : entries) text += kind + name + '\0';
+  text += 'e';
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC | flags, 0600);
+  const bool written = file >= 0 &&
+                       write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       fsync(file) == 0;
+  const int error = errno;
+  if (file >= 0) close(file);
+  if (!written) throw std::system_error(error, std::generic_category());
+}
+
+// None unless the file is whole.
+std::optional<std::vector<Entry>> ReadEntries(const std::string& path, const std::string& head) {
+  std::error_code error;
+  if (!fs::is_regular_file(fs::symlink_status(path, error))) return std::nullopt;
+  std::ifstream stream(path, std::ios::binary);
+  std::string text(head.size(), '\0');
+  if (!stream.read(text.data(), static_cast<std::streamsize>(head.size())) || text != head) {
+    return std::nullopt;
+  }
+  text.assign(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
+  // Not a path that was cut off behind an e.
+  if (text.empty() || text.back() != 'e') return std::nullopt;
+  if (text.size() > 1 && text[text.size() - 2] != '\0') return std::nullopt;
+  std::vector<Entry> entries;
+  for (size_t begin = 0; begin + 1 < text.size();) {
+    const size_t end = text.find('\0', begin);
+    if (end == std::string::npos) break;
+    entries.emplace_back(text[begin], text.substr(begin + 1, end - begin - 1));
+    begin = end + 1;
+  }
+  return entries;
+}
 
 bool IsOfAnother(const std::string& path) {
   struct stat there {};
@@ -37,47 +79,64 @@ bool LeadsThroughLinks(const fs::path& folder, const fs::path& path) {
 
 }  // namespace
 
-// Each entry: 'm' or 'r', the path, a zero byte; at the end an 'e'.
 void WriteSetJournal(const SetJournal& journal, const std::string& set) {
-  std::string text;
-  for (const std::string& path : journal.moves) text += 'm' + path + '\0';
-  for (const std::string& path : journal.removes) text += 'r' + path + '\0';
-  text += 'e';
-  const std::string path = set + "/" + kJournalName;
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  const bool written = file >= 0 &&
-                       write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       fsync(file) == 0;
-  const int error = errno;
-  if (file >= 0) close(file);
-  if (!written) throw std::system_error(error, std::generic_category());
+  std::vector<Entry> entries;
+  if (!journal.waits_for.empty()) entries.emplace_back('w', journal.waits_for);
+  for (const std::string& path : journal.moves) entries.emplace_back('m', path);
+  for (const std::string& path : journal.removes) entries.emplace_back('r', path);
+  WriteEntries(entries, "", set + "/" + kJournalName, O_EXCL);
+}
+
+std::optional<SetJournal> ReadSetJournal(const std::string& set) {
+  const auto entries = ReadEntries(set + "/" + kJournalName, "");
+  if (!entries) return std::nullopt;
+  SetJournal journal;
+  for (const auto& [kind, path] : *entries) {
+    if (kind == 'w') journal.waits_for = path;
+    if (kind == 'm') journal.moves.push_back(path);
+    if (kind == 'r') journal.removes.push_back(path);
+  }
+  return journal;
+}
+
+void WriteCommitRecord(const std::vector<std::string>& sets, const std::string& path) {
+  std::vector<Entry> entries;
+  for (const std::string& set : sets) entries.emplace_back('s', set);
+  WriteEntries(entries, kRecordHead, path, O_TRUNC);
+}
+
+std::optional<std::vector<std::string>> ReadCommitRecord(const std::string& path) {
+  if (IsOfAnother(path)) return std::nullopt;
+  const auto entries = ReadEntries(path, kRecordHead);
+  if (!entries) return std::nullopt;
+  std::vector<std::string> sets;
+  for (const auto& [kind, set] : *entries) sets.push_back(set);
+  return sets;
 }
 
 int FinishMovedSet(const std::string& set, JournalOrigin origin) {
-  const std::string list = set + "/" + kJournalName;
-  if (origin == JournalOrigin::kFound && IsOfAnother(list)) return EPERM;
-  std::ifstream stream(list, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (text.empty() || text.back() != 'e') return 0;
+  if (origin == JournalOrigin::kFound && IsOfAnother(set + "/" + kJournalName)) return EPERM;
+  const std::optional<SetJournal> journal = ReadSetJournal(set);
+  if (!journal) return 0;
+  if (!journal->waits_for.empty() && !ReadCommitRecord(journal->waits_for)) return 0;
   const fs::path from(set), to = from.parent_path();
   int failure = 0;
-  for (size_t begin = 0; begin + 1 < text.size();) {
-    const size_t end = text.find('\0', begin);
-    if (end == std::string::npos) break;
-    const std::string path = text.substr(begin + 1, end - begin - 1);
-    std::error_code error, ignored;
+  // Whoever wrote a name that leads elsewhere wants to reach other files.
+  const auto stays = [&](const std::string& path) {
     const bool through_links = origin == JournalOrigin::kFound &&
                                (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
-    if (path.empty() || !StaysInside(path) || through_links) {
-      // Whoever wrote this wants to reach other files.
-    } else if (text[begin] == 'r') {
-      fs::remove(to / path, error);
-    } else if (fs::exists(fs::symlink_status(from / path, ignored))) {
-      fs::create_directories((to / path).parent_path(), ignored);
-      fs::rename(from / path, to / path, error);
-    }
+    return !path.empty() && StaysInside(path) && !through_links;
+  };
+  std::error_code error, ignored;
+  for (const std::string& path : journal->moves) {
+    if (!stays(path) || !fs::exists(fs::symlink_status(from / path, ignored))) continue;
+    fs::create_directories((to / path).parent_path(), ignored);
+    fs::rename(from / path, to / path, error);
     if (error && failure == 0) failure = error.value();
-    begin = end + 1;
+  }
+  for (const std::string& path : journal->removes) {
+    if (stays(path)) fs::remove(to / path, error);
+    if (error && failure == 0) failure = error.value();
   }
   return failure;
 }

@@ -1,25 +1,36 @@
 #pragma once
-// How OutputSet moves files one by one where folders cannot change places: what is to be moved
-// stands in a list inside the set, so that a killed run can be continued.
+// How files get to their places where no single rename puts all of them there: what is to be moved
+// stands in a list beside them, so that a killed run can be continued.
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace roomtex {
 
+// Of a folder with files that belong into the folder above it.
 struct SetJournal {
   std::vector<std::string> moves;    // below the set: to the same place below its upper folder
   std::vector<std::string> removes;  // files below the upper folder that the set does away with
+  std::string waits_for = {};        // nothing is moved before this commit record is there
 };
 
 // Writes the list to the disk. Throws std::system_error.
 void WriteSetJournal(const SetJournal& journal, const std::string& set);
+// None where there is no whole list.
+std::optional<SetJournal> ReadSetJournal(const std::string& set);
 
-// Moves what the list of the set names and is still there; does nothing without a list. Gives the
-// first error, 0 without one. Names that lead out of the upper folder are passed over. A list that
-// was found may have come with somebody's folder: there links lead out, too, and that of another
-// user is not followed (EPERM).
+// Moves what the list of the set names and is still there; does nothing without a list, or without
+// the record that it waits for. Gives the first error, 0 without one. Names that lead out of the
+// upper folder are passed over. A list that was found may have come with somebody's folder: there
+// links lead out, too, and that of another user is not followed (EPERM).
 enum class JournalOrigin { kOurs, kFound };
 int FinishMovedSet(const std::string& set, JournalOrigin origin);
+
+// A file by whose appearance several sets, in several folders, are to be moved: it names them, so
+// that whoever finds it moves them first. Throws std::system_error.
+void WriteCommitRecord(const std::vector<std::string>& sets, const std::string& path);
+// The sets; none if the file is no whole record, or another user's.
+std::optional<std::vector<std::string>> ReadCommitRecord(const std::string& path);
 
 }  // namespace roomtex

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <utility>
 
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -101,12 +103,11 @@ class Importer {
     FillReport();
     context_.progress.Stage("write", static_cast<int>(options_.output_paths.size()));
     std::string answer = Summary();
-    CommitTogether outputs;
+    CommitFilesAtEnd();
     for (const std::string& path : options_.output_paths) {
       for (const std::string& written : Write(path)) answer += written + "\n";
       context_.progress.Tick();
     }
-    outputs.Finish();
     context_.progress.Finish();
     std::cout << answer;
   }
@@ -295,10 +296,10 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
   images.check = options.reader.e57_check && options.output_paths.empty();  // or done already
   images.cut_panoramas = options.cut_panoramas;
   images.faces = options.faces;
-  OutputSet outputs(options.images_path);
-  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file, outputs.aside(),
-                                            images, &context.progress);
-  RequireNoOtherPhotos(photos, outputs);
+  const auto outputs = std::make_shared<OutputSet>(options.images_path);
+  const E57Photos photos = ExtractE57Images(SplitScanPath(options.input_path).file,
+                                            outputs->aside(), images, &context.progress);
+  RequireNoOtherPhotos(photos, *outputs);
   context.progress.Finish();
   for (const std::string& note : photos.notes) context.Warn(note);
   if (options.image_picks) {
@@ -307,11 +308,11 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
     if (picks.empty()) {
       context.Warn("no picks: no photo with a pose shows six places of the scans");
     } else {
-      WritePhotoPicks(picks, outputs.Path("picks.csv"));
+      WritePhotoPicks(picks, outputs->Path("picks.csv"));
     }
     context.report["num_picks"] = picks.size();
   }
-  outputs.Commit();
+  CommitAtEnd(outputs);
   Json json = Json::array();
   for (const E57Photos::Photo& photo : photos.photos) {
     json.push_back(

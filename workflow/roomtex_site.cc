@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/output_file.h"
@@ -40,6 +41,7 @@ void ReportSite(const SiteOptions& options, const Command::Context& context) {
                                    .lexically_normal()
                                    .lexically_relative(page.parent_path())
                                    .generic_string();
+  CommitFilesAtEnd();
   OutputFile file(options.output_path);
   file.stream() << MakeSitePage(keys, to_rooms == "." ? "" : to_rooms + "/");
   file.Commit();

@@ -22,6 +22,7 @@
 #include "colmap_ext/lens_labels.h"
 #include "colmap_ext/mapper_verdict.h"
 #include "colmap_ext/panorama_model.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "importers/photo_picks.h"
 
@@ -251,6 +252,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   }
   context.report["search"] = reading.search;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
+  CommitFilesAtEnd();
   if (!a.planes_path.empty()) {
     WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads,
                     reading.origin.offset());

@@ -9,6 +9,7 @@
 #include "building/outline_cloud.h"
 #include "building/outline_proposal.h"
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/text.h"
@@ -189,6 +190,7 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
     // A person's buildings, without points to compare them with.
     OutlineProposal drawn;
     drawn.outline = ReadOutline(a.outline_path);
+    CommitFilesAtEnd();
     ReportOutline(drawn, false, context);
     WriteModels(a, drawn.outline);
     WriteOutline(a.output_path, drawn.outline, false);
@@ -241,6 +243,7 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
     proposal = JudgeOutline(cloud, segments, outline);
   }
   context.progress.Finish();
+  CommitFilesAtEnd();
   ReportOutline(proposal, true, context);
   WriteModels(a, proposal.outline);
   WriteOutline(a.output_path, proposal.outline, a.outline_path.empty());

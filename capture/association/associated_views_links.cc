@@ -1,5 +1,6 @@
 #include "capture/association/associated_views_links.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -55,14 +56,14 @@ void Link(const fs::path& photo, const fs::path& link) {
   if (error) fs::copy_file(photo, link);
 }
 
-void Write(const std::string& folder, const fs::path& image_path,
-           const std::vector<AssociatedPair>& pairs) {
-  OutputSet outputs(folder);
-  const fs::path aside = outputs.aside();
+std::shared_ptr<OutputSet> Make(const std::string& folder, const fs::path& image_path,
+                                const std::vector<AssociatedPair>& pairs) {
+  auto outputs = std::make_shared<OutputSet>(folder);
+  const fs::path aside = outputs->aside();
   std::string list;
   for (const char* name : kFolders) {
     fs::create_directories(aside / name);
-    outputs.ReplaceFolder(name);
+    outputs->ReplaceFolder(name);
   }
   for (const AssociatedPair& pair : pairs) {
     if (pair.is_spare) continue;
@@ -72,27 +73,35 @@ void Write(const std::string& folder, const fs::path& image_path,
       list += std::string(kFolders[k]) + "/" + pair.patterned_image + "\n";
     }
   }
-  OutputFile file(outputs.Path(kListName));
+  OutputFile file(outputs->Path(kListName));
   file.stream() << list;
   file.Commit();
-  outputs.Commit();
+  return outputs;
 }
 
 }  // namespace
 
+int NumLinks(const std::vector<AssociatedPair>& pairs) {
+  return static_cast<int>(std::count_if(pairs.begin(), pairs.end(),
+                                        [](const AssociatedPair& pair) { return !pair.is_spare; }));
+}
+
 int WriteLinks(const std::string& folder, const std::string& image_path,
                const std::vector<AssociatedPair>& pairs) {
+  MakeLinks(folder, image_path, pairs)->Commit();
+  return NumLinks(pairs);
+}
+
+std::shared_ptr<OutputSet> MakeLinks(const std::string& folder, const std::string& image_path,
+                                     const std::vector<AssociatedPair>& pairs) {
   MakeFolder(folder);
-  int count = 0;
-  for (const AssociatedPair& pair : pairs) count += pair.is_spare ? 0 : 1;
   try {
     CheckFolders(folder);
-    Write(folder, image_path, pairs);
+    return Make(folder, image_path, pairs);
   } catch (const fs::filesystem_error& error) {
     throw InputError(folder, "", "cannot be filled: " + error.code().message(),
                      "Check that the folder may be written");
   }
-  return count;
 }
 
 }  // namespace roomtex

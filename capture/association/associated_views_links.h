@@ -1,10 +1,12 @@
 #pragma once
 // The associated photos as two folders with the same names in both, for COLMAP and roomtex-texture.
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "capture/association/associated_views.h"
+#include "core/output_set.h"
 
 namespace roomtex {
 
@@ -15,5 +17,9 @@ namespace roomtex {
 // pairs.
 int WriteLinks(const std::string& folder, const std::string& image_path,
                const std::vector<AssociatedPair>& pairs);
+// The same, to be committed by the caller.
+std::shared_ptr<OutputSet> MakeLinks(const std::string& folder, const std::string& image_path,
+                                     const std::vector<AssociatedPair>& pairs);
+int NumLinks(const std::vector<AssociatedPair>& pairs);
 
 }  // namespace roomtex

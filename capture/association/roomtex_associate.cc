@@ -9,6 +9,7 @@
 #include "capture/association/associated_views.h"
 #include "capture/association/associated_views_links.h"
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 
@@ -82,9 +83,11 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   for (const SinglePhoto& single : found.singles) {
     context.Warn(single.image + " is not associated: " + single.reason);
   }
+  CommitFilesAtEnd();
   WriteAssociations(arguments.output_path, found.pairs);
   if (!arguments.links_path.empty()) {
-    context.report["num_links"] = WriteLinks(arguments.links_path, options.image_path, found.pairs);
+    CommitAtEnd(MakeLinks(arguments.links_path, options.image_path, found.pairs));
+    context.report["num_links"] = NumLinks(found.pairs);
   }
   if (found.pairs.empty()) {
     std::string reason = "no pair of a patterned and a plain photo was found among " +

@@ -15,6 +15,7 @@
 #include "capture/calibration/calibration_output.h"
 #include "capture/calibration/calibration_picture.h"
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -139,11 +140,10 @@ void Run(Arguments* a, const Command::Context& context) {
   context.progress.Note(calibration.why_model);
 
   context.progress.Stage("write");
-  CommitTogether outputs;
+  CommitFilesAtEnd();
   WriteCamerasText(a->output_path, calibration.camera);
   if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
-  outputs.Finish();
   context.progress.Note(FocalLengthLine(calibration));
   std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
 }

@@ -311,8 +311,16 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
 
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
                             Progress* progress, bool reachable) {
-  const std::string photo_folder = folder + "/photos";
-  RequireNoOtherPhotos(room, photo_folder);
+  OutputSet outputs(folder);
+  const CaptureSummary summary = MakeCapture(room, progress, reachable, &outputs);
+  outputs.Commit();
+  return summary;
+}
+
+CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool reachable,
+                           OutputSet* outputs) {
+  RequireNoOtherPhotos(room, outputs->folder() + "/photos");
+  const std::string folder = outputs->aside(), photo_folder = folder + "/photos";
   MakeFolder(photo_folder);
   MakeFolder(folder + "/truth");
   CaptureSummary summary;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "capture/simulation/simulated_room.h"
+#include "core/output_set.h"
 #include "core/progress.h"
 
 namespace roomtex {
@@ -15,7 +16,7 @@ struct CaptureSummary {
   size_t num_samples = 0, num_missing = 0;  // of all stations
 };
 
-// Writes into `folder` (made if needed):
+// Writes into `folder` (made if needed), whole or not at all:
 //   photos/           JPEG, with EXIF if the options say so
 //   scan.rtpi         station 0; further ones are scan_1.rtpi ... with scan_poses.txt
 //                     (scan_from_station)
@@ -29,5 +30,8 @@ struct CaptureSummary {
 // Throws InputError if the folder cannot be written or its photos/ holds JPEGs of another capture.
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
                             Progress* progress, bool reachable = false);
+// The same, to be committed by the caller.
+CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool reachable,
+                           OutputSet* outputs);
 
 }  // namespace roomtex

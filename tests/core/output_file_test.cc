@@ -256,33 +256,6 @@ TEST(OutputFile, UnwritableFoldersAreInputErrors) {
   fs::permissions(folder / "locked", fs::perms(0755));
 }
 
-TEST(CommitTogether, AllAppearAtTheEndOrNone) {
-  const TempFolder folder, other;
-  const auto write = [](const std::string& path, const std::string& text) {
-    OutputFile file(path);
-    file.stream() << text;
-    file.Commit();
-  };
-  WriteBytes(other / "b.txt", "old");
-  for (const bool finished : {false, true}) {
-    CommitTogether outputs;
-    write(folder / "a.txt", "new a");
-    write(other / "b.txt", "new b");
-    EXPECT_FALSE(fs::exists(folder / "a.txt"));
-    EXPECT_EQ(ReadBytes(other / "b.txt"), "old");
-    if (finished) outputs.Finish();
-  }
-  EXPECT_EQ(ReadBytes(folder / "a.txt"), "new a");
-  EXPECT_EQ(ReadBytes(other / "b.txt"), "new b");
-  write(folder / "c.txt", "alone");
-  EXPECT_EQ(ReadBytes(folder / "c.txt"), "alone");
-  const auto count = [](const TempFolder& where) {
-    return std::distance(fs::directory_iterator(where.path()), fs::directory_iterator());
-  };
-  EXPECT_EQ(count(folder), 2);
-  EXPECT_EQ(count(other), 1);
-}
-
 TEST(MakeFolder, MakesParentsAndAcceptsWhatIsThere) {
   const TempFolder folder;
   MakeFolder(folder / "a/b/c/");

@@ -15,6 +15,7 @@ class Line:
     unsteady: tuple = ()  # files and folders that hold times
     again: bool = True  # over its own results; False: it replaces nothing
     old: str = " --random_seed 7"  # options of the run that left those results
+    together: bool = True  # all files, in whatever folders, appear as one answer once the next command has run
 
 
 ROOM = "--quiet --input_path room --image_path photos --accept_untrusted 1 "
@@ -27,7 +28,7 @@ LINES = [
     Line("auto", "roomtex-auto --quiet --image_path photos --scan_path scan.rtpi --picks_path "
          "picks.csv --output_path result --only align --quality low --accept_untrusted 1", None,
          ("result/log", "result/aligned/alignment.json", "result/steps.json", "result/report.json",
-          "result/report.html")),
+          "result/report.html"), together=False),
     Line("calibrate", "roomtex-calibrate --quiet --image_path boards --board 6x4 --output_path "
          "camera.txt --coverage_path cover/coverage.png --apply database.db --apply_output "
          "copies/copy.db --report_path reports/r.json", None, ("reports/r.json",)),

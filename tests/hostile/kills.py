@@ -13,7 +13,7 @@ import time
 import scene as s
 from commands import ALONE, LINES, Line, is_unsteady, prepared
 
-LIBRARY = os.environ.get("ROOMTEX_DIE_AT_RENAME", "")
+LIBRARY = os.path.abspath(os.environ["ROOMTEX_DIE_AT_RENAME"]) if "ROOMTEX_DIE_AT_RENAME" in os.environ else ""
 ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
 
 
@@ -30,7 +30,7 @@ def commands():
         "roomtex-texture --quiet --input_path sparse --image_path photos --scan_path scan.rtpi "
         "--scan_path other.rtpi --scan_poses poses.txt --Texture.scale 1 --output_web 0 "
         "--output_path textured --max_samples 9000"), None,  # a set for each station
-        ("textured/report.json",))
+        ("textured/report.json",), together=False)
     yield Line("import photos of an E57", "roomtex-import --quiet --input_path coloured/model.e57 "
                "--images_path taken --E57.picks 1", "taken")
     yield Line("import into three folders", (
@@ -130,6 +130,27 @@ def without(files, unsteady):
     return {name: content for name, content in files.items() if not is_unsteady(name, unsteady)}
 
 
+def not_one_answer(killed, one, before, after):
+    """Whether files of the answer are old and others new, once another command has written beside them."""
+    folders = {os.path.dirname(name) for name in after if before.get(name) != after[name]}
+    folders |= {os.path.dirname(name[:name.index(".roomtex-partial-")] + "x") for name in killed.state()
+                if ".roomtex-partial-" in name}
+    for folder in sorted(folders):
+        if not (killed.root / folder).is_dir():
+            continue
+        answer = killed.run("roomtex-import --quiet --input_path scan.rtpi --output_path " +
+                            os.path.join(folder, "settle.ply"))
+        if answer.code != 0:
+            return f"nothing can be written into {folder}: {answer.err[-200:]}"
+        (killed.root / folder / "settle.ply").unlink()
+    now = killed.state()
+    is_new = {name: now.get(name) != before.get(name) for name in set(before) | set(after)
+              if before.get(name) != after.get(name)}
+    if any(is_new.values()) and not all(is_new.values()):
+        return f"new: {[name for name in is_new if is_new[name]]}, old: {[name for name in is_new if not is_new[name]]}"
+    return ""
+
+
 def at_every_rename(base):
     """First over nothing, then over the results of another run."""
     assert LIBRARY, "ROOMTEX_DIE_AT_RENAME names no library: nothing would be killed"
@@ -176,6 +197,8 @@ def at_every_rename(base):
                 elif any(content not in (before.get(name), after.get(name))
                          for name, content in steady(now).items()):
                     problem = f"{how} {number}: a file is neither old nor new"
+                elif one.together and (problem := not_one_answer(killed, one, before, after)):
+                    problem = f"{how} {number}: {problem}"
                 else:
                     killed.run(line)
                     if killed.leftovers():

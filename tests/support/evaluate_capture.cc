@@ -13,6 +13,7 @@
 
 #include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
+#include "core/commit_together.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
@@ -110,6 +111,7 @@ int main(int argc, char** argv) {
   command.AddBool("fit_similarity", &fit,
                   "move the model by the best similarity first: for one that is not aligned");
   return command.Run(argc, argv, [&](const Command::Context& context) {
+    CommitFilesAtEnd();
     if (input_path.empty() && ply_path.empty()) {
       throw UsageError("give --input_path or --ply_path: what is to be compared with the truth?");
     }

@@ -1,0 +1,157 @@
+#include "core/commit_together.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+#include "core/input_guard.h"
+#include "core/output_set.h"
+#include "core/partial_path.h"
+#include "core/set_journal.h"
+
+namespace roomtex {
+namespace fs = std::filesystem;
+namespace {
+
+std::atomic<CommitTogether*> living{nullptr};
+
+InputError CannotBeReplaced(const std::string& path, const std::string& reason) {
+  return {path, "", "cannot be replaced (" + reason + ")", "Check that you may write this file"};
+}
+
+void Rename(const std::string& from, const fs::path& to, const std::string& path) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) throw CannotBeReplaced(path, error.message());
+  ReleasePartial(from);
+}
+
+fs::path PlaceOf(const std::string& path) {
+  std::error_code error;
+  const fs::path absolute = fs::absolute(path, error);
+  return fs::weakly_canonical(absolute.parent_path(), error) / absolute.filename();
+}
+
+std::unique_ptr<CommitTogether>& AtEnd() {
+  static std::unique_ptr<CommitTogether> files;
+  return files;
+}
+
+}  // namespace
+
+// Files of one folder on their way to it.
+struct CommitTogether::Folder {
+  std::string first;  // as the user named it
+  std::unique_ptr<PartialFolder> aside;
+};
+
+void MoveToPlace(const WholeFile& file) {
+  const CommitLock lock;
+  Rename(file.partial_path, file.target, file.path);
+  NoteOutput(file.path);
+}
+
+CommitTogether::CommitTogether() { living = this; }
+
+CommitTogether::~CommitTogether() {
+  living = nullptr;
+  for (const WholeFile& file : files_) RemovePartial(file.partial_path);
+}
+
+bool CommitTogether::Take(const WholeFile& file) {
+  CommitTogether* const taking = living;
+  if (taking == nullptr || IsPartial(file.target)) return false;
+  const std::lock_guard<std::mutex> lock(taking->mutex_);
+  taking->files_.push_back(file);
+  return true;
+}
+
+bool CommitTogether::Holds(const std::string& path) const {
+  const fs::path place = PlaceOf(path);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::any_of(files_.begin(), files_.end(),
+                     [&](const WholeFile& file) { return PlaceOf(file.target) == place; });
+}
+
+void CommitTogether::GiveToSets(const std::vector<std::shared_ptr<OutputSet>>& sets) {
+  for (const auto& set : sets) {
+    const auto is_of_set = [&](const WholeFile& file) {
+      const std::string name = set->NameOf(file.target);
+      if (name.empty()) return false;
+      Rename(file.partial_path, set->Path(name), file.path);
+      return true;
+    };
+    files_.erase(std::remove_if(files_.begin(), files_.end(), is_of_set), files_.end());
+  }
+}
+
+std::vector<CommitTogether::Folder> CommitTogether::MakeLists(const std::string& record) {
+  std::map<fs::path, std::vector<WholeFile>> files_of;
+  for (const WholeFile& file : files_) files_of[PlaceOf(file.target).parent_path()].push_back(file);
+  std::vector<Folder> folders;
+  for (const auto& [parent, files] : files_of) {
+    Folder& folder = folders.emplace_back();
+    folder.first = files.front().path;
+    folder.aside = std::make_unique<PartialFolder>(parent.string());
+    SetJournal journal;
+    journal.waits_for = record;
+    for (const WholeFile& file : files) {
+      const std::string name = fs::path(file.target).filename().string();
+      Rename(file.partial_path, *folder.aside / name, file.path);
+      journal.moves.push_back(name);
+    }
+    WriteSetJournal(journal, folder.aside->path());
+  }
+  return folders;
+}
+
+void CommitTogether::MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets) {
+  // With a set its folder brings the record along.
+  const std::string folder = PlaceOf(files_.front().target).parent_path().string();
+  const std::string record =
+      sets.empty() ? MakePartial(folder, PartialKind::kFile) : sets.back()->RecordPath();
+  const std::vector<Folder> folders = MakeLists(record);
+  std::vector<std::string> asides;
+  for (const Folder& one : folders) asides.push_back(one.aside->path());
+  {
+    const CommitLock lock;
+    for (const auto& set : sets)
+      set->Commit(set == sets.back() ? asides : std::vector<std::string>());
+    if (sets.empty()) WriteCommitRecord(asides, record);
+    for (const Folder& one : folders) {
+      const int failure = FinishMovedSet(one.aside->path(), JournalOrigin::kOurs);
+      if (failure != 0) throw CannotBeReplaced(one.first, std::strerror(failure));
+    }
+  }
+  for (const WholeFile& file : files_) NoteOutput(file.path);
+  RemovePartial(record);
+}
+
+void CommitTogether::Finish(const std::vector<std::shared_ptr<OutputSet>>& sets) {
+  living = nullptr;
+  GiveToSets(sets);
+  if (files_.empty()) {
+    for (const auto& set : sets) set->Commit();
+  } else if (sets.empty() && files_.size() == 1) {
+    MoveToPlace(files_.front());
+  } else {
+    try {
+      MoveAll(sets);
+    } catch (const std::system_error& error) {
+      throw CannotBeReplaced(files_.front().path, error.code().message());
+    }
+  }
+  files_.clear();
+}
+
+void CommitFilesAtEnd() { AtEnd() = std::make_unique<CommitTogether>(); }
+
+std::unique_ptr<CommitTogether> TakeFilesAtEnd() { return std::exchange(AtEnd(), nullptr); }
+
+}  // namespace roomtex
