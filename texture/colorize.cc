@@ -24,6 +24,7 @@
 #include "texture/sampling/single_holes.h"
 #include "texture/texels/texture_grid.h"
 #include "texture/texels/texture_scale.h"
+#include "texture/tone/contradicted_parts.h"
 #include "texture/tone/unify_exposure.h"
 
 namespace roomtex {
@@ -332,6 +333,20 @@ bool WeighBySharpness(const std::vector<PhotoSharpness>& sharpness, const BlendO
   return any;
 }
 
+// Whether any photo has such parts.
+bool MaskMovingThings(const PhotoPassInput& input, const ObservationStore& store,
+                      const std::vector<Eigen::Vector3f>& gains, const BlendOptions& blend,
+                      int num_threads, std::vector<PhotoView>* photos) {
+  if (!blend.leave_out_moving) return false;
+  const auto masks = FindContradictedParts(input, store, gains, *photos, blend, num_threads);
+  bool any = false;
+  for (size_t i = 0; i < photos->size(); ++i) {
+    (*photos)[i].moving = masks[i];
+    any = any || masks[i] != nullptr;
+  }
+  return any;
+}
+
 Scene MakeScene(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
                 const ColorizeOptions& options, int num_threads) {
   Scene scene = MakeSamples(scans, photos, options, num_threads);
@@ -430,6 +445,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 
+  const bool masked =
+      MaskMovingThings(input, store, result.exposure.gains, options.blend, num_threads, &photos);
   const bool reweighted = WeighBySharpness(result.sharpness, options.blend, &photos);
   bool corrected = false;
   if (options.registration.mode != "none") {
@@ -443,7 +460,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
     corrected = std::any_of(found.begin(), found.end(),
                             [](const PhotoRegistration& photo) { return photo.corrected; });
   }
-  if (corrected || reweighted) {
+  if (corrected || reweighted || masked) {
     progress->Stage("photos", static_cast<int>(photos.size()));
     store = ObservationStore(0, 1);  // before the next one takes its room
     store = ObservationStore(NumSlots(input), options.blend.max_views);

@@ -10,6 +10,9 @@ namespace {
 // Correlation of a photo with the others below which a sentence warns of it.
 constexpr double kDoubtfulAgreement = 0.7;
 
+double RoundedShare(const std::shared_ptr<const PhotoMask>& mask) {
+  return mask ? std::round(1e3 * mask->Share()) / 1e3 : 0;
+}
 double RoundedGain(float gain) { return std::round(1e6 * gain) / 1e6; }
 
 // What was found of the camera: response curve, light in the corners, how true EXIF is.
@@ -133,7 +136,8 @@ void FillColorReport(const std::vector<PhotoView>& photos, const ColorizeOptions
     const PhotoAgreement& photo = result.agreement[i];
     agreement[photos[i].name] = {{"correlation", std::round(1e3 * photo.correlation) / 1e3},
                                  {"difference", std::round(1e3 * photo.difference) / 1e3},
-                                 {"num_samples", photo.num_samples}};
+                                 {"num_samples", photo.num_samples},
+                                 {"moving", RoundedShare(result.photos[i].moving)}};
   }
   report["photo_agreement"] = agreement;
   Json sharpness = Json::object();
@@ -189,6 +193,16 @@ void JudgeColors(const std::vector<PhotoView>& photos, const ColorizeResult& res
   if (!foreign.empty()) {
     context.Warn("much of what these photos show is not what the others show at the same places: " +
                  NameList(photos, foreign));
+  }
+  std::vector<int> moving;
+  for (size_t i = 0; i < result.photos.size(); ++i) {
+    if (result.photos[i].moving) moving.push_back(static_cast<int>(i));
+  }
+  if (!moving.empty()) {
+    context.Warn(
+        "something stands in these photos that the others do not show, and is left out "
+        "(photo_agreement, moving): " +
+        NameList(photos, moving));
   }
   std::vector<int> blind;
   for (size_t i = 0; i < photos.size(); ++i) {

@@ -97,6 +97,33 @@ TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
   EXPECT_NE(strict.err.find("photo_003.jpg"), std::string::npos) << strict.err;
 }
 
+TEST_F(TextureCommand, WhoStoodBeforeTheWallIsNamedAndGivesNoColour) {
+  SimulatedRoomOptions options = RoomOptions();
+  options.strangers = 0.5;
+  Progress progress(true);
+  WriteCapture(SimulatedRoom(options), Path("visited"), &progress);
+  const auto run = [](const std::string& output, const std::string& more) {
+    const CommandResult result = RunCommandLine(
+        "roomtex-texture --quiet --Texture.scale 1 --input_path " + Path("visited/truth") +
+        " --image_path " + Path("visited/photos") + " --scan_path " + Path("visited/scan.rtpi") +
+        " --output_path " + Path(output) + more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadJson(Path(output + "/report.json"));
+  };
+  const json with = run("left_out", ""), without = run("kept", " --Blend.leave_out_moving 0");
+  EXPECT_NE(with["warnings"].dump().find("photo_001.jpg"), std::string::npos) << with["warnings"];
+  for (const auto& [name, photo] : with["photo_agreement"].items()) {
+    const bool visited = name.find_first_of("13579", 8) == 8;  // every other photo: photo_001.jpg
+    EXPECT_EQ(photo["moving"] > 0, visited) << name << " " << photo["moving"];
+    EXPECT_LT(photo["moving"], 0.25) << name;
+    EXPECT_EQ(without["photo_agreement"][name]["moving"], 0);
+  }
+  EXPECT_GT(with["num_colored"], 0.99 * without["num_colored"].get<double>());
+  const PlyVertices truth = ReadPly(Path("visited/truth/true_colors.ply"));
+  EXPECT_GT(Psnr(ReadPly(Path("left_out/model.ply")), truth),
+            Psnr(ReadPly(Path("kept/model.ply")), truth) + 0.7);
+}
+
 TEST_F(TextureCommand, EvidenceIsLeftOutAsAsked) {
   ASSERT_EQ(Texture("bare", "--output_evidence 0").exit_code, 0);
   EXPECT_TRUE(fs::exists(Path("bare/model.ply")));

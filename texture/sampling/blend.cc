@@ -69,6 +69,9 @@ void BlendOptions::Declare(OptionFields* fields) {
                "Colour difference (0..1) from the other photos at which half the weight is "
                "lost; 0 = never.")
       .NotNegative();
+  fields->Bool("Blend.leave_out_moving", &leave_out_moving,
+               "What stands before the surface in one photo and is outvoted by others (people, "
+               "moved chairs) gives no colour anywhere in that photo. Needs Blend.outlier.");
   fields
       ->Number("Blend.min_agreement", &min_agreement,
                "A photo is left out, and named, when its brightness correlates less than this with "
@@ -203,6 +206,24 @@ SampleViews UnpackViews(const Observation* observations, int count,
 }
 
 }  // namespace
+
+void CastVotes(const Observation* observations, int count,
+               const std::vector<Eigen::Vector3f>& gains, double outlier, Vote* votes) {
+  std::fill(votes, votes + count, Vote::kNone);
+  while (count > 0 && observations[count - 1].in_doubt != 0) --count;
+  count = std::min(count, kMostViews);
+  if (count < 2) return;
+  const SampleViews views = UnpackViews(observations, count, gains);
+  const auto scale = static_cast<float>(outlier);
+  const int central = views.Central(scale);
+  int num_agree = 0;
+  for (int i = 0; i < count; ++i) {
+    const bool agrees = views.Agreement(central, i, scale) > kFits;
+    votes[i] = agrees ? Vote::kAgrees : Vote::kOutvoted;
+    num_agree += agrees;
+  }
+  if (2 * num_agree <= count) std::fill(votes, votes + count, Vote::kOpen);
+}
 
 BlendedSample BlendSample(const Observation* observations, int count,
                           const std::vector<Eigen::Vector3f>& gains, double outlier,

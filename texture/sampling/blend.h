@@ -2,6 +2,7 @@
 // Weighted blending (thesis 8.2.2), with a check that the photos agree on the colour of a sample
 // (photo-consistency, as in Waechter, Moehrle and Goesele 2014, "Let There Be Color!").
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,9 @@ struct BlendOptions {
   // scale of 0..1 that is about even to the eye. Larger = more tolerant; below 0.2, shiny surfaces,
   // which look different in every photo, come out in blotches. 0 = never (thesis).
   double outlier = 0.3;
+  // What stands before the surface in one photo, and not in those that outvote it, gives no colour
+  // anywhere in that photo (contradicted_parts.h). Departure from the thesis.
+  bool leave_out_moving = true;
   // A photo whose brightness correlates less than this with that of the others at the same samples
   // shows something else (another room that looks alike, furniture that was moved) and gives no
   // colour, unless more than a fifth of the photos were to go. Photos 3 cm beside their places
@@ -98,5 +102,12 @@ struct BlendedSample {
 BlendedSample BlendSample(const Observation* observations, int count,
                           const std::vector<Eigen::Vector3f>& gains, double outlier,
                           float* shares = nullptr);
+
+// What the photos of a sample say of one of them: kAgrees with most of them, is kOutvoted by most,
+// or kOpen: they differ, and no side has more than half. kNone: a single one, or in doubt.
+enum class Vote : uint8_t { kNone, kAgrees, kOutvoted, kOpen };
+// One vote per observation.
+void CastVotes(const Observation* observations, int count,
+               const std::vector<Eigen::Vector3f>& gains, double outlier, Vote* votes);
 
 }  // namespace roomtex

@@ -46,6 +46,7 @@ class PhotoObserver {
         probe_stride_(probe_stride),
         projector_(view),
         warp_(view.warp),
+        moving_(view.moving),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
         image_(std::move(picture)) {
     if (view.camera.IsPanorama()) {
@@ -118,7 +119,8 @@ class PhotoObserver {
           PackColor(vignetting_ ? color.linear * vignetting_->At(x, y) : color.linear);
       observation.weight = PackWeight(std::max(weight, 1e-10f));
       observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
-      observation.in_doubt = sight < Sight::kBoundary;
+      observation.in_doubt =
+          sight < Sight::kBoundary || (moving_ && moving_->At(shown.x(), shown.y()));
       seen->all.push_back({tile.first_slot + i, observation});
     }
   }
@@ -137,6 +139,7 @@ class PhotoObserver {
   size_t probe_stride_;  // 0 = no probes
   PhotoProjector projector_;
   std::shared_ptr<const PhotoWarp> warp_;
+  std::shared_ptr<const PhotoMask> moving_;
   PhotoVisibility visibility_;
   cv::Mat image_;    // sRGB
   int seam_px_ = 0;  // columns that a panorama's image goes on for beyond both borders

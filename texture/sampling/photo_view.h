@@ -11,6 +11,7 @@
 #include "core/camera_model.h"
 #include "core/photo.h"
 #include "core/similarity.h"
+#include "texture/sampling/photo_mask.h"
 #include "texture/sampling/photo_tone.h"
 #include "texture/sampling/photo_warp.h"
 
@@ -26,6 +27,8 @@ struct PhotoView {
   std::shared_ptr<const PhotoTone> tone;  // how its bytes become light; none = sRGB
   float weight = 1;  // share of its weight in the blend that it keeps, e.g. a blurred one
   std::shared_ptr<const PhotoWarp> warp;  // what camera and pose do not say; none = nothing
+
+  std::shared_ptr<const PhotoMask> moving;  // parts that count for nothing; none = nothing
 
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }
 };

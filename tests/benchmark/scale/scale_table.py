@@ -39,12 +39,13 @@ class Bench(Measurements):
         most = max(a.photos)
         self.simulate("capture", most, 2)
         names = sorted(os.listdir(self.at("capture", "photos")))
+        picked = names.index(open(self.at("capture", "picks.csv")).read().split("\n")[2].split(",")[0])
         camera = open(self.at("capture", "camera_options.txt")).read().split()
         for count in a.photos:
             place = lambda *parts: self.at(f"photos_{count}", *parts)
             os.makedirs(place("photos"), exist_ok=True)
             for i in range(count):
-                name = names[i * most // count]
+                name = names[(picked + i * most // count) % most]
                 if not os.path.exists(place("photos", name)):
                     os.link(self.at("capture", "photos", name), place("photos", name))
             threads = ["--SiftMatching.num_threads", "2", "--SiftMatching.use_gpu", "0"]

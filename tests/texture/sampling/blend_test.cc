@@ -110,6 +110,25 @@ TEST(BlendSample, LeavesOutAColorThatTheOthersContradict) {
 // White paper is clipped in every photo that sees it, and one photo with a wrong pose sees
 // something dark there: clipped photos weigh little in the mean, but they are as good witnesses as
 // any other.
+TEST(CastVotes, MostPhotosOutvoteTheRestAndHalfOfThemDoNot) {
+  using Votes = std::vector<Vote>;
+  const auto cast = [](std::vector<Observation> seen) {
+    Votes votes(seen.size());
+    CastVotes(seen.data(), static_cast<int>(seen.size()), kUnitGains, 0.3, votes.data());
+    return votes;
+  };
+  const Observation wall = Seen(0.4f, 0.3f, 0.3f, 1, 0), too = Seen(0.41f, 0.3f, 0.3f, 0.2f, 1),
+                    coat = Seen(0, 0, 0.05f, 0.9f, 2), hair = Seen(0, 0.4f, 0, 0.1f, 3);
+  EXPECT_EQ(cast({wall, coat, too}), (Votes{Vote::kAgrees, Vote::kOutvoted, Vote::kAgrees}));
+  EXPECT_EQ(cast({wall, too}), (Votes{Vote::kAgrees, Vote::kAgrees}));
+  EXPECT_EQ(cast({wall, coat}), (Votes{Vote::kOpen, Vote::kOpen}));
+  EXPECT_EQ(cast({wall, coat, hair}), Votes(3, Vote::kOpen));
+  EXPECT_EQ(cast({wall}), (Votes{Vote::kNone}));
+  Observation doubtful = too;
+  doubtful.in_doubt = 1;
+  EXPECT_EQ(cast({wall, coat, doubtful}), (Votes{Vote::kOpen, Vote::kOpen, Vote::kNone}));
+}
+
 TEST(BlendSample, ClippedPhotosOutvoteOneThatContradictsThem) {
   std::vector<Observation> observations(4);
   std::vector<Eigen::Vector3f> gains;
