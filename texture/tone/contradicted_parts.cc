@@ -16,7 +16,7 @@ namespace {
 // Chosen on one simulated room with somebody in half of the photos (docs/texture.md).
 constexpr int kCellsPerWidth = 128;
 constexpr int kLeastCellPx = 8;
-constexpr float kMinOfSquare = 4;    // of a square that says anything
+constexpr float kMinOfSquare = 4;   // of a square that says anything
 constexpr int kMinOutvoted = 8;     // squares that hang together
 constexpr double kMinShare = 0.01;  // of a photo; less is left to the blend
 
