@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -44,6 +45,24 @@ std::unique_ptr<CommitTogether>& AtEnd() {
 }
 
 }  // namespace
+
+// Gone at the end, unless what it makes valid has not been done yet.
+class CommitTogether::Record {
+ public:
+  explicit Record(std::string path) : path_(std::move(path)) {}
+  ~Record() { RemovePartial(path_); }
+  Record(const Record&) = delete;
+  Record& operator=(const Record&) = delete;
+
+  const std::string& path() const { return path_; }
+  void Keep() {
+    ReleasePartial(path_);
+    path_.clear();
+  }
+
+ private:
+  std::string path_;
+};
 
 // Files of one folder on their way to it.
 struct CommitTogether::Folder {
@@ -114,23 +133,36 @@ std::vector<CommitTogether::Folder> CommitTogether::MakeLists(const std::string&
 void CommitTogether::MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets) {
   // With a set its folder brings the record along.
   const std::string folder = PlaceOf(files_.front().target).parent_path().string();
-  const std::string record =
-      sets.empty() ? MakePartial(folder, PartialKind::kFile) : sets.back()->RecordPath();
-  const std::vector<Folder> folders = MakeLists(record);
+  Record record(sets.empty() ? MakePartial(folder, PartialKind::kFile) : sets.back()->RecordPath());
+  const std::vector<Folder> folders = MakeLists(record.path());
   std::vector<std::string> asides;
   for (const Folder& one : folders) asides.push_back(one.aside->path());
+  for (const WholeFile& file : files_) RequireReplaceable(file.path);
   {
     const CommitLock lock;
     for (const auto& set : sets)
       set->Commit(set == sets.back() ? asides : std::vector<std::string>());
-    if (sets.empty()) WriteCommitRecord(asides, record);
-    for (const Folder& one : folders) {
-      const int failure = FinishMovedSet(one.aside->path(), JournalOrigin::kOurs);
-      if (failure != 0) throw CannotBeReplaced(one.first, std::strerror(failure));
-    }
+    if (sets.empty()) WriteCommitRecord(asides, record.path());
+    MoveFolders(folders, &record);
   }
   for (const WholeFile& file : files_) NoteOutput(file.path);
-  RemovePartial(record);
+}
+
+// From here on the run counts as done: what cannot be moved waits for the next command.
+void CommitTogether::MoveFolders(const std::vector<Folder>& folders, Record* record) {
+  std::optional<InputError> failed;
+  for (const Folder& one : folders) {
+    const int failure = FinishMovedSet(one.aside->path(), JournalOrigin::kOurs);
+    if (failure == 0) continue;
+    const std::string kept = one.aside->Keep();
+    record->Keep();
+    if (failed) continue;
+    failed = InputError(one.first, "",
+                        "could not be moved to its place (" + std::string(std::strerror(failure)) +
+                            "); it is whole in " + kept,
+                        kNextMovesThem);
+  }
+  if (failed) throw *failed;
 }
 
 void CommitTogether::Finish(const std::vector<std::shared_ptr<OutputSet>>& sets) {

@@ -46,9 +46,11 @@ class CommitTogether {
 
  private:
   struct Folder;
+  class Record;
   void GiveToSets(const std::vector<std::shared_ptr<OutputSet>>& sets);
   std::vector<Folder> MakeLists(const std::string& record);
   void MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets);
+  static void MoveFolders(const std::vector<Folder>& folders, Record* record);
 
   mutable std::mutex mutex_;
   std::vector<WholeFile> files_;

@@ -121,7 +121,13 @@ std::vector<SetWithReport>& SetsWithReport() {
 
 void OutputSet::ReplaceAllOf(const std::string& command) {
   std::error_code error;
-  if (fs::exists(folder_, error) && !fs::is_empty(folder_, error)) {
+  std::vector<fs::directory_entry> old;
+  fs::directory_iterator entry(folder_, error), end;
+  for (; !error && entry != end; entry.increment(error)) {
+    // Where folders cannot change places the set itself is made here.
+    if (entry->path().filename().string().rfind(kPartialPrefix, 0) != 0) old.push_back(*entry);
+  }
+  if (!old.empty()) {
     const Json report = ReadJsonIfAny(folder_ + "/report.json");
     const auto named = report.is_object() ? report.find("command") : report.end();
     if (!report.is_object() || named == report.end() || *named != command) {
@@ -129,10 +135,9 @@ void OutputSet::ReplaceAllOf(const std::string& command) {
                        "Move it away or give another --output_path");
     }
   }
-  fs::directory_iterator entry(folder_, error), end;
-  for (; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    (entry->is_directory(error) ? replaced_ : removed_).insert(name);
+  for (const fs::directory_entry& one : old) {
+    const std::string name = one.path().filename().string();
+    (one.is_directory(error) ? replaced_ : removed_).insert(name);
   }
 }
 
@@ -244,23 +249,28 @@ bool OutputSet::Exchange() {
 void OutputSet::MoveOneByOne(const std::vector<std::string>& files) {
   SetJournal journal;
   journal.moves = files;
-  journal.removes.assign(removed_.begin(), removed_.end());
+  // What is moved to the place of an old file replaces it.
+  const auto remove = [&](const std::string& path) {
+    if (!std::binary_search(files.begin(), files.end(), path)) journal.removes.push_back(path);
+  };
+  for (const std::string& name : removed_) remove(name);
   for (const std::string& name : replaced_) {
-    for (const std::string& file : FilesBelow(fs::path(place_) / name)) {
-      const std::string path = name + "/" + file;
-      if (!std::binary_search(files.begin(), files.end(), path)) journal.removes.push_back(path);
-    }
+    for (const std::string& file : FilesBelow(fs::path(place_) / name)) remove(name + "/" + file);
   }
-  int failure = 0;
   try {
     // What could not be linked to its end is no part of the set.
     if (fs::path(aside()).parent_path() != fs::path(place_)) aside_->MoveInto(place_);
     WriteSetJournal(journal, aside());
-    failure = FinishMovedSet(aside(), JournalOrigin::kOurs);
   } catch (const std::system_error& error) {
-    failure = error.code().value();
+    throw CannotBeFilled(folder_, error.code().message());
   }
-  if (failure != 0) throw CannotBeFilled(folder_, std::strerror(failure));
+  const int failure = FinishMovedSet(aside(), JournalOrigin::kOurs);
+  if (failure == 0) return;
+  const std::string kept = aside_->Keep();
+  throw InputError(folder_, "",
+                   "holds new files beside old ones now (" + std::string(std::strerror(failure)) +
+                       "); those that are missing are in " + kept,
+                   kNextMovesThem);
 }
 
 void OutputSet::Commit(const std::vector<std::string>& waiting) {

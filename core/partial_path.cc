@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -95,9 +96,46 @@ bool FinishSetsOf(const std::string& path) {
     const std::optional<SetJournal> journal = ReadSetJournal(set);
     const bool waits = journal && journal->waits_for == record;
     if (!waits || fs::path(set).filename().string().rfind(kPartialPrefix, 0) != 0) continue;
-    may_go &= TidyUp(set, [&] { return FinishMovedSet(set, JournalOrigin::kFound) != EPERM; });
+    bool is_moved = false;
+    const bool is_left =
+        TidyUp(set, [&] { return is_moved = FinishMovedSet(set, JournalOrigin::kFound) == 0; });
+    may_go &= is_left && is_moved;
   }
   return may_go;
+}
+
+// In the order in which they are looked at: files and folders, of which some bring along the commit
+// record that others wait for.
+enum class Leftover { kWhole, kRecord, kWaiting };
+
+Leftover KindOf(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(path, error))) {
+    return ReadCommitRecord(path) ? Leftover::kRecord : Leftover::kWhole;
+  }
+  const std::optional<SetJournal> journal = ReadSetJournal(path);
+  return journal && !journal->waits_for.empty() ? Leftover::kWaiting : Leftover::kWhole;
+}
+
+std::vector<std::string> LeftoversOf(const std::string& folder, Leftover kind) {
+  std::vector<std::string> found;
+  std::error_code error;
+  fs::directory_iterator entry(folder, error), end;
+  for (; !error && entry != end; entry.increment(error)) {
+    const std::string path = entry->path().string();
+    const bool is_partial = entry->path().filename().string().rfind(kPartialPrefix, 0) == 0;
+    if (is_partial && KindOf(path) == kind) found.push_back(path);
+  }
+  return found;
+}
+
+void TidyUpAll(const std::string& folder, Leftover kind) {
+  for (const std::string& path : LeftoversOf(folder, kind)) {
+    TidyUp(path, [&] {
+      return kind == Leftover::kRecord ? FinishSetsOf(path)
+                                       : FinishMovedSet(path, JournalOrigin::kFound) == 0;
+    });
+  }
 }
 
 }  // namespace
@@ -158,24 +196,24 @@ void PartialFolder::MoveInto(const std::string& parent) {
   path_ = moved;
 }
 
+std::string PartialFolder::Keep() {
+  ReleasePartial(path_);
+  return std::exchange(path_, "");
+}
+
 bool IsPartial(const std::string& path) { return path.find(kPartialPrefix) != std::string::npos; }
 
 void RemoveLeftovers(const std::string& folder) {
-  std::error_code error;
-  std::vector<std::string> candidates;
-  fs::directory_iterator entry(folder.empty() ? "." : folder, error), end;
-  for (; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (name.rfind(kPartialPrefix, 0) == 0) candidates.push_back(entry->path().string());
+  const std::string place = folder.empty() ? "." : folder;
+  for (const Leftover kind : {Leftover::kWhole, Leftover::kRecord}) TidyUpAll(place, kind);
+  for (const std::string& set : LeftoversOf(place, Leftover::kWaiting)) {
+    // Its record may be on its way, too.
+    const std::optional<SetJournal> journal = ReadSetJournal(set);
+    if (!journal) continue;
+    const std::string of_record = fs::path(journal->waits_for).parent_path().string();
+    for (const Leftover kind : {Leftover::kWhole, Leftover::kRecord}) TidyUpAll(of_record, kind);
   }
-  for (const std::string& path : candidates) {
-    TidyUp(path, [&] {
-      if (fs::is_directory(path, error)) {
-        return FinishMovedSet(path, JournalOrigin::kFound) != EPERM;
-      }
-      return FinishSetsOf(path);
-    });
-  }
+  TidyUpAll(place, Leftover::kWaiting);
 }
 
 void RemoveAllPartials() {

@@ -36,6 +36,8 @@ class PartialFolder {
   std::string operator/(const std::string& name) const { return path_ + "/" + name; }
   // Moves it, to be continued there. Throws std::system_error.
   void MoveInto(const std::string& parent);
+  // It stays, for the next command to finish; gives its path.
+  std::string Keep();
 
  private:
   std::string path_;

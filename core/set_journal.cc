@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -30,10 +31,10 @@ void WriteEntries(const std::vector<Entry>& entries, std::string text, const std
   for (const auto& [kind, name] : entries) text += kind + name + '\0';
   text += 'e';
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC | flags, 0600);
-  const bool written = file >= 0 &&
-                       write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       fsync(file) == 0;
-  const int error = errno;
+  const ssize_t size = file >= 0 ? write(file, text.data(), text.size()) : -1;
+  const bool cut = size >= 0 && size < static_cast<ssize_t>(text.size());
+  const bool written = size >= 0 && !cut && fsync(file) == 0;
+  const int error = cut ? ENOSPC : errno;
   if (file >= 0) close(file);
   if (!written) throw std::system_error(error, std::generic_category());
 }
@@ -115,27 +116,36 @@ std::optional<std::vector<std::string>> ReadCommitRecord(const std::string& path
 }
 
 int FinishMovedSet(const std::string& set, JournalOrigin origin) {
-  if (origin == JournalOrigin::kFound && IsOfAnother(set + "/" + kJournalName)) return EPERM;
+  const bool found = origin == JournalOrigin::kFound;
+  if (found && IsOfAnother(set + "/" + kJournalName)) return EPERM;
   const std::optional<SetJournal> journal = ReadSetJournal(set);
-  if (!journal) return 0;
-  if (!journal->waits_for.empty() && !ReadCommitRecord(journal->waits_for)) return 0;
+  if (!journal) return found ? 0 : ENOENT;
+  // Our own record need not be looked at: where files belong to whom the disk says, not to who
+  // makes them (network disks, FAT), it would pass for another user's.
+  if (found && !journal->waits_for.empty() && !ReadCommitRecord(journal->waits_for)) return 0;
   const fs::path from(set), to = from.parent_path();
   int failure = 0;
   // Whoever wrote a name that leads elsewhere wants to reach other files.
   const auto stays = [&](const std::string& path) {
-    const bool through_links = origin == JournalOrigin::kFound &&
-                               (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
+    const bool through_links =
+        found && (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
     return !path.empty() && StaysInside(path) && !through_links;
   };
   std::error_code error, ignored;
-  for (const std::string& path : journal->moves) {
-    if (!stays(path) || !fs::exists(fs::symlink_status(from / path, ignored))) continue;
-    fs::create_directories((to / path).parent_path(), ignored);
-    fs::rename(from / path, to / path, error);
+  const std::set<std::string> moves(journal->moves.begin(), journal->moves.end());
+  for (const std::string& path : journal->removes) {
+    error.clear();
+    if (stays(path) && moves.count(path) == 0) fs::remove(to / path, error);
     if (error && failure == 0) failure = error.value();
   }
-  for (const std::string& path : journal->removes) {
-    if (stays(path)) fs::remove(to / path, error);
+  for (const std::string& path : journal->moves) {
+    if (!stays(path)) continue;
+    if (!fs::exists(fs::symlink_status(from / path, ignored))) {
+      if (!found && failure == 0) failure = ENOENT;
+      continue;
+    }
+    fs::create_directories((to / path).parent_path(), ignored);
+    fs::rename(from / path, to / path, error);
     if (error && failure == 0) failure = error.value();
   }
   return failure;

@@ -20,12 +20,18 @@ void WriteSetJournal(const SetJournal& journal, const std::string& set);
 // None where there is no whole list.
 std::optional<SetJournal> ReadSetJournal(const std::string& set);
 
-// Moves what the list of the set names and is still there; does nothing without a list, or without
-// the record that it waits for. Gives the first error, 0 without one. Names that lead out of the
-// upper folder are passed over. A list that was found may have come with somebody's folder: there
-// links lead out, too, and that of another user is not followed (EPERM).
+// Does away with what the list of the set names, and moves what it names and is still there. Gives
+// the first error, 0 without one; what could not be moved is still in the set then. Names that lead
+// out of the upper folder are passed over. Of a list that was just written all must be there
+// (ENOENT). One that was found may have come with somebody's folder: there links lead out, too,
+// that of another user is not followed (EPERM), and without a list, or without the record that it
+// waits for, nothing is done.
 enum class JournalOrigin { kOurs, kFound };
 int FinishMovedSet(const std::string& set, JournalOrigin origin);
+
+// The remedy where not all could be moved.
+inline constexpr char kNextMovesThem[] =
+    "Check the rights of the folder: the next command that writes there moves them";
 
 // A file by whose appearance several sets, in several folders, are to be moved: it names them, so
 // that whoever finds it moves them first. Throws std::system_error.

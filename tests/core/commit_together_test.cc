@@ -104,6 +104,33 @@ TEST_F(CommitTogetherTest, WithASetThatCannotBeReplacedNothingAppears) {
   EXPECT_EQ(ReadBytes(b), "old");
 }
 
+// A set that is moved file by file brings the record along as one of them.
+TEST_F(CommitTogetherTest, ARecordThatASetBringsAlongCountsAtOnce) {
+  Leave(true);
+  const std::string set = here / (kPartialPrefix + std::string("0"));
+  fs::create_directory(set);
+  fs::rename(record, set + "/" + fs::path(record).filename().string());
+  WriteSetJournal({{fs::path(record).filename().string()}, {}}, set);
+  RemoveLeftovers(here.path());
+  EXPECT_EQ(Contents(), "new a,new b");
+  EXPECT_EQ(EntriesOf(here.path()), 1u);
+  EXPECT_EQ(EntriesOf(there.path()), 1u);
+}
+
+TEST_F(CommitTogetherTest, WhatCannotBeMovedKeepsTheRecord) {
+  Leave(true);
+  fs::remove(b);
+  fs::create_directory(b);
+  RemoveLeftovers(here.path());
+  EXPECT_EQ(ReadBytes(a), "new a");
+  EXPECT_TRUE(fs::exists(record));
+  fs::remove(b);
+  RemoveLeftovers(here.path());
+  EXPECT_EQ(Contents(), "new a,new b");
+  EXPECT_EQ(EntriesOf(here.path()), 1u);
+  EXPECT_EQ(EntriesOf(there.path()), 1u);
+}
+
 TEST_F(CommitTogetherTest, ARunKilledBeforeTheRecordHasChangedNothing) {
   Leave(false);
   WriteBytes(record, "roomtex commit record\ns" + aside_here);  // cut off
