@@ -126,7 +126,8 @@ std::vector<std::shared_ptr<const PhotoMask>> FindContradictedParts(
     for (int i = 0; i < tile.points.size(); ++i) {
       const size_t slot = static_cast<size_t>(tile.first_slot) + i, first = votes[t].size();
       votes[t].resize(first + store.Count(slot));
-      CastVotes(store.Begin(slot), store.Count(slot), gains, blend.outlier, votes[t].data() + first);
+      CastVotes(store.Begin(slot), store.Count(slot), gains, blend.outlier,
+                votes[t].data() + first);
     }
   });
   ParallelFor(num_threads, 0, static_cast<int>(photos.size()),
