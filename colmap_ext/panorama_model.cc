@@ -15,6 +15,7 @@
 #include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -170,10 +171,10 @@ void Adjust(SparseModel* model) {
   std::vector<std::array<double, 6>> poses;
   std::map<uint32_t, size_t> pose_index;
   for (const auto& [id, image] : model->images) {
-    const Eigen::AngleAxisd turn(image.cam_from_model.rotation);
     pose_index[id] = poses.size();
     poses.emplace_back();
-    Eigen::Map<Eigen::Vector3d>(poses.back().data()) = turn.angle() * turn.axis();
+    Eigen::Map<Eigen::Vector3d>(poses.back().data()) =
+        VectorFromRotation(image.cam_from_model.rotation);
     Eigen::Map<Eigen::Vector3d>(poses.back().data() + 3) = image.cam_from_model.translation;
   }
   std::vector<Eigen::Vector3d> points;
@@ -221,10 +222,7 @@ void Adjust(SparseModel* model) {
   for (auto& [id, point] : model->points) point.x_in_model = points[next++];
   for (auto& [id, image] : model->images) {
     const double* const pose = poses[pose_index.at(id)].data();
-    const Eigen::Map<const Eigen::Vector3d> turn(pose);
-    image.cam_from_model.rotation =
-        turn.norm() > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
-                        : Eigen::Quaterniond::Identity();
+    image.cam_from_model.rotation = RotationFromVector(Eigen::Map<const Eigen::Vector3d>(pose));
     image.cam_from_model.translation = Eigen::Map<const Eigen::Vector3d>(pose + 3);
   }
 }

@@ -16,6 +16,14 @@ Eigen::Quaterniond RotationFromVector(const Eigen::Vector3d& w) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, w / angle));
 }
 
+Eigen::Vector3d VectorFromRotation(const Eigen::Quaterniond& rotation) {
+  const double sine = rotation.vec().norm();
+  if (!(sine > 0)) return Eigen::Vector3d::Zero();
+  // Of the two quaternions of a rotation the one of the smaller angle.
+  const double angle = 2 * std::atan2(sine, std::abs(rotation.w()));
+  return (rotation.w() < 0 ? -angle : angle) / sine * rotation.vec();
+}
+
 RotationAndJacobian RotationWithJacobian(const Eigen::Vector3d& w) {
   const double angle2 = w.squaredNorm();
   double a = 1 - angle2 / 6, b = 0.5 - angle2 / 24, c = 1.0 / 6 - angle2 / 120;

@@ -17,6 +17,9 @@ Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v);
 // exp(w), by Rodrigues' formula; exactly the identity for w = 0.
 Eigen::Quaterniond RotationFromVector(const Eigen::Vector3d& w);
 
+// The w of at most half a turn with exp(w) = rotation.
+Eigen::Vector3d VectorFromRotation(const Eigen::Quaterniond& rotation);
+
 // exp(w) as a matrix, and the left Jacobian L of the rotations at w: a further small turn e gives
 // exp(w + L^-1 e) ~ exp(e) exp(w) (Sola et al., equations 144 and 145). Near w = 0 by series: both
 // are smooth there.

@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 definitions() {
-  find core colmap_ext importers align texture capture workflow -name '*.h' -o -name '*.cc' | sort | xargs awk '
+  find core colmap_ext importers align texture building capture dense workflow -name '*.h' -o -name '*.cc' | sort | xargs awk '
     FNR == 1 { anonymous = 0 }
     /^namespace \{/ { anonymous = 1 }
     /^\}  \/\/ namespace$/ { anonymous = 0 }

@@ -29,9 +29,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // The turn that takes `from` to `to`, as a rotation vector in the target frame.
 Eigen::Vector3d TurnBetween(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
-  const Eigen::AngleAxisd turn(to * from.conjugate());
-  const double angle = turn.angle() > kPi ? turn.angle() - 2 * kPi : turn.angle();
-  return angle * turn.axis();
+  return VectorFromRotation(to * from.conjugate());
 }
 
 // d (first_from_second * x) / d (turn, shift).

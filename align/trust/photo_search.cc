@@ -16,6 +16,7 @@
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
+#include "core/twist.h"
 
 namespace roomtex {
 namespace {
@@ -30,11 +31,8 @@ constexpr double kLeastAngle = 2, kMostAngle = 150;  // degrees between its rays
 constexpr double kLeastDepth = 0.1;                  // metres
 
 Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
-  const Eigen::Vector3d turn(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
   Rigid pose;
-  pose.rotation = turn.norm() > 0
-                      ? Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
-                      : Eigen::Quaterniond::Identity();
+  pose.rotation = RotationFromVector({rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2)});
   pose.translation = {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)};
   return pose;
 }
@@ -167,8 +165,7 @@ class PhotoRays {
       for (int c = 0; c < 3; ++c) places(k, c) = places_[matches[k]][c];
       for (int c = 0; c < 2; ++c) planes(k, c) = planes_[matches[k]][c];
     }
-    const Eigen::AngleAxisd turn(start.rotation);
-    const Eigen::Vector3d w = turn.angle() * turn.axis();
+    const Eigen::Vector3d w = VectorFromRotation(start.rotation);
     cv::Mat1d rvec = (cv::Mat1d(3, 1) << w.x(), w.y(), w.z());
     cv::Mat1d tvec =
         (cv::Mat1d(3, 1) << start.translation.x(), start.translation.y(), start.translation.z());

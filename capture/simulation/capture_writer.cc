@@ -19,6 +19,7 @@
 #include "core/partial_path.h"
 #include "core/photo.h"
 #include "core/text.h"
+#include "core/twist.h"
 #include "importers/rtpi.h"
 
 namespace roomtex {
@@ -184,9 +185,9 @@ void WriteMotion(const SimulatedRoom& room, const std::string& folder) {
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
     const Rigid lower_from_upper =
         room.CamFromRoomAt(photo, room.camera().height) * room.CamFromRoomAt(photo, 0).Inverse();
-    const Eigen::AngleAxisd turn(lower_from_upper.rotation);
+    const Eigen::Vector3d turn = VectorFromRotation(lower_from_upper.rotation);
     std::vector<std::string> fields = {room.PhotoName(photo)};
-    for (const double x : turn.axis()) fields.push_back(Exact(DegFromRad(turn.angle()) * x));
+    for (const double x : turn) fields.push_back(Exact(DegFromRad(x)));
     for (const double x : lower_from_upper.translation) fields.push_back(Exact(x));
     text += CsvLine(fields);
   }

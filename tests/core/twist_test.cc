@@ -25,6 +25,20 @@ TEST(RotationFromVector, TurnsByItsLengthAboutItsDirection) {
             Eigen::Quaterniond::Identity().coeffs());
 }
 
+TEST(VectorFromRotation, IsTheInverseUpToHalfATurn) {
+  for (const double scale : {0.0, 1e-200, 1e-9, 0.1, 1.0, 2.3}) {
+    const Eigen::Vector3d w = scale * kTurn;
+    const Eigen::Quaterniond rotation = RotationFromVector(w);
+    EXPECT_THAT(VectorFromRotation(rotation), IsNearMatrix(w, 1e-14)) << scale;
+    const Eigen::Quaterniond same(-rotation.coeffs());
+    EXPECT_THAT(VectorFromRotation(same), IsNearMatrix(w, 1e-14)) << scale;
+  }
+  // More than half a turn is less than half a turn the other way round.
+  const Eigen::Vector3d axis = kTurn.normalized();
+  EXPECT_THAT(VectorFromRotation(RotationFromVector(4 * axis)),
+              IsNearMatrix((4 - 2 * kPi) * axis, 1e-14));
+}
+
 TEST(RotationWithJacobian, IsTheSameRotationAtAnyAngle) {
   for (const double scale : {0.0, 1e-9, 1e-4, 1e-3, 0.1, 1.0, 2.5}) {
     EXPECT_THAT(RotationWithJacobian(scale * kTurn).rotation,

@@ -437,9 +437,8 @@ PhotoPrior PhotoRegistrar::PriorOf(int i, bool with_warp) const {
   PhotoPrior prior;
   prior.is_free = IsFree(i);
   const Rigid& pose = photos_[i].cam_from_scan;
-  const Eigen::AngleAxisd turn(pose.rotation * photo.first_pose.rotation.conjugate());
-  prior.pose << turn.angle() * turn.axis(), pose.translation - photo.first_pose.translation,
-      photo.row_turn;
+  prior.pose << VectorFromRotation(pose.rotation * photo.first_pose.rotation.conjugate()),
+      pose.translation - photo.first_pose.translation, photo.row_turn;
   // What moves nothing is held at 0 by any sigma.
   const double row_turn_deg = options_.row_turn_deg > 0 ? options_.row_turn_deg : 1;
   prior.pose_sigma << Eigen::Vector3d::Constant(RadFromDeg(options_.turn_deg)),
