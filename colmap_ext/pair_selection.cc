@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "colmap_ext/feature_cache.h"
+#include "colmap_ext/nearest_places.h"
 #include "colmap_ext/pair_check.h"
 #include "colmap_ext/pair_groups.h"
 #include "colmap_ext/photo_signature.h"
@@ -20,6 +21,7 @@ namespace {
 
 constexpr int kPairsAtATime = 1000;
 constexpr int kThoroughFeatures = 4;  // a thorough check takes so many times the features
+constexpr int kMostNeighbors = 256;   // of one photo, that lead on to others
 constexpr int kThoroughAtATime = 16;
 constexpr double kBridgeInliers = 2;  // of a pair of them, over --Pairs.min_num_inliers
 constexpr int kBridgeChecks = 20, kBridgeRounds = 2;  // per group
@@ -71,6 +73,7 @@ class PairSearch {
   void Propose(int a, int b, PairSource source);
   void ProposeRow(const std::vector<int>& row, PairSource source, bool within_folder);
   void ProposeFirst();
+  void KeepStrongest(std::vector<std::pair<int, double>>* neighbors) const;
   void ProposeNeighbors();
   std::vector<PairCheck> CheckAll(const std::vector<PhotoPairKey>& pairs);
   void CheckProposed();
@@ -78,8 +81,8 @@ class PairSearch {
   void JoinCertain();
   void JoinSmall();
   bool CheckBridges();
-  std::vector<PhotoPairKey> BridgesOf(const std::vector<int>& group,
-                                      const std::vector<int>& group_of) const;
+  bool MayBridge(int photo, int other, const std::vector<int>& group_of) const;
+  std::vector<PhotoPairKey> Bridges(const std::vector<std::vector<int>>& groups);
 
   double WeightOf(const PairEdge& edge) const;
   void ListGuesses(const std::vector<std::vector<int>>& groups);
@@ -188,19 +191,28 @@ void PairSearch::ProposeFirst() {
     return hints_[static_cast<size_t>(a)].date_time < hints_[static_cast<size_t>(b)].date_time;
   });
   ProposeRow(timed, PairSource::kTime, false);
-  for (const int photo : placed) {
-    std::vector<std::pair<double, int>> nearest;
-    const auto& here = *hints_[static_cast<size_t>(photo)].place;
-    for (const int other : placed) {
-      const auto& there = *hints_[static_cast<size_t>(other)].place;
-      if (other == photo) continue;
-      nearest.emplace_back(std::hypot(here[0] - there[0], here[1] - there[1]), other);
+  std::vector<Place> places;
+  places.reserve(placed.size());
+  for (const int photo : placed) places.push_back(*hints_[static_cast<size_t>(photo)].place);
+  const auto nearest = NearestPlaces(places, options_.num_by_place);
+  for (size_t i = 0; i < placed.size(); ++i) {
+    for (const int other : nearest[i]) {
+      Propose(placed[i], placed[static_cast<size_t>(other)], PairSource::kPlace);
     }
-    const size_t count = std::min(nearest.size(), static_cast<size_t>(options_.num_by_place));
-    std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count),
-                      nearest.end());
-    for (size_t i = 0; i < count; ++i) Propose(photo, nearest[i].second, PairSource::kPlace);
   }
+}
+
+// Of a photo with very many neighbours the strongest count: all that agree with it would look
+// through all of them.
+void PairSearch::KeepStrongest(std::vector<std::pair<int, double>>* neighbors) const {
+  const auto most = std::max<std::ptrdiff_t>(kMostNeighbors, 2 * options_.max_neighbors);
+  if (static_cast<std::ptrdiff_t>(neighbors->size()) <= most) return;
+  std::nth_element(neighbors->begin(), neighbors->begin() + most, neighbors->end(),
+                   [](const auto& a, const auto& b) {
+                     return a.second != b.second ? a.second > b.second : a.first < b.first;
+                   });
+  neighbors->resize(static_cast<size_t>(most));
+  std::sort(neighbors->begin(), neighbors->end());
 }
 
 // Neighbours of neighbours, those that most of the evidence leads to.
@@ -211,6 +223,7 @@ void PairSearch::ProposeNeighbors() {
     neighbors[static_cast<size_t>(key.first)].emplace_back(key.second, WeightOf(edge));
     neighbors[static_cast<size_t>(key.second)].emplace_back(key.first, WeightOf(edge));
   }
+  for (auto& list : neighbors) KeepStrongest(&list);
   for (int photo = 0; photo < NumPhotos(); ++photo) {
     const auto& own = neighbors[static_cast<size_t>(photo)];
     if (own.size() >= 2 * static_cast<size_t>(options_.max_neighbors)) continue;
@@ -318,55 +331,55 @@ void PairSearch::JoinSmall() {
   for (const PhotoPairKey& key : Strongest()) groups_.JoinIfSmall(key);
 }
 
-// The pairs that could connect a group to others, by signature.
-std::vector<PhotoPairKey> PairSearch::BridgesOf(const std::vector<int>& group,
-                                                const std::vector<int>& group_of) const {
-  std::vector<std::pair<double, PhotoPairKey>> found;
-  for (const int photo : group) {
-    if (photos_[static_cast<size_t>(photo)].num_features == 0) continue;
-    const Eigen::VectorXf similarities = signatures_.transpose() * signatures_.col(photo);
-    for (int other = 0; other < NumPhotos(); ++other) {
-      if (group_of[static_cast<size_t>(other)] == group_of[static_cast<size_t>(photo)] ||
-          photos_[static_cast<size_t>(other)].num_features == 0) {
-        continue;
+// Could a look at this pair connect two groups?
+bool PairSearch::MayBridge(int photo, int other, const std::vector<int>& group_of) const {
+  if (group_of[static_cast<size_t>(other)] == group_of[static_cast<size_t>(photo)] ||
+      photos_[static_cast<size_t>(other)].num_features == 0) {
+    return false;
+  }
+  const auto edge = edges_.find(KeyOf(photo, other));
+  // What agrees was looked at thoroughly, or in vain often enough.
+  return edge == edges_.end() || !(edge->second.in_database || edge->second.agrees ||
+                                   edge->second.source == PairSource::kBridge);
+}
+
+// The pairs that could connect each group but the first to others, by signature.
+std::vector<PhotoPairKey> PairSearch::Bridges(const std::vector<std::vector<int>>& groups) {
+  std::vector<int> group_of(photos_.size()), asking;
+  for (size_t group = 0; group < groups.size(); ++group) {
+    for (const int photo : groups[group]) {
+      group_of[static_cast<size_t>(photo)] = static_cast<int>(group);
+      if (group > 0 && photos_[static_cast<size_t>(photo)].num_features > 0) {
+        asking.push_back(photo);
       }
-      const auto edge = edges_.find(KeyOf(photo, other));
-      if (edge != edges_.end() &&
-          (edge->second.in_database || edge->second.source == PairSource::kBridge)) {
-        continue;
-      }
-      // What agrees was looked at thoroughly, or in vain often enough.
-      if (edge != edges_.end() && edge->second.agrees) continue;
-      found.emplace_back(-similarities[other], KeyOf(photo, other));
-    }
-    if (found.size() > kBridgeChecks) {
-      std::nth_element(found.begin(), found.begin() + kBridgeChecks, found.end());
-      found.resize(kBridgeChecks);
     }
   }
-  std::vector<PhotoPairKey> pairs;
-  for (const auto& [score, key] : found) pairs.push_back(key);
-  return pairs;
+  const auto similar =
+      MostSimilarOf(asking, signatures_, kBridgeChecks, num_threads_,
+                    [&](int photo, int other) { return MayBridge(photo, other, group_of); });
+  std::vector<std::vector<std::pair<double, PhotoPairKey>>> of_group(groups.size());
+  for (size_t i = 0; i < asking.size(); ++i) {
+    auto& found = of_group[static_cast<size_t>(group_of[static_cast<size_t>(asking[i])])];
+    for (const SimilarPhoto& one : similar[i]) {
+      found.emplace_back(-one.similarity, KeyOf(asking[i], one.photo));
+    }
+  }
+  std::set<PhotoPairKey> unique;
+  for (auto& found : of_group) {
+    std::sort(found.begin(), found.end());
+    for (size_t i = 0; i < std::min<size_t>(found.size(), kBridgeChecks); ++i) {
+      unique.insert(found[i].second);
+    }
+  }
+  return {unique.begin(), unique.end()};
 }
 
 // False if nothing is left to connect.
 bool PairSearch::CheckBridges() {
   const std::vector<std::vector<int>> groups = groups_.Lists();
   if (groups.size() < 2) return false;
-  std::vector<int> group_of(photos_.size());
-  for (size_t group = 0; group < groups.size(); ++group) {
-    for (const int photo : groups[group]) {
-      group_of[static_cast<size_t>(photo)] = static_cast<int>(group);
-    }
-  }
-  std::vector<std::vector<PhotoPairKey>> bridges(groups.size());
-  ParallelFor(num_threads_, 1, static_cast<int>(groups.size()), [&](int group) {
-    bridges[static_cast<size_t>(group)] = BridgesOf(groups[static_cast<size_t>(group)], group_of);
-  });
-  std::set<PhotoPairKey> unique;
-  for (const auto& of_group : bridges) unique.insert(of_group.begin(), of_group.end());
-  if (unique.empty()) return false;
-  const std::vector<PhotoPairKey> pairs(unique.begin(), unique.end());
+  const std::vector<PhotoPairKey> pairs = Bridges(groups);
+  if (pairs.empty()) return false;
   progress_.Stage("connect groups", static_cast<int>(pairs.size()));
   const std::vector<PairCheck> checks = CheckAll(pairs);
   bool connects = false;
@@ -387,24 +400,23 @@ bool PairSearch::CheckBridges() {
 
 // Photos that nothing connects get the pairs most like them: COLMAP compares all features.
 void PairSearch::ListGuesses(const std::vector<std::vector<int>>& groups) {
+  std::vector<int> asking;
   for (size_t group = 1; group < groups.size(); ++group) {
     if (groups[group].size() > kMaxGuessGroup) continue;
     for (const int photo : groups[group]) {
-      if (photos_[static_cast<size_t>(photo)].num_features == 0) continue;
-      Eigen::VectorXf similarities = signatures_.transpose() * signatures_.col(photo);
-      std::vector<std::pair<float, int>> best;
-      for (int other = 0; other < NumPhotos(); ++other) {
-        if (other == photo || photos_[static_cast<size_t>(other)].num_features == 0) continue;
-        best.emplace_back(-similarities[other], other);
-      }
-      const size_t count = std::min<size_t>(best.size(), kGuesses);
-      std::partial_sort(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(count),
-                        best.end());
-      for (size_t i = 0; i < count; ++i) {
-        PairEdge& edge = edges_[KeyOf(photo, best[i].second)];
-        std::tie(edge.photo1, edge.photo2) = KeyOf(photo, best[i].second);
-        edge.listed = !edge.in_database;
-      }
+      if (photos_[static_cast<size_t>(photo)].num_features > 0) asking.push_back(photo);
+    }
+  }
+  const auto similar =
+      MostSimilarOf(asking, signatures_, kGuesses, num_threads_, [&](int /*photo*/, int other) {
+        return photos_[static_cast<size_t>(other)].num_features > 0;
+      });
+  for (size_t i = 0; i < asking.size(); ++i) {
+    for (const SimilarPhoto& one : similar[i]) {
+      const PhotoPairKey key = KeyOf(asking[i], one.photo);
+      PairEdge& edge = edges_[key];
+      std::tie(edge.photo1, edge.photo2) = key;
+      edge.listed = !edge.in_database;
     }
   }
 }
