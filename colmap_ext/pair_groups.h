@@ -24,6 +24,11 @@ class PairGroups {
       : min_num_inliers_(min_num_inliers), sets_(num_photos) {}
 
   void Join(const PhotoPairKey& key) { sets_.Join(key.first, key.second); }
+  // check: a thorough one. Do its features show one place?
+  bool IsCertain(const PairCheck& check) const;
+  bool AreJoined(const PhotoPairKey& key) {
+    return sets_.Find(key.first) == sets_.Find(key.second);
+  }
   // Is a thorough look at this pair worth it: of two groups that have not failed often?
   bool IsOpen(const PhotoPairKey& key);
   // check: the thorough one. A certain pair takes a small group along; large ones join by two, or
@@ -41,7 +46,6 @@ class PairGroups {
   struct Evidence {
     int num_certain = 0, num_failed = 0;
   };
-  bool IsCertain(const PairCheck& check) const;
 
   int min_num_inliers_;
   DisjointSets sets_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "colmap_ext/feature_cache.h"
+#include "colmap_ext/nearest_places.h"
 #include "colmap_ext/pair_check.h"
 #include "colmap_ext/pair_groups.h"
 #include "colmap_ext/photo_signature.h"
@@ -20,9 +21,12 @@ namespace {
 
 constexpr int kPairsAtATime = 1000;
 constexpr int kThoroughFeatures = 4;  // a thorough check takes so many times the features
+constexpr int kMostNeighbors = 256;   // of one photo, that lead on to others
 constexpr int kThoroughAtATime = 16;
 constexpr double kBridgeInliers = 2;  // of a pair of them, over --Pairs.min_num_inliers
-constexpr int kBridgeChecks = 20, kBridgeRounds = 2;  // per group
+constexpr int kBridgeChecks = 20;     // per group, and per loose end of one, and round
+constexpr int kBridgeRounds = 2;      // though no group grows
+constexpr int kMaxExpansions = 8;     // rounds that each add something
 constexpr int kMaxGuessGroup = 2, kGuesses = 6;
 
 std::string FolderOf(const std::string& name) {
@@ -44,22 +48,22 @@ class PairSearch {
 
   PairSelection Run() {
     ReadPhotos();
-    features_.emplace(database_, options_.num_features);
+    UseFeatures(options_.num_features);
     signatures_ = SignPhotos(&*features_, num_threads_, seed_, &progress_);
     ProposeFirst();
     progress_.Stage("check pairs", static_cast<int>(proposed_.size()));
     CheckProposed();
+    std::vector<int> all(photos_.size());
+    std::iota(all.begin(), all.end(), 0);
     for (int round = 0; round < options_.num_rounds; ++round) {
-      ProposeNeighbors();
+      ProposeNeighbors(all);
       if (proposed_.empty()) break;
       progress_.Stage("check neighbors", static_cast<int>(proposed_.size()));
       CheckProposed();
     }
-    features_.emplace(database_, kThoroughFeatures * options_.num_features);
     JoinCertain();
     JoinSmall();
-    for (int round = 0; round < kBridgeRounds && CheckBridges(); ++round) {
-    }
+    Expand();
     return Select();
   }
 
@@ -67,19 +71,26 @@ class PairSearch {
   int NumPhotos() const { return static_cast<int>(photos_.size()); }
 
   void ReadPhotos();
+  void UseFeatures(int num_features);
 
   void Propose(int a, int b, PairSource source);
   void ProposeRow(const std::vector<int>& row, PairSource source, bool within_folder);
   void ProposeFirst();
-  void ProposeNeighbors();
+  void KeepStrongest(std::vector<std::pair<int, double>>* neighbors) const;
+  void ProposeNeighbors(const std::vector<int>& photos);
   std::vector<PairCheck> CheckAll(const std::vector<PhotoPairKey>& pairs);
-  void CheckProposed();
+  std::vector<PhotoPairKey> CheckProposed();
   std::vector<PhotoPairKey> Strongest() const;
   void JoinCertain();
   void JoinSmall();
-  bool CheckBridges();
-  std::vector<PhotoPairKey> BridgesOf(const std::vector<int>& group,
-                                      const std::vector<int>& group_of) const;
+  void Expand();
+  std::vector<PhotoPairKey> CheckBridges();
+  std::vector<PhotoPairKey> CloseLoops();
+  std::vector<PhotoPairKey> BestBetween(const std::vector<std::vector<int>>& sets,
+                                        const AcceptsSimilar& accepts) const;
+  void CheckAround(std::vector<PhotoPairKey> found);
+  bool MayBridge(int photo, int other) const;
+  std::vector<int> GroupOfEach();
 
   double WeightOf(const PairEdge& edge) const;
   void ListGuesses(const std::vector<std::vector<int>>& groups);
@@ -94,6 +105,7 @@ class PairSearch {
 
   std::vector<PairPhoto> photos_;
   std::optional<FeatureCache> features_;  // that a check compares now
+  int num_features_used_ = 0;             // of a photo
   Eigen::MatrixXf signatures_;            // a column per photo
   std::map<PhotoPairKey, PairEdge> edges_;
   std::map<PhotoPairKey, PairSource> proposed_;
@@ -145,6 +157,12 @@ void PairSearch::ReadPhotos() {
   }
 }
 
+void PairSearch::UseFeatures(int num_features) {
+  if (num_features == num_features_used_) return;
+  features_.emplace(database_, num_features);
+  num_features_used_ = num_features;
+}
+
 void PairSearch::Propose(int a, int b, PairSource source) {
   if (a == b || photos_[static_cast<size_t>(a)].num_features == 0 ||
       photos_[static_cast<size_t>(b)].num_features == 0) {
@@ -188,30 +206,40 @@ void PairSearch::ProposeFirst() {
     return hints_[static_cast<size_t>(a)].date_time < hints_[static_cast<size_t>(b)].date_time;
   });
   ProposeRow(timed, PairSource::kTime, false);
-  for (const int photo : placed) {
-    std::vector<std::pair<double, int>> nearest;
-    const auto& here = *hints_[static_cast<size_t>(photo)].place;
-    for (const int other : placed) {
-      const auto& there = *hints_[static_cast<size_t>(other)].place;
-      if (other == photo) continue;
-      nearest.emplace_back(std::hypot(here[0] - there[0], here[1] - there[1]), other);
+  std::vector<Place> places;
+  places.reserve(placed.size());
+  for (const int photo : placed) places.push_back(*hints_[static_cast<size_t>(photo)].place);
+  const auto nearest = NearestPlaces(places, options_.num_by_place);
+  for (size_t i = 0; i < placed.size(); ++i) {
+    for (const int other : nearest[i]) {
+      Propose(placed[i], placed[static_cast<size_t>(other)], PairSource::kPlace);
     }
-    const size_t count = std::min(nearest.size(), static_cast<size_t>(options_.num_by_place));
-    std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count),
-                      nearest.end());
-    for (size_t i = 0; i < count; ++i) Propose(photo, nearest[i].second, PairSource::kPlace);
   }
 }
 
+// Of a photo with very many neighbours the strongest count: all that agree with it would look
+// through all of them.
+void PairSearch::KeepStrongest(std::vector<std::pair<int, double>>* neighbors) const {
+  const auto most = std::max<std::ptrdiff_t>(kMostNeighbors, 2 * options_.max_neighbors);
+  if (static_cast<std::ptrdiff_t>(neighbors->size()) <= most) return;
+  std::nth_element(neighbors->begin(), neighbors->begin() + most, neighbors->end(),
+                   [](const auto& a, const auto& b) {
+                     return a.second != b.second ? a.second > b.second : a.first < b.first;
+                   });
+  neighbors->resize(static_cast<size_t>(most));
+  std::sort(neighbors->begin(), neighbors->end());
+}
+
 // Neighbours of neighbours, those that most of the evidence leads to.
-void PairSearch::ProposeNeighbors() {
+void PairSearch::ProposeNeighbors(const std::vector<int>& photos) {
   std::vector<std::vector<std::pair<int, double>>> neighbors(photos_.size());
   for (const auto& [key, edge] : edges_) {
     if (!edge.agrees) continue;
     neighbors[static_cast<size_t>(key.first)].emplace_back(key.second, WeightOf(edge));
     neighbors[static_cast<size_t>(key.second)].emplace_back(key.first, WeightOf(edge));
   }
-  for (int photo = 0; photo < NumPhotos(); ++photo) {
+  for (auto& list : neighbors) KeepStrongest(&list);
+  for (const int photo : photos) {
     const auto& own = neighbors[static_cast<size_t>(photo)];
     if (own.size() >= 2 * static_cast<size_t>(options_.max_neighbors)) continue;
     std::map<int, double> evidence;
@@ -252,8 +280,10 @@ std::vector<PairCheck> PairSearch::CheckAll(const std::vector<PhotoPairKey>& pai
   return checks;
 }
 
-void PairSearch::CheckProposed() {
-  std::vector<PhotoPairKey> pairs;
+// Those that agree.
+std::vector<PhotoPairKey> PairSearch::CheckProposed() {
+  UseFeatures(options_.num_features);
+  std::vector<PhotoPairKey> pairs, agreeing;
   for (const auto& [key, source] : proposed_) pairs.push_back(key);
   const std::vector<PairCheck> checks = CheckAll(pairs);
   for (size_t i = 0; i < pairs.size(); ++i) {
@@ -264,8 +294,10 @@ void PairSearch::CheckProposed() {
     edge.num_inliers = checks[i].num_inliers;
     edge.agrees = edge.num_inliers >= options_.min_num_inliers;
     edges_[pairs[i]] = edge;
+    if (edge.agrees) agreeing.push_back(pairs[i]);
   }
   proposed_.clear();
+  return agreeing;
 }
 
 // The database counts matches of all features, a check those of the few that it compares.
@@ -295,6 +327,7 @@ std::vector<PhotoPairKey> PairSearch::Strongest() const {
 // A spanning forest of the strongest pairs (Kruskal), each looked at with many features.
 void PairSearch::JoinCertain() {
   groups_ = PairGroups(NumPhotos(), options_.min_num_inliers);
+  UseFeatures(kThoroughFeatures * options_.num_features);
   progress_.Stage("look thoroughly");
   std::vector<PhotoPairKey> pairs;
   const auto look = [&] {
@@ -318,58 +351,98 @@ void PairSearch::JoinSmall() {
   for (const PhotoPairKey& key : Strongest()) groups_.JoinIfSmall(key);
 }
 
-// The pairs that could connect a group to others, by signature.
-std::vector<PhotoPairKey> PairSearch::BridgesOf(const std::vector<int>& group,
-                                                const std::vector<int>& group_of) const {
-  std::vector<std::pair<double, PhotoPairKey>> found;
-  for (const int photo : group) {
-    if (photos_[static_cast<size_t>(photo)].num_features == 0) continue;
-    const Eigen::VectorXf similarities = signatures_.transpose() * signatures_.col(photo);
-    for (int other = 0; other < NumPhotos(); ++other) {
-      if (group_of[static_cast<size_t>(other)] == group_of[static_cast<size_t>(photo)] ||
-          photos_[static_cast<size_t>(other)].num_features == 0) {
-        continue;
-      }
-      const auto edge = edges_.find(KeyOf(photo, other));
-      if (edge != edges_.end() &&
-          (edge->second.in_database || edge->second.source == PairSource::kBridge)) {
-        continue;
-      }
-      // What agrees was looked at thoroughly, or in vain often enough.
-      if (edge != edges_.end() && edge->second.agrees) continue;
-      found.emplace_back(-similarities[other], KeyOf(photo, other));
-    }
-    if (found.size() > kBridgeChecks) {
-      std::nth_element(found.begin(), found.begin() + kBridgeChecks, found.end());
-      found.resize(kBridgeChecks);
-    }
+// Round after round, until one adds nothing: what connects groups, what closes loops, and what is
+// near that. A round costs so many checks per group, loose end and photo that it adds.
+void PairSearch::Expand() {
+  for (int round = 0; round < kMaxExpansions; ++round) {
+    std::vector<PhotoPairKey> found = CheckBridges();
+    const std::vector<PhotoPairKey> loops = CloseLoops();
+    found.insert(found.end(), loops.begin(), loops.end());
+    if (found.empty()) return;
+    const auto apart = [&](const PhotoPairKey& key) { return !groups_.AreJoined(key); };
+    found.erase(std::remove_if(found.begin(), found.end(), apart), found.end());
+    if (found.empty() && round + 1 >= kBridgeRounds) return;
+    CheckAround(found);
   }
-  std::vector<PhotoPairKey> pairs;
-  for (const auto& [score, key] : found) pairs.push_back(key);
-  return pairs;
 }
 
-// False if nothing is left to connect.
-bool PairSearch::CheckBridges() {
-  const std::vector<std::vector<int>> groups = groups_.Lists();
-  if (groups.size() < 2) return false;
+// Neighbours of neighbours of photos that have got new ones.
+void PairSearch::CheckAround(std::vector<PhotoPairKey> found) {
+  for (int round = 0; round < options_.num_rounds && !found.empty(); ++round) {
+    std::set<int> photos;
+    for (const auto& [photo1, photo2] : found) photos.insert({photo1, photo2});
+    ProposeNeighbors({photos.begin(), photos.end()});
+    if (proposed_.empty()) return;
+    progress_.Stage("check neighbors", static_cast<int>(proposed_.size()));
+    found = CheckProposed();
+  }
+}
+
+std::vector<int> PairSearch::GroupOfEach() {
   std::vector<int> group_of(photos_.size());
+  const std::vector<std::vector<int>> groups = groups_.Lists();
   for (size_t group = 0; group < groups.size(); ++group) {
     for (const int photo : groups[group]) {
       group_of[static_cast<size_t>(photo)] = static_cast<int>(group);
     }
   }
-  std::vector<std::vector<PhotoPairKey>> bridges(groups.size());
-  ParallelFor(num_threads_, 1, static_cast<int>(groups.size()), [&](int group) {
-    bridges[static_cast<size_t>(group)] = BridgesOf(groups[static_cast<size_t>(group)], group_of);
+  return group_of;
+}
+
+// Of each set of photos the pairs with others that are most alike, by signature, of those that
+// `accepts`.
+std::vector<PhotoPairKey> PairSearch::BestBetween(const std::vector<std::vector<int>>& sets,
+                                                  const AcceptsSimilar& accepts) const {
+  std::vector<int> asking;
+  std::vector<size_t> set_of;
+  for (size_t set = 0; set < sets.size(); ++set) {
+    for (const int photo : sets[set]) {
+      if (photos_[static_cast<size_t>(photo)].num_features == 0) continue;
+      asking.push_back(photo);
+      set_of.push_back(set);
+    }
+  }
+  const auto similar =
+      MostSimilarOf(asking, signatures_, kBridgeChecks, num_threads_, [&](int photo, int other) {
+        return photos_[static_cast<size_t>(other)].num_features > 0 && accepts(photo, other);
+      });
+  std::vector<std::vector<std::pair<double, PhotoPairKey>>> of_set(sets.size());
+  for (size_t i = 0; i < asking.size(); ++i) {
+    for (const SimilarPhoto& one : similar[i]) {
+      of_set[set_of[i]].emplace_back(-one.similarity, KeyOf(asking[i], one.photo));
+    }
+  }
+  std::set<PhotoPairKey> best;
+  for (auto& found : of_set) {
+    std::sort(found.begin(), found.end());
+    const size_t count = std::min<size_t>(found.size(), kBridgeChecks);
+    for (size_t i = 0; i < count; ++i) best.insert(found[i].second);
+  }
+  return {best.begin(), best.end()};
+}
+
+// Could a look at this pair of two groups connect them?
+bool PairSearch::MayBridge(int photo, int other) const {
+  const auto edge = edges_.find(KeyOf(photo, other));
+  // What agrees was looked at thoroughly, or in vain often enough.
+  return edge == edges_.end() || !(edge->second.in_database || edge->second.agrees ||
+                                   edge->second.source == PairSource::kBridge);
+}
+
+// Looks at what could connect each group but the largest to others; pairs that agree.
+std::vector<PhotoPairKey> PairSearch::CheckBridges() {
+  std::vector<std::vector<int>> groups = groups_.Lists();
+  groups.erase(groups.begin());
+  const std::vector<int> group_of = GroupOfEach();
+  const std::vector<PhotoPairKey> pairs = BestBetween(groups, [&](int photo, int other) {
+    return group_of[static_cast<size_t>(photo)] != group_of[static_cast<size_t>(other)] &&
+           MayBridge(photo, other);
   });
-  std::set<PhotoPairKey> unique;
-  for (const auto& of_group : bridges) unique.insert(of_group.begin(), of_group.end());
-  if (unique.empty()) return false;
-  const std::vector<PhotoPairKey> pairs(unique.begin(), unique.end());
+  if (pairs.empty()) return {};
   progress_.Stage("connect groups", static_cast<int>(pairs.size()));
+  UseFeatures(kThoroughFeatures * options_.num_features);
   const std::vector<PairCheck> checks = CheckAll(pairs);
-  bool connects = false;
+  std::vector<PhotoPairKey> agreeing;
   for (size_t i = 0; i < pairs.size(); ++i) {
     PairEdge& edge = edges_[pairs[i]];
     std::tie(edge.photo1, edge.photo2) = pairs[i];
@@ -378,33 +451,71 @@ bool PairSearch::CheckBridges() {
     edge.num_inliers = checks[i].num_inliers;
     edge.agrees = edge.num_inliers >= kBridgeInliers * options_.min_num_inliers;
     if (!edge.agrees) continue;
-    connects = true;
+    agreeing.push_back(pairs[i]);
     groups_.JoinIfCertain(pairs[i], checks[i]);
   }
   JoinSmall();
-  return connects;
+  return agreeing;
+}
+
+// Photos that one pair alone connects to their group may be the end of a loop: looks at what is
+// like them elsewhere in the group. What looks alike in two places of a group must be certain.
+std::vector<PhotoPairKey> PairSearch::CloseLoops() {
+  const std::vector<int> group_of = GroupOfEach();
+  const auto same_group = [&](int a, int b) {
+    return group_of[static_cast<size_t>(a)] == group_of[static_cast<size_t>(b)];
+  };
+  std::vector<PhotoPairKey> links;
+  for (const auto& [key, edge] : edges_) {
+    if (edge.agrees && same_group(key.first, key.second)) links.push_back(key);
+  }
+  const std::vector<std::vector<int>> ends = LooseEnds(NumPhotos(), links);
+  std::vector<int> end_of(photos_.size(), -1);
+  for (size_t end = 0; end < ends.size(); ++end) {
+    for (const int photo : ends[end]) end_of[static_cast<size_t>(photo)] = static_cast<int>(end);
+  }
+  const std::vector<PhotoPairKey> pairs = BestBetween(ends, [&](int photo, int other) {
+    return same_group(photo, other) &&
+           end_of[static_cast<size_t>(photo)] != end_of[static_cast<size_t>(other)] &&
+           edges_.count(KeyOf(photo, other)) == 0;
+  });
+  for (const auto& [photo1, photo2] : pairs) Propose(photo1, photo2, PairSource::kLoop);
+  if (proposed_.empty()) return {};
+  progress_.Stage("close loops", static_cast<int>(proposed_.size()));
+  const std::vector<PhotoPairKey> agreeing = CheckProposed();
+  if (options_.join_lookalikes || agreeing.empty()) return agreeing;
+  UseFeatures(kThoroughFeatures * options_.num_features);
+  const std::vector<PairCheck> checks = CheckAll(agreeing);
+  std::vector<PhotoPairKey> certain;
+  for (size_t i = 0; i < agreeing.size(); ++i) {
+    if (groups_.IsCertain(checks[i])) {
+      certain.push_back(agreeing[i]);
+    } else {
+      edges_.at(agreeing[i]).agrees = false;
+    }
+  }
+  return certain;
 }
 
 // Photos that nothing connects get the pairs most like them: COLMAP compares all features.
 void PairSearch::ListGuesses(const std::vector<std::vector<int>>& groups) {
+  std::vector<int> asking;
   for (size_t group = 1; group < groups.size(); ++group) {
     if (groups[group].size() > kMaxGuessGroup) continue;
     for (const int photo : groups[group]) {
-      if (photos_[static_cast<size_t>(photo)].num_features == 0) continue;
-      Eigen::VectorXf similarities = signatures_.transpose() * signatures_.col(photo);
-      std::vector<std::pair<float, int>> best;
-      for (int other = 0; other < NumPhotos(); ++other) {
-        if (other == photo || photos_[static_cast<size_t>(other)].num_features == 0) continue;
-        best.emplace_back(-similarities[other], other);
-      }
-      const size_t count = std::min<size_t>(best.size(), kGuesses);
-      std::partial_sort(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(count),
-                        best.end());
-      for (size_t i = 0; i < count; ++i) {
-        PairEdge& edge = edges_[KeyOf(photo, best[i].second)];
-        std::tie(edge.photo1, edge.photo2) = KeyOf(photo, best[i].second);
-        edge.listed = !edge.in_database;
-      }
+      if (photos_[static_cast<size_t>(photo)].num_features > 0) asking.push_back(photo);
+    }
+  }
+  const auto similar =
+      MostSimilarOf(asking, signatures_, kGuesses, num_threads_, [&](int /*photo*/, int other) {
+        return photos_[static_cast<size_t>(other)].num_features > 0;
+      });
+  for (size_t i = 0; i < asking.size(); ++i) {
+    for (const SimilarPhoto& one : similar[i]) {
+      const PhotoPairKey key = KeyOf(asking[i], one.photo);
+      PairEdge& edge = edges_[key];
+      std::tie(edge.photo1, edge.photo2) = key;
+      edge.listed = !edge.in_database;
     }
   }
 }
@@ -473,6 +584,8 @@ const char* PairSourceName(PairSource source) {
       return "neighbors";
     case PairSource::kBridge:
       return "bridge";
+    case PairSource::kLoop:
+      return "loop";
   }
   return "";
 }

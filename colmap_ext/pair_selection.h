@@ -3,7 +3,9 @@
 // order of the photos and by what EXIF says; each looked at with few features (pair_check.h); then
 // neighbours of neighbours. A spanning forest of the best pairs is looked at with many features:
 // rooms with the same furniture agree on large things, not on the small ones between them, and stay
-// apart. Checks per photo are bounded, so that the cost grows with the number of photos.
+// apart. Then round after round, until one adds nothing: what connects groups, what closes loops,
+// and the neighbours of that. Checks per photo are bounded, so that the cost grows with the number
+// of photos.
 // docs/pairs.md.
 
 #include <array>
@@ -24,7 +26,16 @@ struct PhotoHint {
   std::optional<std::array<double, 2>> place;  // metres east and north of some origin
 };
 
-enum class PairSource { kDatabase, kSignature, kSequence, kTime, kPlace, kNeighbors, kBridge };
+enum class PairSource {
+  kDatabase,
+  kSignature,
+  kSequence,
+  kTime,
+  kPlace,
+  kNeighbors,
+  kBridge,
+  kLoop
+};
 const char* PairSourceName(PairSource source);
 
 // Photos are numbered as `photos` of the selection.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/Eigenvalues>
 
@@ -15,7 +16,8 @@ namespace {
 constexpr int kWordIterations = 10;
 // 1/2 whitens, 0 leaves the axes as they are. Chosen on rooms, docs/pairs.md.
 constexpr float kWhitening = 0.25f;
-constexpr int kPhotosPerBlock = 256;
+// Blocks of photos are compared with tiles of all: products of a thread take 1 MB.
+constexpr int kPhotosPerBlock = 64, kPhotosPerTile = 4096;
 
 // The nearest word of every descriptor.
 std::vector<int> NearestWords(const Eigen::MatrixXf& descriptors, const Eigen::MatrixXf& words) {
@@ -37,6 +39,16 @@ std::vector<int> NearestWords(const Eigen::MatrixXf& descriptors, const Eigen::M
 void Normalise(Eigen::Ref<Eigen::VectorXf> vector) {
   const float length = vector.norm();
   if (length > 0) vector /= length;
+}
+
+// Puts the next one, whose number is larger than those before, among the best if it belongs there.
+void KeepBest(const SimilarPhoto& next, size_t count, std::vector<SimilarPhoto>* best) {
+  if (best->size() == count) best->pop_back();
+  best->insert(std::upper_bound(best->begin(), best->end(), next,
+                                [](const SimilarPhoto& a, const SimilarPhoto& b) {
+                                  return a.similarity > b.similarity;
+                                }),
+               next);
 }
 
 }  // namespace
@@ -115,38 +127,49 @@ SignatureAxes LearnAxes(const Eigen::MatrixXf& vlads, int max_dimensions) {
   return result;
 }
 
-std::vector<std::vector<SimilarPhoto>> MostSimilar(const Eigen::MatrixXf& signatures, int count,
-                                                   int num_threads) {
+std::vector<std::vector<SimilarPhoto>> MostSimilarOf(const std::vector<int>& columns,
+                                                     const Eigen::MatrixXf& signatures, int count,
+                                                     int num_threads,
+                                                     const AcceptsSimilar& accepts) {
+  const auto num_asking = static_cast<int>(columns.size());
   const auto num_photos = static_cast<int>(signatures.cols());
-  std::vector<std::vector<SimilarPhoto>> similar(static_cast<size_t>(num_photos));
-  const Eigen::VectorXf squares = signatures.colwise().squaredNorm().transpose();
-  const int num_blocks = (num_photos + kPhotosPerBlock - 1) / kPhotosPerBlock;
+  std::vector<std::vector<SimilarPhoto>> similar(columns.size());
+  if (count <= 0) return similar;
+  const auto most = static_cast<size_t>(count);
+  const int num_blocks = (num_asking + kPhotosPerBlock - 1) / kPhotosPerBlock;
   ParallelFor(num_threads, 0, num_blocks, [&](int block) {
     const int begin = block * kPhotosPerBlock;
-    const int end = std::min(num_photos, begin + kPhotosPerBlock);
-    const Eigen::MatrixXf products =
-        signatures.transpose() * signatures.middleCols(begin, end - begin);
-    for (int photo = begin; photo < end; ++photo) {
-      if (squares[photo] == 0) continue;
-      std::vector<SimilarPhoto> others;
-      others.reserve(static_cast<size_t>(num_photos));
-      for (int other = 0; other < num_photos; ++other) {
-        if (other != photo && squares[other] > 0) {
-          others.push_back({other, products(other, photo - begin)});
+    const int end = std::min(num_asking, begin + kPhotosPerBlock);
+    Eigen::MatrixXf asking(signatures.rows(), end - begin);
+    for (int i = begin; i < end; ++i) {
+      asking.col(i - begin) = signatures.col(columns[static_cast<size_t>(i)]);
+    }
+    for (int first = 0; first < num_photos; first += kPhotosPerTile) {
+      const int size = std::min(kPhotosPerTile, num_photos - first);
+      const Eigen::MatrixXf products = signatures.middleCols(first, size).transpose() * asking;
+      for (int i = begin; i < end; ++i) {
+        const int column = columns[static_cast<size_t>(i)];
+        std::vector<SimilarPhoto>& best = similar[static_cast<size_t>(i)];
+        for (int k = 0; k < size; ++k) {
+          const SimilarPhoto next{first + k, products(k, i - begin)};
+          if (best.size() == most && !(next.similarity > best.back().similarity)) continue;
+          if (next.photo == column || !accepts(column, next.photo)) continue;
+          KeepBest(next, most, &best);
         }
       }
-      const size_t kept = std::min(others.size(), static_cast<size_t>(std::max(0, count)));
-      std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(kept),
-                        others.end(), [](const SimilarPhoto& a, const SimilarPhoto& b) {
-                          return a.similarity != b.similarity ? a.similarity > b.similarity
-                                                              : a.photo < b.photo;
-                        });
-      others.resize(kept);
-      others.shrink_to_fit();
-      similar[static_cast<size_t>(photo)] = std::move(others);
     }
   });
   return similar;
+}
+
+std::vector<std::vector<SimilarPhoto>> MostSimilar(const Eigen::MatrixXf& signatures, int count,
+                                                   int num_threads) {
+  const Eigen::VectorXf squares = signatures.colwise().squaredNorm().transpose();
+  std::vector<int> all(static_cast<size_t>(signatures.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  return MostSimilarOf(all, signatures, count, num_threads, [&](int column, int other) {
+    return squares[column] > 0 && squares[other] > 0;
+  });
 }
 
 }  // namespace roomtex

@@ -6,6 +6,7 @@
 // downloaded.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -33,13 +34,21 @@ struct SignatureAxes {
 // From VLADs, columns; at most max_dimensions axes.
 SignatureAxes LearnAxes(const Eigen::MatrixXf& vlads, int max_dimensions);
 
-// The `count` most similar other columns of every column, best first (equal ones by their number).
-// signatures: columns of length 1 or 0; those of length 0 have none and are nobody's. Costs the
-// square of the number of columns, but 1 multiplication per dimension only.
 struct SimilarPhoto {
   int photo = 0;
   float similarity = 0;  // cosine, -1 .. 1
 };
+
+// Of every column the `count` most similar others that `accepts(column, other)`, best first (equal
+// ones by their number); of `columns` only, in their order. signatures: columns of length 1 or 0.
+// Costs the square of the number of columns, but 1 multiplication per dimension only: `accepts` is
+// asked for those alone that would be among the best so far. It is called by several threads.
+using AcceptsSimilar = std::function<bool(int column, int other)>;
+std::vector<std::vector<SimilarPhoto>> MostSimilarOf(const std::vector<int>& columns,
+                                                     const Eigen::MatrixXf& signatures, int count,
+                                                     int num_threads,
+                                                     const AcceptsSimilar& accepts);
+// The same for all columns; those of length 0 have none and are nobody's.
 std::vector<std::vector<SimilarPhoto>> MostSimilar(const Eigen::MatrixXf& signatures, int count,
                                                    int num_threads);
 

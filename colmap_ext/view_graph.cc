@@ -17,6 +17,71 @@ std::vector<int> ByWeight(const std::vector<GraphEdge>& edges) {
   return order;
 }
 
+// Finds the edges that no loop contains (Tarjan 1974), without recursion: a chain of 100 000 photos
+// is as deep.
+class CutEdges {
+ public:
+  CutEdges(int num_nodes, const std::vector<std::pair<int, int>>& edges)
+      : edges_(edges),
+        of_node_(static_cast<size_t>(num_nodes)),
+        order_(static_cast<size_t>(num_nodes), -1),
+        low_(static_cast<size_t>(num_nodes)),
+        next_(static_cast<size_t>(num_nodes)),
+        is_cut_(edges.size()) {
+    for (size_t edge = 0; edge < edges.size(); ++edge) {
+      of_node_[static_cast<size_t>(edges[edge].first)].push_back(edge);
+      of_node_[static_cast<size_t>(edges[edge].second)].push_back(edge);
+    }
+    for (size_t node = 0; node < of_node_.size(); ++node) {
+      if (order_[node] < 0) Search(node);
+    }
+  }
+  bool operator[](size_t edge) const { return is_cut_[edge]; }
+
+ private:
+  struct Step {
+    size_t node = 0, from_edge = 0;
+  };
+
+  void Enter(size_t node, size_t from_edge) {
+    order_[node] = low_[node] = num_entered_++;
+    path_.push_back({node, from_edge});
+  }
+
+  void Search(size_t root) {
+    Enter(root, edges_.size());
+    while (!path_.empty()) {
+      const auto [node, from_edge] = path_.back();
+      if (next_[node] < of_node_[node].size()) {
+        const size_t edge = of_node_[node][next_[node]++];
+        if (edge == from_edge) continue;
+        const auto other = static_cast<size_t>(edges_[edge].first) == node
+                               ? static_cast<size_t>(edges_[edge].second)
+                               : static_cast<size_t>(edges_[edge].first);
+        if (order_[other] < 0) {
+          Enter(other, edge);
+        } else {
+          low_[node] = std::min(low_[node], order_[other]);
+        }
+        continue;
+      }
+      path_.pop_back();
+      if (path_.empty()) return;
+      const size_t parent = path_.back().node;
+      low_[parent] = std::min(low_[parent], low_[node]);
+      is_cut_[from_edge] = low_[node] > order_[parent];
+    }
+  }
+
+  const std::vector<std::pair<int, int>>& edges_;
+  std::vector<std::vector<size_t>> of_node_;
+  std::vector<int> order_, low_;  // when a node was entered; the earliest it leads back to
+  std::vector<size_t> next_;
+  std::vector<bool> is_cut_;
+  std::vector<Step> path_;
+  int num_entered_ = 0;
+};
+
 }  // namespace
 
 DisjointSets::DisjointSets(int num_nodes)
@@ -79,6 +144,26 @@ std::vector<int> SparseEdges(int num_nodes, const std::vector<GraphEdge>& edges,
     }
   }
   return {kept.begin(), kept.end()};
+}
+
+std::vector<std::vector<int>> LooseEnds(int num_nodes,
+                                        const std::vector<std::pair<int, int>>& edges) {
+  const CutEdges is_cut(num_nodes, edges);
+  DisjointSets sets(num_nodes);
+  for (size_t edge = 0; edge < edges.size(); ++edge) {
+    if (!is_cut[edge]) sets.Join(edges[edge].first, edges[edge].second);
+  }
+  std::vector<int> num_cuts(static_cast<size_t>(num_nodes));
+  for (size_t edge = 0; edge < edges.size(); ++edge) {
+    if (!is_cut[edge]) continue;
+    ++num_cuts[static_cast<size_t>(sets.Find(edges[edge].first))];
+    ++num_cuts[static_cast<size_t>(sets.Find(edges[edge].second))];
+  }
+  std::vector<std::vector<int>> loose;
+  for (std::vector<int>& group : sets.Groups()) {
+    if (num_cuts[static_cast<size_t>(group[0])] == 1) loose.push_back(std::move(group));
+  }
+  return loose;
 }
 
 }  // namespace roomtex

@@ -1,6 +1,7 @@
 #pragma once
 // Photos and the pairs that connect them: groups, and which pairs to keep.
 
+#include <utility>
 #include <vector>
 
 namespace roomtex {
@@ -29,5 +30,11 @@ class DisjointSets {
 // long baselines), max_per_node together; and a spanning forest of the strongest (Kruskal), so that
 // nothing falls apart. A node may have more, because others asked for it.
 std::vector<int> SparseEdges(int num_nodes, const std::vector<GraphEdge>& edges, int max_per_node);
+
+// Sets of nodes that a single edge connects to the rest of what they belong to, each ascending:
+// cutting it would cut them off, so no loop leads through them. The ends of a chain are two. edges:
+// no pair of nodes twice.
+std::vector<std::vector<int>> LooseEnds(int num_nodes,
+                                        const std::vector<std::pair<int, int>>& edges);
 
 }  // namespace roomtex

@@ -1,6 +1,5 @@
 // roomtex-pairs as users call it, on databases of made-up rooms.
 
-#include <algorithm>
 #include <fstream>
 #include <map>
 #include <set>
@@ -11,10 +10,8 @@
 
 #include "colmap_ext/pair_selection.h"
 #include "colmap_ext/view_graph.h"
-#include "core/random_stream.h"
 #include "core/report.h"
-#include "tests/colmap_ext/database_maker.h"
-#include "tests/colmap_ext/simulated_views.h"
+#include "tests/colmap_ext/room_database.h"
 #include "tests/support/option_check.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -28,48 +25,18 @@ using testing::IsEmpty;
 using testing::SizeIs;
 using NamePair = std::pair<std::string, std::string>;
 
-constexpr int kViewsPerRoom = 8, kPointsPerRoom = 300;
-
-// What a point of a room looks like; the first `num_shared` points of all rooms look alike, as the
-// same furniture does.
-std::vector<uint8_t> DescriptorOf(uint64_t room, int point, int num_shared, uint64_t view) {
-  RandomStream look(MixBits(point < num_shared ? 0 : room + 1, static_cast<uint64_t>(point)));
-  RandomStream noise(MixBits(view, static_cast<uint64_t>(point), 7));
-  std::vector<uint8_t> descriptor(kSiftSize);
-  for (uint8_t& byte : descriptor) {
-    const double value = 45 * std::abs(look.Gaussian()) + 5 * noise.Gaussian();
-    byte = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
-  }
-  return descriptor;
-}
+constexpr int kViewsPerRoom = 8;
 
 class PairsCommand : public testing::Test {
  protected:
-  // Photos "a0.jpg", "a1.jpg" ... of every room, a camera for all.
+  // Photos "a0.jpg", "a1.jpg" ... of every room.
   void WriteRooms(const std::string& rooms, int num_shared = 0, Schema schema = Schema::k38) {
-    DatabaseMaker maker(database_, schema);
-    maker.Run("BEGIN");
-    uint32_t image_id = 0;
-    for (size_t room = 0; room < rooms.size(); ++room) {
-      SimulatedViewsOptions options;
-      options.num_points = kPointsPerRoom;
-      options.num_views = kViewsPerRoom;
-      options.baseline = 0.1;
-      const SimulatedViews views = SimulateViews(options);
-      if (room == 0) maker.AddCamera(views.cameras.begin()->second);
-      for (const auto& [id, image] : views.images) {
-        std::vector<uint8_t> bytes;
-        for (const int point : views.point_of_keypoint.at(id)) {
-          const auto one = DescriptorOf(room, point, num_shared, 100 * room + id);
-          bytes.insert(bytes.end(), one.begin(), one.end());
-        }
-        maker.AddImage(++image_id, rooms[room] + std::to_string(id - 1) + ".jpg",
-                       views.cameras.begin()->first);
-        maker.AddKeypoints(image_id, views.keypoints.at(id), 6);
-        maker.AddDescriptors(image_id, bytes);
-      }
-    }
-    maker.Run("COMMIT");
+    RoomDatabaseOptions options;
+    for (const char room : rooms) options.rooms.emplace_back(1, room);
+    options.num_views = kViewsPerRoom;
+    options.num_shared = num_shared;
+    options.schema = schema;
+    WriteRoomDatabase(database_, options);
   }
   // The database, changed.
   void Change(const std::string& sql) {
@@ -194,7 +161,7 @@ TEST(PairCheck, TakesFeaturesThatAllLieAtOnePlace) {
   ComparedFeatures features;
   for (int i = 0; i < 40; ++i) {
     features.x.emplace_back(10, 20);
-    const std::vector<uint8_t> one = DescriptorOf(0, i, 0, 1);
+    const std::vector<uint8_t> one = DescriptorOfLook(static_cast<uint64_t>(i), 1);
     features.descriptors.insert(features.descriptors.end(), one.begin(), one.end());
   }
   EXPECT_EQ(CheckPair(features, features, PairCheckOptions()).num_matches, 40);
