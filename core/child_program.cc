@@ -86,10 +86,11 @@ cpu_set_t Processors(int max_processors) {
 
 // What the child does between fork and exec: only calls that are safe there.
 [[noreturn]] void BecomeProgram(const char* path, char* const* argv, char* const* envp, int output,
-                                const cpu_set_t& processors, int signal_of_our_end) {
+                                const cpu_set_t& processors, int signal_of_our_end, pid_t parent) {
   sched_setaffinity(0, sizeof(processors), &processors);
   setpgid(0, 0);  // so that all it starts can be killed together
   prctl(PR_SET_PDEATHSIG, signal_of_our_end);
+  if (getppid() != parent) _exit(127);  // ended before that: no signal will come
   for (const int signal : kSignals) ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
@@ -231,10 +232,10 @@ ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& setti
   sigset_t before;
   sigprocmask(SIG_BLOCK, &guarded, &before);
   stop_signal = settings.stop_signal;
-  const pid_t child = fork();
+  const pid_t parent = getpid(), child = fork();
   if (child == 0)
     BecomeProgram(arguments[0].c_str(), argv.data(), envp.data(), ends[1], processors,
-                  settings.stop_signal);
+                  settings.stop_signal, parent);
   if (child > 0) {
     setpgid(child, child);
     running_group = child;

@@ -61,17 +61,70 @@ std::string PlaceToWrite(const std::string& path,
 
 constexpr char kOutOfMemory[] = "out of memory";
 
-// Who ran out of it, at what, and what to do.
-std::string TellMemory(const Progress& progress) {
+std::string Megabytes(uintmax_t bytes) {
+  return std::to_string((bytes + 999999) / 1000000) + " MB";
+}
+
+// "--scan_path room.e57 (340 MB), --image_path photos (24 files, 120 MB)"
+std::string WithSizes(const std::vector<GuardedPaths::OptionPath>& inputs) {
+  namespace fs = std::filesystem;
+  std::string text;
+  for (const auto& [name, path] : inputs) {
+    std::error_code error;
+    uintmax_t bytes = 0, count = 0;
+    if (fs::is_directory(path, error)) {
+      for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+           entry.increment(error)) {
+        std::error_code no_file;
+        if (!entry->is_regular_file(no_file)) continue;
+        const uintmax_t size = entry->file_size(no_file);
+        if (no_file) continue;
+        bytes += size;
+        ++count;
+      }
+      text += (text.empty() ? "" : ", ") + ("--" + name + " " + path) + " (" +
+              std::to_string(count) + " files, " + Megabytes(bytes) + ")";
+    } else if (const std::string file = FileOf(path); fs::is_regular_file(file, error)) {
+      text += (text.empty() ? "" : ", ") + ("--" + name + " " + path) + " (" +
+              Megabytes(fs::file_size(file, error)) + ")";
+    }
+  }
+  return text;
+}
+
+// Who ran out of it, at what, with which inputs, and what to do.
+std::string TellMemory(const Progress& progress,
+                       const std::vector<GuardedPaths::OptionPath>& inputs) {
   const std::vector<std::pair<std::string, double>>& stages = progress.stage_seconds();
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
+  const std::string read = WithSizes(inputs);
   return std::string(kOutOfMemory) +
          (stages.empty() ? "" : " in the stage \"" + stages.back().first + "\"") + ": " +
-         std::to_string(usage.ru_maxrss / 1024) + " MB were in use, and " +
-         std::to_string(AvailableMemory() / 1000000) +
-         " MB are free. Give it more memory, a scan with fewer samples or smaller photos, or "
+         std::to_string(usage.ru_maxrss / 1024) + " MB were in use and more was needed, " +
+         std::to_string(AvailableMemory() / 1000000) + " MB are free" +
+         (read.empty() ? "" : "; read were " + read) +
+         ". Give it more memory, a scan with fewer samples or smaller photos, or "
          "fewer threads (--num_threads)";
+}
+
+// Finishes what killed runs began in the folders of inputs and outputs, before anything there is
+// read. Sentences about what cannot be finished.
+std::vector<std::string> TidyFoldersOf(const GuardedPaths& paths) {
+  std::set<std::string> folders;
+  for (const auto* const some : {&paths.inputs, &paths.outputs}) {
+    for (const auto& [name, path] : *some) {
+      std::error_code error;
+      const std::filesystem::path file = FileOf(path);
+      const auto folder = std::filesystem::is_directory(file, error) ? file : file.parent_path();
+      folders.insert(folder.empty() ? "." : folder.string());
+    }
+  }
+  std::vector<std::string> stuck;
+  for (const std::string& folder : folders) {
+    for (std::string& sentence : RemoveLeftovers(folder)) stuck.push_back(std::move(sentence));
+  }
+  return stuck;
 }
 
 // How a piece of work ended.
@@ -472,10 +525,13 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   }
   Report report;
   std::optional<InputGuard> guard;
+  GuardedPaths paths;
+  std::vector<std::string> stuck;
   try {
     impl_->Parse(arguments);
-    const GuardedPaths paths = impl_->PathsToGuard();
+    paths = impl_->PathsToGuard();
     RequireWorkingFolder(paths);
+    stuck = TidyFoldersOf(paths);
     guard.emplace(paths);
     RemoveLeftoversOf(paths);
     impl_->RequireReplaceableReport();
@@ -490,6 +546,7 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not the end
   Progress progress(common.quiet);
   const SignalTidy tidy(impl_->name);
+  for (const std::string& sentence : stuck) Context{common, progress, report}.Warn(sentence);
   const Outcome outcome = RunBody([&] {
     ProbeThreads(EffectiveThreads(common.num_threads));
     body({common, progress, report});
@@ -503,7 +560,7 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     failure = "the result is not to be trusted: " + report.reason();
   }
   progress.Finish();
-  if (failure == kOutOfMemory) failure = TellMemory(progress);
+  if (failure == kOutOfMemory) failure = TellMemory(progress, paths.inputs);
   if (ThreadsNotStarted() > 0) {
     Context{common, progress, report}.Warn(
         "the system did not give all threads that were asked for: it took longer with fewer "

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <system_error>
 #include <utility>
 
+#include "core/disk_sync.h"
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/output_set.h"
@@ -66,14 +67,35 @@ class CommitTogether::Record {
 
 // Files of one folder on their way to it.
 struct CommitTogether::Folder {
-  std::string first;  // as the user named it
+  std::vector<WholeFile> files;
   std::unique_ptr<PartialFolder> aside;
+
+  // Throws InputError, and keeps them, if they could not be moved.
+  void Move() const {
+    const int failure = FinishMovedSet(aside->path(), JournalOrigin::kOurs);
+    if (failure == 0) {
+      for (const WholeFile& file : files) NoteOutput(file.path);
+      return;
+    }
+    const std::string where = aside->path();
+    aside->Keep();
+    throw CannotBeReplaced(files.front().path,
+                           std::string(std::strerror(failure)) +
+                               "; what is not there yet is kept in " + where +
+                               ", and the next command that writes there moves it");
+  }
 };
 
 void MoveToPlace(const WholeFile& file) {
   const CommitLock lock;
   Rename(file.partial_path, file.target, file.path);
   NoteOutput(file.path);
+  if (IsPartial(file.target)) return;  // its set brings all names to the disk
+  try {
+    SyncFolder(fs::path(file.target).parent_path().string());
+  } catch (const std::system_error& error) {
+    throw CannotBeReplaced(file.path, error.code().message());
+  }
 }
 
 CommitTogether::CommitTogether() { living = this; }
@@ -110,13 +132,13 @@ void CommitTogether::GiveToSets(const std::vector<std::shared_ptr<OutputSet>>& s
   }
 }
 
-std::vector<CommitTogether::Folder> CommitTogether::MakeLists(const std::string& record) {
+std::vector<CommitTogether::Folder> CommitTogether::MakeLists(const std::string& record) const {
   std::map<fs::path, std::vector<WholeFile>> files_of;
   for (const WholeFile& file : files_) files_of[PlaceOf(file.target).parent_path()].push_back(file);
   std::vector<Folder> folders;
   for (const auto& [parent, files] : files_of) {
     Folder& folder = folders.emplace_back();
-    folder.first = files.front().path;
+    folder.files = files;
     folder.aside = std::make_unique<PartialFolder>(parent.string());
     SetJournal journal;
     journal.waits_for = record;
@@ -130,45 +152,55 @@ std::vector<CommitTogether::Folder> CommitTogether::MakeLists(const std::string&
   return folders;
 }
 
-void CommitTogether::MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets) {
-  // With a set its folder brings the record along.
-  const std::string folder = PlaceOf(files_.front().target).parent_path().string();
-  Record record(sets.empty() ? MakePartial(folder, PartialKind::kFile) : sets.back()->RecordPath());
-  const std::vector<Folder> folders = MakeLists(record.path());
-  std::vector<std::string> asides;
-  for (const Folder& one : folders) asides.push_back(one.aside->path());
+void CommitTogether::RequireAllReplaceable(
+    const std::vector<std::shared_ptr<OutputSet>>& sets) const {
+  for (const auto& set : sets) (void)set->Check();
   for (const WholeFile& file : files_) RequireReplaceable(file.path);
-  {
-    const CommitLock lock;
-    for (const auto& set : sets)
-      set->Commit(set == sets.back() ? asides : std::vector<std::string>());
-    if (sets.empty()) WriteCommitRecord(asides, record.path());
-    MoveFolders(folders, &record);
-  }
-  for (const WholeFile& file : files_) NoteOutput(file.path);
 }
 
-// From here on the run counts as done: what cannot be moved waits for the next command.
-void CommitTogether::MoveFolders(const std::vector<Folder>& folders, Record* record) {
-  std::optional<InputError> failed;
-  for (const Folder& one : folders) {
-    const int failure = FinishMovedSet(one.aside->path(), JournalOrigin::kOurs);
-    if (failure == 0) continue;
-    const std::string kept = one.aside->Keep();
-    record->Keep();
-    if (failed) continue;
-    failed = InputError(one.first, "",
-                        "could not be moved to its place (" + std::string(std::strerror(failure)) +
-                            "); it is whole in " + kept,
-                        kNextMovesThem);
+void CommitTogether::MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets) {
+  RequireAllReplaceable(sets);
+  // With a set its folder brings the record along.
+  const std::string first = PlaceOf(files_.front().target).parent_path().string();
+  std::optional<Partial> own_record;
+  if (sets.empty()) own_record.emplace(first, PartialKind::kFile);
+  const std::string record = sets.empty() ? own_record->path() : sets.back()->RecordPath();
+  const std::vector<Folder> folders = MakeLists(record);
+  std::vector<std::string> asides;
+  for (const Folder& one : folders) asides.push_back(one.aside->path());
+  const CommitLock lock;
+  std::exception_ptr failure;  // the first one that all the rest is moved in spite of
+  for (const auto& set : sets) {
+    try {
+      set->Commit(set == sets.back() ? asides : std::vector<std::string>());
+    } catch (const InputError&) {
+      if (!set->stays()) throw;
+      if (!failure) failure = std::current_exception();
+    }
   }
-  if (failed) throw *failed;
+  if (sets.empty()) WriteCommitRecord(asides, record);
+  bool record_may_go = true;
+  for (const Folder& one : folders) {
+    try {
+      one.Move();
+    } catch (const InputError&) {
+      record_may_go = false;
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  if (record_may_go) {
+    RemovePartial(record);
+  } else if (own_record) {
+    own_record->Keep();
+  }
+  if (failure) std::rethrow_exception(failure);
 }
 
 void CommitTogether::Finish(const std::vector<std::shared_ptr<OutputSet>>& sets) {
   living = nullptr;
   GiveToSets(sets);
   if (files_.empty()) {
+    if (sets.size() > 1) RequireAllReplaceable(sets);
     for (const auto& set : sets) set->Commit();
   } else if (sets.empty() && files_.size() == 1) {
     MoveToPlace(files_.front());

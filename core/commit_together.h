@@ -26,7 +26,8 @@ void MoveToPlace(const WholeFile& file);
 // More than one file cannot appear in one step. So each folder gets a list of what is to be moved
 // (set_journal.h), and all lists wait for one commit record. From the moment when that is there, a
 // killed run counts as done: what it has not moved, the next command moves that writes into one of
-// these folders. A run killed before has changed nothing.
+// these folders, and so it does with what could not be moved. A run killed before has changed
+// nothing.
 class CommitTogether {
  public:
   CommitTogether();
@@ -38,7 +39,8 @@ class CommitTogether {
   bool Holds(const std::string& path) const;
   // With the sets, which appear first; the record comes with the last of them. A file that belongs
   // into the folder of a set becomes one of its files. Throws InputError or UsageError for what
-  // cannot be replaced any more.
+  // cannot be replaced any more: then nothing appears; if only the moving failed, all the rest, and
+  // the sentence says where the others are kept.
   void Finish(const std::vector<std::shared_ptr<OutputSet>>& sets = {});
 
   // For OutputFile: false if the file is to go to its place by itself.
@@ -48,7 +50,8 @@ class CommitTogether {
   struct Folder;
   class Record;
   void GiveToSets(const std::vector<std::shared_ptr<OutputSet>>& sets);
-  std::vector<Folder> MakeLists(const std::string& record);
+  void RequireAllReplaceable(const std::vector<std::shared_ptr<OutputSet>>& sets) const;
+  std::vector<Folder> MakeLists(const std::string& record) const;
   void MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets);
   static void MoveFolders(const std::vector<Folder>& folders, Record* record);
 

@@ -15,6 +15,13 @@
 
 namespace roomtex {
 namespace fs = std::filesystem;
+
+std::string FileOf(const std::string& path) {
+  std::error_code error;
+  const size_t hash = path.rfind('#');
+  return hash == std::string::npos || fs::exists(path, error) ? path : path.substr(0, hash);
+}
+
 namespace {
 
 struct Guard {
@@ -55,13 +62,6 @@ bool IsBelow(const std::string& place, const std::string& folder) {
 bool IsSameFile(const std::string& a, const std::string& b) {
   std::error_code error;
   return fs::equivalent(a, b, error) && !error;
-}
-
-// "file.e57#name" is a scan of file.e57.
-std::string FileOf(const std::string& path) {
-  std::error_code error;
-  const size_t hash = path.rfind('#');
-  return hash == std::string::npos || fs::exists(path, error) ? path : path.substr(0, hash);
 }
 
 // What a folder of inputs holds that commands read from it.

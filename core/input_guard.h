@@ -15,6 +15,9 @@ struct GuardedPaths {
   std::vector<OptionPath> inputs, outputs;
 };
 
+// The file of a path: "file.e57#name" is a scan of file.e57.
+std::string FileOf(const std::string& path);
+
 class InputGuard {
  public:
   // Throws UsageError, naming both options, if an output is an input or another output, whatever

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <future>
 #include <list>
 #include <mutex>
 #include <set>
@@ -35,9 +36,14 @@
 namespace roomtex {
 namespace {
 
-constexpr int kMaxConnections = 128;  // open at a time, each with a thread
-constexpr int kMaxPerAddress = 48;    // of another computer
-constexpr int kFewConnections = 32;   // with more, each gets one answer
+constexpr size_t kMaxConnections = 128;  // open at a time
+
+// A thread for each connection, or as many as the system gives; that many are served side by side.
+struct Room {
+  size_t threads = kMaxConnections;
+  size_t PerAddress() const { return std::max<size_t>(1, 3 * threads / 8); }  // another computer's
+  size_t Few() const { return threads / 4; }  // with more, each gets one answer
+};
 
 // The time does not tell how much is right.
 bool EqualSecrets(const std::string& a, const std::string& b) {
@@ -77,7 +83,7 @@ struct LocalServer::Impl {
   void Bind();
   void AllowHosts();
   void CatchSignals();
-  void StartPool();
+  void StartThreads();
   void Accept();
   struct Visitor;
   void Serve(int socket, Visitor* visitor);
@@ -97,9 +103,10 @@ struct LocalServer::Impl {
   std::vector<std::string> hosts;                       // "name:port", lower case
   std::map<std::string, std::set<std::string>> routes;  // methods by path
   HiddenHttp http;
-  std::unique_ptr<httplib::ThreadPool> pool;
+  std::unique_ptr<Workers> pool;
+  Room room;
   std::thread acceptor;
-  std::atomic<int> num_connections{0};
+  std::atomic<size_t> num_connections{0};
 
   // Who is connected, the longest first. Known: has asked with the token. When there is no more
   // room, strangers go, the longest waiting first, so that no number of slow ones keeps a person
@@ -291,32 +298,37 @@ void LocalServer::Impl::Accept() {
   close(std::exchange(listen_fd, -1));
 }
 
-// A thread for each connection, or as many as the system gives.
-void LocalServer::Impl::StartPool() {
-  for (size_t count = kMaxConnections;; count /= 2) {
-    try {
-      pool = std::make_unique<httplib::ThreadPool>(count);
-      return;
-    } catch (const std::system_error&) {
-      if (count <= 4) throw;
-    }
+void LocalServer::Impl::StartThreads() {
+  std::promise<void> ready;
+  acceptor = std::thread([this, go = ready.get_future()] {
+    go.wait();
+    Accept();
+  });
+  try {
+    pool = std::make_unique<Workers>(kMaxConnections);
+  } catch (const std::system_error&) {
+    RequestStop();  // before it accepts anything
+    throw;
   }
+  room.threads = pool->count();
+  ready.set_value();
 }
 
-// False if there is none: all are known.
+// False if there is none: all are known, and enough of them wait for a thread.
 bool LocalServer::Impl::MakeRoom(const std::string& from_where) {
   const std::lock_guard<std::mutex> lock(visitors_mutex);
   const auto is_of_address = [&](const Visitor& one) { return one.address == from_where; };
-  const bool crowds = !from_where.empty() && std::count_if(visitors.begin(), visitors.end(),
-                                                           is_of_address) >= kMaxPerAddress;
-  if (!crowds && visitors.size() < kMaxConnections) return true;
+  const auto num_of_address = std::count_if(visitors.begin(), visitors.end(), is_of_address);
+  const bool crowds =
+      !from_where.empty() && static_cast<size_t>(num_of_address) >= room.PerAddress();
+  if (!crowds && visitors.size() < room.threads) return true;
   for (Visitor& one : visitors) {
     if (one.known || one.socket < 0 || (crowds && !is_of_address(one))) continue;
     shutdown(one.socket, SHUT_RDWR);  // its thread sees the end
     one.socket = -1;
     return true;
   }
-  return false;
+  return !crowds && visitors.size() < kMaxConnections;
 }
 
 void LocalServer::Impl::Serve(int socket, Visitor* visitor) {
@@ -339,7 +351,7 @@ void LocalServer::Impl::Serve(int socket, Visitor* visitor) {
       meet(*request);
       // Nobody waits for a thread while this one waits for a browser's next wish.
       const bool is_last = count == kMaxRequests || request->wants_close || IsReadable(stop_fd) ||
-                           num_connections > kFewConnections;
+                           num_connections > room.Few();
       const LocalSocket to_http = http.Connect();
       if (to_http.get() < 0) return leave();
       if (!connection.Relay(*request, is_last, to_http) || is_last) return leave();
@@ -469,8 +481,7 @@ void LocalServer::Start(bool stop_on_signals) {
   impl_->AllowHosts();
   if (stop_on_signals) impl_->CatchSignals();
   impl_->http.Start(impl_->options.num_threads);
-  impl_->StartPool();
-  impl_->acceptor = std::thread([this] { impl_->Accept(); });
+  impl_->StartThreads();
 }
 
 void LocalServer::Wait() {

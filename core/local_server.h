@@ -47,12 +47,6 @@ struct LocalServerOptions {
   std::vector<std::string> Problems() const;
 };
 
-// What commands say with --allow_remote.
-inline constexpr char kNotEncrypted[] =
-    "other computers are let in, and nothing is encrypted: who listens on the network sees the "
-    "photos and the address with its token, and may use it. Prefer ssh -L, as the line below "
-    "the address says";
-
 // Two commands with pages stand side by side: a port that the user did not ask for, neither on the
 // command line nor in a file, gives way when it is taken.
 void LetPortDiffer(int argc, char** argv, LocalServerOptions* options);

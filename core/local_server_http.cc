@@ -15,6 +15,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "core/resource_limits.h"
+
 namespace roomtex {
 namespace {
 
@@ -30,6 +32,49 @@ std::string PathOf(int descriptor) { return "/proc/self/fd/" + std::to_string(de
 
 LocalSocket::~LocalSocket() {
   if (descriptor_ >= 0) close(descriptor_);
+}
+
+Workers::Workers(size_t count) {
+  threads_.reserve(count);
+  try {
+    while (threads_.size() < count) threads_.emplace_back([this] { Work(); });
+  } catch (const std::system_error&) {
+    if (threads_.empty()) throw;
+    NoteThreadNotStarted();
+  }
+}
+
+void Workers::Work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return ends_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
+    const std::function<void()> job = std::move(jobs_.front());
+    jobs_.pop_front();
+    lock.unlock();
+    job();
+    lock.lock();
+  }
+}
+
+Workers::Enqueued Workers::enqueue(std::function<void()> job) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    jobs_.push_back(std::move(job));
+  }
+  changed_.notify_one();
+  return static_cast<Enqueued>(true);
+}
+
+void Workers::shutdown() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads_) {
+    if (thread.joinable()) thread.join();
+  }
 }
 
 void HiddenHttp::Bind() {
@@ -58,9 +103,11 @@ void HiddenHttp::Start(int num_threads) {
   server_.set_keep_alive_max_count(1);
   // The one public sign that stop() will be heard from now on, in old and new versions.
   const auto listens = std::make_shared<std::promise<void>>();
-  server_.new_task_queue = [listens, num_threads] {
+  const auto workers =
+      std::make_shared<std::unique_ptr<Workers>>(new Workers(static_cast<size_t>(num_threads)));
+  server_.new_task_queue = [listens, workers] {
     listens->set_value();
-    return new httplib::ThreadPool(static_cast<size_t>(num_threads));
+    return workers->release();  // httplib owns them
   };
   listener_ = std::thread([this] { server_.listen_after_bind(); });
   listens->get_future().wait();

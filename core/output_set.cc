@@ -14,6 +14,7 @@
 #include <sys/xattr.h>
 #include <unistd.h>
 
+#include "core/disk_sync.h"
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/json_text.h"
@@ -28,6 +29,8 @@ InputError CannotBeFilled(const std::string& folder, const std::string& reason) 
   return {folder, "", "cannot be written into (" + reason + ")",
           "Check the rights of this folder and the space on the disk"};
 }
+
+bool IsPartialName(const std::string& name) { return name.rfind(kPartialPrefix, 0) == 0; }
 
 // A folder that changes places must be an ordinary one: where somebody works in it, where another
 // disk begins or where access lists hang on it, it stays.
@@ -46,17 +49,11 @@ bool MayChangePlaces(const fs::path& folder) {
          ::access(folder.parent_path().c_str(), W_OK | X_OK) == 0;
 }
 
-void SyncFolder(const fs::path& folder) {
-  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  fsync(descriptor);
-  close(descriptor);
-}
-
-// Paths below the folder of all that is no folder.
+// Paths below the folder of all that is no folder; none if it is a link to one.
 std::vector<std::string> FilesBelow(const fs::path& folder) {
   std::vector<std::string> files;
   std::error_code error;
+  if (fs::is_symlink(folder, error)) return files;
   fs::recursive_directory_iterator entry(folder, error), end;
   for (; !error && entry != end; entry.increment(error)) {
     if (entry->is_directory(error) && !entry->is_symlink(error)) continue;
@@ -92,7 +89,7 @@ class Keeping {
     const fs::file_status there = fs::symlink_status(to_ / path, error);
     if (type == fs::file_type::directory) {
       // Something of another command is being made in it.
-      if (path.filename().string().rfind(kPartialPrefix, 0) == 0) return false;
+      if (IsPartialName(path.filename().string())) return false;
       if (fs::exists(there)) return !fs::is_directory(there) || Link(path);
       fs::create_directory(to_ / path, from_ / path, error);
       return !error && Link(path);
@@ -122,22 +119,20 @@ std::vector<SetWithReport>& SetsWithReport() {
 void OutputSet::ReplaceAllOf(const std::string& command) {
   std::error_code error;
   std::vector<fs::directory_entry> old;
-  fs::directory_iterator entry(folder_, error), end;
-  for (; !error && entry != end; entry.increment(error)) {
-    // Where folders cannot change places the set itself is made here.
-    if (entry->path().filename().string().rfind(kPartialPrefix, 0) != 0) old.push_back(*entry);
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    // The set itself may lie there, and what others are making.
+    if (!IsPartialName(entry->path().filename().string())) old.push_back(*entry);
   }
-  if (!old.empty()) {
-    const Json report = ReadJsonIfAny(folder_ + "/report.json");
-    const auto named = report.is_object() ? report.find("command") : report.end();
-    if (!report.is_object() || named == report.end() || *named != command) {
-      throw InputError(folder_, "", "holds files that " + command + " did not write",
-                       "Move it away or give another --output_path");
-    }
+  const Json report = old.empty() ? Json() : ReadJsonIfAny(folder_ + "/report.json");
+  const auto named = report.is_object() ? report.find("command") : report.end();
+  if (!old.empty() && (!report.is_object() || named == report.end() || *named != command)) {
+    throw InputError(folder_, "", "holds files that " + command + " did not write",
+                     "Move it away or give another --output_path");
   }
-  for (const fs::directory_entry& one : old) {
-    const std::string name = one.path().filename().string();
-    (one.is_directory(error) ? replaced_ : removed_).insert(name);
+  for (const fs::directory_entry& entry : old) {
+    const bool is_folder = fs::is_directory(entry.symlink_status(error));
+    (is_folder ? replaced_ : removed_).insert(entry.path().filename().string());
   }
 }
 
@@ -236,53 +231,63 @@ bool OutputSet::Exchange() {
   if (stat(place_.c_str(), &old) != 0) return false;
   (void)!chown(aside().c_str(), old.st_uid, old.st_gid);
   if (chmod(aside().c_str(), old.st_mode & 07777) != 0) return false;
-  SyncFolder(aside());
+  SyncFoldersBelow(aside());
   if (renameat2(AT_FDCWD, aside().c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) != 0) {
     return false;
   }
-  SyncFolder(fs::path(place_).parent_path());
   // What came into the old folder in the last moment.
   (void)Keeping(aside(), place_, replaced_, removed_).Link();
+  try {
+    SyncFolder(fs::path(place_).parent_path());
+  } catch (const std::system_error&) {
+    // It is there all the same.
+  }
   return true;
 }
 
 void OutputSet::MoveOneByOne(const std::vector<std::string>& files) {
   SetJournal journal;
-  journal.moves = files;
-  // What is moved to the place of an old file replaces it.
-  const auto remove = [&](const std::string& path) {
-    if (!std::binary_search(files.begin(), files.end(), path)) journal.removes.push_back(path);
+  const auto is_of_set = [&](const std::string& name) {
+    return std::binary_search(files.begin(), files.end(), name);
   };
-  for (const std::string& name : removed_) remove(name);
+  // What waits for the record can be moved as soon as it is there.
+  if (is_of_set(record_)) journal.moves.push_back(record_);
+  for (const std::string& name : files) {
+    if (name != record_) journal.moves.push_back(name);
+  }
+  for (const std::string& name : removed_) {
+    if (!is_of_set(name)) journal.removes.push_back(name);
+  }
   for (const std::string& name : replaced_) {
-    for (const std::string& file : FilesBelow(fs::path(place_) / name)) remove(name + "/" + file);
+    for (const std::string& file : FilesBelow(fs::path(place_) / name)) {
+      const std::string path = name + "/" + file;
+      if (!is_of_set(path)) journal.removes.push_back(path);
+    }
   }
-  try {
-    // What could not be linked to its end is no part of the set.
-    if (fs::path(aside()).parent_path() != fs::path(place_)) aside_->MoveInto(place_);
-    WriteSetJournal(journal, aside());
-  } catch (const std::system_error& error) {
-    throw CannotBeFilled(folder_, error.code().message());
-  }
+  // What could not be linked to its end is no part of the set.
+  if (fs::path(aside()).parent_path() != fs::path(place_)) aside_->MoveInto(place_);
+  SyncFoldersBelow(aside());
+  WriteSetJournal(journal, aside());
   const int failure = FinishMovedSet(aside(), JournalOrigin::kOurs);
   if (failure == 0) return;
-  const std::string kept = aside_->Keep();
-  throw InputError(folder_, "",
-                   "holds new files beside old ones now (" + std::string(std::strerror(failure)) +
-                       "); those that are missing are in " + kept,
-                   kNextMovesThem);
+  stays_ = true;
+  const std::string where = aside();
+  aside_->Keep();
+  throw CannotBeFilled(folder_, std::string(std::strerror(failure)) +
+                                    "; what is not there yet is kept in " + where +
+                                    ", and the next command that writes there moves it");
 }
 
 void OutputSet::Commit(const std::vector<std::string>& waiting) {
+  std::vector<std::string> files = Check();
   try {
+    SyncFiles(aside(), files);
     if (!waiting.empty()) WriteCommitRecord(waiting, aside() + "/" + record_);
-  } catch (const std::system_error& error) {
-    throw CannotBeFilled(folder_, error.code().message());
-  }
-  const std::vector<std::string> files = Check();
-  {
+    files = Check();
     const CommitLock lock;
     if (!Exchange()) MoveOneByOne(files);
+  } catch (const std::system_error& error) {
+    throw CannotBeFilled(folder_, error.code().message());
   }
   for (const std::string& name : files) NoteOutput((fs::path(folder_) / name).string());
   aside_.reset();

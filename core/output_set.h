@@ -14,7 +14,8 @@ namespace roomtex {
 // the place of the old folder in one step (renameat2), with everything else that the old one holds.
 // So a run that is killed, at whatever moment, leaves all files as they were or all new ones. Where
 // folders cannot change places (a mount point, no rights beside it, no such call), the files are
-// moved one by one, and what a run killed meanwhile has not moved, the next one moves.
+// moved one by one, and what a run killed meanwhile has not moved, or could not move, the next one
+// moves.
 class OutputSet {
  public:
   // Makes the folder. Throws InputError if nothing can be written there.
@@ -32,8 +33,9 @@ class OutputSet {
   void ReplaceFolder(const std::string& name) { replaced_.insert(name); }
   // The old file `name` is not kept.
   void Remove(const std::string& name) { removed_.insert(name); }
-  // Nothing of the old folder is kept. Throws InputError unless it is missing, empty, or what this
-  // command left there (its report.json names the command): what is not ours stays.
+  // Nothing of the old folder is kept, but what other runs are making there. Throws InputError
+  // unless it is missing, empty, or what this command left there (its report.json names the
+  // command): what is not ours stays.
   void ReplaceAllOf(const std::string& command);
 
   // How the path is called in the folder; "" = it lies elsewhere.
@@ -44,14 +46,17 @@ class OutputSet {
   const std::vector<std::string>& names() const { return names_; }
   const std::string& folder() const { return folder_; }
 
-  // Throws InputError or UsageError, before anything is moved, if a file cannot be replaced. With
-  // `waiting`, folders of files elsewhere that belong to this set (CommitTogether), a commit record
-  // of them at RecordPath() comes with it; the caller moves them and removes it.
+  // The files of the set. Throws InputError or UsageError if one cannot be replaced.
+  std::vector<std::string> Check() const;
+  // Throws as Check() does before anything is moved. With `waiting`, folders of files elsewhere
+  // that belong to this set (CommitTogether), a commit record of them at RecordPath() comes with
+  // it; the caller moves them and removes it. If only some files could be moved it throws, too, and
+  // keeps the others for the next command: stays() is true then, and the set counts as committed.
   void Commit(const std::vector<std::string>& waiting = {});
+  bool stays() const { return stays_; }
   std::string RecordPath() const { return place_ + "/" + record_; }
 
  private:
-  std::vector<std::string> Check() const;
   void RequireFoldersTo(const std::string& name) const;
   bool Exchange();
   void MoveOneByOne(const std::vector<std::string>& files);
@@ -61,6 +66,7 @@ class OutputSet {
   std::unique_ptr<PartialFolder> aside_;
   std::vector<std::string> names_;
   std::set<std::string> replaced_, removed_;
+  bool stays_ = false;
 };
 
 // The report of this command is the last file of the set: Command::Run writes it and commits, once

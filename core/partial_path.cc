@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -71,38 +70,91 @@ void Lock(int descriptor) {
 }
 
 // Removes what a killed process left, once finish() has moved what is to be kept of it and says so.
-// False if it belongs to a living process.
+// Whether nothing is left of it; false also if it belongs to a living process.
 template <typename Finish>
 bool TidyUp(const std::string& path, const Finish& finish) {
   const int descriptor = OpenToLock(path);
-  if (descriptor < 0) return true;
-  const bool is_left = flock(descriptor, LOCK_EX | LOCK_NB) == 0;
-  if (is_left && IsStill(descriptor, path) && finish()) {
-    std::error_code error;
-    fs::remove_all(path, error);
-  }
+  if (descriptor < 0) return errno == ENOENT;
+  std::error_code error;
+  const bool goes =
+      flock(descriptor, LOCK_EX | LOCK_NB) == 0 && IsStill(descriptor, path) && finish();
+  if (goes) fs::remove_all(path, error);
   close(descriptor);
-  return is_left;
+  return goes && !error;
 }
 
-// Moves the sets that wait for this file, if it is a commit record; whether it may go then.
-bool FinishSetsOf(const std::string& path) {
-  const auto sets = ReadCommitRecord(path);
-  if (!sets) return true;
-  std::error_code error;
-  const std::string record = fs::canonical(path, error).string();
-  bool may_go = true;
-  for (const std::string& set : *sets) {
-    const std::optional<SetJournal> journal = ReadSetJournal(set);
-    const bool waits = journal && journal->waits_for == record;
-    if (!waits || fs::path(set).filename().string().rfind(kPartialPrefix, 0) != 0) continue;
-    bool is_moved = false;
-    const bool is_left =
-        TidyUp(set, [&] { return is_moved = FinishMovedSet(set, JournalOrigin::kFound) == 0; });
-    may_go &= is_left && is_moved;
+// What moves the sets of one folder may bring further ones there: the record of others.
+constexpr int kMostRounds = 4;
+
+class Leftovers {
+ public:
+  void Tidy(const std::string& folder) {
+    if (!tidied_.insert(folder).second) return;
+    std::set<std::string> seen;
+    for (int round = 0; round < kMostRounds; ++round) {
+      bool is_new = false;
+      for (const std::string& path : PartialsIn(folder)) {
+        if (!seen.insert(path).second) continue;
+        is_new = true;
+        TidyOne(path);
+      }
+      if (!is_new) return;
+    }
   }
-  return may_go;
-}
+  // What stays although it should be moved.
+  const std::vector<std::string>& stuck() const { return stuck_; }
+
+ private:
+  static std::vector<std::string> PartialsIn(const std::string& folder) {
+    std::error_code error;
+    std::vector<std::string> paths;
+    fs::directory_iterator entry(folder, error), end;
+    for (; !error && entry != end; entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (name.rfind(kPartialPrefix, 0) == 0) paths.push_back(entry->path().string());
+    }
+    return paths;
+  }
+
+  void TidyOne(const std::string& path) {
+    std::error_code error;
+    if (!fs::is_directory(fs::symlink_status(path, error))) {
+      TidyUp(path, [&] { return FinishSetsOf(path); });
+      return;
+    }
+    // The record may still lie in a set that was to bring it.
+    const std::string record = RecordWaitedFor(path);
+    if (!record.empty() && !fs::exists(record, error)) Tidy(fs::path(record).parent_path());
+    TidyUp(path, [&] { return FinishSet(path); });
+  }
+
+  bool FinishSet(const std::string& set) {
+    const int failure = FinishMovedSet(set, JournalOrigin::kFound);
+    if (failure > 0) {
+      stuck_.push_back(set + ": finished files of an earlier run, which cannot be moved to their " +
+                       "places (" + std::generic_category().message(failure) +
+                       "); the next command that works there tries again");
+    }
+    return failure == 0;
+  }
+
+  // Moves the sets that wait for this file, if it is a commit record; whether it may go then.
+  bool FinishSetsOf(const std::string& path) {
+    const auto sets = ReadCommitRecord(path);
+    if (!sets) return true;
+    std::error_code error;
+    const std::string record = fs::canonical(path, error).string();
+    bool may_go = true;
+    for (const std::string& set : *sets) {
+      if (fs::path(set).filename().string().rfind(kPartialPrefix, 0) != 0) continue;
+      if (RecordWaitedFor(set) == record) may_go &= TidyUp(set, [&] { return FinishSet(set); });
+    }
+    return may_go;
+  }
+
+  std::set<std::string> tidied_;
+  std::vector<std::string> stuck_;
+};
 
 // In the order in which they are looked at: files and folders, of which some bring along the commit
 // record that others wait for.
@@ -203,17 +255,10 @@ std::string PartialFolder::Keep() {
 
 bool IsPartial(const std::string& path) { return path.find(kPartialPrefix) != std::string::npos; }
 
-void RemoveLeftovers(const std::string& folder) {
-  const std::string place = folder.empty() ? "." : folder;
-  for (const Leftover kind : {Leftover::kWhole, Leftover::kRecord}) TidyUpAll(place, kind);
-  for (const std::string& set : LeftoversOf(place, Leftover::kWaiting)) {
-    // Its record may be on its way, too.
-    const std::optional<SetJournal> journal = ReadSetJournal(set);
-    if (!journal) continue;
-    const std::string of_record = fs::path(journal->waits_for).parent_path().string();
-    for (const Leftover kind : {Leftover::kWhole, Leftover::kRecord}) TidyUpAll(of_record, kind);
-  }
-  TidyUpAll(place, Leftover::kWaiting);
+std::vector<std::string> RemoveLeftovers(const std::string& folder) {
+  Leftovers leftovers;
+  leftovers.Tidy(folder.empty() ? "." : folder);
+  return leftovers.stuck();
 }
 
 void RemoveAllPartials() {

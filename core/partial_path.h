@@ -4,6 +4,7 @@
 // into the same folder.
 
 #include <string>
+#include <vector>
 
 namespace roomtex {
 
@@ -23,24 +24,31 @@ void RemovePartial(const std::string& path);
 // It has been renamed: the path is no longer ours.
 void ReleasePartial(const std::string& path);
 
-// A folder that is removed at the end, whatever happens.
-class PartialFolder {
+// A file or folder that is removed at the end, whatever happens.
+class Partial {
  public:
-  explicit PartialFolder(const std::string& parent)
-      : path_(MakePartial(parent, PartialKind::kFolder)) {}
-  ~PartialFolder() { RemovePartial(path_); }
-  PartialFolder(const PartialFolder&) = delete;
-  PartialFolder& operator=(const PartialFolder&) = delete;
+  Partial(const std::string& parent, PartialKind kind) : path_(MakePartial(parent, kind)) {}
+  ~Partial() { RemovePartial(path_); }
+  Partial(const Partial&) = delete;
+  Partial& operator=(const Partial&) = delete;
 
   const std::string& path() const { return path_; }
+  // It stays, as if this process had been killed: the next command goes on with it.
+  void Keep() {
+    ReleasePartial(path_);
+    path_.clear();
+  }
+
+ protected:
+  std::string path_;
+};
+
+class PartialFolder : public Partial {
+ public:
+  explicit PartialFolder(const std::string& parent) : Partial(parent, PartialKind::kFolder) {}
   std::string operator/(const std::string& name) const { return path_ + "/" + name; }
   // Moves it, to be continued there. Throws std::system_error.
   void MoveInto(const std::string& parent);
-  // It stays, for the next command to finish; gives its path.
-  std::string Keep();
-
- private:
-  std::string path_;
 };
 
 // Whether the path lies in such a folder or is such a file.
@@ -48,8 +56,9 @@ bool IsPartial(const std::string& path);
 
 // Removes from the folder what killed processes left there; where one was killed while it moved
 // finished files into this folder (OutputSet, CommitTogether), all are moved to their places, also
-// those in other folders that belong to them. Never throws.
-void RemoveLeftovers(const std::string& folder);
+// those in other folders that belong to them. What cannot be moved stays, and a sentence about each
+// is given. Never throws but for want of memory.
+std::vector<std::string> RemoveLeftovers(const std::string& folder);
 
 // For a process that a signal ends: removes all that it is making. From any thread; nothing can be
 // made afterwards.

@@ -6,12 +6,14 @@
 #include <iterator>
 #include <set>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/disk_sync.h"
 #include "core/stays_inside.h"
 
 namespace roomtex {
@@ -26,17 +28,32 @@ constexpr char kRecordHead[] = "roomtex commit record\n";
 // Behind the last one stands an 'e'.
 using Entry = std::pair<char, std::string>;
 
+// 0, or the error.
+int WriteWhole(int file, const std::string& text) {
+  for (size_t done = 0; done < text.size();) {
+    const ssize_t count = write(file, text.data() + done, text.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return count < 0 ? errno : ENOSPC;
+    done += static_cast<size_t>(count);
+  }
+  return fsync(file) == 0 ? 0 : errno;
+}
+
 void WriteEntries(const std::vector<Entry>& entries, std::string text, const std::string& path,
                   int flags) {
   for (const auto& [kind, name] : entries) text += kind + name + '\0';
   text += 'e';
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC | flags, 0600);
-  const ssize_t size = file >= 0 ? write(file, text.data(), text.size()) : -1;
-  const bool cut = size >= 0 && size < static_cast<ssize_t>(text.size());
-  const bool written = size >= 0 && !cut && fsync(file) == 0;
-  const int error = cut ? ENOSPC : errno;
-  if (file >= 0) close(file);
-  if (!written) throw std::system_error(error, std::generic_category());
+  if (file < 0) throw std::system_error(errno, std::generic_category());
+  const int error = WriteWhole(file, text);
+  close(file);
+  try {
+    if (error != 0) throw std::system_error(error, std::generic_category());
+    SyncFolder(fs::path(path).parent_path().string());
+  } catch (const std::system_error&) {
+    unlink(path.c_str());  // it may be whole all the same
+    throw;
+  }
 }
 
 // None unless the file is whole.
@@ -78,6 +95,90 @@ bool LeadsThroughLinks(const fs::path& folder, const fs::path& path) {
   return false;
 }
 
+// Does what a list says.
+class SetMover {
+ public:
+  SetMover(const std::string& set, const SetJournal& journal, JournalOrigin origin)
+      : from_(set), to_(from_.parent_path()), journal_(journal), origin_(origin) {
+    (void)lstat((set + "/" + kJournalName).c_str(), &list_);
+  }
+
+  int Finish() {
+    const std::set<std::string> moves(journal_.moves.begin(), journal_.moves.end());
+    for (const std::string& path : journal_.removes) {
+      // A folder of the set comes into the place of the file.
+      const auto below = moves.lower_bound(path + "/");
+      if (below != moves.end() && below->rfind(path + "/", 0) == 0) Remove(path);
+    }
+    for (const std::string& path : journal_.moves) Move(path);
+    if (failure_ != 0) return failure_;  // nothing old goes before all new is there
+    for (const std::string& path : journal_.removes) {
+      if (moves.count(path) == 0) Remove(path);
+    }
+    try {
+      for (const fs::path& folder : changed_) SyncFolder(folder.string());
+    } catch (const std::system_error& error) {
+      Note(error.code());
+    }
+    return failure_;
+  }
+
+ private:
+  void Note(const std::error_code& error) {
+    if (error && failure_ == 0) failure_ = error.value();
+  }
+
+  // Whoever wrote a name that leads elsewhere wants to reach other files.
+  bool Stays(const std::string& path) const {
+    if (path.empty() || !StaysInside(path)) return false;
+    return origin_ == JournalOrigin::kOurs ||
+           !(LeadsThroughLinks(to_, path) || LeadsThroughLinks(from_, path));
+  }
+
+  // Written by somebody after the run was killed: not lost.
+  bool IsNewerThanList(const fs::path& path) const {
+    struct stat there {};
+    if (origin_ == JournalOrigin::kOurs || lstat(path.c_str(), &there) != 0) return false;
+    return S_ISREG(there.st_mode) && std::tie(there.st_mtim.tv_sec, there.st_mtim.tv_nsec) >
+                                         std::tie(list_.st_mtim.tv_sec, list_.st_mtim.tv_nsec);
+  }
+
+  void NoteFoldersTo(const fs::path& path) {
+    for (fs::path way = path.parent_path(); !way.empty(); way = way.parent_path()) {
+      changed_.insert(to_ / way);
+    }
+    changed_.insert(to_);
+  }
+
+  void Move(const std::string& path) {
+    std::error_code error, ignored;
+    if (!Stays(path)) return;
+    if (origin_ == JournalOrigin::kFound && !fs::exists(fs::symlink_status(from_ / path, ignored)))
+      return;  // has been moved
+    fs::create_directories((to_ / path).parent_path(), ignored);
+    if (IsNewerThanList(to_ / path)) fs::rename(to_ / path, to_ / (path + ".other"), ignored);
+    fs::rename(from_ / path, to_ / path, error);
+    Note(error);
+    NoteFoldersTo(path);
+  }
+
+  void Remove(const std::string& path) {
+    std::error_code error;
+    if (!Stays(path) || fs::is_directory(fs::symlink_status(to_ / path, error))) return;
+    if (IsNewerThanList(to_ / path)) return;
+    fs::remove(to_ / path, error);
+    Note(error);
+    NoteFoldersTo(path);
+  }
+
+  const fs::path from_, to_;
+  const SetJournal& journal_;
+  const JournalOrigin origin_;
+  struct stat list_ {};
+  std::set<fs::path> changed_;
+  int failure_ = 0;
+};
+
 }  // namespace
 
 void WriteSetJournal(const SetJournal& journal, const std::string& set) {
@@ -85,6 +186,7 @@ void WriteSetJournal(const SetJournal& journal, const std::string& set) {
   if (!journal.waits_for.empty()) entries.emplace_back('w', journal.waits_for);
   for (const std::string& path : journal.moves) entries.emplace_back('m', path);
   for (const std::string& path : journal.removes) entries.emplace_back('r', path);
+  SyncFolder(fs::path(set).parent_path().string());
   WriteEntries(entries, "", set + "/" + kJournalName, O_EXCL);
 }
 
@@ -115,40 +217,26 @@ std::optional<std::vector<std::string>> ReadCommitRecord(const std::string& path
   return sets;
 }
 
+std::string RecordWaitedFor(const std::string& set) {
+  if (IsOfAnother(set + "/" + kJournalName)) return "";
+  const std::optional<SetJournal> journal = ReadSetJournal(set);
+  return journal ? journal->waits_for : "";
+}
+
 int FinishMovedSet(const std::string& set, JournalOrigin origin) {
   const bool found = origin == JournalOrigin::kFound;
-  if (found && IsOfAnother(set + "/" + kJournalName)) return EPERM;
+  const std::string list = set + "/" + kJournalName;
+  if (found && IsOfAnother(list)) return kOfAnotherUser;
   const std::optional<SetJournal> journal = ReadSetJournal(set);
-  if (!journal) return found ? 0 : ENOENT;
-  // Our own record need not be looked at: where files belong to whom the disk says, not to who
-  // makes them (network disks, FAT), it would pass for another user's.
-  if (found && !journal->waits_for.empty() && !ReadCommitRecord(journal->waits_for)) return 0;
-  const fs::path from(set), to = from.parent_path();
-  int failure = 0;
-  // Whoever wrote a name that leads elsewhere wants to reach other files.
-  const auto stays = [&](const std::string& path) {
-    const bool through_links =
-        found && (LeadsThroughLinks(to, path) || LeadsThroughLinks(from, path));
-    return !path.empty() && StaysInside(path) && !through_links;
-  };
-  std::error_code error, ignored;
-  const std::set<std::string> moves(journal->moves.begin(), journal->moves.end());
-  for (const std::string& path : journal->removes) {
-    error.clear();
-    if (stays(path) && moves.count(path) == 0) fs::remove(to / path, error);
-    if (error && failure == 0) failure = error.value();
+  if (!journal) {
+    if (!found) return ENOENT;
+    return access(list.c_str(), F_OK) == 0 && access(list.c_str(), R_OK) != 0 ? errno : 0;
   }
-  for (const std::string& path : journal->moves) {
-    if (!stays(path)) continue;
-    if (!fs::exists(fs::symlink_status(from / path, ignored))) {
-      if (!found && failure == 0) failure = ENOENT;
-      continue;
-    }
-    fs::create_directories((to / path).parent_path(), ignored);
-    fs::rename(from / path, to / path, error);
-    if (error && failure == 0) failure = error.value();
+  if (found && !journal->waits_for.empty()) {
+    if (IsOfAnother(journal->waits_for)) return EPERM;
+    if (!ReadCommitRecord(journal->waits_for)) return 0;
   }
-  return failure;
+  return SetMover(set, *journal, origin).Finish();
 }
 
 }  // namespace roomtex

@@ -15,18 +15,24 @@ struct SetJournal {
   std::string waits_for = {};        // nothing is moved before this commit record is there
 };
 
-// Writes the list to the disk. Throws std::system_error.
+// Writes the list to the disk; the files it names must be there. Throws std::system_error, and
+// leaves no list then.
 void WriteSetJournal(const SetJournal& journal, const std::string& set);
 // None where there is no whole list.
 std::optional<SetJournal> ReadSetJournal(const std::string& set);
 
-// Does away with what the list of the set names, and moves what it names and is still there. Gives
-// the first error, 0 without one; what could not be moved is still in the set then. Names that lead
-// out of the upper folder are passed over. Of a list that was just written all must be there
-// (ENOENT). One that was found may have come with somebody's folder: there links lead out, too,
-// that of another user is not followed (EPERM), and without a list, or without the record that it
-// waits for, nothing is done.
+// Moves what the list of the set names, then removes what it names, and brings that to the disk.
+// Gives 0 if nothing is left to be done, so that the set may go; else the first error: it is to be
+// kept, with the record that it waits for.
+//
+// kOurs: the list of this process, which waits for nothing any more; all of it must be there.
+// kFound: what a killed run left, and perhaps had moved in part. Without a whole list, or without
+// the record that it waits for, that run had changed nothing, and nothing is to be done. It may
+// have come with somebody's folder: names that lead out of the upper folder, also by links, are
+// passed over, and the list of another user is not followed. A file that was written since the list
+// was is kept as "file.other", or not removed.
 enum class JournalOrigin { kOurs, kFound };
+inline constexpr int kOfAnotherUser = -1;
 int FinishMovedSet(const std::string& set, JournalOrigin origin);
 
 // The remedy where not all could be moved.
@@ -34,9 +40,11 @@ inline constexpr char kNextMovesThem[] =
     "Check the rights of the folder: the next command that writes there moves them";
 
 // A file by whose appearance several sets, in several folders, are to be moved: it names them, so
-// that whoever finds it moves them first. Throws std::system_error.
+// that whoever finds it moves them first. Throws std::system_error, and leaves no record then.
 void WriteCommitRecord(const std::vector<std::string>& sets, const std::string& path);
 // The sets; none if the file is no whole record, or another user's.
 std::optional<std::vector<std::string>> ReadCommitRecord(const std::string& path);
+// The record that a found list waits for; "" = none, or the list is another user's.
+std::string RecordWaitedFor(const std::string& set);
 
 }  // namespace roomtex

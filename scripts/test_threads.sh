@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# Threaded code under the thread sanitizer: the servers, ParallelFor and what runs by it, reading and colouring. Before a
-# release; a build of its own (build-tsan) and some minutes. Usage: scripts/test_threads.sh [TEST...]
+# Threaded code under the thread sanitizer: the servers, ParallelFor and what runs by it, reading, colouring, searching,
+# simulating, finding boards and pairs. (What has threads in dense/ is tested by its command only.) Before a release; a
+# build of its own (build-tsan) and some minutes. Usage: scripts/test_threads.sh [TEST...]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=("$@")
 if [ ${#tests[@]} = 0 ]; then
-  tests=(core_test server_test importers_test colmap_ext_test texture_test view_test align_pick_server_test)
+  tests=(core_test server_test importers_test colmap_ext_test texture_test view_test align_pick_server_test
+    align_search_test capture_test calibration_test associate_test)
 fi
 # Libraries that are not built for it synchronise by what it does not see. (Embree compares strings of its own by
 # libstdc++, and what is below that on the stack cannot be told.)
@@ -26,6 +28,8 @@ mutex:__GI___nptl_deallocate_tsd
 END
 # Long statistics, and tests that start commands, which are not built here.
 left_out='ModelCheck.*:LensCheck.*:Initializer.IsRightBeforeAWall:*Command.*:*Benchmark*'
+left_out+=':FoundPhotos.*:StartVerdict.*:AutomaticAlignment.*:Calibration.*:CalibrationUncertainty.*:*PhotosOfLens.*'
+left_out+=':Associate.Command*'
 # In the child of a program with threads the sanitizer runs no handler of a signal: it would wait for ever.
 left_out+=':LocalServer.SignalsEndTheProcessCleanly'
 export GTEST_FILTER="${GTEST_FILTER:--$left_out}"

@@ -12,10 +12,10 @@
 #include "align/pick/pick_server.h"
 #include "align/pick/pick_session.h"
 #include "colmap_ext/panorama_model.h"
+#include "core/announce_page.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/local_server_key.h"
-#include "core/open_browser.h"
 #include "core/option_fields.h"
 #include "importers/scan_record.h"
 #include "pick_page.h"
@@ -100,24 +100,11 @@ void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context
                " All: " + names);
 }
 
-// Says where the page is; the browser shows it if asked to.
-void Announce(const Arguments& a, const LocalServer& server, std::optional<OpenBrowser>* browser,
-              const Command::Context& context) {
-  if (a.server.port != 0 && server.port() != a.server.port) {
-    context.progress.Note("port " + std::to_string(a.server.port) + " is taken: using " +
-                          std::to_string(server.port()));
-  }
-  if (a.server.allow_remote) context.Warn(kNotEncrypted);
-  std::cout << server.Url() << "\n" << server.SshLine() << std::endl;
-  if (a.server.open) browser->emplace(server.Url());
-  if (*browser && !(*browser)->problem().empty()) context.Warn((*browser)->problem());
-}
-
 // One reading of the scans. picks: taken over, in place of those of the file. Gives the picks for
 // the next reading, or nothing: the session is over.
 std::optional<std::vector<SessionPick>> ServeScans(
     const std::optional<std::vector<SessionPick>>& picks, Arguments* a,
-    std::optional<OpenBrowser>* browser, const Command::Context& context) {
+    std::unique_ptr<OpenBrowser>* browser, const Command::Context& context) {
   PickScene scene(a->scene, &context.progress);
   if (!a->image_name.empty() && scene.FindPhoto(a->image_name) == nullptr) {
     throw UsageError("--image_name " + a->image_name + " is not among the photos");
@@ -135,7 +122,7 @@ std::optional<std::vector<SessionPick>> ServeScans(
       scene, &session, kPickPage,
       {a->server, a->image_name, a->aligned_path, next_token, BesideThisProgram("roomtex-align")});
   server.Start(true);
-  if (is_first) Announce(*a, server.server(), browser, context);
+  if (is_first) *browser = AnnouncePage(a->server, server.server(), context);
   server.Wait();
   if (!session.SaveAgain()) throw InputError(a->output_path, "", session.Now()->save_error, "");
   context.report["num_picks"] = session.Now()->picks.size();
@@ -151,7 +138,7 @@ std::optional<std::vector<SessionPick>> ServeScans(
 void ServePicking(Arguments a, const Command::Context& context) {
   CheckArguments(&a);
   a.scene.num_threads = context.options.num_threads;
-  std::optional<OpenBrowser> browser;
+  std::unique_ptr<OpenBrowser> browser;
   std::optional<std::vector<SessionPick>> picks;
   do {
     picks = ServeScans(picks, &a, &browser, context);

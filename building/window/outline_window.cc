@@ -1,10 +1,7 @@
 #include "building/window/outline_window.h"
 
-#include <iostream>
-#include <optional>
-
 #include "building/window/outline_session.h"
-#include "core/open_browser.h"
+#include "core/announce_page.h"
 
 namespace roomtex {
 
@@ -28,16 +25,7 @@ OutlineProposal RunOutlineWindow(const OutlineWindowInput& input, OutlineCloud c
   server.AddPost("/models", [&](const Json&) { return session.WriteModels(); });
   server.Start(true);
   context.progress.Finish();
-  if (input.server.port != 0 && server.port() != input.server.port) {
-    context.progress.Note("port " + std::to_string(input.server.port) + " is taken: using " +
-                          std::to_string(server.port()));
-  }
-  std::cout << server.Url() << "\n" << server.SshLine() << std::endl;
-  std::optional<OpenBrowser> browser;
-  if (input.server.open) {
-    browser.emplace(server.Url());
-    if (!browser->problem().empty()) context.Warn(browser->problem());
-  }
+  const auto browser = AnnouncePage(input.server, server, context);
   context.progress.Note("Ctrl-C ends");
   server.Wait();
   return session.Judged();

@@ -1,5 +1,6 @@
 #include "core/command_line.h"
 
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <new>
@@ -12,6 +13,9 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/partial_path.h"
+#include "core/set_journal.h"
+#include "tests/core/failing_calls.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -532,6 +536,64 @@ TEST(CommandLine, AFolderThatIsGoneIsSaid) {
   int status = 0;
   waitpid(child, &status, 0);
   EXPECT_EQ(status, 0);
+}
+
+// What a run was killed at that moved "in" to its place; gives the folder of its files.
+std::string LeaveHalfMoved(const std::string& folder) {
+  WriteBytes(folder + "/in", "old");
+  const std::string set = folder + "/" + kPartialPrefix + "1";
+  std::filesystem::create_directory(set);
+  WriteBytes(set + "/in", "new");
+  WriteSetJournal({{"in"}, {}}, set);
+  return set;
+}
+
+TEST(CommandLine, FinishesWhatAKilledRunBeganBeforeAnInputIsRead) {
+  const TempFolder folder;
+  const std::string in = folder / "in";
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"--input_path", in},
+        {"--input_path", folder.path()},
+        {"--input_path", in + "#scan 1"},
+        {"--input_path", "x", "--output_path", folder / "out"}}) {
+    const std::string set = LeaveHalfMoved(folder.path());
+    TestCommand test;
+    std::string read;
+    EXPECT_EQ(test.Run(arguments, [&](const Command::Context&) { read = ReadBytes(in); }),
+              kExitDone);
+    EXPECT_EQ(read, "new") << testing::PrintToString(arguments);
+    EXPECT_FALSE(std::filesystem::exists(set));
+  }
+}
+
+TEST(CommandLine, WarnsOfWhatItCannotFinishAndGoesOn) {
+  const TempFolder folder;
+  const std::string set = LeaveHalfMoved(folder.path());
+  FailingCalls calls;
+  calls.on_rename = [](const std::string&, const std::string&) { return ENOSPC; };
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--input_path", folder / "in"}), kExitDone);
+  EXPECT_THAT(test.err, HasSubstr(set + ": finished files of an earlier run"));
+  EXPECT_THAT(test.err, HasSubstr("No space left"));
+  EXPECT_EQ(ReadBytes(set + "/in"), "new");
+}
+
+TEST(CommandLine, MemoryThatRunsOutIsSaidWithStageAndInputs) {
+  const TempFolder folder;
+  const std::string in = folder / "in";
+  WriteBytes(in, std::string(2500000, 'x'));
+  TestCommand test;
+  EXPECT_EQ(test.Run({"--input_path", in, "--scan_path", folder.path()},
+                     [](const Command::Context& context) {
+                       context.progress.Stage("colour");
+                       throw std::bad_alloc();
+                     }),
+            kExitInput);
+  for (const std::string& part :
+       {std::string("in the stage \"colour\""), "--input_path " + in + " (3 MB)",
+        "--scan_path " + folder.path() + " (1 files, 3 MB)", std::string("fewer samples")}) {
+    EXPECT_THAT(test.err, HasSubstr(part));
+  }
 }
 
 }  // namespace

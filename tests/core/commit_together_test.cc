@@ -1,7 +1,9 @@
 #include "core/commit_together.h"
 
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
+#include <set>
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -12,6 +14,7 @@
 #include "core/output_set.h"
 #include "core/partial_path.h"
 #include "core/set_journal.h"
+#include "tests/core/failing_calls.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -188,6 +191,120 @@ TEST_F(CommitTogetherTest, ARecordThatWasFoundReachesOnlySetsThatWaitForIt) {
   EXPECT_EQ(ReadBytes(mine + "/work"), "work");
   EXPECT_FALSE(fs::exists(there / "c"));
   EXPECT_EQ(ReadBytes(b), "old");
+}
+
+// As on network folders that give files another owner than the user who makes them.
+TEST_F(CommitTogetherTest, FilesThatBelongToAnotherUserOnceTheyAreMadeAppear) {
+  FailingCalls calls;
+  calls.other_users = 1;
+  {
+    CommitTogether outputs;
+    WriteOutput(a, "new a");
+    WriteOutput(b, "new b");
+    outputs.Finish();
+  }
+  EXPECT_EQ(Contents(), "new a,new b");
+  EXPECT_EQ(EntriesOf(here.path()), 1u);
+}
+
+TEST_F(CommitTogetherTest, ASetOfOursWithoutItsListOrItsFilesIsAnError) {
+  const PartialFolder set(here.path());
+  EXPECT_EQ(FinishMovedSet(set.path(), JournalOrigin::kOurs), ENOENT);
+  EXPECT_EQ(FinishMovedSet(set.path(), JournalOrigin::kFound), 0);
+  WriteSetJournal({{"a.txt"}, {}}, set.path());
+  EXPECT_EQ(FinishMovedSet(set.path(), JournalOrigin::kOurs), ENOENT);
+}
+
+TEST_F(CommitTogetherTest, ARecordThatDoesNotReachTheDiskLeavesNothing) {
+  FailingCalls calls;
+  int number = 0, failing = 0;
+  calls.on_fsync = [&](const std::string&) { return ++number == failing ? EIO : 0; };
+  for (failing = 1; failing < 100; ++failing) {
+    number = 0;
+    CommitTogether outputs;
+    WriteOutput(a, "new a");
+    WriteOutput(b, "new b");
+    try {
+      outputs.Finish();
+      break;
+    } catch (const InputError& error) {
+      const std::string sentence = error.what();
+      if (sentence.find("is kept in") != std::string::npos) break;  // behind the record
+      EXPECT_NE(sentence.find("Input/output error"), std::string::npos) << sentence;
+    }
+    EXPECT_FALSE(fs::exists(a));
+    EXPECT_EQ(ReadBytes(b), "old");
+    EXPECT_EQ(EntriesOf(here.path()), 0u) << failing;
+    EXPECT_EQ(EntriesOf(there.path()), 1u) << failing;
+  }
+  EXPECT_GE(failing, 6);  // two lists with two folders each, the record and its folder
+}
+
+TEST_F(CommitTogetherTest, WhatCannotBeMovedBehindTheRecordIsKeptForTheNextRun) {
+  FailingCalls calls;
+  calls.on_rename = [&](const std::string&, const std::string& to) {
+    return fs::path(to).filename() == "b.txt" && !IsPartial(to) ? ENOSPC : 0;
+  };
+  {
+    CommitTogether outputs;
+    WriteOutput(b, "new b");
+    WriteOutput(a, "new a");
+    EXPECT_INPUT_ERROR(outputs.Finish(), "is kept in ");
+  }
+  EXPECT_EQ(Contents(), "new a,old");
+  RemoveLeftovers(here.path());
+  EXPECT_EQ(Contents(), "new a,old");
+  calls.on_rename = nullptr;
+  RemoveLeftovers(there.path());
+  EXPECT_EQ(Contents(), "new a,new b");
+  RemoveLeftovers(here.path());
+  EXPECT_EQ(EntriesOf(here.path()), 1u);
+  EXPECT_EQ(EntriesOf(there.path()), 1u);
+}
+
+TEST_F(CommitTogetherTest, WhatBecameAFolderMeanwhileIsFoundBeforeTheRecord) {
+  CommitTogether outputs;
+  WriteOutput(a, "new a");
+  WriteOutput(b, "new b");
+  fs::remove(b);
+  fs::create_directory(b);
+  EXPECT_INPUT_ERROR(outputs.Finish(), "is a folder");
+  EXPECT_FALSE(fs::exists(a));
+  EXPECT_EQ(EntriesOf(here.path()), 0u);
+}
+
+// Where folders cannot change places the record is a file of the set, which has to be moved first.
+TEST_F(CommitTogetherTest, ASetThatBringsTheRecordIsMovedFirst) {
+  for (const bool here_first : {true, false}) {
+    WriteBytes(b, "old");
+    Leave(false);
+    fs::remove_all(aside_here);
+    const std::string set = here / (kPartialPrefix + std::string("9"));
+    const std::string name = fs::path(record).filename().string();
+    fs::create_directory(set);
+    WriteBytes(set + "/a.txt", "new a");
+    WriteCommitRecord({aside_there}, set + "/" + name);
+    WriteSetJournal({{name, "a.txt"}, {}}, set);
+    RemoveLeftovers(here_first ? here.path() : there.path());
+    EXPECT_EQ(Contents(), "new a,new b") << here_first;
+    EXPECT_EQ(EntriesOf(here.path()), 1u);
+    EXPECT_EQ(EntriesOf(there.path()), 1u);
+    fs::remove(a);
+  }
+}
+
+TEST_F(CommitTogetherTest, FoldersAreOnTheDiskOnceTheFilesAreThere) {
+  std::set<std::string> synced;
+  FailingCalls calls;
+  calls.on_fsync = [&](const std::string& path) {
+    if (fs::exists(a) && ReadBytes(b) != "old") synced.insert(path);
+    return 0;
+  };
+  CommitTogether outputs;
+  WriteOutput(a, "new a");
+  WriteOutput(b, "new b");
+  outputs.Finish();
+  EXPECT_EQ(synced.count(fs::canonical(there.path()).string()), 1u);
 }
 
 TEST_F(CommitTogetherTest, ARunThatIsKilledLeavesOldFilesForTheNextOne) {

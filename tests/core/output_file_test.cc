@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/report.h"
+#include "tests/core/failing_calls.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -66,6 +67,20 @@ TEST(OutputFile, KilledWriterLeavesTheOldFile) {
   waitpid(child, &status, 0);
   ASSERT_TRUE(WIFSIGNALED(status));
   EXPECT_EQ(ReadBytes(path), "old");
+}
+
+TEST(OutputFile, ItsNameIsOnTheDiskOnceItIsThere) {
+  const TempFolder folder;
+  const std::string path = folder / "out.ply";
+  std::string synced;
+  FailingCalls calls;
+  calls.on_fsync = [&](const std::string& file) {
+    if (fs::exists(path)) synced = file;
+    return 0;
+  };
+  OutputFile file(path);
+  file.Commit();
+  EXPECT_EQ(synced, fs::canonical(folder.path()));
 }
 
 TEST(OutputFile, MayBeWrittenThroughItsPath) {

@@ -15,6 +15,7 @@ class Line:
     unsteady: tuple = ()  # files and folders that hold times
     again: bool = True  # over its own results; False: it replaces nothing
     old: str = " --random_seed 7"  # options of the run that left those results
+    where: str = ""  # the folder to work in
     together: bool = True  # all files, in whatever folders, appear as one answer once the next command has run
 
 

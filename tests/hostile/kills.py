@@ -11,7 +11,7 @@ import subprocess
 import time
 
 import scene as s
-from commands import ALONE, LINES, Line, is_unsteady, prepared
+from commands import ALONE, LINES, ROOM, Line, is_unsteady, prepared
 
 LIBRARY = os.path.abspath(os.environ["ROOMTEX_DIE_AT_RENAME"]) if "ROOMTEX_DIE_AT_RENAME" in os.environ else ""
 ONLY = os.environ.get("ROOMTEX_CASES", "")  # in the title
@@ -23,6 +23,14 @@ def commands():
     yield ALONE
     yield Line("align in the folder that one works in", s.ALIGN + " --output_path .", None,
                ("alignment.json",))
+    # These replace all that they left, one file after the other: nothing can change places here.
+    room = ROOM.replace("room ", "../room ").replace("photos ", "../photos ")
+    for title, line in (("export", "roomtex-export " + room),
+                        ("dense", "roomtex-dense " + room + "--max_image_size 64 "),
+                        ("view", "roomtex-view --quiet --input_path ../coloured --aligned ../sparse "
+                         "--image_path ../photos ")):
+        yield Line(title + " in the folder that one works in", line + "--output_path .", None,
+                   ("here/report.json",), where="here")
     yield Line("align into three folders", (
         s.ALIGN + " --output_path aligned --Plane.output_path planes/planes.ply --report_path "
         "reports/r.json"), "aligned", ("aligned/alignment.json", "reports/r.json"))
@@ -161,18 +169,22 @@ def at_every_rename(base):
         if ONLY not in title:
             continue
         steady = lambda files: without(files, one.unsteady)
+        names = set()
         for old in (False, True) if one.again else (False,):
             here = scene.copy()
             inputs = here.state()
             if old:
-                here.run(line + one.old)
+                here.run(line + one.old, where=one.where)
                 if folder:
                     (here.root / folder / "mine.txt").write_text("mine")
             before = here.state()
             expected = here.copy()
-            answer = expected.run(line)
+            answer = expected.run(line, where=one.where)
             problem = answer.problem(codes)
             after = expected.state()
+            if names - set(after):
+                problem = f"over old results these are missing: {sorted(names - set(after))}"
+            names |= set(after)
             if old and one.old != Line.old and steady(before) == steady(after):
                 problem = "the old results are the new ones"
             number = 0
@@ -180,7 +192,7 @@ def at_every_rename(base):
                 number += 1
                 killed = here.copy()
                 how = "DIE_AT" if number % 2 else "DIE_AFTER"
-                answer = killed.run(line, environment={"LD_PRELOAD": LIBRARY,
+                answer = killed.run(line, where=one.where, environment={"LD_PRELOAD": LIBRARY,
                                                        "DIE_PROGRAM": line.split()[0],
                                                        how: str((number + 1) // 2)})
                 if answer.code in (0, 4):
@@ -200,7 +212,7 @@ def at_every_rename(base):
                 elif one.together and (problem := not_one_answer(killed, one, before, after)):
                     problem = f"{how} {number}: {problem}"
                 else:
-                    killed.run(line)
+                    killed.run(line, where=one.where)
                     if killed.leftovers():
                         problem = f"{how} {number}: the next run leaves {killed.leftovers()}"
                     elif steady(killed.state()) != steady(after):
@@ -255,7 +267,7 @@ def full_disk(base):
         for limit in (0, 2000, 20000):
             here = base.copy()
             before = here.state()
-            answer = here.run(line, limits=[(resource.RLIMIT_FSIZE, limit)])
+            answer = here.run(line, limits=[(resource.RLIMIT_FSIZE, limit)], where=one.where)
             after = here.state()
             problem = answer.problem({0, 3, 4})
             if answer.code in (0, 4) and limit < 2000:

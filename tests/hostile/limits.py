@@ -122,12 +122,15 @@ def geometry(base):
     fan = [[[0, 0, 0.5]] + [[3 * math.cos(angle / 3000), 3 * math.sin(angle / 3000), 0.5]
                             for angle in (k, k + 1)] for k in range(18849)]
     ordinary = scattered(0.05)
-    for scale in ("1", "auto"):
+    pinhole = (base.root / "sparse/cameras.txt").read_text()
+    panorama = "1 EQUIRECTANGULAR 240 160 240 160\n"
+    for camera, scale in ((pinhole, "1"), (pinhole, "auto"), (panorama, "1")):
         seconds = {}
         for kind, triangles in (("ordinary", ordinary), ("random", scattered(5)), ("fan", fan),
                                 ("strips", strips())):
             here = base.copy()
             (here.root / "mesh.ply").write_bytes(triangle_mesh(triangles))
+            (here.root / "sparse/cameras.txt").write_text(camera)
             started = time.time()
             answer = here.run("roomtex-texture --quiet --input_path sparse --image_path photos "
                               "--scan_path mesh.ply --output_path textured --Texture.scale " +
@@ -137,8 +140,8 @@ def geometry(base):
             problem = answer.problem({0, 3, 4})
             if not problem and seconds[kind] > 15 * seconds["ordinary"] + 2:
                 problem = f"{seconds[kind]:.1f} s instead of {seconds['ordinary']:.1f}"
-            yield (f"texture with scale {scale} on {kind} triangles, {seconds[kind]:.1f} s",
-                   problem)
+            yield (f"texture with scale {scale} on {kind} triangles"
+                   f"{' in panoramas' if camera == panorama else ''}, {seconds[kind]:.1f} s", problem)
 
 
 def endless(base):
@@ -154,13 +157,22 @@ def endless(base):
         "sparse/images.txt": (align, s.TEXTURE + " --output_path textured"),
         "photos/photo_000.jpg": (align, s.TEXTURE + " --output_path textured"),
         "project.ini": (align + " --project_path project.ini",),
+        "sparse/cameras.txt": ("roomtex-export --quiet --input_path sparse --image_path photos --scan_path "
+                               "scan.rtpi --output_path exported",),
+        "sparse/points3D.txt": ("roomtex-dense --quiet --input_path sparse --image_path photos --scan_path "
+                                "scan.rtpi --output_path dense",),
+        "house.json": ("roomtex-outline --quiet --outline_path house.json --output_path outline.json",),
+        "pairs.csv": (s.TEXTURE + " --output_path textured --associations_path pairs.csv",),
+        "model.ply": ("roomtex-view --quiet --input_path model.ply --output_path page",
+                      "roomtex-render --quiet --ply_path model.ply --input_path sparse --num_photos 1 "
+                      "--output_path picture.png"),
     }
     for name, using in lines.items():
         for kind in ("200 GB of nothing", "a pipe", "/dev/zero"):
             for line in using:
                 here = base.copy()
                 path = here.root / name
-                path.unlink()
+                path.unlink(missing_ok=True)
                 if kind == "a pipe":
                     os.mkfifo(path)
                 elif kind == "/dev/zero":
@@ -171,6 +183,15 @@ def endless(base):
                 answer = here.run(line, limits=[(resource.RLIMIT_AS, 3 << 30)], seconds=60)
                 good = {0, 3, 4} if name.startswith("photos") else {3}
                 yield f"{name} is {kind}: {line.split()[0]}", answer.problem(good)
+    here = base.copy()
+    program = here.root / "colmap"
+    program.write_text("#!/bin/sh\nhead -c 3000000000 /dev/zero | tr '\\0' x\nexit 1\n")
+    program.chmod(0o755)
+    answer = here.run("roomtex-mapper --quiet --database_path database.db --image_path photos "
+                      "--output_path mapped --colmap ./colmap", limits=[(resource.RLIMIT_AS, 1 << 30)])
+    log = sum(path.stat().st_size for path in here.root.rglob("*.log"))
+    yield "colmap prints a line of 3 GB: roomtex-mapper", answer.problem({3}) or (
+        f"keeps {log} bytes of it" if log > 1 << 20 or len(answer.err) > 1 << 16 else "")
 
 
 if __name__ == "__main__":

@@ -67,16 +67,17 @@ class Scene:
         return self.run_program(arguments, **how)
 
     def run_program(self, arguments, limits=(), environment=None, seconds=SECONDS, stdin=None,
-                    prepare=None):
-        """prepare: called in the process before the program is."""
+                    prepare=None, where=""):
+        """prepare: called in the process before the program is. where: the folder to work in."""
         def limit():
             for what, value in limits:
                 resource.setrlimit(what, (value, value))
             if prepare:
                 prepare()
 
+        (self.root / where).mkdir(exist_ok=True)
         process = subprocess.Popen(
-            arguments, cwd=self.root, stdin=stdin or subprocess.DEVNULL, stdout=subprocess.PIPE,
+            arguments, cwd=self.root / where, stdin=stdin or subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, preexec_fn=limit, start_new_session=True,
             env={**os.environ, **(environment or {})})
         try:

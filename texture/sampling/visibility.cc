@@ -127,8 +127,12 @@ class TriangleSplitter {
 class PanoramaSplitter {
  public:
   PanoramaSplitter(const PhotoProjector& projector, float scale_x, float scale_y, float max_edge_px,
-                   cv::Mat1f* out)
-      : projector_(projector), scale_x_(scale_x), scale_y_(scale_y), out_(out) {
+                   int64_t* splits_left, cv::Mat1f* out)
+      : splits_left_(splits_left),
+        projector_(projector),
+        scale_x_(scale_x),
+        scale_y_(scale_y),
+        out_(out) {
     px_per_radian_ = projector.camera().camera().MeanFocalLength() * scale_x;
     max_edge_px_ = std::min<double>(max_edge_px, kMaxEdge * px_per_radian_);
     max_bend_px_ = max_edge_px < kShadowEdgePx ? kMaxBendPx : kMaxShadowBendPx;
@@ -172,10 +176,11 @@ class PanoramaSplitter {
     if (std::max({a.distance, b.distance, c.distance}) < kNearDepth) return;
     const double ab = Excess(a, b), bc = Excess(b, c), ca = Excess(c, a);
     const double worst = std::max({ab, bc, ca});
-    if (!(worst > 0) || depth >= kMaxPanoramaSplits) {
+    if (!(worst > 0) || depth >= kMaxPanoramaSplits || *splits_left_ <= 0) {
       if (std::min({a.distance, b.distance, c.distance}) >= kNearDepth) DrawSmall(a, b, c);
       return;
     }
+    --*splits_left_;
     if (ab == worst) {
       Halve(a, b, c, depth);
     } else if (bc == worst) {
@@ -306,8 +311,8 @@ DepthMap::DepthMap(int photo_width, int photo_height, double scale, bool wraps) 
   scale_y_ = static_cast<float>(height) / static_cast<float>(photo_height);
 }
 
-void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
-                    float max_edge_px) {
+int64_t DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
+                       float max_edge_px) {
   const CpuTimer timer(CpuStage::kDepthMap);
   const auto width = static_cast<float>(inverse_depth_.cols);
   const auto height = static_cast<float>(inverse_depth_.rows);
@@ -316,9 +321,10 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
   for (const MeshTile& tile : tiles) {
     splits_left += kSplitsPerTriangle * static_cast<int64_t>(tile.triangles.size());
   }
+  const int64_t splits_at_most = splits_left;
   const TriangleSplitter splitter(projector, scale_x_, scale_y_, max_edge_px, &splits_left,
                                   &inverse_depth_);
-  const PanoramaSplitter panorama_splitter(projector, scale_x_, scale_y_, max_edge_px,
+  const PanoramaSplitter panorama_splitter(projector, scale_x_, scale_y_, max_edge_px, &splits_left,
                                            &inverse_depth_);
   // A triangle of a panorama that is small in the raster does not meet the seam; nor, away from
   // there, a pole.
@@ -360,6 +366,7 @@ void DepthMap::Draw(const PhotoProjector& projector, const std::vector<MeshTile>
       }
     }
   }
+  return splits_at_most - splits_left;
 }
 
 void DepthMap::CloseGaps(int radius_px) {

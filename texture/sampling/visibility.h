@@ -51,9 +51,10 @@ class DepthMap {
   DepthMap(int photo_width, int photo_height, double scale, bool wraps = false);
 
   // Draws the tiles that the photo may see. Triangles longer than max_edge_px (map pixels) are
-  // split, because a lens bends their sides.
-  void Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
-            float max_edge_px = 24);
+  // split, because a lens bends their sides. Gives how many splits that took: at most one per pixel
+  // of the map and 8 per triangle, beyond which they are drawn as they are.
+  int64_t Draw(const PhotoProjector& projector, const std::vector<MeshTile>& tiles,
+               float max_edge_px = 24);
 
   // Closes gaps of up to 2 * radius_px pixels with the nearest surface around them: single samples
   // that the scanner missed, and the cracks between a depth jump's two sides. Larger holes stay

@@ -7,12 +7,12 @@
 
 #include <Eigen/Geometry>
 
+#include "core/announce_page.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/local_server.h"
 #include "core/local_server_key.h"
-#include "core/open_browser.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
@@ -174,18 +174,8 @@ void Serve(const ViewOptions& options, const Command::Context& context) {
   LocalServer server(server_options);
   const ViewServer view(std::move(content), &server, context.options.num_threads);
   server.Start(true);
-  if (options.server.port != 0 && server.port() != options.server.port) {
-    context.progress.Note("port " + std::to_string(options.server.port) + " is taken: using " +
-                          std::to_string(server.port()));
-  }
   context.progress.Finish();
-  std::cout << server.Url() << std::endl << server.SshLine() << std::endl;
-  std::optional<OpenBrowser> browser;
-  if (options.server.open) {
-    browser.emplace(server.Url());
-    if (!browser->problem().empty()) context.Warn(browser->problem());
-  }
-  if (options.server.allow_remote) context.Warn(kNotEncrypted);
+  const auto browser = AnnouncePage(options.server, server, context);
   context.progress.Note("Ctrl-C ends");
   server.Wait();
 }

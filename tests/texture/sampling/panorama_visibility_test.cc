@@ -1,6 +1,7 @@
 // Depth maps of panoramas.
 
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -78,6 +79,29 @@ TEST(PanoramaVisibility, TheSeamIsNoDepthBoundary) {
     EXPECT_EQ(visibility.Look(x, 256, 3.5f), Sight::kHidden) << x;
     EXPECT_NE(visibility.Look(x, 256, 1.0f), Sight::kHidden) << x;
   }
+}
+
+// Triangles all over the room, as a broken mesh has them: each alone would be split thousands of
+// times.
+TEST(PanoramaDepthMap, SplitsAreBoundedByTheMapAndTheNumberOfTriangles) {
+  std::mt19937 generator(1);
+  std::uniform_real_distribution<double> anywhere(-3, 3);
+  MeshTile tile;
+  constexpr uint16_t kNumTriangles = 3000;
+  for (uint16_t k = 0; k < kNumTriangles; ++k) {
+    for (int corner = 0; corner < 3; ++corner) {
+      tile.points.Add({anywhere(generator), anywhere(generator), anywhere(generator)});
+    }
+    const auto first = static_cast<uint16_t>(3 * k);
+    tile.triangles.push_back(
+        {first, static_cast<uint16_t>(first + 1), static_cast<uint16_t>(first + 2)});
+  }
+  const PhotoProjector projector(View(Eigen::Quaterniond::Identity()));
+  DepthMap map(1024, 512, 0.25, true);
+  EXPECT_LE(map.Draw(projector, {tile}), 256 * 128 + 8 * kNumTriangles + 1);
+  // Those of a whole room are far from the bound.
+  DepthMap room(1024, 512, 1, true);
+  EXPECT_LT(room.Draw(projector, {Box({2, 1.3, 1.6})}), 1024 * 512 / 10);
 }
 
 }  // namespace
