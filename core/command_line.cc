@@ -12,7 +12,6 @@
 #include <optional>
 #include <set>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include <opencv2/core.hpp>
@@ -165,20 +164,6 @@ Outcome RunBody(const std::function<void()>& body) {
   } catch (...) {
     return {kExitInternalError, "internal error of an unknown kind"};
   }
-}
-
-// Before anything is read, so that nobody reads one half of what a killed command was moving.
-void RemoveLeftoversOf(const GuardedPaths& paths) {
-  namespace fs = std::filesystem;
-  std::set<std::string> folders;
-  for (const auto* options : {&paths.inputs, &paths.outputs}) {
-    for (const auto& [name, path] : *options) {
-      std::error_code error;
-      if (path.empty()) continue;
-      folders.insert(fs::is_directory(path, error) ? path : fs::path(path).parent_path().string());
-    }
-  }
-  for (const std::string& folder : folders) RemoveLeftovers(folder);
 }
 
 }  // namespace
@@ -533,7 +518,6 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     RequireWorkingFolder(paths);
     stuck = TidyFoldersOf(paths);
     guard.emplace(paths);
-    RemoveLeftoversOf(paths);
     impl_->RequireReplaceableReport();
   } catch (const UsageError& error) {
     std::cerr << impl_->name << ": " << error.what() << "\nSee " << impl_->name << " --help\n";

@@ -47,24 +47,6 @@ std::unique_ptr<CommitTogether>& AtEnd() {
 
 }  // namespace
 
-// Gone at the end, unless what it makes valid has not been done yet.
-class CommitTogether::Record {
- public:
-  explicit Record(std::string path) : path_(std::move(path)) {}
-  ~Record() { RemovePartial(path_); }
-  Record(const Record&) = delete;
-  Record& operator=(const Record&) = delete;
-
-  const std::string& path() const { return path_; }
-  void Keep() {
-    ReleasePartial(path_);
-    path_.clear();
-  }
-
- private:
-  std::string path_;
-};
-
 // Files of one folder on their way to it.
 struct CommitTogether::Folder {
   std::vector<WholeFile> files;

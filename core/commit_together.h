@@ -48,12 +48,10 @@ class CommitTogether {
 
  private:
   struct Folder;
-  class Record;
   void GiveToSets(const std::vector<std::shared_ptr<OutputSet>>& sets);
   void RequireAllReplaceable(const std::vector<std::shared_ptr<OutputSet>>& sets) const;
   std::vector<Folder> MakeLists(const std::string& record) const;
   void MoveAll(const std::vector<std::shared_ptr<OutputSet>>& sets);
-  static void MoveFolders(const std::vector<Folder>& folders, Record* record);
 
   mutable std::mutex mutex_;
   std::vector<WholeFile> files_;

@@ -7,7 +7,6 @@
 #include <mutex>
 #include <set>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -156,40 +155,6 @@ class Leftovers {
   std::vector<std::string> stuck_;
 };
 
-// In the order in which they are looked at: files and folders, of which some bring along the commit
-// record that others wait for.
-enum class Leftover { kWhole, kRecord, kWaiting };
-
-Leftover KindOf(const std::string& path) {
-  std::error_code error;
-  if (!fs::is_directory(fs::symlink_status(path, error))) {
-    return ReadCommitRecord(path) ? Leftover::kRecord : Leftover::kWhole;
-  }
-  const std::optional<SetJournal> journal = ReadSetJournal(path);
-  return journal && !journal->waits_for.empty() ? Leftover::kWaiting : Leftover::kWhole;
-}
-
-std::vector<std::string> LeftoversOf(const std::string& folder, Leftover kind) {
-  std::vector<std::string> found;
-  std::error_code error;
-  fs::directory_iterator entry(folder, error), end;
-  for (; !error && entry != end; entry.increment(error)) {
-    const std::string path = entry->path().string();
-    const bool is_partial = entry->path().filename().string().rfind(kPartialPrefix, 0) == 0;
-    if (is_partial && KindOf(path) == kind) found.push_back(path);
-  }
-  return found;
-}
-
-void TidyUpAll(const std::string& folder, Leftover kind) {
-  for (const std::string& path : LeftoversOf(folder, kind)) {
-    TidyUp(path, [&] {
-      return kind == Leftover::kRecord ? FinishSetsOf(path)
-                                       : FinishMovedSet(path, JournalOrigin::kFound) == 0;
-    });
-  }
-}
-
 }  // namespace
 
 std::string PartialName() { return kPartialPrefix + RandomDigits(); }
@@ -246,11 +211,6 @@ void PartialFolder::MoveInto(const std::string& parent) {
   LivingPaths()[moved] = LivingPaths()[path_];
   LivingPaths().erase(path_);
   path_ = moved;
-}
-
-std::string PartialFolder::Keep() {
-  ReleasePartial(path_);
-  return std::exchange(path_, "");
 }
 
 bool IsPartial(const std::string& path) { return path.find(kPartialPrefix) != std::string::npos; }

@@ -35,10 +35,6 @@ enum class JournalOrigin { kOurs, kFound };
 inline constexpr int kOfAnotherUser = -1;
 int FinishMovedSet(const std::string& set, JournalOrigin origin);
 
-// The remedy where not all could be moved.
-inline constexpr char kNextMovesThem[] =
-    "Check the rights of the folder: the next command that writes there moves them";
-
 // A file by whose appearance several sets, in several folders, are to be moved: it names them, so
 // that whoever finds it moves them first. Throws std::system_error, and leaves no record then.
 void WriteCommitRecord(const std::vector<std::string>& sets, const std::string& path);

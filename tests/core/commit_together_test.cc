@@ -107,33 +107,6 @@ TEST_F(CommitTogetherTest, WithASetThatCannotBeReplacedNothingAppears) {
   EXPECT_EQ(ReadBytes(b), "old");
 }
 
-// A set that is moved file by file brings the record along as one of them.
-TEST_F(CommitTogetherTest, ARecordThatASetBringsAlongCountsAtOnce) {
-  Leave(true);
-  const std::string set = here / (kPartialPrefix + std::string("0"));
-  fs::create_directory(set);
-  fs::rename(record, set + "/" + fs::path(record).filename().string());
-  WriteSetJournal({{fs::path(record).filename().string()}, {}}, set);
-  RemoveLeftovers(here.path());
-  EXPECT_EQ(Contents(), "new a,new b");
-  EXPECT_EQ(EntriesOf(here.path()), 1u);
-  EXPECT_EQ(EntriesOf(there.path()), 1u);
-}
-
-TEST_F(CommitTogetherTest, WhatCannotBeMovedKeepsTheRecord) {
-  Leave(true);
-  fs::remove(b);
-  fs::create_directory(b);
-  RemoveLeftovers(here.path());
-  EXPECT_EQ(ReadBytes(a), "new a");
-  EXPECT_TRUE(fs::exists(record));
-  fs::remove(b);
-  RemoveLeftovers(here.path());
-  EXPECT_EQ(Contents(), "new a,new b");
-  EXPECT_EQ(EntriesOf(here.path()), 1u);
-  EXPECT_EQ(EntriesOf(there.path()), 1u);
-}
-
 TEST_F(CommitTogetherTest, ARunKilledBeforeTheRecordHasChangedNothing) {
   Leave(false);
   WriteBytes(record, "roomtex commit record\ns" + aside_here);  // cut off
@@ -221,10 +194,10 @@ TEST_F(CommitTogetherTest, ARecordThatDoesNotReachTheDiskLeavesNothing) {
   calls.on_fsync = [&](const std::string&) { return ++number == failing ? EIO : 0; };
   for (failing = 1; failing < 100; ++failing) {
     number = 0;
-    CommitTogether outputs;
-    WriteOutput(a, "new a");
-    WriteOutput(b, "new b");
     try {
+      CommitTogether outputs;
+      WriteOutput(a, "new a");
+      WriteOutput(b, "new b");
       outputs.Finish();
       break;
     } catch (const InputError& error) {
@@ -263,12 +236,14 @@ TEST_F(CommitTogetherTest, WhatCannotBeMovedBehindTheRecordIsKeptForTheNextRun) 
 }
 
 TEST_F(CommitTogetherTest, WhatBecameAFolderMeanwhileIsFoundBeforeTheRecord) {
-  CommitTogether outputs;
-  WriteOutput(a, "new a");
-  WriteOutput(b, "new b");
-  fs::remove(b);
-  fs::create_directory(b);
-  EXPECT_INPUT_ERROR(outputs.Finish(), "is a folder");
+  {
+    CommitTogether outputs;
+    WriteOutput(a, "new a");
+    WriteOutput(b, "new b");
+    fs::remove(b);
+    fs::create_directory(b);
+    EXPECT_INPUT_ERROR(outputs.Finish(), "is a folder");
+  }
   EXPECT_FALSE(fs::exists(a));
   EXPECT_EQ(EntriesOf(here.path()), 0u);
 }

@@ -90,26 +90,6 @@ TEST_F(OutputSetTest, FillsTheFolderThatOneWorksIn) {
   fs::current_path(before);
 }
 
-// Its own folder is made there, and files of the same names are both replaced and done away with.
-TEST_F(OutputSetTest, ReplacesAllOfTheFolderThatOneWorksIn) {
-  fs::create_directory(place);
-  const fs::path before = fs::current_path();
-  fs::current_path(place);
-  for (const char* round : {"first", "second"}) {
-    OutputSet set(".");
-    set.ReplaceAllOf("roomtex-test");
-    WriteBytes(set.Path("report.json"), R"({"command": "roomtex-test"})");
-    WriteBytes(set.Path("data/a"), round);
-    WriteBytes(set.Path(std::string("only_") + round), round);
-    set.Commit();
-    EXPECT_EQ(ReadBytes("data/a"), round);
-    EXPECT_TRUE(fs::exists("report.json"));
-    EXPECT_EQ(NumEntries("."), 3u);
-  }
-  EXPECT_TRUE(fs::exists("only_second"));
-  fs::current_path(before);
-}
-
 TEST_F(OutputSetTest, GoesToTheEndOfALinkToAFolder) {
   fs::create_directory(folder / "real");
   fs::create_directory_symlink("real", place);
@@ -171,38 +151,6 @@ TEST_F(OutputSetTest, AListThatWasFoundReachesNoFileOutsideItsFolder) {
   EXPECT_EQ(ReadBytes(In("whole")), "theirs");
   EXPECT_FALSE(fs::exists(In("taken")));
   EXPECT_FALSE(fs::exists(set));
-}
-
-TEST_F(OutputSetTest, WhatCannotBeMovedIsKept) {
-  fs::create_directories(In("b"));  // in the place of a file
-  const std::string set = In(std::string(kPartialPrefix) + "0");
-  fs::create_directory(set);
-  for (const char* name : {"a", "b", "c"}) WriteBytes(set + "/" + name, "new");
-  WriteSetJournal({{"a", "b", "c"}, {"c", "old"}}, set);
-  RemoveLeftovers(place);
-  EXPECT_EQ(ReadBytes(In("a")) + ReadBytes(In("c")), "newnew");
-  EXPECT_EQ(ReadBytes(set + "/b"), "new");
-  fs::remove(In("b"));
-  RemoveLeftovers(place);
-  EXPECT_EQ(ReadBytes(In("b")), "new");
-  EXPECT_EQ(NumEntries(place), 3u);
-}
-
-// As on disks that say themselves whom files belong to.
-TEST_F(OutputSetTest, WhatThisProcessMadeIsMovedWhomeverItBelongsTo) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root makes files of others";
-  const std::string set = In("set");
-  fs::create_directories(set);
-  const std::string record = In("record");
-  WriteBytes(set + "/a", "new");
-  WriteSetJournal({{"a"}, {}, record}, set);
-  WriteCommitRecord({set}, record);
-  for (const std::string& path : {set + "/.roomtex-journal", record}) {
-    ASSERT_EQ(lchown(path.c_str(), 65534, 65534), 0);
-  }
-  EXPECT_EQ(FinishMovedSet(set, JournalOrigin::kOurs), 0);
-  EXPECT_EQ(ReadBytes(In("a")), "new");
-  EXPECT_EQ(FinishMovedSet(set, JournalOrigin::kOurs), ENOENT);  // it is no longer there to move
 }
 
 TEST_F(OutputSetTest, TheListOfAnotherUserIsNotFollowed) {
