@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Installs every dependency from Debian 12's packages. Idempotent; uses sudo only when not root.
-# Usage: scripts/setup.sh [--site]    --site: Snakemake, too, for docs/site.md (80 packages, 0.7 GB)
+# Usage: scripts/setup.sh [--site | --slurm]
+#   --site: Snakemake, too, for docs/site.md (80 packages, 0.7 GB); --slurm: and Slurm, for scripts/test_slurm.sh
 set -euo pipefail
 case "${1:-}" in
-  "" | --site) ;;
-  *) echo "Say: scripts/setup.sh [--site]" >&2; exit 2 ;;
+  "" | --site | --slurm) ;;
+  *) echo "Say: scripts/setup.sh [--site | --slurm]" >&2; exit 2 ;;
 esac
 
 packages=(
@@ -23,7 +24,8 @@ packages=(
 command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 command -v python3 >/dev/null || packages+=(python3)  # tests/hostile
-[ "${1:-}" != --site ] || packages+=(snakemake)
+[ -z "${1:-}" ] || packages+=(snakemake)
+[ "${1:-}" != --slurm ] || packages+=(slurm-wlm munge)
 
 missing=()
 for package in "${packages[@]}"; do

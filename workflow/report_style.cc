@@ -61,6 +61,8 @@ svg.site .room.doubted { stroke: var(--bad); stroke-opacity: 1; stroke-width: 3;
 svg.site .name text { paint-order: stroke; stroke: var(--ground); stroke-width: 5px; font-size: 18px; }
 svg.site .door { fill: var(--ground); stroke: var(--text); stroke-width: 3; }
 svg.site .door.doubted { stroke: var(--bad); }
+.plans { display: flex; flex-wrap: wrap; align-items: flex-end; gap: 0 20px; }
+.plans svg.plan { width: auto; max-width: 100%; height: auto; }
 svg .scale path { stroke: var(--text); stroke-width: 3; }
 .key { display: flex; flex-wrap: wrap; gap: 4px 18px; margin: 8px 0; font-size: .875rem; color: var(--quiet); }
 .key i { display: inline-block; width: 14px; height: 14px; border-radius: 3px; margin-right: 6px; vertical-align: -2px; }

@@ -1,7 +1,11 @@
 #include "workflow/site_page.h"
 
 #include <algorithm>
+#include <optional>
+#include <set>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "core/command_line.h"
 #include "core/text.h"
@@ -13,6 +17,8 @@ namespace roomtex {
 namespace {
 
 constexpr size_t kPlacesPerRoom = 3;
+// Pixels that the largest of the rooms drawn by themselves takes, and that a metre takes at most.
+constexpr double kRoomWidth = 300, kRoomHeight = 260, kPixelsPerMetre = 80;
 
 class SitePage {
  public:
@@ -23,6 +29,7 @@ class SitePage {
     Remedies();
     Rooms();
     Joined();
+    RoomPlans();
     Places();
     Steps();
     return HtmlPage(keys_["verdict"]["headline"], body_);
@@ -153,6 +160,7 @@ class SitePage {
       Loops();
     } catch (const Json::exception&) {
       body_ = before;
+      drawn_.clear();
     }
   }
 
@@ -175,6 +183,9 @@ class SitePage {
     for (const std::string& frame : frames) {
       const std::string plan = DrawSitePlan(keys_, frame, to_rooms_);
       if (plan.empty()) continue;
+      for (const Json& room : joined["rooms"]) {
+        if (room.at("frame") == frame) drawn_.insert(room.at("name").get<std::string>());
+      }
       body_ += "<figure>" + plan + "<figcaption>In the scan frame of " + HtmlText(frame) +
                ". Circles: doorways with photos or scans that both rooms share; red: not to be "
                "trusted. Colours as in the reports of the rooms: blue two photos or more, orange "
@@ -259,6 +270,39 @@ class SitePage {
         "\n";
   }
 
+  // The rooms that are in no plan with others, beside each other to one scale.
+  void RoomPlans() {
+    std::vector<const Json*> rooms;
+    double units = kPixelsPerMetre;
+    for (const Json& room : keys_["rooms"]) {
+      const std::optional<Eigen::Vector2d> size = PlanSize(room);
+      if (!size || drawn_.count(room["name"].get<std::string>()) > 0) continue;
+      units = std::min({units, kRoomWidth / size->x(), kRoomHeight / size->y()});
+      rooms.push_back(&room);
+    }
+    if (rooms.empty()) return;
+    Heading(rooms.size() > 1 ? "Rooms in frames of their own" : "A room in a frame of its own");
+    body_ +=
+        HtmlTag(
+            "p class=\"quiet\"",
+            std::string(rooms.size() > 1
+                            ? "These rooms stand in no common frame. They are drawn side by side, "
+                              "to one scale; where they stand to each other is not known. "
+                            : "") +
+                "Colours as in the reports of the rooms: blue two photos or more, orange "
+                "one, red none.") +
+        "\n<div class=\"plans\">";
+    for (const Json* room : rooms) {
+      const Eigen::Vector2d size = *PlanSize(*room);
+      const std::string state = (*room)["state"];
+      body_ += "<figure>" + DrawRoomPlan(*room, units, to_rooms_) + "<figcaption>" + NameOf(*room) +
+               ", " + Number(size.x(), 1) + " × " + Number(size.y(), 1) + "\u00a0m" +
+               (state == "trusted" ? "" : ". " + HtmlText(VerdictWord(state))) +
+               "</figcaption></figure>";
+    }
+    body_ += "</div>\n";
+  }
+
   // The rooms of which most is missing first.
   void Places() {
     std::vector<const Json*> rooms;
@@ -312,6 +356,7 @@ class SitePage {
 
   const Json& keys_;
   std::string to_rooms_, body_;
+  std::set<std::string> drawn_;  // rooms in a plan with others
 };
 
 }  // namespace

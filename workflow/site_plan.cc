@@ -17,9 +17,40 @@ namespace {
 constexpr double kWidth = 1000, kHeight = 620;
 constexpr double kMarginShare = 0.04;  // of the rooms' longer side
 constexpr double kLongestScale = 0.2;  // of the width
+constexpr double kLargestPlan = 1e5;   // metres; beyond it is no plan
+// Of the drawing of one room, in its units.
+constexpr double kEdge = 14, kFoot = 36, kRoomScale = 100;
 
 Eigen::Vector3d VectorOf(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+// 1, 2 or 5 metres, or ten times as many: as many as are shorter than `longest`.
+double ScaleMetres(double longest) {
+  double metres = 1;
+  for (const double next : {2., 5., 10., 20., 50., 100., 200., 500.}) {
+    if (next < longest) metres = next;
+  }
+  return metres;
+}
+
+std::string Pair(const Eigen::Vector2d& x) { return Number(x.x(), 1) + "," + Number(x.y(), 1); }
+
+std::string Text(const Eigen::Vector2d& at, const std::string& text) {
+  return "<text x=\"" + Number(at.x(), 1) + "\" y=\"" + Number(at.y(), 1) + "\">" + HtmlText(text) +
+         "</text>";
+}
+
+// From `left` on, with `units` of the drawing in a metre.
+std::string ScaleBar(const Eigen::Vector2d& left, double metres, double units) {
+  const Eigen::Vector2d right = left + Eigen::Vector2d(metres * units, 0);
+  return "<g class=\"scale\"><path d=\"M" + Pair(left) + " L" + Pair(right) + "\"/>" +
+         Text(right + Eigen::Vector2d(36, 0), Number(metres, 0) + " m") + "</g>";
+}
+
+std::string PicturePath(const Json& room, const std::string& to_rooms) {
+  return UrlPath(to_rooms + room.at("folder").get<std::string>() + "/" +
+                 room.at("plan").at("picture").get<std::string>());
 }
 
 Eigen::Matrix3d RowsOf(const Json& json) {
@@ -99,8 +130,7 @@ class SiteDrawing {
         level_from_site_ * rotation * plan_from_scan.transpose();
     PlacedPlan placed;
     placed.room = &room;
-    placed.picture =
-        to_rooms_ + room["folder"].get<std::string>() + "/" + plan.at("picture").get<std::string>();
+    placed.picture = PicturePath(room, to_rooms_);
     placed.trusted = joined.at("trusted").get<bool>();
     placed.size = VectorOf(plan.at("size")).head<2>();
     placed.turn = level_from_plan.topLeftCorner<2, 2>();
@@ -112,13 +142,6 @@ class SiteDrawing {
   // Drawn with y up.
   Eigen::Vector2d OnPage(const Eigen::Vector2d& x) const {
     return units_ * Eigen::Vector2d(x.x() - low_.x(), high_.y() - x.y());
-  }
-  static std::string Pair(const Eigen::Vector2d& x) {
-    return Number(x.x(), 1) + "," + Number(x.y(), 1);
-  }
-  static std::string Text(const Eigen::Vector2d& at, const std::string& text) {
-    return "<text x=\"" + Number(at.x(), 1) + "\" y=\"" + Number(at.y(), 1) + "\">" +
-           HtmlText(text) + "</text>";
   }
 
   std::string Room(const PlacedPlan& plan) const {
@@ -137,8 +160,8 @@ class SiteDrawing {
     return "<image transform=\"matrix(" + matrix + Number(origin.x(), 2) + " " +
            Number(origin.y(), 2) + ")\" width=\"" + Number(plan.size.x(), 3) + "\" height=\"" +
            Number(plan.size.y(), 3) + "\" preserveAspectRatio=\"none\" href=\"" +
-           HtmlText(UrlPath(plan.picture)) + "\"/><path class=\"room" +
-           (plan.trusted ? "" : " doubted") + "\" d=\"" + outline + " Z\"/>";
+           HtmlText(plan.picture) + "\"/><path class=\"room" + (plan.trusted ? "" : " doubted") +
+           "\" d=\"" + outline + " Z\"/>";
   }
 
   std::string Name(const PlacedPlan& plan) const {
@@ -159,16 +182,9 @@ class SiteDrawing {
            "</title></circle>";
   }
 
-  // 1, 2 or 5 metres, or ten times as many.
   std::string Scale() const {
-    double metres = 1;
-    for (const double next : {2., 5., 10., 20., 50., 100., 200., 500.}) {
-      if (next < kLongestScale * (high_.x() - low_.x())) metres = next;
-    }
-    const Eigen::Vector2d left = OnPage(low_) + Eigen::Vector2d(20, -16);
-    const Eigen::Vector2d right = left + Eigen::Vector2d(metres * units_, 0);
-    return "<g class=\"scale\"><path d=\"M" + Pair(left) + " L" + Pair(right) + "\"/>" +
-           Text(right + Eigen::Vector2d(36, 0), Number(metres, 0) + " m") + "</g>";
+    return ScaleBar(OnPage(low_) + Eigen::Vector2d(20, -16),
+                    ScaleMetres(kLongestScale * (high_.x() - low_.x())), units_);
   }
 
   const Json& keys_;
@@ -187,6 +203,33 @@ std::string DrawSitePlan(const Json& keys, const std::string& frame, const std::
   } catch (const Json::exception&) {
     return "";  // a report of another version
   }
+}
+
+std::optional<Eigen::Vector2d> PlanSize(const Json& room) {
+  try {
+    const Eigen::Vector2d size = VectorOf(room.at("plan").at("size")).head<2>();
+    const bool is_plan = size.minCoeff() > 0 && size.maxCoeff() < kLargestPlan;
+    if (!is_plan || !room.at("plan").at("picture").is_string()) return std::nullopt;
+    return size;
+  } catch (const Json::exception&) {
+    return std::nullopt;  // a report of another version, or of a room that is not so far
+  }
+}
+
+std::string DrawRoomPlan(const Json& room, double units, const std::string& to_rooms) {
+  const Eigen::Vector2d plan = units * PlanSize(room).value();
+  const double metres = ScaleMetres(kRoomScale / units);
+  const double width = std::max(plan.x(), metres * units + 64) + 2 * kEdge;
+  const double height = plan.y() + kEdge + kFoot;
+  const std::string place = " width=\"" + Number(plan.x(), 1) + "\" height=\"" +
+                            Number(plan.y(), 1) + "\" x=\"" + Number(0.5 * (width - plan.x()), 1) +
+                            "\" y=\"" + Number(kEdge, 1) + "\"";
+  return "<svg class=\"plan site alone\" role=\"img\" width=\"" + Number(width, 0) +
+         "\" height=\"" + Number(height, 0) + "\" viewBox=\"0 0 " + Number(width, 0) + " " +
+         Number(height, 0) + "\" aria-label=\"Plan of " + HtmlText(room["name"]) + "\"><image" +
+         place + " preserveAspectRatio=\"none\" href=\"" + HtmlText(PicturePath(room, to_rooms)) +
+         "\"/><rect class=\"room\"" + place + "/>" +
+         ScaleBar({kEdge, height - 0.5 * kFoot}, metres, units) + "</svg>";
 }
 
 }  // namespace roomtex

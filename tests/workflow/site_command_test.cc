@@ -1,5 +1,8 @@
 // roomtex-site as users call it, on rooms whose reports are written here.
 
+#include <map>
+#include <string>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -174,6 +177,56 @@ TEST_F(SiteCommand, ShowsTheRoomsInOnePlanAndWhatLinksThem) {
   WriteBytes(folder_ / "joined/joined.json", "[]");
   EXPECT_EQ(Run().exit_code, 0);
   EXPECT_TRUE(Site()["joined"].is_null());
+}
+
+// Three rooms with plans of which roomtex-join linked none: each is drawn by itself, all to one
+// scale, that of the largest.
+TEST_F(SiteCommand, ShowsRoomsThatNothingLinksEachInAPlanOfItsOwn) {
+  const std::map<std::string, json> sizes = {
+      {"attic", {6, 3, 2.5}}, {"b", {2, 1, 2.5}}, {"c", {1, 1, 2.5}}, {"d", {0, 1, 2.5}}};
+  for (const auto& [room, size] : sizes) {
+    AddStep(room, "align", StepState::kDone);
+    AddReport(room, room == "b" ? "untrusted" : "trusted");
+    WriteBytes(folder_ / (room + "/log/plan.png"), "a picture");
+    json report = json::parse(ReadBytes(folder_ / (room + "/report.json")));
+    report["plan"] = {{"picture", "log/plan.png"},
+                      {"plan_from_scan", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                      {"low", {0, 0, 0}},
+                      {"size", size}};
+    WriteBytes(folder_ / (room + "/report.json"), report.dump());
+  }
+  EXPECT_EQ(Run().exit_code, 4);
+  const std::string page = Page();
+  for (const char* text :
+       {"These rooms stand in no common frame", "width=\"300.0\" height=\"150.0\"",
+        "width=\"100.0\" height=\"50.0\"", "href=\"attic/log/plan.png\"",
+        "attic</a>, 6.0 × 3.0\u00a0m<", "b</a>, 2.0 × 1.0\u00a0m. Not to be trusted<", ">1 m<"}) {
+    EXPECT_THAT(page, HasSubstr(text));
+  }
+  EXPECT_THAT(page, Not(HasSubstr("d/log/plan.png")));  // no size, no plan
+
+  // With the first two linked, the third is by itself.
+  json joined = json::parse(R"({"trusted": true, "reason": "", "reference": "attic",
+    "scene": null, "links": [], "loops": [], "rooms": []})");
+  for (const char* name : {"attic", "b", "c"}) {
+    joined["rooms"].push_back({{"name", name},
+                               {"frame", name[0] == 'c' ? "c" : "attic"},
+                               {"trusted", true},
+                               {"site_from_room", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}}});
+  }
+  MakeFolder(folder_ / "joined");
+  WriteBytes(folder_ / "joined/joined.json", joined.dump());
+  EXPECT_EQ(Run().exit_code, 4);
+  const std::string linked = Page();
+  EXPECT_THAT(linked, HasSubstr("A room in a frame of its own"));
+  EXPECT_THAT(linked, HasSubstr("aria-label=\"Plan of c\""));
+  EXPECT_THAT(linked, Not(HasSubstr("aria-label=\"Plan of b\"")));
+
+  // A report that cannot be read links none.
+  joined["links"] = {3};
+  WriteBytes(folder_ / "joined/joined.json", joined.dump());
+  EXPECT_EQ(Run().exit_code, 4);
+  EXPECT_THAT(Page(), HasSubstr("aria-label=\"Plan of b\""));
 }
 
 // A killed run, another program: what is no report counts as none.

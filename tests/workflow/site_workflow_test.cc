@@ -2,9 +2,13 @@
 // matches made in parts, and one whose photos show nothing in common; and of two rooms that share
 // photos. Label `slow`.
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
@@ -207,6 +211,46 @@ TEST_F(SiteWorkflow, JoinsTwoRoomsByThePhotosThatTheyShare) {
   EXPECT_LT(Eigen::AngleAxisd(off.rotation()).angle(), 0.003);
   const json site = json::parse(ReadBytes(At("site.json")));
   EXPECT_EQ(site["counts"]["trusted"], 2);
+}
+
+// What every job of a dry run asks for, by its rule.
+std::map<std::string, int> AskedOf(const std::string& dry_run, const std::string& resource) {
+  std::map<std::string, int> asked;
+  std::istringstream lines(dry_run);
+  std::string rule;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("rule ", 0) == 0) rule = line.substr(5, line.find(':') - 5);
+    const size_t at = line.find(" " + resource + "=");
+    if (line.find("resources:") == std::string::npos || at == std::string::npos) continue;
+    asked[rule] = std::stoi(line.substr(at + resource.size() + 2));
+  }
+  return asked;
+}
+
+TEST_F(SiteWorkflow, AsksForTwiceTheMemoryAndTimeWithEveryTry) {
+  Simulate("a",
+           "--num_photos 8 --photo_width 240 --photo_height 160 --scan_columns 200 --scan_rows 80");
+  // Its matches in two parts, so that every rule is there.
+  WriteBytes(folder_ / "site.csv",
+             "room,photos,scans,options\nhall,a/photos,a/scan.rtpi,--pairs 1\n");
+  std::vector<std::map<std::string, int>> megabytes, minutes;
+  for (const char* attempt : {"1", "2", "3"}) {
+    const CommandResult run = RunSite(std::string("max_mem_mb=1700 -n --attempt ") + attempt);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    megabytes.push_back(AskedOf(run.err, "mem_mb"));
+    minutes.push_back(AskedOf(run.err, "runtime"));
+  }
+  for (const char* rule : {"features", "pairs", "part", "parts", "matches", "mapper", "align",
+                           "texture", "pictures"}) {
+    ASSERT_EQ(megabytes[0].count(rule), 1u) << rule;
+    const int first = megabytes[0][rule];
+    EXPECT_GT(first, 100) << rule;
+    EXPECT_LT(first, 1700) << rule;
+    EXPECT_EQ(megabytes[1][rule], std::min(2 * first, 1700)) << rule;
+    EXPECT_EQ(megabytes[2][rule], std::min(4 * first, 1700)) << rule;
+    EXPECT_EQ(minutes[1][rule], 2 * minutes[0][rule]) << rule;
+    EXPECT_EQ(minutes[2][rule], 4 * minutes[0][rule]) << rule;
+  }
 }
 
 TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
