@@ -237,6 +237,7 @@ class PanoramaSplitter {
     }
   }
 
+  int64_t* splits_left_;
   const PhotoProjector& projector_;
   float scale_x_, scale_y_;
   double px_per_radian_, max_edge_px_, max_bend_px_;
