@@ -9,9 +9,6 @@
 namespace roomtex {
 namespace {
 
-// Pixels per coordinate; keypoints are not exacter than that, even where a small model fits them.
-constexpr double kLeastKeypointNoise = 0.3;
-
 void Append(std::vector<std::string> more, std::vector<std::string>* all) {
   std::move(more.begin(), more.end(), std::back_inserter(*all));
 }
@@ -25,10 +22,6 @@ constexpr double kSameFocalDeviations = 3, kClearlyNearer = 0.95;
 // ... or the photos have to be this sure of its focal length. A scan that is itself off by
 // centimetres may lie a few per cent nearer to the wrong lens; it has to lie far nearer then.
 constexpr double kSureFocalDeviations = 6, kFarNearer = 0.6;
-
-double KeypointSigma(double reprojection_rms_px) {
-  return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
-}
 
 // RMS over all observations, pixels.
 double ReprojectionRms(SparseModel model) { return UpdateReprojectionErrors(&model).rms_px; }

@@ -1,6 +1,7 @@
 #include "align/alignment_fit.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/camera_formulas.h"
 
@@ -22,6 +23,12 @@ double PickBend(const AlignmentInput& input, const ShapeDisagreement& disagreeme
 }
 
 }  // namespace
+
+double KeypointSigma(double reprojection_rms_px) {
+  // Pixels; keypoints are not exacter than that, even where a small model fits them.
+  constexpr double kLeastKeypointNoise = 0.3;
+  return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
+}
 
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
                           const AlignmentOptions& options) {

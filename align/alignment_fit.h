@@ -28,6 +28,9 @@ struct AlignmentFit {
   double pick_bend_px = 0;
 };
 
+// Standard deviation of an observation's coordinate, pixels.
+double KeypointSigma(double reprojection_rms_px);
+
 // sigma_px: of an observation of the sparse model, per coordinate (KeypointSigma()).
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
                           const AlignmentOptions& options);

@@ -202,6 +202,11 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
 
 }  // namespace
 
+double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface) {
+  // A coarse scan is not a laser's.
+  return std::max(trust.surface_tolerance, kNoiseReach * surface.TypicalThickness());
+}
+
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
                    const AlignmentFit& fit, const AlignmentOptions& options) {
   Judgement judgement;
@@ -215,9 +220,7 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
   }
   FindAccuracy(input, start, fit, options, &judgement);
   TrustOptions trust = options.trust;
-  // A coarse scan is not a laser's.
-  trust.surface_tolerance =
-      std::max(trust.surface_tolerance, kNoiseReach * input.surveyed.patches().TypicalThickness());
+  trust.surface_tolerance = SurfaceTolerance(trust, input.surveyed.patches());
   if (!fit.refined) {
     // Clicks alone are rough, and say themselves how rough.
     trust.surface_tolerance =

@@ -30,6 +30,9 @@ struct Judgement {
   std::string sparse_on_surface;
 };
 
+// Metres; a sparse point this near to the surface is on it.
+double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface);
+
 // Picks and scale of the start, similarity and placement of the fit: before the poses are adjusted,
 // which brings points to the surface that do not belong there, too.
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,

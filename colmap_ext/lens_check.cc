@@ -236,11 +236,14 @@ std::string LensFinding::Sentence() const {
   const double told_px = told.MeanFocalLength(), found_px = found.MeanFocalLength();
   std::string who = "Camera " + std::to_string(camera_ids[0]);
   if (apart) {
+    const bool is_one = photos.size() == 1;
     who = photos[0] +
-          (photos.size() > 1 ? " and " + std::to_string(photos.size() - 1) + " more photos" : "");
-    return who + " obey a focal length of " + Number(found_px, 1) + " pixels instead of " +
+          (is_one ? " obeys" : " and " + std::to_string(photos.size() - 1) + " more photos obey");
+    return who + " a focal length of " + Number(found_px, 1) + " pixels instead of " +
            Number(told_px, 1) + ": a zoom or another focus. " +
-           (used ? "They got a camera of their own." : "The lens as told is kept.");
+           (!used    ? "The lens as told is kept."
+            : is_one ? "It got a camera of its own."
+                     : "They got a camera of their own.");
   }
   if (camera_ids.size() > 1) {
     who = "Cameras " + std::to_string(camera_ids.front()) + " to " +
@@ -296,6 +299,16 @@ std::map<uint32_t, int> LensesAsTold(const SparseModel& model,
   int next = static_cast<int>(lenses.size());
   for (const auto& [id, camera] : model.cameras) next += lens_of_camera.emplace(id, next).second;
   return lens_of_camera;
+}
+
+// Whether other photos than these have their cameras: else what was told is of them alone.
+bool SharesCameras(const SparseModel& model, const LensFinding& finding) {
+  return std::any_of(model.images.begin(), model.images.end(), [&](const auto& image) {
+    const auto& ids = finding.camera_ids;
+    return std::find(ids.begin(), ids.end(), image.second.camera_id) != ids.end() &&
+           std::find(finding.photos.begin(), finding.photos.end(), image.second.name) ==
+               finding.photos.end();
+  });
 }
 
 // What the photos say: every lens freed, and without those parameters that they do not ask for.
@@ -368,7 +381,8 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
   for (size_t i = 0; i < mended.lenses.size(); ++i) {
     LensFinding finding =
         FindingOf(model, freed->full, static_cast<int>(i), freed->noise, i >= freed->num_shared);
-    finding.used = refine == RefineIntrinsics::kAlways || finding.apart || !finding.told_alike ||
+    finding.used = refine == RefineIntrinsics::kAlways ||
+                   (finding.apart && SharesCameras(model, finding)) || !finding.told_alike ||
                    finding.deviations > kMaxDeviations;
     if (finding.sigmas.size() == 0 || too_dear) finding.used = false;
     mended.lenses[i].free = finding.used;

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <set>
 
+#include "colmap_ext/match_support.h"
 #include "colmap_ext/third_view.h"
 #include "colmap_ext/two_view_geometry.h"
 #include "core/frames.h"
 #include "core/parallel.h"
-#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -55,54 +55,6 @@ std::vector<const DatabasePair*> ChoosePairs(const MatchedImages& images, const 
     }
   }
   return chosen;
-}
-
-Rigid ModelMotion(const SparseModel& model, const DatabasePair& pair) {
-  Rigid motion = model.images.at(pair.image_id2).cam_from_model *
-                 model.images.at(pair.image_id1).cam_from_model.Inverse();
-  motion.translation.normalize();
-  return motion;
-}
-
-// An epipolar error of a model is that of its keypoints and that of its poses.
-constexpr double kPoseErrorFactor = 2;
-
-// Below this share a photo is doubtful even if all of them are alike.
-constexpr double kLeastSupport = 0.4;
-
-void CountSupport(MatchedImages* images, const SparseModel& model, const ModelCheckOptions& options,
-                  ModelCheck* check) {
-  const double limit2 = std::pow(kPoseErrorFactor * options.pair.MaxEpipolarErrorPx(), 2);
-  std::map<uint32_t, std::pair<size_t, size_t>> obeying_of_all;
-  for (const DatabasePair& pair : images->pairs()) {
-    if (static_cast<int>(pair.matches.size()) < options.pair.min_num_inliers) continue;
-    if (model.images.count(pair.image_id1) == 0 || model.images.count(pair.image_id2) == 0) {
-      continue;
-    }
-    const Eigen::Matrix3d essential = EssentialFromPose(ModelMotion(model, pair));
-    const std::vector<RayMatch> matches = images->Matches(pair);
-    const auto num_obeying = std::count_if(
-        matches.begin(), matches.end(),
-        [&](const RayMatch& match) { return EpipolarError2(essential, match) < limit2; });
-    for (const uint32_t image_id : {pair.image_id1, pair.image_id2}) {
-      obeying_of_all[image_id].first += static_cast<size_t>(num_obeying);
-      obeying_of_all[image_id].second += matches.size();
-    }
-  }
-  std::vector<double> shares;
-  for (const auto& [image_id, counts] : obeying_of_all) {
-    if (counts.second == 0) continue;
-    shares.push_back(static_cast<double>(counts.first) / static_cast<double>(counts.second));
-    check->support[image_id] = shares.back();
-  }
-  if (shares.empty()) return;
-  // The better photos tell what the matches are worth; the median may be dragged down by what is
-  // looked for.
-  const double upper_quartile = AtRank(&shares, shares.size() * 3 / 4);
-  const double limit = std::max(kLeastSupport, options.min_support * upper_quartile);
-  for (const auto& [image_id, share] : check->support) {
-    if (share < limit) check->doubtful.push_back(image_id);
-  }
 }
 
 // Turned by more, or its baseline.
@@ -165,7 +117,11 @@ ModelCheck CheckModel(MatchedImages* images, const SparseModel& model,
   ParallelFor(num_threads, 0, static_cast<int>(pairs.size()),
               [&](int i) { TestPair(options, &pairs[i]); });
   ModelCheck check;
-  CountSupport(images, model, options, &check);
+  check.support = MatchSupport(images, model, options.pair);
+  const double limit = SupportLimit(check.support, options.min_support);
+  for (const auto& [image_id, share] : check.support) {
+    if (share < limit) check.doubtful.push_back(image_id);
+  }
   for (const TestedPair& tested : pairs) {
     if (!tested.decided) continue;
     ++check.num_pairs;

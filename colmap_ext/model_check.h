@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "colmap_ext/match_support.h"
 #include "colmap_ext/matched_images.h"
 #include "colmap_ext/sparse_model.h"
 #include "colmap_ext/two_view_hypotheses.h"
@@ -27,10 +28,7 @@ struct ModelCheckOptions {
   double min_tri_angle_deg = 2;
   // Share of the tested pairs that must contradict; one pair alone does where fewer are tested.
   double max_contradicting = 0.25;
-  // Of a photo's verified matches with other photos of the model, the share that must obey the
-  // model's poses, relative to the upper quartile of all photos; larger = stricter. On a real
-  // kitchen right photos reach 0.94 of it or more, one that stands 42 cm off 0.63.
-  double min_support = 0.75;
+  double min_support = kMinSupport;  // of a photo; larger = stricter
 };
 
 struct ModelCheck {

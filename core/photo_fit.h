@@ -50,5 +50,8 @@ void ThrowIfAnyLeftOut(const std::vector<PhotoLeftOut>& photos, const std::strin
 inline constexpr char kStrictHelp[] =
     "Stop at a photo that is missing, unreadable or of another shape than its camera; 0 = leave it "
     "out and name it.";
+inline constexpr char kUseDoubtfulHelp[] =
+    "Use photos that roomtex-align doubts (the alignment's `images` say why), too; 0 = leave them "
+    "out and name them.";
 
 }  // namespace roomtex

@@ -68,9 +68,10 @@ SignalTidy::SignalTidy(const std::string& command) {
   tidy_descriptor = ends_[1];
   struct sigaction action {};
   action.sa_handler = PassSignalOn;
-  action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);  // the second one kills
   sigemptyset(&action.sa_mask);
   for (TidySignal& one : tidy_signals) {
+    // The second one kills; but what is told to nobody on the way must not cut tidying short.
+    action.sa_flags = SA_RESTART | (one.number == SIGPIPE ? 0 : static_cast<int>(SA_RESETHAND));
     sigaction(one.number, nullptr, &one.action_before);
     if (one.action_before.sa_handler == SIG_IGN) continue;
     sigaction(one.number, &action, nullptr);

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include <fmt/core.h>
@@ -28,7 +29,7 @@ struct DenseCommandOptions {
   std::string input_path, image_path, output_path, scan_poses;
   std::vector<std::string> scan_paths;
   ScanReaderOptions scan_reader;
-  bool accept_untrusted = false, strict = false;
+  bool accept_untrusted = false, strict = false, use_doubtful = false;
   DenseOptions dense;
 };
 
@@ -52,17 +53,24 @@ void AddOptions(DenseCommandOptions* o, Command* command) {
   command->Add(FieldsOf(&o->dense.fusion));
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
+  command->AddBool("use_doubtful", &o->use_doubtful, kUseDoubtfulHelp);
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->Add(FieldsOf(&o->scan_reader));
 }
 
 std::vector<DensePhoto> ListDensePhotos(const SparseModel& model, const std::string& image_path,
+                                        const std::map<std::string, std::string>& doubtful,
                                         std::vector<PhotoLeftOut>* left_out,
                                         const Command::Context& context) {
   RequireFolder(image_path, "Check --image_path: it is the folder that COLMAP was given");
   std::vector<DensePhoto> photos;
   std::vector<std::string> notes;
   for (const auto& [id, image] : model.images) {
+    const auto doubt = doubtful.find(image.name);
+    if (doubt != doubtful.end()) {
+      left_out->push_back({image.name, doubt->second});
+      continue;
+    }
     DensePhoto photo{image.name, image_path + "/" + image.name, PhotoPixels::kAsStored,
                      model.cameras.at(image.camera_id), image.cam_from_model};
     const PhotoFit fit =
@@ -133,8 +141,10 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   const SparseModel model = ReadSparseModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
   std::vector<PhotoLeftOut> left_out;
+  const std::map<std::string, std::string> none;
   const std::vector<DensePhoto> photos =
-      ListDensePhotos(model, options.image_path, &left_out, context);
+      ListDensePhotos(model, options.image_path,
+                      options.use_doubtful ? none : alignment.doubtful_photos, &left_out, context);
   if (options.strict) ThrowIfAnyLeftOut(left_out, options.image_path);
   if (photos.empty()) {
     throw InputError(options.input_path, "",

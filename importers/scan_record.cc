@@ -303,6 +303,13 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
       record.expected_error = found.get<double>() / 1000;
       break;
     }
+    for (const Json& image : json.value("images", Json::array())) {
+      const Json doubt = image.value("doubt", Json());
+      if (!doubt.is_string()) continue;
+      const std::string name = image.at("name");
+      record.doubtful_photos[name] = "roomtex-align doubts " + name + ": " +
+                                     doubt.get<std::string>() + " --use_doubtful 1 uses it.";
+    }
     if (!json.contains("scans")) return record;
     for (const Json& scan : json.at("scans")) record.scans.push_back(RecordFromJson(scan));
   } catch (const std::exception&) {

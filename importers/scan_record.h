@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,9 @@ struct AlignmentRecord {
   // not known.
   double expected_error = 0;
   std::vector<ScanRecord> scans;  // empty: not remembered
+  // Photos that agree with nobody (align/trust/photo_verdict.h), by name: why they are left out, in
+  // sentences.
+  std::map<std::string, std::string> doubtful_photos;
 };
 // Throws InputError for a file that is there and cannot be understood.
 AlignmentRecord ReadAlignmentRecord(const std::string& model_folder);

@@ -69,6 +69,7 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                         Command::Kind::kOptional);
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
+  command->AddBool("use_doubtful", &o->sources.use_doubtful, kUseDoubtfulHelp);
   command->AddOutputPath("output_path", &o->output_path,
                          "Folder to write model.ply, model.glb, texture.png, report.json (and "
                          "model.rtpi) into. Of scans with more than --max_samples these show the "

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "align/alignment.h"
 #include "align/automatic_alignment.h"
 #include "align/command/align_outputs.h"
@@ -19,8 +21,12 @@
 #include "align/command/search_report.h"
 #include "align/mirrored_reading.h"
 #include "align/surface/scan_planes_report.h"
+#include "align/trust/photo_verdict.h"
+#include "colmap_ext/database.h"
+#include "colmap_ext/duplicate_photos.h"
 #include "colmap_ext/lens_labels.h"
 #include "colmap_ext/mapper_verdict.h"
+#include "colmap_ext/match_support.h"
 #include "colmap_ext/panorama_model.h"
 #include "core/commit_together.h"
 #include "core/error.h"
@@ -212,6 +218,59 @@ std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<
   return {near};
 }
 
+// Photos that say nothing new are set aside, until the others have found their places; which is
+// said.
+std::map<uint32_t, uint32_t> SetDuplicatesAside(const MapperVerdict& verdict,
+                                                const std::vector<Pick>& picks,
+                                                const std::vector<NearHint>& near,
+                                                SparseModel* model,
+                                                const Command::Context& context) {
+  std::set<std::string> kept(verdict.photos_held.begin(), verdict.photos_held.end());
+  for (const auto& [name, pose] : verdict.told_poses) kept.insert(name);
+  for (const Pick& pick : picks) kept.insert(pick.image_name);
+  for (const NearHint& hint : near) kept.insert(hint.image_name);
+  std::map<uint32_t, uint32_t> duplicates = FindDuplicates(*model, kept);
+  if (duplicates.empty()) return duplicates;
+  const auto& [id, of] = *duplicates.begin();
+  context.Warn(
+      fmt::format("{} of {} photos show the same from the same place as another ({} as {}): "
+                  "they count once",
+                  duplicates.size(), model->images.size(), model->images.at(id).name,
+                  model->images.at(of).name));
+  *model = WithoutDuplicates(*model, duplicates);
+  return duplicates;
+}
+
+// Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
+std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
+                                                   const SparseModel& aligned,
+                                                   const SurveyedScans& surveyed, double rms_px,
+                                                   const Command::Context& context) {
+  constexpr double kMostDoubtful = 0.34;
+  context.progress.Stage("single photos");
+  std::map<uint32_t, double> support;
+  if (!a.database_path.empty()) {
+    support = MatchSupport(Database(a.database_path), aligned, HypothesisOptions());
+  }
+  auto photos =
+      JudgePhotos(aligned, surveyed, SurfaceTolerance(a.alignment.trust, surveyed.patches()),
+                  KeypointSigma(rms_px), support);
+  size_t num_doubtful = 0;
+  for (const auto& [id, photo] : photos) {
+    if (photo.doubt.empty()) continue;
+    ++num_doubtful;
+    context.Warn(aligned.images.at(id).name +
+                 " is doubtful and takes no part in colours: " + photo.doubt);
+  }
+  if (static_cast<double>(num_doubtful) > kMostDoubtful * static_cast<double>(photos.size())) {
+    context.report.SetUntrusted(
+        fmt::format("{} of {} photos are doubtful (the report's `images` say why): which of them "
+                    "are right cannot be told.",
+                    num_doubtful, photos.size()));
+  }
+  return photos;
+}
+
 }  // namespace
 
 void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
@@ -240,6 +299,8 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   }
   const bool one_place = !picks.empty() && !verdict.told_poses.empty() && a.picks_path.empty();
   if (!verdict.known_rms && !one_place) RequirePicksOrPhotos(a);
+  const SparseModel input = model;
+  const auto duplicates = SetDuplicatesAside(verdict, picks, near, &model, context);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
@@ -275,7 +336,17 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
   context.report["cameras"] = CamerasToJson(alignment);
+  auto photos = JudgeSinglePhotos(a, model, *reading.surveyed, after.rms_px, context);
+  PutDuplicatesBack(input, duplicates, alignment.scan_from_sparse.scale, &model);
+  for (const auto& [id, of] : duplicates) {
+    // They stand and fall together.
+    photos[id] = photos.at(of);
+    photos[id].duplicate_of = model.images.at(of).name;
+    const auto sigma = alignment.photo_sigmas.find(of);
+    if (sigma != alignment.photo_sigmas.end()) alignment.photo_sigmas[id] = sigma->second;
+  }
   context.report["images"] = PhotosToJson(alignment, model);
+  AddVerdicts(photos, model, &context.report["images"]);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   CompareWithPhotos(a, model, *reading.surveyed, told, context);

@@ -147,6 +147,22 @@ Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
   return json;
 }
 
+void AddVerdicts(const std::map<uint32_t, PhotoVerdict>& photos, const SparseModel& aligned,
+                 Json* images) {
+  for (Json& one : *images) {
+    const SparseImage* const image = aligned.FindImage(one["name"].get<std::string>());
+    const PhotoVerdict& photo = photos.at(image->image_id);
+    one["num_points"] = photo.num_points;
+    one["num_expected"] = photo.num_expected;
+    one["sight_share"] = NumberOrNull(photo.sight_share);
+    one["unevenness"] = NumberOrNull(photo.unevenness);
+    one["surface_share"] = NumberOrNull(photo.surface_share);
+    one["match_support"] = NumberOrNull(photo.match_support);
+    one["duplicate_of"] = photo.duplicate_of.empty() ? Json(nullptr) : Json(photo.duplicate_of);
+    one["doubt"] = photo.doubt.empty() ? Json(nullptr) : Json(photo.doubt);
+  }
+}
+
 Json StationsToJson(const StationCheck& check, const std::vector<Scan>& scans) {
   Json json = Json::array();
   for (const StationPair& pair : check.pairs) {

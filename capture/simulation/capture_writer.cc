@@ -40,9 +40,14 @@ std::string ScanName(int station) {
   return station == 0 ? "scan.rtpi" : "scan_" + std::to_string(station) + ".rtpi";
 }
 
+std::string SimilarRoomPhotoName(const SimulatedRoom& room, int i) {
+  return room.PhotoName(room.NumPhotos() + i);
+}
+
 void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_folder) {
   std::set<std::string> names;
-  for (int i = 0; i < room.NumPhotos(); ++i) names.insert(room.PhotoName(i));
+  const int count = room.NumPhotos() + room.options().similar_room;
+  for (int i = 0; i < count; ++i) names.insert(room.PhotoName(i));
   RemoveLeftovers(photo_folder);
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(photo_folder, ignored)) {
@@ -81,6 +86,26 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
     WriteExposureData(file.partial_path(), exposure);
   }
   file.Commit();
+}
+
+// Photos of another room among those of the first (SimulatedRoomOptions::similar_room), as if taken
+// after them.
+void WriteSimilarRoom(const SimulatedRoom& room, const std::string& photo_folder,
+                      Progress* progress) {
+  const int count = room.options().similar_room;
+  if (count == 0) return;
+  SimulatedRoomOptions options = room.options();
+  options.similar_room = 0;
+  options.furniture_seed = options.random_seed + 1;
+  // Other places than those of the first room.
+  options.num_photos = std::max(options.num_photos + 3, count);
+  const SimulatedRoom other(options);
+  for (int i = 0; i < count; ++i) {
+    // Spread over the places: each looks somewhere else.
+    const int photo = (2 * i + 1) * other.NumPhotos() / (2 * count);
+    WritePhoto(other, photo, photo_folder + "/" + SimilarRoomPhotoName(room, i));
+    progress->Tick();
+  }
 }
 
 std::string PoseLine(const Rigid& pose) {
@@ -330,11 +355,12 @@ CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool r
   WritePicks(room, folder, &summary);
   WriteReadme(room, folder);
   WriteScans(room, folder, &summary, progress);
-  progress->Stage("photos", room.NumPhotos());
+  progress->Stage("photos", room.NumPhotos() + room.options().similar_room);
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
     WritePhoto(room, photo, photo_folder + "/" + room.PhotoName(photo));
     progress->Tick();
   }
+  WriteSimilarRoom(room, photo_folder, progress);
   WriteTrueColors(room, photo_folder, reachable, folder + "/truth", progress);
   progress->Finish();
   return summary;

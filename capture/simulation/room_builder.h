@@ -37,8 +37,10 @@ class RoomBuilder {
   };
 
   uint32_t NextSeed() {
-    return static_cast<uint32_t>(
-        MixBits(static_cast<uint64_t>(options_.random_seed), 77, ++num_seeds_));
+    const bool is_shell = num_seeds_ < num_shell_seeds_;
+    const int seed =
+        is_shell || options_.furniture_seed < 0 ? options_.random_seed : options_.furniture_seed;
+    return static_cast<uint32_t>(MixBits(static_cast<uint64_t>(seed), 77, ++num_seeds_));
   }
   int Add(const TexturePtr& texture, const Infrared& infrared,
           Surface::Kind kind = Surface::Kind::kOpaque, bool shines = false,
@@ -91,6 +93,7 @@ class RoomBuilder {
   RoomScene& scene_;
   double width_, depth_, height_;
   uint64_t num_seeds_ = 0;
+  uint64_t num_shell_seeds_ = UINT64_MAX;  // those before are of the shell; set when it stands
   int oak_, walnut_, pine_, white_, black_, metal_;
   // The opening of the window in the north wall.
   double window_left_ = 0, window_right_ = 0, window_bottom_ = 0.85, window_top_ = 2.15;

@@ -75,6 +75,7 @@ void RoomBuilder::AddShell() {
     scene_.AddQuad(walls[wall], frame.top_left, frame.length * frame.right,
                    -height_ * Vector3d::UnitZ());
   }
+  num_shell_seeds_ = num_seeds_;
   if (options_.bare_walls) return;
   window_left_ = 0.5 * width_ - 0.85;
   window_right_ = 0.5 * width_ + 0.75;

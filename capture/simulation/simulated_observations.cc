@@ -17,11 +17,12 @@ struct SurfacePoint {
 
 // What a random pixel of a random photo shows; none where that is the mirror or lies outside.
 std::optional<SurfacePoint> RandomPoint(const RoomPhotos& photos, RandomStream* random) {
-  const Camera& camera = photos.camera.camera();
   const int photo = random->Index(static_cast<int>(photos.poses.size()));
+  const CameraProjection& projection = photos.CameraOf(photo);
+  const Camera& camera = projection.camera();
   const Eigen::Vector2d x_in_img(random->Uniform(0, camera.width),
                                  random->Uniform(0, camera.height));
-  const auto ray = photos.camera.RayFromImg(x_in_img);
+  const auto ray = projection.RayFromImg(x_in_img);
   if (!ray) return std::nullopt;
   const Rigid room_from_cam = photos.poses[photo].At(x_in_img.y()).Inverse();
   const auto hit =
@@ -41,8 +42,9 @@ struct Observation {
 
 std::optional<Eigen::Vector2d> RoomPhotos::See(int photo, const Eigen::Vector3d& x_in_room,
                                                const Eigen::Vector3d& normal_in_room) const {
-  const auto x_in_img = poses[photo].Project(camera, x_in_room);
-  if (!x_in_img || !camera.InImage(*x_in_img)) return std::nullopt;
+  const CameraProjection& projection = CameraOf(photo);
+  const auto x_in_img = poses[photo].Project(projection, x_in_room);
+  if (!x_in_img || !projection.InImage(*x_in_img)) return std::nullopt;
   const Eigen::Vector3d centre = poses[photo].At(x_in_img->y()).TargetOriginInSource();
   const Eigen::Vector3d view = (centre - x_in_room).normalized();
   // Flatter than 80 degrees nobody finds a feature again.

@@ -19,8 +19,13 @@ namespace roomtex {
 struct RoomPhotos {
   const SimulatedRoomOptions& options;
   const RoomScene& scene;
-  const CameraProjection& camera;
+  const CameraProjection& camera;  // as told
+  const CameraProjection& zoomed_camera;
   const std::vector<RowPoses>& poses;
+
+  const CameraProjection& CameraOf(int photo) const {
+    return options.IsZoomed(photo) ? zoomed_camera : camera;
+  }
 
   // Position of a surface point in a photo that really sees it: in the image, from the front,
   // unoccluded.

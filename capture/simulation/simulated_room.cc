@@ -17,6 +17,7 @@
 #include "capture/simulation/simulated_projector.h"
 #include "capture/simulation/simulated_scan.h"
 #include "capture/simulation/stranger.h"
+#include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -34,6 +35,13 @@ bool IsOfShare(int photo, double share) {
   return std::floor((photo + 1) * share) > std::floor(photo * share);
 }
 
+Camera Zoomed(Camera camera) {
+  const int num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
+  if (camera.IsPanorama()) return camera;
+  for (int k = 0; k < num_focal; ++k) camera.params[static_cast<size_t>(k)] *= kZoom;
+  return camera;
+}
+
 SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
   options.bare_walls = options.bare_walls || options.bare;
   return options;
@@ -43,7 +51,10 @@ SimulatedRoomOptions Completed(SimulatedRoomOptions options) {
 
 struct SimulatedRoom::Impl {
   explicit Impl(const SimulatedRoomOptions& given)
-      : options(Completed(given)), camera(MakeRoomCamera(given)), projection(camera) {
+      : options(Completed(given)),
+        camera(MakeRoomCamera(given)),
+        projection(camera),
+        zoomed_projection(Zoomed(camera)) {
     scene.SetFinestDetail(options.finest_detail);
     FurnishRoom(options, &scene);
     const std::vector<Rigid> room_from_projector = PlaceProjectors(options);
@@ -66,20 +77,22 @@ struct SimulatedRoom::Impl {
   RoomScanner Scanner(int station) const {
     return RoomScanner(options, scene, station, room_from_station.at(station));
   }
-  RoomPhotos Photos() const { return {options, scene, projection, row_poses}; }
+  RoomPhotos Photos() const { return {options, scene, projection, zoomed_projection, row_poses}; }
   std::vector<PickCandidate> Candidates(int photo) const {
     return FindPickCandidates(Photos(), Scanner(0), room_from_station[0], photo);
   }
   double PhotoDiagonal() const { return std::hypot(camera.width, camera.height); }
-  const PhotoRenderer& Renderer() const {
-    std::call_once(renderer_made,
-                   [this] { renderer = std::make_unique<PhotoRenderer>(scene, projection); });
-    return *renderer;
+  const PhotoRenderer& Renderer(int place) const {
+    std::call_once(renderer_made, [this] {
+      renderer = std::make_unique<PhotoRenderer>(scene, projection);
+      if (options.zoomed > 0) zoomer = std::make_unique<PhotoRenderer>(scene, zoomed_projection);
+    });
+    return options.IsZoomed(place) ? *zoomer : *renderer;
   }
 
   const SimulatedRoomOptions options;
   const Camera camera;
-  const CameraProjection projection;
+  const CameraProjection projection, zoomed_projection;
   RoomScene scene;
   std::vector<Rigid> cam_from_room, room_from_station;
   std::vector<RowPoses> row_poses;
@@ -88,7 +101,7 @@ struct SimulatedRoom::Impl {
   std::unique_ptr<ProjectedLight> projected;  // if there are projectors
   std::vector<double> patterned_exposures;    // per place
   mutable std::once_flag renderer_made;
-  mutable std::unique_ptr<PhotoRenderer> renderer;
+  mutable std::unique_ptr<PhotoRenderer> renderer, zoomer;
 };
 
 SimulatedRoom::SimulatedRoom(const SimulatedRoomOptions& options) {
@@ -149,8 +162,9 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   settings.noise = impl_->options.photo_noise;
   settings.noise_seed = MixBits(static_cast<uint64_t>(impl_->options.random_seed), 501, photo);
   if (IsPatterned(photo)) settings.projected = impl_->projected.get();
-  cv::Mat image = impl_->Renderer().Render(impl_->row_poses.at(PlaceOf(photo)), settings,
-                                           impl_->options.num_threads);
+  const int place = PlaceOf(photo);
+  cv::Mat image = impl_->Renderer(place).Render(impl_->row_poses.at(place), settings,
+                                                impl_->options.num_threads);
   if (HasStranger(photo)) {
     DrawStranger(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 521, photo), &image);
   }
@@ -241,14 +255,15 @@ std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& sam
   constexpr double kFlattest = 0.05;
   constexpr int kAtOnce = 4096;
   const RowPoses& poses = impl_->row_poses.at(PlaceOf(photo));
+  const CameraProjection& projection = impl_->Photos().CameraOf(PlaceOf(photo));
   const int count = static_cast<int>(samples.points.size());
   std::vector<Eigen::Vector2f> sightings(
       count, Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
   ParallelFor(impl_->options.num_threads, 0, (count + kAtOnce - 1) / kAtOnce, [&](int block) {
     for (int i = block * kAtOnce; i < std::min(count, (block + 1) * kAtOnce); ++i) {
       const Eigen::Vector3d& point = samples.points[i];
-      const auto position = poses.Project(impl_->projection, point);
-      if (!position || !impl_->projection.InImage(*position)) continue;
+      const auto position = poses.Project(projection, point);
+      if (!position || !projection.InImage(*position)) continue;
       const Eigen::Vector3d centre = poses.At(position->y()).TargetOriginInSource();
       const Eigen::Vector3d to_camera = (centre - point).normalized();
       if (!(to_camera.dot(samples.normals[i].cast<double>()) > kFlattest)) continue;
@@ -303,6 +318,7 @@ int SimulatedRoom::BestPhotoForPicks() const {
   double best = -1;
   for (int photo = 0; photo < NumPhotos(); ++photo) {
     if (impl_->projected && !IsPatterned(photo)) continue;
+    if (impl_->options.IsZoomed(PlaceOf(photo))) continue;  // nobody clicks in the odd one
     // How far apart the picks would lie: the smallest spread of the points in space.
     const auto picks = SpreadPicks(impl_->Candidates(PlaceOf(photo)), 8, impl_->PhotoDiagonal());
     if (picks.size() < 6) continue;

@@ -1,6 +1,7 @@
 #include "capture/simulation/simulated_room_options.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "capture/simulation/camera_faults.h"
 #include "core/camera_formulas.h"
@@ -120,6 +121,18 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       ->Number("strangers", &strangers,
                "share of the photos in which somebody stands who is not in the scan")
       .Within(0, 1, "(a share of the photos)");
+  fields
+      ->Number("zoomed", &zoomed,
+               "share of the photos taken at 1.3 times the focal length, which nobody tells")
+      .Within(0, 0.9, "(a share of the photos)");
+  fields
+      ->Int(
+          "similar_room", &similar_room,
+          "so many more photos, of another room with the same plan, walls, floor and ceiling, and "
+          "other pictures and cloths; they have no truth")
+      .Within(0, 1000);
+  fields->Require(similar_room == 0 || projectors == 0,
+                  "--similar_room and --projectors cannot be had together; give one of them");
   fields->Int("num_stations", &num_stations, "number of scans").Within(1, 8);
   fields->Int("scan_columns", &scan_columns, "samples over the full turn").Within(16, 20000);
   fields->Int("scan_rows", &scan_rows, "samples from -60 to +75 degrees of elevation")
@@ -153,6 +166,10 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       ->Number("click_noise_px", &click_noise_px,
                "noise of the clicks, standard deviation per coordinate in pixels")
       .Within(0, 100);
+}
+
+bool SimulatedRoomOptions::IsZoomed(int place) const {
+  return std::floor((place + 1) * zoomed) > std::floor(place * zoomed);
 }
 
 std::vector<std::string> SimulatedRoomOptions::Problems() const { return ProblemsOf(*this); }

@@ -11,6 +11,8 @@
 namespace roomtex {
 
 inline constexpr int kMaxProjectors = 8;
+// Of photos that are zoomed: a finger on the ring.
+inline constexpr double kZoom = 1.3;
 
 class OptionFields;
 
@@ -63,6 +65,11 @@ struct SimulatedRoomOptions {
   double hand_move = 0.1;     // metres per second
   double hand_turn_deg = 10;  // degrees per second
   double strangers = 0;       // share of the photos in which somebody stands who is not in the scan
+  double zoomed = 0;          // share of the photos taken at kZoom times the focal length
+  // So many more photos, without truth, of another room: the same plan, walls, floor and ceiling,
+  // other pictures and cloths.
+  int similar_room = 0;
+  int furniture_seed = -1;  // of what is not the room's shell; -1 = random_seed
   // Scans.
   int num_stations = 1;
   int scan_columns = 2000, scan_rows = 1000;  // grid over the full turn and -60..+75 degrees
@@ -80,6 +87,8 @@ struct SimulatedRoomOptions {
   int num_picks = 6;
   double click_noise_px = 1.5;  // standard deviation per coordinate
   int num_threads = -1;         // -1 = all; changes nothing in the results
+
+  bool IsZoomed(int place) const;  // spread evenly over the places
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;

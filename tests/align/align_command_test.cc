@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -5,6 +6,7 @@
 #include "core/frames.h"
 #include "core/report.h"
 #include "importers/content_hash.h"
+#include "importers/scan_record.h"
 #include "tests/align/case_folder.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
@@ -274,6 +276,75 @@ TEST(AlignCommand, FindsTheReadingOfAScanByThePicks) {
       0.003);
   // What is said wins.
   EXPECT_EQ(files.Align("--azimuth counterclockwise").exit_code, 0);
+}
+
+// A copy of a photo in the model, with all its keypoints.
+void AddCopy(uint32_t of, const std::string& name, SparseModel* model) {
+  SparseImage copy = model->images.at(of);
+  copy.image_id = model->images.rbegin()->first + 1;
+  copy.name = name;
+  for (uint32_t k = 0; k < copy.point3d_ids.size(); ++k) {
+    if (copy.point3d_ids[k] == kInvalidPoint3dId) continue;
+    model->points.at(copy.point3d_ids[k]).track.push_back({copy.image_id, k});
+  }
+  model->images[copy.image_id] = copy;
+}
+
+TEST(AlignCommand, CopiesOfAPhotoCountOnce) {
+  const CaseFolder single(MakeCase());
+  SimulatedCase one = MakeCase();
+  for (const char* name : {"photo_copy_1.jpg", "photo_copy_2.jpg", "photo_copy_3.jpg"}) {
+    AddCopy(5, name, &one.model);
+  }
+  const CaseFolder copied(one);
+  ASSERT_EQ(single.Align().exit_code, 0);
+  ASSERT_EQ(copied.Align().exit_code, 0);
+  const SparseModel expected = ReadSparseModel(single.folder / "aligned");
+  const SparseModel found = ReadSparseModel(copied.folder / "aligned");
+  ASSERT_EQ(found.images.size(), 19u);
+  for (const auto& [id, image] : found.images) {
+    const Rigid& pose = expected.images.at(id <= 16 ? id : 5).cam_from_model;
+    EXPECT_LT((image.cam_from_model.translation - pose.translation).norm(), 1e-9) << image.name;
+    EXPECT_LT(RotationAngle(image.cam_from_model.rotation, pose.rotation), 1e-9) << image.name;
+  }
+  const Json report = Json::parse(ReadBytes(copied.folder / "aligned/alignment.json"));
+  for (const Json& image : report["images"]) {
+    const bool is_copy = image["name"].get<std::string>().find("copy") != std::string::npos;
+    EXPECT_EQ(image["duplicate_of"], is_copy ? Json("photo_004.jpg") : Json(nullptr));
+  }
+  EXPECT_EQ(report["expected_error"]["at_far_corner_mm"],
+            Json::parse(ReadBytes(single.folder /
+                                  "aligned/alignment.json"))["expected_error"]["at_far_corner_mm"]);
+}
+
+// Two thirds of it show something else: another room with the same wall on its left.
+TEST(AlignCommand, NamesAPhotoThatAgreesWithNobody) {
+  SimulatedCase one = MakeCase();
+  SparseImage& image = one.model.images.at(9);
+  for (auto& [id, point] : one.model.points) {
+    const auto is_other = [&](const TrackElement& element) {
+      return element.image_id == 9 &&
+             image.points2d[element.point2d_index].x() > 0.3 * one.room->camera().width;
+    };
+    const auto gone = std::find_if(point.track.begin(), point.track.end(), is_other);
+    if (gone == point.track.end() || point.track.size() < 3) continue;
+    image.point3d_ids[gone->point2d_index] = kInvalidPoint3dId;
+    point.track.erase(gone);
+  }
+  const CaseFolder files(one);
+  ASSERT_EQ(files.Align().exit_code, 0);
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  int num_doubtful = 0;
+  for (const Json& photo : report["images"]) {
+    num_doubtful += photo["doubt"].is_string();
+    EXPECT_EQ(photo["doubt"].is_string(), photo["name"] == "photo_008.jpg") << photo;
+  }
+  EXPECT_EQ(num_doubtful, 1);
+  EXPECT_NE(report["warnings"].dump().find("photo_008.jpg is doubtful"), std::string::npos);
+  // What is built on it knows.
+  const AlignmentRecord record = ReadAlignmentRecord(files.folder / "aligned");
+  ASSERT_EQ(record.doubtful_photos.size(), 1u);
+  EXPECT_NE(record.doubtful_photos.at("photo_008.jpg").find("ought to show"), std::string::npos);
 }
 
 TEST(AlignCommand, RemembersItsScans) {

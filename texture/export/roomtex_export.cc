@@ -64,6 +64,7 @@ void AddOptions(ExportCommandOptions* o, Command* command) {
   command->Add(FieldsOf(&o->exporting));
   command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
   command->AddBool("strict", &o->strict, kStrictHelp);
+  command->AddBool("use_doubtful", &o->sources.use_doubtful, kUseDoubtfulHelp);
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
   command->Add(FieldsOf(&o->scan_reader));
   command->Add(FieldsOf(&o->exporting.occlusion));

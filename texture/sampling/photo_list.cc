@@ -206,6 +206,11 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
   for (const auto& [id, image] : model_in_scan.images) {
     const auto file = file_of.find(image.name);
     if (file == file_of.end()) continue;
+    const auto doubt = sources.doubtful_photos.find(image.name);
+    if (doubt != sources.doubtful_photos.end()) {
+      list.left_out.push_back({file->second, doubt->second});
+      continue;
+    }
     const std::string path = sources.image_path + "/" + file->second;
     const Camera& camera = cameras.Find(image);
     const PhotoFit fit = FitPhotoToCamera(path, file->second, camera.width, camera.height);
@@ -239,6 +244,7 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
 PhotoList ListPhotosOf(const SparseModel& model, const AlignmentRecord& alignment,
                        PhotoSources sources, bool strict, const Command::Context& context) {
   sources.aligned_model = alignment.found;
+  if (!sources.use_doubtful) sources.doubtful_photos = alignment.doubtful_photos;
   PhotoList list = ListPhotos(model, sources);
   if (strict) ThrowIfAnyLeftOut(list.left_out, sources.image_path);
   for (const std::string& warning : list.warnings) context.Warn(warning);

@@ -1,6 +1,7 @@
 #pragma once
 // Which photos give colour, from where, with which camera.
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,16 @@ struct PhotoSources {
   // The model's poses go with its own intrinsics (roomtex-align may have adjusted both): those of
   // the database that differ are not used, which is warned of.
   bool aligned_model = false;
+  // Of the aligned model: photos that are left out, and why, by name.
+  std::map<std::string, std::string> doubtful_photos;
+  bool use_doubtful = false;      // they are not
   std::string associations_path;  // "" = every registered photo gives colour
 };
 
 struct PhotoList {
   std::vector<PhotoView> photos;      // ordered by name
   std::vector<std::string> warnings;  // plain sentences
-  // Missing, no image, or of another shape than the camera's; ordered by name.
+  // Doubtful, missing, no image, or of another shape than the camera's; ordered by name.
   std::vector<PhotoLeftOut> left_out;
 };
 

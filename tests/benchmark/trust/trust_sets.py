@@ -53,6 +53,11 @@ ROOMS = {
     "classroom": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "23"},
     "classroom_twin": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "24"},
     "bare_twin": {"--random_seed": "30", "--bare": "1"},
+    # Single photos that do not belong: of another room with the same walls, and taken at 1.3 times the focal length.
+    "similar": {"--random_seed": "31", "--similar_room": "2"},
+    "similar_twin": {"--random_seed": "32", "--similar_room": "2"},
+    "zoomed": {"--random_seed": "33", "--zoomed": "0.0625"},
+    "zoomed_twin": {"--random_seed": "34", "--zoomed": "0.0625"},
 }
 # Lenses told wrong, and held by the mapper or not.
 WRONG_LENSES = ["long1", "long2", "long3", "held2", "free"]
@@ -87,6 +92,17 @@ def map_photos(tools, database, photos, folder, *options):
                                "--output_path", folder, "--quiet", "1", *options], stdout=log, stderr=log,
                               env={**os.environ, "QT_QPA_PLATFORM": "offscreen"}).returncode
     print(os.getcwd(), folder, "mapper", code, flush=True)
+
+
+def map_plainly(database, photos, folder):
+    """By COLMAP's own mapper, the lens held."""
+    if os.path.exists(os.path.join(folder, "0", "images.bin")):
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    hold = [word for what in ("focal_length", "principal_point", "extra_params")
+            for word in ("--Mapper.ba_refine_" + what, "0")]
+    run("colmap", "mapper", "--database_path", database, "--image_path", photos, "--output_path", folder, *hold)
 
 
 def with_cameras(database, change):
@@ -158,9 +174,15 @@ def make_room(sets, tools, name):
         "few": ["free"],
         "bare": ["long2", "held2"],
         "bare_twin": ["long2", "held2"],
+        **{room: ["plain"] for room in ROOMS if room.split("_")[0] in ("similar", "zoomed")},
         **{room: WRONG_LENSES for room in ROOMS if room.split("_")[0] in ("lounge", "classroom")},
     }
     for variant in variants.get(name, []):
+        if variant == "plain":
+            map_plainly("database.db", "capture/photos", "sparse_plain")
+            write_case(sets, name + "_plain", model=folder + "/sparse_plain/0", right_mm=right,
+                       database=folder + "/database.db", **common)
+            continue
         database, options = variant + ".db", []
         if variant.startswith("long"):
             with_cameras(database, longer(float(variant[4:]) / 100))

@@ -93,6 +93,8 @@ def align(case, args, out):
     if not args.without_picks:
         command += ["--picks_path", case["picks"]]
     command += ["--image_path", case["photos"], "--quiet", "1"]
+    if "database" in case:
+        command += ["--database_path", case["database"]]
     command += ["--num_threads", "1"] + case.get("options", []) + args.option
     for stale in ("alignment.json", "images.bin"):
         for folder in (out, out + ".untrusted"):

@@ -233,6 +233,18 @@ TEST(SimulateCommand, WritesPatternedAndPlainPhotosAsAPhotographerTakesThem) {
   EXPECT_EQ(report["num_projectors"], 2);
 }
 
+TEST(SimulateCommand, MixesInPhotosOfASimilarRoomWithoutTruth) {
+  const TempFolder folder;
+  const std::string out = " --quiet --output_path " + (folder / "capture") + kSmall;
+  ASSERT_EQ(RunCommandLine("roomtex-simulate" + out + " --similar_room 2").exit_code, 0);
+  const SparseModel truth = ReadSparseModel(folder / "capture/truth");
+  size_t num_photos = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "capture/photos")) {
+    num_photos += entry.path().extension() == ".jpg";
+  }
+  EXPECT_EQ(num_photos, truth.images.size() + 2);
+}
+
 TEST(SimulateCommand, SaysWhatIsWrong) {
   const TempFolder folder;
   const auto expect = [&](const std::string& arguments, int exit_code, const std::string& text) {

@@ -410,6 +410,33 @@ TEST(SimulatedRoom, SightingsProjectTheSamplesThatNothingHides) {
   EXPECT_GT(num_seen, 0.05 * static_cast<double>(scan.points.size()));
 }
 
+// What lies at a distance from the middle of a photo lies 1.3 times as far out in a zoomed one.
+TEST(SimulatedRoom, ZoomedPhotosShowAThirdMore) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.distortion = false;
+  options.camera_model = "PINHOLE";
+  const SimulatedRoom usual(options);
+  options.zoomed = 0.2;
+  const SimulatedRoom zoomed(options);
+  const TrueSamples samples = usual.MakeTrueSamples(0);
+  const auto& params = usual.camera().params;
+  const Eigen::Vector2f centre = Eigen::Vector2d(params[2], params[3]).cast<float>();
+  for (const int photo : {3, 4}) {  // every fifth
+    const double zoom = photo == 4 ? 1.3 : 1;
+    const auto before = usual.TrueSightings(samples, photo);
+    const auto after = zoomed.TrueSightings(samples, photo);
+    int num_seen = 0;
+    for (size_t i = 0; i < before.size(); ++i) {
+      if (!before[i].allFinite() || !after[i].allFinite()) continue;
+      ++num_seen;
+      EXPECT_LT((after[i] - centre - static_cast<float>(zoom) * (before[i] - centre)).norm(),
+                0.01f);
+    }
+    EXPECT_GT(num_seen, 1000);
+  }
+  EXPECT_NE(zoomed.BestPhotoForPicks(), 4);
+}
+
 TEST(SimulatedRoom, StrangersStandInTheGivenShareOfThePhotos) {
   SimulatedRoomOptions options = SmallRoom();
   options.num_photos = 4;

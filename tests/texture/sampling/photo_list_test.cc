@@ -62,6 +62,15 @@ TEST_F(PhotoListTest, ScalesTheCameraForResizedPhotos) {
   EXPECT_EQ(list.warnings.size(), 1u);
 }
 
+TEST_F(PhotoListTest, LeavesOutDoubtfulPhotos) {
+  sources_.doubtful_photos["b.png"] = "roomtex-align doubts b.png: it floats.";
+  const PhotoList list = ListPhotos(model_, sources_);
+  EXPECT_EQ(Names(), (std::vector<std::string>{"a.png", "c.png"}));
+  ASSERT_EQ(list.left_out.size(), 1u);
+  EXPECT_EQ(list.left_out[0].name, "b.png");
+  EXPECT_EQ(list.left_out[0].reason, "roomtex-align doubts b.png: it floats.");
+}
+
 TEST_F(PhotoListTest, LeavesOutPhotosOfAnotherShapeAndMissingOnes) {
   const auto expect_left_out = [this](const std::string& reason) {
     const PhotoList list = ListPhotos(model_, sources_);

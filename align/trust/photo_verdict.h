@@ -1,0 +1,48 @@
+#pragma once
+// Whether single photos of a model that lies in the scan are to be believed: one of another room,
+// one that a repeated pattern has put elsewhere, or one that stands wrong agrees with nobody,
+// though the model as a whole is right.
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "align/surveyed_scans.h"
+#include "colmap_ext/sparse_model.h"
+
+namespace roomtex {
+
+inline constexpr double kUnknownShare = std::numeric_limits<double>::quiet_NaN();
+
+struct PhotoVerdict {
+  size_t num_points = 0;  // sparse points that it has a keypoint for
+  // Of the points that two other photos found and that this one ought to have found, too, how many
+  // it did find. It ought to: a point in its picture, nothing of the scan in front, that another
+  // photo saw from about the same side and distance among about as many keypoints.
+  int num_expected = 0;
+  double sight_share = kUnknownShare;
+  // How unevenly what it found lies over the picture: chi-square per degree of freedom over cells.
+  // A blurred photo finds little anywhere, one of another room nothing where that differs.
+  double unevenness = kUnknownShare;
+  // Of its points, where the scan knows: the share on its surface. A point that many photos see
+  // says little of one of them, and counts less: twice the inverse of their number.
+  double surface_share = kUnknownShare;
+  double num_judged = 0;  // sum of these weights
+  // Share of its verified matches that obey the model's poses; unknown without a database.
+  double match_support = kUnknownShare;
+  std::string duplicate_of;  // a photo that shows the same from the same place; "" = none
+  // Why it is not to be believed, a sentence without the photo's name in front; "" = nothing speaks
+  // against it.
+  std::string doubt;
+};
+
+// By image_id, for every photo. aligned: in the scan frame. tolerance: metres, of the surface.
+// sigma_px: of a keypoint's coordinate. match_support: as far as it is known (match_support.h), by
+// image_id. Photos are compared with what is usual in this model.
+std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned,
+                                             const SurveyedScans& surveyed, double tolerance,
+                                             double sigma_px,
+                                             const std::map<uint32_t, double>& match_support);
+
+}  // namespace roomtex

@@ -1,0 +1,132 @@
+#include "align/trust/photo_verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/random_stream.h"
+#include "tests/align/simulated_alignment.h"
+
+namespace roomtex {
+namespace {
+
+constexpr double kSigmaPx = 0.7;
+
+SparseModel AlignedModel() {
+  SparseModel model = MakeCase().model;
+  TransformModel(MakeCase().room->ScanFromSparse(), &model);
+  return model;
+}
+
+// The photo has keypoints as before, but those that `loses` have nothing to do with what is there.
+void LosePoints(uint32_t image_id,
+                const std::function<bool(const Eigen::Vector2d& x_in_img)>& loses,
+                SparseModel* model) {
+  SparseImage& image = model->images.at(image_id);
+  for (auto& [id, point] : model->points) {
+    std::vector<TrackElement> kept;
+    for (const TrackElement& element : point.track) {
+      if (element.image_id == image_id && loses(image.points2d[element.point2d_index])) {
+        image.point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+      } else {
+        kept.push_back(element);
+      }
+    }
+    point.track = kept;
+  }
+}
+
+std::map<uint32_t, PhotoVerdict> Judge(const SparseModel& aligned,
+                                       const std::map<uint32_t, double>& support = {}) {
+  return JudgePhotos(aligned, Survey(MakeCase().scans), 0.05, kSigmaPx, support);
+}
+
+TEST(PhotoVerdict, DoubtsNoRightPhoto) {
+  for (const auto& [id, photo] : Judge(AlignedModel())) {
+    EXPECT_EQ(photo.doubt, "") << id;
+    EXPECT_GT(photo.num_points, 100u) << id;
+    EXPECT_GT(photo.num_expected, 60) << id;
+    // 15 % of all sightings are left out by the simulator.
+    EXPECT_GT(photo.sight_share, 0.7) << id;
+    EXPECT_GT(photo.surface_share, 0.9) << id;
+    EXPECT_TRUE(std::isnan(photo.match_support)) << id;
+  }
+}
+
+// Its walls are those of this room, what hangs there is not: all that it has lies right.
+TEST(PhotoVerdict, DoubtsAPhotoThatShowsAnotherRoomInMostOfItsPicture) {
+  SparseModel model = AlignedModel();
+  const double width = model.cameras.begin()->second.width;
+  LosePoints(
+      4, [&](const Eigen::Vector2d& x) { return x.x() > 0.3 * width; }, &model);
+  for (const auto& [id, photo] : Judge(model)) {
+    EXPECT_EQ(photo.doubt.empty(), id != 4) << id << ": " << photo.doubt;
+  }
+  const PhotoVerdict photo = Judge(model).at(4);
+  EXPECT_GT(photo.surface_share, 0.9);
+  EXPECT_NE(photo.doubt.find("ought to show"), std::string::npos) << photo.doubt;
+}
+
+TEST(PhotoVerdict, DoesNotDoubtABlurredPhotoThatFindsLittleAnywhere) {
+  SparseModel model = AlignedModel();
+  RandomStream random(1);
+  LosePoints(
+      4, [&](const Eigen::Vector2d&) { return random.Uniform() < 0.6; }, &model);
+  const PhotoVerdict photo = Judge(model).at(4);
+  EXPECT_LT(photo.sight_share, 0.5);
+  EXPECT_EQ(photo.doubt, "");
+}
+
+// It finds little where it has no keypoints: too dark there.
+TEST(PhotoVerdict, DoesNotAskForPointsWhereThePhotoHasNoKeypoints) {
+  SparseModel model = AlignedModel();
+  const double width = model.cameras.begin()->second.width;
+  LosePoints(
+      4, [&](const Eigen::Vector2d& x) { return x.x() > 0.3 * width; }, &model);
+  for (Eigen::Vector2d& x : model.images.at(4).points2d) {
+    if (x.x() > 0.3 * width) x = {-100, -100};
+  }
+  EXPECT_EQ(Judge(model).at(4).doubt, "");
+}
+
+// Points that rest on it and one more photo lie halfway to what they show.
+TEST(PhotoVerdict, CountsPointsOfAPhotoThatFloat) {
+  SparseModel model = AlignedModel();
+  const Eigen::Vector3d centre = model.images.at(4).cam_from_model.TargetOriginInSource();
+  for (auto& [id, point] : model.points) {
+    const auto is_of_it = [](const TrackElement& element) { return element.image_id == 4; };
+    const auto own = std::find_if(point.track.begin(), point.track.end(), is_of_it);
+    if (own == point.track.end() || id % 4 == 0) continue;
+    std::vector<TrackElement> kept = {*own};
+    for (const TrackElement& element : point.track) {
+      if (element.image_id == 4) continue;
+      if (kept.size() < 2) {
+        kept.push_back(element);
+      } else {
+        model.images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+      }
+    }
+    point.track = kept;
+    point.x_in_model = 0.5 * (point.x_in_model + centre);
+  }
+  const PhotoVerdict photo = Judge(model).at(4);
+  EXPECT_LT(photo.surface_share, 0.4);
+}
+
+TEST(PhotoVerdict, DoubtsAPhotoThatItsOwnMatchesContradict) {
+  std::map<uint32_t, double> support;
+  for (const auto& [id, image] : MakeCase().model.images) support[id] = 0.97;
+  support[7] = 0.59;
+  for (const auto& [id, photo] : Judge(AlignedModel(), support)) {
+    EXPECT_EQ(photo.match_support, support.at(id));
+    EXPECT_EQ(photo.doubt.empty(), id != 7) << id;
+  }
+  EXPECT_NE(Judge(AlignedModel(), support).at(7).doubt.find("59 %"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace roomtex
