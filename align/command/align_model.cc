@@ -252,9 +252,9 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
   if (!a.database_path.empty()) {
     support = MatchSupport(Database(a.database_path), aligned, HypothesisOptions());
   }
-  auto photos =
-      JudgePhotos(aligned, surveyed, SurfaceTolerance(a.alignment.trust, surveyed.patches()),
-                  KeypointSigma(rms_px), support);
+  auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
+                            SurfaceTolerance(a.alignment.trust, surveyed.patches()),
+                            KeypointSigma(rms_px), support);
   size_t num_doubtful = 0;
   for (const auto& [id, photo] : photos) {
     if (photo.doubt.empty()) continue;

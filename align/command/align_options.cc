@@ -57,7 +57,8 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
                   "photo, scan intensity from its pose, and the scan's edges on the photo; needs "
                   "--image_path.");
   command->AddInputPath("database_path", &a->database_path,
-                        "COLMAP's database; not needed for an alignment by picks.",
+                        "COLMAP's database: with it every photo is asked how many of its verified "
+                        "matches obey the poses. Not needed.",
                         Command::Kind::kOptional);
   command->AddInputPath("panoramas_path", &a->panoramas_path, PanoramasHelp(),
                         Command::Kind::kOptional);

@@ -193,13 +193,13 @@ void CountSights(const std::vector<ExpectedPoint>& expected, uint32_t image_id,
 }
 
 // Sets num_judged and surface_share.
-void CountOnSurface(const SparseModel& aligned, const SurveyedScans& surveyed, double tolerance,
-                    double sigma_px, std::map<uint32_t, PhotoVerdict>* photos) {
-  const FreeSpace& free_space = surveyed.free_space();
-  const double reach = std::hypot(tolerance, surveyed.patches().cell_size());
+void CountOnSurface(const SparseModel& aligned, const ScanPatches& surface,
+                    const FreeSpace& free_space, double tolerance, double sigma_px,
+                    std::map<uint32_t, PhotoVerdict>* photos) {
+  const double reach = std::hypot(tolerance, surface.cell_size());
   std::map<uint32_t, double> on_surface;
   for (const SurfacePoint& point : FindSurfacePoints(aligned, 2, sigma_px)) {
-    const auto nearest = surveyed.patches().FindNearest(point.x_in_sparse, reach);
+    const auto nearest = surface.FindNearest(point.x_in_sparse, reach);
     const bool is_on = nearest && std::abs(nearest->distance) < tolerance;
     if (!is_on) {
       // What stands before the surface is known to be off it; behind, and where nobody measured,
@@ -236,8 +236,8 @@ double UsualSightShare(const std::map<uint32_t, PhotoVerdict>& photos) {
 
 }  // namespace
 
-std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned,
-                                             const SurveyedScans& surveyed, double tolerance,
+std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const ScanPatches& surface,
+                                             const FreeSpace& free_space, double tolerance,
                                              double sigma_px,
                                              const std::map<uint32_t, double>& match_support) {
   const PhotosInScan in_scan(aligned);
@@ -253,12 +253,12 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned,
     photo.num_points = static_cast<size_t>(
         std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
                       [](uint64_t point) { return point != kInvalidPoint3dId; }));
-    CountSights(PointsExpected(in_scan, image, points, surveyed.free_space()), id,
+    CountSights(PointsExpected(in_scan, image, points, free_space), id,
                 aligned.cameras.at(image.camera_id), &photo);
     const auto support = match_support.find(id);
     if (support != match_support.end()) photo.match_support = support->second;
   }
-  CountOnSurface(aligned, surveyed, tolerance, sigma_px, &photos);
+  CountOnSurface(aligned, surface, free_space, tolerance, sigma_px, &photos);
 
   const double usual_sight = UsualSightShare(photos);
   const double least_support = SupportLimit(match_support, kMinSupport);

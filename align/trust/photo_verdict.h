@@ -8,7 +8,8 @@
 #include <map>
 #include <string>
 
-#include "align/surveyed_scans.h"
+#include "align/surface/scan_patches.h"
+#include "align/trust/free_space.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
@@ -40,8 +41,8 @@ struct PhotoVerdict {
 // By image_id, for every photo. aligned: in the scan frame. tolerance: metres, of the surface.
 // sigma_px: of a keypoint's coordinate. match_support: as far as it is known (match_support.h), by
 // image_id. Photos are compared with what is usual in this model.
-std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned,
-                                             const SurveyedScans& surveyed, double tolerance,
+std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const ScanPatches& surface,
+                                             const FreeSpace& free_space, double tolerance,
                                              double sigma_px,
                                              const std::map<uint32_t, double>& match_support);
 
