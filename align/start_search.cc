@@ -14,10 +14,10 @@ namespace {
 
 // Pixels per coordinate, as in alignment.cc.
 constexpr double kLeastSearchNoise = 0.3;
-constexpr size_t kCloudPoints = 4000;                // that finalists are fitted with
-constexpr size_t kFirstPoints = 700;                 // that every hypothesis is fitted with
-constexpr double kFirstGate = 0.4, kLastGate = 0.1;  // metres, of the fits
-constexpr double kSightTolerance = 0.05;             // metres
+constexpr size_t kCloudPoints = 4000;  // that finalists are fitted with
+constexpr size_t kFirstPoints = 700;   // that every hypothesis is fitted with
+constexpr double kFirstSearchGate = 0.4, kLastSearchGate = 0.1;  // metres, of the fits
+constexpr double kSightTolerance = 0.05;                         // metres
 class Fitter {
  public:
   Fitter(const AlignmentInput& input, const AlignmentOptions& options,
@@ -31,9 +31,10 @@ class Fitter {
     for (const StartHypothesis& one : hypotheses) {
       starts.push_back({one.scan_from_sparse, one.score, false, 0, 0, {}, {}, false});
     }
-    starts = DistinctStarts(cloud, FitEach(few, kFirstGate, kMaxStartScaleChange, starts),
+    starts = DistinctStarts(cloud, FitEach(few, kFirstSearchGate, kMaxStartScaleChange, starts),
                             search_.num_finalists);
-    return DistinctStarts(cloud, FitEach(cloud, kLastGate, options_.fit.max_scale_change, starts),
+    return DistinctStarts(cloud,
+                          FitEach(cloud, kLastSearchGate, options_.fit.max_scale_change, starts),
                           search_.num_finalists);
   }
 
