@@ -218,39 +218,49 @@ std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<
   return {near};
 }
 
-// Photos that say nothing new are set aside, until the others have found their places; which is
-// said.
-std::map<uint32_t, uint32_t> SetDuplicatesAside(const MapperVerdict& verdict,
-                                                const std::vector<Pick>& picks,
-                                                const std::vector<NearHint>& near,
-                                                SparseModel* model,
-                                                const Command::Context& context) {
+// Photos that say nothing new, until the others have found their places.
+struct DuplicatesAside {
+  std::map<uint32_t, uint32_t> photos;  // FindDuplicates()
+  SparseModel input;                    // with them; empty if there are none
+};
+
+// Takes them out of the model, which is said.
+DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vector<Pick>& picks,
+                                   const std::vector<NearHint>& near, SparseModel* model,
+                                   const Command::Context& context) {
   std::set<std::string> kept(verdict.photos_held.begin(), verdict.photos_held.end());
   for (const auto& [name, pose] : verdict.told_poses) kept.insert(name);
   for (const Pick& pick : picks) kept.insert(pick.image_name);
   for (const NearHint& hint : near) kept.insert(hint.image_name);
-  std::map<uint32_t, uint32_t> duplicates = FindDuplicates(*model, kept);
-  if (duplicates.empty()) return duplicates;
-  const auto& [id, of] = *duplicates.begin();
+  DuplicatesAside aside;
+  aside.photos = FindDuplicates(*model, kept);
+  if (aside.photos.empty()) return aside;
+  const auto& [id, of] = *aside.photos.begin();
   context.Warn(
       fmt::format("{} of {} photos show the same from the same place as another ({} as {}): "
                   "they count once",
-                  duplicates.size(), model->images.size(), model->images.at(id).name,
+                  aside.photos.size(), model->images.size(), model->images.at(id).name,
                   model->images.at(of).name));
-  *model = WithoutDuplicates(*model, duplicates);
-  return duplicates;
+  aside.input = std::move(*model);
+  *model = WithoutDuplicates(aside.input, aside.photos);
+  return aside;
 }
 
 // Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
 std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
+                                                   const Database* database,
                                                    const SparseModel& aligned,
                                                    const SurveyedScans& surveyed, double rms_px,
                                                    const Command::Context& context) {
   constexpr double kMostDoubtful = 0.34;
   context.progress.Stage("single photos");
   std::map<uint32_t, double> support;
-  if (!a.database_path.empty()) {
-    support = MatchSupport(Database(a.database_path), aligned, HypothesisOptions());
+  if (database != nullptr) {
+    support = MatchSupport(*database, aligned, HypothesisOptions());
+    if (support.empty()) {
+      context.Warn(a.database_path +
+                   " holds no verified matches between photos of the model: none were asked");
+    }
   }
   auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),
@@ -279,6 +289,9 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
+  // Opened now: what is no database is said before anything takes long.
+  std::optional<Database> database;
+  if (!a.database_path.empty()) database.emplace(a.database_path);
   if (!verdict.known_rms && verdict.told_poses.empty()) RequirePicksOrPhotos(a);
   std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
   NamePicksAsInModel(model, &picks);
@@ -299,8 +312,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   }
   const bool one_place = !picks.empty() && !verdict.told_poses.empty() && a.picks_path.empty();
   if (!verdict.known_rms && !one_place) RequirePicksOrPhotos(a);
-  const SparseModel input = model;
-  const auto duplicates = SetDuplicatesAside(verdict, picks, near, &model, context);
+  const DuplicatesAside duplicates = SetDuplicatesAside(verdict, picks, near, &model, context);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
   AlignScans(a,
@@ -336,9 +348,13 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
   context.report["cameras"] = CamerasToJson(alignment);
-  auto photos = JudgeSinglePhotos(a, model, *reading.surveyed, after.rms_px, context);
-  PutDuplicatesBack(input, duplicates, alignment.scan_from_sparse.scale, &model);
-  for (const auto& [id, of] : duplicates) {
+  auto photos = JudgeSinglePhotos(a, database ? &*database : nullptr, model, *reading.surveyed,
+                                  after.rms_px, context);
+  context.report["planes"] = ScanPlanesToJson(planes, model);
+  SetNumPointsOfPlanes(alignment, &context.report["planes"]);
+  CompareWithPhotos(a, model, *reading.surveyed, told, context);
+  PutDuplicatesBack(duplicates.input, duplicates.photos, alignment.scan_from_sparse.scale, &model);
+  for (const auto& [id, of] : duplicates.photos) {
     // They stand and fall together.
     photos[id] = photos.at(of);
     photos[id].duplicate_of = model.images.at(of).name;
@@ -347,9 +363,6 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   }
   context.report["images"] = PhotosToJson(alignment, model);
   AddVerdicts(photos, model, &context.report["images"]);
-  context.report["planes"] = ScanPlanesToJson(planes, model);
-  SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  CompareWithPhotos(a, model, *reading.surveyed, told, context);
   WriteAligned(a, model, alignment.scan_from_sparse, &reading, told, context);
 }
 

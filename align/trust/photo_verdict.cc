@@ -42,33 +42,32 @@ constexpr double kMinJudgedOfPhoto = 10;
 class KeypointDensity {
  public:
   KeypointDensity(const SparseImage& image, const Camera& camera)
-      : cell_px_(std::max(1.0, camera.width / 40.0)),
-        columns_(static_cast<int>(camera.width / cell_px_) + 1),
-        rows_(static_cast<int>(camera.height / cell_px_) + 1),
-        counts_(static_cast<size_t>(columns_) * rows_, 0) {
+      : cell_px_(std::max(camera.width, camera.height) / static_cast<double>(kCells)),
+        counts_(static_cast<size_t>(kCells) * kCells, 0) {
     for (const Eigen::Vector2d& x : image.points2d) {
-      const int column = static_cast<int>(x.x() / cell_px_),
-                row = static_cast<int>(x.y() / cell_px_);
-      if (column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;
-      ++counts_[static_cast<size_t>(row) * columns_ + column];
+      // Keypoints of a file may lie anywhere.
+      if (!(x.minCoeff() >= 0) || !(x.maxCoeff() < kCells * cell_px_)) continue;
+      ++counts_[static_cast<size_t>(Cell(x.y())) * kCells + Cell(x.x())];
     }
   }
 
   // In the nine cells about a position.
   int Near(const Eigen::Vector2d& x) const {
     int sum = 0;
-    const int column = static_cast<int>(x.x() / cell_px_), row = static_cast<int>(x.y() / cell_px_);
-    for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
-      for (int c = std::max(0, column - 1); c <= std::min(columns_ - 1, column + 1); ++c) {
-        sum += counts_[static_cast<size_t>(r) * columns_ + c];
+    const int column = Cell(x.x()), row = Cell(x.y());
+    for (int r = std::max(0, row - 1); r <= std::min(kCells - 1, row + 1); ++r) {
+      for (int c = std::max(0, column - 1); c <= std::min(kCells - 1, column + 1); ++c) {
+        sum += counts_[static_cast<size_t>(r) * kCells + c];
       }
     }
     return sum;
   }
 
  private:
+  static constexpr int kCells = 40;  // along the longer side
+  int Cell(double x) const { return static_cast<int>(std::clamp(x / cell_px_, 0.0, kCells - 1.0)); }
+
   double cell_px_;
-  int columns_, rows_;
   std::vector<int> counts_;
 };
 
@@ -192,12 +191,12 @@ void CountSights(const std::vector<ExpectedPoint>& expected, uint32_t image_id,
   if (num_parts > 1) photo->unevenness = chi_square / (num_parts - 1);
 }
 
-// Sets num_judged and surface_share.
+// Sets surface_share.
 void CountOnSurface(const SparseModel& aligned, const ScanPatches& surface,
                     const FreeSpace& free_space, double tolerance, double sigma_px,
                     std::map<uint32_t, PhotoVerdict>* photos) {
   const double reach = std::hypot(tolerance, surface.cell_size());
-  std::map<uint32_t, double> on_surface;
+  std::map<uint32_t, double> judged, on_surface;  // sums of weights
   for (const SurfacePoint& point : FindSurfacePoints(aligned, 2, sigma_px)) {
     const auto nearest = surface.FindNearest(point.x_in_sparse, reach);
     const bool is_on = nearest && std::abs(nearest->distance) < tolerance;
@@ -214,14 +213,12 @@ void CountOnSurface(const SparseModel& aligned, const ScanPatches& surface,
     const SparsePoint& sparse = aligned.points.at(point.point3d_id);
     const double weight = 2.0 / static_cast<double>(sparse.track.size());
     for (const TrackElement& element : sparse.track) {
-      photos->at(element.image_id).num_judged += weight;
+      judged[element.image_id] += weight;
       if (is_on) on_surface[element.image_id] += weight;
     }
   }
   for (auto& [id, photo] : *photos) {
-    if (photo.num_judged >= kMinJudgedOfPhoto) {
-      photo.surface_share = on_surface[id] / photo.num_judged;
-    }
+    if (judged[id] >= kMinJudgedOfPhoto) photo.surface_share = on_surface[id] / judged[id];
   }
 }
 

@@ -29,7 +29,6 @@ struct PhotoVerdict {
   // Of its points, where the scan knows: the share on its surface. A point that many photos see
   // says little of one of them, and counts less: twice the inverse of their number.
   double surface_share = kUnknownShare;
-  double num_judged = 0;  // sum of these weights
   // Share of its verified matches that obey the model's poses; unknown without a database.
   double match_support = kUnknownShare;
   std::string duplicate_of;  // a photo that shows the same from the same place; "" = none

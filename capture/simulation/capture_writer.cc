@@ -300,6 +300,12 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
       << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
       << "photos/             the photos"
       << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
+      << (options.similar_room > 0
+              ? fmt::format("                    from {} on of another room, which have no truth\n",
+                            SimilarRoomPhotoName(room, 0))
+              : "")
+      << (options.zoomed > 0 ? "                    some taken at 1.3 times the focal length told\n"
+                             : "")
       << (paired ? "                    every place twice, the camera unmoved: in the light of the "
                    "projectors,\n"
                    "                    then without it\n"

@@ -30,14 +30,9 @@ double NominalExposureTime(const SimulatedRoomOptions& options) {
   return options.projectors > 0 ? 1.0 / 4 : 1.0 / 30;
 }
 
-// Spread evenly over the photos.
-bool IsOfShare(int photo, double share) {
-  return std::floor((photo + 1) * share) > std::floor(photo * share);
-}
-
 Camera Zoomed(Camera camera) {
-  const int num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
   if (camera.IsPanorama()) return camera;
+  const int num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
   for (int k = 0; k < num_focal; ++k) camera.params[static_cast<size_t>(k)] *= kZoom;
   return camera;
 }

@@ -10,6 +10,10 @@
 
 namespace roomtex {
 
+bool IsOfShare(int photo, double share) {
+  return std::floor((photo + 1) * share) > std::floor(photo * share);
+}
+
 void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Number("room_width", &width, "size of the room along x, metres")
       .Within(4.6, 20, "m: the furniture has to fit in");
@@ -131,6 +135,8 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
           "so many more photos, of another room with the same plan, walls, floor and ceiling, and "
           "other pictures and cloths; they have no truth")
       .Within(0, 1000);
+  fields->Require(zoomed == 0 || model != CameraModel::kEquirectangular,
+                  "--zoomed needs a lens, which --camera_model EQUIRECTANGULAR has not");
   fields->Require(similar_room == 0 || projectors == 0,
                   "--similar_room and --projectors cannot be had together; give one of them");
   fields->Int("num_stations", &num_stations, "number of scans").Within(1, 8);
@@ -166,10 +172,6 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       ->Number("click_noise_px", &click_noise_px,
                "noise of the clicks, standard deviation per coordinate in pixels")
       .Within(0, 100);
-}
-
-bool SimulatedRoomOptions::IsZoomed(int place) const {
-  return std::floor((place + 1) * zoomed) > std::floor(place * zoomed);
 }
 
 std::vector<std::string> SimulatedRoomOptions::Problems() const { return ProblemsOf(*this); }

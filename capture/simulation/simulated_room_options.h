@@ -16,6 +16,9 @@ inline constexpr double kZoom = 1.3;
 
 class OptionFields;
 
+// Whether a photo is one of those that something is for: a share of all, spread evenly over them.
+bool IsOfShare(int photo, double share);
+
 struct SimulatedRoomOptions {
   int random_seed = 0;
   // Room and what stands in it.
@@ -88,7 +91,7 @@ struct SimulatedRoomOptions {
   double click_noise_px = 1.5;  // standard deviation per coordinate
   int num_threads = -1;         // -1 = all; changes nothing in the results
 
-  bool IsZoomed(int place) const;  // spread evenly over the places
+  bool IsZoomed(int place) const { return IsOfShare(place, zoomed); }
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
