@@ -74,6 +74,20 @@ LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& option
   return CheckLenses(input.model, input.photo_labels, options.refine_intrinsics);
 }
 
+// Lenses that the user holds although their photos contradict them: said, and not trusted where
+// that moves photos by more than an alignment is off.
+void JudgeHeldLenses(const LensCheck& lenses, Alignment* result) {
+  constexpr double kHarmlessShare = 0.003;  // of the focal length; 1 cm at 3 m
+  for (const LensFinding& lens : lenses.lenses) {
+    if (!lens.Contradicts()) continue;
+    const double told_px = lens.told.MeanFocalLength();
+    const bool harmful = lens.FocalDeviations() > kSureFocalDeviations &&
+                         std::abs(lens.found.MeanFocalLength() - told_px) > kHarmlessShare * told_px;
+    const std::string text = lens.Sentence() + " --refine_intrinsics auto uses the lens found.";
+    (harmful ? result->reasons : result->warnings).push_back(text);
+  }
+}
+
 Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
                       const AlignmentStart& start, const AlignmentOptions& options,
                       Progress* progress) {
@@ -84,6 +98,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   for (const LensFinding& lens : lenses.lenses) {
     if (lens.used) result.warnings.push_back(lens.Sentence());
   }
+  if (!lenses.not_checked.empty()) result.warnings.push_back(lenses.not_checked);
   result.reprojection_rms_px = ReprojectionRms(input.model);
   const double sigma_px = KeypointSigma(result.reprojection_rms_px);
   result.fit = FitAlignment(input, start, sigma_px, options);
@@ -109,6 +124,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   }
   const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
   if (!reason.empty()) result.reasons.push_back(reason);
+  if (options.refine_intrinsics == RefineIntrinsics::kNever) JudgeHeldLenses(lenses, &result);
   if (result.reasons.empty() && result.fit.refined) {
     Append(PicksOffWarnings(start, result.refined_pick_px, options.picks.min_bad_pick_px),
            &result.warnings);

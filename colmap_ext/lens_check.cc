@@ -228,6 +228,8 @@ void LensFinding::SetCovariance(const Eigen::MatrixXd& covariance) {
   deviations = std::sqrt(std::max(0.0, off.dot(covariance.ldlt().solve(off))));
 }
 
+bool LensFinding::Contradicts() const { return deviations > kMaxDeviations; }
+
 double LensFinding::FocalDeviations() const {
   return std::abs(found.MeanFocalLength() - told.MeanFocalLength()) / focal_sigma;
 }
@@ -370,8 +372,18 @@ bool HasPanoramasOrRigs(const SparseModel& model) {
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine) {
   LensCheck check;
   check.lens_of_camera = LensesAsTold(model, {});
-  if (refine == RefineIntrinsics::kNever || model.images.size() < 2) return check;
-  if (HasPanoramasOrRigs(model)) return check;
+  if (model.images.size() < 2) return check;
+  if (HasPanoramasOrRigs(model)) {
+    const bool has_lens =
+        std::any_of(model.cameras.begin(), model.cameras.end(),
+                    [](const auto& camera) { return !camera.second.IsPanorama(); });
+    if (has_lens) {
+      check.not_checked =
+          "The lenses are not checked: in a model with rigs or panoramas they stay as told. A focal "
+          "length that is 1 % wrong moves photos by centimetres.";
+    }
+    return check;
+  }
   const double sigma_px = KeypointNoise(model);
   const SparseModel thinned = ThinnedModel(model, kLensPointsPerImage);
   const std::optional<FreedLenses> freed = FreeLenses(thinned, labels, sigma_px);
@@ -383,12 +395,14 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
         FindingOf(model, freed->full, static_cast<int>(i), freed->noise, i >= freed->num_shared);
     finding.used = refine == RefineIntrinsics::kAlways ||
                    (finding.apart && SharesCameras(model, finding)) || !finding.told_alike ||
-                   finding.deviations > kMaxDeviations;
-    if (finding.sigmas.size() == 0 || too_dear) finding.used = false;
+                   finding.Contradicts();
+    const bool never = refine == RefineIntrinsics::kNever;
+    if (finding.sigmas.size() == 0 || too_dear || never) finding.used = false;
     mended.lenses[i].free = finding.used;
     if (!finding.used) mended.lenses[i].camera = model.cameras.at(finding.camera_ids[0]);
     check.lenses.push_back(std::move(finding));
   }
+  if (refine == RefineIntrinsics::kNever) return check;
   check.lens_of_camera = LensesAsTold(model, check.lenses);
   const auto is_used = [](const LensFinding& lens) { return lens.used; };
   if (std::none_of(check.lenses.begin(), check.lenses.end(), is_used)) return check;

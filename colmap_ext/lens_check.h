@@ -40,6 +40,8 @@ struct LensFinding {
   // covariance (Mahalanobis 1936).
   double deviations = 0;
   bool used = false;  // found takes told's place
+  // Told and found differ by more than keypoints do, photo by photo.
+  bool Contradicts() const;
 
   // Sets sigmas, focal_sigma and deviations by the covariance of found's parameters; 0 x 0 = not
   // determined.
@@ -55,6 +57,8 @@ struct LensCheck {
   std::optional<SparseModel> mended;
   // Of the mended model: cameras that are one lens have the same number.
   std::map<uint32_t, int> lens_of_camera;
+  // Why nobody looked at the lenses, in a sentence; empty if somebody did.
+  std::string not_checked;
 
   // Of the mended model (or the input): what was told of each of its cameras.
   std::map<uint32_t, Camera> ToldCameras(const SparseModel& model) const;
@@ -66,8 +70,8 @@ Json LensToJson(const LensFinding& finding);
 // Cameras of the same model and photo size whose photos have the same label (what EXIF says of
 // their camera and focal length, by image_id; may lack any) are one lens, as far as the photos
 // allow that: those that obey another focal length (by 1 %, and significantly) have their own. A
-// lens is used if its photos contradict what was told (auto), or in any case (always). Models with
-// panoramas or rigs keep theirs.
+// lens is used if its photos contradict what was told (auto), in any case (always), or in none
+// (never). Models with panoramas or rigs keep theirs, and these are not looked at.
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine);
 
 }  // namespace roomtex

@@ -58,9 +58,7 @@ void SearchScans(const AlignmentInput& input, const std::vector<NearHint>& near,
   MirroredReading other;
   other.scans = std::make_unique<const std::vector<Scan>>(MirrorScans(input.surveyed.scans()));
   other.surveyed = std::make_unique<const SurveyedScans>(*other.scans, input.surveyed.options());
-  AlignmentInput turned{input.model,          *other.surveyed,  input.picks,
-                        input.picks_path,     input.azimuth,    input.photo_labels,
-                        input.lenses_refined, input.image_path, input.num_threads};
+  const AlignmentInput turned = input.With(input.model, *other.surveyed, input.picks);
   AutomaticAlignment again = AlignAutomatically(turned, near, options, &context.progress);
   if (!again.attempt.alignment) return;
   reading->search = SearchToJson(again);
@@ -315,11 +313,13 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   const DuplicatesAside duplicates = SetDuplicatesAside(verdict, picks, near, &model, context);
   context.progress.Stage("planes");
   PlanesOf(a, *reading.surveyed);
-  AlignScans(a,
-             {model, *reading.surveyed, picks, a.picks_path, reading.azimuth(),
-              PhotoLabels(model, a.image_path), verdict.refined, a.image_path,
-              context.options.num_threads},
-             near, verdict.known_rms, one_place, &reading, context);
+  AlignmentInput input{model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
+  input.photo_labels = PhotoLabels(model, a.image_path);
+  input.lenses_refined = verdict.refined;
+  input.principal_points_refined = verdict.principal_points_refined;
+  input.image_path = a.image_path;
+  input.num_threads = context.options.num_threads;
+  AlignScans(a, input, near, verdict.known_rms, one_place, &reading, context);
   if (verdict.known_rms && reading.search.is_null() && a.picks_path.empty()) {
     reading.search = {{"method", "known_poses"}, {"position_rms_m", *verdict.known_rms}};
   }

@@ -78,7 +78,7 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
       "refine_intrinsics", &a->refine_intrinsics, kRefineIntrinsicsWords,
       "Adjust focal length, principal point and distortion, one set for all photos of "
       "a lens: auto = where photos or scan contradict what was told, which is said; "
-      "1 = always; 0 = never.");
+      "1 = always; 0 = never, but a lens that the photos contradict is not trusted.");
   command->Add(FieldsOf(&o.bundle));
   command->Add(FieldsOf(&a->planes));
   command->AddOutputPath("Plane.output_path", &a->planes_path,

@@ -486,10 +486,13 @@ TEST(Alignment, AWrongLensIsNoticedAndMended) {
   const SparseModel& model = alignment.adjustment.bundle.model;
   EXPECT_NEAR(model.cameras.begin()->second.MeanFocalLength() / focal_length, 1, 0.001);
   EXPECT_LT(WorstPoseErrors(*wrong.room, model, Similarity()).position, 0.004);
-  // Told to keep it, it is wrong or refused.
+  // Told to keep it, it is wrong, and not to be trusted.
   AlignmentOptions options;
   options.refine_intrinsics = RefineIntrinsics::kNever;
-  EXPECT_FALSE(AlignCase(wrong, options).lenses.mended);
+  const Alignment held = AlignCase(wrong, options);
+  EXPECT_FALSE(held.lenses.mended);
+  EXPECT_THAT(Reasons(held), HasSubstr("The lens as told is kept. --refine_intrinsics auto"));
+  EXPECT_THAT(AlignCase(right, options).reasons, IsEmpty());
   // A right one stays as it is.
   const Alignment& usual = AlignedCase(0, 6);
   EXPECT_FALSE(usual.lenses.mended);

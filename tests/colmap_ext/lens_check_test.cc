@@ -82,10 +82,23 @@ TEST(LensCheck, AWrongFocalLengthIsFoundAndMended) {
     EXPECT_LT(WorstPlace(*check.mended, truth), 1.3 * best);
     EXPECT_THAT(lens.Sentence(), HasSubstr("standard deviations"));
   }
-  // Told not to look, it does not.
+  // Told to keep it, it looks all the same.
   SparseModel wrong = truth;
-  Scale(1.2, &wrong.cameras.at(1));
-  EXPECT_FALSE(CheckLenses(wrong, {}, RefineIntrinsics::kNever).mended);
+  Scale(1.03, &wrong.cameras.at(1));
+  const LensCheck held = CheckLenses(Mapped(wrong), {}, RefineIntrinsics::kNever);
+  EXPECT_FALSE(held.mended);
+  ASSERT_EQ(held.lenses.size(), 1u);
+  EXPECT_TRUE(held.lenses[0].Contradicts());
+  EXPECT_FALSE(held.lenses[0].used);
+}
+
+TEST(LensCheck, ARigIsNotLookedAtWhichIsSaid) {
+  SparseModel rig = TrueModel(2);
+  rig.images.begin()->second.frame_id = 1;
+  const LensCheck check = CheckLenses(rig, {}, RefineIntrinsics::kAuto);
+  EXPECT_TRUE(check.lenses.empty());
+  EXPECT_THAT(check.not_checked, HasSubstr("rigs"));
+  EXPECT_EQ(CheckLenses(Mapped(TrueModel(2)), {}, RefineIntrinsics::kAuto).not_checked, "");
 }
 
 TEST(LensCheck, CamerasThatWereRefinedOneByOneAreOneLens) {

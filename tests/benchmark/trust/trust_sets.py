@@ -169,8 +169,8 @@ def make_room(sets, tools, name):
     write_case(sets, name, model=folder + "/sparse/0", right_mm=right, **common)
     variants = {
         "s1": ["long1", "long3", "long20", "each", "free"],
-        "s2": ["long1", "long3", "each", "free"],
-        "s3": ["long3", "each", "free"],
+        "s2": ["long1", "long3", "long20", "each", "free"],
+        "s3": ["long3", "long20", "each", "free"],
         "few": ["free"],
         "bare": ["long2", "held2"],
         "bare_twin": ["long2", "held2"],
