@@ -77,7 +77,7 @@ LensChoice ChooseLens(const AlignmentInput& input, const AlignmentFit& fit, cons
     return LensChoice::kHeld;
   }
   if (refine == RefineIntrinsics::kAlways || lenses.mended || input.lenses_refined) {
-    return !input.principal_points_refined && IsCentreCalibrated(lenses) ? LensChoice::kFreeButCentre
+    return !input.lenses_refined && IsCentreCalibrated(lenses) ? LensChoice::kFreeButCentre
                                                                : LensChoice::kFree;
   }
   const bool open =

@@ -46,9 +46,8 @@ struct AlignmentInput {
   std::string azimuth;  // as the scans were read: "clockwise" or "counterclockwise"
   // What EXIF says of the photos' cameras (CheckLenses), by image_id; may be empty.
   LensLabels photo_labels = {};
-  // The model's lenses are what a mapper made of them, and their principal points, too: the scan
-  // has the last word on them.
-  bool lenses_refined = false, principal_points_refined = false;
+  // The model's lenses are what a mapper made of them: the scan has the last word on them.
+  bool lenses_refined = false;
   // Folder of the photos, for a second opinion where few points lie on a rough surface; may be
   // empty.
   std::string image_path = "";
@@ -60,7 +59,6 @@ struct AlignmentInput {
     AlignmentInput other{other_model, other_scans, other_picks, picks_path, azimuth};
     other.photo_labels = photo_labels;
     other.lenses_refined = lenses_refined;
-    other.principal_points_refined = principal_points_refined;
     other.image_path = image_path;
     other.num_threads = num_threads;
     return other;

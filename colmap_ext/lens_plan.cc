@@ -6,8 +6,6 @@
 #include <tuple>
 #include <utility>
 
-#include <Eigen/Core>
-
 #include "core/camera_formulas.h"
 #include "core/text.h"
 
@@ -47,11 +45,6 @@ std::vector<Group> GroupByLabel(const std::vector<uint32_t>& images, const LensL
 void ScaleFocalLength(double factor, Camera* camera) {
   const int num_focal = camera_formulas::HasOneFocalLength(camera->model) ? 1 : 2;
   for (int k = 0; k < num_focal; ++k) camera->params[static_cast<size_t>(k)] *= factor;
-}
-
-Eigen::Vector2d PrincipalPoint(const Camera& camera) {
-  const size_t first = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
-  return {camera.params[first], camera.params[first + 1]};
 }
 
 // An id that neither has.
@@ -153,20 +146,6 @@ void LensPlan::EraseUnused() {
   for (auto at = cameras_.begin(); at != cameras_.end();) {
     at = used.count(at->first) > 0 ? std::next(at) : cameras_.erase(at);
   }
-}
-
-bool LensPlan::KeepsPrincipalPoints(const SparseModel& model) const {
-  // Pixels; one that is held moves by its prior's few hundredths.
-  constexpr double kHeldWithin = 0.2;
-  return std::all_of(model.images.begin(), model.images.end(), [&](const auto& one) {
-    const auto& [id, image] = one;
-    const Camera& told = database_cameras_.at(database_images_.at(id).camera_id);
-    if (told.IsPanorama()) return true;
-    const Eigen::Vector2d centre = PrincipalPoint(told);
-    const Eigen::Vector2d middle(told.width / 2.0, told.height / 2.0);
-    return told.has_prior_focal_length && centre != middle &&
-           (PrincipalPoint(model.cameras.at(image.camera_id)) - centre).norm() < kHeldWithin;
-  });
 }
 
 void LensPlan::Restore(SparseModel* model) const {

@@ -47,11 +47,6 @@ class LensPlan {
   // of one that is several, the others keep the new ids.
   void Restore(SparseModel* model) const;
 
-  // Whether the principal points of a model of this plan are those of the database, as a
-  // calibration measured them: neither guessed (without a prior focal length, or in the very middle
-  // of the photo) nor found by the photos.
-  bool KeepsPrincipalPoints(const SparseModel& model) const;
-
  private:
   void EraseUnused();
 

@@ -44,8 +44,6 @@ MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& mo
     return verdict;
   }
   verdict.refined = json.value("refined_intrinsics", Json()) == true;
-  verdict.principal_points_refined =
-      verdict.refined && json.value("principal_points_as_told", Json()) != true;
   const Json known = json.value("known", Json());
   if (known.is_object() && known.value("placed", Json()) == true) {
     const Json rms = known.value("position_rms_m", Json());

@@ -16,8 +16,6 @@ inline constexpr char kMapperReportName[] = "roomtex-mapper.json";
 
 struct MapperVerdict {
   bool refined = false;  // the lenses are what the mapper made of them, not what was told
-  // All of them, their principal points as well: these are not a calibration's.
-  bool principal_points_refined = false;
   // The mapper's reasons not to trust the model, in sentences, by what they are about.
   std::vector<std::string> calibration;  // the lenses
   std::vector<std::string> photos;       // single photos, or how many there are

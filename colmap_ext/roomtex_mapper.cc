@@ -358,8 +358,6 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   const MappingOutcome& outcome = pass.best[0];
   FillMappingReport(outcome, *pass.images, &context.report);
   context.report["refined_intrinsics"] = pass.refine;
-  context.report["principal_points_as_told"] =
-      pass.plan.KeepsPrincipalPoints(outcome.result.model);
   context.report["cameras"] = Json::array();
   for (const LensFinding& lens : pass.lenses.lenses) {
     context.report["cameras"].push_back(LensToJson(lens));

@@ -316,7 +316,6 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   AlignmentInput input{model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
   input.photo_labels = PhotoLabels(model, a.image_path);
   input.lenses_refined = verdict.refined;
-  input.principal_points_refined = verdict.principal_points_refined;
   input.image_path = a.image_path;
   input.num_threads = context.options.num_threads;
   AlignScans(a, input, near, verdict.known_rms, one_place, &reading, context);

@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include "colmap_ext/calibration_check.h"
 #include "colmap_ext/mapper_verdict.h"
 #include "tests/support/temp_folder.h"
 
@@ -102,30 +101,6 @@ TEST(LensPlan, PhotosAreToldACameraOfTheirOwn) {
   EXPECT_EQ(plan.cameras().count(1), 0u);  // nobody's any more
 }
 
-// A mapper that mends a focal length need not have touched what else was measured.
-TEST(LensPlan, KnowsWhetherAModelHasTheCalibratedPrincipalPoints) {
-  Camera camera = PlannedCamera(1, 500);
-  camera.params[1] += 3;
-  camera.has_prior_focal_length = true;
-  const std::map<uint32_t, DatabaseImage> images = {{1, {1, 1, "photo_1"}}};
-  const LensPlan plan({{1, camera}}, images);
-  SparseModel model = ModelOf(plan);
-  model.cameras.at(1).params[0] *= 1.03;
-  EXPECT_TRUE(plan.KeepsPrincipalPoints(model));
-  Camera& richer = model.cameras.at(1);
-  richer = RicherCamera(richer);
-  EXPECT_TRUE(plan.KeepsPrincipalPoints(model));
-  richer.params[richer.model == CameraModel::kSimpleRadial ? 2 : 3] += 1;  // cy
-  EXPECT_FALSE(plan.KeepsPrincipalPoints(model));
-
-  // Nobody measured those of a camera that was guessed, or that lie in the very middle.
-  camera.has_prior_focal_length = false;
-  const LensPlan guessed({{1, camera}}, images);
-  EXPECT_FALSE(guessed.KeepsPrincipalPoints(ModelOf(guessed)));
-  const LensPlan middle({{1, PlannedCamera(1, 500)}}, images);
-  EXPECT_FALSE(middle.KeepsPrincipalPoints(ModelOf(middle)));
-}
-
 TEST(MapperVerdict, IsReadBesideItsOwnModelOnly) {
   const TempFolder folder;
   SparseModel model;
@@ -137,17 +112,11 @@ TEST(MapperVerdict, IsReadBesideItsOwnModelOnly) {
              {"about": "calibration", "reason": "bent"}, 5, {"about": 3}]})";
   const MapperVerdict verdict = ReadMapperVerdict(folder.path(), model);
   EXPECT_TRUE(verdict.refined);
-  EXPECT_TRUE(verdict.principal_points_refined);
   EXPECT_THAT(verdict.motion, ElementsAre("planar-ambiguous"));
   EXPECT_THAT(verdict.calibration, ElementsAre("bent"));
   EXPECT_TRUE(verdict.photos.empty());
   model.points[8];
   EXPECT_TRUE(ReadMapperVerdict(folder.path(), model).motion.empty());
-  std::ofstream(folder / kMapperReportName)
-      << R"({"num_reg_images": 1, "num_points": 2, "refined_intrinsics": true,
-             "principal_points_as_told": true})";
-  EXPECT_TRUE(ReadMapperVerdict(folder.path(), model).refined);
-  EXPECT_FALSE(ReadMapperVerdict(folder.path(), model).principal_points_refined);
   std::ofstream(folder / kMapperReportName) << "no JSON";
   EXPECT_FALSE(ReadMapperVerdict(folder.path(), model).refined);
 }
