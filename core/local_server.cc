@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
-#include <future>
 #include <list>
 #include <mutex>
 #include <set>
@@ -117,6 +116,7 @@ struct LocalServer::Impl {
     bool known = false;
   };
   bool MakeRoom(const std::string& from_where);
+  std::mutex starting;  // held until the acceptor may begin
   std::mutex visitors_mutex;
   std::list<Visitor> visitors;
   bool catches_signals = false;
@@ -299,9 +299,10 @@ void LocalServer::Impl::Accept() {
 }
 
 void LocalServer::Impl::StartThreads() {
-  std::promise<void> ready;
-  acceptor = std::thread([this, go = ready.get_future()] {
-    go.wait();
+  const std::lock_guard<std::mutex> lock(starting);
+  acceptor = std::thread([this] {
+    starting.lock();  // until there are threads to give visitors to
+    starting.unlock();
     Accept();
   });
   try {
@@ -311,7 +312,6 @@ void LocalServer::Impl::StartThreads() {
     throw;
   }
   room.threads = pool->count();
-  ready.set_value();
 }
 
 // False if there is none: all are known, and enough of them wait for a thread.
