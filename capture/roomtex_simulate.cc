@@ -32,7 +32,7 @@ void Describe(const SimulatedRoom& room, const CaptureSummary& summary, Report* 
   const Rigid scan_from_room = room.ScanFromRoom();
   (*report)["scan_from_room"] =
       ToJson(Similarity{1, scan_from_room.rotation, scan_from_room.translation});
-  (*report)["num_stations"] = room.options().num_stations;
+  (*report)["num_stations"] = room.NumStations();
   (*report)["num_samples"] = summary.num_samples;
   (*report)["num_missing"] = summary.num_missing;
   (*report)["picked_photo"] = summary.picked_photo;

@@ -195,6 +195,11 @@ Step MakeAlign(Chain* chain) {
   } else {
     AddOption("--input_path", chain->At("sparse/0"), &line);
     step.inputs.push_back(chain->At("sparse/0"));
+    // Its matches tell which photos are right; those of panoramas are their faces'.
+    if (!HasPanoramas(chain)) {
+      AddOption("--database_path", chain->At("database.db"), &line);
+      step.inputs.push_back(chain->At("database.db"));
+    }
   }
   step.inputs.push_back(chain->ColorFolder());
   AddScans(options, &line, &step.inputs);

@@ -125,9 +125,9 @@ Scan InItsStation(Scan scan) {
 
 void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary,
                 Progress* progress) {
-  progress->Stage("scans", room.options().num_stations);
+  progress->Stage("scans", room.NumStations());
   std::string poses = "# scan_from_station: NAME qw qx qy qz tx ty tz, metres\n";
-  for (int station = 0; station < room.options().num_stations; ++station) {
+  for (int station = 0; station < room.NumStations(); ++station) {
     const Scan scan = room.MakeScan(station);
     WriteRtpi(RtpiFromScan(InItsStation(scan)), folder + "/" + ScanName(station));
     poses += ScanName(station) + " " + PoseLine(scan.scan_from_station) + "\n";
@@ -135,27 +135,31 @@ void WriteScans(const SimulatedRoom& room, const std::string& folder, CaptureSum
     summary->num_missing += scan.NumMissing();
     progress->Tick();
   }
-  if (room.options().num_stations > 1) WriteText(folder + "/scan_poses.txt", poses);
+  if (room.NumStations() > 1) WriteText(folder + "/scan_poses.txt", poses);
 }
 
-void WritePicks(const SimulatedRoom& room, const std::string& folder, CaptureSummary* summary) {
+// Into `path`, on the scan of a station.
+void WritePicks(const SimulatedRoom& room, int station, const std::string& path,
+                CaptureSummary* summary) {
   std::string text =
       "# pixel in the photo (centre of the upper-left pixel = 0.5, 0.5), point in the scan frame "
       "in "
       "metres\n" +
       CsvLine({"image_name", "x", "y", "scan_x", "scan_y", "scan_z"});
   if (room.options().num_picks > 0) {
-    const int photo = room.BestPhotoForPicks();
-    for (const SimulatedPick& pick : room.MakePicks(photo, room.options().num_picks)) {
-      summary->picked_photo = pick.image_name;
-      ++summary->num_picks;
+    const int photo = room.BestPhotoForPicks(station);
+    for (const SimulatedPick& pick : room.MakePicks(photo, room.options().num_picks, station)) {
+      if (station == 0) {
+        summary->picked_photo = pick.image_name;
+        ++summary->num_picks;
+      }
       std::vector<std::string> fields = {pick.image_name};
       for (const double x : pick.x_in_img) fields.push_back(Number(x, 2));
       for (const double x : pick.x_in_scan) fields.push_back(Number(x, 4));
       text += CsvLine(fields);
     }
   }
-  WriteText(folder + "/picks.csv", text);
+  WriteText(path, text);
 }
 
 std::string CameraParams(const Camera& camera) {
@@ -288,21 +292,28 @@ std::string CommandsToType(bool paired, const std::string& scans) {
 void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   const SimulatedRoomOptions& options = room.options();
   std::string scans;
-  for (int station = 0; station < options.num_stations; ++station) {
+  for (int station = 0; station < room.NumStations(); ++station) {
     scans += " --scan_path " + ScanName(station);
   }
-  if (options.num_stations > 1) scans += " --scan_poses scan_poses.txt";
+  if (room.NumStations() > 1) scans += " --scan_poses scan_poses.txt";
   std::ostringstream text;
   const bool paired = options.projectors > 0;
   text
-      << "A simulated room: " << room.NumPhotos() << " photos and " << options.num_stations
-      << (options.num_stations == 1 ? " range scan" : " range scans")
+      << (options.second_room ? "Two simulated rooms with an open door: " : "A simulated room: ")
+      << room.NumPhotos() << " photos and " << room.NumStations()
+      << (room.NumStations() == 1 ? " range scan" : " range scans")
       << ", made by roomtex-simulate with seed " << options.random_seed << ".\n\n"
       << "photos/             the photos"
       << (options.exif ? ", exposure in EXIF\n" : ", without EXIF\n")
       << (options.similar_room > 0
               ? fmt::format("                    from {} on of another room, which have no truth\n",
                             SimilarRoomPhotoName(room, 0))
+              : "")
+      << (options.second_room
+              ? fmt::format(
+                    "                    from {} on of the second room, from {} on on the way "
+                    "through the\n                    door, there and back\n",
+                    room.PhotoName(options.num_photos), room.PhotoName(2 * options.num_photos))
               : "")
       << (options.zoomed > 0 ? "                    some taken at 1.3 times the focal length told\n"
                              : "")
@@ -311,9 +322,16 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
                    "                    then without it\n"
                  : "")
       << "scan.rtpi           the range scan; azimuth clockwise (the default)\n"
-      << (options.num_stations > 1 ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
-                                   : "")
+      << (room.NumStations() > 1 ? "scan_N.rtpi         further scans, placed by scan_poses.txt\n"
+                                 : "")
+      << (options.second_room ? fmt::format("                    from {} on of the second room\n",
+                                            ScanName(options.num_stations))
+                              : "")
       << "picks.csv           clicks: a pixel of a photo and the scan point seen there\n"
+      << (options.second_room
+              ? "second_room_picks.csv  the same for the second room, in the frame of its first "
+                "scan\n"
+              : "")
       << "cameras.txt         the calibrated camera\n"
       << "camera_options.txt  the same as options of colmap feature_extractor\n"
       << "truth/              what the tools have to find out: the true poses in the scan frame "
@@ -358,7 +376,10 @@ CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool r
   CaptureSummary summary;
   WriteCamera(room, folder);
   WriteTruth(room, folder + "/truth");
-  WritePicks(room, folder, &summary);
+  WritePicks(room, 0, folder + "/picks.csv", &summary);
+  if (room.options().second_room) {
+    WritePicks(room, room.options().num_stations, folder + "/second_room_picks.csv", &summary);
+  }
   WriteReadme(room, folder);
   WriteScans(room, folder, &summary, progress);
   progress->Stage("photos", room.NumPhotos() + room.options().similar_room);

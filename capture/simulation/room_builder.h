@@ -29,6 +29,7 @@ class RoomBuilder {
   void AddFurniture();
   void AddFewFurniture();  // of a bare room
   void AddDoor();
+  void AddDoorway();  // of the wall between two rooms
 
  private:
   struct WallFrame {
@@ -75,6 +76,7 @@ class RoomBuilder {
     scene_.AddQuad(surface, room_from_piece * corner, room_from_piece.rotation * right,
                    room_from_piece.rotation * down);
   }
+  void AddWallWithDoorway(int surface);
   // Centre `from_left` metres along the wall and `z` above the floor.
   void Hang(Wall wall, double from_left, double z, double width, double height,
             const cv::Mat& picture, double thickness = 0.004);

@@ -78,6 +78,13 @@ Eigen::Quaterniond CamFromRoomRotation(double yaw, double pitch, double roll) {
   return Eigen::Quaterniond(room_from_cam * about_axis.toRotationMatrix()).conjugate();
 }
 
+Rigid PoseAt(const Eigen::Vector3d& place, double yaw, double pitch, double roll) {
+  Rigid pose;
+  pose.rotation = CamFromRoomRotation(yaw, pitch, roll);
+  pose.translation = -(pose.rotation * place);
+  return pose;
+}
+
 // Free space around a tripod of this height.
 double TripodClearance(const RoomScene& scene, double x, double y, double height) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -159,7 +166,10 @@ Camera MakeRoomCamera(const SimulatedRoomOptions& options) {
   return camera;
 }
 
-std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomScene& scene) {
+namespace {
+
+std::vector<Rigid> PlaceCamerasInRoom(const SimulatedRoomOptions& options, const RoomScene& scene,
+                                      const Rigid& scene_from_room) {
   std::vector<Rigid> poses;
   const Eigen::Vector2d middle(0.5 * options.width, 0.5 * options.depth);
   const bool level = MakeRoomCamera(options).IsPanorama();
@@ -180,18 +190,60 @@ std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomS
     for (int attempt = 0; attempt < 14; ++attempt, offset *= 0.93) {
       place << middle + offset, height;
       const Eigen::Quaterniond cam_from_room = CamFromRoomRotation(yaw, pitch, roll);
-      const auto ahead = scene.Cast(place, cam_from_room.conjugate() * Eigen::Vector3d::UnitZ());
-      if (ClearanceAround(scene, place) > 0.42 && (!ahead || ahead->distance > 1.5)) break;
+      const Eigen::Vector3d forward = cam_from_room.conjugate() * Eigen::Vector3d::UnitZ();
+      const Eigen::Vector3d here = scene_from_room * place;
+      const auto ahead = scene.Cast(here, scene_from_room.rotation * forward);
+      if (ClearanceAround(scene, here) > 0.42 && (!ahead || ahead->distance > 1.5)) break;
     }
-    Rigid pose;
-    pose.rotation = CamFromRoomRotation(yaw, pitch, roll);
-    pose.translation = -(pose.rotation * place);
-    poses.push_back(pose);
+    poses.push_back(PoseAt(place, yaw, pitch, roll) * scene_from_room.Inverse());
   }
   return poses;
 }
 
-std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const RoomScene& scene) {
+// On the way through the door, there and back: a few steps before it, in it, and beyond it a look
+// to either side.
+std::vector<Rigid> PlaceCamerasInDoorway(const SimulatedRoomOptions& options,
+                                         const RoomScene& scene) {
+  struct Step {
+    double before;  // metres before the door
+    double yaw_deg;
+  };
+  constexpr Step kSteps[] = {{1.9, 0}, {1.2, 8}, {0.6, -8}, {0.1, 0}, {-0.15, 32}, {-0.2, -32}};
+  std::vector<Rigid> poses;
+  for (const bool back : {false, true}) {
+    for (const Step& step : kSteps) {
+      RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 204, poses.size()));
+      const double y = back ? -kPartitionThickness - step.before : step.before;
+      Eigen::Vector3d place(options.DoorX() + random.Uniform(-0.08, 0.08), y,
+                            1.55 + random.Uniform(-0.1, 0.1));
+      for (int attempt = 0; attempt < 10 && ClearanceAround(scene, place) < 0.25; ++attempt) {
+        place.y() = -kPartitionThickness / 2 + 0.9 * (place.y() + kPartitionThickness / 2);
+      }
+      poses.push_back(PoseAt(place, RadFromDeg((back ? 90 : -90) + step.yaw_deg),
+                             RadFromDeg(random.Uniform(-12, -4)),
+                             RadFromDeg(random.Uniform(-options.roll_deg, options.roll_deg))));
+    }
+  }
+  return poses;
+}
+
+}  // namespace
+
+std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomScene& scene) {
+  std::vector<Rigid> poses = PlaceCamerasInRoom(options, scene, Rigid());
+  if (!options.second_room) return poses;
+  for (const auto& more :
+       {PlaceCamerasInRoom(options.SecondRoom(), scene, options.RoomFromSecondRoom()),
+        PlaceCamerasInDoorway(options, scene)}) {
+    poses.insert(poses.end(), more.begin(), more.end());
+  }
+  return poses;
+}
+
+namespace {
+
+std::vector<Rigid> PlaceStationsInRoom(const SimulatedRoomOptions& options, const RoomScene& scene,
+                                       const Rigid& scene_from_room) {
   static constexpr double kPreferred[][2] = {{0.42, 0.52}, {0.78, 0.7}, {0.25, 0.75}, {0.6, 0.2}};
   std::vector<Rigid> stations;
   for (int k = 0; k < options.num_stations; ++k) {
@@ -203,7 +255,8 @@ std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const Room
     double best = -std::numeric_limits<double>::infinity();
     for (double x = 0.5; x <= options.width - 0.5; x += 0.2) {
       for (double y = 0.5; y <= options.depth - 0.5; y += 0.2) {
-        double score = std::min(TripodClearance(scene, x, y, height), 0.6) -
+        const Eigen::Vector3d foot = scene_from_room * Eigen::Vector3d(x, y, 0);
+        double score = std::min(TripodClearance(scene, foot.x(), foot.y(), height), 0.6) -
                        0.12 * (Eigen::Vector2d(x, y) - preferred).norm();
         // A second scan from the same place shows nothing new.
         for (const Rigid& other : stations) {
@@ -227,6 +280,17 @@ std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const Room
     room_from_station.translation = place;
     stations.push_back(room_from_station);
   }
+  for (Rigid& station : stations) station = scene_from_room * station;
+  return stations;
+}
+
+}  // namespace
+
+std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const RoomScene& scene) {
+  std::vector<Rigid> stations = PlaceStationsInRoom(options, scene, Rigid());
+  if (!options.second_room) return stations;
+  const auto more = PlaceStationsInRoom(options.SecondRoom(), scene, options.RoomFromSecondRoom());
+  stations.insert(stations.end(), more.begin(), more.end());
   return stations;
 }
 

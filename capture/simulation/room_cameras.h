@@ -17,7 +17,8 @@ class ProjectedLight;
 Camera MakeRoomCamera(const SimulatedRoomOptions& options);
 
 // cam_from_room of every photo: an oval of cameras that look across the room, alternately low and
-// high, clear of the furniture.
+// high, clear of the furniture; then those of the second room and those taken on the way through
+// the door, where there is one.
 std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomScene& scene);
 
 // room_from_station: y up, turned about it; the first is level, the others nearly.

@@ -361,7 +361,9 @@ void RoomBuilder::AddFewFurniture() {
   Part(Placed(1.0, depth_ - 0.62, 0, 5), carton, 0, 0, 0, 0.55, 0.42, 0.38);
 }
 
-void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
+namespace {
+
+void FurnishOneRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
   RoomBuilder builder(options, scene);
   builder.AddShell();
   builder.AddLights();
@@ -376,6 +378,17 @@ void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
   } else {
     builder.AddFurniture();
   }
+}
+
+}  // namespace
+
+void FurnishRoom(const SimulatedRoomOptions& options, RoomScene* scene) {
+  FurnishOneRoom(options, scene);
+  if (!options.second_room) return;
+  RoomBuilder(options, scene).AddDoorway();
+  scene->Place(options.RoomFromSecondRoom());
+  FurnishOneRoom(options.SecondRoom(), scene);
+  scene->Place(Rigid());
 }
 
 }  // namespace roomtex

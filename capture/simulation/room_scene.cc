@@ -24,7 +24,16 @@ int RoomScene::AddSurface(const Surface& surface) {
 
 void RoomScene::AddPatch(const Patch& patch) {
   patches_.push_back(patch);
-  patches_.back().shines = surfaces_[patch.surface].shines;
+  Patch& added = patches_.back();
+  added.origin = room_from_part_ * patch.origin;
+  added.edge_s = room_from_part_.rotation * patch.edge_s;
+  added.edge_t = room_from_part_.rotation * patch.edge_t;
+  added.shines = surfaces_[patch.surface].shines;
+}
+
+void RoomScene::AddLight(const AreaLight& light) {
+  lights_.push_back({room_from_part_ * light.corner, room_from_part_.rotation * light.edge_s,
+                     room_from_part_.rotation * light.edge_t, light.power});
 }
 
 void RoomScene::AddQuad(int surface, const Eigen::Vector3d& origin, const Eigen::Vector3d& edge_s,

@@ -74,6 +74,9 @@ class RoomScene {
   RoomScene();
   ~RoomScene();
 
+  // Where what is added from now on stands: its frame is no longer the room's.
+  void Place(const Rigid& room_from_part) { room_from_part_ = room_from_part; }
+
   // Gives the index for the calls below.
   int AddSurface(const Surface& surface);
   // Texture coordinates in metres from uv_origin.
@@ -87,7 +90,7 @@ class RoomScene {
   // Upright frustum with `sides` sides; with_caps closes it.
   void AddFrustum(int surface, const Eigen::Vector3d& bottom_centre, double bottom_radius,
                   double top_radius, double height, int sides, bool with_caps);
-  void AddLight(const AreaLight& light) { lights_.push_back(light); }
+  void AddLight(const AreaLight& light);
 
   // Colours are averaged over at least this width (metres), the photos' and the true ones alike.
   void SetFinestDetail(double width) {
@@ -118,6 +121,7 @@ class RoomScene {
   struct Light;
   LinearRgb Illumination(const SceneHit& hit) const;
 
+  Rigid room_from_part_;
   float finest_detail_ = kTextureBandLimit;
   std::vector<Surface> surfaces_;
   std::vector<Patch> patches_;

@@ -72,6 +72,10 @@ void RoomBuilder::AddShell() {
   for (const Wall wall : {kSouth, kEast, kNorth, kWest}) {
     const WallFrame frame = FrameOf(wall);
     if (wall == kNorth && !options_.bare_walls) continue;  // AddWindow
+    if (wall == kSouth && options_.second_room) {
+      AddWallWithDoorway(walls[wall]);
+      continue;
+    }
     scene_.AddQuad(walls[wall], frame.top_left, frame.length * frame.right,
                    -height_ * Vector3d::UnitZ());
   }
@@ -95,6 +99,29 @@ void RoomBuilder::AddShell() {
   Box(white_, width_ - kThick, 0, 0, kThick, depth_, kHigh, 1);
   Box(walnut_, 0.24 * width_, 0, height_ - 0.16, 0.13, depth_, 0.16, 1);
   Box(walnut_, 0.77 * width_, 0, height_ - 0.16, 0.13, depth_, 0.16, 1);
+}
+
+void RoomBuilder::AddWallWithDoorway(int surface) {
+  const WallFrame frame = FrameOf(kSouth);
+  const auto piece = [&](double left, double right, double bottom) {
+    scene_.AddQuad(surface, frame.top_left + left * frame.right, (right - left) * frame.right,
+                   (bottom - height_) * Vector3d::UnitZ(), {static_cast<float>(left), 0.0f});
+  };
+  const double left = width_ - options_.DoorX() - kDoorWidth / 2, right = left + kDoorWidth;
+  piece(0, left, 0);
+  piece(left, right, kDoorHeight);
+  piece(right, frame.length, 0);
+}
+
+void RoomBuilder::AddDoorway() {
+  // What lies in the wall: the sides, the lintel and the threshold.
+  const double left = options_.DoorX() - kDoorWidth / 2, right = left + kDoorWidth;
+  const Vector3d through(0, kPartitionThickness, 0), up(0, 0, kDoorHeight);
+  const Vector3d foot_left(left, -kPartitionThickness, 0), foot_right(right, 0, 0);
+  scene_.AddQuad(white_, foot_left + up, through, -up);
+  scene_.AddQuad(white_, foot_right + up, -through, -up);
+  scene_.AddQuad(white_, foot_left + up, {kDoorWidth, 0, 0}, through);
+  scene_.AddQuad(oak_, foot_left + through, {kDoorWidth, 0, 0}, -through);
 }
 
 void RoomBuilder::AddWindow() {
@@ -188,12 +215,14 @@ void RoomBuilder::AddDoor() {
   const int brass = Add(MakePlaster(RgbFromSrgb(190, 165, 100), 0.1f, NextSeed()),
                         {0.5f, 0.3f, {0.4f, 0.3f, 0.1f}});
   // Looks along +y; the origin is at its foot, in the middle.
-  const Rigid at = Placed(width_ - 0.75, 0, 0);
-  constexpr double kWide = 0.88, kHigh = 2.04;
-  Face(at, door, {kWide / 2, 0.012, kHigh}, {-kWide, 0, 0}, {0, 0, -kHigh});
+  const Rigid at = Placed(options_.DoorX(), 0, 0);
+  constexpr double kWide = kDoorWidth, kHigh = kDoorHeight;
+  const bool has_leaf = !options_.second_room;  // else it was taken off its hinges
+  if (has_leaf) Face(at, door, {kWide / 2, 0.012, kHigh}, {-kWide, 0, 0}, {0, 0, -kHigh});
   for (const double x : {-kWide / 2 - 0.08, kWide / 2})
     Part(at, frame, x, 0, 0, 0.08, 0.03, kHigh + 0.08, 2);
   Part(at, frame, -kWide / 2, 0, kHigh, kWide, 0.03, 0.08);
+  if (!has_leaf) return;
   Part(at, brass, kWide / 2 - 0.1, 0.012, 0.98, 0.035, 0.01, 0.16, 2);
   Part(at, brass, kWide / 2 - 0.18, 0.04, 1.07, 0.11, 0.018, 0.022);
   Part(at, brass, kWide / 2 - 0.09, 0.02, 1.072, 0.018, 0.03, 0.018);

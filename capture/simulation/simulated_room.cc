@@ -73,8 +73,8 @@ struct SimulatedRoom::Impl {
     return RoomScanner(options, scene, station, room_from_station.at(station));
   }
   RoomPhotos Photos() const { return {options, scene, projection, zoomed_projection, row_poses}; }
-  std::vector<PickCandidate> Candidates(int photo) const {
-    return FindPickCandidates(Photos(), Scanner(0), room_from_station[0], photo);
+  std::vector<PickCandidate> Candidates(int photo, int station) const {
+    return FindPickCandidates(Photos(), Scanner(station), room_from_station.at(station), photo);
   }
   double PhotoDiagonal() const { return std::hypot(camera.width, camera.height); }
   const PhotoRenderer& Renderer(int place) const {
@@ -108,9 +108,10 @@ SimulatedRoom::~SimulatedRoom() = default;
 const SimulatedRoomOptions& SimulatedRoom::options() const { return impl_->options; }
 const Camera& SimulatedRoom::camera() const { return impl_->camera; }
 int SimulatedRoom::NumPhotos() const {
-  return impl_->options.num_photos * (impl_->projected ? 2 : 1);
+  return static_cast<int>(impl_->cam_from_room.size()) * (impl_->projected ? 2 : 1);
 }
 bool SimulatedRoom::IsPatterned(int photo) const { return impl_->projected && photo % 2 == 0; }
+int SimulatedRoom::NumStations() const { return static_cast<int>(impl_->room_from_station.size()); }
 int SimulatedRoom::PlaceOf(int photo) const { return impl_->projected ? photo / 2 : photo; }
 const std::vector<Projector>& SimulatedRoom::Projectors() const { return impl_->projectors; }
 
@@ -293,11 +294,11 @@ SparseModel SimulatedRoom::MakeSparseModel(int num_points, double noise_px) cons
   return model;
 }
 
-std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const {
+std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count, int station) const {
   RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 701, photo));
   std::vector<SimulatedPick> picks;
   for (const PickCandidate& candidate :
-       SpreadPicks(impl_->Candidates(PlaceOf(photo)), count, impl_->PhotoDiagonal())) {
+       SpreadPicks(impl_->Candidates(PlaceOf(photo), station), count, impl_->PhotoDiagonal())) {
     const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
     const Eigen::Vector2d click = candidate.x_in_img + impl_->options.click_noise_px * noise;
     // Nobody clicks beside the photo.
@@ -308,14 +309,15 @@ std::vector<SimulatedPick> SimulatedRoom::MakePicks(int photo, int count) const 
   return picks;
 }
 
-int SimulatedRoom::BestPhotoForPicks() const {
+int SimulatedRoom::BestPhotoForPicks(int station) const {
   int best_photo = 0;
   double best = -1;
   for (int photo = 0; photo < NumPhotos(); ++photo) {
     if (impl_->projected && !IsPatterned(photo)) continue;
     if (impl_->options.IsZoomed(PlaceOf(photo))) continue;  // nobody clicks in the odd one
     // How far apart the picks would lie: the smallest spread of the points in space.
-    const auto picks = SpreadPicks(impl_->Candidates(PlaceOf(photo)), 8, impl_->PhotoDiagonal());
+    const auto picks =
+        SpreadPicks(impl_->Candidates(PlaceOf(photo), station), 8, impl_->PhotoDiagonal());
     if (picks.size() < 6) continue;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const auto& pick : picks) mean += pick.x_in_scan / static_cast<double>(picks.size());

@@ -43,7 +43,8 @@ class SimulatedRoom {
   const SimulatedRoomOptions& options() const;
   const Camera& camera() const;  // one for all photos, camera_id 1
 
-  int NumPhotos() const;  // twice the places if there are projectors
+  int NumPhotos() const;  // of all rooms; twice the places if there are projectors
+  int NumStations() const;
   // "photo_000.jpg"; with projectors IMG_0001.jpg (patterned), IMG_0002.jpg (plain), IMG_0003.jpg
   std::string PhotoName(int photo) const;
   bool IsPatterned(int photo) const;   // taken in the projectors' light
@@ -82,12 +83,12 @@ class SimulatedRoom {
   SparseModel MakeSparseModel(int num_points, double noise_px) const;
   Similarity ScanFromSparse() const;
 
-  // Picks of one photo (scan samples that the photo sees, well spread, at corners of things), with
-  // the click noise of the options.
-  std::vector<SimulatedPick> MakePicks(int photo, int count) const;
-  // The photo that sees the most of the scan, spread in depth: where a user would click. Never a
-  // plain one, if there are projectors: COLMAP gets the patterned ones.
-  int BestPhotoForPicks() const;
+  // Picks of one photo (samples of a station's scan that the photo sees, well spread, at corners of
+  // things), with the click noise of the options, in the frame of that station.
+  std::vector<SimulatedPick> MakePicks(int photo, int count, int station = 0) const;
+  // The photo that sees the most of a station's scan, spread in depth: where a user would click.
+  // Never a plain one, if there are projectors: COLMAP gets the patterned ones.
+  int BestPhotoForPicks(int station = 0) const;
 
  private:
   struct Impl;

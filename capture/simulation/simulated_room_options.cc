@@ -6,12 +6,27 @@
 #include "capture/simulation/camera_faults.h"
 #include "core/camera_formulas.h"
 #include "core/camera_model.h"
+#include "core/frames.h"
 #include "core/option_fields.h"
 
 namespace roomtex {
 
 bool IsOfShare(int photo, double share) {
   return std::floor((photo + 1) * share) > std::floor(photo * share);
+}
+
+SimulatedRoomOptions SimulatedRoomOptions::SecondRoom() const {
+  // Any that nobody is likely to ask for himself: the rooms have nothing in common.
+  constexpr int kOtherSeeds = 100003;
+  SimulatedRoomOptions second = *this;
+  second.random_seed ^= kOtherSeeds;
+  if (furniture_seed >= 0) second.furniture_seed ^= kOtherSeeds;
+  return second;
+}
+
+Rigid SimulatedRoomOptions::RoomFromSecondRoom() const {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitZ())),
+          Eigen::Vector3d(2 * DoorX(), -kPartitionThickness, 0)};
 }
 
 void SimulatedRoomOptions::Declare(OptionFields* fields) {
@@ -139,6 +154,12 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                   "--zoomed needs a lens, which --camera_model EQUIRECTANGULAR has not");
   fields->Require(similar_room == 0 || projectors == 0,
                   "--similar_room and --projectors cannot be had together; give one of them");
+  fields->Bool("second_room", &second_room,
+               "behind the open door, with --num_photos and --num_stations of its own; further "
+               "photos are taken on the way through the door");
+  fields->Require(!second_room || (projectors == 0 && !depth_camera && similar_room == 0),
+                  "--second_room cannot be had with --projectors, --depth_camera or "
+                  "--similar_room; give one of them");
   fields->Int("num_stations", &num_stations, "number of scans").Within(1, 8);
   fields->Int("scan_columns", &scan_columns, "samples over the full turn").Within(16, 20000);
   fields->Int("scan_rows", &scan_rows, "samples from -60 to +75 degrees of elevation")

@@ -8,11 +8,15 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "core/similarity.h"
+
 namespace roomtex {
 
 inline constexpr int kMaxProjectors = 8;
 // Of photos that are zoomed: a finger on the ring.
 inline constexpr double kZoom = 1.3;
+// Metres: of the door, and of the wall between two rooms.
+inline constexpr double kDoorWidth = 0.88, kDoorHeight = 2.04, kPartitionThickness = 0.15;
 
 class OptionFields;
 
@@ -72,6 +76,9 @@ struct SimulatedRoomOptions {
   // So many more photos, without truth, of another room: the same plan, walls, floor and ceiling,
   // other pictures and cloths.
   int similar_room = 0;
+  // Behind the door, which stands open: turned by 180 degrees, with walls, pictures, scans and
+  // photos of its own, as many as the first; further photos are taken on the way through.
+  bool second_room = false;
   int furniture_seed = -1;  // of what is not the room's shell; -1 = random_seed
   // Scans.
   int num_stations = 1;
@@ -92,6 +99,10 @@ struct SimulatedRoomOptions {
   int num_threads = -1;         // -1 = all; changes nothing in the results
 
   bool IsZoomed(int place) const { return IsOfShare(place, zoomed); }
+  double DoorX() const { return width - 0.75; }  // its middle, in the wall at y = 0
+  // What the second room is made of, in a frame as that of the first.
+  SimulatedRoomOptions SecondRoom() const;
+  Rigid RoomFromSecondRoom() const;
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;

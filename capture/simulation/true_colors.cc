@@ -111,7 +111,7 @@ class PlyFile {
 
 void WriteTrueColors(const SimulatedRoom& room, const std::string& photo_folder, bool reachable,
                      const std::string& folder, Progress* progress) {
-  const int num_stations = room.options().num_stations;
+  const int num_stations = room.NumStations();
   progress->Stage("truth", num_stations * room.NumPhotos());
   std::vector<Scan> scans;
   size_t num_vertices = 0;

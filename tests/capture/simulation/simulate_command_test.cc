@@ -245,6 +245,23 @@ TEST(SimulateCommand, MixesInPhotosOfASimilarRoomWithoutTruth) {
   EXPECT_EQ(num_photos, truth.images.size() + 2);
 }
 
+TEST(SimulateCommand, WritesASecondRoomWithPicksOfItsOwn) {
+  const TempFolder folder;
+  const std::string capture = folder / "capture";
+  const std::string out = " --quiet --output_path " + capture + kSmall;
+  ASSERT_EQ(RunCommandLine("roomtex-simulate" + out + " --second_room 1").exit_code, 0);
+  const size_t num_first = ReadSparseModel(capture + "/truth").images.size() - 12;
+  EXPECT_EQ(num_first % 2, 0u);
+  for (const char* file : {"scan_1.rtpi", "scan_poses.txt", "second_room_picks.csv"}) {
+    EXPECT_TRUE(std::filesystem::exists(capture + "/" + file)) << file;
+  }
+  EXPECT_NE(ReadBytes(capture + "/picks.csv"), ReadBytes(capture + "/second_room_picks.csv"));
+  EXPECT_NE(ReadBytes(capture + "/README.txt").find("scan_1.rtpi on of the second room"),
+            std::string::npos);
+  EXPECT_EQ(RunCommandLine("roomtex-simulate" + out + " --second_room 1 --projectors 1").exit_code,
+            2);
+}
+
 TEST(SimulateCommand, SaysWhatIsWrong) {
   const TempFolder folder;
   const auto expect = [&](const std::string& arguments, int exit_code, const std::string& text) {

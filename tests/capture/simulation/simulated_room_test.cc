@@ -457,5 +457,82 @@ TEST(SimulatedRoom, StrangersStandInTheGivenShareOfThePhotos) {
   EXPECT_EQ(num_strangers, 2);
 }
 
+// Metres to the nearest sample of a scan that lies within four degrees of the ray; 0 = there is
+// none.
+double RangeAlong(const Scan& scan, const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
+  double nearest = 0;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    const Eigen::Vector3d to = scan.points[i] - from;
+    if (to.normalized().dot(direction) < std::cos(RadFromDeg(4))) continue;
+    if (nearest == 0 || to.norm() < nearest) nearest = to.norm();
+  }
+  return nearest;
+}
+
+TEST(SimulatedRoom, ASecondOneLiesBehindTheOpenDoor) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.range_noise = 0;
+  const SimulatedRoom closed(options);
+  options.second_room = true;
+  const SimulatedRoom room(options);
+  ASSERT_EQ(room.NumStations(), 2);
+  ASSERT_EQ(room.NumPhotos(), 32);
+  const auto place_of = [&](int photo) { return room.CamFromRoom(photo).TargetOriginInSource(); };
+  for (int photo = 0; photo < 10; ++photo) {
+    EXPECT_GT(place_of(photo).y(), 0.4);
+    EXPECT_LT(place_of(photo + 10).y(), -kPartitionThickness - 0.4);
+  }
+  // On the way through the door: from the first room into the second, and back.
+  EXPECT_GT(place_of(20).y(), 0.5);
+  EXPECT_LT(place_of(25).y(), -kPartitionThickness);
+  EXPECT_LT(place_of(26).y(), -0.5);
+  EXPECT_GT(place_of(31).y(), 0);
+  for (int photo = 20; photo < 32; ++photo) {
+    EXPECT_NEAR(place_of(photo).x(), options.DoorX(), 0.1) << photo;
+    const double forward =
+        room.CamFromRoom(photo).rotation.conjugate()._transformVector({0, 0, 1}).y();
+    EXPECT_EQ(forward < 0, photo < 26) << photo;
+  }
+
+  // Each scan has its room, and what the door shows of the other.
+  const Rigid room_from_scan = room.ScanFromRoom().Inverse();
+  const double other_side[] = {-kPartitionThickness - 0.01, 0.01};
+  for (const int station : {0, 1}) {
+    const Scan scan = room.MakeScan(station);
+    int num_here = 0, num_there = 0;
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      if (scan.IsMissing(static_cast<int>(i))) continue;
+      const double y = (room_from_scan * scan.points[i]).y();
+      const bool there = station == 0 ? y < other_side[0] : y > other_side[1];
+      ++(there ? num_there : num_here);
+    }
+    EXPECT_GT(num_there, 100) << station;
+    EXPECT_LT(num_there, 0.1 * num_here) << station;
+  }
+  // Through the door, and against it where it is shut.
+  const Eigen::Vector3d before_door(options.DoorX(), 1, 1.9);
+  const auto range = [&](const SimulatedRoom& of, const Scan& scan) {
+    return RangeAlong(scan, of.ScanFromRoom() * before_door,
+                      of.ScanFromRoom().rotation * Eigen::Vector3d(0, -1, 0));
+  };
+  EXPECT_NEAR(range(closed, closed.MakeScan()), 1, 0.05);
+  EXPECT_GT(range(room, room.MakeScan(1)), 1 + kPartitionThickness + 1.5);
+
+  // Picks of the second room are in the frame of its own scan.
+  const int picked = room.BestPhotoForPicks(1);
+  EXPECT_GE(picked, 10);
+  const Rigid scan_from_station = room.MakeScan(1).scan_from_station;
+  const CameraProjection camera(room.camera());
+  const auto picks = room.MakePicks(picked, 6, 1);
+  ASSERT_EQ(picks.size(), 6u);
+  for (const SimulatedPick& pick : picks) {
+    const auto at =
+        camera.ImgFromCam(room.CamFromScan(picked) * (scan_from_station * pick.x_in_scan));
+    ASSERT_TRUE(at.has_value());
+    EXPECT_LT((pick.x_in_img - *at).norm(), 5 * options.click_noise_px);
+  }
+}
+
 }  // namespace
 }  // namespace roomtex
