@@ -168,6 +168,7 @@ Camera MakeRoomCamera(const SimulatedRoomOptions& options) {
 
 namespace {
 
+// In the frame of a room of the scene.
 std::vector<Rigid> PlaceCamerasInRoom(const SimulatedRoomOptions& options, const RoomScene& scene,
                                       const Rigid& scene_from_room) {
   std::vector<Rigid> poses;
@@ -195,7 +196,7 @@ std::vector<Rigid> PlaceCamerasInRoom(const SimulatedRoomOptions& options, const
       const auto ahead = scene.Cast(here, scene_from_room.rotation * forward);
       if (ClearanceAround(scene, here) > 0.42 && (!ahead || ahead->distance > 1.5)) break;
     }
-    poses.push_back(PoseAt(place, yaw, pitch, roll) * scene_from_room.Inverse());
+    poses.push_back(PoseAt(place, yaw, pitch, roll));
   }
   return poses;
 }
@@ -232,16 +233,18 @@ std::vector<Rigid> PlaceCamerasInDoorway(const SimulatedRoomOptions& options,
 std::vector<Rigid> PlaceCameras(const SimulatedRoomOptions& options, const RoomScene& scene) {
   std::vector<Rigid> poses = PlaceCamerasInRoom(options, scene, Rigid());
   if (!options.second_room) return poses;
-  for (const auto& more :
-       {PlaceCamerasInRoom(options.SecondRoom(), scene, options.RoomFromSecondRoom()),
-        PlaceCamerasInDoorway(options, scene)}) {
-    poses.insert(poses.end(), more.begin(), more.end());
+  const Rigid place = options.RoomFromSecondRoom();
+  for (const Rigid& pose : PlaceCamerasInRoom(options.SecondRoom(), scene, place)) {
+    poses.push_back(pose * place.Inverse());
   }
+  const std::vector<Rigid> between = PlaceCamerasInDoorway(options, scene);
+  poses.insert(poses.end(), between.begin(), between.end());
   return poses;
 }
 
 namespace {
 
+// In the frame of a room of the scene.
 std::vector<Rigid> PlaceStationsInRoom(const SimulatedRoomOptions& options, const RoomScene& scene,
                                        const Rigid& scene_from_room) {
   static constexpr double kPreferred[][2] = {{0.42, 0.52}, {0.78, 0.7}, {0.25, 0.75}, {0.6, 0.2}};
@@ -280,7 +283,6 @@ std::vector<Rigid> PlaceStationsInRoom(const SimulatedRoomOptions& options, cons
     room_from_station.translation = place;
     stations.push_back(room_from_station);
   }
-  for (Rigid& station : stations) station = scene_from_room * station;
   return stations;
 }
 
@@ -289,8 +291,10 @@ std::vector<Rigid> PlaceStationsInRoom(const SimulatedRoomOptions& options, cons
 std::vector<Rigid> PlaceStations(const SimulatedRoomOptions& options, const RoomScene& scene) {
   std::vector<Rigid> stations = PlaceStationsInRoom(options, scene, Rigid());
   if (!options.second_room) return stations;
-  const auto more = PlaceStationsInRoom(options.SecondRoom(), scene, options.RoomFromSecondRoom());
-  stations.insert(stations.end(), more.begin(), more.end());
+  const Rigid place = options.RoomFromSecondRoom();
+  for (const Rigid& station : PlaceStationsInRoom(options.SecondRoom(), scene, place)) {
+    stations.push_back(place * station);
+  }
   return stations;
 }
 
