@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/e57_document.h"
 #include "importers/e57_grid.h"
 #include "importers/e57_points.h"

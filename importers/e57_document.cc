@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -91,7 +92,7 @@ class DocumentParser {
     const std::optional<double> number = ParseNumber(node.child_value());
     if (!number || !std::isfinite(*number)) {
       throw Error(node, std::string("element ") + node.name() + " is " +
-                            Quoted(node.child_value()) + ", expected a number");
+                            Quoted(std::string(node.child_value())) + ", expected a number");
     }
     return *number;
   }
@@ -106,7 +107,7 @@ class DocumentParser {
     const std::optional<int64_t> number = ParseInteger(node.child_value());
     if (!number) {
       throw Error(node, std::string("element ") + node.name() + " is " +
-                            Quoted(node.child_value()) + ", expected a whole number");
+                            Quoted(std::string(node.child_value())) + ", expected a whole number");
     }
     return *number;
   }
@@ -117,7 +118,7 @@ class DocumentParser {
     const std::optional<int64_t> number = ParseInteger(attribute.value());
     if (!number) {
       throw Error(node, std::string("attribute ") + name + " of " + node.name() + " is " +
-                            Quoted(attribute.value()) + ", expected a whole number");
+                            Quoted(std::string(attribute.value())) + ", expected a whole number");
     }
     return *number;
   }
@@ -128,7 +129,7 @@ class DocumentParser {
     const std::optional<double> number = ParseNumber(attribute.value());
     if (!number || !std::isfinite(*number)) {
       throw Error(node, std::string("attribute ") + name + " of " + node.name() + " is " +
-                            Quoted(attribute.value()) + ", expected a number");
+                            Quoted(std::string(attribute.value())) + ", expected a number");
     }
     return *number;
   }

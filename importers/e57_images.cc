@@ -11,6 +11,7 @@
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "core/text.h"
 #include "importers/e57_document.h"
 
 namespace fs = std::filesystem;

@@ -75,7 +75,7 @@ InputError E57Pages::Error(int64_t byte, const std::string& finding) const {
 
 void E57Pages::ReadHeader() {
   const std::string header = file_.ReadSome(0, kHeaderSize);
-  if (!LooksLikeE57(header)) throw Error(0, "begins with " + Quoted(header, 8) + ", not ASTM-E57");
+  if (!LooksLikeE57(header)) throw Error(0, "begins with " + Quoted(header) + ", not ASTM-E57");
   if (static_cast<int64_t>(header.size()) < kHeaderSize) {
     throw Error(static_cast<int64_t>(header.size()), "the file ends in its header of 48 bytes");
   }

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/scan.h"
+#include "core/text.h"
 #include "importers/mesh_scan.h"
 
 namespace roomtex {

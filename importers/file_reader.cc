@@ -109,12 +109,15 @@ bool LineReader::Next(std::string_view* line) {
   return true;
 }
 
-std::string Quoted(std::string_view text, size_t max_length) {
-  std::string quoted = "\"";
-  for (const char c : text.substr(0, max_length)) {
-    quoted += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
+std::vector<std::string> WordsOf(std::string_view line) {
+  std::vector<std::string> words;
+  size_t at = 0;
+  while ((at = line.find_first_not_of(" \t", at)) != std::string_view::npos) {
+    const size_t end = std::min(line.find_first_of(" \t", at), line.size());
+    words.emplace_back(line.substr(at, end - at));
+    at = end;
   }
-  return quoted + (text.size() > max_length ? "...\"" : "\"");
+  return words;
 }
 
 }  // namespace roomtex

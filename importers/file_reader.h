@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/text.h"
+
 namespace roomtex {
 
 // The remedy for a file that contradicts itself.
@@ -59,7 +61,10 @@ class LineReader {
   long line_number_ = 0;
 };
 
-// The text, shortened and with control bytes shown as '?', in double quotes: for messages.
-std::string Quoted(std::string_view text, size_t max_length = 40);
+// What stands between blanks and tabs.
+std::vector<std::string> WordsOf(std::string_view line);
+
+// As core/text.h has it.
+inline std::string Quoted(std::string_view text) { return Quoted(std::string(text)); }
 
 }  // namespace roomtex

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/free_vectors.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 

@@ -21,6 +21,7 @@
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 #include "importers/up_axis.h"
@@ -55,17 +56,6 @@ struct PcdHeader {
   }
 };
 
-std::vector<std::string> Words(std::string_view line) {
-  std::vector<std::string> words;
-  size_t at = 0;
-  while ((at = line.find_first_not_of(" \t", at)) != std::string_view::npos) {
-    const size_t end = std::min(line.find_first_of(" \t", at), line.size());
-    words.emplace_back(line.substr(at, end - at));
-    at = end;
-  }
-  return words;
-}
-
 bool ParseWhole(const std::string& word, int64_t low, int64_t high, int64_t* number) {
   const char* const end = word.data() + word.size();
   const auto [next, error] = std::from_chars(word.data(), end, *number);
@@ -90,7 +80,7 @@ class PcdHeaderParser {
         throw InputError(file_.path(), BytePosition(lines_.offset()),
                          "the header does not end: no DATA line up to here", kDamaged);
       }
-      const std::vector<std::string> words = Words(line);
+      const std::vector<std::string> words = WordsOf(line);
       if (words.empty() || words[0][0] == '#') continue;
       if (!ParseEntry(words))
         throw Error("is " + Quoted(line) + ", which is no line of a PCD header");
@@ -337,7 +327,7 @@ void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* fille
       throw error("the file ends after " + std::to_string(cell) + " of " +
                   std::to_string(header.width * header.height) + " points");
     }
-    const std::vector<std::string> words = Words(line);
+    const std::vector<std::string> words = WordsOf(line);
     if (words.empty()) continue;
     bool good = words.size() == values.size();
     for (size_t i = 0; good && i < words.size(); ++i) good = ParseReal(words[i], &values[i]);
@@ -356,7 +346,7 @@ void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* fille
     }
   }
   while (lines.Next(&line)) {
-    if (!Words(line).empty()) throw error("is " + Quoted(line) + ", expected the end of the file");
+    if (!WordsOf(line).empty()) throw error("is " + Quoted(line) + ", expected the end of the file");
   }
 }
 

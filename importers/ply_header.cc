@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -24,17 +25,6 @@ std::optional<PlyType> TypeFromName(const std::string& name) {
     if (name == known) return type;
   }
   return std::nullopt;
-}
-
-std::vector<std::string> WordsOfLine(std::string_view line) {
-  std::vector<std::string> words;
-  size_t at = 0;
-  while ((at = line.find_first_not_of(" \t", at)) != std::string_view::npos) {
-    const size_t end = std::min(line.find_first_of(" \t", at), line.size());
-    words.emplace_back(line.substr(at, end - at));
-    at = end;
-  }
-  return words;
 }
 
 bool ParseFormat(const std::vector<std::string>& words, PlyHeader* header) {
@@ -124,7 +114,7 @@ PlyHeader ReadPlyHeader(const FileReader& file) {
   LineReader lines(file);
   PlyHeader header;
   std::string_view line;
-  if (!lines.Next(&line) || WordsOfLine(line) != std::vector<std::string>{"ply"}) {
+  if (!lines.Next(&line) || WordsOf(line) != std::vector<std::string>{"ply"}) {
     throw InputError(file.path(), LinePosition(1), "does not begin with \"ply\"",
                      "Give a PLY file");
   }
@@ -134,7 +124,7 @@ PlyHeader ReadPlyHeader(const FileReader& file) {
                        "the header does not end: no line \"end_header\" up to here",
                        "The file is cut off or damaged: copy it again");
     }
-    const std::vector<std::string> words = WordsOfLine(line);
+    const std::vector<std::string> words = WordsOf(line);
     if (words.empty()) continue;
     if (words[0] == "end_header") break;
     bool good = true;

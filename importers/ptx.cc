@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 #include "importers/up_axis.h"

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 
 namespace roomtex {
@@ -86,7 +87,7 @@ ScanPoses::Entry ScanPoses::ParseEntry(const std::string& line_text, long line) 
   // A name with spaces stands in double quotes. '#' starts a comment at the beginning of a word;
   // inside a word it is part of a name ("room.ptx#2").
   if (!(words >> std::quoted(entry.name)) || entry.name.empty()) {
-    throw fail("is " + Quoted(line_text, 60) + ", which names no scan", kFormat);
+    throw fail("is " + Quoted(line_text) + ", which names no scan", kFormat);
   }
   std::vector<double> numbers;
   bool good = true, is_geo = false;
@@ -101,7 +102,7 @@ ScanPoses::Entry ScanPoses::ParseEntry(const std::string& line_text, long line) 
   }
   if (is_geo) {
     if (!good || numbers.size() != 4) {
-      throw fail("is " + Quoted(line_text, 60) + ", which is no surveyed station", kGeoFormat);
+      throw fail("is " + Quoted(line_text) + ", which is no surveyed station", kGeoFormat);
     }
     entry.station = SurveyedStation{{numbers[0], numbers[1], numbers[2]}, numbers[3]};
     std::vector<std::string> problems = entry.station->position.Problems();
@@ -109,12 +110,12 @@ ScanPoses::Entry ScanPoses::ParseEntry(const std::string& line_text, long line) 
       problems.push_back("the heading must lie within -360 and 360 degrees");
     }
     if (!problems.empty()) {
-      throw fail("is " + Quoted(line_text, 60) + ", but " + problems[0], kGeoFormat);
+      throw fail("is " + Quoted(line_text) + ", but " + problems[0], kGeoFormat);
     }
     return entry;
   }
   if (!good || (numbers.size() != 16 && numbers.size() != 7)) {
-    throw fail("is " + Quoted(line_text, 60) + ", which is no pose", kFormat);
+    throw fail("is " + Quoted(line_text) + ", which is no pose", kFormat);
   }
   const std::optional<Rigid> pose =
       numbers.size() == 16 ? PoseFromMatrix(numbers) : PoseFromQuaternion(numbers);

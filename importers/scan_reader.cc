@@ -338,7 +338,7 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),
                      foreign.empty()
-                         ? "begins with " + Quoted(start, 16) + ", which is no scan format"
+                         ? "begins with " + Quoted(start) + ", which is no scan format"
                          : "is " + foreign + ", expected a range scan",
                      kKnownFormats);
   }

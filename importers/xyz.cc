@@ -14,6 +14,7 @@
 #include "core/free_vectors.h"
 #include "core/output_file.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
 
