@@ -298,7 +298,7 @@ void AddWallEvidence(const OutlineCloud& cloud, const GroundPlane& ground,
       wall.middle = mean;
       wall.sigma_angle = wall.sigma_offset / std::max(std::sqrt(spread), 0.1 * wall.length);
     }
-    if (!lines.empty() && !inferred && lines[i].points.size() > 0) {
+    if (!lines.empty() && !inferred && !lines[i].points.empty()) {
       wall.sigma_offset = lines[i].sigma_offset;
       wall.sigma_angle = lines[i].sigma_angle;
       wall.middle = lines[i].middle - lines[i].line.Direction().dot(building.footprint[i]);

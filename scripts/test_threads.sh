@@ -16,6 +16,7 @@ cat >build-tsan/suppressions.txt <<'END'
 called_from_lib:libembree
 called_from_lib:libtbb.so
 called_from_lib:libopencv_core
+called_from_lib:libopencv_features2d
 called_from_lib:libceres
 race:libembree
 race:std::allocator<char> >::compare(char const
