@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 #include <vector>
 
 #include "align/fit/similarity_fit.h"
 #include "colmap_ext/match_support.h"
+#include "colmap_ext/view_graph.h"
 #include "core/camera_model.h"
 #include "core/frames.h"
 #include "core/statistics.h"
@@ -32,7 +34,8 @@ constexpr int kCellColumns = 8, kCellRows = 6, kMinPointsOfPart = 5;
 // and 0.14 to 0.19 with 1.2 to 2.3. Right photos, blurred by the hand: 0.21 and 0.24 (desk, 0.7 and
 // 1.2), 0.45 (desk, 2.2), 0.31 (kitchen, 1.1); all others of these 0.5 and more.
 constexpr double kLeastSightShare = 0.5, kUneven = 2.5, kHardlyAnything = 0.2;
-constexpr int kMinExpected = 60;
+constexpr size_t kMinExpected = 60;
+constexpr int kMinExpectedOfPair = 20;  // of two photos
 // What a surface share rests on. It says something of the photo, but no doubt follows from it: a
 // right photo that looks past what was scanned (desk) has 0.07.
 constexpr double kMinJudgedOfPhoto = 10;
@@ -81,6 +84,8 @@ struct PhotosInScan {
     }
   }
 
+  bool IsWitness(uint32_t image_id) const { return not_believed.count(image_id) == 0; }
+
   // Whether another photo than `image_id`, which has the point at x_in_img, sees it as this one
   // would, with no more than twice the keypoints round it.
   bool IsSeenAlike(const SparsePoint& point, uint32_t image_id,
@@ -89,7 +94,7 @@ struct PhotosInScan {
     const double range = own.norm(), like_cosine = std::cos(RadFromDeg(kLikeAngleDeg));
     const int num_near = densities.at(image_id).Near(x_in_img);
     return std::any_of(point.track.begin(), point.track.end(), [&](const TrackElement& element) {
-      if (element.image_id == image_id) return false;
+      if (element.image_id == image_id || !IsWitness(element.image_id)) return false;
       const Eigen::Vector3d other = centres.at(element.image_id) - point.x_in_model;
       const double distance = other.norm();
       if (!(own.dot(other) > like_cosine * range * distance) ||
@@ -106,6 +111,7 @@ struct PhotosInScan {
   std::map<uint32_t, CameraProjection> projections;  // by camera_id
   std::map<uint32_t, Eigen::Vector3d> centres;
   std::map<uint32_t, KeypointDensity> densities;
+  std::set<uint32_t> not_believed;  // what these found, others need not show
 };
 
 bool IsInTrack(const SparsePoint& point, uint32_t image_id) {
@@ -114,10 +120,11 @@ bool IsInTrack(const SparsePoint& point, uint32_t image_id) {
 }
 
 // Whether two others than this photo see the point.
-bool IsOthersPoint(const SparsePoint& point, uint32_t image_id) {
+bool IsOthersPoint(const PhotosInScan& photos, const SparsePoint& point, uint32_t image_id) {
   uint32_t first = image_id;
   for (const TrackElement& element : point.track) {
     if (element.image_id == image_id || element.image_id == first) continue;
+    if (!photos.IsWitness(element.image_id)) continue;
     if (first != image_id) return true;
     first = element.image_id;
   }
@@ -138,7 +145,7 @@ std::vector<ExpectedPoint> PointsExpected(const PhotosInScan& photos, const Spar
   for (const SparsePoint* const point : points) {
     const auto x_in_img = projection.ImgFromCam(image.cam_from_model * point->x_in_model);
     if (!x_in_img || !projection.InImage(*x_in_img)) continue;
-    if (!IsOthersPoint(*point, image.image_id)) continue;
+    if (!IsOthersPoint(photos, *point, image.image_id)) continue;
     if (photos.IsSeenAlike(*point, image.image_id, *x_in_img))
       expected.push_back({point, *x_in_img});
   }
@@ -155,9 +162,65 @@ std::vector<ExpectedPoint> PointsExpected(const PhotosInScan& photos, const Spar
   return in_sight;
 }
 
-// Sets num_expected, sight_share and unevenness.
+using Expectations = std::map<uint32_t, std::vector<ExpectedPoint>>;  // by image_id
+
+Expectations FindExpected(const PhotosInScan& photos, const std::vector<const SparsePoint*>& points,
+                          const FreeSpace& free_space) {
+  Expectations expected;
+  for (const auto& [id, image] : photos.model.images) {
+    expected[id] = PointsExpected(photos, image, points, free_space);
+  }
+  return expected;
+}
+
+// Photos that do not belong to the most that find what each other found. Photos of another room
+// that came together find each other's points, and lack those of all others, as these lack theirs:
+// the shares of both suffer, and do not tell which is which.
+std::set<uint32_t> OutsideLargestGroup(const Expectations& expected) {
+  struct Common {
+    int num_expected = 0, num_found = 0;
+    double Share() const { return static_cast<double>(num_found) / num_expected; }
+  };
+  std::map<uint32_t, int> index;
+  for (const auto& [id, points] : expected) index.emplace(id, static_cast<int>(index.size()));
+  std::map<std::pair<int, int>, Common> pairs;
+  for (const auto& [id, points] : expected) {
+    for (const ExpectedPoint& one : points) {
+      const bool is_found = IsInTrack(*one.point, id);
+      for (const TrackElement& element : one.point->track) {
+        if (element.image_id == id) continue;
+        Common& common = pairs[std::minmax(index.at(id), index.at(element.image_id))];
+        ++common.num_expected;
+        common.num_found += is_found;
+      }
+    }
+  }
+  std::vector<double> shares;
+  for (const auto& [pair, common] : pairs) {
+    if (common.num_expected >= kMinExpectedOfPair) shares.push_back(common.Share());
+  }
+  if (shares.empty()) return {};
+  const double least = kLeastSightShare * Median(&shares);
+  DisjointSets sets(static_cast<int>(index.size()));
+  for (const auto& [pair, common] : pairs) {
+    const bool may_tell = common.num_expected >= kMinExpectedOfPair;
+    if (may_tell && common.Share() >= least) sets.Join(pair.first, pair.second);
+  }
+  const int largest = sets.Groups()[0][0];
+  std::set<uint32_t> outside;
+  for (const auto& [id, i] : index) {
+    if (sets.Find(i) != largest) outside.insert(id);
+  }
+  return outside;
+}
+
+// Sets num_expected, sight_share and unevenness; leaves them where fewer than `least` are expected.
 void CountSights(const std::vector<ExpectedPoint>& expected, uint32_t image_id,
-                 const Camera& camera, PhotoVerdict* photo) {
+                 const Camera& camera, size_t least, PhotoVerdict* photo) {
+  if (expected.size() < least) {
+    if (std::isnan(photo->sight_share)) photo->num_expected = static_cast<int>(expected.size());
+    return;
+  }
   struct Part {
     int num_expected = 0, num_seen = 0;
   };
@@ -176,9 +239,9 @@ void CountSights(const std::vector<ExpectedPoint>& expected, uint32_t image_id,
     part.num_seen += is_seen;
   }
   photo->num_expected = static_cast<int>(expected.size());
-  if (photo->num_expected < kMinExpected) return;
   const double share = static_cast<double>(num_seen) / photo->num_expected;
   photo->sight_share = share;
+  photo->unevenness = kUnknownShare;
   if (!(share > 0 && share < 1)) return;
   double chi_square = 0;
   int num_parts = 0;
@@ -222,6 +285,16 @@ void CountOnSurface(const SparseModel& aligned, const ScanPatches& surface,
   }
 }
 
+// Of a photo that stands apart, few points that the others found have to do.
+void CountSights(const Expectations& expected, const PhotosInScan& in_scan,
+                 std::map<uint32_t, PhotoVerdict>* photos) {
+  for (const auto& [id, points] : expected) {
+    const Camera& camera = in_scan.model.cameras.at(in_scan.model.images.at(id).camera_id);
+    const size_t least = in_scan.IsWitness(id) ? kMinExpected : kMinExpectedOfPair;
+    CountSights(points, id, camera, least, &photos->at(id));
+  }
+}
+
 // Of the photos where it is known; NaN without any.
 double UsualSightShare(const std::map<uint32_t, PhotoVerdict>& photos) {
   std::vector<double> shares;
@@ -237,7 +310,7 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
                                              const FreeSpace& free_space, double tolerance,
                                              double sigma_px,
                                              const std::map<uint32_t, double>& match_support) {
-  const PhotosInScan in_scan(aligned);
+  PhotosInScan in_scan(aligned);
   std::vector<const SparsePoint*> points;
   const size_t stride = aligned.points.size() / kMaxPointsAsked + 1;
   size_t next = 0;
@@ -250,12 +323,18 @@ std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const S
     photo.num_points = static_cast<size_t>(
         std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
                       [](uint64_t point) { return point != kInvalidPoint3dId; }));
-    CountSights(PointsExpected(in_scan, image, points, free_space), id,
-                aligned.cameras.at(image.camera_id), &photo);
     const auto support = match_support.find(id);
     if (support != match_support.end()) photo.match_support = support->second;
   }
   CountOnSurface(aligned, surface, free_space, tolerance, sigma_px, &photos);
+  // By what photos found that belong together; what strangers found together the right ones lack.
+  Expectations expected = FindExpected(in_scan, points, free_space);
+  CountSights(expected, in_scan, &photos);
+  in_scan.not_believed = OutsideLargestGroup(expected);
+  if (!in_scan.not_believed.empty()) {
+    expected = FindExpected(in_scan, points, free_space);
+    CountSights(expected, in_scan, &photos);
+  }
 
   const double usual_sight = UsualSightShare(photos);
   const double least_support = SupportLimit(match_support, kMinSupport);

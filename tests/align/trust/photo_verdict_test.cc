@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <set>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -70,6 +71,38 @@ TEST(PhotoVerdict, DoubtsAPhotoThatShowsAnotherRoomInMostOfItsPicture) {
   const PhotoVerdict photo = Judge(model).at(4);
   EXPECT_GT(photo.surface_share, 0.9);
   EXPECT_NE(photo.doubt.find("ought to show"), std::string::npos) << photo.doubt;
+}
+
+// On the way out through a door, say: what they show of the other room each of them has, and nobody
+// else here; of this room they have little. Then the right ones that look the same way lack what
+// these found, and are not to be taken for strangers either.
+TEST(PhotoVerdict, DoubtsPhotosOfAnotherRoomThatCameTogether) {
+  SparseModel model = AlignedModel();
+  const std::set<uint32_t> strangers = {3, 4, 5, 6};
+  const auto is_stranger = [&](const TrackElement& element) {
+    return strangers.count(element.image_id) > 0;
+  };
+  uint64_t next_id = model.points.rbegin()->first + 1;
+  std::map<uint64_t, SparsePoint> theirs;
+  for (auto& [id, point] : model.points) {
+    if (id % 8 == 0) continue;  // alike in both rooms
+    SparsePoint other = point;
+    std::vector<TrackElement>& track = point.track;
+    const auto first = std::stable_partition(track.begin(), track.end(), std::not_fn(is_stranger));
+    other.track.assign(first, track.end());
+    track.erase(first, track.end());
+    for (const TrackElement& element : other.track) {
+      model.images.at(element.image_id).point3d_ids[element.point2d_index] = next_id;
+    }
+    theirs[next_id++] = other;
+  }
+  model.points.insert(theirs.begin(), theirs.end());
+  for (const auto& [id, photo] : Judge(model)) {
+           photo.unevenness);
+    EXPECT_EQ(photo.doubt.empty(), strangers.count(id) == 0)
+        << id << ": " << photo.sight_share << " of " << photo.num_expected << " "
+        << photo.unevenness;
+  }
 }
 
 TEST(PhotoVerdict, DoesNotDoubtABlurredPhotoThatFindsLittleAnywhere) {
