@@ -16,9 +16,12 @@ cat >build-tsan/suppressions.txt <<'END'
 called_from_lib:libembree
 called_from_lib:libtbb.so
 called_from_lib:libopencv_core
-called_from_lib:libopencv_features2d
 called_from_lib:libceres
 race:libembree
+race:libopencv_aruco
+race:libopencv_calib3d
+race:libopencv_features2d
+mutex:libopencv_features2d
 race:std::allocator<char> >::compare(char const
 race:libtbb
 race:libcpp-httplib

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <map>
 
+#include <fmt/core.h>
+
 #include "colmap_ext/sparse_model.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -102,9 +104,14 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
   }
   const Rigid scan_from_room = room.RoomFromScan().Inverse();
   bool is_missing = false;
+  size_t num_doubtful = 0;
   for (const auto& [id, image] : model.images) {
     const auto at = sigmas.find(image.name);
     if (at == sigmas.end()) continue;
+    if (room.alignment.doubtful_photos.count(image.name) > 0) {
+      ++num_doubtful;
+      continue;
+    }
     RoomPhoto photo;
     photo.name = image.name;
     photo.path = (fs::path(folder) / image.name).string();
@@ -120,6 +127,11 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
   }
   std::sort(room.photos.begin(), room.photos.end(),
             [](const RoomPhoto& a, const RoomPhoto& b) { return a.name < b.name; });
+  if (num_doubtful > 0) {
+    context.Warn(fmt::format("{} photos of {} are doubtful, e.g. {}: they link it to no other room",
+                             num_doubtful, room.name,
+                             room.alignment.doubtful_photos.begin()->first));
+  }
   if (folder.empty()) {
     context.Warn(room.alignment.path +
                  " names no photos: what photos it shares with other rooms is not known. Give "

@@ -27,7 +27,7 @@ struct RoomRecord {
   AlignmentRecord alignment;                         // in `scan`
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of `room`, in `scan`
   std::optional<Eigen::Vector3d> up;                 // unit; none = no scan says it
-  std::vector<RoomPhoto> photos;                     // those with an expected error, by name
+  std::vector<RoomPhoto> photos;  // those with an expected error that nobody doubts, by name
 
   Rigid RoomFromScan() const { return {Eigen::Quaterniond::Identity(), -origin}; }
 };

@@ -123,6 +123,7 @@ class JoinCommand : public testing::Test {
     SparseModel model;
     std::vector<ScanRecord> scans;
     bool trusted = true;
+    std::string doubtful;  // a photo that roomtex-align doubts
   };
   TempFolder folder_;
   std::map<std::string, Room> rooms_;
@@ -154,9 +155,11 @@ class JoinCommand : public testing::Test {
                  {"scans", ToJson(room.scans)},
                  {"images", Json::array()}};
     for (const auto& [id, image] : room.model.images) {
-      json["images"].push_back({{"name", image.name},
-                                {"position_sigma_mm", 1000 * std::sqrt(3) * kPositionSigma},
-                                {"rotation_sigma_deg", DegFromRad(std::sqrt(3) * kRotationSigma)}});
+      json["images"].push_back(
+          {{"name", image.name},
+           {"position_sigma_mm", 1000 * std::sqrt(3) * kPositionSigma},
+           {"rotation_sigma_deg", DegFromRad(std::sqrt(3) * kRotationSigma)},
+           {"doubt", image.name == room.doubtful ? Json("It is alone.") : Json()}});
     }
     WriteBytes(aligned + "/alignment.json", json.dump());
   }
@@ -213,6 +216,13 @@ TEST_F(JoinCommand, NamesThePhotoThatIsWrongInOneRoom) {
   EXPECT_THAT(report_["warnings"].dump(), HasSubstr("x.jpg puts hall and library"));
   EXPECT_LT(ErrorOf("library"), 0.006);
   EXPECT_EQ(LinkOf("hall", "library")["num_agreeing"], 3);
+  EXPECT_EQ(LinkOf("hall", "library")["num_photos"], 4);
+
+  rooms_["library"].doubtful = "x.jpg";
+  ASSERT_EQ(Join().exit_code, 0);
+  EXPECT_EQ(LinkOf("hall", "library")["num_photos"], 3);
+  EXPECT_THAT(report_["warnings"].dump(),
+              HasSubstr("1 photos of library are doubtful, e.g. x.jpg"));
 }
 
 TEST_F(JoinCommand, DoesNotTrustWhatNothingConfirms) {
