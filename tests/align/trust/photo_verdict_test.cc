@@ -98,7 +98,6 @@ TEST(PhotoVerdict, DoubtsPhotosOfAnotherRoomThatCameTogether) {
   }
   model.points.insert(theirs.begin(), theirs.end());
   for (const auto& [id, photo] : Judge(model)) {
-           photo.unevenness);
     EXPECT_EQ(photo.doubt.empty(), strangers.count(id) == 0)
         << id << ": " << photo.sight_share << " of " << photo.num_expected << " "
         << photo.unevenness;
