@@ -81,8 +81,9 @@ void JudgeHeldLenses(const LensCheck& lenses, Alignment* result) {
   for (const LensFinding& lens : lenses.lenses) {
     if (!lens.Contradicts()) continue;
     const double told_px = lens.told.MeanFocalLength();
-    const bool harmful = lens.FocalDeviations() > kSureFocalDeviations &&
-                         std::abs(lens.found.MeanFocalLength() - told_px) > kHarmlessShare * told_px;
+    const bool harmful =
+        lens.FocalDeviations() > kSureFocalDeviations &&
+        std::abs(lens.found.MeanFocalLength() - told_px) > kHarmlessShare * told_px;
     const std::string text = lens.Sentence() + " --refine_intrinsics auto uses the lens found.";
     (harmful ? result->reasons : result->warnings).push_back(text);
   }

@@ -379,7 +379,8 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
                     [](const auto& camera) { return !camera.second.IsPanorama(); });
     if (has_lens) {
       check.not_checked =
-          "The lenses are not checked: in a model with rigs or panoramas they stay as told. A focal "
+          "The lenses are not checked: in a model with rigs or panoramas they stay as told. A "
+          "focal "
           "length that is 1 % wrong moves photos by centimetres.";
     }
     return check;

@@ -346,7 +346,8 @@ void ReadAscii(const FileReader& file, const PcdHeader& header, PcdFiller* fille
     }
   }
   while (lines.Next(&line)) {
-    if (!WordsOf(line).empty()) throw error("is " + Quoted(line) + ", expected the end of the file");
+    if (!WordsOf(line).empty())
+      throw error("is " + Quoted(line) + ", expected the end of the file");
   }
 }
 

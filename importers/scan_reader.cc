@@ -337,9 +337,8 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
   } else {
     const std::string foreign = ForeignFormat(start);
     throw InputError(path, BytePosition(0),
-                     foreign.empty()
-                         ? "begins with " + Quoted(start) + ", which is no scan format"
-                         : "is " + foreign + ", expected a range scan",
+                     foreign.empty() ? "begins with " + Quoted(start) + ", which is no scan format"
+                                     : "is " + foreign + ", expected a range scan",
                      kKnownFormats);
   }
   if (file.byte_order == "ascii") file.byte_order = "text";
