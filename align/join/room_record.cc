@@ -128,8 +128,8 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
   std::sort(room.photos.begin(), room.photos.end(),
             [](const RoomPhoto& a, const RoomPhoto& b) { return a.name < b.name; });
   if (num_doubtful > 0) {
-    context.Warn(fmt::format("{} photos of {} are doubtful, e.g. {}: they link it to no other room",
-                             num_doubtful, room.name,
+    context.Warn(fmt::format("photos of {} that are doubtful link it to no other room: {}, e.g. {}",
+                             room.name, num_doubtful,
                              room.alignment.doubtful_photos.begin()->first));
   }
   if (folder.empty()) {

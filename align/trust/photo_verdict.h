@@ -18,9 +18,10 @@ inline constexpr double kUnknownShare = std::numeric_limits<double>::quiet_NaN()
 
 struct PhotoVerdict {
   size_t num_points = 0;  // sparse points that it has a keypoint for
-  // Of the points that two other photos found and that this one ought to have found, too, how many
-  // it did find. It ought to: a point in its picture, nothing of the scan in front, that another
-  // photo saw from about the same side and distance among about as many keypoints.
+  // Of the points that two others of the largest group of photos that find each other's points
+  // found, and that this one ought to have found, too, how many it did find. It ought to: a point
+  // in its picture, nothing of the scan in front, that another photo saw from about the same side
+  // and distance among about as many keypoints.
   int num_expected = 0;
   double sight_share = kUnknownShare;
   // How unevenly what it found lies over the picture: chi-square per degree of freedom over cells.

@@ -221,8 +221,9 @@ TEST_F(JoinCommand, NamesThePhotoThatIsWrongInOneRoom) {
   rooms_["library"].doubtful = "x.jpg";
   ASSERT_EQ(Join().exit_code, 0);
   EXPECT_EQ(LinkOf("hall", "library")["num_photos"], 3);
-  EXPECT_THAT(report_["warnings"].dump(),
-              HasSubstr("1 photos of library are doubtful, e.g. x.jpg"));
+  EXPECT_THAT(
+      report_["warnings"].dump(),
+      HasSubstr("photos of library that are doubtful link it to no other room: 1, e.g. x.jpg"));
 }
 
 TEST_F(JoinCommand, DoesNotTrustWhatNothingConfirms) {

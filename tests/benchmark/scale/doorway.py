@@ -54,29 +54,28 @@ def measure(folder, tools, seed, num_photos):
     names = sorted(os.listdir(os.path.join(capture, "photos")))
     rooms = {"first": ("scan.rtpi", "picks.csv", names[:num_photos]),
              "second": ("scan_1.rtpi", "second_room_picks.csv", names[num_photos:2 * num_photos])}
-    said, codes = [], []
+    said = []
     for room, (scan, picks, photos) in rooms.items():
         images, result = os.path.join(folder, "photos_" + room), os.path.join(folder, room)
         shutil.rmtree(images, ignore_errors=True)
         os.makedirs(images)
         for name in photos + names[2 * num_photos:]:
             os.link(os.path.join(capture, "photos", name), os.path.join(images, name))
-        codes.append(run(folder, tools, "roomtex-auto", "--image_path", images, "--scan_path", os.path.join(capture, scan),
-                         "--picks_path", os.path.join(capture, picks), "--cameras_path",
-                         os.path.join(capture, "cameras.txt"), "--quality", "low", "--until", "align", "--output_path",
-                         result))
+        run(folder, tools, "roomtex-auto", "--image_path", images, "--scan_path", os.path.join(capture, scan),
+            "--picks_path", os.path.join(capture, picks), "--cameras_path", os.path.join(capture, "cameras.txt"),
+            "--quality", "low", "--until", "align", "--output_path", result)
         report = json.load(open(os.path.join(result, "aligned", "alignment.json")))
         said.append("%s %.1f" % ("trusted," if report["trusted"] else "refused,",
                                  report["expected_error"]["at_cameras_mm"]))
     joined = os.path.join(folder, "joined")
     shutil.rmtree(joined, ignore_errors=True)
-    codes.append(run(folder, tools, "roomtex-join", "--input_path", os.path.join(folder, "first", "aligned"), "--input_path",
-                     os.path.join(folder, "second", "aligned"), "--output_path", joined))
+    code = run(folder, tools, "roomtex-join", "--input_path", os.path.join(folder, "first", "aligned"), "--input_path",
+               os.path.join(folder, "second", "aligned"), "--output_path", joined)
     report = json.load(open(os.path.join(joined, "joined.json")))
     found = report["rooms"][1]["site_from_room"]
     row = "| %d | %s | %s |" % (seed, said[0], said[1])
     if not report["links"] or found is None:
-        return row + " – | – | no | exit %s |" % codes[-1]
+        return row + " – | – | no | exit %s |" % code
     link = report["links"][0]
     truth = place_of_second_scan(capture)
     off = multiply(found, inverse(truth))
