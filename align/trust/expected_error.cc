@@ -7,6 +7,19 @@
 #include "core/statistics.h"
 
 namespace roomtex {
+namespace {
+
+// Medians over the photos that see the surface; 0 if none does.
+PhotoDisagreement OfTheMedianPhoto(const ShapeDisagreement& disagreement) {
+  std::vector<double> shifts, rotations;
+  for (const auto& [image_id, photo] : disagreement.photos) {
+    shifts.push_back(photo.shift);
+    rotations.push_back(photo.rotation);
+  }
+  return {Median(&shifts), Median(&rotations)};
+}
+
+}  // namespace
 
 double PositionSigmaAt(const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan) {
   const Eigen::Vector3d x = x_in_scan - fit.pivot;
@@ -31,6 +44,7 @@ std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariance
                                                const SimilarityFit& fit,
                                                const ShapeDisagreement& disagreement) {
   const double rotation = std::sqrt(fit.covariance.block<3, 3>(3, 3).trace());
+  const PhotoDisagreement taken_up = OfTheMedianPhoto(disagreement);
   std::map<uint32_t, PhotoSigma> sigmas;
   for (const auto& [image_id, centre] : centres) {
     PhotoSigma sigma{PositionSigmaAt(fit, centre), rotation};
@@ -41,8 +55,10 @@ std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariance
     }
     const auto seen = disagreement.photos.find(image_id);
     const bool known = seen != disagreement.photos.end();
-    sigma.position = std::hypot(sigma.position, known ? seen->second.shift : disagreement.rms);
-    if (known) sigma.rotation = std::hypot(sigma.rotation, seen->second.rotation);
+    sigma.position =
+        std::hypot(sigma.position, known ? seen->second.shift : disagreement.rms, taken_up.shift);
+    sigma.rotation =
+        std::hypot(sigma.rotation, known ? seen->second.rotation : 0, taken_up.rotation);
     sigmas[image_id] = sigma;
   }
   return sigmas;

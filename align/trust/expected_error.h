@@ -37,7 +37,9 @@ CameraCentres FindCameraCentres(const SparseModel& model, const Similarity& scan
 
 // Of the photos, by image_id. The larger of two: the photo's own
 // covariance where there is one (of an adjusted model), and that of the similarity at its place;
-// and beside it how far sparse model and scan disagree in what the photo sees.
+// beside it how far sparse model and scan disagree in what the photo sees, and as much as they do
+// before the median photo, for what the fit has taken up and nothing shows: twelve rooms of a
+// drifting depth camera were off by that much more (docs/real-rooms.md).
 std::map<uint32_t, PhotoSigma> FindPhotoSigmas(const PoseCovariances& covariances,
                                                const CameraCentres& centres,
                                                const SimilarityFit& fit,

@@ -79,10 +79,12 @@ TEST(ExpectedError, HoldsWhatModelAndScanDisagreeIn) {
   disagreement.photos[1] = {0.04, 0.02};
   const auto sigmas = FindPhotoSigmas({}, centres, fit, disagreement);
   const double alone = PositionSigmaAt(fit, {-1, -2, -3});
-  EXPECT_NEAR(sigmas.at(1).position, std::hypot(alone, 0.04), 1e-12);
-  EXPECT_GT(sigmas.at(1).rotation, 0.02);
+  // Twice: what is seen, and as much that the fit has taken up.
+  EXPECT_NEAR(sigmas.at(1).position, std::hypot(alone, 0.04, 0.04), 1e-12);
+  EXPECT_GT(sigmas.at(1).rotation, std::hypot(0.02, 0.02));
   // A photo that sees nothing of the surface may be off like the room.
-  EXPECT_NEAR(sigmas.at(2).position, std::hypot(PositionSigmaAt(fit, {-2, -2, -3}), 0.03), 1e-12);
+  EXPECT_NEAR(sigmas.at(2).position, std::hypot(PositionSigmaAt(fit, {-2, -2, -3}), 0.03, 0.04),
+              1e-12);
   ExpectedError error;
   error.at_far_corner = 0.04;
   SetExpectedErrorAtCameras(sigmas, disagreement, &error);
@@ -90,6 +92,19 @@ TEST(ExpectedError, HoldsWhatModelAndScanDisagreeIn) {
   EXPECT_NEAR(error.at_far_corner, 0.05, 1e-12);
   SetExpectedErrorAtCameras({}, disagreement, &error);
   EXPECT_EQ(error.at_cameras, sigmas.at(3).position);
+}
+
+// What fits where one photo looks was fitted there: it is no surer than the others.
+TEST(ExpectedError, OfAPhotoThatSeesNoDisagreementHoldsThatOfTheOthers) {
+  const SimilarityFit fit = FitWithCovariance();
+  const CameraCentres centres = {{1, {-1, -2, -3}}, {2, {-1, -2, -3}}, {3, {-1, -2, -3}}};
+  ShapeDisagreement disagreement;
+  disagreement.rms = 0.03;
+  disagreement.photos = {{1, {0, 0}}, {2, {0.04, 0.02}}, {3, {0.05, 0.03}}};
+  const auto sigmas = FindPhotoSigmas({}, centres, fit, disagreement);
+  EXPECT_NEAR(sigmas.at(1).position, std::hypot(PositionSigmaAt(fit, {-1, -2, -3}), 0.04), 1e-12);
+  EXPECT_GT(sigmas.at(1).rotation, 0.02);
+  EXPECT_LT(sigmas.at(1).position, sigmas.at(2).position);
 }
 
 TEST(ExpectedError, IsInfiniteWhereTheFitLeavesSomethingOpen) {

@@ -16,6 +16,7 @@ import struct
 
 from measurements import Measurements
 
+SMALL_DENSE = ["--max_image_size", "240"]
 
 class Bench(Measurements):
     def __init__(self, arguments):
@@ -73,6 +74,14 @@ class Bench(Measurements):
             self.run("photos", "texture", count, [
                 "roomtex-texture", "--quiet", "--input_path", place("aligned"), "--image_path", place("photos"),
                 "--accept_untrusted", "1", "--Texture.scale", "1", "--output_path", place("textured")], (0, 4))
+            self.run("photos", "pictures", count, [
+                "roomtex-render", "--quiet", "--ply_path", place("textured", "model.ply"), "--input_path",
+                place("aligned"), "--image_path", place("photos"), "--folder_path", place("pictures")])
+            for command, options in (("export", []), ("dense", SMALL_DENSE)):
+                self.run("photos", command, count, [
+                    f"roomtex-{command}", "--quiet", "--input_path", place("aligned"), "--image_path", place("photos"),
+                    "--accept_untrusted", "1", "--output_path", place(command)] + options, (0, 4))
+                shutil.rmtree(place(command), ignore_errors=True)
 
     def sample_curve(self):
         for millions in self.arguments.samples:
@@ -88,7 +97,7 @@ class Bench(Measurements):
             self.texture(millions, "texture, grid", place, "scan.rtpi", [])
             self.texture(millions, "texture, cloud", place, *self.cloud(place))
             self.beside_texture(millions, "export", place, [])
-            self.beside_texture(millions, "dense", place, ["--max_image_size", "240"])
+            self.beside_texture(millions, "dense", place, SMALL_DENSE)
             self.run("samples", "align", millions, [
                 "roomtex-align", "--quiet", "--input_path", place("truth"), "--scan_path", place("scan.rtpi"),
                 "--picks_path", place("picks.csv"), "--image_path", place("photos"), "--output_path",

@@ -53,6 +53,8 @@ ROOMS = {
     "classroom": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "23"},
     "classroom_twin": {**DEPTH_CAMERA, **CLASSROOM, "--random_seed": "24"},
     "bare_twin": {"--random_seed": "30", "--bare": "1"},
+    # More rooms like the lounge. Tuned on: even seeds; never: odd ones.
+    **{f"depth_{seed}": {**DEPTH_CAMERA, "--random_seed": str(seed)} for seed in range(130, 142)},
     # Single photos that do not belong: of another room with the same walls, and taken at 1.3 times the focal length.
     "similar": {"--random_seed": "31", "--similar_room": "2"},
     "similar_twin": {"--random_seed": "32", "--similar_room": "2"},
