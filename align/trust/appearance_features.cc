@@ -60,6 +60,8 @@ float KeypointAngle(const Eigen::Vector2d& direction) {
   return static_cast<float>(angle < 0 ? angle + 360 : angle);
 }
 
+cv::Ptr<cv::SIFT> MakeSift() { return cv::SIFT::create(0, 3, 0.02, 12, 1.6); }
+
 // RootSIFT (Arandjelovic and Zisserman 2012).
 void TakeRoots(cv::Mat1f* sift) {
   for (int i = 0; i < sift->rows; ++i) {
@@ -117,17 +119,22 @@ std::optional<Eigen::Vector2d> DirectionInImg(const CameraProjection& projection
   return *moved - *at;
 }
 
-AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright,
-                                    int most, const PlaceOfKeypoint& place_of) {
-  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, 0.02, 12, 1.6);
-  std::vector<cv::KeyPoint> found, used;
-  sift->detect(picture, found, valid);
+std::vector<cv::KeyPoint> FindKeypoints(const cv::Mat1b& picture, const cv::Mat1b& valid) {
+  std::vector<cv::KeyPoint> found;
+  MakeSift()->detect(picture, found, valid);
   std::sort(found.begin(), found.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
     return std::make_tuple(-a.response, a.pt.x, a.pt.y, a.size) <
            std::make_tuple(-b.response, b.pt.x, b.pt.y, b.size);
   });
+  return found;
+}
+
+AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
+                                    const std::vector<cv::KeyPoint>& keypoints, bool upright,
+                                    int most, const PlaceOfKeypoint& place_of) {
+  std::vector<cv::KeyPoint> used;
   AppearanceFeatures features;
-  for (const cv::KeyPoint& one : found) {
+  for (const cv::KeyPoint& one : keypoints) {
     if (static_cast<int>(used.size()) == most) break;
     const bool is_again = !used.empty() && used.back().pt == one.pt && used.back().size == one.size;
     if (upright && is_again) continue;  // several directions of its gradients
@@ -141,7 +148,7 @@ AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture, const cv::Mat1b& v
     features.responses.push_back(one.response);
   }
   cv::Mat descriptors;
-  if (!used.empty()) sift->compute(picture, used, descriptors);
+  if (!used.empty()) MakeSift()->compute(picture, used, descriptors);
   features.sift = descriptors;
   TakeRoots(&features.sift);
   return features;
@@ -227,7 +234,7 @@ AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera
     const Eigen::Vector3d station = viewer.scans()[scan].Station();
     return normal.dot(station - x) * normal.dot(cam_from_scan.TargetOriginInSource() - x) < 0;
   };
-  return DescribeFeatures(picture, view.valid, up_in_scan.has_value(), most,
+  return DescribeFeatures(picture, FindKeypoints(picture, view.valid), up_in_scan.has_value(), most,
                           [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
                             const auto plane = projection.CamFromImg(at);
                             const auto x = place_at(at);

@@ -36,9 +36,12 @@ struct FeaturePlace {
 // By a keypoint's position in its picture; none to leave it out.
 using PlaceOfKeypoint = std::function<std::optional<FeaturePlace>(const Eigen::Vector2d&)>;
 
-// The `most` strongest features. upright: place_of says which way is down; else features are turned
-// as their own gradients say.
-AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture, const cv::Mat1b& valid, bool upright,
+// The strongest first; several of one place have different directions. Empty valid: everywhere.
+std::vector<cv::KeyPoint> FindKeypoints(const cv::Mat1b& picture, const cv::Mat1b& valid);
+// The `most` strongest of FindKeypoints() that have a place. upright: place_of says which way is
+// down; else features are turned as their own gradients say.
+AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
+                                    const std::vector<cv::KeyPoint>& keypoints, bool upright,
                                     int most, const PlaceOfKeypoint& place_of);
 // The `most` strongest of all. part_ids: of the photos, or none.
 AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,

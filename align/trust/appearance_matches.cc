@@ -39,7 +39,7 @@ AppearanceFeatures FeaturesOfPhoto(const SparseModel& model, const SparseImage& 
   }
   const CameraProjection projection(camera);
   return DescribeFeatures(
-      picture, cv::Mat1b(), up_in_sparse.has_value(), most,
+      picture, FindKeypoints(picture, cv::Mat1b()), up_in_sparse.has_value(), most,
       [&](const Eigen::Vector2d& small_at) -> std::optional<FeaturePlace> {
         const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
         int nearest = -1;

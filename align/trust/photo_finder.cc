@@ -16,11 +16,13 @@ const std::vector<double> kExifScales = {0.96, 1, 1.04};
 const std::vector<double> kUnknownScales = {0.5, 0.58, 0.67, 0.77, 0.88, 1, 1.15, 1.32, 1.52};
 
 // Looks at one place: how far a feature may be from where the view has it, degrees, and how far
-// from the pose that comes of them all.
+// from the pose that comes of them all. With fewer cells than `fewest` there is no further one: of
+// the kitchen's and the desk's photos no place that came to 25 had fewer than 9 and then 21.
 struct CloserLook {
   double reach, tolerance;
+  int fewest;
 };
-constexpr CloserLook kLooks[] = {{5, 0.6}, {3, 0.6}, {3, 0.4}, {3, 0.4}};
+constexpr CloserLook kLooks[] = {{5, 0.6, 8}, {3, 0.6, 15}, {3, 0.4, 0}, {3, 0.4, 0}};
 // Of the places that come of the views so many at least, and those with so many of the cells of the
 // best one.
 constexpr size_t kFewestLooks = 2;
@@ -102,15 +104,16 @@ PhotoFinder::PhotoFinder(const ScanViewer& viewer, const Eigen::Vector3d& up_in_
       upright_(FeaturesOfScan(viewer, up_in_scan, true, options.max_stations,
                               options.max_scan_features, num_threads)) {}
 
-std::vector<PhotoMatch> PhotoFinder::MatchPicture(const cv::Mat1b& picture,
+std::vector<PhotoMatch> PhotoFinder::MatchPicture(const Picture& picture,
                                                   const Camera& camera) const {
-  const Eigen::Vector2d size(camera.width, camera.height), small(picture.cols, picture.rows);
+  const Eigen::Vector2d size(camera.width, camera.height),
+      small(picture.grey.cols, picture.grey.rows);
   std::vector<PhotoMatch> matches;
   for (const AppearanceFeatures* scan : {&natural_, &upright_}) {
     // Photos are mostly held level or upright.
     const AppearanceFeatures photo =
-        DescribeFeatures(picture, cv::Mat1b(), scan == &upright_, options_.max_photo_features,
-                         [&](const Eigen::Vector2d& at) {
+        DescribeFeatures(picture.grey, picture.keypoints, scan == &upright_,
+                         options_.max_photo_features, [&](const Eigen::Vector2d& at) {
                            return FeaturePlace{Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 1),
                                                at.cwiseProduct(size.cwiseQuotient(small))};
                          });
@@ -121,8 +124,8 @@ std::vector<PhotoMatch> PhotoFinder::MatchPicture(const cv::Mat1b& picture,
   return matches;
 }
 
-SeenPlace PhotoFinder::LookCloser(const cv::Mat1b& picture, const Camera& camera,
-                                  FocalSource source, const PhotoPlace& place) const {
+SeenPlace PhotoFinder::LookCloser(const Picture& picture, const Camera& camera, FocalSource source,
+                                  const PhotoPlace& place) const {
   SeenPlace seen;
   Camera lens = WithFocalScale(camera, place.focal_scale);
   seen.pose.cam_from_scan = place.cam_from_scan;
@@ -130,17 +133,18 @@ SeenPlace PhotoFinder::LookCloser(const cv::Mat1b& picture, const Camera& camera
   search.num_samples = kCloserSamples;
   search.focal_scales = {1};
   search.num_kept = 1;
-  const Eigen::Vector2d grow = Eigen::Vector2d(camera.width, camera.height)
-                                   .cwiseQuotient(Eigen::Vector2d(picture.cols, picture.rows));
+  const Eigen::Vector2d grow =
+      Eigen::Vector2d(camera.width, camera.height)
+          .cwiseQuotient(Eigen::Vector2d(picture.grey.cols, picture.grey.rows));
   for (const CloserLook& look : kLooks) {
     Camera small = lens;
-    small.Resize(picture.cols, picture.rows);
+    small.Resize(picture.grey.cols, picture.grey.rows);
     const CameraProjection projection(small);
     const Rigid now = seen.pose.cam_from_scan;
     const Eigen::Vector3d down = now.rotation * -up_in_scan_;
     const AppearanceFeatures view = FeaturesOfView(viewer_, small, now, up_in_scan_, kMostFeatures);
     const AppearanceFeatures photo =
-        DescribeFeatures(picture, cv::Mat1b(), true, kMostFeatures,
+        DescribeFeatures(picture.grey, picture.keypoints, true, kMostFeatures,
                          [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
                            const auto plane = projection.CamFromImg(at);
                            if (!plane) return std::nullopt;
@@ -165,6 +169,7 @@ SeenPlace PhotoFinder::LookCloser(const cv::Mat1b& picture, const Camera& camera
     if (!solved) return {};
     seen.pose = *solved;
     if (solved->lens) lens = *solved->lens;
+    if (seen.num_cells < look.fewest) break;
   }
   if (!seen.pose.lens && source != FocalSource::kGiven) seen.pose.lens = lens;
   return seen;
@@ -176,12 +181,15 @@ PhotoSighting PhotoFinder::Find(const SparseImage& image, const Camera& camera, 
   PhotoSearchOptions search = options_.search;
   search.focal_scales = FocalScales(source);
   // Of the shortest focal length: as fine as the views.
-  const cv::Mat1b picture =
+  Picture picture;
+  picture.grey =
       ReadPictureOf(image, WithFocalScale(camera, search.focal_scales[0]), image_path, viewer_);
-  sighting.is_read = !picture.empty();
+  sighting.is_read = !picture.grey.empty();
   if (!sighting.is_read) return sighting;
+  picture.keypoints = FindKeypoints(picture.grey, cv::Mat1b());
   const std::vector<PhotoPlace> found =
       SearchPhotoPlaces(MatchPicture(picture, camera), camera, search, num_threads_);
+  if (found.empty() || found[0].num_cells < options_.min_cells_of_views) return sighting;
   for (size_t k = 0; k < found.size(); ++k) {
     const PhotoPlace& place = found[k];
     if (k >= kFewestLooks && place.num_cells < kRivalShare * found[0].num_cells) break;

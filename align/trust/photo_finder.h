@@ -24,6 +24,9 @@ struct PhotoFinderOptions {
   int max_stations = 8;          // views are made from, evenly taken
   double max_ratio = 0.8;        // Lowe's; larger = more matches, more of them wrong
   double max_ratio_near = 0.85;  // of the closer look
+  // Cells of the scan in which the views agree with a photo at its best place: with fewer it is not
+  // looked at closely. Larger = faster, and fewer photos are placed.
+  int min_cells_of_views = 0;
   PhotoSearchOptions search;
 };
 
@@ -54,8 +57,13 @@ class PhotoFinder {
                      const std::string& image_path) const;
 
  private:
-  std::vector<PhotoMatch> MatchPicture(const cv::Mat1b& picture, const Camera& camera) const;
-  SeenPlace LookCloser(const cv::Mat1b& picture, const Camera& camera, FocalSource source,
+  struct Picture {
+    cv::Mat1b grey;
+    std::vector<cv::KeyPoint> keypoints;
+  };
+
+  std::vector<PhotoMatch> MatchPicture(const Picture& picture, const Camera& camera) const;
+  SeenPlace LookCloser(const Picture& picture, const Camera& camera, FocalSource source,
                        const PhotoPlace& place) const;
 
   const ScanViewer& viewer_;
