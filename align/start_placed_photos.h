@@ -23,8 +23,8 @@ struct PlacedPhotoOptions {
   double same_place = 0.3, same_turn_deg = 4;
   FoundPhotoOptions photo;
 
-  // Where the model is asked for, a photo with little to say is passed over: of the kitchen's and
-  // the desk's 34 photos that can be placed one has 4 cells, the others 5 and more.
+  // Where the model is asked for, a photo with little to say is passed over: of the 29 photos of
+  // kitchen and desk that are placed all but one have 5 cells and more.
   PlacedPhotoOptions() { photo.finder.min_cells_of_views = 5; }
 };
 

@@ -17,7 +17,7 @@ const std::vector<double> kUnknownScales = {0.5, 0.58, 0.67, 0.77, 0.88, 1, 1.15
 
 // Looks at one place: how far a feature may be from where the view has it, degrees, and how far
 // from the pose that comes of them all. With fewer cells than `fewest` there is no further one: of
-// the kitchen's and the desk's photos no place that came to 25 had fewer than 9 and then 21.
+// the kitchen's and the desk's photos no place that came to 25 had fewer than 9 and then 17.
 struct CloserLook {
   double reach, tolerance;
   int fewest;

@@ -18,6 +18,7 @@ from measurements import Measurements
 
 SMALL_DENSE = ["--max_image_size", "240"]
 
+
 class Bench(Measurements):
     def __init__(self, arguments):
         super().__init__(arguments.folder, arguments.bin, "measured.json")
