@@ -18,6 +18,10 @@ namespace {
 // Cells of the surface with fewer points say nothing about the accuracy of the fit.
 constexpr int kMinPointsOfCell = 5;
 constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
+// A model of few points leaves most small cells with fewer: cells grow until half the points count,
+// up to this edge in metres. Of 349 points in a room 75 counted by half metres, and the jackknife
+// had 0.4 m where the fit was right to 4 mm.
+constexpr double kMaxCellSize = 2;
 constexpr double kPartSize = 1.5;         // metres; edge of the parts of the jackknife
 constexpr int kMinParts = 5;              // fewer leave the jackknife nothing to compare
 
@@ -78,6 +82,19 @@ Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
          relative.eigenvectors().transpose() * root;
 }
 
+// By the smallest cells that leave half the points in cells that say something.
+SurfaceCells CellsThatCount(const std::vector<Eigen::Vector3d>& places,
+                            const std::vector<Eigen::Vector3d>& normals) {
+  for (double size = SurfaceCells::kSize;; size *= 2) {
+    SurfaceCells cells(places, normals, size);
+    size_t num_counted = 0;
+    for (size_t i = 0; i < places.size(); ++i) {
+      num_counted += cells.NumPoints(cells.Cell(i)) >= kMinPointsOfCell;
+    }
+    if (2 * num_counted >= places.size() || size >= kMaxCellSize) return cells;
+  }
+}
+
 }  // namespace
 
 SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches,
@@ -87,7 +104,7 @@ SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches,
     places.push_back(surface.patches()[match.patch].point);
     normals.push_back(surface.patches()[match.patch].normal);
   }
-  const SurfaceCells cells(places, normals);
+  const SurfaceCells cells = CellsThatCount(places, normals);
   const double common = CommonVariance(matches, cells);
   common_sigma_ = std::sqrt(common);
   std::map<std::array<long, 3>, int> parts;

@@ -11,7 +11,7 @@
 
 namespace roomtex {
 
-// The matches of one step by cells of half a metre. What stays unknown of a surface, and how the
+// The matches of one step by cells of half a metre, larger where points are few. What stays unknown of a surface, and how the
 // model bends against it, is the same for all points of a cell; a cell's points together weigh as
 // much as that allows. A few points, where patches may straddle an edge, fix nothing on their own.
 class SurfaceWeights {

@@ -72,7 +72,8 @@ struct SimilarityFit {
   double rms_before = 0, rms_after = 0;
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   // Of (dt, w, ds); infinite without a solution. What stays unknown of a surface, and how the model
-  // bends against it, is taken to be the same for all points of half a metre of it.
+  // bends against it, is taken to be the same for all points of half a metre of it (of more where
+  // points are few).
   Matrix7d covariance = Matrix7d::Zero();
   // Inverse of the covariance that the surface alone would give: without picks, without a solution
   // zero.

@@ -8,8 +8,7 @@
 namespace roomtex {
 namespace {
 
-constexpr double kCellSize = 0.5;  // metres
-constexpr double kAlike = 0.966;   // cosine of 15 degrees
+constexpr double kAlike = 0.966;  // cosine of 15 degrees
 
 struct Nearest {
   int facing = 0;
@@ -27,7 +26,7 @@ Nearest FindNearest(const std::vector<Eigen::Vector3d>& facings, const Eigen::Ve
 }  // namespace
 
 SurfaceCells::SurfaceCells(const std::vector<Eigen::Vector3d>& points,
-                           const std::vector<Eigen::Vector3d>& normals) {
+                           const std::vector<Eigen::Vector3d>& normals, double size) {
   std::vector<Eigen::Vector3d> facings = normals;
   std::vector<Nearest> nearest(normals.size());
   // The first facing that a normal is near to takes it in, so the order decides: each pass puts the
@@ -55,7 +54,7 @@ SurfaceCells::SurfaceCells(const std::vector<Eigen::Vector3d>& points,
   std::map<std::array<long, 4>, int> cells;
   for (size_t i = 0; i < points.size(); ++i) {
     std::array<long, 4> key;
-    for (int k = 0; k < 3; ++k) key[k] = std::lround(std::floor(points[i][k] / kCellSize));
+    for (int k = 0; k < 3; ++k) key[k] = std::lround(std::floor(points[i][k] / size));
     key[3] = 2 * nearest[i].facing + (nearest[i].cosine < 0);
     const auto [at, is_new] = cells.emplace(key, NumCells());
     if (is_new) num_points_.push_back(0);

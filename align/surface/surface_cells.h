@@ -1,6 +1,6 @@
 #pragma once
-// Points on the scan's surface by half-metre cells. What is unknown of a surface is the same for
-// all points of a cell, so that thousands of points on a wall do not make it exact.
+// Points on the scan's surface by cells, of half a metre unless told. What is unknown of a surface
+// is the same for all points of a cell, so that thousands of points on a wall do not make it exact.
 
 #include <vector>
 
@@ -10,11 +10,13 @@ namespace roomtex {
 
 class SurfaceCells {
  public:
-  // One point and one normal (unit length) per index; `scan`, metres.
-  SurfaceCells(const std::vector<Eigen::Vector3d>& points,
-               const std::vector<Eigen::Vector3d>& normals);
+  static constexpr double kSize = 0.5;  // metres
 
-  // Index of the cell of a point: half a metre of a surface that faces one way.
+  // One point and one normal (unit length) per index; `scan`, metres. size: edge of a cell, metres.
+  SurfaceCells(const std::vector<Eigen::Vector3d>& points,
+               const std::vector<Eigen::Vector3d>& normals, double size = kSize);
+
+  // Index of the cell of a point: a piece of a surface that faces one way.
   int Cell(size_t index) const { return cell_[index]; }
   int NumPoints(int cell) const { return num_points_[cell]; }
   int NumCells() const { return static_cast<int>(num_points_.size()); }

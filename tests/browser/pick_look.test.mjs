@@ -330,6 +330,28 @@ test('a server that does not answer loses nothing', async () => {
   }, {picksFile: fileOf(places.slice(0, 6)), allowed: [/ERR_CONNECTION_REFUSED/, /failed$/]});
 });
 
+test('a server that takes questions and never answers loses nothing', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    await page.page.clock.install();
+    let asked = 0;
+    await page.page.route('**/picks', () => ++asked);  // neither answered nor refused
+    await page.page.keyboard.press('n');
+    await page.page.keyboard.press('Delete');
+    await page.rowsAre(5);
+    await until(() => asked === 1, 'it has asked');
+    assert.equal(await page.text('#save'), 'saving…');
+    await page.page.clock.fastForward(20000);
+    await until(async () => /not saved/.test(await page.text('#save')), 'it says so');
+    assert.equal(page.file().length, 6);
+    await page.page.unroute('**/picks');
+    await page.page.clock.resume();
+    await page.page.clock.fastForward(5000);
+    await page.saved();
+    await until(() => page.file().length === 5, 'saved once the server is back');
+  }, {picksFile: fileOf(places.slice(0, 6)), allowed: [/ERR_/, /failed$/]});
+});
+
 test('why picks cannot be saved is said in full, and they are once they can', async () => {
   await pageOn(async (page, {folder}) => {
     await page.rowsAre(6);

@@ -133,12 +133,15 @@ TEST_F(ScannerPhotos, PutModelAndAlignmentIntoTheScanWithoutAPick) {
       RunCommandLine("roomtex-align --quiet --input_path " + Path("sparse/0") + " --scan_path " +
                      Path("site/model.e57") + " --output_path " + Path("aligned"));
   ASSERT_EQ(aligned.exit_code, 0) << aligned.err;
-  EXPECT_LT(MedianError(ReadSparseModel(Path("aligned"))), 0.005);
+  const double off_mm = 1000 * MedianError(ReadSparseModel(Path("aligned")));
+  EXPECT_LT(off_mm, 5);
   const json report = json::parse(ReadBytes(Path("aligned/alignment.json")));
   EXPECT_EQ(report["search"]["method"], "known_poses");
   EXPECT_GE(report["picks"]["num_used"],
             12);  // the scanner's photos hold what the surface does not
-  EXPECT_LT(report["expected_error"]["at_cameras_mm"], 5);
+  // What is said covers what it is off by, without saying much more.
+  EXPECT_GE(report["expected_error"]["at_cameras_mm"], off_mm);
+  EXPECT_LE(report["expected_error"]["at_cameras_mm"], 3 * off_mm);
   EXPECT_NEAR(report["scan_from_sparse"]["scale"].get<double>(), 1, 0.005);
 }
 

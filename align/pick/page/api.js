@@ -10,6 +10,23 @@ export class ServerError extends Error {
   }
 }
 
+const kPatience = 15000;  // milliseconds
+
+// A question that is answered at once by a server that is well: with no answer after a while (the
+// machine sleeps, a tunnel hangs) the server is taken to be gone.
+async function askBriefly(path, init = {}) {
+  const giveUp = new AbortController();
+  const timer = setTimeout(() => giveUp.abort(), kPatience);
+  try {
+    return await ask(path, {...init, signal: giveUp.signal});
+  } catch (error) {
+    if (error.name !== 'AbortError') throw error;
+    throw new ServerError('gone', 'the server does not answer');
+  } finally {
+    clearTimeout(timer);
+  }
+}
+
 async function ask(path, init = {}) {
   let response;
   try {
@@ -34,24 +51,20 @@ async function ask(path, init = {}) {
   throw new ServerError('gone', (answer && answer.error) || `the server says ${response.status}`);
 }
 
-function send(method, path, body) {
-  return ask(path, {
-    method,
-    headers: {'Content-Type': 'application/json'},
-    body: JSON.stringify(body),
-  });
+function bodyOf(method, body) {
+  return {method, headers: {'Content-Type': 'application/json'}, body: JSON.stringify(body)};
 }
 
 export const api = {
-  state: () => ask('state'),
+  state: () => askBriefly('state'),
   scanPoint: (scan, x, y) => ask(`scan_point?scan=${scan}&x=${x}&y=${y}`),
   corner: (photo, [x, y], reach) => ask(`corner?photo=${photo}&x=${x}&y=${y}&reach=${reach}`),
-  putPicks: (revision, picks) => send('PUT', 'picks', {revision, picks}),
+  putPicks: (revision, picks) => askBriefly('picks', bodyOf('PUT', {revision, picks})),
   edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, {signal}),
-  startAlign: () => send('POST', 'align', {}),
-  endAlign: () => send('DELETE', 'align', {}),
-  align: () => ask('align'),
-  mirror: () => send('POST', 'mirror', {}),
+  startAlign: () => ask('align', bodyOf('POST', {})),
+  endAlign: () => ask('align', bodyOf('DELETE', {})),
+  align: () => askBriefly('align'),
+  mirror: () => ask('mirror', bodyOf('POST', {})),
 
   photoTile: (photo) => (level, x, y) => `tile?photo=${photo}&level=${level}&x=${x}&y=${y}`,
   scanTile: (scan, picture) => (level, x, y) =>
