@@ -8,7 +8,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "align/surface/surface_cells.h"
 #include "core/frames.h"
 #include "core/statistics.h"
 
@@ -18,12 +17,12 @@ namespace {
 // Cells of the surface with fewer points say nothing about the accuracy of the fit.
 constexpr int kMinPointsOfCell = 5;
 constexpr double kMinFacingShare = 0.03;  // nor do the ways that fewer points of all face
-// A model of few points leaves most small cells with fewer: cells grow until half the points count,
-// up to this edge in metres. Of 349 points in a room 75 counted by half metres, and the jackknife
-// had 0.4 m where the fit was right to 4 mm.
+// A model of few points leaves most small cells with fewer: to judge, cells grow until half the
+// points count, up to this edge in metres. Of 349 points in a room 75 counted by half metres, and
+// the jackknife had 0.4 m where the fit was right to 4 mm.
 constexpr double kMaxCellSize = 2;
-constexpr double kPartSize = 1.5;         // metres; edge of the parts of the jackknife
-constexpr int kMinParts = 5;              // fewer leave the jackknife nothing to compare
+constexpr double kPartSize = 1.5;  // metres; edge of the parts of the jackknife
+constexpr int kMinParts = 5;       // fewer leave the jackknife nothing to compare
 
 // How far the surface is off as a whole within a cell, metres^2: the spread of the cells' median
 // distances beyond what their points' own noise explains. Bends of model and scan show there.
@@ -82,35 +81,47 @@ Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
          relative.eigenvectors().transpose() * root;
 }
 
-// By the smallest cells that leave half the points in cells that say something.
-SurfaceCells CellsThatCount(const std::vector<Eigen::Vector3d>& places,
-                            const std::vector<Eigen::Vector3d>& normals) {
-  for (double size = SurfaceCells::kSize;; size *= 2) {
-    SurfaceCells cells(places, normals, size);
-    size_t num_counted = 0;
-    for (size_t i = 0; i < places.size(); ++i) {
-      num_counted += cells.NumPoints(cells.Cell(i)) >= kMinPointsOfCell;
+// The distances at the solution of a fit, all together and part by part; facing: mean of n n^T.
+struct SurfaceSums {
+  SurfaceSums(const std::vector<SurfaceMatch>& matches, const std::vector<SurfacePoint>& points,
+              const SurfaceWeights& weights, const SimilarityFit& fit)
+      : parts(weights.num_parts()) {
+    int num_counted = 0;
+    for (size_t i = 0; i < matches.size(); ++i) {
+      if (!weights.Counts(i)) continue;
+      ++num_counted;
+      const Eigen::Vector3d& n = weights.Normal(i);
+      const Eigen::Vector3d x_in_scan = fit.scan_from_sparse * points[matches[i].point].x_in_sparse;
+      for (SimilarityNormal* one : {&all, &parts[weights.Part(i)]}) {
+        one->AddDistance(matches[i].distance, x_in_scan, n, fit.pivot, 1 / weights.Variance(i));
+      }
+      facing += n * n.transpose();
     }
-    if (2 * num_counted >= places.size() || size >= kMaxCellSize) return cells;
+    facing /= std::max(1, num_counted);
   }
-}
+
+  SimilarityNormal all;
+  std::vector<SimilarityNormal> parts;
+  Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();
+};
 
 }  // namespace
 
-SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches,
-                               const ScanPatches& surface) {
+SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches, const ScanPatches& surface,
+                               double cell_size) {
   std::vector<Eigen::Vector3d> places, normals;
   for (const SurfaceMatch& match : matches) {
     places.push_back(surface.patches()[match.patch].point);
     normals.push_back(surface.patches()[match.patch].normal);
   }
-  const SurfaceCells cells = CellsThatCount(places, normals);
+  const SurfaceCells cells(places, normals, cell_size);
   const double common = CommonVariance(matches, cells);
   common_sigma_ = std::sqrt(common);
   std::map<std::array<long, 3>, int> parts;
   for (size_t i = 0; i < matches.size(); ++i) {
     const int count = cells.NumPoints(cells.Cell(i));
     const double share = cells.NumPointsAlike(i) / static_cast<double>(matches.size());
+    num_in_cells_ += count >= kMinPointsOfCell;
     counts_.push_back(count >= kMinPointsOfCell && share >= kMinFacingShare);
     const double own = std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2);
     variances_.push_back(own + count * common);
@@ -126,23 +137,17 @@ void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,
                    const std::vector<SurfacePoint>& points, const ScanPatches& surface,
                    const PickTerms& terms, const std::vector<bool>& used, double sigma_px,
                    const Similarity& start, SimilarityFit* fit) {
-  const SurfaceWeights weights(matches, surface);
-  SimilarityNormal normal;
-  std::vector<SimilarityNormal> parts(weights.num_parts());
-  int num_counted = 0;
-  fit->facing.setZero();
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (!weights.Counts(i)) continue;
-    ++num_counted;
-    const Eigen::Vector3d& n = weights.Normal(i);
-    const Eigen::Vector3d x_in_scan = fit->scan_from_sparse * points[matches[i].point].x_in_sparse;
-    for (SimilarityNormal* one : {&normal, &parts[weights.Part(i)]}) {
-      one->AddDistance(matches[i].distance, x_in_scan, n, fit->pivot, 1 / weights.Variance(i));
-    }
-    fit->facing += n * n.transpose();
+  SurfaceWeights weights(matches, surface);
+  SurfaceSums sums(matches, points, weights, *fit);
+  fit->surface_information = sums.all.matrix;
+  fit->facing = sums.facing;
+  const size_t half = matches.size() / 2;
+  for (double size = SurfaceCells::kSize; weights.num_in_cells() < half && size < kMaxCellSize;) {
+    size *= 2;
+    weights = SurfaceWeights(matches, surface, size);
+    sums = SurfaceSums(matches, points, weights, *fit);
   }
-  fit->facing /= std::max(1, num_counted);
-  fit->surface_information = normal.matrix;
+  SimilarityNormal& normal = sums.all;
   normal.AddPicks(terms, used, sigma_px, weights.CommonSigma(), fit->scan_from_sparse, fit->pivot);
   normal.AddScalePrior(fit->scan_from_sparse, start, kScalePrior);
   Vector7d step;
@@ -150,7 +155,7 @@ void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,
     fit->covariance.setConstant(std::numeric_limits<double>::infinity());
     return;
   }
-  fit->covariance = Larger(fit->covariance, JackknifeCovariance(normal, parts));
+  fit->covariance = Larger(fit->covariance, JackknifeCovariance(normal, sums.parts));
 }
 
 }  // namespace roomtex

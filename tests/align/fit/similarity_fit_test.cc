@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "align/trust/expected_error.h"
 #include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/support/matchers.h"
@@ -88,6 +89,30 @@ TEST(SimilarityFit, ExactPicksInSeveralPhotosGiveTheTruth) {
   // The start's scale (1 % off) is believed to 5 %, so a trace of it stays.
   EXPECT_NEAR(fit.scan_from_sparse.scale / truth.scale, 1, 2e-4);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 1e-3);
+}
+
+TEST(SimilarityFit, KnowsWhatItIsWorthOnFewPoints) {
+  // Every subset of some two hundred points, all over the room: most half metres have one or two.
+  const SimulatedCase& one = MakeCase();
+  const ScanPatches surface(one.scans, ScanPatchOptions());
+  const auto points = FindSurfacePoints(one.model, 3, 0.7);
+  const size_t num_subsets = points.size() / 200;
+  ASSERT_GE(num_subsets, 5U);
+  size_t num_covered = 0;
+  for (size_t subset = 0; subset < num_subsets; ++subset) {
+    std::vector<SurfacePoint> few;
+    for (size_t i = subset; i < points.size(); i += num_subsets) few.push_back(points[i]);
+    const SimilarityFit fit = FitToSurface(one.model, few, surface, {}, {}, 1.5, 0.2,
+                                           Disturbed(one.room->ScanFromSparse(), 0.3, 0.02, 0.005),
+                                           SimilarityFitOptions());
+    ASSERT_TRUE(fit.converged) << subset;
+    const double off =
+        (fit.scan_from_sparse.translation - one.room->ScanFromSparse().translation).norm();
+    const double said = PositionSigmaAt(fit, fit.scan_from_sparse.translation);
+    EXPECT_LT(said, 0.02) << subset;
+    num_covered += off < 2 * said;
+  }
+  EXPECT_GE(10 * num_covered, 9 * num_subsets);
 }
 
 TEST(SurfacePoints, CovarianceIsThatOfTriangulation) {
