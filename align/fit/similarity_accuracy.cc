@@ -141,10 +141,10 @@ void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,
   SurfaceSums sums(matches, points, weights, *fit);
   fit->surface_information = sums.all.matrix;
   fit->facing = sums.facing;
-  const size_t half = matches.size() / 2;
-  for (double size = SurfaceCells::kSize; weights.num_in_cells() < half && size < kMaxCellSize;) {
-    size *= 2;
-    weights = SurfaceWeights(matches, surface, size);
+  double cell_size = SurfaceCells::kSize;
+  while (2 * weights.num_in_cells() < matches.size() && cell_size < kMaxCellSize) {
+    cell_size *= 2;
+    weights = SurfaceWeights(matches, surface, cell_size);
     sums = SurfaceSums(matches, points, weights, *fit);
   }
   SimilarityNormal& normal = sums.all;
