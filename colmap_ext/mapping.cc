@@ -1,10 +1,14 @@
 #include "colmap_ext/mapping.h"
 
 #include <algorithm>
+#include <iterator>
+#include <set>
 #include <utility>
 
 #include <fmt/core.h>
 
+#include "colmap_ext/expected_sightings.h"
+#include "colmap_ext/lookalike_rooms.h"
 #include "colmap_ext/mapping_report.h"
 #include "colmap_ext/model_check.h"
 #include "core/output_file.h"
@@ -132,6 +136,17 @@ bool IsDetermined(const LensCheck& check) {
   });
 }
 
+// Of some photos of a model, without points.
+SparseModel PosesOf(const SparseModel& model, const std::set<uint32_t>& photos) {
+  SparseModel poses;
+  poses.cameras = model.cameras;
+  for (const uint32_t id : photos) {
+    const SparseImage& image = model.images.at(id);
+    poses.images[id] = {id, image.camera_id, image.name, image.cam_from_model, {}, {}};
+  }
+  return poses;
+}
+
 // The later one, if it lost no photos.
 MappingPass BetterOf(MappingPass first, MappingPass second) {
   if (second.best.empty()) return first;
@@ -251,6 +266,8 @@ MappingPass Mapping::Run() {
   context_.progress.Stage("check model");
   pass.check = Check(pass);
   for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) pass.check = Check(pass);
+  context_.progress.Stage("look for rooms");
+  if (TakeRoomsApart(&pass)) pass.check = Check(pass);
   if (!known_.cam_from_scan.empty()) {
     context_.progress.Stage("known poses");
     MappingOutcome& outcome = pass.best[0];
@@ -270,6 +287,46 @@ ModelCheck Mapping::Check(const MappingPass& pass) const {
                     context_.options.num_threads);
 }
 
+bool Mapping::TakeRoomsApart(MappingPass* pass) const {
+  MappingOutcome& outcome = pass->best[0];
+  const SparseModel& model = outcome.result.model;
+  LookalikeRooms found =
+      FindLookalikeRooms(model, FindExpectedSightings(model, HiddenByOwnPoints(model), {}));
+  std::vector<std::set<uint32_t>>& rooms = found.rooms;
+  if (rooms.size() < 2) return false;
+  const auto num_known = [&](const std::set<uint32_t>& room) {
+    return std::count_if(room.begin(), room.end(),
+                         [&](uint32_t id) { return known_.cam_from_scan.count(id) > 0; });
+  };
+  std::stable_sort(rooms.begin(), rooms.end(),
+                   [&](const auto& a, const auto& b) { return num_known(a) > num_known(b); });
+  std::vector<MapperResult> results;
+  for (const std::set<uint32_t>& room : rooms) {
+    MapperResult result = pass->mapper->Adjust(PosesOf(model, room));
+    // Rather one model of two rooms, which roomtex-align can refuse, than none.
+    if (!result.problem.empty() || result.model.images.size() != room.size()) return false;
+    result.grew = outcome.result.grew;
+    results.push_back(std::move(result));
+  }
+  context_.Warn(fmt::format(
+      "The photos show {} rooms that are alike, or a room before and after much was moved: of what "
+      "those of one show ({} of what they ought to), those of another show {}. Each has a model of "
+      "its own: 0 holds {} photos, e.g. {}, 1 holds {}, e.g. {}.",
+      rooms.size(), Percent(found.share_within), Percent(found.share_between), rooms[0].size(),
+      names_.at(*rooms[0].begin()), rooms[1].size(), names_.at(*rooms[1].begin())));
+  for (size_t i = 1; i < rooms.size(); ++i) {
+    for (const uint32_t id : rooms[i]) {
+      outcome.reasons[id] = "shows another room that is alike: it is in model " + std::to_string(i);
+    }
+  }
+  outcome.result = std::move(results[0]);
+  outcome.other_rooms.assign(std::make_move_iterator(results.begin() + 1),
+                             std::make_move_iterator(results.end()));
+  outcome.share_within = found.share_within;
+  outcome.share_between = found.share_between;
+  return true;
+}
+
 bool Mapping::LeaveOutDoubtful(MappingPass* pass) const {
   MappingOutcome& outcome = pass->best[0];
   const ModelCheck& check = pass->check;
@@ -278,12 +335,10 @@ bool Mapping::LeaveOutDoubtful(MappingPass* pass) const {
       static_cast<double>(check.doubtful.size()) > kMaxLeftOut * num_photos) {
     return false;
   }
-  SparseModel poses;
-  poses.cameras = pass->model().cameras;
-  for (const auto& [id, image] : pass->model().images) {
-    poses.images[id] = {id, image.camera_id, image.name, image.cam_from_model, {}, {}};
-  }
-  for (const uint32_t image_id : check.doubtful) poses.images.erase(image_id);
+  std::set<uint32_t> kept;
+  for (const auto& [id, image] : pass->model().images) kept.insert(id);
+  for (const uint32_t image_id : check.doubtful) kept.erase(image_id);
+  const SparseModel poses = PosesOf(pass->model(), kept);
   MapperResult adjusted = pass->mapper->Adjust(poses);
   if (!adjusted.problem.empty() || adjusted.model.images.size() != poses.images.size()) {
     return false;

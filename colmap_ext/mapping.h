@@ -38,6 +38,10 @@ struct MappingOutcome {
   std::map<uint32_t, ChainedView> chained;
   std::map<uint32_t, std::string> reasons;  // of photos that could not be chained, or were left out
   std::optional<KnownPlacement> known;      // with photos of known poses
+  // Photos of other rooms that are alike, which matching had put into the same model: models of
+  // their own, in frames of their own.
+  std::vector<MapperResult> other_rooms;
+  double share_within = 0, share_between = 0;  // LookalikeRooms, if there are others
 };
 
 // The photos of one way to see the lenses, mapped.
@@ -64,7 +68,8 @@ class Mapping {
 
   // With the lenses as the database has them (those of known photos as told with their poses), and,
   // if the photos know better, once more. Photos that stand where most of their own matches do not
-  // put them are left out, if they are few. Known photos then put the model where they stand.
+  // put them are left out, if they are few; rooms that are alike get models of their own. Known
+  // photos then put the model where they stand.
   MappingPass Run();
 
  private:
@@ -76,6 +81,8 @@ class Mapping {
   LensPlan PlanLenses() const;
   // False: nothing was to be left out, or could be.
   bool LeaveOutDoubtful(MappingPass* pass) const;
+  // True: there were several, and the model is that of one.
+  bool TakeRoomsApart(MappingPass* pass) const;
   ModelCheck Check(const MappingPass& pass) const;
 
   const MappingOptions& options_;

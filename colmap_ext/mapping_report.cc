@@ -1,6 +1,7 @@
 #include "colmap_ext/mapping_report.h"
 
 #include <cmath>
+#include <vector>
 
 #include <fmt/core.h>
 
@@ -46,6 +47,12 @@ Json ImageJson(const DatabaseImage& image, const MappingOutcome& outcome,
   return json;
 }
 
+std::vector<const SparseModel*> ModelsOfRooms(const MappingOutcome& outcome) {
+  std::vector<const SparseModel*> models = {&outcome.result.model};
+  for (const MapperResult& room : outcome.other_rooms) models.push_back(&room.model);
+  return models;
+}
+
 }  // namespace
 
 void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& images, Report* report) {
@@ -78,6 +85,20 @@ void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& image
     init["seed_images"].push_back(image.name);
   }
   r["init"] = init;
+  if (!outcome.other_rooms.empty()) {
+    Json rooms;
+    rooms["share_within"] = outcome.share_within;
+    rooms["share_between"] = outcome.share_between;
+    rooms["models"] = Json::array();
+    for (const SparseModel* of_room : ModelsOfRooms(outcome)) {
+      Json one;
+      one["num_points"] = of_room->points.size();
+      one["images"] = Json::array();
+      for (const auto& [id, image] : of_room->images) one["images"].push_back(image.name);
+      rooms["models"].push_back(one);
+    }
+    r["rooms"] = rooms;
+  }
   r["images"] = Json::array();
   for (const auto& [image_id, image] : images.images()) {
     r["images"].push_back(ImageJson(image, outcome, images));

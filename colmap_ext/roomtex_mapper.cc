@@ -138,7 +138,8 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
   if (outcome.seed.ambiguous) {
     Refuse("motion", AmbiguousSentence(trial, images), context, reasons);
   }
-  const size_t num_registered = outcome.result.model.images.size();
+  size_t num_registered = outcome.result.model.images.size();
+  for (const MapperResult& room : outcome.other_rooms) num_registered += room.model.images.size();
   if (2 * num_registered < images.images().size()) {
     Refuse("photos",
            "only " + std::to_string(num_registered) + " of " +
@@ -298,29 +299,56 @@ void CheckLens(MapperRun* mapper, const MappingOutcome& outcome, bool refined,
       context, reasons);
 }
 
-// Models with the cameras of the user's database, which appear with the report.
+std::string RoomPath(const MappingOptions& options, int number) {
+  return options.output_path + "/" + std::to_string(number);
+}
+
+// With the cameras of the user's database, as outputs/name.
+void WriteModel(const MapperResult& result, const std::string& name, const LensPlan& plan,
+                const ScratchFolder& scratch, OutputSet* outputs) {
+  std::string folder = result.folder;
+  if (!plan.IsAsInDatabase()) {
+    SparseModel model = result.model;
+    plan.Restore(&model);
+    folder = scratch / ("restored_" + name);
+    WriteSparseModel(model, folder);
+  }
+  std::error_code error;
+  fs::copy(folder, outputs->aside() + "/" + name, error);
+  if (error) {
+    throw InputError(outputs->folder(), "", "cannot be written into (" + error.message() + ")",
+                     "Check the rights of this folder and the space on the disk");
+  }
+  outputs->ReplaceFolder(name);
+}
+
+// The models appear with the report. reasons: not to trust them.
 void WriteModels(const MappingOptions& options, const MappingPass& pass,
-                 const ScratchFolder& scratch) {
+                 const ScratchFolder& scratch, const Json& reasons) {
   const MappingOutcome& outcome = pass.best[0];
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   SparseModel pair_model = outcome.seed.pair_model;
-  std::string folder = outcome.result.folder;
-  if (!pass.plan.IsAsInDatabase()) {
-    SparseModel model = outcome.result.model;
-    pass.plan.Restore(&model);
-    pass.plan.Restore(&pair_model);
-    folder = scratch / "restored";
-    WriteSparseModel(model, folder);
-  }
+  if (!pass.plan.IsAsInDatabase()) pass.plan.Restore(&pair_model);
   WriteSparseModel(pair_model, outputs->aside() + "/init");
-  std::error_code error;
-  std::filesystem::copy(folder, outputs->aside() + "/0", error);
-  if (error) {
-    throw InputError(options.output_path, "", "cannot be written into (" + error.message() + ")",
-                     "Check the rights of this folder and the space on the disk");
-  }
   outputs->ReplaceFolder("init");
-  outputs->ReplaceFolder("0");
+  WriteModel(outcome.result, "0", pass.plan, scratch, outputs.get());
+  int number = 1;
+  for (const MapperResult& room : outcome.other_rooms) {
+    const std::string name = std::to_string(number++);
+    WriteModel(room, name, pass.plan, scratch, outputs.get());
+    Json json;
+    json["command"] = "roomtex-mapper";
+    json["num_reg_images"] = room.model.images.size();
+    json["num_points"] = room.model.points.size();
+    json["mean_reprojection_error_px"] = room.mean_reprojection_error_px;
+    json["refined_intrinsics"] = pass.refine;
+    json["reasons"] = reasons;
+    WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName, json);
+  }
+  // Rooms of an earlier run are none of this one.
+  while (fs::exists(RoomPath(options, number) + "/" + kMapperReportName)) {
+    outputs->ReplaceFolder(std::to_string(number++));
+  }
   ThrowIfInterrupted();
   CommitWithReport(std::string("0/") + kMapperReportName, outputs);
 }
@@ -370,7 +398,10 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   context.report["reasons"] = reasons;
 
   context.progress.Stage("write model");
-  WriteModels(options, pass, scratch);
+  for (size_t i = 1; i <= outcome.other_rooms.size(); ++i) {
+    RequireReplaceableModel(RoomPath(options, static_cast<int>(i)));
+  }
+  WriteModels(options, pass, scratch, reasons);
   std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
               model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
               outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);

@@ -248,6 +248,7 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
 std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
                                                    const Database* database,
                                                    const SparseModel& aligned,
+                                                   const std::vector<Pick>& picks,
                                                    const SurveyedScans& surveyed, double rms_px,
                                                    const Command::Context& context) {
   constexpr double kMostDoubtful = 0.34;
@@ -260,9 +261,14 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
                    " holds no verified matches between photos of the model: none were asked");
     }
   }
+  std::set<uint32_t> picked;
+  for (const Pick& pick : picks) {
+    const SparseImage* const image = aligned.FindImage(pick.image_name);
+    if (image != nullptr) picked.insert(image->image_id);
+  }
   auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),
-                            KeypointSigma(rms_px), support);
+                            KeypointSigma(rms_px), support, picked);
   size_t num_doubtful = 0;
   for (const auto& [id, photo] : photos) {
     if (photo.doubt.empty()) continue;
@@ -347,8 +353,8 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   const ReprojectionErrors after = UpdateReprojectionErrors(&model);
   FillReport(alignment, after.rms_px, &context.report);
   context.report["cameras"] = CamerasToJson(alignment);
-  auto photos = JudgeSinglePhotos(a, database ? &*database : nullptr, model, *reading.surveyed,
-                                  after.rms_px, context);
+  auto photos = JudgeSinglePhotos(a, database ? &*database : nullptr, model, picks,
+                                  *reading.surveyed, after.rms_px, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   CompareWithPhotos(a, model, *reading.surveyed, told, context);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 
 #include "align/surface/scan_patches.h"
@@ -40,10 +41,12 @@ struct PhotoVerdict {
 
 // By image_id, for every photo. aligned: in the scan frame. tolerance: metres, of the surface.
 // sigma_px: of a keypoint's coordinate. match_support: as far as it is known (match_support.h), by
-// image_id. Photos are compared with what is usual in this model.
+// image_id. picked: photos that are known to show what was scanned, as those with picks. Photos are
+// compared with what is usual in this model.
 std::map<uint32_t, PhotoVerdict> JudgePhotos(const SparseModel& aligned, const ScanPatches& surface,
                                              const FreeSpace& free_space, double tolerance,
                                              double sigma_px,
-                                             const std::map<uint32_t, double>& match_support);
+                                             const std::map<uint32_t, double>& match_support,
+                                             const std::set<uint32_t>& picked);
 
 }  // namespace roomtex

@@ -13,6 +13,7 @@
 
 #include "colmap_ext/initializer.h"
 #include "colmap_ext/sparse_model.h"
+#include "tests/colmap_ext/lookalike_views.h"
 #include "tests/colmap_ext/simulated_database.h"
 #include "tests/support/folders.h"
 #include "tests/support/matchers.h"
@@ -127,6 +128,43 @@ TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
   EXPECT_EQ(fs::last_write_time(folder_ / "database.db"), time_before);
   EXPECT_FALSE(fs::exists(folder_ / "database.db-wal"));
   ExpectNoScratch();
+}
+
+// Matching puts them into one model, as the same furniture stands in both; the next run, of the
+// photos of one, leaves nothing of the other.
+TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
+  SimulatedViewsOptions options = RoomOptions(13);
+  options.num_points = 1500;
+  options.baseline = 0.1;
+  views_ = SimulateViews(options);
+  const auto room_of = [](uint32_t id) { return id % 3 == 0 ? 2 : 1; };
+  ShowLookalikeRooms(
+      room_of, [](const Eigen::Vector3d& x) { return x.x() > 0; }, &views_);
+  WriteSimulatedDatabase(views_, folder_.path());
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("2 rooms that are alike"), std::string::npos) << result.err;
+  for (const int room : {1, 2}) {
+    const SparseModel model = ReadSparseModel(folder_ / ("sparse/" + std::to_string(room - 1)));
+    EXPECT_EQ(model.images.size(), room == 1 ? 9u : 4u);
+    for (const auto& [id, image] : model.images) EXPECT_EQ(room_of(id), room) << image.name;
+    ExpectNearTruth(model, 0.01, 0.01);
+    const nlohmann::json rooms = Report()["rooms"]["models"];
+    EXPECT_EQ(rooms[static_cast<size_t>(room - 1)]["images"].size(), model.images.size());
+    EXPECT_EQ(rooms[static_cast<size_t>(room - 1)]["num_points"], model.points.size());
+  }
+  EXPECT_EQ(Report()["num_reg_images"], 9);
+  EXPECT_EQ(Report()["images"][2]["registered"], false);
+  EXPECT_NE(Report()["images"][2]["reason"].get<std::string>().find("model 1"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder_ / "sparse/1/roomtex-mapper.json"));
+  ExpectNoScratch();
+
+  fs::remove(folder_ / "database.db");
+  fs::remove_all(folder_ / "photos");
+  Simulate(RoomOptions(7));
+  ASSERT_EQ(Run().exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
+  EXPECT_EQ(Report().count("rooms"), 0u);
 }
 
 TEST_F(MapperCommand, IsRightBeforeAWall) {

@@ -44,7 +44,8 @@ void LosePoints(uint32_t image_id,
 std::map<uint32_t, PhotoVerdict> Judge(const SparseModel& aligned,
                                        const std::map<uint32_t, double>& support = {}) {
   const SurveyedScans& surveyed = Survey(MakeCase().scans);
-  return JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(), 0.05, kSigmaPx, support);
+  return JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(), 0.05, kSigmaPx, support,
+                     {});
 }
 
 TEST(PhotoVerdict, DoubtsNoRightPhoto) {

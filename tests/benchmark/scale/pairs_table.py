@@ -3,8 +3,9 @@
 
   tests/benchmark/scale/pairs_table.py --bin build/bin FOLDER --photos 100 200 400 --exhaustive 100
 
-25 simulated photos in each room, all rooms with the same furniture at the same places; the smaller sets are the first
-rooms of the largest. Beside the list: the photos of each room with each other, which only the truth can tell (all that
+25 simulated photos in each room, all rooms with the same furniture at the same places (--same_walls 1: of two rooms each
+walls, floor and ceiling are the same to the last fibre, too, and the truth knows the poses of the first alone); the
+smaller sets are the first rooms of the largest. Beside the list: the photos of each room with each other, which only the truth can tell (all that
 matching all pairs could find there), and, up to --exhaustive photos, all with all. COLMAP's mapper makes its models of
 the first two; a photo counts where most photos of its model are of its room. What was measured before
 (FOLDER/pairs.json) is not run again.
@@ -50,19 +51,20 @@ class Bench(Measurements):
         """Every room by itself, and the photos of all under names of their own in one folder."""
         a = self.arguments
         os.makedirs(self.at("photos"), exist_ok=True)
-        for room in self.rooms(photos):
+        rooms = self.rooms(photos)
+        for room, twin in zip(rooms[::2], rooms[1::2]) if a.same_walls else ((room, None) for room in rooms):
             if not os.path.exists(self.at(room, "README.txt")):
                 self.seconds("roomtex-simulate", "--quiet", "1", "--seed", room[4:], "--num_photos",
                              str(PHOTOS_OF_A_ROOM), "--photo_width", str(a.width), "--photo_height",
                              str(a.width * 2 // 3), "--scan_columns", "400", "--scan_rows", "150", "--output_path",
-                             self.at(room))
+                             self.at(room), "--similar_room", str(PHOTOS_OF_A_ROOM if twin else 0))
                 truth = self.at(room, "truth", "images.txt")
                 with open(truth) as stream:
                     text = stream.read()
                 with open(truth, "w") as stream:
                     stream.write(text.replace(" photo_", f" {room}_photo_"))
-            for name in os.listdir(self.at(room, "photos")):
-                link = self.at("photos", f"{room}_{name}")
+            for number, name in enumerate(sorted(os.listdir(self.at(room, "photos")))):
+                link = self.at("photos", f"{room if number < PHOTOS_OF_A_ROOM else twin}_{name}")
                 if not os.path.exists(link):
                     os.link(self.at(room, "photos", name), link)
 
@@ -97,9 +99,10 @@ class Bench(Measurements):
                 names = read_names(model)
                 room, own = collections.Counter(map(room_of, names)).most_common(1)[0]
                 off = None
-                if own == len(names):  # of others the truth knows nothing
+                truth = self.at(room, "truth")
+                if own == len(names) and os.path.exists(truth):  # of others the truth knows nothing
                     report = os.path.join(model, "evaluate.json")
-                    self.seconds("roomtex-evaluate", "--quiet", "1", "--truth_path", self.at(room, "truth"),
+                    self.seconds("roomtex-evaluate", "--quiet", "1", "--truth_path", truth,
                                  "--input_path", model, "--fit_similarity", "1", "--report_path", report)
                     off = json.load(open(report))["poses"]["position_median_mm"]
                 found["models"].append({"room": room, "own": own, "others": len(names) - own, "off_mm": off})
@@ -186,8 +189,12 @@ def main():
     parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
     parser.add_argument("--features", type=int, default=1500, help="per photo, for COLMAP")
     parser.add_argument("--exhaustive", type=int, default=100, help="all pairs are matched, too, up to so many photos")
+    parser.add_argument("--same_walls", type=int, default=0, help="1 = of two rooms each")
     parser.add_argument("--rooms", type=int, default=1, help="0 = not the pairs of each room beside the list")
-    bench = Bench(parser.parse_args())
+    arguments = parser.parse_args()
+    if arguments.same_walls and any(photos % (2 * PHOTOS_OF_A_ROOM) for photos in arguments.photos):
+        parser.error(f"--same_walls takes multiples of {2 * PHOTOS_OF_A_ROOM} --photos")
+    bench = Bench(arguments)
     most = max(bench.arguments.photos)
     bench.simulate(most)
     bench.features(most)
