@@ -266,8 +266,7 @@ MappingPass Mapping::Run() {
   context_.progress.Stage("check model");
   pass.check = Check(pass);
   for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) pass.check = Check(pass);
-  context_.progress.Stage("look for rooms");
-  if (TakeRoomsApart(&pass)) pass.check = Check(pass);
+  if (options_.take_rooms_apart && TakeRoomsApart(&pass)) pass.check = Check(pass);
   if (!known_.cam_from_scan.empty()) {
     context_.progress.Stage("known poses");
     MappingOutcome& outcome = pass.best[0];
@@ -288,6 +287,7 @@ ModelCheck Mapping::Check(const MappingPass& pass) const {
 }
 
 bool Mapping::TakeRoomsApart(MappingPass* pass) const {
+  context_.progress.Stage("look for rooms");
   MappingOutcome& outcome = pass->best[0];
   const SparseModel& model = outcome.result.model;
   LookalikeRooms found =
@@ -311,7 +311,8 @@ bool Mapping::TakeRoomsApart(MappingPass* pass) const {
   context_.Warn(fmt::format(
       "The photos show {} rooms that are alike, or a room before and after much was moved: of what "
       "those of one show ({} of what they ought to), those of another show {}. Each has a model of "
-      "its own: 0 holds {} photos, e.g. {}, 1 holds {}, e.g. {}.",
+      "its own: 0 holds {} photos, e.g. {}, 1 holds {}, e.g. {}. --Rooms.enabled 0 leaves them "
+      "together.",
       rooms.size(), Percent(found.share_within), Percent(found.share_between), rooms[0].size(),
       names_.at(*rooms[0].begin()), rooms[1].size(), names_.at(*rooms[1].begin())));
   for (size_t i = 1; i < rooms.size(); ++i) {

@@ -30,6 +30,7 @@ struct MappingOptions {
   MapperOptions mapper;
   ChainOptions chain;
   std::string refine_intrinsics = "auto";
+  bool take_rooms_apart = true;  // that are alike
 };
 
 struct MappingOutcome {

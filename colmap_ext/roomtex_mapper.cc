@@ -45,10 +45,10 @@ void AddOptions(MappingOptions* options, Command* command) {
       "(DIR/sparse). Two or more of them that stand apart put the model into that frame, metric; "
       "those of one standpoint leave that to roomtex-align. It needs no picks either way.",
       Command::Kind::kOptional);
-  command->AddOutputPath(
-      "output_path", &options->output_path,
-      "Folder to write into: 0/ (the model), init/ (the two-view model it started "
-      "from), roomtex-mapper.log (what COLMAP said).");
+  command->AddOutputPath("output_path", &options->output_path,
+                         "Folder to write into: 0/ (the model; 1/ ... those of rooms that are "
+                         "alike), init/ (the two-view model it started "
+                         "from), roomtex-mapper.log (what COLMAP said).");
   command->AddString("colmap", &options->colmap, "COLMAP's program: a path, or a name on the PATH.",
                      Kind::kOptional);
   command->AddChoice(
@@ -59,6 +59,10 @@ void AddOptions(MappingOptions* options, Command* command) {
       "it; 1 = always; 0 = never.");
   command->Add(FieldsOf(&options->init));
   command->Add(FieldsOf(&options->chain));
+  command->AddBool(
+      "Rooms.enabled", &options->take_rooms_apart,
+      "Give rooms that are alike (the same wallpaper and furniture) models of their own, 0/, 1/ "
+      "...: photos that find each other's points, and not those of the others at the same places.");
   command->PassThrough(
       "--Mapper.", &options->mapper.mapper_arguments,
       "Handed on to colmap mapper (see colmap mapper -h). --Mapper.init_* have no effect: "

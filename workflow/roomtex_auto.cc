@@ -77,7 +77,7 @@ void AddOptions(AutoOptions* o, Command* command) {
                              "--ExhaustiveMatching.", "--SequentialMatching."}) {
     command->PassThrough(prefix, &passed.matches, "Handed on to COLMAP's matcher.");
   }
-  for (const char* prefix : {"--Mapper.", "--Init.", "--Chain."}) {
+  for (const char* prefix : {"--Mapper.", "--Init.", "--Chain.", "--Rooms."}) {
     command->PassThrough(prefix, &passed.mapper, "Handed on to roomtex-mapper.");
   }
   for (const char* prefix : {"--Picks.", "--Plane.", "--PlaneBA.", "--Trust."}) {

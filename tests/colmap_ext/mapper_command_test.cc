@@ -130,8 +130,7 @@ TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
   ExpectNoScratch();
 }
 
-// Matching puts them into one model, as the same furniture stands in both; the next run, of the
-// photos of one, leaves nothing of the other.
+// Matching puts them into one model, as the same furniture stands in both.
 TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   SimulatedViewsOptions options = RoomOptions(13);
   options.num_points = 1500;
@@ -159,11 +158,15 @@ TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   EXPECT_TRUE(fs::exists(folder_ / "sparse/1/roomtex-mapper.json"));
   ExpectNoScratch();
 
+  ASSERT_EQ(Run("--Rooms.enabled 0").exit_code, 0);
+  EXPECT_EQ(Report()["num_reg_images"], 13);
+  EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
+
   fs::remove(folder_ / "database.db");
   fs::remove_all(folder_ / "photos");
   Simulate(RoomOptions(7));
   ASSERT_EQ(Run().exit_code, 0);
-  EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
+  EXPECT_EQ(Report()["num_reg_images"], 7);
   EXPECT_EQ(Report().count("rooms"), 0u);
 }
 

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "core/random_stream.h"
+#include "core/statistics.h"
 #include "tests/align/simulated_alignment.h"
 
 namespace roomtex {
@@ -42,10 +43,11 @@ void LosePoints(uint32_t image_id,
 }
 
 std::map<uint32_t, PhotoVerdict> Judge(const SparseModel& aligned,
-                                       const std::map<uint32_t, double>& support = {}) {
+                                       const std::map<uint32_t, double>& support = {},
+                                       const std::set<uint32_t>& picked = {}) {
   const SurveyedScans& surveyed = Survey(MakeCase().scans);
   return JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(), 0.05, kSigmaPx, support,
-                     {});
+                     picked);
 }
 
 TEST(PhotoVerdict, DoubtsNoRightPhoto) {
@@ -74,34 +76,69 @@ TEST(PhotoVerdict, DoubtsAPhotoThatShowsAnotherRoomInMostOfItsPicture) {
   EXPECT_NE(photo.doubt.find("ought to show"), std::string::npos) << photo.doubt;
 }
 
-// On the way out through a door, say: what they show of the other room each of them has, and nobody
-// else here; of this room they have little. Then the right ones that look the same way lack what
-// these found, and are not to be taken for strangers either.
-TEST(PhotoVerdict, DoubtsPhotosOfAnotherRoomThatCameTogether) {
-  SparseModel model = AlignedModel();
-  const std::set<uint32_t> strangers = {3, 4, 5, 6};
+// Their sightings of what is not alike become points of their own at the same places.
+void MoveToAnotherRoom(const std::set<uint32_t>& strangers,
+                       const std::function<bool(uint64_t id, const SparsePoint& point)>& is_alike,
+                       SparseModel* model) {
   const auto is_stranger = [&](const TrackElement& element) {
     return strangers.count(element.image_id) > 0;
   };
-  uint64_t next_id = model.points.rbegin()->first + 1;
+  uint64_t next_id = model->points.rbegin()->first + 1;
   std::map<uint64_t, SparsePoint> theirs;
-  for (auto& [id, point] : model.points) {
-    if (id % 8 == 0) continue;  // alike in both rooms
+  for (auto& [id, point] : model->points) {
+    if (is_alike(id, point)) continue;
     SparsePoint other = point;
     std::vector<TrackElement>& track = point.track;
     const auto first = std::stable_partition(track.begin(), track.end(), std::not_fn(is_stranger));
     other.track.assign(first, track.end());
     track.erase(first, track.end());
     for (const TrackElement& element : other.track) {
-      model.images.at(element.image_id).point3d_ids[element.point2d_index] = next_id;
+      model->images.at(element.image_id).point3d_ids[element.point2d_index] = next_id;
     }
     theirs[next_id++] = other;
   }
-  model.points.insert(theirs.begin(), theirs.end());
+  model->points.insert(theirs.begin(), theirs.end());
+}
+
+// On the way out through a door, say: what they show of the other room each of them has, and nobody
+// else here; of this room they have little. Then the right ones that look the same way lack what
+// these found, and are not to be taken for strangers either.
+TEST(PhotoVerdict, DoubtsPhotosOfAnotherRoomThatCameTogether) {
+  SparseModel model = AlignedModel();
+  const std::set<uint32_t> strangers = {3, 4, 5, 6};
+  MoveToAnotherRoom(
+      strangers, [](uint64_t id, const SparsePoint&) { return id % 8 == 0; }, &model);
   for (const auto& [id, photo] : Judge(model)) {
     EXPECT_EQ(photo.doubt.empty(), strangers.count(id) == 0)
         << id << ": " << photo.sight_share << " of " << photo.num_expected << " "
         << photo.unevenness;
+  }
+}
+
+// Half of what there is is the same in both rooms: the larger one is doubted where a photo of the
+// other is known to show what was scanned.
+TEST(PhotoVerdict, DoubtsARoomThatIsAlike) {
+  SparseModel model = AlignedModel();
+  std::vector<double> heights;
+  for (const auto& [id, point] : model.points) heights.push_back(point.x_in_model.y());
+  const double middle = Median(heights);
+  std::set<uint32_t> strangers;
+  for (const auto& [id, image] : model.images) {
+    if (id % 3 == 0) strangers.insert(id);
+  }
+  MoveToAnotherRoom(
+      strangers, [&](uint64_t, const SparsePoint& point) { return point.x_in_model.y() > middle; },
+      &model);
+  for (const bool picked : {false, true}) {
+    for (const auto& [id, photo] :
+         Judge(model, {}, picked ? std::set<uint32_t>{3} : std::set<uint32_t>{})) {
+      EXPECT_EQ(photo.doubt.empty(), (strangers.count(id) > 0) == picked)
+          << id << ": " << photo.sight_share << " of " << photo.num_expected << " "
+          << photo.unevenness;
+      if (!photo.doubt.empty()) {
+        EXPECT_NE(photo.doubt.find("another room that is alike"), std::string::npos) << photo.doubt;
+      }
+    }
   }
 }
 

@@ -3,12 +3,14 @@
 
   tests/benchmark/scale/pairs_table.py --bin build/bin FOLDER --photos 100 200 400 --exhaustive 100
 
-25 simulated photos in each room, all rooms with the same furniture at the same places (--same_walls 1: of two rooms each
-walls, floor and ceiling are the same to the last fibre, too, and the truth knows the poses of the first alone); the
-smaller sets are the first rooms of the largest. Beside the list: the photos of each room with each other, which only the truth can tell (all that
+25 simulated photos in each room, all rooms with the same furniture at the same places; the smaller sets are the first
+rooms of the largest. Beside the list: the photos of each room with each other, which only the truth can tell (all that
 matching all pairs could find there), and, up to --exhaustive photos, all with all. COLMAP's mapper makes its models of
 the first two; a photo counts where most photos of its model are of its room. What was measured before
 (FOLDER/pairs.json) is not run again.
+
+--same_walls 1: of two rooms each walls, floor and ceiling are the same to the last fibre, too; the truth knows the
+poses of the first alone. roomtex-mapper makes the models then.
 """
 
 import argparse
@@ -45,7 +47,8 @@ class Bench(Measurements):
         return self.call(list(line))["cpu"]
 
     def rooms(self, photos):
-        return [f"room{seed}" for seed in range(101, 101 + photos // PHOTOS_OF_A_ROOM)]
+        first = self.arguments.first_seed
+        return [f"room{seed}" for seed in range(first, first + photos // PHOTOS_OF_A_ROOM)]
 
     def simulate(self, photos):
         """Every room by itself, and the photos of all under names of their own in one folder."""
@@ -88,11 +91,15 @@ class Bench(Measurements):
             sparse = self.at(f"{kind}_{photos}")
             shutil.rmtree(sparse, ignore_errors=True)
             os.makedirs(sparse)
-            lens = [word for option in FIXED_LENS for word in (option, "0")]
-            cpu = self.seconds("colmap", "mapper", "--database_path", self.at(f"{kind}_{photos}.db"), "--image_path",
-                               self.at("photos"), "--output_path", sparse, *lens)
+            paths = ["--database_path", self.at(f"{kind}_{photos}.db"), "--image_path", self.at("photos"),
+                     "--output_path", sparse]
+            if self.arguments.same_walls:
+                cpu = self.call(["roomtex-mapper", "--quiet", "1", *paths], (0, 4))["cpu"]
+            else:
+                lens = [word for option in FIXED_LENS for word in (option, "0")]
+                cpu = self.seconds("colmap", "mapper", *paths, *lens)
             found = {"cpu": cpu, "models": []}
-            for number in sorted(os.listdir(sparse), key=int):
+            for number in sorted((name for name in os.listdir(sparse) if name.isdigit()), key=int):
                 model = os.path.join(sparse, number)
                 self.seconds("colmap", "model_converter", "--input_path", model, "--output_path", model,
                              "--output_type", "TXT")
@@ -166,7 +173,8 @@ class Bench(Measurements):
         row("listed", lambda size: str(known("pairs listed", size)))
         row("CPU s: the list", cpu("the list"))
         row("CPU s: matching the list", cpu("matches of list"))
-        row("CPU s: colmap mapper", lambda size: f"{known('models of list', size)['cpu']:.0f}")
+        mapper = "roomtex-mapper" if self.arguments.same_walls else "colmap mapper"
+        row(f"CPU s: {mapper}", lambda size: f"{known('models of list', size)['cpu']:.0f}")
         row("CPU s: matching all", cpu("matches of all"))
         row("both, of matching all", lambda size: f"{share(size):.0f} %" if known("matches of all", size) else "")
         for kind, models in (("list", lambda size: known("models of list", size)["models"]),
@@ -189,6 +197,7 @@ def main():
     parser.add_argument("--width", type=int, default=960, help="of the photos, pixels")
     parser.add_argument("--features", type=int, default=1500, help="per photo, for COLMAP")
     parser.add_argument("--exhaustive", type=int, default=100, help="all pairs are matched, too, up to so many photos")
+    parser.add_argument("--first_seed", type=int, default=101, help="of the rooms")
     parser.add_argument("--same_walls", type=int, default=0, help="1 = of two rooms each")
     parser.add_argument("--rooms", type=int, default=1, help="0 = not the pairs of each room beside the list")
     arguments = parser.parse_args()
