@@ -58,6 +58,8 @@ ROOMS = {
     # Single photos that do not belong: of another room with the same walls, and taken at 1.3 times the focal length.
     "similar": {"--random_seed": "31", "--similar_room": "2"},
     "similar_twin": {"--random_seed": "32", "--similar_room": "2"},
+    # Never looked at while thresholds were chosen.
+    **{f"similar_{seed}": {"--random_seed": str(seed), "--similar_room": "2"} for seed in (35, 36, 37)},
     "zoomed": {"--random_seed": "33", "--zoomed": "0.0625"},
     "zoomed_twin": {"--random_seed": "34", "--zoomed": "0.0625"},
 }
