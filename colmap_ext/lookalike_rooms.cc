@@ -15,7 +15,7 @@ constexpr int kMinExpectedOfPair = 20;
 constexpr size_t kMinPhotos = 4;  // of a room
 // A split is believed whose photos find less than this share of what those of their own side find,
 // with no more than so many pairs on the wrong side of the middle, and less evenly over the picture
-// than their own.
+// than their own. What rooms that are alike and single rooms come to: docs/pairs.md.
 constexpr double kMaxRatio = 0.67, kMaxWrong = 0.15;
 constexpr double kMinUneven = 1.5;
 
@@ -50,7 +50,7 @@ Shares SharesOf(const std::vector<PairShare>& pairs, const Sides& sides) {
 class SignedGraph {
  public:
   SignedGraph(int num_photos, const std::vector<PairShare>& pairs)
-      : pairs_(pairs), neighbors_(static_cast<size_t>(num_photos)) {
+      : neighbors_(static_cast<size_t>(num_photos)) {
     for (const PairShare& pair : pairs) {
       neighbors_[static_cast<size_t>(pair.photo1)].emplace_back(pair.photo2, pair.share);
       neighbors_[static_cast<size_t>(pair.photo2)].emplace_back(pair.photo1, pair.share);
@@ -108,7 +108,6 @@ class SignedGraph {
     return sum;
   }
 
-  const std::vector<PairShare>& pairs_;
   std::vector<std::vector<std::pair<int, double>>> neighbors_;
 };
 

@@ -22,6 +22,7 @@
 #include "colmap_ext/model_output.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
@@ -307,6 +308,11 @@ std::string RoomPath(const MappingOptions& options, int number) {
   return options.output_path + "/" + std::to_string(number);
 }
 
+bool IsRoomOfEarlierRun(const MappingOptions& options, int number) {
+  const Json report = ReadJsonIfAny(RoomPath(options, number) + "/" + kMapperReportName);
+  return report.is_object() && report.value("room", Json()) == number;
+}
+
 // With the cameras of the user's database, as outputs/name.
 void WriteModel(const MapperResult& result, const std::string& name, const LensPlan& plan,
                 const ScratchFolder& scratch, OutputSet* outputs) {
@@ -342,6 +348,7 @@ void WriteModels(const MappingOptions& options, const MappingPass& pass,
     WriteModel(room, name, pass.plan, scratch, outputs.get());
     Json json;
     json["command"] = "roomtex-mapper";
+    json["room"] = number - 1;
     json["num_reg_images"] = room.model.images.size();
     json["num_points"] = room.model.points.size();
     json["mean_reprojection_error_px"] = room.mean_reprojection_error_px;
@@ -349,9 +356,9 @@ void WriteModels(const MappingOptions& options, const MappingPass& pass,
     json["reasons"] = reasons;
     WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName, json);
   }
-  // Rooms of an earlier run are none of this one.
-  while (fs::exists(RoomPath(options, number) + "/" + kMapperReportName)) {
-    outputs->ReplaceFolder(std::to_string(number++));
+  // Rooms of an earlier run are none of this one; what somebody has put there stays.
+  for (; IsRoomOfEarlierRun(options, number); ++number) {
+    outputs->ReplaceFolder(std::to_string(number));
   }
   ThrowIfInterrupted();
   CommitWithReport(std::string("0/") + kMapperReportName, outputs);
@@ -409,6 +416,12 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
               model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
               outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);
+  int number = 1;
+  for (const MapperResult& room : outcome.other_rooms) {
+    std::printf("%s: %zu photos of another room that is alike, %zu points, %.3f px\n",
+                RoomPath(options, number++).c_str(), room.model.images.size(),
+                room.model.points.size(), room.mean_reprojection_error_px);
+  }
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ namespace {
 
 // Metres and share of the distance; what lies in front of a point by more hides it.
 constexpr double kInFrontBy = 0.05, kInFrontShare = 0.02;
+
 // A photo is doubtful that found less than this share of what photos usually find here, unevenly
 // over its picture; or hardly anything, where that cannot be told. Photos of another room with the
 // same walls (eight, of two rooms): 0.25 to 0.45 of the median with an unevenness of 3.1 to 9.2,

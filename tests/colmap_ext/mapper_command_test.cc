@@ -158,9 +158,14 @@ TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   EXPECT_TRUE(fs::exists(folder_ / "sparse/1/roomtex-mapper.json"));
   ExpectNoScratch();
 
+  EXPECT_NE(result.out.find("sparse/1: 4 photos"), std::string::npos) << result.out;
+
+  // The next run takes its own rooms away, and leaves a copy that somebody made.
+  fs::copy(folder_ / "sparse/0", folder_ / "sparse/2");
   ASSERT_EQ(Run("--Rooms.enabled 0").exit_code, 0);
   EXPECT_EQ(Report()["num_reg_images"], 13);
   EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
+  EXPECT_TRUE(fs::exists(folder_ / "sparse/2/images.bin"));
 
   fs::remove(folder_ / "database.db");
   fs::remove_all(folder_ / "photos");
