@@ -202,7 +202,7 @@ class SitePage {
     }
     if (joined["scene"].is_string()) {
       const std::string scene = joined["scene"];
-      body_ += "<p>All rooms in one scene: <a href=\"" +
+      body_ += "<p>The rooms that stand in one frame, as one scene: <a href=\"" +
                HtmlText(UrlPath(to_rooms_ + "joined/" + scene)) + "\">" + HtmlText(scene) +
                "</a> (it refers to the rooms' own files).</p>\n";
     }

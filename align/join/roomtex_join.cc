@@ -160,7 +160,8 @@ void FillReport(const std::vector<RoomRecord>& rooms, const std::vector<RoomLink
   }
 }
 
-// The rooms' coloured models, as roomtex-auto lays them out; the report's `scene`.
+// The rooms' coloured models, as roomtex-auto lays them out, of the rooms in the first one's frame;
+// of one room alone its own model is all there is. The report's `scene`.
 void WriteScene(const std::vector<RoomRecord>& rooms, const RoomGraph& graph,
                 const std::string& folder, OutputSet* outputs, const Command::Context& context) {
   std::vector<SceneRoom> models;
@@ -172,7 +173,7 @@ void WriteScene(const std::vector<RoomRecord>& rooms, const RoomGraph& graph,
                       FrameFromScan(rooms[0], rooms[i], graph.places[i])});
   }
   context.report["scene"] = nullptr;
-  if (models.empty()) {
+  if (models.size() < 2) {
     outputs->Remove(kSceneName);
     return;
   }
@@ -229,9 +230,9 @@ int main(int argc, char** argv) {
                         Command::Kind::kOptional);
   command.AddOutputPath("output_path", &options.output_path,
                         "Folder for joined.json (the report), ROOM.txt (4x4 matrix from the room's "
-                        "scan frame to the common one, e.g. for CloudCompare), and site.gltf, all "
-                        "rooms coloured, where ../textured/model.glb lies beside the rooms' "
-                        "models, whose files it refers to.");
+                        "scan frame to the common one, e.g. for CloudCompare), and site.gltf, the "
+                        "rooms of that frame coloured, where two or more of them have "
+                        "../textured/model.glb beside their models, whose files it refers to.");
   command.AddBool("registered", &options.registered,
                   "The scans of all rooms lie in one frame already: nothing is moved, and what "
                   "rooms share is compared with that.");

@@ -400,6 +400,19 @@ TEST_F(JoinCommand, ShowsAllRoomsInOneScene) {
   EXPECT_THAT(broken.err, HasSubstr("model.glb"));
 }
 
+TEST_F(JoinCommand, MakesNoSceneWhereNothingLinksTheRooms) {
+  AddRoom("hall", Rigid());
+  AddRoom("library", Turned(90, {5, 5, 0}));
+  for (const std::string name : {"hall", "library"}) {
+    MakeFolder(folder_ / (name + "/textured"));
+    WriteTriangle(folder_ / (name + "/textured/model.glb"), {0, 0, 0, 1, 0, 0, 0, 1, 0}, "..");
+  }
+  Join();
+  EXPECT_EQ(RoomOf("library")["frame"], "library");
+  EXPECT_TRUE(report_.at("scene").is_null());
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "joined/site.gltf"));
+}
+
 TEST_F(JoinCommand, SaysWhatCannotBeUsed) {
   AddRoom("hall", Rigid());
   EXPECT_EQ(Join().exit_code, 0) << "one room is its own site";
