@@ -264,9 +264,16 @@ MappingPass Mapping::Run() {
   MappingPass pass = MapAsLensesAre();
   if (pass.best.empty()) return pass;
   context_.progress.Stage("check model");
-  pass.check = Check(pass);
-  for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) pass.check = Check(pass);
-  if (options_.take_rooms_apart && TakeRoomsApart(&pass)) pass.check = Check(pass);
+  pass.check = Check(pass, pass.model());
+  for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) {
+    pass.check = Check(pass, pass.model());
+  }
+  if (options_.take_rooms_apart && TakeRoomsApart(&pass)) {
+    pass.check = Check(pass, pass.model());
+    for (const MapperResult& room : pass.best[0].other_rooms) {
+      pass.room_checks.push_back(Check(pass, room.model));
+    }
+  }
   if (!known_.cam_from_scan.empty()) {
     context_.progress.Stage("known poses");
     MappingOutcome& outcome = pass.best[0];
@@ -276,13 +283,13 @@ MappingPass Mapping::Run() {
   return pass;
 }
 
-ModelCheck Mapping::Check(const MappingPass& pass) const {
-  MatchedImages images = ImagesOfModel(database_, *pass.images, pass.model());
+ModelCheck Mapping::Check(const MappingPass& pass, const SparseModel& model) const {
+  MatchedImages images = ImagesOfModel(database_, *pass.images, model);
   ModelCheckOptions check_options;
   check_options.pair = HypothesisOptionsOf(options_, context_);
   check_options.min_confidence = options_.init.min_confidence;
   const PairTrial& trial = pass.best[0].seed.trial;
-  return CheckModel(&images, pass.model(), {trial.image_id1, trial.image_id2}, check_options,
+  return CheckModel(&images, model, {trial.image_id1, trial.image_id2}, check_options,
                     context_.options.num_threads);
 }
 

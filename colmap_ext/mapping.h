@@ -55,7 +55,9 @@ struct MappingPass {
   std::unique_ptr<MapperRun> mapper;
   std::vector<MappingOutcome> best;  // at most one
   LensCheck lenses;
-  ModelCheck check;  // of the best model, once Mapping::Run() is done
+  // Of the best model, and of its other rooms', once Mapping::Run() is done.
+  ModelCheck check;
+  std::vector<ModelCheck> room_checks;
   Json trials = Json::array();
 
   const SparseModel& model() const { return best[0].result.model; }
@@ -84,7 +86,7 @@ class Mapping {
   bool LeaveOutDoubtful(MappingPass* pass) const;
   // True: there were several, and the model is that of one.
   bool TakeRoomsApart(MappingPass* pass) const;
-  ModelCheck Check(const MappingPass& pass) const;
+  ModelCheck Check(const MappingPass& pass, const SparseModel& model) const;
 
   const MappingOptions& options_;
   const Command::Context& context_;

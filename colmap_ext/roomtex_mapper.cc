@@ -233,50 +233,64 @@ void ReportKnown(const MappingOutcome& outcome, const KnownPhotos& known,
       "points, or the keypoints fit much worse. The model was moved to them, and no more.");
 }
 
-// The third-view test on pairs that the model was not started from.
-void ReportCheck(const MappingPass& pass, const Command::Context& context, Json* reasons) {
-  const MatchedImages& images = *pass.images;
-  const ModelCheck& check = pass.check;
-  Json& json = context.report["check"];
-  json["num_pairs"] = check.num_pairs;
-  json["contradicting"] = Json::array();
-  std::string names;
+// A sentence on what roomtex-align goes by (mapper_verdict.h).
+struct Doubt {
+  const char* about;
+  std::string reason;
+};
+
+// What a model's own photos say against it, the third-view test on pairs that it was not started
+// from among it. json: the numbers.
+std::vector<Doubt> DoubtsOf(const ModelCheck& check, const MatchedImages& images, Json* json) {
+  std::vector<Doubt> doubts;
+  const auto name_of = [&](uint32_t image_id) { return images.images().at(image_id).name; };
+  (*json)["num_pairs"] = check.num_pairs;
+  (*json)["contradicting"] = Json::array();
   for (const auto& [image_id1, image_id2] : check.contradicting) {
-    const std::string name1 = images.images().at(image_id1).name,
-                      name2 = images.images().at(image_id2).name;
-    json["contradicting"].push_back({name1, name2});
-    if (names.empty()) names = name1 + " and " + name2;
+    (*json)["contradicting"].push_back({name_of(image_id1), name_of(image_id2)});
   }
-  json["doubtful_images"] = Json::array();
+  (*json)["doubtful_images"] = Json::array();
   std::string doubtful;
   for (const uint32_t image_id : check.doubtful) {
-    const std::string name = images.images().at(image_id).name;
-    json["doubtful_images"].push_back(name);
-    doubtful +=
-        (doubtful.empty() ? "" : ", ") + name + " (" + Percent(check.support.at(image_id)) + ")";
-  }
-  for (Json& image : context.report["images"]) {
-    const auto found = check.support.find(images.FindImage(image["name"])->image_id);
-    if (found != check.support.end()) image["match_support"] = found->second;
+    (*json)["doubtful_images"].push_back(name_of(image_id));
+    doubtful += (doubtful.empty() ? "" : ", ") + name_of(image_id) + " (" +
+                Percent(check.support.at(image_id)) + ")";
   }
   if (!check.doubtful.empty()) {
-    Refuse("photos",
-           "photos stand where most of their own matches do not put them: " + doubtful +
-               " of the matches obey the model. Take these photos out (they may show a repeated "
-               "pattern, or something that moved) and map again.",
-           context, reasons);
+    doubts.push_back({"photos",
+                      "photos stand where most of their own matches do not put them: " + doubtful +
+                          " of the matches obey the model. Take these photos out (they may show a "
+                          "repeated pattern, or something that moved) and map again."});
   }
-  if (static_cast<double>(check.contradicting.size()) <=
+  const size_t num_contradicting = check.contradicting.size();
+  if (static_cast<double>(num_contradicting) >
       ModelCheckOptions().max_contradicting * check.num_pairs) {
-    return;
+    const auto& [image_id1, image_id2] = check.contradicting.front();
+    doubts.push_back(
+        {"motion", fmt::format("the model is contradicted by its own photos: for {} of {} pairs, "
+                               "e.g. {} and {}, a third photo supports another camera motion. "
+                               "Start from another pair (--Init.image_name1), or add photos that "
+                               "show something off the wall.",
+                               num_contradicting, check.num_pairs, name_of(image_id1),
+                               name_of(image_id2))});
   }
-  Refuse("motion",
-         "the model is contradicted by its own photos: for " +
-             std::to_string(check.contradicting.size()) + " of " + std::to_string(check.num_pairs) +
-             " pairs, e.g. " + names +
-             ", a third photo supports another camera motion. Start from another pair "
-             "(--Init.image_name1), or add photos that show something off the wall.",
-         context, reasons);
+  return doubts;
+}
+
+void ReportCheck(const MappingPass& pass, const Command::Context& context, Json* reasons) {
+  const MatchedImages& images = *pass.images;
+  for (Json& image : context.report["images"]) {
+    const uint32_t image_id = images.FindImage(image["name"])->image_id;
+    const auto add = [&](const ModelCheck& check) {
+      const auto found = check.support.find(image_id);
+      if (found != check.support.end()) image["match_support"] = found->second;
+    };
+    add(pass.check);
+    for (const ModelCheck& check : pass.room_checks) add(check);
+  }
+  for (const auto& [about, reason] : DoubtsOf(pass.check, images, &context.report["check"])) {
+    Refuse(about, reason, context, reasons);
+  }
 }
 
 // Whether the errors shrink when the lens may change. refined: the mapper did refine it.
@@ -332,9 +346,29 @@ void WriteModel(const MapperResult& result, const std::string& name, const LensP
   outputs->ReplaceFolder(name);
 }
 
-// The models appear with the report. reasons: not to trust them.
+// A room beside the first: its own photos are asked, what is common to all rooms is handed on.
+Json ReportOfRoom(const MappingPass& pass, int number, const Json& common,
+                  const Command::Context& context) {
+  const MapperResult& room = pass.best[0].other_rooms[number - 1];
+  Json json;
+  json["command"] = "roomtex-mapper";
+  json["room"] = number;
+  json["num_reg_images"] = room.model.images.size();
+  json["num_points"] = room.model.points.size();
+  json["mean_reprojection_error_px"] = room.mean_reprojection_error_px;
+  json["refined_intrinsics"] = pass.refine;
+  json["reasons"] = common;
+  const ModelCheck& check = pass.room_checks[number - 1];
+  for (const auto& [about, reason] : DoubtsOf(check, *pass.images, &json["check"])) {
+    json["reasons"].push_back({{"about", about}, {"reason", reason}});
+    context.Warn(fmt::format("Model {} is not to be trusted: {}", number, reason));
+  }
+  return json;
+}
+
+// The models appear with the report. rooms: reports of those beside the first.
 void WriteModels(const MappingOptions& options, const MappingPass& pass,
-                 const ScratchFolder& scratch, const Json& reasons) {
+                 const ScratchFolder& scratch, const std::vector<Json>& rooms) {
   const MappingOutcome& outcome = pass.best[0];
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   SparseModel pair_model = outcome.seed.pair_model;
@@ -346,15 +380,7 @@ void WriteModels(const MappingOptions& options, const MappingPass& pass,
   for (const MapperResult& room : outcome.other_rooms) {
     const std::string name = std::to_string(number++);
     WriteModel(room, name, pass.plan, scratch, outputs.get());
-    Json json;
-    json["command"] = "roomtex-mapper";
-    json["room"] = number - 1;
-    json["num_reg_images"] = room.model.images.size();
-    json["num_points"] = room.model.points.size();
-    json["mean_reprojection_error_px"] = room.mean_reprojection_error_px;
-    json["refined_intrinsics"] = pass.refine;
-    json["reasons"] = reasons;
-    WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName, json);
+    WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName, rooms[number - 2]);
   }
   // Rooms of an earlier run are none of this one; what somebody has put there stays.
   for (; IsRoomOfEarlierRun(options, number); ++number) {
@@ -401,18 +427,23 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   for (const LensFinding& lens : pass.lenses.lenses) {
     context.report["cameras"].push_back(LensToJson(lens));
   }
-  Json reasons = Json::array();
-  JudgeTrust(outcome, *pass.images, context, &reasons);
-  ReportCheck(pass, context, &reasons);
-  ReportKnown(outcome, known, images.images(), context, &reasons);
-  CheckLens(pass.mapper.get(), outcome, pass.refine, context, &reasons);
-  context.report["reasons"] = reasons;
+  Json common = Json::array(), own = Json::array();  // to all rooms, and of the first model
+  JudgeTrust(outcome, *pass.images, context, &common);
+  ReportCheck(pass, context, &own);
+  ReportKnown(outcome, known, images.images(), context, &own);
+  CheckLens(pass.mapper.get(), outcome, pass.refine, context, &common);
+  context.report["reasons"] = common;
+  for (const Json& reason : own) context.report["reasons"].push_back(reason);
+  std::vector<Json> rooms;
+  for (size_t i = 1; i <= outcome.other_rooms.size(); ++i) {
+    rooms.push_back(ReportOfRoom(pass, static_cast<int>(i), common, context));
+  }
 
   context.progress.Stage("write model");
   for (size_t i = 1; i <= outcome.other_rooms.size(); ++i) {
     RequireReplaceableModel(RoomPath(options, static_cast<int>(i)));
   }
-  WriteModels(options, pass, scratch, reasons);
+  WriteModels(options, pass, scratch, rooms);
   std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
               model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
               outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);

@@ -155,7 +155,12 @@ TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   EXPECT_EQ(Report()["num_reg_images"], 9);
   EXPECT_EQ(Report()["images"][2]["registered"], false);
   EXPECT_NE(Report()["images"][2]["reason"].get<std::string>().find("model 1"), std::string::npos);
-  EXPECT_TRUE(fs::exists(folder_ / "sparse/1/roomtex-mapper.json"));
+  const auto of_room =
+      nlohmann::json::parse(ReadBytes(folder_ / "sparse/1/roomtex-mapper.json"));
+  EXPECT_GE(of_room["check"]["num_pairs"].get<int>(), 2) << of_room;
+  EXPECT_TRUE(of_room["check"]["contradicting"].empty());
+  EXPECT_TRUE(of_room["reasons"].empty());
+  EXPECT_GT(Report()["images"][2]["match_support"].get<double>(), 0.9) << "by those of its room";
   ExpectNoScratch();
 
   EXPECT_NE(result.out.find("sparse/1: 4 photos"), std::string::npos) << result.out;
