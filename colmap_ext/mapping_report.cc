@@ -1,9 +1,13 @@
 #include "colmap_ext/mapping_report.h"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <vector>
 
 #include <fmt/core.h>
+
+#include "colmap_ext/view_graph.h"
 
 namespace roomtex {
 
@@ -121,6 +125,37 @@ std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& image
       "planar-ambiguous: two camera motions explain {} and {} about equally well (ratio {:.2f}, {} "
       "third views), as happens before a wall.{}",
       name1, name2, trial.decision.confidence, trial.decision.num_views, cure);
+}
+
+std::string SeparateGroupsSentence(const MatchedImages& images) {
+  constexpr size_t kFewest = 4;  // photos, to be called a group
+  constexpr size_t kNumShown = 4;
+  std::vector<const DatabaseImage*> photos;
+  std::map<uint32_t, int> place;
+  for (const auto& [image_id, image] : images.images()) {
+    place[image_id] = static_cast<int>(photos.size());
+    photos.push_back(&image);
+  }
+  DisjointSets sets(static_cast<int>(photos.size()));
+  for (const DatabasePair& pair : images.pairs()) {
+    sets.Join(place.at(pair.image_id1), place.at(pair.image_id2));
+  }
+  std::vector<std::vector<int>> groups = sets.Groups();
+  groups.erase(std::remove_if(groups.begin(), groups.end(),
+                              [](const std::vector<int>& group) { return group.size() < kFewest; }),
+               groups.end());
+  if (groups.size() < 2) return "";
+  std::string list;
+  for (size_t i = 0; i < std::min(groups.size(), kNumShown); ++i) {
+    list += fmt::format("{}{} photos (e.g. {})", i == 0 ? "" : ", ", groups[i].size(),
+                        photos[groups[i][0]]->name);
+  }
+  if (groups.size() > kNumShown) list += fmt::format(" and {} more", groups.size() - kNumShown);
+  return fmt::format(
+      "Verified matches connect the photos in {} groups that nothing connects to each other: {}. A "
+      "model holds one of them: map each room's photos by themselves, or take and match photos "
+      "between.",
+      groups.size(), list);
 }
 
 }  // namespace roomtex

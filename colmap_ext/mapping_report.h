@@ -14,5 +14,7 @@ Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::s
 void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& images, Report* report);
 // Names the pair, and the photo that would cure it.
 std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& images);
+// Of photos that fall into several groups, each connected by pairs: rooms; otherwise "".
+std::string SeparateGroupsSentence(const MatchedImages& images);
 
 }  // namespace roomtex

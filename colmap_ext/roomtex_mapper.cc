@@ -145,13 +145,17 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
   }
   size_t num_registered = outcome.result.model.images.size();
   for (const MapperResult& room : outcome.other_rooms) num_registered += room.model.images.size();
+  const std::string groups = SeparateGroupsSentence(images);
   if (2 * num_registered < images.images().size()) {
     Refuse("photos",
-           "only " + std::to_string(num_registered) + " of " +
-               std::to_string(images.images().size()) +
-               " photos could be registered. Take more photos between those that are "
-               "missing, or match them more thoroughly.",
+           fmt::format("only {} of {} photos could be registered. {}", num_registered,
+                       images.images().size(),
+                       groups.empty() ? "Take more photos between those that are missing, or match "
+                                        "them more thoroughly."
+                                      : groups),
            context, reasons);
+  } else if (!groups.empty()) {
+    context.Warn(groups);
   }
 }
 

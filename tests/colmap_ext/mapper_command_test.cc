@@ -1,9 +1,11 @@
 // roomtex-mapper as users call it, with the installed COLMAP.
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <signal.h>
@@ -24,6 +26,7 @@ namespace roomtex {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::HasSubstr;
 using Scene = SimulatedViewsOptions::Scene;
 
 class MapperCommand : public ::testing::Test {
@@ -178,6 +181,33 @@ TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   ASSERT_EQ(Run().exit_code, 0);
   EXPECT_EQ(Report()["num_reg_images"], 7);
   EXPECT_EQ(Report().count("rooms"), 0u);
+}
+
+TEST_F(MapperCommand, SaysThatNothingConnectsTwoRooms) {
+  SimulatedViewsOptions options = RoomOptions(12);
+  options.baseline = 0.2;
+  views_ = SimulateViews(options);
+  const auto separate = [&](uint32_t last_of_first) {
+    SimulatedViews apart = views_;
+    apart.pairs.erase(std::remove_if(apart.pairs.begin(), apart.pairs.end(),
+                                     [&](const DatabasePair& pair) {
+                                       return (pair.image_id1 <= last_of_first) !=
+                                              (pair.image_id2 <= last_of_first);
+                                     }),
+                      apart.pairs.end());
+    fs::remove(folder_ / "database.db");
+    WriteSimulatedDatabase(apart, folder_.path());
+    return Run();
+  };
+  const CommandResult most = separate(7);
+  EXPECT_EQ(most.exit_code, 0) << most.err;
+  EXPECT_EQ(Report()["num_reg_images"], 7);
+  const std::string second = views_.images.at(8).name;
+  EXPECT_THAT(most.err, HasSubstr("2 groups that nothing connects"));
+  EXPECT_THAT(most.err, HasSubstr("5 photos (e.g. " + second + ")"));
+  separate(9);  // three photos alone are no room
+  EXPECT_EQ(Report()["num_reg_images"], 9);
+  EXPECT_TRUE(Report()["warnings"].empty()) << Report()["warnings"];
 }
 
 TEST_F(MapperCommand, IsRightBeforeAWall) {
