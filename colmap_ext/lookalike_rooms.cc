@@ -18,6 +18,8 @@ constexpr size_t kMinPhotos = 4;  // of a room
 // than their own. What rooms that are alike and single rooms come to: docs/pairs.md.
 constexpr double kMaxRatio = 0.67, kMaxWrong = 0.15;
 constexpr double kMinUneven = 1.5;
+// Where they find next to nothing, what they find lies evenly, too, but no photo is in between.
+constexpr double kFarRatio = 0.25, kFarWrong = 0.05;
 
 struct PairShare {
   int photo1, photo2;  // photo1 < photo2
@@ -213,18 +215,17 @@ class RoomSearch {
     if (shares.within.empty() || shares.between.empty()) return false;
     const double within = Median(&shares.within), between = Median(&shares.between),
                  middle = (within + between) / 2;
-    const auto count_if = [](const std::vector<double>& values, const auto& predicate) {
-      return static_cast<double>(std::count_if(values.begin(), values.end(), predicate));
+    const auto share_if = [](const std::vector<double>& values, const auto& predicate) {
+      return static_cast<double>(std::count_if(values.begin(), values.end(), predicate)) /
+             static_cast<double>(values.size());
     };
-    const double wrong_within = count_if(shares.within, [&](double x) { return x < middle; }),
-                 wrong_between = count_if(shares.between, [&](double x) { return x > middle; });
-    const double uneven_between = MedianUnevenness(model_, expected_, photos, across),
-                 uneven_within = MedianUnevenness(model_, expected_, photos, same_room);
-    if (between > kMaxRatio * within ||
-        wrong_within > kMaxWrong * static_cast<double>(shares.within.size()) ||
-        wrong_between > kMaxWrong * static_cast<double>(shares.between.size()) ||
-        !(uneven_between > kMinUneven * uneven_within)) {
-      return false;
+    const double wrong = std::max(share_if(shares.within, [&](double x) { return x < middle; }),
+                                  share_if(shares.between, [&](double x) { return x > middle; }));
+    if (between > kMaxRatio * within || wrong > kMaxWrong) return false;
+    if (between > kFarRatio * within || wrong > kFarWrong) {
+      const double uneven_between = MedianUnevenness(model_, expected_, photos, across),
+                   uneven_within = MedianUnevenness(model_, expected_, photos, same_room);
+      if (!(uneven_between > kMinUneven * uneven_within)) return false;
     }
     if (!(between / within <= share_between / share_within)) {
       share_within = within;

@@ -1,5 +1,6 @@
 #include "colmap_ext/lookalike_rooms.h"
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <set>
@@ -23,11 +24,16 @@ SimulatedViewsOptions ManyViews() {
   return options;
 }
 
+using IsCommon = std::function<bool(const Eigen::Vector3d& x)>;
+
+bool InOneHalf(const Eigen::Vector3d& x) { return x.x() > 0; }
+
 // As COLMAP would have it: a point for each thing, of the rooms that are alike only where they are.
 // Sightings that `misses` says are not found; the keypoints are there.
-SparseModel ModelOf(
-    const SimulatedViews& views, const std::function<int(uint32_t image_id)>& room_of,
-    const std::function<bool(uint32_t image_id, const Eigen::Vector3d& x)>& misses) {
+SparseModel ModelOf(const SimulatedViews& views,
+                    const std::function<int(uint32_t image_id)>& room_of,
+                    const std::function<bool(uint32_t image_id, const Eigen::Vector3d& x)>& misses,
+                    const IsCommon& is_common = InOneHalf) {
   SparseModel model;
   model.cameras = views.cameras;
   for (const auto& [id, image] : views.images) {
@@ -42,8 +48,8 @@ SparseModel ModelOf(
       const auto index = static_cast<size_t>(views.point_of_keypoint.at(id)[i]);
       const Eigen::Vector3d& x = views.points_in_scene[index];
       if (misses(id, x)) continue;
-      const bool is_common = x.x() > 0;
-      const uint64_t point_id = 10 * index + (is_common ? 0 : static_cast<uint64_t>(room_of(id)));
+      const uint64_t point_id =
+          10 * index + (is_common(x) ? 0 : static_cast<uint64_t>(room_of(id)));
       photo.point3d_ids[i] = point_id;
       SparsePoint& point = model.points[point_id];
       point.x_in_model = x;
@@ -85,6 +91,18 @@ TEST(LookalikeRooms, AreTakenApartWhereThereAreThree) {
   const Rooms rooms = RoomsOf(model);
   EXPECT_EQ(std::set<std::set<uint32_t>>(rooms.begin(), rooms.end()),
             std::set<std::set<uint32_t>>({{1, 4, 7, 10}, {2, 5, 8, 11}, {3, 6, 9, 12}}));
+}
+
+// Here and there a thing, as evenly as those of one's own room: few as they are, they tell.
+TEST(LookalikeRooms, AreTakenApartWhereLittleIsAlike) {
+  const SimulatedViews views = SimulateViews(ManyViews());
+  const auto room_of = [](uint32_t id) { return id % 3 == 0 ? 2 : 1; };
+  const IsCommon scattered = [](const Eigen::Vector3d& x) {
+    return std::fmod(std::abs(100 * x.x()), 1) < 0.15;
+  };
+  const SparseModel model =
+      ModelOf(views, room_of, MissesShare([](uint32_t) { return 0.3; }), scattered);
+  EXPECT_EQ(RoomsOf(model), Rooms({{1, 2, 4, 5, 7, 8, 10, 11}, {3, 6, 9, 12}}));
 }
 
 // Strangers in twos and threes are no room: roomtex-align asks each of them.
