@@ -24,6 +24,25 @@ float NearlyGaussian(uint64_t bits) {
   return (static_cast<float>(sum) / 65536.0f - 2.0f + 2.0f / 65536.0f) * 1.7320508f;
 }
 
+// Light spread evenly over a straight way, whose middle stays where it is.
+cv::Mat MotionKernel(const Eigen::Vector2d& motion) {
+  const int radius = static_cast<int>(std::ceil(motion.cwiseAbs().maxCoeff() / 2)) + 1;
+  cv::Mat kernel = cv::Mat::zeros(2 * radius + 1, 2 * radius + 1, CV_32F);
+  const int steps = 16 * radius;
+  for (int i = 0; i < steps; ++i) {
+    const Eigen::Vector2d at =
+        motion * ((i + 0.5) / steps - 0.5) + Eigen::Vector2d::Constant(radius);
+    const int x = static_cast<int>(at.x()), y = static_cast<int>(at.y());
+    const auto s = static_cast<float>(at.x() - x), t = static_cast<float>(at.y() - y);
+    const float weight = 1.0f / static_cast<float>(steps);
+    kernel.at<float>(y, x) += weight * (1 - s) * (1 - t);
+    kernel.at<float>(y, x + 1) += weight * s * (1 - t);
+    kernel.at<float>(y + 1, x) += weight * (1 - s) * t;
+    kernel.at<float>(y + 1, x + 1) += weight * s * t;
+  }
+  return kernel;
+}
+
 }  // namespace
 
 PhotoRenderer::PhotoRenderer(const RoomScene& scene, const CameraProjection& camera)
@@ -185,6 +204,11 @@ void PhotoRenderer::Develop(const cv::Mat& linear, const PhotoSettings& settings
                             cv::Mat* photo) const {
   cv::Mat light = linear;
   if (settings.blur_px > 0) cv::GaussianBlur(linear, light, {0, 0}, settings.blur_px);
+  if (!settings.motion_px.isZero()) {
+    cv::Mat moved;
+    cv::filter2D(light, moved, CV_32F, MotionKernel(settings.motion_px));
+    light = moved;
+  }
   photo->create(height_, width_, CV_8UC3);
   const Eigen::Vector3f gain =
       static_cast<float>(std::exp2(settings.exposure_ev)) * settings.white_balance;

@@ -152,6 +152,12 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   settings.exposure_ev = ExposureEv(photo);
   settings.gloss = impl_->options.gloss;
   settings.blur_px = IsBlurred(photo) ? impl_->options.blur_px : 0;
+  if (IsBlurred(photo)) {
+    RandomStream random(MixBits(static_cast<uint64_t>(impl_->options.random_seed), 511, photo));
+    const double direction = random.Uniform(0, kPi);
+    settings.motion_px =
+        impl_->options.motion_px * Eigen::Vector2d(std::cos(direction), std::sin(direction));
+  }
   settings.response = impl_->options.response;
   settings.vignetting = impl_->options.vignetting;
   settings.white_balance = WhiteBalance(photo);

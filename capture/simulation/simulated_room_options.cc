@@ -101,7 +101,13 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "noise of the photos, standard deviation in grey levels of 255")
       .Within(0, 64, "grey levels");
   fields->Number("blur_px", &blur_px, "blur of the photos, Gaussian sigma in pixels").Within(0, 50);
-  fields->Number("blurred", &blurred, "share of the photos that --blur_px is for")
+  fields
+      ->Number("motion_px", &motion_px,
+               "motion blur: so many pixels does the camera move while it is exposed, in another "
+               "direction for each photo")
+      .Within(0, 100);
+  fields
+      ->Number("blurred", &blurred, "share of the photos that --blur_px and --motion_px are for")
       .Within(0, 1, "(a share of the photos)");
   fields->Choice("response", &response, ResponseTable::Names(),
                  "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "

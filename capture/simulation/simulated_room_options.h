@@ -59,7 +59,8 @@ struct SimulatedRoomOptions {
   bool exif = true;                // exposure time, aperture, ISO
   double photo_noise = 1.5;        // grey levels (of 255), standard deviation
   double blur_px = 0.0;            // Gaussian sigma
-  double blurred = 1;              // share of the photos that are blurred
+  double motion_px = 0.0;          // that the camera moves while it is exposed
+  double blurred = 1;              // share of the photos that are blurred, either way
   std::string response = "srgb";   // or "film", see camera_faults.h
   double vignetting = 0;           // share of the light lost in the corners
   double white_balance_ev = 0;     // red and blue vary by up to +- this from photo to photo

@@ -40,6 +40,8 @@ ROOMS = {
     "few": {"--random_seed": "4", "--num_photos": "8"},
     "big": {"--random_seed": "5", "--room_width": "14", "--room_depth": "12", "--num_photos": "24"},
     "blur": {"--random_seed": "6", "--blur_px": "4"},
+    "shaken": {"--random_seed": "38", "--motion_px": "10"},
+    "shaken_twin": {"--random_seed": "39", "--motion_px": "10"},
     "strangers": {"--random_seed": "7", "--strangers": "0.5"},
     "bare": {"--random_seed": "8", "--bare": "1"},
     "bent": {"--random_seed": "9", "--bend": "0.005"},

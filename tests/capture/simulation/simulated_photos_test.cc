@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -319,6 +321,41 @@ TEST(SimulatedPhotos, AreBlurredAsOftenAsAsked) {
         cv::norm(some.RenderPhoto(photo), none.RenderPhoto(photo), cv::NORM_L1);
     EXPECT_EQ(difference > 0, photo % 2 == 1) << photo;
   }
+}
+
+// Sharp across the motion, smeared along it; things stay where they are.
+TEST(SimulatedPhotos, AreShaken) {
+  SimulatedRoomOptions options = SmallRoom();
+  options.num_photos = 2;
+  options.photo_noise = 0;
+  const SimulatedRoom still(options);
+  options.motion_px = 9;
+  const SimulatedRoom shaken(options);
+  const auto grey_of = [](const cv::Mat& photo) {
+    cv::Mat grey;
+    cv::cvtColor(photo, grey, cv::COLOR_BGR2GRAY);
+    return cv::Mat1f(grey);
+  };
+  const auto structure = [&](const cv::Mat& photo) {
+    cv::Mat1f dx, dy;
+    cv::Sobel(grey_of(photo), dx, CV_32F, 1, 0);
+    cv::Sobel(grey_of(photo), dy, CV_32F, 0, 1);
+    Eigen::Matrix2d energy;
+    energy << dx.dot(dx), dx.dot(dy), dx.dot(dy), dy.dot(dy);
+    return energy;
+  };
+  std::vector<double> angles;
+  for (int photo = 0; photo < 2; ++photo) {
+    const cv::Mat a = still.RenderPhoto(photo), b = shaken.RenderPhoto(photo);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> kept(structure(b),
+                                                                         structure(a));
+    EXPECT_LT(kept.eigenvalues()[0], 0.2) << photo;
+    EXPECT_GT(kept.eigenvalues()[1], 2 * kept.eigenvalues()[0]) << photo;
+    angles.push_back(std::atan2(kept.eigenvectors()(1, 0), kept.eigenvectors()(0, 0)));
+    const cv::Point2d shift = cv::phaseCorrelate(grey_of(a), grey_of(b));
+    EXPECT_LT(std::hypot(shift.x, shift.y), 0.3) << photo;
+  }
+  EXPECT_GT(std::abs(std::sin(angles[1] - angles[0])), 0.1);
 }
 
 }  // namespace
