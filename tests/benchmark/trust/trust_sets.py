@@ -187,7 +187,8 @@ def make_room(sets, tools, name):
         common["options"] = ["--scan_poses", here + "/scan_poses.txt"]
     map_photos(tools, "database.db", "capture/photos", "sparse")
     size = [int({**SMALL, **ROOMS[name]}[side]) for side in ("--photo_width", "--photo_height")]
-    right = {"big": 15, "blur": 15, "bent": 10, "bare": 10, "few": 6}.get(name, 60 if is_small else 6)
+    right = {"big": 15, "blur": 15, "shaken": 15, "shaken_twin": 15, "bent": 10, "bare": 10,
+             "few": 6}.get(name, 60 if is_small else 6)
     write_case(sets, name, model=folder + "/sparse/0", right_mm=right, **common)
     variants = {
         "s1": ["long1", "long3", "long20", "each", "free", *ANEW],
