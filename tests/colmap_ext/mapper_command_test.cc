@@ -158,8 +158,7 @@ TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   EXPECT_EQ(Report()["num_reg_images"], 9);
   EXPECT_EQ(Report()["images"][2]["registered"], false);
   EXPECT_NE(Report()["images"][2]["reason"].get<std::string>().find("model 1"), std::string::npos);
-  const auto of_room =
-      nlohmann::json::parse(ReadBytes(folder_ / "sparse/1/roomtex-mapper.json"));
+  const auto of_room = nlohmann::json::parse(ReadBytes(folder_ / "sparse/1/roomtex-mapper.json"));
   EXPECT_GE(of_room["check"]["num_pairs"].get<int>(), 2) << of_room;
   EXPECT_TRUE(of_room["check"]["contradicting"].empty());
   EXPECT_TRUE(of_room["reasons"].empty());
