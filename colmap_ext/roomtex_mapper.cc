@@ -261,22 +261,22 @@ std::vector<Doubt> DoubtsOf(const ModelCheck& check, const MatchedImages& images
                 Percent(check.support.at(image_id)) + ")";
   }
   if (!check.doubtful.empty()) {
-    doubts.push_back({"photos",
-                      "photos stand where most of their own matches do not put them: " + doubtful +
-                          " of the matches obey the model. Take these photos out (they may show a "
-                          "repeated pattern, or something that moved) and map again."});
+    doubts.push_back(
+        {"photos", "photos stand where most of their own matches do not put them: " + doubtful +
+                       " of the matches obey the model. Take these photos out (they may show a "
+                       "repeated pattern, or something that moved) and map again."});
   }
   const size_t num_contradicting = check.contradicting.size();
   if (static_cast<double>(num_contradicting) >
       ModelCheckOptions().max_contradicting * check.num_pairs) {
     const auto& [image_id1, image_id2] = check.contradicting.front();
     doubts.push_back(
-        {"motion", fmt::format("the model is contradicted by its own photos: for {} of {} pairs, "
-                               "e.g. {} and {}, a third photo supports another camera motion. "
-                               "Start from another pair (--Init.image_name1), or add photos that "
-                               "show something off the wall.",
-                               num_contradicting, check.num_pairs, name_of(image_id1),
-                               name_of(image_id2))});
+        {"motion",
+         fmt::format("the model is contradicted by its own photos: for {} of {} pairs, "
+                     "e.g. {} and {}, a third photo supports another camera motion. "
+                     "Start from another pair (--Init.image_name1), or add photos that "
+                     "show something off the wall.",
+                     num_contradicting, check.num_pairs, name_of(image_id1), name_of(image_id2))});
   }
   return doubts;
 }

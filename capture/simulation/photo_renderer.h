@@ -16,8 +16,8 @@ class ProjectedLight;
 
 struct PhotoSettings {
   double exposure_ev = 0;
-  double gloss = 0;         // see SimulatedRoomOptions
-  double blur_px = 0;       // Gaussian sigma
+  double gloss = 0;    // see SimulatedRoomOptions
+  double blur_px = 0;  // Gaussian sigma
   // How the camera's own motion moves what it shows while it is exposed, pixels.
   Eigen::Vector2d motion_px = Eigen::Vector2d::Zero();
   double noise = 0;         // grey levels of 255, standard deviation

@@ -106,8 +106,7 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "motion blur: so many pixels does the camera move while it is exposed, in another "
                "direction for each photo")
       .Within(0, 100);
-  fields
-      ->Number("blurred", &blurred, "share of the photos that --blur_px and --motion_px are for")
+  fields->Number("blurred", &blurred, "share of the photos that --blur_px and --motion_px are for")
       .Within(0, 1, "(a share of the photos)");
   fields->Choice("response", &response, ResponseTable::Names(),
                  "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
