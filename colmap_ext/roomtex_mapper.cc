@@ -427,6 +427,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   const MappingOutcome& outcome = pass.best[0];
   FillMappingReport(outcome, *pass.images, &context.report);
   context.report["refined_intrinsics"] = pass.refine;
+  if (!pass.lenses.not_checked.empty()) context.Warn(pass.lenses.not_checked);
   context.report["cameras"] = Json::array();
   for (const LensFinding& lens : pass.lenses.lenses) {
     context.report["cameras"].push_back(LensToJson(lens));

@@ -295,6 +295,10 @@ std::string AzimuthOfScanner(const RtpiHeader& header) {
   return is_scanners ? "counterclockwise" : "";
 }
 
+std::string OtherAzimuth(const std::string& azimuth) {
+  return azimuth == "clockwise" ? "counterclockwise" : "clockwise";
+}
+
 std::string RtpiHeaderText(const RtpiHeader& header, int64_t num_columns) {
   const int64_t max_samples_per_column = header.max_samples_per_column.value_or(0);
   std::string text;

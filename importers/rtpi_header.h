@@ -43,6 +43,10 @@ bool LooksLikeRtpi(const std::string& first_bytes);
 // the scan: manual 15.2, which counts so), else "".
 std::string AzimuthOfScanner(const RtpiHeader& header);
 
+// "clockwise" for "counterclockwise", and the other way round: a scan that is read the other way
+// is its own mirror image.
+std::string OtherAzimuth(const std::string& azimuth);
+
 // Tolerates CR LF, unknown and missing lines, values on the next line, en dashes as minus signs.
 // Throws InputError (not RTPI, version 1, no end of the header, a number that is none).
 RtpiLayout ReadRtpiHeader(const FileReader& file);

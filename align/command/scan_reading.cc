@@ -6,6 +6,7 @@
 #include "align/trust/station_check.h"
 #include "core/resource_limits.h"
 #include "core/surfels.h"
+#include "importers/rtpi_header.h"
 #include "importers/scan_reader.h"
 
 namespace roomtex {
@@ -45,10 +46,6 @@ void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
   const StationCheck check = CheckStations(*scans);
   context.report["stations"] = StationsToJson(check, *scans);
   if (!check.wrong.empty()) context.report.SetUntrusted(check.Sentence(*scans));
-}
-
-std::string OtherAzimuth(const std::string& azimuth) {
-  return azimuth == "clockwise" ? "counterclockwise" : "clockwise";
 }
 
 }  // namespace

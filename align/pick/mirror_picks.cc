@@ -5,10 +5,6 @@
 
 namespace roomtex {
 
-std::string OtherAzimuth(const std::string& azimuth) {
-  return azimuth == "counterclockwise" ? "clockwise" : "counterclockwise";
-}
-
 std::string MirrorProblem(const PickScene& scene) {
   if (scene.azimuth().empty()) return "Only RTPI scans can be read the other way round.";
   if (!ReadAlignmentRecord(scene.input().input_path).scans.empty()) {

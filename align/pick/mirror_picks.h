@@ -9,9 +9,6 @@
 
 namespace roomtex {
 
-// "clockwise" for "counterclockwise", and the other way round.
-std::string OtherAzimuth(const std::string& azimuth);
-
 // Why the scans of the scene cannot be read the other way round, a sentence; "" = they can.
 std::string MirrorProblem(const PickScene& scene);
 

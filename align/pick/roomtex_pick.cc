@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/local_server_key.h"
 #include "core/option_fields.h"
+#include "importers/rtpi_header.h"
 #include "importers/scan_record.h"
 #include "pick_page.h"
 
