@@ -61,7 +61,7 @@ ROOMS = {
     "similar": {"--random_seed": "31", "--similar_room": "2"},
     "similar_twin": {"--random_seed": "32", "--similar_room": "2"},
     # Never looked at while thresholds were chosen.
-    **{f"similar_{seed}": {"--random_seed": str(seed), "--similar_room": "2"} for seed in (35, 36, 37)},
+    **{f"similar_{seed}": {"--random_seed": str(seed), "--similar_room": "2"} for seed in range(35, 40)},
     "zoomed": {"--random_seed": "33", "--zoomed": "0.0625"},
     "zoomed_twin": {"--random_seed": "34", "--zoomed": "0.0625"},
 }
@@ -323,6 +323,12 @@ def main():
     os.makedirs(sets, exist_ok=True)
     wanted = lambda name: not args.names or name in args.names  # noqa: E731
     turned = ["--azimuth", "counterclockwise"]
+    real = ("kitchen", "desk", "floor")
+    unknown = [name for name in args.names if name not in ROOMS and name not in real]
+    if unknown:
+        parser.error("no such set: %s; there are %s" % (", ".join(unknown), ", ".join([*real, *ROOMS])))
+    if not args.data and any(name in real for name in args.names):
+        parser.error("%s are made of real captures: give their folder with --data" % ", ".join(real))
     if args.data:
         data = os.path.abspath(args.data)
         if wanted("kitchen"):
