@@ -32,6 +32,9 @@ constexpr double kLeastSightShare = 0.5, kUneven = 2.5, kHardlyAnything = 0.2;
 // 0.22 and 0.23 of the median, 3.2 and 4.2 robust deviations below it, have 2.1 and 2.3. Right ones
 // at 0.23 and 0.24 (desk, where shares scatter) are 1.4 to 1.9 deviations below.
 constexpr double kRareShare = 0.3, kRareSigmas = 2.5, kUnevenOfRare = 1.5;
+// And a little more than half will do where it is all in one part of the picture: strangers at 0.52
+// and 0.55 have 7.0 and 7.7. Right ones with 4 and more (kitchen) have more than the median.
+constexpr double kShareOfPart = 0.6, kUnevenOfPart = 5;
 constexpr size_t kMinExpected = 60;
 constexpr int kMinExpectedOfPair = 20;  // of two photos
 // What a surface share rests on. It says something of the photo, but no doubt follows from it: a
@@ -160,6 +163,7 @@ bool LacksWhatOthersFound(const PhotoVerdict& photo, const UsualSights& usual) {
   const double share = photo.sight_share;
   if (share < kHardlyAnything * usual.median) return true;
   if (share < kLeastSightShare * usual.median && photo.unevenness > kUneven) return true;
+  if (share < kShareOfPart * usual.median && photo.unevenness > kUnevenOfPart) return true;
   return share < kRareShare * usual.median && share < usual.median - kRareSigmas * usual.sigma &&
          photo.unevenness > kUnevenOfRare;
 }

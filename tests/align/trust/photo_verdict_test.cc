@@ -76,6 +76,23 @@ TEST(PhotoVerdict, DoubtsAPhotoThatShowsAnotherRoomInMostOfItsPicture) {
   EXPECT_NE(photo.doubt.find("ought to show"), std::string::npos) << photo.doubt;
 }
 
+// More than half of what is usual, and all of it in one part of the picture.
+TEST(PhotoVerdict, DoubtsAPhotoThatShowsAnotherRoomInHalfOfItsPicture) {
+  SparseModel model = AlignedModel();
+  const double width = model.cameras.begin()->second.width;
+  LosePoints(
+      4, [&](const Eigen::Vector2d& x) { return x.x() > 0.57 * width; }, &model);
+  const std::map<uint32_t, PhotoVerdict> photos = Judge(model);
+  std::vector<double> shares;
+  for (const auto& [id, photo] : photos) {
+    EXPECT_EQ(photo.doubt.empty(), id != 4) << id << ": " << photo.doubt;
+    shares.push_back(photo.sight_share);
+  }
+  const double usual = Median(&shares);
+  EXPECT_GT(photos.at(4).sight_share, 0.5 * usual);
+  EXPECT_LT(photos.at(4).sight_share, 0.6 * usual);
+}
+
 // Their sightings of what is not alike become points of their own at the same places.
 void MoveToAnotherRoom(const std::set<uint32_t>& strangers,
                        const std::function<bool(uint64_t id, const SparsePoint& point)>& is_alike,
