@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -87,6 +88,10 @@ class Database {
   // two_view_geometries); of a pair in several copies, that of the first. Throws InputError for a
   // copy whose photos or numbers of keypoints are not these.
   void CopyWithMatches(const std::string& path, const std::vector<const Database*>& copies) const;
+
+  // Takes the verified pairs out of a copy that CopyForMapper made, but for those between these
+  // photos.
+  static void KeepPairsBetween(const std::string& copy_path, const std::set<uint32_t>& image_ids);
 
   // Gives the images of a copy that CopyForMapper made these cameras. False, and nothing done,
   // where rigs name the cameras, too (COLMAP 4.x).

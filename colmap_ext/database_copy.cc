@@ -209,6 +209,27 @@ void Database::CopyWithMatches(const std::string& path,
   });
 }
 
+void Database::KeepPairsBetween(const std::string& copy_path, const std::set<uint32_t>& image_ids) {
+  SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
+  std::vector<int64_t> others;
+  SQLite::Statement read(copy, "SELECT pair_id FROM two_view_geometries");
+  while (read.executeStep()) {
+    const int64_t pair_id = read.getColumn(0).getInt64();
+    const auto [image_id1, image_id2] = ImagesFromPairId(static_cast<uint64_t>(pair_id));
+    if (image_ids.count(image_id1) == 0 || image_ids.count(image_id2) == 0) {
+      others.push_back(pair_id);
+    }
+  }
+  SQLite::Transaction transaction(copy);
+  SQLite::Statement remove(copy, "DELETE FROM two_view_geometries WHERE pair_id = ?");
+  for (const int64_t pair_id : others) {
+    remove.bind(1, pair_id);
+    remove.exec();
+    remove.reset();
+  }
+  transaction.commit();
+}
+
 bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
                           const std::map<uint32_t, DatabaseImage>& images) {
   SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);

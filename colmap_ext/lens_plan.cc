@@ -133,6 +133,15 @@ void LensPlan::Take(const LensCheck& found, const SparseModel& model) {
   }
 }
 
+void LensPlan::Calibrate(const SparseModel& model) {
+  for (const auto& [id, camera] : model.cameras) {
+    const auto planned = cameras_.find(id);
+    if (planned == cameras_.end()) continue;
+    planned->second = camera;
+    planned->second.has_prior_focal_length = true;
+  }
+}
+
 void LensPlan::Tell(const std::vector<uint32_t>& image_ids, Camera camera) {
   camera.camera_id = NextId(cameras_, database_cameras_);
   for (const uint32_t id : image_ids) images_.at(id).camera_id = camera.camera_id;

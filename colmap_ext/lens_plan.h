@@ -40,6 +40,9 @@ class LensPlan {
   // apart only where all else stays: beside a wrong lens single photos look wrong that are right.
   void Take(const LensCheck& found, const SparseModel& model);
 
+  // The cameras of a model of this plan as they are there, calibrated ones from now on.
+  void Calibrate(const SparseModel& model);
+
   // Gives some photos a camera of their own, whatever the database says of them.
   void Tell(const std::vector<uint32_t>& image_ids, Camera camera);
 

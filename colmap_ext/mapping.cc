@@ -11,6 +11,7 @@
 #include "colmap_ext/lookalike_rooms.h"
 #include "colmap_ext/mapping_report.h"
 #include "colmap_ext/model_check.h"
+#include "colmap_ext/photo_groups.h"
 #include "core/output_file.h"
 #include "core/text.h"
 
@@ -112,6 +113,29 @@ std::vector<MappingOutcome> TrySeeds(const Database& database, MatchedImages* im
   return best;
 }
 
+std::map<uint32_t, DatabaseImage> ImagesOf(std::map<uint32_t, DatabaseImage> images,
+                                           const std::set<uint32_t>& photos) {
+  for (auto at = images.begin(); at != images.end();) {
+    at = photos.count(at->first) > 0 ? std::next(at) : images.erase(at);
+  }
+  return images;
+}
+
+std::vector<DatabasePair> PairsOf(const MatchedImages& images, const std::set<uint32_t>& photos) {
+  std::vector<DatabasePair> pairs;
+  for (const DatabasePair& pair : images.pairs()) {
+    if (photos.count(pair.image_id1) > 0 && photos.count(pair.image_id2) > 0) pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+KnownPhotos KnownOf(KnownPhotos known, const std::set<uint32_t>& photos) {
+  for (auto at = known.cam_from_scan.begin(); at != known.cam_from_scan.end();) {
+    at = photos.count(at->first) > 0 ? std::next(at) : known.cam_from_scan.erase(at);
+  }
+  return known;
+}
+
 // As a share; larger is no determination.
 constexpr double kMaxFocalSigma = 0.03;
 
@@ -156,6 +180,33 @@ MappingPass BetterOf(MappingPass first, MappingPass second) {
 
 }  // namespace
 
+std::vector<const MapperResult*> MappingOutcome::Models() const {
+  std::vector<const MapperResult*> models = {&result};
+  for (const MapperResult& room : other_rooms) models.push_back(&room);
+  return models;
+}
+
+std::vector<MappedModel> ListModels(const std::vector<MappingPass>& passes) {
+  std::vector<MappedModel> models;
+  for (const MappingPass& pass : passes) {
+    const std::vector<const MapperResult*> of_pass = pass.best[0].Models();
+    for (size_t i = 0; i < of_pass.size(); ++i) {
+      models.push_back({&pass, of_pass[i], i == 0 ? &pass.check : &pass.room_checks[i - 1], i > 0});
+    }
+  }
+  return models;
+}
+
+std::vector<std::set<uint32_t>> PhotoGroups(const MatchedImages& images,
+                                            const MappingOptions& options) {
+  std::set<uint32_t> all;
+  for (const auto& [id, image] : images.images()) all.insert(id);
+  std::vector<std::set<uint32_t>> groups;
+  if (options.map_all_groups) groups = ConnectedPhotos(images, all, kFewestOfModel);
+  if (groups.size() < 2) groups = {all};
+  return groups;
+}
+
 Mapping::Mapping(const MappingOptions& options, const Command::Context& context,
                  const Database& database, const MatchedImages& images, const KnownPhotos& known,
                  const ScratchFolder& scratch)
@@ -179,12 +230,19 @@ LensPlan Mapping::PlanLenses() const {
   return plan;
 }
 
+bool Mapping::IsCalibrated(const LensPlan& plan) const {
+  return std::all_of(photos_.begin(), photos_.end(), [&](uint32_t id) {
+    return plan.cameras().at(plan.images().at(id).camera_id).has_prior_focal_length;
+  });
+}
+
 MappingPass Mapping::MapAsLensesAre() {
-  LensPlan plan = PlanLenses();
-  for (const std::string& note : plan.notes()) context_.Warn(note);
-  const bool calibrated =
-      std::all_of(plan.cameras().begin(), plan.cameras().end(),
-                  [](const auto& one) { return one.second.has_prior_focal_length; });
+  if (!plan_) {
+    plan_ = PlanLenses();
+    for (const std::string& note : plan_->notes()) context_.Warn(note);
+  }
+  LensPlan plan = *plan_;
+  const bool calibrated = IsCalibrated(plan);
   const bool automatic = refine_ == RefineIntrinsics::kAuto;
   MappingPass best = Map(plan, refine_ == RefineIntrinsics::kAlways || (automatic && !calibrated));
   if (best.best.empty() || refine_ == RefineIntrinsics::kNever) return best;
@@ -236,11 +294,12 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   const int version = colmap_.VersionNumber();
   database_.CopyForMapper(database_copy, version > 0 && version < 310 ? Database::Schema::kColmap39
                                                                       : Database::Schema::kAsIs);
+  if (photos_.size() < names_.size()) Database::KeepPairsBetween(database_copy, photos_);
   const bool as_planned =
       plan.IsAsInDatabase() || Database::SetCameras(database_copy, plan.cameras(), plan.images());
   MappingPass pass(as_planned ? plan : LensPlan(images_.cameras(), images_.images()), refine);
   pass.images = std::make_unique<MatchedImages>(
-      pass.plan.cameras(), pass.plan.images(), images_.pairs(),
+      pass.plan.cameras(), ImagesOf(pass.plan.images(), photos_), PairsOf(images_, photos_),
       [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
   const std::string folder = scratch_ / ("pass_" + std::to_string(number));
   MakeFolder(folder);
@@ -260,7 +319,47 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   return pass;
 }
 
-MappingPass Mapping::Run() {
+std::vector<MappingPass> Mapping::Run() {
+  std::vector<std::set<uint32_t>> groups = PhotoGroups(images_, options_);
+  std::vector<MappingPass> passes;
+  for (size_t next = 0; next < groups.size(); ++next) {  // grows
+    photos_ = groups[next];
+    if (next > 0) {
+      context_.progress.Note(fmt::format("another group: {} photos, e.g. {}", photos_.size(),
+                                         names_.at(*photos_.begin())));
+    }
+    MappingPass pass = MapGroup();
+    for (const Json& trial : pass.trials) trials_.push_back(trial);
+    if (pass.best.empty() || (next > 0 && pass.model().images.size() < kFewestOfModel)) continue;
+    LearnLenses(pass);
+    if (options_.map_all_groups) {
+      std::set<uint32_t> rest = photos_;
+      for (const MapperResult* result : pass.best[0].Models()) {
+        for (const auto& [id, image] : result->model.images) rest.erase(id);
+      }
+      for (auto& group : ConnectedPhotos(images_, rest, kFewestOfModel)) {
+        groups.push_back(std::move(group));
+      }
+    }
+    passes.push_back(std::move(pass));
+  }
+  const auto rank = [&](const MappingPass& pass) {
+    size_t num_known = 0;
+    for (const auto& [id, image] : pass.model().images) num_known += known_.cam_from_scan.count(id);
+    return std::make_pair(num_known, pass.model().images.size());
+  };
+  std::stable_sort(passes.begin(), passes.end(),
+                   [&](const auto& a, const auto& b) { return rank(a) > rank(b); });
+  return passes;
+}
+
+void Mapping::LearnLenses(const MappingPass& pass) {
+  plan_ = pass.plan;
+  const bool knows = pass.refine && !pass.lenses.lenses.empty() && IsDetermined(pass.lenses);
+  if (knows) plan_->Calibrate(pass.model());
+}
+
+MappingPass Mapping::MapGroup() {
   MappingPass pass = MapAsLensesAre();
   if (pass.best.empty()) return pass;
   context_.progress.Stage("check model");
@@ -274,10 +373,11 @@ MappingPass Mapping::Run() {
       pass.room_checks.push_back(Check(pass, room.model));
     }
   }
-  if (!known_.cam_from_scan.empty()) {
+  const KnownPhotos known = KnownOf(known_, photos_);
+  if (!known.cam_from_scan.empty()) {
     context_.progress.Stage("known poses");
     MappingOutcome& outcome = pass.best[0];
-    outcome.known = PlaceByKnownPhotos(known_, pass.plan.images(), pass.plan.cameras(),
+    outcome.known = PlaceByKnownPhotos(known, pass.plan.images(), pass.plan.cameras(),
                                        scratch_ / "known", pass.mapper.get(), &outcome.result);
   }
   return pass;
@@ -318,15 +418,10 @@ bool Mapping::TakeRoomsApart(MappingPass* pass) const {
   context_.Warn(fmt::format(
       "The photos show {} rooms that are alike, or a room before and after much was moved: of what "
       "those of one show ({} of what they ought to), those of another show {}. Each has a model of "
-      "its own: 0 holds {} photos, e.g. {}, 1 holds {}, e.g. {}. --Rooms.enabled 0 leaves them "
+      "its own: one holds {} photos, e.g. {}, another {}, e.g. {}. --Rooms.enabled 0 leaves them "
       "together.",
       rooms.size(), Percent(found.share_within), Percent(found.share_between), rooms[0].size(),
       names_.at(*rooms[0].begin()), rooms[1].size(), names_.at(*rooms[1].begin())));
-  for (size_t i = 1; i < rooms.size(); ++i) {
-    for (const uint32_t id : rooms[i]) {
-      outcome.reasons[id] = "shows another room that is alike: it is in model " + std::to_string(i);
-    }
-  }
   outcome.result = std::move(results[0]);
   outcome.other_rooms.assign(std::make_move_iterator(results.begin() + 1),
                              std::make_move_iterator(results.end()));

@@ -1,11 +1,13 @@
 #pragma once
 // The photos of a database mapped: seeds tried one after the other, what COLMAP leaves out chained,
-// and all of it once more where the photos know their lenses better than the database.
+// and all of it once more where the photos know their lenses better than the database. Groups of
+// photos that no pair connects get models of their own.
 
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +24,9 @@
 
 namespace roomtex {
 
+// Rooms and groups of fewer photos get no model of their own.
+inline constexpr size_t kFewestOfModel = 4;
+
 struct MappingOptions {
   std::string database_path, image_path, output_path;
   std::string known_path;  // model of photos with known poses; "" = none
@@ -31,6 +36,7 @@ struct MappingOptions {
   ChainOptions chain;
   std::string refine_intrinsics = "auto";
   bool take_rooms_apart = true;  // that are alike
+  bool map_all_groups = true;    // of photos that no pair connects
 };
 
 struct MappingOutcome {
@@ -43,15 +49,17 @@ struct MappingOutcome {
   // their own, in frames of their own.
   std::vector<MapperResult> other_rooms;
   double share_within = 0, share_between = 0;  // LookalikeRooms, if there are others
+
+  std::vector<const MapperResult*> Models() const;  // result, other_rooms
 };
 
-// The photos of one way to see the lenses, mapped.
+// A group of photos, mapped with one way to see the lenses.
 struct MappingPass {
   MappingPass(LensPlan planned, bool refined) : plan(std::move(planned)), refine(refined) {}
 
-  LensPlan plan;
+  LensPlan plan;  // of all photos
   bool refine;
-  std::unique_ptr<MatchedImages> images;
+  std::unique_ptr<MatchedImages> images;  // of the group, and the pairs between them
   std::unique_ptr<MapperRun> mapper;
   std::vector<MappingOutcome> best;  // at most one
   LensCheck lenses;
@@ -63,25 +71,48 @@ struct MappingPass {
   const SparseModel& model() const { return best[0].result.model; }
 };
 
+// As it is written: 0/, 1/ ...
+struct MappedModel {
+  const MappingPass* pass;
+  const MapperResult* result;
+  const ModelCheck* check;
+  bool is_room;  // one of other_rooms
+};
+// Of the passes one after the other, each with its other rooms behind it.
+std::vector<MappedModel> ListModels(const std::vector<MappingPass>& passes);
+
+// What is mapped one after the other: groups of photos that pairs connect, if there are several of
+// kFewestOfModel and more; else, or if only one model is wanted, all photos.
+std::vector<std::set<uint32_t>> PhotoGroups(const MatchedImages& images,
+                                            const MappingOptions& options);
+
 class Mapping {
  public:
   // All must outlive it. images: of the database, with its cameras. known: may hold nothing.
   Mapping(const MappingOptions& options, const Command::Context& context, const Database& database,
           const MatchedImages& images, const KnownPhotos& known, const ScratchFolder& scratch);
 
+  // Every group that gives a model, with the most known photos first, then with the most photos.
+  // What COLMAP could not reach from where it started in a group is another group.
+  std::vector<MappingPass> Run();
+  // One of `pair_trials` for each pair that was started from, of all groups.
+  const Json& trials() const { return trials_; }
+
+ private:
   // With the lenses as the database has them (those of known photos as told with their poses), and,
   // if the photos know better, once more. Photos that stand where most of their own matches do not
   // put them are left out, if they are few; rooms that are alike get models of their own. Known
   // photos then put the model where they stand.
-  MappingPass Run();
-
- private:
+  MappingPass MapGroup();
+  // A lens that a group's photos have determined is a calibrated one for the next.
+  void LearnLenses(const MappingPass& pass);
   void KeepCalibrated(MappingPass* pass) const;
   // And says so.
   bool IsContradicted(const MappingPass& pass) const;
   MappingPass Map(const LensPlan& plan, bool refine);
   MappingPass MapAsLensesAre();
   LensPlan PlanLenses() const;
+  bool IsCalibrated(const LensPlan& plan) const;
   // False: nothing was to be left out, or could be.
   bool LeaveOutDoubtful(MappingPass* pass) const;
   // True: there were several, and the model is that of one.
@@ -99,7 +130,10 @@ class Mapping {
   MapperOptions mapper_options_;
   std::map<uint32_t, std::string> names_;
   LensLabels labels_;
+  std::optional<LensPlan> plan_;  // as far as it is known
+  std::set<uint32_t> photos_;     // of the group that is mapped
   int num_passes_ = 0;
+  Json trials_ = Json::array();
 };
 
 }  // namespace roomtex

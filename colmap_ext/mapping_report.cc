@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <set>
 #include <vector>
 
 #include <fmt/core.h>
 
-#include "colmap_ext/view_graph.h"
+#include "colmap_ext/photo_groups.h"
 
 namespace roomtex {
 
@@ -24,42 +24,95 @@ Json TrialJson(const PairTrial& trial, const MatchedImages& images, const std::s
 
 namespace {
 
+struct PlaceOfPhoto {
+  size_t model = 0;
+  const MappedModel* mapped = nullptr;  // none: it is not registered
+};
+
+PlaceOfPhoto FindPhoto(const std::vector<MappedModel>& models, uint32_t image_id) {
+  for (size_t i = 0; i < models.size(); ++i) {
+    if (models[i].result->model.images.count(image_id) > 0) return {i, &models[i]};
+  }
+  return {};
+}
+
+// Why a photo is not in the first model.
+std::string ReasonOf(uint32_t image_id, const PlaceOfPhoto& place,
+                     const std::vector<MappingPass>& passes) {
+  if (place.mapped != nullptr) {
+    const std::string where = ": it is in model " + std::to_string(place.model);
+    return (place.mapped->is_room ? "shows another room that is alike"
+                                  : "too little connects it to model 0") +
+           where;
+  }
+  for (const MappingPass& pass : passes) {
+    const auto& reasons = pass.best[0].reasons;
+    const auto reason = reasons.find(image_id);
+    if (reason != reasons.end()) return reason->second;
+  }
+  return "too few points of the model for colmap mapper, and --Chain.enabled 0";
+}
+
 // How a photo was registered, or why it was not.
-Json ImageJson(const DatabaseImage& image, const MappingOutcome& outcome,
-               const MatchedImages& images) {
-  const bool registered = outcome.result.model.images.count(image.image_id) > 0;
-  const auto chained = outcome.chained.find(image.image_id);
+Json ImageJson(const DatabaseImage& image, const std::vector<MappingPass>& passes,
+               const std::vector<MappedModel>& models, const MatchedImages& images) {
+  const uint32_t image_id = image.image_id;
+  const MappingOutcome& outcome = passes[0].best[0];
+  const PlaceOfPhoto place = FindPhoto(models, image_id);
+  const bool registered = place.mapped != nullptr && place.model == 0;
+  const auto chained = outcome.chained.find(image_id);
   Json json;
   json["name"] = image.name;
   json["registered"] = registered;
-  json["by"] = !registered                                                       ? "none"
-               : chained != outcome.chained.end()                                ? "chained"
-               : outcome.known && outcome.known->added.count(image.image_id) > 0 ? "known"
-               : outcome.seed.poses.images.count(image.image_id) > 0             ? "seed"
-                                                                                 : "mapper";
+  json["by"] = !registered                                                 ? "none"
+               : chained != outcome.chained.end()                          ? "chained"
+               : outcome.known && outcome.known->added.count(image_id) > 0 ? "known"
+               : outcome.seed.poses.images.count(image_id) > 0             ? "seed"
+                                                                           : "mapper";
   if (registered && chained != outcome.chained.end()) {
     json["neighbor"] = images.images().at(chained->second.neighbor_id).name;
     json["num_common_points"] = chained->second.num_common_points;
     json["scale_spread"] = chained->second.scale_spread;
   }
-  if (!registered) {
-    const auto reason = outcome.reasons.find(image.image_id);
-    json["reason"] = reason != outcome.reasons.end()
-                         ? reason->second
-                         : "too few points of the model for colmap mapper, and --Chain.enabled 0";
+  if (!registered) json["reason"] = ReasonOf(image_id, place, passes);
+  if (place.mapped != nullptr) {
+    const auto support = place.mapped->check->support.find(image_id);
+    if (support != place.mapped->check->support.end()) json["match_support"] = support->second;
   }
   return json;
 }
 
-std::vector<const SparseModel*> ModelsOfRooms(const MappingOutcome& outcome) {
-  std::vector<const SparseModel*> models = {&outcome.result.model};
-  for (const MapperResult& room : outcome.other_rooms) models.push_back(&room.model);
-  return models;
+Json NamesOf(const SparseModel& model) {
+  Json names = Json::array();
+  for (const auto& [id, image] : model.images) names.push_back(image.name);
+  return names;
+}
+
+Json ModelJson(const MappedModel& model) {
+  Json json;
+  json["num_reg_images"] = model.result->model.images.size();
+  json["num_points"] = model.result->model.points.size();
+  json["mean_reprojection_error_px"] = model.result->mean_reprojection_error_px;
+  json["refined_intrinsics"] = model.pass->refine;
+  json["is_alike"] = model.is_room;
+  json["images"] = NamesOf(model.result->model);
+  return json;
+}
+
+void AddLenses(const MappingPass& pass, Report* report) {
+  (*report)["cameras"] = Json::array();
+  for (const LensFinding& lens : pass.lenses.lenses) {
+    (*report)["cameras"].push_back(LensToJson(lens));
+  }
 }
 
 }  // namespace
 
-void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& images, Report* report) {
+void FillMappingReport(const std::vector<MappingPass>& passes, const MatchedImages& images,
+                       Report* report) {
+  const std::vector<MappedModel> models = ListModels(passes);
+  const MappingPass& pass = passes[0];
+  const MappingOutcome& outcome = pass.best[0];
   const PairTrial& trial = outcome.seed.trial;
   const SparseModel& model = outcome.result.model;
   Report& r = *report;
@@ -94,18 +147,21 @@ void FillMappingReport(const MappingOutcome& outcome, const MatchedImages& image
     rooms["share_within"] = outcome.share_within;
     rooms["share_between"] = outcome.share_between;
     rooms["models"] = Json::array();
-    for (const SparseModel* of_room : ModelsOfRooms(outcome)) {
-      Json one;
-      one["num_points"] = of_room->points.size();
-      one["images"] = Json::array();
-      for (const auto& [id, image] : of_room->images) one["images"].push_back(image.name);
-      rooms["models"].push_back(one);
+    for (const MapperResult* of_room : outcome.Models()) {
+      rooms["models"].push_back(
+          {{"num_points", of_room->model.points.size()}, {"images", NamesOf(of_room->model)}});
     }
     r["rooms"] = rooms;
   }
+  r["refined_intrinsics"] = pass.refine;
+  AddLenses(pass, report);
+  if (models.size() > 1) {
+    r["models"] = Json::array();
+    for (const MappedModel& one : models) r["models"].push_back(ModelJson(one));
+  }
   r["images"] = Json::array();
   for (const auto& [image_id, image] : images.images()) {
-    r["images"].push_back(ImageJson(image, outcome, images));
+    r["images"].push_back(ImageJson(image, passes, models, images));
   }
 }
 
@@ -128,33 +184,20 @@ std::string AmbiguousSentence(const PairTrial& trial, const MatchedImages& image
 }
 
 std::string SeparateGroupsSentence(const MatchedImages& images) {
-  constexpr size_t kFewest = 4;  // photos, to be called a group
   constexpr size_t kNumShown = 4;
-  std::vector<const DatabaseImage*> photos;
-  std::map<uint32_t, int> place;
-  for (const auto& [image_id, image] : images.images()) {
-    place[image_id] = static_cast<int>(photos.size());
-    photos.push_back(&image);
-  }
-  DisjointSets sets(static_cast<int>(photos.size()));
-  for (const DatabasePair& pair : images.pairs()) {
-    sets.Join(place.at(pair.image_id1), place.at(pair.image_id2));
-  }
-  std::vector<std::vector<int>> groups = sets.Groups();
-  groups.erase(std::remove_if(groups.begin(), groups.end(),
-                              [](const std::vector<int>& group) { return group.size() < kFewest; }),
-               groups.end());
+  std::set<uint32_t> all;
+  for (const auto& [image_id, image] : images.images()) all.insert(image_id);
+  const std::vector<std::set<uint32_t>> groups = ConnectedPhotos(images, all, kFewestOfModel);
   if (groups.size() < 2) return "";
   std::string list;
   for (size_t i = 0; i < std::min(groups.size(), kNumShown); ++i) {
     list += fmt::format("{}{} photos (e.g. {})", i == 0 ? "" : ", ", groups[i].size(),
-                        photos[groups[i][0]]->name);
+                        images.images().at(*groups[i].begin()).name);
   }
   if (groups.size() > kNumShown) list += fmt::format(" and {} more", groups.size() - kNumShown);
   return fmt::format(
-      "Verified matches connect the photos in {} groups that nothing connects to each other: {}. A "
-      "model holds one of them: map each room's photos by themselves, or take and match photos "
-      "between.",
+      "Verified matches connect the photos in {} groups that nothing connects to each other: {}. "
+      "Only one of them is in the model.",
       groups.size(), list);
 }
 

@@ -1,24 +1,21 @@
 // roomtex-mapper: COLMAP's mapper behind an initialiser that is not fooled by walls.
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <set>
-#include <utility>
+#include <string>
+#include <vector>
 
 #include <fmt/core.h>
 
-#include "colmap_ext/calibration_check.h"
 #include "colmap_ext/known_photos.h"
-#include "colmap_ext/lens_check.h"
 #include "colmap_ext/mapper_verdict.h"
 #include "colmap_ext/mapping.h"
 #include "colmap_ext/mapping_report.h"
-#include "colmap_ext/model_check.h"
+#include "colmap_ext/mapping_trust.h"
 #include "colmap_ext/model_output.h"
 #include "core/command_line.h"
 #include "core/error.h"
@@ -47,9 +44,9 @@ void AddOptions(MappingOptions* options, Command* command) {
       "those of one standpoint leave that to roomtex-align. It needs no picks either way.",
       Command::Kind::kOptional);
   command->AddOutputPath("output_path", &options->output_path,
-                         "Folder to write into: 0/ (the model; 1/ ... those of rooms that are "
-                         "alike), init/ (the two-view model it started "
-                         "from), roomtex-mapper.log (what COLMAP said).");
+                         "Folder to write into: 0/ (the model; 1/ ... those of other rooms), init/ "
+                         "(the two-view model that 0/ started from), roomtex-mapper.log (what "
+                         "COLMAP said).");
   command->AddString("colmap", &options->colmap, "COLMAP's program: a path, or a name on the PATH.",
                      Kind::kOptional);
   command->AddChoice(
@@ -60,6 +57,10 @@ void AddOptions(MappingOptions* options, Command* command) {
       "it; 1 = always; 0 = never.");
   command->Add(FieldsOf(&options->init));
   command->Add(FieldsOf(&options->chain));
+  command->AddBool(
+      "Groups.enabled", &options->map_all_groups,
+      "Give groups of photos that nothing connects models of their own, 0/, 1/ ... (of four photos "
+      "and more), the one with the most photos first; 0 = only one of them is mapped.");
   command->AddBool(
       "Rooms.enabled", &options->take_rooms_apart,
       "Give rooms that are alike (the same wallpaper and furniture) models of their own, 0/, 1/ "
@@ -130,35 +131,6 @@ KnownPhotos ReadKnownPhotos(const MappingOptions& options, const MatchedImages& 
   return known;
 }
 
-// Not to be trusted. about: what roomtex-align goes by when it reads this (mapper_verdict.h).
-void Refuse(const std::string& about, const std::string& reason, const Command::Context& context,
-            Json* reasons) {
-  context.report.SetUntrusted(reason);
-  reasons->push_back({{"about", about}, {"reason", reason}});
-}
-
-void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
-                const Command::Context& context, Json* reasons) {
-  const PairTrial& trial = outcome.seed.trial;
-  if (outcome.seed.ambiguous) {
-    Refuse("motion", AmbiguousSentence(trial, images), context, reasons);
-  }
-  size_t num_registered = outcome.result.model.images.size();
-  for (const MapperResult& room : outcome.other_rooms) num_registered += room.model.images.size();
-  const std::string groups = SeparateGroupsSentence(images);
-  if (2 * num_registered < images.images().size()) {
-    Refuse("photos",
-           fmt::format("only {} of {} photos could be registered. {}", num_registered,
-                       images.images().size(),
-                       groups.empty() ? "Take more photos between those that are missing, or match "
-                                        "them more thoroughly."
-                                      : groups),
-           context, reasons);
-  } else if (!groups.empty()) {
-    context.Warn(groups);
-  }
-}
-
 [[noreturn]] void ThrowNothingWorked(const std::string& database_path, const Json& trials) {
   std::string reasons;
   std::set<std::string> told;
@@ -186,160 +158,24 @@ void JudgeTrust(const MappingOutcome& outcome, const MatchedImages& images,
                                   "--Init.*");
 }
 
-// What becomes of a model beside photos with known poses.
-void ReportKnown(const MappingOutcome& outcome, const KnownPhotos& known,
-                 const std::map<uint32_t, DatabaseImage>& images, const Command::Context& context,
-                 Json* reasons) {
-  if (!outcome.known) return;
-  const KnownPlacement& placement = *outcome.known;
-  const KnownFit& fit = placement.fit;
-  context.report["known"] = KnownToJson(placement, known, images);
-  const char by_scan[] =
-      " The model keeps a frame of its own; roomtex-align puts it into the scan by what the scan "
-      "shows in these photos.";
-  switch (fit.kind) {
-    case KnownFit::Kind::kTooFew:
-      context.Warn(std::string("Fewer than two of the photos with known poses could be mapped.") +
-                   by_scan);
-      return;
-    case KnownFit::Kind::kOnePlace:
-      context.Warn(std::string("The photos with known poses stand too near each other to tell the "
-                               "scale.") +
-                   by_scan);
-      return;
-    case KnownFit::Kind::kContradicts:
-      Refuse("motion",
-             "the known poses contradict the photos: no similarity brings more than half of them "
-             "to where the photos were mapped. Check --known_path, or map without it.",
-             context, reasons);
-      return;
-    case KnownFit::Kind::kPlaced:
-      break;
-  }
-  const auto names = [&images](const std::set<uint32_t>& ids) {
-    std::string list;
-    for (const uint32_t id : ids) list += (list.empty() ? "" : ", ") + images.at(id).name;
-    return list;
-  };
-  if (!fit.contradicting.empty()) {
-    context.Warn("Photos that were not taken where --known_path has them, as the others tell: " +
-                 names(fit.contradicting) + ". Their poses are those of their matches.");
-  }
-  if (placement.held) {
-    if (placement.rough.empty()) return;
-    context.Warn("Known poses that are not exact enough to be held, and were adjusted: " +
-                 names(placement.rough));
-    return;
-  }
-  context.Warn(
-      "The known poses are not exact enough to be held: most of the photos would lose most of "
-      "their "
-      "points, or the keypoints fit much worse. The model was moved to them, and no more.");
-}
-
-// A sentence on what roomtex-align goes by (mapper_verdict.h).
-struct Doubt {
-  const char* about;
-  std::string reason;
-};
-
-// What a model's own photos say against it, the third-view test on pairs that it was not started
-// from among it. json: the numbers.
-std::vector<Doubt> DoubtsOf(const ModelCheck& check, const MatchedImages& images, Json* json) {
-  std::vector<Doubt> doubts;
-  const auto name_of = [&](uint32_t image_id) { return images.images().at(image_id).name; };
-  (*json)["num_pairs"] = check.num_pairs;
-  (*json)["contradicting"] = Json::array();
-  for (const auto& [image_id1, image_id2] : check.contradicting) {
-    (*json)["contradicting"].push_back({name_of(image_id1), name_of(image_id2)});
-  }
-  (*json)["doubtful_images"] = Json::array();
-  std::string doubtful;
-  for (const uint32_t image_id : check.doubtful) {
-    (*json)["doubtful_images"].push_back(name_of(image_id));
-    doubtful += (doubtful.empty() ? "" : ", ") + name_of(image_id) + " (" +
-                Percent(check.support.at(image_id)) + ")";
-  }
-  if (!check.doubtful.empty()) {
-    doubts.push_back(
-        {"photos", "photos stand where most of their own matches do not put them: " + doubtful +
-                       " of the matches obey the model. Take these photos out (they may show a "
-                       "repeated pattern, or something that moved) and map again."});
-  }
-  const size_t num_contradicting = check.contradicting.size();
-  if (static_cast<double>(num_contradicting) >
-      ModelCheckOptions().max_contradicting * check.num_pairs) {
-    const auto& [image_id1, image_id2] = check.contradicting.front();
-    doubts.push_back(
-        {"motion",
-         fmt::format("the model is contradicted by its own photos: for {} of {} pairs, "
-                     "e.g. {} and {}, a third photo supports another camera motion. "
-                     "Start from another pair (--Init.image_name1), or add photos that "
-                     "show something off the wall.",
-                     num_contradicting, check.num_pairs, name_of(image_id1), name_of(image_id2))});
-  }
-  return doubts;
-}
-
-void ReportCheck(const MappingPass& pass, const Command::Context& context, Json* reasons) {
-  const MatchedImages& images = *pass.images;
-  for (Json& image : context.report["images"]) {
-    const uint32_t image_id = images.FindImage(image["name"])->image_id;
-    const auto add = [&](const ModelCheck& check) {
-      const auto found = check.support.find(image_id);
-      if (found != check.support.end()) image["match_support"] = found->second;
-    };
-    add(pass.check);
-    for (const ModelCheck& check : pass.room_checks) add(check);
-  }
-  for (const auto& [about, reason] : DoubtsOf(pass.check, images, &context.report["check"])) {
-    Refuse(about, reason, context, reasons);
-  }
-}
-
-// Whether the errors shrink when the lens may change. refined: the mapper did refine it.
-void CheckLens(MapperRun* mapper, const MappingOutcome& outcome, bool refined,
-               const Command::Context& context, Json* reasons) {
-  context.progress.Stage("check calibration");
-  const CalibrationCheck check =
-      CheckCalibration(outcome.result.model, [&](const SparseModel& model, bool refine) {
-        ThrowIfInterrupted();
-        return mapper->BundleAdjust(model, refine);
-      });
-  Json& json = context.report["check"]["calibration"];
-  json["rms_fixed_px"] = check.rms_fixed_px;
-  json["rms_free_px"] = check.rms_free_px;
-  if (check.Fits()) return;
-  Refuse(
-      "calibration",
-      fmt::format("the camera's calibration does not fit the photos: their error falls from {:.2f} "
-                  "to {:.2f} px "
-                  "when focal length and distortion may change, so the model is bent. {}",
-                  check.rms_fixed_px, check.rms_free_px,
-                  refined ? "Extract the features with a camera model that can describe the lens "
-                            "(--ImageReader.camera_model OPENCV)."
-                          : "Calibrate the camera, or give --refine_intrinsics auto."),
-      context, reasons);
-}
-
-std::string RoomPath(const MappingOptions& options, int number) {
+std::string ModelPath(const MappingOptions& options, size_t number) {
   return options.output_path + "/" + std::to_string(number);
 }
 
-bool IsRoomOfEarlierRun(const MappingOptions& options, int number) {
-  const Json report = ReadJsonIfAny(RoomPath(options, number) + "/" + kMapperReportName);
-  return report.is_object() && report.value("room", Json()) == number;
+bool IsOfEarlierRun(const MappingOptions& options, size_t number) {
+  const Json report = ReadJsonIfAny(ModelPath(options, number) + "/" + kMapperReportName);
+  return report.is_object() && report.value("model", Json()) == number;
 }
 
 // With the cameras of the user's database, as outputs/name.
-void WriteModel(const MapperResult& result, const std::string& name, const LensPlan& plan,
-                const ScratchFolder& scratch, OutputSet* outputs) {
-  std::string folder = result.folder;
-  if (!plan.IsAsInDatabase()) {
-    SparseModel model = result.model;
-    plan.Restore(&model);
+void WriteModel(const MappedModel& model, const std::string& name, const ScratchFolder& scratch,
+                OutputSet* outputs) {
+  std::string folder = model.result->folder;
+  if (!model.pass->plan.IsAsInDatabase()) {
+    SparseModel restored = model.result->model;
+    model.pass->plan.Restore(&restored);
     folder = scratch / ("restored_" + name);
-    WriteSparseModel(model, folder);
+    WriteSparseModel(restored, folder);
   }
   std::error_code error;
   fs::copy(folder, outputs->aside() + "/" + name, error);
@@ -350,48 +186,78 @@ void WriteModel(const MapperResult& result, const std::string& name, const LensP
   outputs->ReplaceFolder(name);
 }
 
-// A room beside the first: its own photos are asked, what is common to all rooms is handed on.
-Json ReportOfRoom(const MappingPass& pass, int number, const Json& common,
-                  const Command::Context& context) {
-  const MapperResult& room = pass.best[0].other_rooms[number - 1];
+// Of a model beside the first, for its folder.
+Json ReportOfModel(const MappedModel& model, size_t number, const ModelTrust& trust) {
   Json json;
   json["command"] = "roomtex-mapper";
-  json["room"] = number;
-  json["num_reg_images"] = room.model.images.size();
-  json["num_points"] = room.model.points.size();
-  json["mean_reprojection_error_px"] = room.mean_reprojection_error_px;
-  json["refined_intrinsics"] = pass.refine;
-  json["reasons"] = common;
-  const ModelCheck& check = pass.room_checks[number - 1];
-  for (const auto& [about, reason] : DoubtsOf(check, *pass.images, &json["check"])) {
-    json["reasons"].push_back({{"about", about}, {"reason", reason}});
-    context.Warn(fmt::format("Model {} is not to be trusted: {}", number, reason));
-  }
+  json["model"] = number;
+  json["num_reg_images"] = model.result->model.images.size();
+  json["num_points"] = model.result->model.points.size();
+  json["mean_reprojection_error_px"] = model.result->mean_reprojection_error_px;
+  json["refined_intrinsics"] = model.pass->refine;
+  json["reasons"] = trust.reasons;
+  json["check"] = trust.check;
+  if (!trust.known.is_null()) json["known"] = trust.known;
   return json;
 }
 
-// The models appear with the report. rooms: reports of those beside the first.
-void WriteModels(const MappingOptions& options, const MappingPass& pass,
-                 const ScratchFolder& scratch, const std::vector<Json>& rooms) {
-  const MappingOutcome& outcome = pass.best[0];
+// The models appear with the report.
+void WriteModels(const MappingOptions& options, const std::vector<MappedModel>& models,
+                 const std::vector<ModelTrust>& trusts, const ScratchFolder& scratch) {
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
-  SparseModel pair_model = outcome.seed.pair_model;
-  if (!pass.plan.IsAsInDatabase()) pass.plan.Restore(&pair_model);
+  const MappingPass& first = *models[0].pass;
+  SparseModel pair_model = first.best[0].seed.pair_model;
+  if (!first.plan.IsAsInDatabase()) first.plan.Restore(&pair_model);
   WriteSparseModel(pair_model, outputs->aside() + "/init");
   outputs->ReplaceFolder("init");
-  WriteModel(outcome.result, "0", pass.plan, scratch, outputs.get());
-  int number = 1;
-  for (const MapperResult& room : outcome.other_rooms) {
-    const std::string name = std::to_string(number++);
-    WriteModel(room, name, pass.plan, scratch, outputs.get());
-    WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName, rooms[number - 2]);
+  for (size_t number = 0; number < models.size(); ++number) {
+    const std::string name = std::to_string(number);
+    WriteModel(models[number], name, scratch, outputs.get());
+    if (number == 0) continue;
+    WriteJson(outputs->aside() + "/" + name + "/" + kMapperReportName,
+              ReportOfModel(models[number], number, trusts[number]));
   }
-  // Rooms of an earlier run are none of this one; what somebody has put there stays.
-  for (; IsRoomOfEarlierRun(options, number); ++number) {
+  // Models of an earlier run are none of this one; what somebody has put there stays.
+  for (size_t number = models.size(); IsOfEarlierRun(options, number); ++number) {
     outputs->ReplaceFolder(std::to_string(number));
   }
   ThrowIfInterrupted();
   CommitWithReport(std::string("0/") + kMapperReportName, outputs);
+}
+
+// That there are several, and what is not to be trusted of those beside the first, whose trust is
+// that of the command.
+void SayWhatModelsThereAre(const std::vector<MappedModel>& models,
+                           const std::vector<ModelTrust>& trusts, const Command::Context& context) {
+  constexpr size_t kNumShown = 4;
+  std::string list;
+  size_t num_groups = 0;
+  for (size_t i = 0; i < models.size(); ++i) {
+    if (models[i].is_room) continue;
+    const SparseModel& model = models[i].result->model;
+    if (++num_groups > kNumShown) continue;
+    list += fmt::format("{}{} holds {} photos, e.g. {}", list.empty() ? "" : ", ", i,
+                        model.images.size(), model.images.begin()->second.name);
+  }
+  if (num_groups > 1) {
+    context.Warn(fmt::format(
+        "The photos make {} models that too little connects to each other: {}{}. Each has a frame "
+        "of its own, and roomtex-align puts each into the scan by itself. Of rooms that were meant "
+        "to be one model, take and match photos between.",
+        num_groups, list,
+        num_groups > kNumShown ? fmt::format(" and {} more", num_groups - kNumShown) : ""));
+  }
+  for (const Json& reason : trusts[0].reasons) {
+    context.report.SetUntrusted(reason["reason"].get<std::string>());
+  }
+  for (size_t i = 1; i < models.size(); ++i) {
+    for (const Json& reason : trusts[i].reasons) {
+      const bool is_told = std::count(trusts[0].reasons.begin(), trusts[0].reasons.end(), reason);
+      if (is_told) continue;
+      context.Warn(
+          fmt::format("Model {} is not to be trusted: {}", i, reason["reason"].get<std::string>()));
+    }
+  }
 }
 
 void MapPhotos(const MappingOptions& options, const Command::Context& context) {
@@ -406,8 +272,8 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   const KnownPhotos known = ReadKnownPhotos(options, images, context);
 
   MakeFolder(options.output_path);
-  const std::string model_path = options.output_path + "/0";
-  RequireReplaceableModel(model_path);
+  const size_t num_groups = PhotoGroups(images, options).size();
+  for (size_t i = 0; i < num_groups; ++i) RequireReplaceableModel(ModelPath(options, i));
   RequireReplaceableModel(options.output_path + "/init");
   const SignalGuard signals;
   const ScratchFolder scratch(options.output_path);
@@ -420,43 +286,29 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   }
 
   Mapping mapping(options, context, database, images, known, scratch);
-  MappingPass pass = mapping.Run();
-  context.report["pairs_tried"] = pass.trials.size();
-  context.report["pair_trials"] = pass.trials;
-  if (pass.best.empty()) ThrowNothingWorked(options.database_path, pass.trials);
-  const MappingOutcome& outcome = pass.best[0];
-  FillMappingReport(outcome, *pass.images, &context.report);
-  context.report["refined_intrinsics"] = pass.refine;
-  if (!pass.lenses.not_checked.empty()) context.Warn(pass.lenses.not_checked);
-  context.report["cameras"] = Json::array();
-  for (const LensFinding& lens : pass.lenses.lenses) {
-    context.report["cameras"].push_back(LensToJson(lens));
-  }
-  Json common = Json::array(), own = Json::array();  // to all rooms, and of the first model
-  JudgeTrust(outcome, *pass.images, context, &common);
-  ReportCheck(pass, context, &own);
-  ReportKnown(outcome, known, images.images(), context, &own);
-  CheckLens(pass.mapper.get(), outcome, pass.refine, context, &common);
-  context.report["reasons"] = common;
-  for (const Json& reason : own) context.report["reasons"].push_back(reason);
-  std::vector<Json> rooms;
-  for (size_t i = 1; i <= outcome.other_rooms.size(); ++i) {
-    rooms.push_back(ReportOfRoom(pass, static_cast<int>(i), common, context));
-  }
+  const std::vector<MappingPass> passes = mapping.Run();
+  context.report["pairs_tried"] = mapping.trials().size();
+  context.report["pair_trials"] = mapping.trials();
+  if (passes.empty()) ThrowNothingWorked(options.database_path, mapping.trials());
+  FillMappingReport(passes, images, &context.report);
+  const std::string& not_checked = passes[0].lenses.not_checked;
+  if (!not_checked.empty()) context.Warn(not_checked);
+  const std::vector<MappedModel> models = ListModels(passes);
+  const std::vector<ModelTrust> trusts = JudgeModels(passes, images, known, context);
+  context.report["check"] = trusts[0].check;
+  if (!trusts[0].known.is_null()) context.report["known"] = trusts[0].known;
+  context.report["reasons"] = trusts[0].reasons;
+  SayWhatModelsThereAre(models, trusts, context);
 
   context.progress.Stage("write model");
-  for (size_t i = 1; i <= outcome.other_rooms.size(); ++i) {
-    RequireReplaceableModel(RoomPath(options, static_cast<int>(i)));
-  }
-  WriteModels(options, pass, scratch, rooms);
-  std::printf("%s: %zu of %zu photos, %zu points, mean reprojection error %.3f px\n",
-              model_path.c_str(), outcome.result.model.images.size(), images.images().size(),
-              outcome.result.model.points.size(), outcome.result.mean_reprojection_error_px);
-  int number = 1;
-  for (const MapperResult& room : outcome.other_rooms) {
-    std::printf("%s: %zu photos of another room that is alike, %zu points, %.3f px\n",
-                RoomPath(options, number++).c_str(), room.model.images.size(),
-                room.model.points.size(), room.mean_reprojection_error_px);
+  for (size_t i = 0; i < models.size(); ++i) RequireReplaceableModel(ModelPath(options, i));
+  WriteModels(options, models, trusts, scratch);
+  for (size_t i = 0; i < models.size(); ++i) {
+    const MapperResult& result = *models[i].result;
+    std::printf("%s: %zu of %zu photos%s, %zu points, mean reprojection error %.3f px\n",
+                ModelPath(options, i).c_str(), result.model.images.size(), images.images().size(),
+                models[i].is_room ? ", of another room that is alike" : "",
+                result.model.points.size(), result.mean_reprojection_error_px);
   }
 }
 

@@ -78,7 +78,8 @@ TEST_F(ChainingCommand, RegistersEightOfEightPhotosAlongAWallWithWeakTriples) {
 
 TEST_F(ChainingCommand, LeavesPhotosOutWhenToldToAndSaysWhy) {
   const SimulatedViews views = WeakWallSequence(Scene::kRelief, 0);
-  const CommandResult result = Run(views, "--Chain.enabled 0 --Init.max_pairs 1");
+  const CommandResult result =
+      Run(views, "--Chain.enabled 0 --Groups.enabled 0 --Init.max_pairs 1");
   EXPECT_EQ(Count("chained"), 0);
   const int num_left_out = Count("none");
   ASSERT_GT(num_left_out, 0) << result.err;

@@ -15,12 +15,7 @@
 
 #include "colmap_ext/initializer.h"
 #include "colmap_ext/sparse_model.h"
-#include "tests/colmap_ext/lookalike_views.h"
-#include "tests/colmap_ext/simulated_database.h"
-#include "tests/support/folders.h"
-#include "tests/support/matchers.h"
-#include "tests/support/run_command.h"
-#include "tests/support/temp_folder.h"
+#include "tests/colmap_ext/mapper_scene.h"
 
 namespace roomtex {
 namespace {
@@ -28,66 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using Scene = SimulatedViewsOptions::Scene;
-
-class MapperCommand : public ::testing::Test {
- protected:
-  void Simulate(const SimulatedViewsOptions& options, bool with_pairs = true) {
-    views_ = SimulateViews(options);
-    WriteSimulatedDatabase(views_, folder_.path(), with_pairs);
-  }
-  std::string Arguments() const {
-    return "roomtex-mapper --database_path " + (folder_ / "database.db") + " --image_path " +
-           (folder_ / "photos") + " --output_path " + (folder_ / "sparse") + " --report_path " +
-           (folder_ / "report.json") + " ";
-  }
-  CommandResult Run(const std::string& more = "") const {
-    return RunCommandLine(Arguments() + more);
-  }
-  nlohmann::json Report() const {
-    return nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
-  }
-  // Centre errors (metres) and rotation errors (radians) after the best similarity onto the truth.
-  void ExpectNearTruth(const SparseModel& model, double metres, double radians) const {
-    Eigen::Matrix3Xd found(3, model.images.size()), truth(3, model.images.size());
-    int column = 0;
-    for (const auto& [image_id, image] : model.images) {
-      found.col(column) = image.cam_from_model.TargetOriginInSource();
-      truth.col(column++) = views_.cam_from_scene.at(image_id).TargetOriginInSource();
-    }
-    const Similarity scene_from_model = FitSimilarity(found, truth);
-    for (const auto& [image_id, image] : model.images) {
-      const Rigid pose = CamFromScan(image.cam_from_model, scene_from_model);
-      const Rigid& expected = views_.cam_from_scene.at(image_id);
-      EXPECT_LE(RotationAngle(pose.rotation, expected.rotation), radians) << image.name;
-      EXPECT_LE((pose.TargetOriginInSource() - expected.TargetOriginInSource()).norm(), metres)
-          << image.name;
-    }
-  }
-  // Nothing of the work on the way is left.
-  void ExpectNoScratch() const {
-    if (!fs::exists(folder_ / "sparse")) return;
-    for (const auto& entry : fs::directory_iterator(folder_ / "sparse")) {
-      EXPECT_EQ(entry.path().filename().string().find(".roomtex"), std::string::npos)
-          << entry.path();
-    }
-  }
-  void WriteScript(const std::string& name, const std::string& body) const {
-    WriteBytes(folder_ / name, "#!/bin/sh\n" + body);
-    fs::permissions(folder_ / name, fs::perms::owner_all);
-  }
-
-  TempFolder folder_;
-  SimulatedViews views_;
-};
-
-SimulatedViewsOptions RoomOptions(int num_views) {
-  SimulatedViewsOptions options;
-  options.num_views = num_views;
-  options.num_points = 500;
-  options.baseline = 0.4;
-  options.distortion = true;
-  return options;
-}
 
 TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
   SimulatedViewsOptions options = RoomOptions(7);
@@ -131,82 +66,6 @@ TEST_F(MapperCommand, RegistersEveryPhotoOfARoomNearTheTruth) {
   EXPECT_EQ(fs::last_write_time(folder_ / "database.db"), time_before);
   EXPECT_FALSE(fs::exists(folder_ / "database.db-wal"));
   ExpectNoScratch();
-}
-
-// Matching puts them into one model, as the same furniture stands in both.
-TEST_F(MapperCommand, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
-  SimulatedViewsOptions options = RoomOptions(13);
-  options.num_points = 1500;
-  options.baseline = 0.1;
-  views_ = SimulateViews(options);
-  const auto room_of = [](uint32_t id) { return id % 3 == 0 ? 2 : 1; };
-  ShowLookalikeRooms(
-      room_of, [](const Eigen::Vector3d& x) { return x.x() > 0; }, &views_);
-  WriteSimulatedDatabase(views_, folder_.path());
-  const CommandResult result = Run();
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.err.find("2 rooms that are alike"), std::string::npos) << result.err;
-  for (const int room : {1, 2}) {
-    const SparseModel model = ReadSparseModel(folder_ / ("sparse/" + std::to_string(room - 1)));
-    EXPECT_EQ(model.images.size(), room == 1 ? 9u : 4u);
-    for (const auto& [id, image] : model.images) EXPECT_EQ(room_of(id), room) << image.name;
-    ExpectNearTruth(model, 0.01, 0.01);
-    const nlohmann::json rooms = Report()["rooms"]["models"];
-    EXPECT_EQ(rooms[static_cast<size_t>(room - 1)]["images"].size(), model.images.size());
-    EXPECT_EQ(rooms[static_cast<size_t>(room - 1)]["num_points"], model.points.size());
-  }
-  EXPECT_EQ(Report()["num_reg_images"], 9);
-  EXPECT_EQ(Report()["images"][2]["registered"], false);
-  EXPECT_NE(Report()["images"][2]["reason"].get<std::string>().find("model 1"), std::string::npos);
-  const auto of_room = nlohmann::json::parse(ReadBytes(folder_ / "sparse/1/roomtex-mapper.json"));
-  EXPECT_GE(of_room["check"]["num_pairs"].get<int>(), 2) << of_room;
-  EXPECT_TRUE(of_room["check"]["contradicting"].empty());
-  EXPECT_TRUE(of_room["reasons"].empty());
-  EXPECT_GT(Report()["images"][2]["match_support"].get<double>(), 0.9) << "by those of its room";
-  ExpectNoScratch();
-
-  EXPECT_NE(result.out.find("sparse/1: 4 photos"), std::string::npos) << result.out;
-
-  // The next run takes its own rooms away, and leaves a copy that somebody made.
-  fs::copy(folder_ / "sparse/0", folder_ / "sparse/2");
-  ASSERT_EQ(Run("--Rooms.enabled 0").exit_code, 0);
-  EXPECT_EQ(Report()["num_reg_images"], 13);
-  EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
-  EXPECT_TRUE(fs::exists(folder_ / "sparse/2/images.bin"));
-
-  fs::remove(folder_ / "database.db");
-  fs::remove_all(folder_ / "photos");
-  Simulate(RoomOptions(7));
-  ASSERT_EQ(Run().exit_code, 0);
-  EXPECT_EQ(Report()["num_reg_images"], 7);
-  EXPECT_EQ(Report().count("rooms"), 0u);
-}
-
-TEST_F(MapperCommand, SaysThatNothingConnectsTwoRooms) {
-  SimulatedViewsOptions options = RoomOptions(12);
-  options.baseline = 0.2;
-  views_ = SimulateViews(options);
-  const auto separate = [&](uint32_t last_of_first) {
-    SimulatedViews apart = views_;
-    apart.pairs.erase(std::remove_if(apart.pairs.begin(), apart.pairs.end(),
-                                     [&](const DatabasePair& pair) {
-                                       return (pair.image_id1 <= last_of_first) !=
-                                              (pair.image_id2 <= last_of_first);
-                                     }),
-                      apart.pairs.end());
-    fs::remove(folder_ / "database.db");
-    WriteSimulatedDatabase(apart, folder_.path());
-    return Run();
-  };
-  const CommandResult most = separate(7);
-  EXPECT_EQ(most.exit_code, 0) << most.err;
-  EXPECT_EQ(Report()["num_reg_images"], 7);
-  const std::string second = views_.images.at(8).name;
-  EXPECT_THAT(most.err, HasSubstr("2 groups that nothing connects"));
-  EXPECT_THAT(most.err, HasSubstr("5 photos (e.g. " + second + ")"));
-  separate(9);  // three photos alone are no room
-  EXPECT_EQ(Report()["num_reg_images"], 9);
-  EXPECT_TRUE(Report()["warnings"].empty()) << Report()["warnings"];
 }
 
 TEST_F(MapperCommand, IsRightBeforeAWall) {
