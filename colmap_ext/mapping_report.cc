@@ -75,6 +75,7 @@ Json ImageJson(const DatabaseImage& image, const std::vector<MappingPass>& passe
     json["scale_spread"] = chained->second.scale_spread;
   }
   if (!registered) json["reason"] = ReasonOf(image_id, place, passes);
+  json["model"] = place.mapped == nullptr ? Json() : Json(place.model);
   if (place.mapped != nullptr) {
     const auto support = place.mapped->check->support.find(image_id);
     if (support != place.mapped->check->support.end()) json["match_support"] = support->second;

@@ -126,6 +126,17 @@ bool Chain::SeemsPatterned() {
   return *seems_patterned_;
 }
 
+std::vector<std::string> Chain::SparseModels() const {
+  std::vector<std::string> models = {At("sparse/0")};
+  for (int number = 1;; ++number) {
+    const std::string model = At("sparse/" + std::to_string(number));
+    const Json report = ReadJsonFile(model + "/roomtex-mapper.json");
+    if (!report.is_object() || report.value("model", Json()) != number) break;
+    if (report.value("is_alike", Json()) == false) models.push_back(model);
+  }
+  return models;
+}
+
 CommandLine Chain::PickCommand() const {
   CommandLine line = {"roomtex-pick", "--input_path", At("sparse/0"), "--image_path",
                       ColorFolder()};

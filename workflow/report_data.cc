@@ -154,7 +154,12 @@ class ReportMaker {
 
   Json Facts() const {
     Json facts = Json::array();
-    const double registered = NumberAt(mapper_, {"num_reg_images"});
+    double registered = NumberAt(mapper_, {"num_reg_images"});
+    const Json& models = At(mapper_, {"models"});
+    if (models.is_array()) {
+      registered = 0;
+      for (const Json& model : models) registered += NumberAt(model, {"num_reg_images"});
+    }
     Fact("Photos registered", registered,
          Number(registered, 0) + " of " + Number(NumberAt(mapper_, {"num_images"}), 0), &facts);
     const double mm = NumberAt(align_, {"expected_error", "at_cameras_mm"});
@@ -195,12 +200,20 @@ class ReportMaker {
     for (const Json& image : mapped.is_array() ? mapped : Json::array()) {
       Json& photo = photos[image.at("name")];
       photo["registered_by"] = image.value("by", "none");
+      photo["model"] = image.value("model", Json());
       photo["match_support"] = image.contains("match_support") ? image["match_support"] : Json();
       if (image.contains("reason")) photo["left_out"] = image["reason"];
     }
     const Json& aligned = At(align_, {"images"});
     for (const Json& image : aligned.is_array() ? aligned : Json::array()) {
-      photos[image.at("name")]["expected_error_mm"] = image.value("position_sigma_mm", Json());
+      Json& photo = photos[image.at("name")];
+      photo["expected_error_mm"] = image.value("position_sigma_mm", Json());
+      // Of another model, which was put into the scan, too.
+      photo.erase("left_out");
+      const Json model = photo.value("model", Json());
+      if (model.is_number() && model != 0) {
+        photo["registered_by"] = "model " + std::to_string(model.get<int>());
+      }
     }
     for (const Json* report : {&align_, &texture_}) {
       const Json& left_out = At(*report, {"photos_left_out"});

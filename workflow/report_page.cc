@@ -219,7 +219,8 @@ class Page {
     body_ +=
         "<p class=\"quiet\">Registered: seed = of the first photos, mapper = by COLMAP, chained = "
         "by its "
-        "neighbours alone. Error: expected, one standard deviation. Support: share of its matches "
+        "neighbours alone, model 1 and on = in another sparse model. Error: expected, one standard "
+        "deviation. Support: share of its matches "
         "that obey the model. Exposure: brighter (+) or darker (-) than the reference photo.</p>"
         "<div class=\"table\"><table><thead><tr><th class=\"n\">No.</th><th>Photo</th>"
         "<th>Registered</th><th class=\"n\">Error, mm</th><th class=\"n\">Support, %</th>"

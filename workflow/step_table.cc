@@ -193,8 +193,16 @@ Step MakeAlign(Chain* chain) {
     AddLensOfPhotosAlone(chain, &line);
     step.notes.emplace_back("so few photos make no sparse model: each is placed by itself");
   } else {
-    AddOption("--input_path", chain->At("sparse/0"), &line);
-    step.inputs.push_back(chain->At("sparse/0"));
+    const std::vector<std::string> models = chain->SparseModels();
+    for (const std::string& model : models) {
+      AddOption("--input_path", model, &line);
+      step.inputs.push_back(model);
+    }
+    if (models.size() > 1) {
+      step.notes.push_back(std::to_string(models.size()) +
+                           " sparse models that nothing connects: each is put into the scan by "
+                           "itself");
+    }
     // Its matches tell which photos are right; those of panoramas are their faces'.
     if (!HasPanoramas(chain)) {
       AddOption("--database_path", chain->At("database.db"), &line);

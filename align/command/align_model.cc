@@ -1,8 +1,6 @@
 #include "align/command/align_model.h"
 
 #include <algorithm>
-#include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,364 +9,222 @@
 
 #include <fmt/core.h>
 
-#include "align/alignment.h"
-#include "align/automatic_alignment.h"
 #include "align/command/align_outputs.h"
-#include "align/command/alignment_report.h"
-#include "align/command/lens_report.h"
-#include "align/command/plane_bundle_report.h"
-#include "align/command/scan_reading.h"
-#include "align/command/search_report.h"
-#include "align/mirrored_reading.h"
+#include "align/command/one_model.h"
 #include "align/surface/scan_planes_report.h"
-#include "align/trust/photo_verdict.h"
-#include "colmap_ext/database.h"
-#include "colmap_ext/duplicate_photos.h"
-#include "colmap_ext/lens_labels.h"
-#include "colmap_ext/mapper_verdict.h"
-#include "colmap_ext/match_support.h"
-#include "colmap_ext/panorama_model.h"
+#include "colmap_ext/model_join.h"
 #include "core/commit_together.h"
 #include "core/error.h"
-#include "importers/photo_picks.h"
 
 namespace roomtex {
 namespace {
 
-// The planes of the scans (thesis 7.2), where they are asked for.
-std::vector<ScanPlane> PlanesOf(const AlignCommandOptions& a, const SurveyedScans& surveyed) {
-  if (!a.alignment.plane_constrained && a.planes_path.empty()) return {};
-  return surveyed.planes();
-}
+// One of several models, and what became of it.
+struct Attempt {
+  std::string path;
+  size_t num_images = 0;
+  Report report;
+  std::string refusal;
+  std::optional<AlignedModel> aligned;
 
-// What was searched for, from here on the attempt.
-void TakeAutomatic(AutomaticAlignment found, ScanReading* reading) {
-  reading->search = SearchToJson(found);
-  reading->attempt = std::move(found.attempt);
-}
-
-// Aligns without picks, or with few as a hint. A mirrored scan is read the other way, as below.
-void SearchScans(const AlignmentInput& input, const std::vector<NearHint>& near,
-                 const AlignmentOptions& options, bool may_turn, ScanReading* reading,
-                 const Command::Context& context) {
-  AutomaticAlignment found = AlignAutomatically(input, near, options, &context.progress);
-  const bool turns = found.attempt.says_mirrored && may_turn;
-  TakeAutomatic(std::move(found), reading);
-  if (!turns) return;
-  MirroredReading other;
-  other.scans = std::make_unique<const std::vector<Scan>>(MirrorScans(input.surveyed.scans()));
-  other.surveyed = std::make_unique<const SurveyedScans>(*other.scans, input.surveyed.options());
-  const AlignmentInput turned = input.With(input.model, *other.surveyed, input.picks);
-  AutomaticAlignment again = AlignAutomatically(turned, near, options, &context.progress);
-  if (!again.attempt.alignment) return;
-  reading->search = SearchToJson(again);
-  other.attempt = std::move(again.attempt);
-  other.evidence = "without picks, only the other reading fits the photos";
-  TakeMirroredReading(std::move(other), reading, context);
-}
-
-// Places of the scans in the photos that are known to stand somewhere: those that roomtex-mapper
-// holds there, in `model`, hold what the surface leaves open; those of a single standpoint, of
-// which only the poses in the file are known, put a model of any frame into the scan, its scale by
-// the depth of its points in them.
-std::vector<Pick> PicksOfKnownPhotos(const MapperVerdict& verdict, const SparseModel& model,
-                                     const Eigen::Vector3d& origin,
-                                     const std::vector<Scan>& scans) {
-  std::vector<PosedPhoto> photos;
-  const auto add = [&](const std::string& name, const Rigid* told) {
-    const SparseImage& image = *model.FindImage(name);
-    photos.push_back(
-        {name, model.cameras.at(image.camera_id), told ? *told : image.cam_from_model});
-  };
-  for (const std::string& name : verdict.photos_held) add(name, nullptr);
-  for (auto [name, cam_from_scan] : verdict.told_poses) {
-    cam_from_scan.translation += cam_from_scan.rotation * origin;
-    add(name, &cam_from_scan);
-  }
-  std::vector<Pick> picks;
-  for (const PhotoPick& pick : PicksOfPosedPhotos(photos, scans)) {
-    picks.push_back({pick.image_name, pick.x_in_img, pick.x_in_scan});
-  }
-  return picks;
-}
-
-// From rough poses of photos, by which roomtex-mapper has put the model into the scan's frame and
-// which hold nothing. False: that is not to be trusted, and the place has to be searched for.
-bool AlignFromKnownPoses(const AlignCommandOptions& a, const AlignmentInput& input,
-                         const AlignmentOptions& options, double known_rms, ScanReading* reading,
-                         const Command::Context& context) {
-  // Metres, one standard deviation: scanners know the places of their cameras to centimetres.
-  constexpr double kLeastSigma = 0.03;
-  AlignmentAttempt attempt;
-  attempt.alignment = AlignToScan(
-      input,
-      StartFromSimilarity(input.model, input.picks, Similarity(), std::max(kLeastSigma, known_rms)),
-      options, &context.progress);
-  if (!attempt.trusted() && !a.image_path.empty()) {
-    context.Warn("the model does not lie in the scan where the known poses put it (" +
-                 attempt.alignment->reasons[0] + "); its place is searched for");
-    return false;
-  }
-  reading->attempt = std::move(attempt);
-  return true;
-}
-
-// By the places of the scans in photos of a single standpoint. False: that is not to be trusted,
-// and the place has to be searched for.
-bool AlignFromOnePlace(const AlignCommandOptions& a, const AlignmentInput& input,
-                       const AlignmentOptions& options, ScanReading* reading,
-                       const Command::Context& context) {
-  std::string problem;
-  try {
-    reading->attempt = AttemptAlignment(input, options, &context.progress);
-    if (reading->attempt.trusted() || a.image_path.empty()) {
-      reading->search = {{"method", "known_poses"}, {"position_rms_m", nullptr}};
-      return true;
-    }
-    problem = reading->attempt.alignment ? reading->attempt.alignment->reasons[0]
-                                         : reading->attempt.refusal;
-  } catch (const InputError& error) {
-    if (a.image_path.empty()) throw;
-    problem = error.what();
-  }
-  context.Warn("the known poses do not put the model into the scan (" + problem +
-               "); its place is searched for");
-  return false;
-}
-
-// Aligns, and finds out whether the scan is mirrored: then reads it the other way, if nobody said
-// how and there is no other format among the scans, or says so.
-// known_rms: MapperVerdict's. one_place: the picks are those of known photos at one standpoint.
-void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
-                const std::vector<NearHint>& near, const std::optional<double>& known_rms,
-                bool one_place, ScanReading* reading, const Command::Context& context) {
-  const std::vector<PlacedScans::File>& files = reading->placed.files;
-  const bool may_turn = MayTurn(a, *reading);
-  AlignmentOptions options = a.alignment;
-  options.refine_intrinsics = RefineIntrinsicsFromWord(a.refine_intrinsics);
-  if (known_rms && input.picks.empty() && near.empty() &&
-      AlignFromKnownPoses(a, input, options, *known_rms, reading, context)) {
-    return;
-  }
-  if (one_place) {
-    if (AlignFromOnePlace(a, input, options, reading, context)) return;
-    static const std::vector<Pick> kNone;
-    return SearchScans(input.With(input.model, input.surveyed, kNone), near, options, may_turn,
-                       reading, context);
-  }
-  if (AreHints(input.picks)) {
-    return SearchScans(input, near, options, may_turn, reading, context);
-  }
-  AlignmentAttempt& attempt = reading->attempt;
-  attempt = AttemptAlignment(input, options, &context.progress);
-  if (attempt.says_mirrored && !may_turn) return;
-  MirroredReading found = FindMirroredReading(input, attempt, options, &context.progress);
-  if (found.kind == MirroredReading::Kind::kNone) return;
-  if (found.kind == MirroredReading::Kind::kScan && may_turn) {
-    TakeMirroredReading(std::move(found), reading, context);
-  } else if (!attempt.says_mirrored) {
-    const bool both = found.kind == MirroredReading::Kind::kScanAndPicks;
-    attempt.alignment.reset();
-    attempt.refusal = MirroredScan(files[0].path,
-                                   std::string("the scan is a mirror image of the room") +
-                                       (both ? ", and so are the picks: " : ": ") + found.evidence,
-                                   MirrorRemedy(input), !both)
-                          .what();
-  }
-}
-
-// What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
-// that it refused, and photos are judged here, too.
-void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment,
-                        const Command::Context& context) {
-  const std::string source = "roomtex-mapper did not trust the sparse model: ";
-  const bool mended =
-      alignment.lenses.mended || (alignment.adjusted() && alignment.adjustment.freed);
-  for (const std::string& reason : verdict.calibration) {
-    if (!mended) context.report.SetUntrusted(source + reason);
-  }
-  for (const std::string& reason : verdict.motion) context.report.SetUntrusted(source + reason);
-  for (const std::string& reason : verdict.photos) context.Warn(source + reason);
-}
-
-// What EXIF says of the photos' lenses, where the photos are given.
-LensLabels PhotoLabels(const SparseModel& model, const std::string& image_path) {
-  std::map<uint32_t, std::string> names;
-  for (const auto& [id, image] : model.images) names[id] = image.name;
-  return ReadLensLabels(names, image_path);
-}
-
-// Where the photos belong, besides the picks, which are checked: fewer than six are a hint where
-// there are photos to confirm what is found.
-std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,
-                                const SparseModel& model) {
-  if (a.picks_path.empty() || (AreHints(picks) && !a.image_path.empty())) {
-    CheckPickNames(a.picks_path, picks, model);
-  } else {
-    CheckPicksAgainstModel(a.picks_path, picks, model);
-  }
-  if (a.near.empty()) return {};
-  const NearHint near = ParseNearHint(a.near);
-  if (!AreHints(picks)) throw UsageError("--near is a hint for a search, which six picks need not");
-  if (model.FindImage(near.image_name) == nullptr) {
-    throw UsageError("--near names " + near.image_name + ", which is not in the sparse model");
-  }
-  return {near};
-}
-
-// Photos that say nothing new, until the others have found their places.
-struct DuplicatesAside {
-  std::map<uint32_t, uint32_t> photos;  // FindDuplicates()
-  SparseModel input;                    // with them; empty if there are none
+  bool trusted() const { return aligned.has_value() && report.trusted(); }
+  std::string Problem() const { return aligned ? report.reason() : refusal; }
 };
 
-// Takes them out of the model, which is said.
-DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vector<Pick>& picks,
-                                   const std::vector<NearHint>& near, SparseModel* model,
-                                   const Command::Context& context) {
-  std::set<std::string> kept(verdict.photos_held.begin(), verdict.photos_held.end());
-  for (const auto& [name, pose] : verdict.told_poses) kept.insert(name);
-  for (const Pick& pick : picks) kept.insert(pick.image_name);
-  for (const NearHint& hint : near) kept.insert(hint.image_name);
-  DuplicatesAside aside;
-  aside.photos = FindDuplicates(*model, kept);
-  if (aside.photos.empty()) return aside;
-  const auto& [id, of] = *aside.photos.begin();
-  context.Warn(
-      fmt::format("{} of {} photos show the same from the same place as another ({} as {}): "
-                  "they count once",
-                  aside.photos.size(), model->images.size(), model->images.at(id).name,
-                  model->images.at(of).name));
-  aside.input = std::move(*model);
-  *model = WithoutDuplicates(aside.input, aside.photos);
-  return aside;
+// Picks belong to the model that holds their photo, and so does a hint.
+void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
+             std::vector<ModelToAlign>* models) {
+  std::set<std::string> known;
+  for (ModelToAlign& one : *models) {
+    std::vector<Pick> own;
+    for (const Pick& pick : one.picks) {
+      if (one.model.FindImage(pick.image_name) == nullptr) continue;
+      known.insert(pick.image_name);
+      own.push_back(pick);
+    }
+    one.picks = std::move(own);
+  }
+  // The others are a mistake, which the first model's names tell.
+  for (size_t i = 0; i < picks.size(); ++i) {
+    const bool is_known = std::any_of(models->begin(), models->end(), [&](const auto& one) {
+      return std::any_of(one.picks.begin(), one.picks.end(),
+                         [&](const Pick& pick) { return pick.line == picks[i].line; });
+    });
+    if (!is_known) CheckPickNames(a.picks_path, {picks[i]}, (*models)[0].model);
+  }
+  if (a.near.empty()) {
+    for (ModelToAlign& one : *models) {
+      if (one.picks.empty()) one.options.picks_path.clear();
+    }
+    return;
+  }
+  const NearHint near = ParseNearHint(a.near);
+  for (ModelToAlign& one : *models) {
+    if (one.picks.empty()) one.options.picks_path.clear();
+    if (one.model.FindImage(near.image_name) == nullptr) one.options.near.clear();
+  }
+  if (std::all_of(models->begin(), models->end(),
+                  [](const ModelToAlign& one) { return one.options.near.empty(); })) {
+    throw UsageError("--near names " + near.image_name + ", which is in none of the sparse models");
+  }
 }
 
-// Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
-std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
-                                                   const Database* database,
-                                                   const SparseModel& aligned,
-                                                   const std::vector<Pick>& picks,
-                                                   const SurveyedScans& surveyed, double rms_px,
-                                                   const Command::Context& context) {
-  constexpr double kMostDoubtful = 0.34;
-  context.progress.Stage("single photos");
-  std::map<uint32_t, double> support;
-  if (database != nullptr) {
-    support = MatchSupport(*database, aligned, HypothesisOptions());
-    if (support.empty()) {
-      context.Warn(a.database_path +
-                   " holds no verified matches between photos of the model: none were asked");
+std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
+                                     const Command::Context& context) {
+  const std::vector<Pick> picks =
+      a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  std::vector<ModelToAlign> models;
+  bool any_known = false;
+  for (const std::string& path : a.input_paths) {
+    AlignCommandOptions own = a;
+    own.input_path = path;
+    models.push_back(ReadModelToAlign(own, picks, context));
+    const MapperVerdict& verdict = models.back().verdict;
+    any_known |= verdict.known_rms || !verdict.told_poses.empty();
+  }
+  if (!any_known) RequirePicksOrPhotos(a);
+  if (models.size() > 1) GiveOut(a, picks, &models);
+  for (ModelToAlign& one : models) {
+    one.near = ReadHints(one.options, one.picks, one.model);
+    one.told = LookForPhotos(a, one.model, context);
+  }
+  return models;
+}
+
+std::string ShortName(const Attempt& attempt) {
+  return fmt::format("{} ({} photos)", attempt.path, attempt.num_images);
+}
+
+// Each by itself. A model that lies in the scan says how the scans are to be read; the others do
+// not turn them any more.
+std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database* database,
+                               ScanReading* reading, const Command::Context& context) {
+  std::vector<Attempt> attempts(models.size());
+  bool may_turn = true;
+  for (size_t i = 0; i < models.size(); ++i) {
+    Attempt& attempt = attempts[i];
+    attempt.path = models[i].options.input_path;
+    attempt.num_images = models[i].model.images.size();
+    context.progress.Note(ShortName(attempt));
+    const Command::Context own{context.options, context.progress, attempt.report};
+    try {
+      const bool turns = may_turn && MayTurn(models[i].options, *reading);
+      attempt.aligned =
+          AlignOne(std::move(models[i]), database, turns, reading, &attempt.refusal, own);
+    } catch (const InputError& error) {
+      attempt.refusal = error.what();
+    } catch (const UsageError&) {  // RequirePicksOrPhotos()
+      attempt.refusal =
+          "none of the picks is in its photos, and without --image_path its place cannot be "
+          "searched for";
+    }
+    may_turn &= !attempt.trusted();
+  }
+  return attempts;
+}
+
+// The one that the report is of: the first that is trusted, else the first that has a place.
+const Attempt& MainOf(const std::vector<Attempt>& attempts) {
+  const auto trusted = std::find_if(attempts.begin(), attempts.end(),
+                                    [](const Attempt& attempt) { return attempt.trusted(); });
+  if (trusted != attempts.end()) return *trusted;
+  const auto placed = std::find_if(attempts.begin(), attempts.end(), [](const Attempt& attempt) {
+    return attempt.aligned.has_value();
+  });
+  return placed != attempts.end() ? *placed : attempts[0];
+}
+
+// The report's `models`.
+Json AttemptsToJson(const std::vector<Attempt>& attempts, const Attempt& main) {
+  Json json = Json::array();
+  for (const Attempt& attempt : attempts) {
+    Json one = attempt.report.keys();
+    for (const char* key : {"images", "planes"}) one.erase(key);
+    one["input_path"] = attempt.path;
+    one["num_images"] = attempt.num_images;
+    one["trusted"] = attempt.trusted();
+    one["reason"] = attempt.Problem();
+    one["joined"] = attempt.trusted() || (&attempt == &main && attempt.aligned);
+    json.push_back(one);
+  }
+  return json;
+}
+
+// Photos of the others beside those of the main one; of a photo in several models, the first
+// counts.
+SparseModel JoinTrusted(const std::vector<Attempt>& attempts, const Attempt& main, Json* images) {
+  std::vector<const SparseModel*> models = {&main.aligned->model};
+  std::set<std::string> names;
+  for (const Json& image : *images) names.insert(image["name"].get<std::string>());
+  for (const Attempt& attempt : attempts) {
+    if (&attempt == &main || !attempt.trusted()) continue;
+    models.push_back(&attempt.aligned->model);
+    for (const Json& image : attempt.report.keys().at("images")) {
+      if (names.insert(image["name"].get<std::string>()).second) images->push_back(image);
     }
   }
-  std::set<uint32_t> picked;
-  for (const Pick& pick : picks) {
-    const SparseImage* const image = aligned.FindImage(pick.image_name);
-    if (image != nullptr) picked.insert(image->image_id);
+  return JoinModels(models);
+}
+
+// What is said of several models becomes the report of one.
+void TakeOver(const std::vector<Attempt>& attempts, const Attempt& main,
+              const Command::Context& context) {
+  for (const auto& [key, value] : main.report.keys().items()) context.report[key] = value;
+  context.report["models"] = AttemptsToJson(attempts, main);
+  for (const Attempt& attempt : attempts) {
+    for (const std::string& warning : attempt.report.warnings()) {
+      context.report.AddWarning(attempt.path + ": " + warning);
+    }
   }
-  auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
-                            SurfaceTolerance(a.alignment.trust, surveyed.patches()),
-                            KeypointSigma(rms_px), support, picked);
-  size_t num_doubtful = 0;
-  for (const auto& [id, photo] : photos) {
-    if (photo.doubt.empty()) continue;
-    ++num_doubtful;
-    context.Warn(aligned.images.at(id).name +
-                 " is doubtful and takes no part in colours: " + photo.doubt);
+  if (!main.trusted()) {
+    context.report.SetUntrusted(ShortName(main) + ": " + main.Problem());
+    return;
   }
-  if (static_cast<double>(num_doubtful) > kMostDoubtful * static_cast<double>(photos.size())) {
-    context.report.SetUntrusted(
-        fmt::format("{} of {} photos are doubtful (the report's `images` say why): which of them "
-                    "are right cannot be told.",
-                    num_doubtful, photos.size()));
+  for (const Attempt& attempt : attempts) {
+    if (attempt.trusted()) continue;
+    context.Warn(ShortName(attempt) + " is left out, not to be trusted: " + attempt.Problem());
   }
-  return photos;
 }
 
 }  // namespace
 
 void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
   context.progress.Stage("read model");
-  std::vector<std::string> face_warnings;
-  SparseModel model = ReadModelOfPanoramas(a.input_path, a.panoramas_path, &face_warnings);
-  for (const std::string& warning : face_warnings) context.Warn(warning);
-  const MapperVerdict verdict = ReadMapperVerdict(a.input_path, model);
   // Opened now: what is no database is said before anything takes long.
   std::optional<Database> database;
   if (!a.database_path.empty()) database.emplace(a.database_path);
-  if (!verdict.known_rms && verdict.told_poses.empty()) RequirePicksOrPhotos(a);
-  std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
-  NamePicksAsInModel(model, &picks);
-  std::vector<NearHint> near = ReadHints(a, picks, model);
-  const std::set<std::string> told = LookForPhotos(a, model, context);
+  const Database* const matches = database ? &*database : nullptr;
+  std::vector<ModelToAlign> models = ReadModels(a, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);
-  reading.origin.MoveToLocal(&picks);
-  reading.origin.MoveToLocal(&near);
-  // A model that is in the scan's frame already moves about the same origin.
-  Similarity local_from_sparse;
-  if (verdict.known_rms) {
-    local_from_sparse.translation = -reading.origin.offset();
-    TransformModel(local_from_sparse, &model);
+  for (ModelToAlign& one : models) MoveToLocal(reading, &one);
+  std::set<std::string> told;
+  for (const ModelToAlign& one : models) told.insert(one.told.begin(), one.told.end());
+
+  std::string refusal;
+  std::optional<AlignedModel> aligned;
+  if (models.size() == 1) {
+    const bool may_turn = MayTurn(a, reading);
+    aligned = AlignOne(std::move(models[0]), matches, may_turn, &reading, &refusal, context);
+  } else {
+    std::vector<Attempt> attempts = AlignEach(std::move(models), matches, &reading, context);
+    const Attempt& main = MainOf(attempts);
+    refusal = ShortName(main) + ": " + main.refusal;
+    if (main.aligned) {
+      TakeOver(attempts, main, context);
+      aligned = *main.aligned;
+      aligned->model = JoinTrusted(attempts, main, &context.report["images"]);
+    } else {
+      context.report["models"] = AttemptsToJson(attempts, main);
+    }
   }
-  if (a.picks_path.empty() && near.empty()) {
-    picks = PicksOfKnownPhotos(verdict, model, reading.origin.offset(), reading.surveyed->scans());
-  }
-  const bool one_place = !picks.empty() && !verdict.told_poses.empty() && a.picks_path.empty();
-  if (!verdict.known_rms && !one_place) RequirePicksOrPhotos(a);
-  const DuplicatesAside duplicates = SetDuplicatesAside(verdict, picks, near, &model, context);
-  context.progress.Stage("planes");
-  PlanesOf(a, *reading.surveyed);
-  AlignmentInput input{model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
-  input.photo_labels = PhotoLabels(model, a.image_path);
-  input.lenses_refined = verdict.refined;
-  input.image_path = a.image_path;
-  input.num_threads = context.options.num_threads;
-  AlignScans(a, input, near, verdict.known_rms, one_place, &reading, context);
-  if (verdict.known_rms && reading.search.is_null() && a.picks_path.empty()) {
-    reading.search = {{"method", "known_poses"}, {"position_rms_m", *verdict.known_rms}};
-  }
-  context.report["search"] = reading.search;
-  const std::vector<ScanPlane> planes = PlanesOf(a, *reading.surveyed);
   CommitFilesAtEnd();
   if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), planes, context.options.num_threads,
-                    reading.origin.offset());
+    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), PlanesOf(a, *reading.surveyed),
+                    context.options.num_threads, reading.origin.offset());
   }
-  if (!reading.attempt.alignment) return WriteRefusal(a, reading.attempt.refusal, context);
-  Alignment& alignment = *reading.attempt.alignment;
-  for (const std::string& warning : alignment.warnings) context.Warn(warning);
-  for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
-  CarryMapperVerdict(verdict, alignment, context);
-
-  if (alignment.lenses.mended) model = *alignment.lenses.mended;
-  if (alignment.adjusted()) {
-    model = alignment.adjustment.bundle.model;
-  } else {
-    TransformModel(alignment.scan_from_sparse, &model);
-  }
-  for (Similarity* answer : {&alignment.scan_from_sparse, &alignment.start.scan_from_sparse}) {
-    *answer = *answer * local_from_sparse;  // from the model as it was read
-  }
-  const ReprojectionErrors after = UpdateReprojectionErrors(&model);
-  FillReport(alignment, after.rms_px, &context.report);
-  context.report["cameras"] = CamerasToJson(alignment);
-  auto photos = JudgeSinglePhotos(a, database ? &*database : nullptr, model, picks,
-                                  *reading.surveyed, after.rms_px, context);
-  context.report["planes"] = ScanPlanesToJson(planes, model);
-  SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  CompareWithPhotos(a, model, *reading.surveyed, told, context);
-  PutDuplicatesBack(duplicates.input, duplicates.photos, alignment.scan_from_sparse.scale, &model);
-  for (const auto& [id, of] : duplicates.photos) {
-    // They stand and fall together.
-    photos[id] = photos.at(of);
-    photos[id].duplicate_of = model.images.at(of).name;
-    const auto sigma = alignment.photo_sigmas.find(of);
-    if (sigma != alignment.photo_sigmas.end()) alignment.photo_sigmas[id] = sigma->second;
-  }
-  context.report["images"] = PhotosToJson(alignment, model);
-  AddVerdicts(photos, model, &context.report["images"]);
-  WriteAligned(a, model, alignment.scan_from_sparse, &reading, told, context);
+  if (!aligned) return WriteRefusal(a, refusal, context);
+  WriteAligned(a, std::move(aligned->model), aligned->local_from_sparse, &reading, told, context);
 }
 
 }  // namespace roomtex

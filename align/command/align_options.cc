@@ -15,11 +15,14 @@
 namespace roomtex {
 
 void AddOptions(AlignCommandOptions* a, Command* command) {
-  command->AddInputPath("input_path", &a->input_path,
-                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
-                        "--image_path that have six picks are placed each by its own; without "
-                        "picks, too, every photo by what it shows of the scan's intensity.",
-                        Command::Kind::kOptional);
+  command->AddInputPaths("input_path", &a->input_paths,
+                         "COLMAP's sparse model: a folder, .bin or .txt. Several (photos that "
+                         "nothing connects: sparse/0 sparse/1) are put into the scan each by "
+                         "itself, by its own picks or without, and those that are trusted are "
+                         "written as one. Without it the photos of "
+                         "--image_path that have six picks are placed each by its own; without "
+                         "picks, too, every photo by what it shows of the scan's intensity.",
+                         Command::Kind::kOptional);
   command->AddInputPaths(
       "scan_path", &a->scan_paths,
       "Range scan: .rtpi, .ptx, .e57, .pcd, .las, a mesh or a cloud. Not needed for "
@@ -101,7 +104,9 @@ void RequirePicksOrPhotos(const AlignCommandOptions& a) {
       "image_name,x,y,scan_x,scan_y,scan_z and six or more lines");
 }
 
-void CheckOptions(const AlignCommandOptions& a) {
+void CheckOptions(AlignCommandOptions* options) {
+  if (!options->input_paths.empty()) options->input_path = options->input_paths[0];
+  const AlignCommandOptions& a = *options;
   if (a.input_path.empty()) RequirePicksOrPhotos(a);
   std::vector<std::string> problems = a.scan_reader.Problems();
   AppendProblems(a.bound.Problems(), &problems);
@@ -130,7 +135,8 @@ void CheckOptions(const AlignCommandOptions& a) {
   RequireScans(a.scan_paths, a.input_path);
   ParseGeoOrigin(a.geo_origin);
   std::error_code ignored;
-  if (!a.input_path.empty() && std::filesystem::equivalent(a.input_path, a.output_path, ignored)) {
+  for (const std::string& path : a.input_paths) {
+    if (!std::filesystem::equivalent(path, a.output_path, ignored)) continue;
     throw UsageError(
         "--output_path is the same folder as --input_path: the input model is never "
         "overwritten");

@@ -15,6 +15,8 @@ namespace roomtex {
 class Command;
 
 struct AlignCommandOptions {
+  // Sparse models; input_path: the first, or the one that is aligned now; "" = there is none.
+  std::vector<std::string> input_paths;
   std::string input_path, picks_path, output_path, image_path, database_path, scan_poses;
   std::string panoramas_path;
   std::string geo_origin;
@@ -33,8 +35,9 @@ struct AlignCommandOptions {
 
 void AddOptions(AlignCommandOptions* a, Command* command);
 
-// Throws UsageError, InputError: what contradicts, is missing, or cannot be read or written.
-void CheckOptions(const AlignCommandOptions& a);
+// Sets input_path. Throws UsageError, InputError: what contradicts, is missing, or cannot be read
+// or written.
+void CheckOptions(AlignCommandOptions* a);
 // Throws UsageError. A model that lies in the scan's frame already needs neither.
 void RequirePicksOrPhotos(const AlignCommandOptions& a);
 

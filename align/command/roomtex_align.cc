@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
       "--output_path aligned");
   roomtex::AddOptions(&arguments, &command);
   return command.Run(argc, argv, [&arguments](const roomtex::Command::Context& context) {
-    roomtex::CheckOptions(arguments);
+    roomtex::CheckOptions(&arguments);
     if (!arguments.input_path.empty()) {
       roomtex::AlignModel(arguments, context);
     } else if (!arguments.picks_path.empty()) {

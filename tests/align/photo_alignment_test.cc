@@ -6,6 +6,7 @@
 #include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/support/matchers.h"
+#include "tests/support/temp_folder.h"
 
 namespace roomtex {
 namespace {
