@@ -105,6 +105,7 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
     Attempt& attempt = attempts[i];
     attempt.path = models[i].options.input_path;
     attempt.num_images = models[i].model.images.size();
+    context.progress.Finish();
     context.progress.Note(ShortName(attempt));
     const Command::Context own{context.options, context.progress, attempt.report};
     try {
