@@ -44,6 +44,7 @@ MapperVerdict ReadMapperVerdict(const std::string& folder, const SparseModel& mo
     return verdict;
   }
   verdict.refined = json.value("refined_intrinsics", Json()) == true;
+  verdict.is_alike = json.value("is_alike", Json()) == true;
   const Json known = json.value("known", Json());
   if (known.is_object() && known.value("placed", Json()) == true) {
     const Json rms = known.value("position_rms_m", Json());

@@ -16,6 +16,8 @@ inline constexpr char kMapperReportName[] = "roomtex-mapper.json";
 
 struct MapperVerdict {
   bool refined = false;  // the lenses are what the mapper made of them, not what was told
+  // There are models of other rooms that are alike, of the same photos.
+  bool is_alike = false;
   // The mapper's reasons not to trust the model, in sentences, by what they are about.
   std::vector<std::string> calibration;  // the lenses
   std::vector<std::string> photos;       // single photos, or how many there are

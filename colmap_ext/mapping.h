@@ -77,6 +77,9 @@ struct MappedModel {
   const MapperResult* result;
   const ModelCheck* check;
   bool is_room;  // one of other_rooms
+
+  // It shows one of several rooms that are alike.
+  bool IsAlike() const { return !pass->best[0].other_rooms.empty(); }
 };
 // Of the passes one after the other, each with its other rooms behind it.
 std::vector<MappedModel> ListModels(const std::vector<MappingPass>& passes);

@@ -95,7 +95,7 @@ Json ModelJson(const MappedModel& model) {
   json["num_points"] = model.result->model.points.size();
   json["mean_reprojection_error_px"] = model.result->mean_reprojection_error_px;
   json["refined_intrinsics"] = model.pass->refine;
-  json["is_alike"] = model.is_room;
+  json["is_alike"] = model.IsAlike();
   json["images"] = NamesOf(model.result->model);
   return json;
 }
@@ -154,6 +154,7 @@ void FillMappingReport(const std::vector<MappingPass>& passes, const MatchedImag
     }
     r["rooms"] = rooms;
   }
+  r["is_alike"] = models[0].IsAlike();
   r["refined_intrinsics"] = pass.refine;
   AddLenses(pass, report);
   if (models.size() > 1) {

@@ -191,7 +191,7 @@ Json ReportOfModel(const MappedModel& model, size_t number, const ModelTrust& tr
   Json json;
   json["command"] = "roomtex-mapper";
   json["model"] = number;
-  json["is_alike"] = model.is_room;
+  json["is_alike"] = model.IsAlike();
   json["num_reg_images"] = model.result->model.images.size();
   json["num_points"] = model.result->model.points.size();
   json["mean_reprojection_error_px"] = model.result->mean_reprojection_error_px;

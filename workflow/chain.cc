@@ -132,7 +132,7 @@ std::vector<std::string> Chain::SparseModels() const {
     const std::string model = At("sparse/" + std::to_string(number));
     const Json report = ReadJsonFile(model + "/roomtex-mapper.json");
     if (!report.is_object() || report.value("model", Json()) != number) break;
-    if (report.value("is_alike", Json()) == false) models.push_back(model);
+    models.push_back(model);
   }
   return models;
 }

@@ -54,8 +54,8 @@ class Chain {
   std::string ScannerFolder() const;
   // cameras[] of the report of roomtex-import; empty before it has run, and without poses.
   Json ScannerCameras() const;
-  // What roomtex-mapper made: sparse/0, and those of photos that nothing connects to its own; not
-  // those of rooms that are alike, of which one is the scanned one.
+  // What roomtex-mapper made: sparse/0, and those of photos that nothing connects to its own, or of
+  // rooms that are alike.
   std::vector<std::string> SparseModels() const;
   // Their model, for roomtex-mapper, also before it is there; "" = none.
   std::string KnownPath() const;

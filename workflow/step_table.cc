@@ -200,8 +200,7 @@ Step MakeAlign(Chain* chain) {
     }
     if (models.size() > 1) {
       step.notes.push_back(std::to_string(models.size()) +
-                           " sparse models that nothing connects: each is put into the scan by "
-                           "itself");
+                           " sparse models: each is put into the scan by itself");
     }
     // Its matches tell which photos are right; those of panoramas are their faces'.
     if (!HasPanoramas(chain)) {

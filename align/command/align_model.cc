@@ -15,6 +15,8 @@
 #include "colmap_ext/model_join.h"
 #include "core/commit_together.h"
 #include "core/error.h"
+#include "core/scan.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -23,6 +25,7 @@ namespace {
 struct Attempt {
   std::string path;
   size_t num_images = 0;
+  bool is_alike = false;  // MapperVerdict's
   Report report;
   std::string refusal;
   std::optional<AlignedModel> aligned;
@@ -95,6 +98,57 @@ std::string ShortName(const Attempt& attempt) {
   return fmt::format("{} ({} photos)", attempt.path, attempt.num_images);
 }
 
+// Of the places where photos and scan can be compared, those that agree; none if nobody compared.
+double AgreeingShare(const Attempt& attempt) {
+  const Json& keys = attempt.report.keys();
+  const Json agreement = keys.value("agreement", Json());
+  if (!agreement.is_object()) return 0;
+  const Json share = agreement["gradient_shift"].value("share", Json());
+  return share.is_number() ? share.get<double>() : 0;
+}
+
+// Do most of the photos of b stand among those of a?
+bool StandsAmong(const SparseModel& b, const SparseModel& a) {
+  constexpr double kMargin = 0.5;  // metres
+  Bounds among;
+  for (const auto& [id, image] : a.images) {
+    const Eigen::Vector3d centre = image.cam_from_model.TargetOriginInSource();
+    among.min = among.min.cwiseMin(centre - Eigen::Vector3d::Constant(kMargin));
+    among.max = among.max.cwiseMax(centre + Eigen::Vector3d::Constant(kMargin));
+  }
+  const auto num_inside = std::count_if(b.images.begin(), b.images.end(), [&](const auto& one) {
+    const Eigen::Vector3d centre = one.second.cam_from_model.TargetOriginInSource();
+    return (centre.array() >= among.min.array()).all() &&
+           (centre.array() <= among.max.array()).all();
+  });
+  return 2 * num_inside > static_cast<long>(b.images.size());
+}
+
+// Of rooms that are alike only one stands in one place of the scan: the one whose photos show more
+// of what the scan has there.
+void DoubtRivals(std::vector<Attempt>* attempts) {
+  std::vector<Attempt*> ranked;
+  for (Attempt& attempt : *attempts) {
+    if (attempt.trusted() && attempt.is_alike) ranked.push_back(&attempt);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Attempt* a, const Attempt* b) {
+    return AgreeingShare(*a) > AgreeingShare(*b);
+  });
+  for (size_t i = 1; i < ranked.size(); ++i) {
+    const SparseModel& model = ranked[i]->aligned->model;
+    const auto rival = std::find_if(
+        ranked.begin(), ranked.begin() + static_cast<long>(i), [&](const Attempt* other) {
+          const SparseModel& there = other->aligned->model;
+          return other->trusted() && (StandsAmong(model, there) || StandsAmong(there, model));
+        });
+    if (rival == ranked.begin() + static_cast<long>(i)) continue;
+    ranked[i]->report.SetUntrusted(fmt::format(
+        "it fits where {} lies, which shows a room that is alike, and {} of the places "
+        "that can be compared agree with the scan, {} there.",
+        (*rival)->path, Percent(AgreeingShare(*ranked[i])), Percent(AgreeingShare(**rival))));
+  }
+}
+
 // Each by itself. A model that lies in the scan says how the scans are to be read; the others do
 // not turn them any more.
 std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database* database,
@@ -105,6 +159,7 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
     Attempt& attempt = attempts[i];
     attempt.path = models[i].options.input_path;
     attempt.num_images = models[i].model.images.size();
+    attempt.is_alike = models[i].verdict.is_alike;
     context.progress.Finish();
     context.progress.Note(ShortName(attempt));
     const Command::Context own{context.options, context.progress, attempt.report};
@@ -121,6 +176,7 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
     }
     may_turn &= !attempt.trusted();
   }
+  DoubtRivals(&attempts);
   return attempts;
 }
 

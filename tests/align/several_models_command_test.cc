@@ -134,6 +134,25 @@ TEST_F(SeveralModels, WhereNoneIsTrustedTheFirstSaysWhy) {
   EXPECT_THAT(Report()["models"], SizeIs(2));
 }
 
+// As roomtex-mapper says of photos of a hotel's rooms: both fit the scan of one.
+TEST_F(SeveralModels, OfRoomsThatAreAlikeOnlyOneStandsInOnePlace) {
+  const auto say_alike = [&](const std::string& name, const SparseModel& model) {
+    const Json json = {{"num_reg_images", model.images.size()},
+                       {"num_points", model.points.size()},
+                       {"is_alike", true}};
+    WriteBytes(files_.folder / (name + "/roomtex-mapper.json"), json.dump());
+  };
+  say_alike("0", first_);
+  say_alike("1", second_);
+  const CommandResult result = AlignWith({PicksOf(first_), PicksOf(second_)});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadSparseModel(files_.output_path).images.size(), first_.images.size());
+  const Json report = Report();
+  EXPECT_TRUE(report["models"][0]["joined"].get<bool>());
+  EXPECT_FALSE(report["models"][1]["joined"].get<bool>());
+  EXPECT_THAT(report["models"][1]["reason"].get<std::string>(), HasSubstr("a room that is alike"));
+}
+
 TEST_F(SeveralModels, APickInNoneOfThemGetsASentence) {
   std::vector<Pick> picks = PicksOf(first_);
   picks[3].image_name = "photo_0l3.jpg";

@@ -67,6 +67,8 @@ TEST_F(MapperModels, GivesRoomsThatAreAlikeModelsOfTheirOwn) {
   EXPECT_GE(of_room["check"]["num_pairs"].get<int>(), 2) << of_room;
   EXPECT_TRUE(of_room["check"]["contradicting"].empty());
   EXPECT_TRUE(of_room["reasons"].empty());
+  EXPECT_TRUE(of_room["is_alike"].get<bool>());
+  EXPECT_TRUE(Report()["is_alike"].get<bool>());
   EXPECT_GT(Report()["images"][2]["match_support"].get<double>(), 0.9) << "by those of its room";
   ExpectNoScratch();
 
