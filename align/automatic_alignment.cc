@@ -36,18 +36,6 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
 // not known of any, and neighbouring ones are off together.
 constexpr size_t kMostCorners = 200, kFewCorners = 30;
 
-// The surface leaves something open, so that it does not hold the model there, or it drew the model
-// away from where the photos confirmed the start.
-bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
-                  const SparseModel& model) {
-  constexpr double kDrawnAway = 2;  // times what the corners were off
-  const AlignmentFit& fit = alignment.fit;
-  if (!fit.surface.converged || !alignment.open.None() || !fit.surface.covariance.allFinite()) {
-    return true;
-  }
-  return CornerSigma(corners, model, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
-}
-
 // On the surface; where that does not hold the model, by what the photos show of the scan's
 // intensity as well, if they confirm the start.
 Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& found,
@@ -85,6 +73,22 @@ bool IsWorthALook(StartVerdict::Kind kind) {
 }
 
 }  // namespace
+
+bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
+                  const SparseModel& model) {
+  constexpr double kDrawnAway = 2;  // times what the corners were off
+  // Metres at the photos, one standard deviation, and times what model and scan disagree by.
+  constexpr double kHeldByOnePart = 0.02, kBeyondDisagreement = 3;
+  const AlignmentFit& fit = alignment.fit;
+  if (!fit.surface.converged || !alignment.open.None() || !fit.surface.covariance.allFinite()) {
+    return true;
+  }
+  if (alignment.expected_error.at_cameras >
+      std::max(kHeldByOnePart, kBeyondDisagreement * alignment.disagreement.rms)) {
+    return true;
+  }
+  return CornerSigma(corners, model, alignment.scan_from_sparse) > kDrawnAway * sigma_px;
+}
 
 bool AreHints(const std::vector<Pick>& picks) {
   return std::count_if(picks.begin(), picks.end(),

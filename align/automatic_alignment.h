@@ -23,6 +23,13 @@ struct AutomaticAlignment {
 // Fewer picks than fix a pose, so that they can only be a hint.
 bool AreHints(const std::vector<Pick>& picks);
 
+// Whether an alignment has to be held by corners that photos show where the scan has them: the
+// surface leaves something open, or it holds the model by a part of the room alone, without which
+// the fit lies elsewhere; or it drew the model away from where the photos confirmed the start.
+// sigma_px: CornerSigma() there.
+bool NeedsCorners(const Alignment& alignment, const std::vector<Pick>& corners, double sigma_px,
+                  const SparseModel& model);
+
 // input.picks: hints, may be empty. near: names must be in the model.
 AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
                                       const std::vector<NearHint>& near,

@@ -298,6 +298,23 @@ TEST(AutomaticAlignment, PhotosThatArePlacedElsewhereSpeakAgainstThoseThatAgree)
   EXPECT_FALSE(StandsOut(evidence, options));
 }
 
+// 0.36 m was expected of a room where one part alone faced one of the ways, and 16 mm were true.
+TEST(AutomaticAlignment, PhotosHoldWhatOnePartOfTheRoomAloneHolds) {
+  Alignment alignment;
+  alignment.fit.surface.converged = true;
+  alignment.fit.surface.covariance.setIdentity();
+  const auto needs = [&](double expected, double disagreement) {
+    alignment.expected_error.at_cameras = expected;
+    alignment.disagreement.rms = disagreement;
+    return NeedsCorners(alignment, {}, 1, SparseModel());
+  };
+  EXPECT_FALSE(needs(0.004, 0.001));
+  EXPECT_TRUE(needs(0.084, 0.003));
+  EXPECT_FALSE(needs(0.045, 0.030)) << "a scan that drifts: corners are off there, too";
+  alignment.open.slides.emplace_back(0, 0, 1);
+  EXPECT_TRUE(needs(0.004, 0.001));
+}
+
 TEST(AutomaticAlignCommand, PhotosHoldTheHeightThatWallsLeaveOpen) {
   const FolderWithPhotos& folder = FolderWithPhotos::Get();
   SparseModel walls = folder.one.model;
