@@ -162,6 +162,11 @@ class ReportMaker {
     }
     Fact("Photos registered", registered,
          Number(registered, 0) + " of " + Number(NumberAt(mapper_, {"num_images"}), 0), &facts);
+    if (At(align_, {"models"}).is_array() && At(align_, {"images"}).is_array()) {
+      const auto placed = static_cast<double>(At(align_, {"images"}).size());
+      Fact("Photos placed in the scan", placed, Number(placed, 0) + " of " + Number(registered, 0),
+           &facts);
+    }
     const double mm = NumberAt(align_, {"expected_error", "at_cameras_mm"});
     Fact("Expected error at the photos", mm, Millimetres(mm), &facts);
     const double corner = NumberAt(align_, {"expected_error", "at_far_corner_mm"});
@@ -213,6 +218,13 @@ class ReportMaker {
       const Json model = photo.value("model", Json());
       if (model.is_number() && model != 0) {
         photo["registered_by"] = "model " + std::to_string(model.get<int>());
+      }
+    }
+    if (At(align_, {"models"}).is_array()) {
+      for (auto& [name, photo] : photos) {
+        if (photo.value("model", Json()).is_number() && !photo.contains("expected_error_mm")) {
+          photo["left_out"] = "its sparse model has no place in the scan that can be trusted";
+        }
       }
     }
     for (const Json* report : {&align_, &texture_}) {
