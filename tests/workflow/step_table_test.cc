@@ -201,6 +201,22 @@ TEST_F(StepTableTest, ThePicksThatAreThereAreUsed) {
   EXPECT_THAT(Line("align"), HasSubstr("--picks_path mine.csv"));
 }
 
+TEST_F(StepTableTest, AllModelsOfTheMapperArePutIntoTheScan) {
+  AddPhotos("a", 12, 64);
+  const auto model = [&](int number) {
+    return std::string(folder_ / ("result/sparse/" + std::to_string(number)));
+  };
+  const auto make = [&](int number, int said) {
+    fs::create_directories(model(number));
+    WriteBytes(model(number) + "/roomtex-mapper.json", "{\"model\": " + std::to_string(said) + "}");
+  };
+  make(1, 1);
+  make(2, 1);  // a copy that somebody made
+  EXPECT_THAT(Line("align"), HasSubstr("--input_path " + model(0) + " --input_path " + model(1)));
+  EXPECT_THAT(Line("align"), Not(HasSubstr(model(2))));
+  EXPECT_THAT(Make("align").inputs, Contains(model(1)));
+}
+
 TEST_F(StepTableTest, OnePhotoIsPlacedByItselfWithoutAModel) {
   AddPhotos("a", 1, 64);
   options_.camera_model = "OPENCV";
