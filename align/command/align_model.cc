@@ -34,42 +34,36 @@ struct Attempt {
   std::string Problem() const { return aligned ? report.reason() : refusal; }
 };
 
-// Picks belong to the model that holds their photo, and so does a hint.
+// Picks belong to the model that holds their photo, and so does a hint. Throws InputError for a pick
+// and UsageError for a hint whose photo no model holds.
 void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
              std::vector<ModelToAlign>* models) {
-  std::set<std::string> known;
+  std::set<long> lines;  // of picks that have a photo
   for (ModelToAlign& one : *models) {
     std::vector<Pick> own;
     for (const Pick& pick : one.picks) {
       if (one.model.FindImage(pick.image_name) == nullptr) continue;
-      known.insert(pick.image_name);
+      lines.insert(pick.line);
       own.push_back(pick);
     }
     one.picks = std::move(own);
-  }
-  // The others are a mistake, which the first model's names tell.
-  for (size_t i = 0; i < picks.size(); ++i) {
-    const bool is_known = std::any_of(models->begin(), models->end(), [&](const auto& one) {
-      return std::any_of(one.picks.begin(), one.picks.end(),
-                         [&](const Pick& pick) { return pick.line == picks[i].line; });
-    });
-    if (!is_known) CheckPickNames(a.picks_path, {picks[i]}, (*models)[0].model);
-  }
-  if (a.near.empty()) {
-    for (ModelToAlign& one : *models) {
-      if (one.picks.empty()) one.options.picks_path.clear();
-    }
-    return;
-  }
-  const NearHint near = ParseNearHint(a.near);
-  for (ModelToAlign& one : *models) {
     if (one.picks.empty()) one.options.picks_path.clear();
-    if (one.model.FindImage(near.image_name) == nullptr) one.options.near.clear();
   }
-  if (std::all_of(models->begin(), models->end(),
-                  [](const ModelToAlign& one) { return one.options.near.empty(); })) {
-    throw UsageError("--near names " + near.image_name + ", which is in none of the sparse models");
+  for (const Pick& pick : picks) {
+    if (lines.count(pick.line) == 0) {
+      CheckPickNames(a.picks_path, {pick}, (*models)[0].model, "in any of the sparse models");
+    }
   }
+  if (a.near.empty()) return;
+  const NearHint near = ParseNearHint(a.near);
+  bool is_known = false;
+  for (ModelToAlign& one : *models) {
+    const bool is_here = one.model.FindImage(near.image_name) != nullptr;
+    if (!is_here) one.options.near.clear();
+    is_known |= is_here;
+  }
+  if (is_known) return;
+  throw UsageError("--near names " + near.image_name + ", which is in none of the sparse models");
 }
 
 std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
