@@ -34,8 +34,8 @@ struct Attempt {
   std::string Problem() const { return aligned ? report.reason() : refusal; }
 };
 
-// Picks belong to the model that holds their photo, and so does a hint. Throws InputError for a pick
-// and UsageError for a hint whose photo no model holds.
+// Picks belong to the model that holds their photo, and so does a hint. Throws InputError for a
+// pick and UsageError for a hint whose photo no model holds.
 void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
              std::vector<ModelToAlign>* models) {
   std::set<long> lines;  // of picks that have a photo

@@ -158,7 +158,9 @@ TEST_F(SeveralModels, APickInNoneOfThemGetsASentence) {
   picks[3].image_name = "photo_0l3.jpg";
   const CommandResult result = AlignWith({picks});
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("photo_0l3.jpg"));
+  EXPECT_THAT(result.err, HasSubstr("photo_0l3.jpg is not in any of the sparse models"));
+  const CommandResult hint = files_.Align("--near nobody.jpg,1,2,3");
+  EXPECT_NE(hint.exit_code, 0);
   EXPECT_FALSE(std::filesystem::exists(files_.output_path));
 }
 
