@@ -159,8 +159,10 @@ TEST_F(SeveralModels, APickInNoneOfThemGetsASentence) {
   const CommandResult result = AlignWith({picks});
   EXPECT_EQ(result.exit_code, 3) << result.err;
   EXPECT_THAT(result.err, HasSubstr("photo_0l3.jpg is not in any of the sparse models"));
+  WritePicks(files_.picks_path, PicksOf(first_));
   const CommandResult hint = files_.Align("--near nobody.jpg,1,2,3");
-  EXPECT_NE(hint.exit_code, 0);
+  EXPECT_EQ(hint.exit_code, 2);
+  EXPECT_THAT(hint.err, HasSubstr("nobody.jpg, which is in none of the sparse models"));
   EXPECT_FALSE(std::filesystem::exists(files_.output_path));
 }
 
