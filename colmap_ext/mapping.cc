@@ -288,6 +288,17 @@ bool Mapping::IsContradicted(const MappingPass& pass) const {
   return contradicted && IsDetermined(pass.lenses);
 }
 
+InitOptions Mapping::InitOfGroup(const MatchedImages& images) const {
+  InitOptions init = options_.init;
+  for (const std::string* name : {&options_.init.image_name1, &options_.init.image_name2}) {
+    if (!name->empty() && images.FindImage(*name) == nullptr) {
+      init.image_name1.clear();
+      init.image_name2.clear();
+    }
+  }
+  return init;
+}
+
 MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   const int number = ++num_passes_;
   const std::string database_copy = scratch_ / ("database_" + std::to_string(number) + ".db");
@@ -310,8 +321,10 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   pass.mapper = std::make_unique<MapperRun>(&colmap_, database_copy, options_.image_path, folder,
                                             mapper_options_);
   context_.progress.Stage("initialise");
+  MappingOptions of_group = options_;
+  of_group.init = InitOfGroup(*pass.images);
   pass.best =
-      TrySeeds(database_, pass.images.get(), pass.mapper.get(), options_, context_, &pass.trials);
+      TrySeeds(database_, pass.images.get(), pass.mapper.get(), of_group, context_, &pass.trials);
   if (!pass.best.empty()) {
     context_.progress.Stage("check lenses");
     pass.lenses = CheckLenses(pass.model(), labels_, RefineIntrinsics::kAuto);
@@ -330,7 +343,8 @@ std::vector<MappingPass> Mapping::Run() {
     }
     MappingPass pass = MapGroup();
     for (const Json& trial : pass.trials) trials_.push_back(trial);
-    if (pass.best.empty() || (next > 0 && pass.model().images.size() < kFewestOfModel)) continue;
+    if (pass.best.empty()) continue;
+    if (!passes.empty() && pass.model().images.size() < kFewestOfModel) continue;
     LearnLenses(pass);
     if (options_.map_all_groups) {
       std::set<uint32_t> rest = photos_;
@@ -378,7 +392,8 @@ MappingPass Mapping::MapGroup() {
     context_.progress.Stage("known poses");
     MappingOutcome& outcome = pass.best[0];
     outcome.known = PlaceByKnownPhotos(known, pass.plan.images(), pass.plan.cameras(),
-                                       scratch_ / "known", pass.mapper.get(), &outcome.result);
+                                       scratch_ / ("known_" + std::to_string(num_passes_)),
+                                       pass.mapper.get(), &outcome.result);
   }
   return pass;
 }

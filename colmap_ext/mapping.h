@@ -116,6 +116,8 @@ class Mapping {
   MappingPass MapAsLensesAre();
   LensPlan PlanLenses() const;
   bool IsCalibrated(const LensPlan& plan) const;
+  // Photos to start from that are told are those of their own group.
+  InitOptions InitOfGroup(const MatchedImages& images) const;
   // False: nothing was to be left out, or could be.
   bool LeaveOutDoubtful(MappingPass* pass) const;
   // True: there were several, and the model is that of one.

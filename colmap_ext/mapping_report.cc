@@ -45,12 +45,15 @@ std::string ReasonOf(uint32_t image_id, const PlaceOfPhoto& place,
                                   : "too little connects it to model 0") +
            where;
   }
+  bool is_of_a_group = false;
   for (const MappingPass& pass : passes) {
     const auto& reasons = pass.best[0].reasons;
     const auto reason = reasons.find(image_id);
     if (reason != reasons.end()) return reason->second;
+    is_of_a_group |= pass.images->images().count(image_id) > 0;
   }
-  return "too few points of the model for colmap mapper, and --Chain.enabled 0";
+  return is_of_a_group ? "too few points of the model for colmap mapper, and --Chain.enabled 0"
+                       : "too few photos are connected with it, or no model came of them";
 }
 
 // How a photo was registered, or why it was not.

@@ -35,24 +35,30 @@ struct Attempt {
 };
 
 // Picks belong to the model that holds their photo, and so does a hint. Throws InputError for a
-// pick and UsageError for a hint whose photo no model holds.
+// pick whose photo no model holds, or several under other names, and UsageError for such a hint.
 void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
              std::vector<ModelToAlign>* models) {
-  std::set<long> lines;  // of picks that have a photo
+  std::vector<std::string> photos;  // of the picks
+  for (size_t i = 0; i < picks.size(); ++i) {
+    std::set<std::string> names;  // NamePicksAsInModel() of each model
+    for (const ModelToAlign& one : *models) {
+      const std::string& name = one.picks[i].image_name;
+      if (one.model.FindImage(name) != nullptr) names.insert(name);
+    }
+    if (names.count(picks[i].image_name) > 0) names = {picks[i].image_name};
+    if (names.size() != 1) {
+      CheckPickNames(a.picks_path, {picks[i]}, (*models)[0].model, "in any of the sparse models");
+    }
+    photos.push_back(*names.begin());
+  }
   for (ModelToAlign& one : *models) {
     std::vector<Pick> own;
-    for (const Pick& pick : one.picks) {
-      if (one.model.FindImage(pick.image_name) == nullptr) continue;
-      lines.insert(pick.line);
-      own.push_back(pick);
+    for (size_t i = 0; i < picks.size(); ++i) {
+      const Pick& pick = one.picks[i];
+      if (pick.image_name == photos[i] && one.model.FindImage(photos[i])) own.push_back(pick);
     }
     one.picks = std::move(own);
     if (one.picks.empty()) one.options.picks_path.clear();
-  }
-  for (const Pick& pick : picks) {
-    if (lines.count(pick.line) == 0) {
-      CheckPickNames(a.picks_path, {pick}, (*models)[0].model, "in any of the sparse models");
-    }
   }
   if (a.near.empty()) return;
   const NearHint near = ParseNearHint(a.near);
@@ -154,6 +160,7 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
     attempt.path = models[i].options.input_path;
     attempt.num_images = models[i].model.images.size();
     attempt.is_alike = models[i].verdict.is_alike;
+    const bool is_strict = models[i].options.strict;
     context.progress.Finish();
     context.progress.Note(ShortName(attempt));
     const Command::Context own{context.options, context.progress, attempt.report};
@@ -162,6 +169,7 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
       attempt.aligned =
           AlignOne(std::move(models[i]), database, turns, reading, &attempt.refusal, own);
     } catch (const InputError& error) {
+      if (is_strict) throw;
       attempt.refusal = error.what();
     } catch (const UsageError&) {  // RequirePicksOrPhotos()
       attempt.refusal =
@@ -228,7 +236,8 @@ void TakeOver(const std::vector<Attempt>& attempts, const Attempt& main,
     }
   }
   if (!main.trusted()) {
-    context.report.SetUntrusted(ShortName(main) + ": " + main.Problem());
+    // Without a place WriteRefusal() says it.
+    if (main.aligned) context.report.SetUntrusted(ShortName(main) + ": " + main.Problem());
     return;
   }
   for (const Attempt& attempt : attempts) {
@@ -261,12 +270,10 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
     std::vector<Attempt> attempts = AlignEach(std::move(models), matches, &reading, context);
     const Attempt& main = MainOf(attempts);
     refusal = ShortName(main) + ": " + main.refusal;
+    TakeOver(attempts, main, context);
     if (main.aligned) {
-      TakeOver(attempts, main, context);
       aligned = *main.aligned;
       aligned->model = JoinTrusted(attempts, main, &context.report["images"]);
-    } else {
-      context.report["models"] = AttemptsToJson(attempts, main);
     }
   }
   CommitFilesAtEnd();

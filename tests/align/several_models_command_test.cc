@@ -166,5 +166,23 @@ TEST_F(SeveralModels, APickInNoneOfThemGetsASentence) {
   EXPECT_FALSE(std::filesystem::exists(files_.output_path));
 }
 
+// COLMAP names photos by their folders, people who pick may not: of two rooms it could be either.
+TEST_F(SeveralModels, APickWhosePhotoCouldBeInTwoGetsASentence) {
+  const std::vector<Pick> picks = PicksOf(first_);
+  const auto rename = [&](SparseModel model, const std::string& folder, const std::string& name) {
+    SparseImage& image = model.images.begin()->second;
+    image.name = folder + "/" + name;
+    WriteSparseModel(model, files_.folder / folder);
+  };
+  rename(first_, "0", "picked.jpg");
+  rename(second_, "1", "picked.jpg");
+  std::vector<Pick> of_either = picks;
+  for (Pick& pick : of_either) pick.image_name = "picked.jpg";
+  const CommandResult result = AlignWith({of_either});
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("picked.jpg is not in any of the sparse models"));
+  EXPECT_THAT(result.err, HasSubstr("0/picked.jpg"));
+}
+
 }  // namespace
 }  // namespace roomtex

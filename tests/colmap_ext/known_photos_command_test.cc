@@ -1,7 +1,9 @@
 // roomtex-mapper with a scanner's own photos among the user's, with the installed COLMAP.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -100,6 +102,25 @@ TEST_F(KnownPhotosCommand, PutTheModelWhereTheyStand) {
   EXPECT_EQ(known["num_agreeing"], 4);
   EXPECT_LT(known["position_rms_m"], 0.005);
   ASSERT_TRUE(ReadMapperVerdict(folder_ / "sparse/0", model).known_rms);
+}
+
+TEST_F(KnownPhotosCommand, PutEveryGroupWhereTheyStand) {
+  views_.pairs.erase(std::remove_if(views_.pairs.begin(), views_.pairs.end(),
+                                    [](const DatabasePair& pair) {
+                                      return (pair.image_id1 <= 4) != (pair.image_id2 <= 4);
+                                    }),
+                     views_.pairs.end());
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::set<uint32_t> photos;
+  for (const char* name : {"sparse/0", "sparse/1"}) {
+    const SparseModel model = ReadSparseModel(folder_ / name);
+    ASSERT_EQ(model.images.size(), 4u);
+    for (const auto& [id, image] : model.images) photos.insert(id);
+    ExpectNearTruth(model, 0.02);
+    EXPECT_TRUE(ReadMapperVerdict(folder_ / name, model).known_rms) << name;
+  }
+  EXPECT_EQ(photos.size(), 8u);
 }
 
 TEST_F(KnownPhotosCommand, OneThatIsToldWronglyIsNamed) {

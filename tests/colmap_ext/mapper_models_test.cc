@@ -146,12 +146,26 @@ TEST_F(MapperModels, OfManyRoomsAllCount) {
   EXPECT_EQ(num_photos, 14u);
 }
 
+TEST_F(MapperModels, ThePairThatIsToldIsThatOfItsOwnGroup) {
+  SimulateRoom(12);
+  Separate(5);
+  const std::string name1 = views_.images.at(2).name, name2 = views_.images.at(3).name;
+  const CommandResult result = Run("--Init.image_name1 " + name1 + " --Init.image_name2 " + name2);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(Report()["models"], SizeIs(2));
+  const nlohmann::json trials = Report()["pair_trials"];
+  EXPECT_TRUE(std::any_of(trials.begin(), trials.end(), [&](const nlohmann::json& trial) {
+    return trial["pair"] == nlohmann::json({name1, name2});
+  })) << trials;
+}
+
 TEST_F(MapperModels, ThreePhotosAloneAreNoRoom) {
   SimulateRoom(12);
   Separate(9);
   ASSERT_EQ(Run().exit_code, 0);
   EXPECT_EQ(Report()["num_reg_images"], 9);
   EXPECT_TRUE(Report()["warnings"].empty()) << Report()["warnings"];
+  EXPECT_TRUE(Report()["images"][10]["model"].is_null());
   EXPECT_FALSE(fs::exists(folder_ / "sparse/1"));
 }
 
