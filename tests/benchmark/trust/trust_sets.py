@@ -17,6 +17,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from take_pairs_out import take_pairs_out  # noqa: E402
 from trust_table import multiply, read_truth  # noqa: E402
 
 MODELS = {"SIMPLE_RADIAL": 2, "PINHOLE": 1, "OPENCV": 4}
@@ -332,8 +333,15 @@ def main():
     if args.data:
         data = os.path.abspath(args.data)
         if wanted("kitchen"):
-            make_real(sets, tools, data, "kitchen", "images", "SIMPLE_RADIAL", "525.9,320,240,-0.025", (640, 480), turned,
-                      60, ["frame-000494.color.jpg", "frame-000618.color.jpg", "frame-000903.color.jpg"])
+            common = make_real(sets, tools, data, "kitchen", "images", "SIMPLE_RADIAL", "525.9,320,240,-0.025",
+                               (640, 480), turned, 60,
+                               ["frame-000494.color.jpg", "frame-000618.color.jpg", "frame-000903.color.jpg"])
+            # As two groups of photos that nothing connects.
+            if not os.path.exists("halves.db"):
+                take_pairs_out("told.db", 18, "halves.db")
+            map_photos(tools, "halves.db", common["photos"], "sparse_halves")
+            write_case(sets, "kitchen_halves", model=[os.path.join(sets, "kitchen/sparse_halves", k) for k in "01"],
+                       picks=os.path.join(data, "kitchen/picks.csv"), options=turned, **common)
         if wanted("desk"):
             lens = "524.544,523.949,318.603,255.33,0.0359359,0.00176108,-0.00554649,0.0025468"
             common = make_real(sets, tools, data, "desk", "photos", "OPENCV", lens, (640, 480), turned, 30,

@@ -87,7 +87,9 @@ def median(values):
 
 
 def align(case, args, out):
-    command = [os.path.join(args.bin, "roomtex-align"), "--input_path", case["model"], "--output_path", out]
+    command = [os.path.join(args.bin, "roomtex-align"), "--output_path", out]
+    for model in case["model"] if isinstance(case["model"], list) else [case["model"]]:
+        command += ["--input_path", model]
     for scan in case["scans"]:
         command += ["--scan_path", scan]
     if not args.without_picks:
