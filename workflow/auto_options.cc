@@ -46,6 +46,25 @@ void AutoOptions::Declare(OptionFields* fields) {
       "The scanner's own photos in an E57, those with a pose: beside yours, they put the model "
       "into the scan (roomtex-mapper --known_path); without any of yours, the colours come from "
       "them. auto = where the scan has some.");
+  fields->Choice(
+      "refine_intrinsics", &refine_intrinsics, kAutoWords,
+      "The photos' lens, as roomtex-mapper and roomtex-align have it: 1 = adjusted in any "
+      "case, 0 = never, auto = where photos or scan contradict what was told.");
+  fields->Bool("register_stations", &register_stations,
+               "Move scans that do not fit the others, as roomtex-align has it.");
+  fields->Bool("strict", &strict,
+               "Stop at a photo that is missing, unreadable or of another shape than its camera; 0 "
+               "= leave it out and name it.");
+  fields
+      ->Number("max_range", &max_range,
+               "Metres; samples farther from the scanner count as missing. 0 = the limit that the "
+               "file gives, if any.")
+      .NotNegative()
+      .Finite()
+      .Says("must be 0 (no limit) or a number of metres");
+  fields->Bool("E57.check", &e57_check,
+               "Compare the checksums of an E57 file before it is read; 0 = take a damaged file as "
+               "it is.");
   fields
       ->Int("video_frames", &video_frames,
             "Pictures to take out of a video; 0 = 60, 120 or 240 by the quality.")

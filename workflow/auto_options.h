@@ -18,12 +18,16 @@ struct AutoOptions {
   std::string image_path, panoramas_path, video_path;
   std::vector<std::string> scan_paths;
   std::string scan_poses, azimuth = "auto", up_axis = "auto", units;
+  double max_range = 0;
+  bool e57_check = true;
   std::string output_path, picks_path;
   std::string camera_model, camera_params, cameras_path;
   std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";
   std::string pairs = "auto", scanner_photos = "auto";
+  std::string refine_intrinsics = "auto";
   int video_frames = 0;
   std::string from, until, only;
+  bool register_stations = false, strict = false;
   bool accept_untrusted = false, dry_run = false;
   std::string colmap = "colmap";
   PassedOptions passed;

@@ -6,6 +6,7 @@
 #include "core/child_program.h"
 #include "core/json_text.h"
 #include "core/report.h"
+#include "core/text.h"
 #include "workflow/scanner_photos.h"
 #include "workflow/step.h"
 
@@ -30,6 +31,15 @@ void AddOption(const std::string& name, const std::string& value, CommandLine* l
   if (value.empty()) return;
   line->push_back(name);
   line->push_back(value);
+}
+
+void AddScanReading(const AutoOptions& options, CommandLine* line) {
+  AddOption("--scan_poses", options.scan_poses, line);
+  if (options.azimuth != "auto") AddOption("--azimuth", options.azimuth, line);
+  if (options.up_axis != "auto") AddOption("--up_axis", options.up_axis, line);
+  AddOption("--units", options.units, line);
+  if (options.max_range > 0) AddOption("--max_range", Exact(options.max_range), line);
+  if (!options.e57_check) AddOption("--E57.check", "0", line);
 }
 
 Chain::Chain(const AutoOptions& options)
@@ -138,16 +148,16 @@ std::vector<std::string> Chain::SparseModels() const {
 }
 
 CommandLine Chain::PickCommand() const {
-  CommandLine line = {"roomtex-pick", "--input_path", At("sparse/0"), "--image_path",
-                      ColorFolder()};
+  CommandLine line = {"roomtex-pick"};
+  for (const std::string& model : SparseModels()) {
+    if (IsThere(model)) AddOption("--input_path", model, &line);  // not of photos by themselves
+  }
+  AddOption("--image_path", ColorFolder(), &line);
   if (!options_.panoramas_path.empty()) {
     AddOption("--panoramas_path", At("faces/panoramas.json"), &line);
   }
   for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
-  AddOption("--scan_poses", options_.scan_poses, &line);
-  if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
-  if (options_.up_axis != "auto") AddOption("--up_axis", options_.up_axis, &line);
-  AddOption("--units", options_.units, &line);
+  AddScanReading(options_, &line);
   AddOption("--output_path", options_.picks_path.empty() ? At("picks.csv") : options_.picks_path,
             &line);
   return line;
@@ -159,10 +169,7 @@ CommandLine Chain::AutoCommand() const {
   AddOption("--panoramas_path", options_.panoramas_path, &line);
   AddOption("--video_path", options_.video_path, &line);
   for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
-  AddOption("--scan_poses", options_.scan_poses, &line);
-  if (options_.azimuth != "auto") AddOption("--azimuth", options_.azimuth, &line);
-  if (options_.up_axis != "auto") AddOption("--up_axis", options_.up_axis, &line);
-  AddOption("--units", options_.units, &line);
+  AddScanReading(options_, &line);
   AddOption("--output_path", options_.output_path, &line);
   AddOption("--picks_path", options_.picks_path, &line);
   AddOption("--camera_model", options_.camera_model, &line);
@@ -176,6 +183,11 @@ CommandLine Chain::AutoCommand() const {
   if (options_.scanner_photos != "auto") {
     AddOption("--scanner_photos", options_.scanner_photos, &line);
   }
+  if (options_.refine_intrinsics != "auto") {
+    AddOption("--refine_intrinsics", options_.refine_intrinsics, &line);
+  }
+  if (options_.register_stations) AddOption("--register_stations", "1", &line);
+  if (options_.strict) AddOption("--strict", "1", &line);
   if (options_.video_frames > 0) {
     AddOption("--video_frames", std::to_string(options_.video_frames), &line);
   }

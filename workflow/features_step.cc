@@ -212,6 +212,7 @@ Step MakeScanner(Chain* chain) {
                       "--images_path",           chain->ScannerFolder(), "--report_path",
                       chain->ReportOf("scanner")};
   AddOption("--units", options.units, &line);
+  if (!options.e57_check) AddOption("--E57.check", "0", &line);
   step.inputs = {ScanFileOf(chain->ScannerScan())};
   if (chain->OnlyScanner()) {
     step.outputs = {chain->ScannerFolder()};

@@ -77,13 +77,15 @@ void AddOptions(AutoOptions* o, Command* command) {
                              "--ExhaustiveMatching.", "--SequentialMatching."}) {
     command->PassThrough(prefix, &passed.matches, "Handed on to COLMAP's matcher.");
   }
-  for (const char* prefix : {"--Mapper.", "--Init.", "--Chain.", "--Rooms."}) {
+  for (const char* prefix : {"--Mapper.", "--Init.", "--Chain.", "--Groups.", "--Rooms."}) {
     command->PassThrough(prefix, &passed.mapper, "Handed on to roomtex-mapper.");
   }
-  for (const char* prefix : {"--Picks.", "--Plane.", "--PlaneBA.", "--Trust."}) {
+  for (const char* prefix :
+       {"--Picks.", "--Plane.", "--PlaneBA.", "--Patches.", "--Fit.", "--Scale.", "--Trust."}) {
     command->PassThrough(prefix, &passed.align, "Handed on to roomtex-align.");
   }
-  for (const char* prefix : {"--Texture.", "--Exposure.", "--Blend.", "--Occlusion."}) {
+  for (const char* prefix : {"--Texture.", "--Exposure.", "--Registration.", "--Blend.",
+                             "--Occlusion.", "--Surface.", "--Mesh."}) {
     command->PassThrough(prefix, &passed.texture, "Handed on to roomtex-texture.");
   }
 }

@@ -67,11 +67,8 @@ void AddScans(const AutoOptions& options, CommandLine* line, std::vector<std::st
     AddOption("--scan_path", path, line);
     inputs->push_back(ScanFileOf(path));
   }
-  AddOption("--scan_poses", options.scan_poses, line);
+  AddScanReading(options, line);
   if (!options.scan_poses.empty()) inputs->push_back(options.scan_poses);
-  if (options.azimuth != "auto") AddOption("--azimuth", options.azimuth, line);
-  if (options.up_axis != "auto") AddOption("--up_axis", options.up_axis, line);
-  AddOption("--units", options.units, line);
 }
 
 bool HasPanoramas(Chain* chain) { return !chain->options().panoramas_path.empty(); }

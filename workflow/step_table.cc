@@ -171,6 +171,9 @@ Step MakeMapper(Chain* chain) {
   const std::string known = chain->KnownPath();
   AddOption("--known_path", known, &line);
   if (options.colmap != "colmap") AddOption("--colmap", options.colmap, &line);
+  if (options.refine_intrinsics != "auto") {
+    AddOption("--refine_intrinsics", options.refine_intrinsics, &line);
+  }
   AddCommon(options, &line);
   AddPassed(options.passed.mapper, &line);
   step.commands = {line};
@@ -225,6 +228,11 @@ Step MakeAlign(Chain* chain) {
   AddOption("--output_path", chain->At("aligned"), &line);
   AddOption("--overlays", kNumOverlays, &line);
   AddOption("--report_path", chain->ReportOf("align"), &line);
+  if (options.refine_intrinsics != "auto") {
+    AddOption("--refine_intrinsics", options.refine_intrinsics, &line);
+  }
+  if (options.register_stations) AddOption("--register_stations", "1", &line);
+  if (options.strict) AddOption("--strict", "1", &line);
   AddCommon(options, &line);
   AddPassed(options.passed.align, &line);
   step.commands = {line};
@@ -238,7 +246,12 @@ Step MakeTexture(Chain* chain) {
   CommandLine line = {"roomtex-texture",    "--input_path",  chain->AlignedPath(), "--image_path",
                       chain->ColorFolder(), "--output_path", chain->At("textured")};
   step.inputs = {chain->AlignedPath(), chain->ColorFolder()};
-  if (chain->OnlyScanner()) AddScans(options, &line, &step.inputs);
+  if (chain->OnlyScanner()) {
+    AddScans(options, &line, &step.inputs);
+  } else if (!options.e57_check) {
+    AddOption("--E57.check", "0", &line);  // the aligned model remembers how else to read its scans
+  }
+  if (options.strict) AddOption("--strict", "1", &line);
   AddOption("--Texture.scale", QualityOf(options).texture_scale, &line);
   if (options.accept_untrusted) AddOption("--accept_untrusted", "1", &line);
   AddOption("--report_path", chain->ReportOf("texture"), &line);

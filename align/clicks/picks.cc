@@ -4,6 +4,7 @@
 #include <cctype>
 #include <map>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include <fmt/core.h>
@@ -142,18 +143,28 @@ int EditDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-std::string NearestName(const SparseModel& model, const std::string& name) {
+std::string NearestName(const std::vector<const SparseModel*>& models, const std::string& name) {
   std::string nearest;
   int nearest_distance = -1;
-  for (const auto& [id, image] : model.images) {
-    const int distance =
-        EditDistance(Lowercase(image.name.substr(0, 256)), Lowercase(name.substr(0, 256)));
-    if (nearest_distance < 0 || distance < nearest_distance) {
+  for (const SparseModel* model : models) {
+    for (const auto& [id, image] : model->images) {
+      const int distance =
+          EditDistance(Lowercase(image.name.substr(0, 256)), Lowercase(name.substr(0, 256)));
+      if (nearest_distance >= 0 && distance >= nearest_distance) continue;
       nearest = image.name;
       nearest_distance = distance;
     }
   }
   return nearest;
+}
+
+// The first that has a photo of this name; null if none has.
+const SparseModel* ModelWithPhoto(const std::vector<const SparseModel*>& models,
+                                  const std::string& name) {
+  const auto at = std::find_if(models.begin(), models.end(), [&](const SparseModel* model) {
+    return model->FindImage(name) != nullptr;
+  });
+  return at == models.end() ? nullptr : *at;
 }
 
 }  // namespace
@@ -201,32 +212,34 @@ void WritePicks(const std::string& path, const std::vector<Pick>& picks) {
   file.Commit();
 }
 
-void NamePicksAsInModel(const SparseModel& model, std::vector<Pick>* picks) {
+void NamePicksAsInModels(const std::vector<const SparseModel*>& models, std::vector<Pick>* picks) {
   for (Pick& pick : *picks) {
-    if (model.FindImage(pick.image_name) != nullptr) continue;
+    if (ModelWithPhoto(models, pick.image_name) != nullptr) continue;
     const std::string ending = "/" + pick.image_name;
-    std::vector<const SparseImage*> in_folders;
-    for (const auto& [id, image] : model.images) {
-      const std::string& name = image.name;
-      const bool ends_so = name.size() > ending.size() &&
-                           name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
-      if (ends_so) in_folders.push_back(&image);
+    std::set<std::string> in_folders;
+    for (const SparseModel* model : models) {
+      for (const auto& [id, image] : model->images) {
+        const std::string& name = image.name;
+        const bool ends_so = name.size() > ending.size() &&
+                             name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+        if (ends_so) in_folders.insert(name);
+      }
     }
-    if (in_folders.size() == 1) pick.image_name = in_folders[0]->name;
+    if (in_folders.size() == 1) pick.image_name = *in_folders.begin();
   }
 }
 
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
-                    const SparseModel& model, const std::string& among) {
+                    const std::vector<const SparseModel*>& models, const std::string& among) {
   for (const Pick& pick : picks) {
-    const SparseImage* image = model.FindImage(pick.image_name);
-    if (image == nullptr) {
+    const SparseModel* model = ModelWithPhoto(models, pick.image_name);
+    if (model == nullptr) {
       throw InputError(path, LinePosition(pick.line),
                        fmt::format("the photo {} is not {} (nearest name: {})", pick.image_name,
-                                   among, NearestName(model, pick.image_name)),
+                                   among, NearestName(models, pick.image_name)),
                        "Correct the name, or pick in a photo that COLMAP has registered");
     }
-    const Camera& camera = model.cameras.at(image->camera_id);
+    const Camera& camera = model->cameras.at(model->FindImage(pick.image_name)->camera_id);
     const Eigen::Vector2d& x = pick.x_in_img;
     if (!(x.x() >= 0 && x.y() >= 0 && x.x() <= camera.width && x.y() <= camera.height)) {
       throw InputError(path, LinePosition(pick.line),
@@ -240,7 +253,7 @@ void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
 
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model) {
-  CheckPickNames(path, picks, model);
+  CheckPickNames(path, picks, {&model});
   const auto num_on =
       std::count_if(picks.begin(), picks.end(), [](const Pick& pick) { return pick.weight > 0; });
   if (num_on >= kMinPicksPerPhoto) return;

@@ -41,16 +41,17 @@ std::vector<Pick> ReadPicks(const std::string& path);
 // Written aside and renamed; reading it back gives the same numbers to the last bit.
 void WritePicks(const std::string& path, const std::vector<Pick>& picks);
 
-// A name that the model does not have becomes that of its one photo which has it in a folder
-// (`photo.jpg` is `scanner/photo.jpg` there): picks of roomtex-import --E57.picks in a model of
-// roomtex-auto. Of several none is taken.
-void NamePicksAsInModel(const SparseModel& model, std::vector<Pick>* picks);
+// A name that no model has becomes that of their one photo which has it in a folder (`photo.jpg` is
+// `scanner/photo.jpg` there): picks of roomtex-import --E57.picks in a model of roomtex-auto. Of
+// several none is taken.
+void NamePicksAsInModels(const std::vector<const SparseModel*>& models, std::vector<Pick>* picks);
 
-// Throws InputError: a name that is not in the model (with the nearest one that is), a pixel
+// Throws InputError: a name that is in none of the models (with the nearest one that is), a pixel
 // outside its photo.
 // `among`: what the names are looked up in, for the message.
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
-                    const SparseModel& model, const std::string& among = "in the sparse model");
+                    const std::vector<const SparseModel*>& models,
+                    const std::string& among = "in the sparse model");
 // The same, and for fewer than kMinPicksPerPhoto picks that count, over all photos.
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model);

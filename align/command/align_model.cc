@@ -1,6 +1,7 @@
 #include "align/command/align_model.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <string>
@@ -34,30 +35,22 @@ struct Attempt {
   std::string Problem() const { return aligned ? report.reason() : refusal; }
 };
 
-// Picks belong to the model that holds their photo, and so does a hint. Throws InputError for a
+// Picks belong to the models that hold their photo, and so does a hint. Throws InputError for a
 // pick whose photo no model holds, or several under other names, and UsageError for such a hint.
-void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
-             std::vector<ModelToAlign>* models) {
-  std::vector<std::string> photos;  // of the picks
-  for (size_t i = 0; i < picks.size(); ++i) {
-    std::set<std::string> names;  // NamePicksAsInModel() of each model
-    for (const ModelToAlign& one : *models) {
-      const std::string& name = one.picks[i].image_name;
-      if (one.model.FindImage(name) != nullptr) names.insert(name);
-    }
-    if (names.count(picks[i].image_name) > 0) names = {picks[i].image_name};
-    if (names.size() != 1) {
-      CheckPickNames(a.picks_path, {picks[i]}, (*models)[0].model, "in any of the sparse models");
-    }
-    photos.push_back(*names.begin());
+void GiveOut(const AlignCommandOptions& a, std::vector<ModelToAlign>* models) {
+  std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
+  std::vector<const SparseModel*> all;
+  for (const ModelToAlign& one : *models) all.push_back(&one.model);
+  NamePicksAsInModels(all, &picks);
+  if (models->size() == 1) {
+    (*models)[0].picks = std::move(picks);
+    return;
   }
+  CheckPickNames(a.picks_path, picks, all, "in any of the sparse models");
   for (ModelToAlign& one : *models) {
-    std::vector<Pick> own;
-    for (size_t i = 0; i < picks.size(); ++i) {
-      const Pick& pick = one.picks[i];
-      if (pick.image_name == photos[i] && one.model.FindImage(photos[i])) own.push_back(pick);
-    }
-    one.picks = std::move(own);
+    std::copy_if(
+        picks.begin(), picks.end(), std::back_inserter(one.picks),
+        [&one](const Pick& pick) { return one.model.FindImage(pick.image_name) != nullptr; });
     if (one.picks.empty()) one.options.picks_path.clear();
   }
   if (a.near.empty()) return;
@@ -74,19 +67,17 @@ void GiveOut(const AlignCommandOptions& a, const std::vector<Pick>& picks,
 
 std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
                                      const Command::Context& context) {
-  const std::vector<Pick> picks =
-      a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
   std::vector<ModelToAlign> models;
   bool any_known = false;
   for (const std::string& path : a.input_paths) {
     AlignCommandOptions own = a;
     own.input_path = path;
-    models.push_back(ReadModelToAlign(own, picks, context));
+    models.push_back(ReadModelToAlign(own, context));
     const MapperVerdict& verdict = models.back().verdict;
     any_known |= verdict.known_rms || !verdict.told_poses.empty();
   }
   if (!any_known) RequirePicksOrPhotos(a);
-  if (models.size() > 1) GiveOut(a, picks, &models);
+  GiveOut(a, &models);
   for (ModelToAlign& one : models) {
     one.near = ReadHints(one.options, one.picks, one.model);
     one.told = LookForPhotos(a, one.model, context);

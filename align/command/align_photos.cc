@@ -78,7 +78,7 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
   context.progress.Stage("read photos");
   std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
-  CheckPickNames(a.picks_path, picks, photos.model);
+  CheckPickNames(a.picks_path, picks, {&photos.model});
   const std::set<std::string> told = LookForPhotos(a, photos.model, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);

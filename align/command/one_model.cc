@@ -263,23 +263,20 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
 
 }  // namespace
 
-ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const std::vector<Pick>& picks,
-                              const Command::Context& context) {
+ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command::Context& context) {
   ModelToAlign one;
   one.options = options;
   std::vector<std::string> face_warnings;
   one.model = ReadModelOfPanoramas(options.input_path, options.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
   one.verdict = ReadMapperVerdict(options.input_path, one.model);
-  one.picks = picks;
-  NamePicksAsInModel(one.model, &one.picks);
   return one;
 }
 
 std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,
                                 const SparseModel& model) {
   if (a.picks_path.empty() || (AreHints(picks) && !a.image_path.empty())) {
-    CheckPickNames(a.picks_path, picks, model);
+    CheckPickNames(a.picks_path, picks, {&model});
   } else {
     CheckPicksAgainstModel(a.picks_path, picks, model);
   }

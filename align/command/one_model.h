@@ -27,10 +27,8 @@ struct ModelToAlign {
   std::set<std::string> told;  // of LookForPhotos()
 };
 
-// The model of options.input_path, and what its mapper said of it. picks: of all photos, named as
-// in this model. Throws InputError.
-ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const std::vector<Pick>& picks,
-                              const Command::Context& context);
+// The model of options.input_path, and what its mapper said of it; no picks. Throws InputError.
+ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command::Context& context);
 // Where the photos belong, besides the picks, which are checked: fewer than six are a hint where
 // there are photos to confirm what is found.
 std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,

@@ -7,7 +7,7 @@ namespace roomtex {
 
 std::string MirrorProblem(const PickScene& scene) {
   if (scene.azimuth().empty()) return "Only RTPI scans can be read the other way round.";
-  if (!ReadAlignmentRecord(scene.input().input_path).scans.empty()) {
+  if (!ReadAlignmentRecord(scene.input().AlignedPath()).scans.empty()) {
     return "This model is aligned to the scan as it is read now. To read it the other way round, "
            "start from the model that was not aligned yet.";
   }

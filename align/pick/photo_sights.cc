@@ -65,7 +65,10 @@ std::shared_ptr<const Json> PhotoSights::Edges(const PickPhoto& photo, const Pho
 
 std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int revision) {
   const ScanRays* rays = scene_.rays();
-  if (!solution.scan_from_sparse || rays == nullptr) return {};
+  const bool any_placed =
+      std::any_of(solution.models.begin(), solution.models.end(),
+                  [](const ModelState& model) { return model.scan_from_sparse.has_value(); });
+  if (!any_placed || rays == nullptr) return {};
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (shares_revision_ == revision) return shares_;
@@ -79,8 +82,9 @@ std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int re
     }
   }
   const std::vector<PickPhoto>& photos = scene_.photos();
-  std::vector<double> shares(photos.size(), 0.0);
+  std::vector<double> shares(photos.size(), kNoNumber);
   ParallelFor(scene_.input().num_threads, 0, static_cast<int>(photos.size()), [&](int i) {
+    if (!solution.models[photos[i].model].scan_from_sparse) return;
     const Rigid& cam_from_scan = solution.photos.at(photos[i].name()).cam_from_scan;
     const Eigen::Vector3d centre = cam_from_scan.TargetOriginInSource();
     int num_seen = 0;

@@ -22,8 +22,9 @@ class PhotoSights {
   std::shared_ptr<const Json> Edges(const PickPhoto& photo, const PhotoState& state, int revision,
                                     const std::function<bool()>& give_up);
 
-  // Share of all scans' samples that each photo sees, in the order of PickScene::photos(); empty
-  // without a similarity. From a few thousand samples, one computation per revision.
+  // Share of all scans' samples that each photo sees, in the order of PickScene::photos(); NaN of
+  // photos whose model has no place yet, and empty where no model has one. From a few thousand
+  // samples, one computation per revision.
   std::vector<double> ScanShares(const PickSolution& solution, int revision);
 
  private:

@@ -157,16 +157,17 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
 
 namespace {
 
-// The picks that count, over the photos.
+// The picks that count in the photos of one model.
 struct Tally {
   int num_half = 0, total = 0, most = 0;
   std::string name;  // the photo with most
 };
 
-Tally TallyOf(const std::vector<SessionPick>& picks) {
+Tally TallyOf(const std::vector<SessionPick>& picks, int model, const PickScene& scene) {
   Tally tally;
   std::map<std::string, int> on;
   for (const SessionPick& pick : picks) {
+    if (scene.FindPhoto(pick.image_name)->model != model) continue;
     if (!pick.complete()) ++tally.num_half;
     if (pick.complete() && pick.weight > 0) ++on[pick.image_name];
   }
@@ -189,7 +190,11 @@ std::string NextOfFew(const Tally& tally, int needed, const PickSolution& soluti
                       const PickScene& scene) {
   const PhotoState& photo = solution.photos.at(tally.name);
   const std::string more = Count(needed - tally.most, "more pair");
-  const std::string where = scene.has_model() ? ", in this photo or in others" : " in this photo";
+  const int model = scene.FindPhoto(tally.name)->model;
+  const std::string where = !scene.has_model() ? " in this photo"
+                            : scene.models().size() == 1
+                                ? ", in this photo or in others"
+                                : ", in this photo or in others of " + scene.ModelName(model);
   if (needed > kMinPicksPerPhoto) {
     return more +
            " to go in this photo: nothing says its focal length, and eight tell it, in front "
@@ -206,53 +211,100 @@ std::string NextOfFew(const Tally& tally, int needed, const PickSolution& soluti
   return more + " to go" + where + ". Click one side: the other shows where to look.";
 }
 
-}  // namespace
+struct Advice {
+  std::string text;
+  bool is_begun = false, is_done = false;
+};
 
-std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
-                     const PickScene& scene) {
-  const Tally tally = TallyOf(picks);
-  const int needed = scene.has_model() ? kMinPicksPerPhoto - (tally.total - tally.most)
-                                       : NeededIn(scene.focal_source(tally.name));
-  if (tally.num_half > 0 && tally.most < needed) {
-    return "Click the same point on the other side.";
+// The number of a pick of this model that is left out as wrong; 0 = none is.
+int WrongPick(const std::vector<SessionPick>& picks, int model, const PickSolution& solution,
+              const PickScene& scene) {
+  for (size_t i = 0; i < picks.size(); ++i) {
+    const bool is_wrong = solution.picks[i].status == PickState::Status::kBad &&
+                          scene.FindPhoto(picks[i].image_name)->model == model;
+    if (is_wrong) return static_cast<int>(i) + 1;
   }
-  if (tally.total == 0) {
-    return "Click a point that you recognise on both sides, such as the corner of a picture or a "
-           "switch: once in the photo, once in the scan.";
-  }
-  if (tally.most < needed) return NextOfFew(tally, needed, solution, scene);
+  return 0;
+}
+
+std::string NextWithEnough(const std::vector<SessionPick>& picks, const Tally& tally, int needed,
+                           const PickSolution& solution, const PickScene& scene, bool* is_done) {
+  const int model_index = scene.FindPhoto(tally.name)->model;
+  const ModelState& model = solution.models[model_index];
   const PhotoState& photo = solution.photos.at(tally.name);
-  const auto bad =
-      std::find_if(solution.picks.begin(), solution.picks.end(),
-                   [](const PickState& state) { return state.status == PickState::Status::kBad; });
+  const int wrong = WrongPick(picks, model_index, solution, scene);
   const bool is_whole = tally.most >= kMinPicksPerPhoto || !scene.has_model();
-  if (!photo.solved() || (!is_whole && !solution.scan_from_sparse)) {
+  if (!photo.solved() || (!is_whole && !model.scan_from_sparse)) {
     if (!is_whole && !solution.with_rays) return "Enough picks; the scan is being prepared.";
-    if (!solution.warnings.empty()) return solution.warnings[0];
+    if (!model.warnings.empty()) return model.warnings[0];
     return photo.warnings.empty() ? "These picks fix no pose: check them." : photo.warnings[0];
   }
-  if (bad != solution.picks.end()) {
-    return "A pick is left out as wrong (pick " + std::to_string(bad - solution.picks.begin() + 1) +
+  if (wrong > 0) {
+    return "A pick is left out as wrong (pick " + std::to_string(wrong) +
            "): drag it to its place, or pick another point, so that " +
            (needed > kMinPicksPerPhoto ? "eight" : "six") + " remain.";
   }
   const TrustOptions trust;
   const Camera& camera = scene.FindPhoto(tally.name)->projection->camera();
-  const double rms_px = is_whole ? photo.rms_px : solution.rms_px;
+  const double rms_px = is_whole ? photo.rms_px : model.rms_px;
   if (rms_px > trust.PickRmsLimit(camera)) {
     return "The picks miss by " + Number(rms_px, 1) +
            " pixels: look at the worst one, or switch picks off one by one.";
   }
   if (!solution.with_rays) return "Enough picks; the scan is being prepared.";
+  *is_done = true;
   if (!scene.has_model()) {
     return "Enough picks for this photo: compare it with the scan by the back-projection, then "
            "align. Another photo needs as many of its own.";
   }
-  if (!solution.scan_from_sparse) {
+  if (!model.scan_from_sparse) {
+    *is_done = false;
     return "The pose of the photo is known, but no sparse point of it lies on the scan: pick in a "
            "photo with more sparse points.";
   }
   return "Enough picks: compare photo and scan by the back-projection, then align.";
+}
+
+Advice AdviceOf(int model, const std::vector<SessionPick>& picks, const PickSolution& solution,
+                const PickScene& scene) {
+  const Tally tally = TallyOf(picks, model, scene);
+  Advice advice;
+  advice.is_begun = tally.num_half > 0 || tally.total > 0;
+  const int needed = scene.has_model() ? kMinPicksPerPhoto - (tally.total - tally.most)
+                                       : NeededIn(scene.focal_source(tally.name));
+  if (tally.num_half > 0 && tally.most < needed) {
+    advice.text = "Click the same point on the other side.";
+  } else if (tally.total == 0) {
+    advice.text =
+        "Click a point that you recognise on both sides, such as the corner of a picture or a "
+        "switch: once in the photo, once in the scan.";
+  } else if (tally.most < needed) {
+    advice.text = NextOfFew(tally, needed, solution, scene);
+  } else {
+    advice.text = NextWithEnough(picks, tally, needed, solution, scene, &advice.is_done);
+  }
+  return advice;
+}
+
+}  // namespace
+
+std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
+                     const PickScene& scene) {
+  std::string done, others;  // what is said of the models that have enough, and names of the rest
+  for (size_t model = 0; model < scene.models().size(); ++model) {
+    const int index = static_cast<int>(model);
+    const Advice advice = AdviceOf(index, picks, solution, scene);
+    if (advice.is_begun && !advice.is_done) return advice.text;
+    if (advice.is_begun) {
+      done = advice.text;
+    } else {
+      others += (others.empty() ? "" : ", ") + scene.ModelName(index);
+    }
+  }
+  if (done.empty()) return AdviceOf(0, picks, solution, scene).text;
+  if (others.empty()) return done;
+  return done + " The photos of " + others +
+         " have no picks: pick in one of them, too, or let the alignment search for them.";
 }
 
 }  // namespace roomtex

@@ -198,6 +198,16 @@ Json PhotoToJson(const PhotoState& photo) {
   return json;
 }
 
+// Null where the model has no place yet.
+Json SimilarityToJson(const ModelState& model) {
+  if (!model.scan_from_sparse) return nullptr;
+  return {{"scale", model.scan_from_sparse->scale},
+          {"relative_mad", NumberOrNull(model.scale.relative_mad)},
+          {"num_features", model.scale.num_features},
+          {"rms_px", NumberOrNull(model.rms_px)},
+          {"num_photos", model.num_clicked_photos}};
+}
+
 }  // namespace
 
 Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
@@ -232,15 +242,9 @@ Json SessionToJson(const PickSession::Snapshot& snapshot, const PickScene& scene
   for (const PickPhoto& photo : scene.photos()) {
     json["photos"][photo.name()] = PhotoToJson(solution.photos.at(photo.name()));
   }
-  json["similarity"] = nullptr;
-  if (solution.scan_from_sparse) {
-    Json similarity;
-    similarity["scale"] = solution.scan_from_sparse->scale;
-    similarity["relative_mad"] = NumberOrNull(solution.scale.relative_mad);
-    similarity["num_features"] = solution.scale.num_features;
-    similarity["rms_px"] = NumberOrNull(solution.rms_px);
-    similarity["num_photos"] = solution.num_clicked_photos;
-    json["similarity"] = similarity;
+  json["similarities"] = Json::array();
+  for (const ModelState& model : solution.models) {
+    json["similarities"].push_back(SimilarityToJson(model));
   }
   json["check_points"] = nullptr;
   if (solution.num_check_points > 0) {

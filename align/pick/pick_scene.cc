@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <tuple>
 
 #include "align/pick/mesh_panorama.h"
 #include "colmap_ext/panorama_model.h"
@@ -47,8 +48,11 @@ double ScoreOf(const SparseImage& image, const Camera& camera, const SparseModel
 
 PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
   RequireFolder(input.image_path, "Check --image_path");
-  ReadModel(progress);
-  for (const auto& [id, camera] : model_.cameras) projections_.emplace(id, camera);
+  ReadModels(progress);
+  for (const SparseModel& model : models_) {
+    std::map<uint32_t, CameraProjection>& projections = projections_.emplace_back();
+    for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  }
   AddPhotos();
   progress->Stage("read scan");
   ReadScans();
@@ -59,21 +63,22 @@ PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(i
   progress->Finish();
 }
 
-void PickScene::ReadModel(Progress* progress) {
-  if (has_model()) {
-    progress->Stage("read model");
+void PickScene::ReadModels(Progress* progress) {
+  if (has_model()) progress->Stage("read model");
+  for (const std::string& path : input_.input_paths) {
     std::vector<std::string> warnings;
-    model_ = ReadModelOfPanoramas(input_.input_path, input_.panoramas_path, &warnings);
+    models_.push_back(ReadModelOfPanoramas(path, input_.panoramas_path, &warnings));
     for (const std::string& warning : warnings) progress->Note(warning);
-    if (!model_.images.empty()) return;
-    throw InputError(input_.input_path, "", "the sparse model has no photos",
+    if (!models_.back().images.empty()) continue;
+    throw InputError(path, "", "the sparse model has no photos",
                      "Reconstruct the photos first (roomtex-mapper)");
   }
+  if (has_model()) return;
   progress->Stage("read photos");
   PhotoModel photos =
       MakePhotoModel(input_.image_path, ListPhotoFiles(input_.image_path, "Check --image_path"),
                      input_.camera, UnfitPhotos::kTaken);
-  model_ = std::move(photos.model);
+  models_.push_back(std::move(photos.model));
   focal_sources_ = std::move(photos.focal_sources);
 }
 
@@ -83,7 +88,7 @@ FocalSource PickScene::focal_source(const std::string& name) const {
 }
 
 void PickScene::ReadScans() {
-  const AlignmentRecord record = ReadAlignmentRecord(input_.input_path);
+  const AlignmentRecord record = ReadAlignmentRecord(input_.AlignedPath());
   PlacedScans placed =
       ReadScansOfModel(record, {input_.scan_paths, input_.scan_poses, input_.scan_reader});
   scans_ = std::move(placed.scans);
@@ -120,27 +125,41 @@ PickScene::~PickScene() {
   if (worker_.joinable()) worker_.join();
 }
 
+void PickScene::AddPhoto(int model, const SparseImage& image, std::vector<std::string>* notes) {
+  PickPhoto photo;
+  photo.model = model;
+  photo.image = &image;
+  photo.projection = &projections_[model].at(image.camera_id);
+  photo.path = input_.image_path + "/" + image.name;
+  const Camera& camera = photo.projection->camera();
+  photo.fit = FitPhotoToCamera(photo.path, image.name, camera.width, camera.height);
+  photo.problem = photo.fit.problem;
+  if (photo.problem.empty() && !photo.fit.note.empty()) notes->push_back(photo.fit.note);
+  photo.missing = !photo.problem.empty();
+  photo.num_points = static_cast<int>(
+      std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
+                    [](uint64_t point_id) { return point_id != kInvalidPoint3dId; }));
+  photo.score = ScoreOf(image, camera, models_[model]);
+  photos_.push_back(photo);
+}
+
 void PickScene::AddPhotos() {
   std::vector<std::string> notes;
-  for (const auto& [id, image] : model_.images) {
-    PickPhoto photo;
-    photo.image = &image;
-    photo.projection = &projections_.at(image.camera_id);
-    photo.path = input_.image_path + "/" + image.name;
-    const Camera& camera = photo.projection->camera();
-    photo.fit = FitPhotoToCamera(photo.path, image.name, camera.width, camera.height);
-    photo.problem = photo.fit.problem;
-    if (photo.problem.empty() && !photo.fit.note.empty()) notes.push_back(photo.fit.note);
-    photo.missing = !photo.problem.empty();
-    photo.num_points = static_cast<int>(
-        std::count_if(image.point3d_ids.begin(), image.point3d_ids.end(),
-                      [](uint64_t point_id) { return point_id != kInvalidPoint3dId; }));
-    photo.score = ScoreOf(image, photo.projection->camera(), model_);
-    photos_.push_back(photo);
+  for (size_t model = 0; model < models_.size(); ++model) {
+    for (const auto& [id, image] : models_[model].images) {
+      AddPhoto(static_cast<int>(model), image, &notes);
+    }
   }
   for (const std::string& note : FirstNotes(notes)) notes_.push_back(note);
-  std::sort(photos_.begin(), photos_.end(),
-            [](const PickPhoto& a, const PickPhoto& b) { return a.name() < b.name(); });
+  // A photo that two models hold is picked in for the one in which it sees more.
+  std::stable_sort(photos_.begin(), photos_.end(), [](const PickPhoto& a, const PickPhoto& b) {
+    return std::forward_as_tuple(a.name(), b.num_points) <
+           std::forward_as_tuple(b.name(), a.num_points);
+  });
+  photos_.erase(
+      std::unique(photos_.begin(), photos_.end(),
+                  [](const PickPhoto& a, const PickPhoto& b) { return a.name() == b.name(); }),
+      photos_.end());
   for (size_t i = 0; i < photos_.size(); ++i) photos_[i].id = static_cast<int>(i);
   const bool none = std::all_of(photos_.begin(), photos_.end(),
                                 [](const PickPhoto& photo) { return photo.missing; });
@@ -148,7 +167,7 @@ void PickScene::AddPhotos() {
     std::string problem = photos_[0].problem;
     problem.pop_back();  // the full stop
     throw InputError(input_.image_path, "",
-                     (has_model() ? "none of the model's " : "none of the ") +
+                     (has_model() ? "none of the sparse model's " : "none of the ") +
                          std::to_string(photos_.size()) + " photos can be shown. " + problem,
                      "");
   }
@@ -157,7 +176,8 @@ void PickScene::AddPhotos() {
 std::vector<const PickPhoto*> PickScene::Ranked(const std::vector<double>& scan_shares) const {
   std::vector<std::pair<double, const PickPhoto*>> scored;
   for (const PickPhoto& photo : photos_) {
-    const double share = scan_shares.empty() ? 1 : scan_shares[photo.id];
+    const double known = scan_shares.empty() ? 1 : scan_shares[photo.id];
+    const double share = std::isnan(known) ? 1 : known;
     scored.emplace_back(photo.missing ? 1.0 : -photo.score * std::sqrt(share), &photo);
   }
   std::stable_sort(scored.begin(), scored.end(),

@@ -1,5 +1,5 @@
 #pragma once
-// What roomtex-pick works on and what does not change while it runs: sparse model or photos alone,
+// What roomtex-pick works on and what does not change while it runs: sparse models or photos alone,
 // scans.
 // What takes seconds is made in the background.
 
@@ -27,16 +27,21 @@
 namespace roomtex {
 
 struct PickSceneInput {
-  std::string input_path, image_path, scan_poses;  // input_path "": the photos of image_path alone
-  std::string panoramas_path;                      // of MergeFaces(); may be empty
-  PhotoCameraOptions camera;                       // of those
-  std::vector<std::string> scan_paths;             // empty: those that the model remembers
+  std::vector<std::string> input_paths;  // empty: the photos of image_path alone
+  std::string image_path, scan_poses;
+  std::string panoramas_path;           // of MergeFaces(); may be empty
+  PhotoCameraOptions camera;            // of those
+  std::vector<std::string> scan_paths;  // empty: those that the one model remembers
   ScanReaderOptions scan_reader;
   int num_threads = -1;
+
+  // The model that may remember its scans; "" = none or several.
+  std::string AlignedPath() const { return input_paths.size() == 1 ? input_paths[0] : ""; }
 };
 
 struct PickPhoto {
-  int id = 0;  // position in PickScene::photos(), which are in the order of their names
+  int id = 0;     // position in PickScene::photos(), which are in the order of their names
+  int model = 0;  // position in PickScene::models()
   const SparseImage* image = nullptr;
   const CameraProjection* projection = nullptr;
   std::string path;
@@ -65,9 +70,12 @@ class PickScene {
   const std::vector<std::string>& notes() const {
     return notes_;
   }  // on scans and photos; sentences
-  // Of photos alone: cameras as far as they are known, no points, poses that say nothing.
-  const SparseModel& model() const { return model_; }
-  bool has_model() const { return !input_.input_path.empty(); }
+  // Each in a frame of its own. Of photos alone one: cameras as far as they are known, no points,
+  // poses that say nothing.
+  const std::vector<SparseModel>& models() const { return models_; }
+  bool has_model() const { return !input_.input_paths.empty(); }
+  // How people call it: its path. Of photos alone "".
+  std::string ModelName(int model) const { return has_model() ? input_.input_paths[model] : ""; }
   // Whether its picks have to find the lens of a photo as well.
   FocalSource focal_source(const std::string& name) const;
   const std::vector<Scan>& scans() const { return scans_; }
@@ -77,7 +85,7 @@ class PickScene {
   const std::vector<PickPhoto>& photos() const { return photos_; }
   const PickPhoto* FindPhoto(const std::string& name) const;
   // The best to pick in first, those without a file last. scan_shares: by id, what share of the
-  // scan each sees; empty = not known.
+  // scan each sees; NaN = not known.
   std::vector<const PickPhoto*> Ranked(const std::vector<double>& scan_shares) const;
 
   // Begins to make what takes seconds.
@@ -93,8 +101,9 @@ class PickScene {
   const Edges* WaitForEdges(const std::function<bool()>& give_up) const;
 
  private:
-  void ReadModel(Progress* progress);
+  void ReadModels(Progress* progress);
   void AddPhotos();
+  void AddPhoto(int model, const SparseImage& image, std::vector<std::string>* notes);
   void ReadScans();
   void AddPanorama(const Scan& mesh);
   void Work();
@@ -102,13 +111,13 @@ class PickScene {
   PickSceneInput input_;
   std::string azimuth_;
   std::vector<std::string> notes_;
-  SparseModel model_;
+  std::vector<SparseModel> models_;
   std::map<std::string, FocalSource> focal_sources_;  // without a sparse model
   std::vector<Scan> scans_;
   const SurveyedScans surveyed_{scans_};
   std::deque<Scan> panoramas_;  // of meshes
   std::vector<std::unique_ptr<ScanPlaces>> places_;
-  std::map<uint32_t, CameraProjection> projections_;
+  std::vector<std::map<uint32_t, CameraProjection>> projections_;  // of each model
   std::vector<PickPhoto> photos_;
 
   std::thread worker_;

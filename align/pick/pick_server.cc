@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -36,7 +37,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
     arguments.push_back(name);
     arguments.push_back(value);
   };
-  if (scene.has_model()) add("--input_path", input.input_path);
+  for (const std::string& path : input.input_paths) add("--input_path", path);
   for (const std::string& path : input.scan_paths) add("--scan_path", path);
   add("--picks_path", session.picks_path());
   add("--output_path", setup.aligned_path);
@@ -190,6 +191,7 @@ int PickServer::SelectedPhoto() const {
 Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
   const std::vector<double> shares = sights_.ScanShares(snapshot.solution, snapshot.revision);
   Json json = Json::array();
+  std::set<int> suggested;  // the models whose best photo was passed
   for (const PickPhoto* photo : scene_.Ranked(shares)) {
     const TilePyramid pyramid = tiles_.Pyramid(PhotoPicture(photo->id));
     const Camera& camera = photo->projection->camera();
@@ -203,8 +205,10 @@ Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
     one["missing"] = photo->missing;
     one["problem"] = photo->problem;
     one["num_points"] = photo->num_points;
-    one["scan_share"] = shares.empty() ? Json() : Json(shares[photo->id]);
+    one["scan_share"] = shares.empty() ? Json() : NumberOrNull(shares[photo->id]);
     one["rank"] = json.size() + 1;
+    one["model"] = photo->model;
+    one["suggested"] = suggested.insert(photo->model).second;
     json.push_back(one);
   }
   return json;
@@ -216,7 +220,7 @@ Json PickServer::State() {
   Json json;
   json["version"] = Version();
   json["min_picks"] = kMinPicksPerPhoto;
-  json["has_model"] = scene_.has_model();
+  json["models"] = scene_.input().input_paths;
   json["can_mirror"] = MirrorProblem(scene_).empty();
   json["picks_path"] = session_->picks_path();
   json["aligned_path"] = setup_.aligned_path;

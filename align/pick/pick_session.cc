@@ -58,9 +58,13 @@ void PickSession::Read() {
   Snapshot snapshot;
   if (std::filesystem::exists(picks_path())) {
     std::vector<Pick> picks = ReadPicks(picks_path());
-    NamePicksAsInModel(scene_.model(), &picks);
-    CheckPickNames(picks_path(), picks, scene_.model(),
-                   scene_.has_model() ? "in the sparse model" : "among those of --image_path");
+    std::vector<const SparseModel*> models;
+    for (const SparseModel& model : scene_.models()) models.push_back(&model);
+    NamePicksAsInModels(models, &picks);
+    CheckPickNames(picks_path(), picks, models,
+                   !scene_.has_model()  ? "among those of --image_path"
+                   : models.size() == 1 ? "in the sparse model"
+                                        : "in any of the sparse models");
     for (const Pick& pick : picks) {
       SessionPick one{pick.image_name, pick.x_in_img, pick.x_in_scan, {}, pick.weight, pick.label};
       one.spot = SpotOf(scene_, pick.x_in_scan);

@@ -127,17 +127,21 @@ std::optional<PoseChoice> PickSolver::SolveView(const ScaleOfPhoto& scale_of_pho
   return choice;
 }
 
-PickSolver::Complete PickSolver::CompletePicks(const std::vector<SessionPick>& picks,
-                                               PickSolution* solution) const {
-  Complete complete;
+std::vector<PickSolver::Complete> PickSolver::CompletePicks(const std::vector<SessionPick>& picks,
+                                                            PickSolution* solution) const {
+  std::vector<Complete> complete(scene_.models().size());
+  for (size_t model = 0; model < complete.size(); ++model) {
+    complete[model].model = static_cast<int>(model);
+  }
   std::map<std::string, std::vector<int>> on;
   for (size_t i = 0; i < picks.size(); ++i) {
     const SessionPick& pick = picks[i];
     if (!pick.complete()) continue;
     const int index = static_cast<int>(i);
-    complete.picks.push_back(
+    Complete& own = complete[scene_.FindPhoto(pick.image_name)->model];
+    own.picks.push_back(
         {pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight, pick.label});
-    complete.index.push_back(index);
+    own.index.push_back(index);
     ++solution->photos[pick.image_name].num_complete;
     solution->picks[i].status =
         pick.weight > 0 ? PickState::Status::kUsed : PickState::Status::kOff;
@@ -149,11 +153,11 @@ PickSolver::Complete PickSolver::CompletePicks(const std::vector<SessionPick>& p
   return complete;
 }
 
-ScaleOfPhoto PickSolver::ScaleByRays(const ScanRays* rays) const {
+ScaleOfPhoto PickSolver::ScaleByRays(int model, const ScanRays* rays) const {
   if (rays == nullptr) return {};
-  return [this, rays](const SparseImage& image, const Rigid& cam_from_scan,
-                      const ScaleOptions& options) {
-    return EstimateScale(scene_.model(), image, cam_from_scan, rays->caster(), options,
+  return [this, model, rays](const SparseImage& image, const Rigid& cam_from_scan,
+                             const ScaleOptions& options) {
+    return EstimateScale(scene_.models()[model], image, cam_from_scan, rays->caster(), options,
                          scene_.input().num_threads);
   };
 }
@@ -163,7 +167,7 @@ PickSolver::Views PickSolver::SolveViews(const Complete& complete,
                                          PickSolution* solution) {
   Views solved;
   solved.views =
-      ReviewViews(scene_.model(), complete.picks, kMinPicks, options_.picks,
+      ReviewViews(scene_.models()[complete.model], complete.picks, kMinPicks, options_.picks,
                   [this](const std::string& name, const CameraProjection& projection,
                          const PointPairs& pairs) { return Review(name, projection, pairs); });
   for (PickView& view : solved.views) {
@@ -195,14 +199,15 @@ PickSolver::Views PickSolver::SolveViews(const Complete& complete,
 // What picks that place the model together say.
 void PickSolver::TakeSpread(const Complete& complete, const PickStart& found,
                             PickSolution* solution) const {
-  solution->warnings = SpreadWarnings(*found.spread, complete.index, scene_.azimuth());
+  const std::vector<std::string>& spread = solution->models[complete.model].warnings =
+      SpreadWarnings(*found.spread, complete.index, scene_.azimuth());
   std::set<std::string> clicked;
   for (const Pick& pick : complete.picks) {
     if (pick.weight > 0) clicked.insert(pick.image_name);
   }
   for (const std::string& name : clicked) {
     std::vector<std::string>& warnings = solution->photos[name].warnings;
-    warnings.insert(warnings.end(), solution->warnings.begin(), solution->warnings.end());
+    warnings.insert(warnings.end(), spread.begin(), spread.end());
   }
   if (!found.start) return;
   for (size_t k = 0; k < complete.index.size(); ++k) {
@@ -216,15 +221,16 @@ void PickSolver::TakeSpread(const Complete& complete, const PickStart& found,
   }
 }
 
-// One similarity for the model (thesis 7.1.3).
+// One similarity for each model (thesis 7.1.3).
 void PickSolver::FitModel(const Complete& complete, const Views& views,
                           const ScaleOfPhoto& scale_of_photo, PickSolution* solution) const {
-  const PickStart found = StartFromPicks(scene_.model(), complete.picks, views.views, views.choices,
-                                         options_, scale_of_photo);
+  const PickStart found = StartFromPicks(scene_.models()[complete.model], complete.picks,
+                                         views.views, views.choices, options_, scale_of_photo);
   if (found.spread) TakeSpread(complete, found, solution);
   if (!found.start) return;
-  solution->scale = found.start->scale;
-  solution->scan_from_sparse = found.start->scan_from_sparse;
+  ModelState& model = solution->models[complete.model];
+  model.scale = found.start->scale;
+  model.scan_from_sparse = found.start->scan_from_sparse;
   for (size_t k = 0; k < complete.index.size(); ++k) {
     PickState& state = solution->picks[complete.index[k]];
     const bool is_left_out = !found.start->picks[k].used;
@@ -233,8 +239,9 @@ void PickSolver::FitModel(const Complete& complete, const Views& views,
     }
   }
   for (const PickPhoto& photo : scene_.photos()) {
+    if (photo.model != complete.model) continue;
     PhotoState& state = solution->photos[photo.name()];
-    state.cam_from_scan = CamFromScan(photo.image->cam_from_model, *solution->scan_from_sparse);
+    state.cam_from_scan = CamFromScan(photo.image->cam_from_model, *model.scan_from_sparse);
     if (!state.solved()) state.by = PhotoState::By::kSparseModel;
   }
 }
@@ -250,7 +257,8 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
       weights += weight * weight;
     }
   };
-  Sums all, check;
+  Sums check;
+  std::vector<Sums> of_model(solution->models.size());
   std::map<std::string, Sums> of_photo;
   for (size_t i = 0; i < picks.size(); ++i) {
     const SessionPick& pick = picks[i];
@@ -261,7 +269,8 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
       if (state.status == PickState::Status::kUsed) state.status = PickState::Status::kWaiting;
       continue;
     }
-    const CameraProjection& projection = photo.projection(*scene_.FindPhoto(pick.image_name));
+    const PickPhoto& where = *scene_.FindPhoto(pick.image_name);
+    const CameraProjection& projection = photo.projection(where);
     const auto error = projection.ImgError(photo.cam_from_scan * *pick.x_in_scan, *pick.x_in_img);
     if (error) state.error_px = *error;
     state.residual_px = state.error_px.norm();
@@ -272,7 +281,7 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     }
     if (state.status != PickState::Status::kUsed) continue;
     ++photo.num_used;
-    all.Add(state, pick.weight);
+    of_model[where.model].Add(state, pick.weight);
     Sums& sums = of_photo[pick.image_name];
     sums.Add(state, pick.weight);
     sums.picks.push_back(static_cast<int>(i));
@@ -284,11 +293,13 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     PickState& worst = solution->picks[WorstOf(sums.picks, solution->picks)];
     // Of three picks that fit exactly none is worse than another.
     worst.worst = worst.residual_px > 0.01;
+    ++solution->models[scene_.FindPhoto(name)->model].num_clicked_photos;
   }
-  solution->rms_px = WeightedRms(all.px2, all.weights);
+  for (size_t model = 0; model < of_model.size(); ++model) {
+    solution->models[model].rms_px = WeightedRms(of_model[model].px2, of_model[model].weights);
+  }
   solution->check_rms_px = WeightedRms(check.px2, check.weights);
   solution->check_rms = WeightedRms(check.metres2, check.weights);
-  solution->num_clicked_photos = static_cast<int>(of_photo.size());
 }
 
 // The other side of half-finished pairs.
@@ -318,20 +329,20 @@ void PickSolver::Predict(const std::vector<SessionPick>& picks, const ScanRays* 
   }
 }
 
-PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
-  const ScanRays* rays = scene_.rays();
-  PickSolution solution;
-  solution.with_rays = rays != nullptr;
-  solution.picks.resize(picks.size());
-  for (const PickPhoto& photo : scene_.photos()) solution.photos[photo.name()];
-  const Complete complete = CompletePicks(picks, &solution);
-  const ScaleOfPhoto scale_of_photo = ScaleByRays(scene_.has_model() ? rays : nullptr);
-  const Views views = SolveViews(complete, scale_of_photo, &solution);
-  if (scale_of_photo) FitModel(complete, views, scale_of_photo, &solution);
-  Measure(picks, &solution);
+PickSolver::Views PickSolver::SolveModel(const Complete& complete, const ScanRays* rays,
+                                         PickSolution* solution) {
+  const ScaleOfPhoto scale_of_photo =
+      ScaleByRays(complete.model, scene_.has_model() ? rays : nullptr);
+  Views views = SolveViews(complete, scale_of_photo, solution);
+  if (scale_of_photo) FitModel(complete, views, scale_of_photo, solution);
+  return views;
+}
+
+// What is said of the layout of picks, and of a photo's place among the others.
+void PickSolver::Warn(const Views& views, PickSolution* solution) const {
   for (const PickView& view : views.views) {
     if (!view.HasPose()) continue;
-    PhotoState& photo = solution.photos[view.image_name];
+    PhotoState& photo = solution->photos[view.image_name];
     const CameraProjection& projection = *scene_.FindPhoto(view.image_name)->projection;
     for (std::string& warning : SpreadWarnings(view.pairs, projection.camera())) {
       photo.warnings.push_back(std::move(warning));
@@ -339,6 +350,21 @@ PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
     const std::string warning = ModelWarning(view.review, photo);
     if (!warning.empty()) photo.warnings.push_back(warning);
   }
+}
+
+PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
+  const ScanRays* rays = scene_.rays();
+  PickSolution solution;
+  solution.with_rays = rays != nullptr;
+  solution.picks.resize(picks.size());
+  solution.models.resize(scene_.models().size());
+  for (const PickPhoto& photo : scene_.photos()) solution.photos[photo.name()];
+  std::vector<Views> solved;
+  for (const Complete& complete : CompletePicks(picks, &solution)) {
+    solved.push_back(SolveModel(complete, rays, &solution));
+  }
+  Measure(picks, &solution);
+  for (const Views& views : solved) Warn(views, &solution);
   Predict(picks, rays, &solution);
   solution.next = NextStep(picks, solution, scene_);
   return solution;

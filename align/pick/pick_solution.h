@@ -59,18 +59,23 @@ struct PhotoState {
   }
 };
 
-struct PickSolution {
-  std::vector<PickState> picks;              // one per pick
-  std::map<std::string, PhotoState> photos;  // all of the model
+// One of the sparse models: the picks in its photos place it, and no other.
+struct ModelState {
   std::optional<Similarity> scan_from_sparse;
   ScaleEstimate scale;
-  double rms_px = kNoNumber;  // of all used picks, as roomtex-align's picks.rms_px
-  // Of the check points (weight 0) in photos that are solved; metres.
-  int num_check_points = 0;
-  double check_rms_px = kNoNumber, check_rms = kNoNumber;
+  double rms_px = kNoNumber;  // of its used picks, as roomtex-align's picks.rms_px
   // What is wrong with picks that count together over several photos.
   std::vector<std::string> warnings;
   int num_clicked_photos = 0;
+};
+
+struct PickSolution {
+  std::vector<PickState> picks;              // one per pick
+  std::map<std::string, PhotoState> photos;  // all of the scene
+  std::vector<ModelState> models;            // the same
+  // Of the check points (weight 0) in photos that are solved; metres.
+  int num_check_points = 0;
+  double check_rms_px = kNoNumber, check_rms = kNoNumber;
   bool with_rays = false;  // the ray caster stood
   std::string next;        // what to do now
 };
@@ -83,8 +88,9 @@ class PickSolver {
   PickSolution Solve(const std::vector<SessionPick>& picks);
 
  private:
-  // The picks that have both sides, and where each stands in the list.
+  // The picks of one model that have both sides, and where each stands in the list.
   struct Complete {
+    int model = 0;
     std::vector<Pick> picks;
     std::vector<int> index;
   };
@@ -96,12 +102,16 @@ class PickSolver {
 
   PickReview Review(const std::string& name, const CameraProjection& projection,
                     const PointPairs& pairs);
-  Complete CompletePicks(const std::vector<SessionPick>& picks, PickSolution* solution) const;
+  // Of each model.
+  std::vector<Complete> CompletePicks(const std::vector<SessionPick>& picks,
+                                      PickSolution* solution) const;
   Views SolveViews(const Complete& complete, const ScaleOfPhoto& scale_of_photo,
                    PickSolution* solution);
   std::optional<PoseChoice> SolveView(const ScaleOfPhoto& scale_of_photo, PickView* view,
                                       PhotoState* photo) const;
-  ScaleOfPhoto ScaleByRays(const ScanRays* rays) const;  // empty without them
+  ScaleOfPhoto ScaleByRays(int model, const ScanRays* rays) const;  // empty without them
+  Views SolveModel(const Complete& complete, const ScanRays* rays, PickSolution* solution);
+  void Warn(const Views& views, PickSolution* solution) const;
   void FitModel(const Complete& complete, const Views& views, const ScaleOfPhoto& scale_of_photo,
                 PickSolution* solution) const;
   void TakeSpread(const Complete& complete, const PickStart& found, PickSolution* solution) const;

@@ -31,10 +31,12 @@ struct Arguments {
 };
 
 void AddOptions(Arguments* a, Command* command) {
-  command->AddInputPath("input_path", &a->scene.input_path,
-                        "COLMAP's sparse model: a folder, .bin or .txt. Without it the photos of "
-                        "--image_path are placed each by its own picks.",
-                        Command::Kind::kOptional);
+  command->AddInputPaths("input_path", &a->scene.input_paths,
+                         "COLMAP's sparse model: a folder, .bin or .txt. Several (photos that "
+                         "nothing connects: sparse/0 sparse/1) are placed each by the picks in its "
+                         "photos. Without it the photos of --image_path are placed each by its own "
+                         "picks.",
+                         Command::Kind::kOptional);
   command->AddInputPath("image_path", &a->scene.image_path, "Folder of the photos.");
   command->AddInputPaths(
       "scan_path", &a->scene.scan_paths,
@@ -65,13 +67,13 @@ void CheckArguments(Arguments* a) {
   std::vector<std::string> problems = a->scene.scan_reader.Problems();
   AppendProblems(a->server.Problems(), &problems);
   AppendProblems(a->scene.camera.Problems(), &problems);
-  if (!a->scene.input_path.empty() && !a->scene.camera.camera_params.empty()) {
+  if (!a->scene.input_paths.empty() && !a->scene.camera.camera_params.empty()) {
     problems.push_back(
         "--camera_params is for photos without a sparse model: that of --input_path "
         "has cameras");
   }
   ThrowIfProblems(problems);
-  RequireScans(a->scene.scan_paths, a->scene.input_path);
+  RequireScans(a->scene.scan_paths, a->scene.AlignedPath());
   const std::filesystem::path picks(a->output_path);
   if (a->aligned_path.empty()) a->aligned_path = (picks.parent_path() / "aligned").string();
   if (std::filesystem::is_directory(picks)) {

@@ -7,33 +7,13 @@
 #include <gmock/gmock.h>
 
 #include "tests/align/case_folder.h"
+#include "tests/align/model_part.h"
 #include "tests/support/matchers.h"
 
 namespace roomtex {
 namespace {
 using testing::HasSubstr;
 using testing::SizeIs;
-
-// Photos of which `is_in` is true, with the points that two of them see.
-template <typename IsIn>
-SparseModel PartOf(const SparseModel& model, const IsIn& is_in) {
-  SparseModel part = model;
-  for (const auto& [id, image] : model.images) {
-    if (!is_in(id)) part.images.erase(id);
-  }
-  for (const auto& [id, point] : model.points) {
-    SparsePoint& left = part.points.at(id);
-    const auto is_gone = [&](const TrackElement& element) { return !is_in(element.image_id); };
-    left.track.erase(std::remove_if(left.track.begin(), left.track.end(), is_gone),
-                     left.track.end());
-    if (left.track.size() >= 2) continue;
-    for (const TrackElement& element : left.track) {
-      part.images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
-    }
-    part.points.erase(id);
-  }
-  return part;
-}
 
 class SeveralModels : public testing::Test {
  protected:

@@ -46,7 +46,7 @@ export class AlignDialog {
   #parts = {};
   #timer = 0;
 
-  // picks: Picks; facts: {min_picks, has_model, aligned_path}
+  // picks: Picks; facts: {min_picks, models, photos, aligned_path}
   constructor(picks, facts) {
     this.picks = picks;
     this.facts = facts;
@@ -84,17 +84,16 @@ export class AlignDialog {
   // hint: fewer picks than an alignment needs say where to search.
   async #start({hint = false} = {}) {
     const {body} = this.#parts;
-    const {min_picks, has_model: hasModel} = this.facts;
-    const counts = Object.values(this.picks.session.photos).map((one) => one.num_complete);
-    const count =
-        hasModel ? counts.reduce((sum, one) => sum + one, 0) : Math.max(0, ...counts);
+    const {min_picks} = this.facts;
+    const hasModel = this.facts.models.length > 0;
+    const {count, where} = this.#fewest();
     if (count < min_picks && !hint) {
       this.#status = null;
       this.#buttons(false);
       body.replaceChildren(
           el('p', {},
              `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
-                 `there are ${count} so far.`),
+                 `there are ${count} so far${where}.`),
           el('p', {}, this.picks.session.next));
       if (hasModel && count > 0) body.append(this.#offerSearch());
       return;
@@ -118,6 +117,20 @@ export class AlignDialog {
     }
     this.#message('Starting roomtex-align…');
     await this.#poll();
+  }
+
+  // The picks there are: of photos alone in the one that has most, of several models in the photos
+  // of the one that has fewest and any.
+  #fewest() {
+    const {models, photos} = this.facts;
+    const numComplete = (photo) => this.picks.session.photos[photo.name].num_complete;
+    if (models.length === 0) return {count: Math.max(0, ...photos.map(numComplete)), where: ''};
+    const counts = models.map(() => 0);
+    for (const photo of photos) counts[photo.model] += numComplete(photo);
+    const begun = counts.filter((count) => count > 0);
+    const count = begun.length > 0 ? Math.min(...begun) : 0;
+    const several = models.length > 1 && count > 0;
+    return {count, where: several ? ` in photos of ${models[counts.indexOf(count)]}` : ''};
   }
 
   #offerSearch() {

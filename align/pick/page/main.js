@@ -328,7 +328,7 @@ async function start() {
   app.server = server;
   document.title = `roomtex-pick: ${server.picks_path}`;
   build();
-  app.strip = new Strip(server.photos, (id) => choosePhoto(id));
+  app.strip = new Strip(server.photos, server.models, (id) => choosePhoto(id));
   app.picks.adopt(server.session);
   app.picks.keepHistory(server.picks_path);
   byId('scan-choice').hidden = server.scans.length < 2;

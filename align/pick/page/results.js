@@ -122,8 +122,8 @@ export class Results {
   }
 }
 
-// What the picks of the photo that is shown say about its pose, and the model as a whole.
-export function showSummary(photo, session, {min_picks, has_model: hasModel}) {
+// What the picks of the photo that is shown say about its pose, and those of its model as a whole.
+export function showSummary(photo, session, {min_picks, models}) {
   const solution = session.photos[photo?.name];
   const body = byId('summary-body');
   const facts = [];
@@ -149,9 +149,9 @@ export function showSummary(photo, session, {min_picks, has_model: hasModel}) {
   } else {
     add('Pose',
         `not solved; roomtex-align wants ${min_picks} picks, ` +
-            (hasModel ? 'here or in several photos' : 'in this photo'));
+            (models.length > 0 ? 'here or in several photos' : 'in this photo'));
   }
-  const similarity = session.similarity;
+  const similarity = session.similarities[photo?.model ?? 0];
   if (similarity) {
     add('Scale',
         `${Number(similarity.scale.toPrecision(6))}, spread ${

@@ -5,16 +5,19 @@ import {byId, el, number, setText} from './dom.js';
 
 export class Strip {
   #photos = [];
+  #models = [];
   #thumbs = new Map();  // id -> {photo, element, picks, rms, image}
   #queue = [];          // ids of thumbnails in view that are not loaded
   #loading = false;
   #shown = [];  // ids in order, under the filter
   #current = null;
 
-  constructor(photos, choose) {
+  // models: their paths; with several each photo says of which it is.
+  constructor(photos, models, choose) {
     this.box = byId('thumbs');
     this.choose = choose;
     this.#photos = photos;
+    this.#models = models.length > 1 ? models : [];
     const seen = new IntersectionObserver((entries) => this.#seen(entries), {root: this.box});
     for (const photo of photos) {
       const image = el('img', {alt: '', draggable: 'false'});
@@ -33,6 +36,8 @@ export class Strip {
             },
           },
              image, picks, rms, el('span', {class: 'name'}, `\u200e${photo.name}`));
+      const model = this.#modelOf(photo);
+      if (model) element.append(el('span', {class: 'badge model'}, model));
       this.#thumbs.set(photo.id, {photo, element, picks, rms, image});
       this.box.append(element);
       seen.observe(element);
@@ -78,9 +83,14 @@ export class Strip {
     }
   }
 
+  // The path of its model; '' where there is but one.
+  #modelOf(photo) {
+    return this.#models[photo.model] ?? '';
+  }
+
   #fill({photo, element, picks, rms}, chosen, count, rms_px) {
     element.setAttribute('aria-selected', String(chosen));
-    picks.hidden = count === 0 && photo.rank !== 1 && !photo.missing;
+    picks.hidden = count === 0 && !photo.suggested && !photo.missing;
     setText(
         picks,
         photo.missing ? 'cannot be shown' :
@@ -91,8 +101,8 @@ export class Strip {
     const sees = typeof photo.scan_share === 'number' ?
         `, sees ${Math.round(100 * photo.scan_share)} % of the scan` :
         '';
-    const points =
-        photo.num_points > 0 ? `${photo.num_points} points of the sparse model` : 'a photo';
+    const model = this.#modelOf(photo) || 'the sparse model';
+    const points = photo.num_points > 0 ? `${photo.num_points} points of ${model}` : 'a photo';
     element.title =
         `${photo.name}: ${photo.missing ? photo.problem || 'no such file' : points + sees}`;
   }
@@ -101,7 +111,8 @@ export class Strip {
     const text = byId('filter').value.trim().toLowerCase();
     this.#shown = [];
     for (const {photo, element} of this.#thumbs.values()) {
-      element.hidden = !photo.name.toLowerCase().includes(text);
+      const names = [photo.name, this.#modelOf(photo)];
+      element.hidden = !names.some((name) => name.toLowerCase().includes(text));
       if (!element.hidden) this.#shown.push(photo.id);
     }
     setText(

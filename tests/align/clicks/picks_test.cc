@@ -182,11 +182,26 @@ TEST(Picks, TakeTheNameOfTheOnlyPhotoThatHasItInAFolder) {
   for (const char* name : {"a.jpg", "b.jpg", "c.jpg", "d.jpg", "mine/b.jpg", "nowhere/a.jpg"}) {
     picks.push_back(PicksOf(name, 1)[0]);
   }
-  NamePicksAsInModel(model, &picks);
+  NamePicksAsInModels({&model}, &picks);
   std::vector<std::string> names;
   for (const Pick& pick : picks) names.push_back(pick.image_name);
   EXPECT_EQ(names, (std::vector<std::string>{"scanner/a.jpg", "b.jpg", "c.jpg", "d.jpg",
                                              "mine/b.jpg", "nowhere/a.jpg"}));
+}
+
+TEST(Picks, OfSeveralModelsBelongToTheOneThatHoldsTheirPhoto) {
+  const SparseModel left = ModelWith({"left/a.jpg", "left/b.jpg", "c.jpg"});
+  const SparseModel right = ModelWith({"right/a.jpg", "right/d.jpg", "other/c.jpg"});
+  std::vector<Pick> picks;
+  for (const char* name : {"d.jpg", "b.jpg", "c.jpg"}) picks.push_back(PicksOf(name, 1)[0]);
+  NamePicksAsInModels({&left, &right}, &picks);
+  EXPECT_EQ(picks[0].image_name, "right/d.jpg");
+  EXPECT_EQ(picks[1].image_name, "left/b.jpg");
+  EXPECT_EQ(picks[2].image_name, "c.jpg");
+  EXPECT_NO_THROW(CheckPickNames("p.csv", picks, {&left, &right}));
+  std::vector<Pick> either = PicksOf("a.jpg", 1);
+  NamePicksAsInModels({&left, &right}, &either);
+  EXPECT_INPUT_ERROR(CheckPickNames("p.csv", either, {&left, &right}), "nearest name: left/a.jpg");
 }
 
 TEST(Picks, RefusesPixelOutsideThePhoto) {

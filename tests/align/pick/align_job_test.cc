@@ -44,7 +44,7 @@ TEST_F(AlignButton, AlignsAndSaysHowGoodItIs) {
   EXPECT_TRUE(idle["exit_code"].is_null());
   EXPECT_EQ(Post("align").status, 422);  // there are no pairs yet
   EXPECT_THAT(idle["command"].get<std::string>(),
-              HasSubstr("roomtex-align --input_path " + ThePickRoom().input().input_path));
+              HasSubstr("roomtex-align --input_path " + ThePickRoom().input().input_paths[0]));
   ASSERT_EQ(Put(1, ToJson(TruePicks(8))).status, 200);
   const Json state = Align();
   EXPECT_EQ(state["exit_code"], 0) << state.dump(1);
@@ -69,7 +69,7 @@ TEST_F(AlignButton, AlignsAndSaysHowGoodItIs) {
   // The same numbers on the page and in the report.
   const Json report = Json::parse(ReadBytes(folder_ / "aligned/alignment.json"));
   const Json session = Get("state").json()["session"];
-  EXPECT_NEAR(report["picks"]["rms_px"], session["similarity"]["rms_px"].get<double>(), 1e-9);
+  EXPECT_NEAR(report["picks"]["rms_px"], session["similarities"][0]["rms_px"].get<double>(), 1e-9);
   for (size_t i = 0; i < 8; ++i) {
     EXPECT_NEAR(report["picks"]["per_pick"][i]["residual_px"],
                 session["picks"][i]["residual_px"].get<double>(), 1e-9);

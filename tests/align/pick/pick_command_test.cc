@@ -25,7 +25,7 @@ using testing::StartsWith;
 
 std::string Options(const std::string& picks_path) {
   const PickSceneInput input = ThePickRoom().input();
-  return "--input_path " + input.input_path + " --image_path " + input.image_path +
+  return "--input_path " + input.input_paths[0] + " --image_path " + input.image_path +
          " --scan_path " + input.scan_paths[0] + " --output_path " + picks_path;
 }
 
@@ -163,7 +163,7 @@ TEST(PickCommand, RefusesWhatCannotBeServed) {
   std::string elsewhere = Options(folder / "picks.csv");
   const std::string images = ThePickRoom().input().image_path;
   elsewhere.replace(elsewhere.find(images), images.size(), folder.path());
-  expect(elsewhere, 3, "none of the model's 8 photos can be shown");
+  expect(elsewhere, 3, "none of the sparse model's 8 photos can be shown");
   const CommandResult help = RunCommandLine("roomtex-pick --help");
   EXPECT_EQ(help.exit_code, 0);
   for (const char* option : {"--image_name", "--aligned_path", "--scan_poses", "--azimuth",

@@ -37,7 +37,7 @@ class PickRoom {
 
   PickSceneInput input() const {
     PickSceneInput input;
-    input.input_path = folder_ / "sparse";
+    input.input_paths = {folder_ / "sparse"};
     input.image_path = folder_ / "images";
     input.scan_paths = {folder_ / "room.rtpi"};
     return input;

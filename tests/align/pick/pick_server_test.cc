@@ -59,7 +59,7 @@ TEST_F(PickPage, StateSaysWhatThereIs) {
   EXPECT_EQ(session["save_error"], "");
   EXPECT_EQ(session["picks"], Json::array());
   EXPECT_EQ(session["photos"].size(), 8u);
-  EXPECT_TRUE(session["similarity"].is_null());
+  EXPECT_TRUE(session["similarities"][0].is_null());
   EXPECT_THAT(session["next"].get<std::string>(), HasSubstr("Click a point"));
   EXPECT_FALSE(std::filesystem::exists(picks_path_));  // nothing was changed yet
 }
@@ -210,8 +210,8 @@ TEST_F(PickPage, PicksAreSolvedAndSaved) {
   const Json& other = session["photos"][ThePickRoom().room().PhotoName(0)];
   EXPECT_EQ(other["by"], "sparse_model");
   EXPECT_TRUE(other["rms_px"].is_null());
-  EXPECT_EQ(session["similarity"]["num_photos"], 1);
-  EXPECT_LT(session["similarity"]["relative_mad"], 0.02);
+  EXPECT_EQ(session["similarities"][0]["num_photos"], 1);
+  EXPECT_LT(session["similarities"][0]["relative_mad"], 0.02);
   EXPECT_GT(session["milliseconds"], 0);
 
   const std::vector<Pick> saved = ReadPicks(picks_path_);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "core/text.h"
+#include "tests/align/model_part.h"
 #include "tests/align/pick/pick_room.h"
 #include "tests/support/matchers.h"
 
@@ -12,6 +13,7 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Status = PickState::Status;
 
 PickSolution Solve(const std::vector<SessionPick>& picks) {
@@ -42,9 +44,10 @@ TEST(PickSolution, SixTruePicksGiveTheTruthAndNoResiduals) {
   EXPECT_LT(photo.rms, 1e-6);
   EXPECT_FALSE(photo.ambiguous);
   EXPECT_THAT(photo.warnings, IsEmpty());
-  ASSERT_TRUE(solution.scan_from_sparse);
-  EXPECT_NEAR(solution.scan_from_sparse->scale / ThePickRoom().room().ScanFromSparse().scale, 1,
-              1e-3);
+  ASSERT_TRUE(solution.models[0].scan_from_sparse);
+  EXPECT_NEAR(
+      solution.models[0].scan_from_sparse->scale / ThePickRoom().room().ScanFromSparse().scale, 1,
+      1e-3);
   ExpectTruePoses(solution, 0.01);
   for (const PickState& pick : solution.picks) {
     EXPECT_EQ(pick.status, Status::kUsed);
@@ -74,7 +77,7 @@ TEST(PickSolution, ThreeToFivePicksAreDecidedByTheSparseModel) {
 TEST(PickSolution, TwoPicksSayNothing) {
   const PickSolution solution = Solve(TruePicks(2));
   EXPECT_FALSE(solution.photos.at(ClickedName()).solved());
-  EXPECT_FALSE(solution.scan_from_sparse);
+  EXPECT_FALSE(solution.models[0].scan_from_sparse);
   for (const PickState& pick : solution.picks) {
     EXPECT_EQ(pick.status, Status::kWaiting);
     EXPECT_TRUE(std::isnan(pick.residual_px));
@@ -141,7 +144,8 @@ TEST(PickSolution, AGoodFourthPickNeverTakesThePoseAway) {
       *four[3].x_in_img += Eigen::Vector2d(1.2, -0.9);
       const PickSolution by_four = Solve(four);
       EXPECT_TRUE(by_four.photos.at(ClickedName()).solved()) << a << " " << share;
-      EXPECT_EQ(by_four.scan_from_sparse.has_value(), by_three.scan_from_sparse.has_value());
+      EXPECT_EQ(by_four.models[0].scan_from_sparse.has_value(),
+                by_three.models[0].scan_from_sparse.has_value());
       EXPECT_LT((by_four.photos.at(ClickedName()).cam_from_scan.TargetOriginInSource() -
                  room.room().CamFromScan(room.clicked_photo()).TargetOriginInSource())
                     .norm(),
@@ -159,7 +163,7 @@ TEST(PickSolution, PicksOfSeveralPhotosCountTogetherAsInTheAlignment) {
     for (const SessionPick& pick : room.SmoothPicks(photo, 2)) picks.push_back(pick);
   }
   const PickSolution solution = Solve(picks);
-  ASSERT_TRUE(solution.scan_from_sparse);
+  ASSERT_TRUE(solution.models[0].scan_from_sparse);
   ExpectTruePoses(solution, 0.001);
   EXPECT_THAT(solution.next, HasSubstr("Enough picks"));
   for (const PickState& pick : solution.picks) EXPECT_LT(pick.leave_one_out_px, 0.1);
@@ -272,15 +276,15 @@ Alignment Align(const std::vector<SessionPick>& session_picks) {
   AlignmentOptions options;
   options.plane_constrained = false;
   Progress progress(true);
-  return AlignToScan({scene.model(), surveyed, picks, "picks.csv", "clockwise"}, options,
+  return AlignToScan({scene.models()[0], surveyed, picks, "picks.csv", "clockwise"}, options,
                      &progress);
 }
 
 void ExpectSameNumbers(const PickSolution& solution, const Alignment& alignment) {
   const AlignmentStart& start = alignment.start;
-  EXPECT_NEAR(solution.rms_px, start.pick_rms_px, 1e-9);
-  EXPECT_NEAR(solution.scan_from_sparse->scale, start.scan_from_sparse.scale, 1e-6);
-  EXPECT_EQ(solution.scale.num_features, start.scale.num_features);
+  EXPECT_NEAR(solution.models[0].rms_px, start.pick_rms_px, 1e-9);
+  EXPECT_NEAR(solution.models[0].scan_from_sparse->scale, start.scan_from_sparse.scale, 1e-6);
+  EXPECT_EQ(solution.models[0].scale.num_features, start.scale.num_features);
   for (size_t i = 0; i < solution.picks.size(); ++i) {
     EXPECT_NEAR(solution.picks[i].residual_px, start.picks[i].residual_px, 1e-9) << i;
     EXPECT_EQ(solution.picks[i].status == Status::kUsed, start.picks[i].used) << i;
@@ -316,7 +320,7 @@ TEST(PickSolution, NumbersOfPicksInTwoPhotosAreThoseOfTheAlignment) {
   const PickSolution solution = Solve(picks);
   ExpectSameNumbers(solution, Align(picks));
   EXPECT_EQ(solution.picks.back().status, Status::kBad);
-  EXPECT_EQ(solution.num_clicked_photos, 2);
+  EXPECT_EQ(solution.models[0].num_clicked_photos, 2);
 }
 
 void ExpectSameBits(const Similarity& a, const Similarity& b) {
@@ -330,7 +334,7 @@ void ExpectSameBits(const Similarity& a, const Similarity& b) {
 TEST(PickSolution, SixPicksGiveTheSimilarityOfTheAlignment) {
   const std::vector<SessionPick> picks = WithNoise(TruePicks(6));
   const PickScene& scene = ThePickRoom().scene();
-  const Similarity by_window = Solve(picks).scan_from_sparse.value();
+  const Similarity by_window = Solve(picks).models[0].scan_from_sparse.value();
   const Alignment alignment = Align(picks);
   Similarity by_command = alignment.start.scan_from_sparse;
   EXPECT_NEAR(by_command.scale / by_window.scale, 1, 1e-6);
@@ -338,21 +342,21 @@ TEST(PickSolution, SixPicksGiveTheSimilarityOfTheAlignment) {
   // With the command's views and the window's scale, to the last bit.
   const std::vector<Pick> as_in_file = AsInAFile(picks);
   const PickStart found = StartFromPicks(
-      scene.model(), as_in_file, ReviewViews(scene.model(), as_in_file, PickReviewOptions()), {},
-      AlignmentOptions(),
+      scene.models()[0], as_in_file,
+      ReviewViews(scene.models()[0], as_in_file, PickReviewOptions()), {}, AlignmentOptions(),
       [&](const SparseImage& image, const Rigid& cam_from_scan, const ScaleOptions& options) {
-        return EstimateScale(scene.model(), image, cam_from_scan, scene.rays()->caster(), options,
-                             1);
+        return EstimateScale(scene.models()[0], image, cam_from_scan, scene.rays()->caster(),
+                             options, 1);
       });
   ExpectSameBits(found.start.value().scan_from_sparse, by_window);
   // And with the window's own scale estimate on the command's mesh.
   const SurveyedScans surveyed(scene.scans());
   const PickStart on_mesh = StartFromPicks(
-      scene.model(), as_in_file, ReviewViews(scene.model(), as_in_file, PickReviewOptions()), {},
-      AlignmentOptions(),
+      scene.models()[0], as_in_file,
+      ReviewViews(scene.models()[0], as_in_file, PickReviewOptions()), {}, AlignmentOptions(),
       [&](const SparseImage& image, const Rigid& cam_from_scan, const ScaleOptions& options) {
-        return EstimateScale(scene.model(), image, cam_from_scan, scene.scans(), surveyed.meshes(),
-                             options);
+        return EstimateScale(scene.models()[0], image, cam_from_scan, scene.scans(),
+                             surveyed.meshes(), options);
       });
   ExpectSameBits(on_mesh.start.value().scan_from_sparse, by_command);
 }
@@ -360,13 +364,71 @@ TEST(PickSolution, SixPicksGiveTheSimilarityOfTheAlignment) {
 // The same room without its sparse model: photos alone, their camera told or to be found.
 std::unique_ptr<PickScene> PhotosAlone(const PhotoCameraOptions& camera) {
   PickSceneInput input = ThePickRoom().input();
-  input.input_path = "";
+  input.input_paths.clear();
   input.camera = camera;
   Progress progress(true);
   auto scene = std::make_unique<PickScene>(input, &progress);
   scene->Prepare();
   scene->WaitForEdges([] { return false; });
   return scene;
+}
+
+// The same room with its photos in two sparse models, the second in a frame of its own.
+std::unique_ptr<PickScene> TwoModels() {
+  const SimulatedRoom& room = ThePickRoom().room();
+  const std::string other = room.PhotoName(ThePickRoom().other_photo());
+  const SparseModel whole = room.MakeSparseModel(1500, 0.0);
+  // Every other photo, so that the clicked one and this one are in different models.
+  const auto in_second = [&](uint32_t id) {
+    const std::string& name = whole.images.at(id).name;
+    return name == other || (name != ClickedName() && id % 2 == 0);
+  };
+  const SparseModel first = PartOf(whole, [&](uint32_t id) { return !in_second(id); });
+  SparseModel second = PartOf(whole, in_second);
+  Similarity elsewhere;
+  elsewhere.scale = 0.25;
+  elsewhere.translation = {3, -2, 1};
+  TransformModel(elsewhere, &second);
+  PickSceneInput input = ThePickRoom().input();
+  input.input_paths = {ThePickRoom().folder() / "first", ThePickRoom().folder() / "second"};
+  WriteSparseModel(first, input.input_paths[0]);
+  WriteSparseModel(second, input.input_paths[1]);
+  Progress progress(true);
+  auto scene = std::make_unique<PickScene>(input, &progress);
+  scene->Prepare();
+  scene->WaitForEdges([] { return false; });
+  return scene;
+}
+
+TEST(PickSolution, OfSeveralModelsEachIsPlacedByThePicksInItsPhotos) {
+  const auto scene = TwoModels();
+  const std::string other = ThePickRoom().room().PhotoName(ThePickRoom().other_photo());
+  ASSERT_EQ(scene->photos().size(), 8u);
+  ASSERT_EQ(scene->FindPhoto(ClickedName())->model, 0);
+  ASSERT_EQ(scene->FindPhoto(other)->model, 1);
+  PickSolver solver(*scene);
+  std::vector<SessionPick> picks = TruePicks(6);
+  const PickSolution by_first = solver.Solve(picks);
+  ASSERT_TRUE(by_first.models[0].scan_from_sparse);
+  EXPECT_FALSE(by_first.models[1].scan_from_sparse);
+  EXPECT_FALSE(by_first.photos.at(other).solved());
+  EXPECT_THAT(by_first.next, HasSubstr("Enough picks"));
+  EXPECT_THAT(by_first.next, HasSubstr("The photos of " + scene->ModelName(1) + " have no picks"));
+  for (const SessionPick& pick : ThePickRoom().Picks(ThePickRoom().other_photo(), 6)) {
+    picks.push_back(pick);
+    if (picks.size() != 9) continue;
+    const PickSolution begun = solver.Solve(picks);
+    EXPECT_THAT(begun.next, HasSubstr("3 more pairs to go, in this photo or in others of " +
+                                      scene->ModelName(1)));
+  }
+  const PickSolution solution = solver.Solve(picks);
+  ExpectTruePoses(solution, 0.01);
+  EXPECT_EQ(solution.models[0].num_clicked_photos, 1);
+  EXPECT_EQ(solution.models[1].num_clicked_photos, 1);
+  EXPECT_NEAR(solution.models[1].scan_from_sparse->scale * 0.25 /
+                  solution.models[0].scan_from_sparse->scale,
+              1, 1e-3);
+  EXPECT_THAT(solution.next, Not(HasSubstr("have no picks")));
 }
 
 PhotoCameraOptions TrueCamera() {
@@ -392,7 +454,7 @@ TEST(PickSolution, WithoutASparseModelAPhotoIsSolvedByItsOwnPicks) {
   EXPECT_THAT(
       photo.cam_from_scan,
       IsNearRigid(ThePickRoom().room().CamFromScan(ThePickRoom().clicked_photo()), 1e-4, 1e-4));
-  EXPECT_FALSE(solution.scan_from_sparse);
+  EXPECT_FALSE(solution.models[0].scan_from_sparse);
   EXPECT_FALSE(photo.found_projection);
   EXPECT_THAT(solution.next, HasSubstr("Enough picks for this photo"));
   const std::string other = ThePickRoom().room().PhotoName(ThePickRoom().other_photo());
@@ -425,7 +487,7 @@ TEST(PickSolution, BeforeTheRayCasterStandsThePoseIsThereAlready) {
   EXPECT_FALSE(solution.with_rays);
   EXPECT_TRUE(solution.photos.at(ClickedName()).solved());
   EXPECT_LT(solution.photos.at(ClickedName()).rms_px, 1e-3);
-  EXPECT_FALSE(solution.scan_from_sparse);
+  EXPECT_FALSE(solution.models[0].scan_from_sparse);
 }
 
 TEST(PickScene, ThePhotosAreRankedAndWhatIsMissingIsSaid) {
