@@ -19,6 +19,21 @@ double NumberAt(const Json& json, std::initializer_list<const char*> keys) {
   return at->is_number() ? at->get<double>() : std::nan("");
 }
 
+// Of several models all picks, though `picks` is of the first that was placed.
+double NumberOfPicks(const Json& report, const char* key) {
+  if (!report.contains("models") || !report["models"].is_array()) {
+    return NumberAt(report, {"picks", key});
+  }
+  double sum = 0;
+  bool any = false;
+  for (const Json& model : report["models"]) {
+    const double number = NumberAt(model, {"picks", key});
+    any |= std::isfinite(number);
+    if (std::isfinite(number)) sum += number;
+  }
+  return any ? sum : std::nan("");
+}
+
 std::string Millimetres(double mm) {
   if (!std::isfinite(mm)) return "unknown";
   if (mm >= 1000) return Number(mm / 1000, 2) + " m";
@@ -42,8 +57,8 @@ void AddFacts(const Json& report, AlignVerdict* verdict) {
   facts.Add("Expected error at the photos", at_cameras, Millimetres(at_cameras));
   const double at_corner = NumberAt(report, {"expected_error", "at_far_corner_mm"});
   facts.Add("Expected error at the scan's far corner", at_corner, Millimetres(at_corner));
-  const double count = NumberAt(report, {"picks", "count"});
-  const double used = NumberAt(report, {"picks", "num_used"});
+  const double count = NumberOfPicks(report, "count");
+  const double used = NumberOfPicks(report, "num_used");
   const double rms_px = NumberAt(report, {"picks", "rms_px"});
   facts.Add("Picks used", count, Number(used, 0) + " of " + Number(count, 0));
   facts.Add("Picks miss by (rms)", rms_px, Number(rms_px, 2) + " px");
@@ -67,6 +82,21 @@ void AddFacts(const Json& report, AlignVerdict* verdict) {
   const double chance = NumberAt(report, {"agreement", "gradient_shift", "chance", "share"});
   facts.Add("Photos and scan intensity agree", agreement,
             Percent(agreement) + " of the places looked at (by chance " + Percent(chance) + ")");
+}
+
+// Of several models those that are not trusted are left out: how many photos are placed, and of how
+// many; "" = all.
+std::string PlacedPhotos(const Json& report) {
+  if (!report.contains("models") || !report["models"].is_array()) return "";
+  int num_placed = 0, num_photos = 0;
+  for (const Json& model : report["models"]) {
+    const double num_images = NumberAt(model, {"num_images"});
+    if (!std::isfinite(num_images)) return "";
+    num_photos += static_cast<int>(num_images);
+    if (model.value("joined", false)) num_placed += static_cast<int>(num_images);
+  }
+  if (num_placed == num_photos) return "";
+  return std::to_string(num_placed) + " of " + std::to_string(num_photos) + " photos";
 }
 
 void AddWarnings(const Json& report, AlignVerdict* verdict) {
@@ -96,7 +126,9 @@ AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::
     verdict.verdict = "trusted";
     verdict.headline = "Trusted.";
     if (std::isfinite(mm)) {
-      verdict.headline = "Trusted: the photos are placed to about " + Millimetres(mm) + ".";
+      const std::string placed = has_report ? PlacedPhotos(report) : "";
+      verdict.headline = "Trusted: " + (placed.empty() ? "the photos" : placed) +
+                         " are placed to about " + Millimetres(mm) + ".";
     }
   } else {
     verdict.verdict = "untrusted";

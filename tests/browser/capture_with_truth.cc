@@ -6,12 +6,15 @@
 #include <exception>
 #include <fstream>
 #include <limits>
+#include <set>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
 #include "colmap_ext/sparse_model.h"
+#include "tests/align/model_part.h"
 
 namespace roomtex {
 namespace {
@@ -58,14 +61,30 @@ void WriteAll(const std::string& folder) {
   const SimulatedRoom room(options);
   Progress progress(/*quiet=*/true);
   WriteCapture(room, folder + "/capture", &progress);
-  WriteSparseModel(room.MakeSparseModel(2500, 0.5), folder + "/sparse");
+  const SparseModel model = room.MakeSparseModel(2500, 0.5);
+  WriteSparseModel(model, folder + "/sparse");
   const Scan scan = room.MakeScan(0);
   const int best = room.BestPhotoForPicks();
   nlohmann::json places;
   places["photo"] = room.PhotoName(best);
   places["places"] = Places(room, scan, best, 16);
-  places["other_photo"] = room.PhotoName((best + 1) % room.NumPhotos());
-  places["other_places"] = Places(room, scan, (best + 1) % room.NumPhotos(), 16);
+  const int other = (best + 1) % room.NumPhotos();
+  places["other_photo"] = room.PhotoName(other);
+  places["other_places"] = Places(room, scan, other, 16);
+  // The same photos as two models, as if nothing connected them: the half that begins with the
+  // other photo, and the half that ends with the best one.
+  std::set<std::string> names;
+  for (int i = 0; i < room.NumPhotos() / 2; ++i) {
+    names.insert(room.PhotoName((other + i) % room.NumPhotos()));
+  }
+  const auto in_second = [&](uint32_t id) { return names.count(model.images.at(id).name) > 0; };
+  WriteSparseModel(PartOf(model, [&](uint32_t id) { return !in_second(id); }), folder + "/first");
+  SparseModel second = PartOf(model, in_second);
+  Similarity elsewhere;
+  elsewhere.scale = 0.25;
+  elsewhere.translation = {3, -2, 1};
+  TransformModel(elsewhere, &second);
+  WriteSparseModel(second, folder + "/second");
   std::ofstream(folder + "/places.json") << places.dump(1) << "\n";
 }
 

@@ -14,6 +14,14 @@ let other_places;
 const pageOn = (body, options = {}) =>
     onPage(browser, body, {image_name: places[0].image_name, ...options});
 
+// Of an aligned model against the truth, by roomtex-evaluate.
+async function posesOf(aligned) {
+  const result = await run(
+      'roomtex-evaluate', ['--truth_path', capture('capture', 'truth'), '--input_path', aligned]);
+  assert.equal(result.code, 0, result.stderr);
+  return JSON.parse(result.stdout).poses;
+}
+
 before(async () => {
   browser = await launchBrowser();
   ({places, other_places} = await usablePlaces());
@@ -389,11 +397,7 @@ test('Align says trusted, and the model lies where it should', async () => {
     await until(async () => !await page.page.isVisible('#large'), 'Escape closes it');
     await screenshot(page.page, 'pick-align');
     assert.ok((await lowestContrast(page.page, '#align')).ratio >= 4.5);
-    const aligned = folder.path('aligned');
-    const result = await run(
-        'roomtex-evaluate', ['--truth_path', capture('capture', 'truth'), '--input_path', aligned]);
-    assert.equal(result.code, 0, result.stderr);
-    const {poses} = JSON.parse(result.stdout);
+    const poses = await posesOf(folder.path('aligned'));
     assert.equal(poses.num_registered, 12);
     assert.ok(poses.position_median_mm < 10, `${poses.position_median_mm} mm`);
     assert.ok(poses.rotation_median_deg < 0.15, `${poses.rotation_median_deg} degrees`);
@@ -441,6 +445,44 @@ test('six pairs in two photos are enough', async () => {
   }, {picksFile: fileOf([...places.slice(0, 3), ...other_places.slice(0, 3)])});
 });
 
+test('two sparse models: each is placed by the pairs in its photos', async () => {
+  await pageOn(async (page, {folder}) => {
+    await page.rowsAre(9);
+    const second = capture('second');
+    await until(
+        async () => (await page.text('#next')).includes(second), 'the second model needs more');
+    assert.match(await page.text('#next'), /3 more pairs to go, in this photo or in others of /);
+    assert.match(await page.text('#summary-body'), /6 used of 6[^]*Scale/);
+    const labels = await page.page.locator('.thumb .badge.model').allInnerTexts();
+    assert.equal(labels.length, 12);
+    const isOf = (name) => labels.filter((label) => label.endsWith(`/${name}`)).length;
+    assert.deepEqual([isOf('first'), isOf('second')], [6, 6], labels.join());
+    await page.page.fill('#filter', '/second');
+    await until(
+        async () => await page.text('#strip-count') === '6 of 12', 'the second model\u2019s');
+    await page.page.fill('#filter', '');
+    await page.page.click('#align-open');
+    assert.match(
+        await page.text('#align .body'), /needs 6 picks; there are 3 so far in photos of .*second/);
+    await page.page.keyboard.press('Escape');
+    await page.page.locator(`.thumb[title^="${other_places[0].image_name}:"]`).click();
+    for (const place of other_places.slice(3, 6)) await page.pick(place);
+    await until(
+        async () => /^Enough picks/.test(await page.text('#next')), 'both models have enough');
+    await screenshot(page.page, 'pick-two-models');
+    await page.page.click('#align-open');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+    await screenshot(page.page, 'pick-two-models-aligned');
+    const poses = await posesOf(folder.path('aligned'));
+    assert.equal(poses.num_registered, 12);
+    assert.ok(poses.position_max_mm < 15, `${poses.position_max_mm}`);
+  }, {
+    models: ['first', 'second'],
+    picksFile: fileOf([...places.slice(0, 6), ...other_places.slice(0, 3)]),
+  });
+});
+
 test('photos alone: each is solved by its own pairs, and aligned', async () => {
   const [camera] = readFileSync(capture('capture', 'cameras.txt'), 'utf8')
                        .split('\n')
@@ -460,7 +502,7 @@ test('photos alone: each is solved by its own pairs, and aligned', async () => {
     assert.match(await page.text('#align .verdict'), /^✓\s*Trusted/);
     await screenshot(page.page, 'pick-alone-aligned');
   }, {
-    alone: true,
+    models: [],
     picksFile: fileOf(places.slice(0, 6)),
     more: ['--camera_model', model, '--camera_params', params.join(',')],
   });

@@ -44,10 +44,11 @@ export function capture(...parts) {
   return path.join(folder, ...parts);
 }
 
-// Starts roomtex-pick on it; alone: on its photos, without the sparse model.
-export function servePicks(picksPath, more = [], port = 0, alone = false) {
+// Starts roomtex-pick on it. models: none = on its photos alone; ['first', 'second'] = its photos in
+// two models.
+export function servePicks(picksPath, more = [], port = 0, models = ['sparse']) {
   return serve('roomtex-pick', [
-    ...(alone ? [] : ['--input_path', capture('sparse')]),
+    ...models.flatMap((model) => ['--input_path', capture(model)]),
     '--image_path',
     capture('capture', 'photos'),
     '--scan_path',
@@ -211,13 +212,13 @@ export class PickPage {
 
 // Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
 // what `allowed` names. picksFile: what the picks file holds before; more: options of the command;
-// alone: without the sparse model.
+// models: as servePicks() has them.
 export async function onPage(
-    browser, body, {image_name, picksFile = '', allowed = [], more = [], alone = false}) {
+    browser, body, {image_name, picksFile = '', allowed = [], more = [], models = ['sparse']}) {
   const folder = makeFolder();
   const picksPath = folder.path('picks.csv');
   if (picksFile) writeFileSync(picksPath, picksFile);
-  const server = await servePicks(picksPath, ['--image_name', image_name, ...more], 0, alone);
+  const server = await servePicks(picksPath, ['--image_name', image_name, ...more], 0, models);
   // Small: without a graphics processor the time goes into pixels.
   const page = await PickPage.open(browser, server, picksPath, {width: 1280, height: 720});
   try {

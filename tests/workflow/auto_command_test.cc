@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <regex>
+#include <set>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -73,6 +76,29 @@ class AutoCommand : public testing::Test {
   static TempFolder* folder_;
 };
 TempFolder* AutoCommand::folder_ = nullptr;
+
+// Groups of options (--Rooms.enabled: Rooms) in what a command prints for --help.
+std::set<std::string> OptionGroups(const std::string& command) {
+  const std::string help = RunCommandLine(command + " --help").out;
+  const std::regex option("\n  --([A-Za-z0-9]+)\\.");
+  std::set<std::string> groups;
+  for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at) {
+    groups.insert((*at)[1]);
+  }
+  return groups;
+}
+
+TEST(AutoOptions, HoldEveryGroupOfOptionsOfTheCommandsThatItRuns) {
+  const std::set<std::string> known = OptionGroups("roomtex-auto");
+  for (const char* command :
+       {"roomtex-pairs", "roomtex-mapper", "roomtex-align", "roomtex-texture"}) {
+    const std::set<std::string> groups = OptionGroups(command);
+    EXPECT_FALSE(groups.empty()) << command;
+    for (const std::string& group : groups) {
+      EXPECT_EQ(known.count(group), 1u) << command << " --" << group << ".*";
+    }
+  }
+}
 
 TEST_F(AutoCommand, PrintsTheCommandsWithoutRunningThem) {
   const CommandResult result = RunCommandLine(Arguments() + " --dry_run");

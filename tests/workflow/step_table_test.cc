@@ -163,6 +163,41 @@ TEST_F(StepTableTest, OptionsHandedOnTakeThePlaceOfOurs) {
   EXPECT_THAT(Line("texture"), Not(HasSubstr("auto")));
 }
 
+TEST_F(StepTableTest, HowScansAreReadAndTheLensGoesToEveryCommandThatAsks) {
+  AddPhotos("a", 4, 64);
+  for (const char* step : {"mapper", "align", "texture"}) {
+    for (const char* option : {"max_range", "E57", "refine", "register", "strict"}) {
+      EXPECT_THAT(Line(step), Not(HasSubstr(option))) << step;
+    }
+  }
+  options_.max_range = 12.5;
+  options_.e57_check = false;
+  options_.refine_intrinsics = "0";
+  options_.register_stations = options_.strict = true;
+  EXPECT_THAT(Line("mapper"), HasSubstr("--refine_intrinsics 0"));
+  for (const char* option : {"--max_range 12.5", "--E57.check 0", "--refine_intrinsics 0",
+                             "--register_stations 1", "--strict 1"}) {
+    EXPECT_THAT(Line("align"), HasSubstr(option));
+    EXPECT_THAT(CommandText(Chain(options_).AutoCommand()), HasSubstr(option));
+  }
+  EXPECT_THAT(Line("texture"), HasSubstr("--E57.check 0"));
+  EXPECT_THAT(Line("texture"), HasSubstr("--strict 1"));
+  EXPECT_THAT(Line("texture"), Not(HasSubstr("--max_range")));  // the aligned model remembers it
+}
+
+TEST_F(StepTableTest, PicksAreMadeInAllModels) {
+  AddPhotos("a", 4, 64);
+  const auto pick = [this] { return CommandText(Chain(options_).PickCommand()); };
+  EXPECT_THAT(pick(), Not(HasSubstr("--input_path")));  // there is none yet
+  for (const char* number : {"0", "1"}) {
+    const std::string model = folder_ / "result/sparse/" + number;
+    fs::create_directories(model);
+    WriteBytes(model + "/roomtex-mapper.json", std::string("{\"model\": ") + number + "}");
+  }
+  EXPECT_THAT(pick(), HasSubstr("--input_path " + (folder_ / "result/sparse/0") + " --input_path " +
+                                (folder_ / "result/sparse/1")));
+}
+
 TEST_F(StepTableTest, LoosePhotosAreAllMatchedThoseInARowWithNeighbours) {
   AddPhotos("a", 4, 60);
   EXPECT_THAT(Line("matches"), HasSubstr("exhaustive_matcher"));

@@ -3,6 +3,11 @@
 import {api} from './api.js';
 import {byId, el, number, setText} from './dom.js';
 
+// The last two names of a path: what tells sparse/0 from sparse/1.
+function shortPath(path) {
+  return path.split('/').filter((name) => name !== '').slice(-2).join('/');
+}
+
 export class Strip {
   #photos = [];
   #models = [];
@@ -17,7 +22,7 @@ export class Strip {
     this.box = byId('thumbs');
     this.choose = choose;
     this.#photos = photos;
-    this.#models = models.length > 1 ? models : [];
+    this.#models = models.length > 1 ? models.map(shortPath) : [];
     const seen = new IntersectionObserver((entries) => this.#seen(entries), {root: this.box});
     for (const photo of photos) {
       const image = el('img', {alt: '', draggable: 'false'});
@@ -83,7 +88,7 @@ export class Strip {
     }
   }
 
-  // The path of its model; '' where there is but one.
+  // Its model, as sparse/0; '' where there is but one.
   #modelOf(photo) {
     return this.#models[photo.model] ?? '';
   }

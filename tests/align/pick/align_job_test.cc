@@ -212,6 +212,11 @@ TEST(AlignVerdict, SaysWhatTheExitCodeMeans) {
   const AlignVerdict trusted = JudgeRun(kExitDone, report, {});
   EXPECT_EQ(trusted.headline, "Trusted: the photos are placed to about 3.4 mm.");
   EXPECT_THAT(trusted.sentences, Contains("A warning."));
+  Json of_two = report;
+  of_two["models"] = {{{"num_images", 7}, {"joined", true}},
+                      {{"num_images", 5}, {"joined", false}}};
+  EXPECT_EQ(JudgeRun(kExitDone, of_two, {}).headline,
+            "Trusted: 7 of 12 photos are placed to about 3.4 mm.");
   const AlignVerdict untrusted = JudgeRun(kExitUntrusted, report, {});
   EXPECT_EQ(untrusted.verdict, "untrusted");
   EXPECT_THAT(untrusted.sentences, Contains("Few points lie on the surface."));
