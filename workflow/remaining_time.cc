@@ -76,20 +76,22 @@ double ShareOfLine(const std::string& line) {
   const size_t bracket = line.find('[');
   if (bracket == std::string::npos) return -1;
   const bool is_block = line.rfind("Matching block", 0) == 0;
-  const bool is_counted = is_block || line.rfind("Processed file", 0) == 0 ||
+  const bool is_model = line.rfind("  sparse model [", 0) == 0;
+  const bool is_counted = is_block || is_model || line.rfind("Processed file", 0) == 0 ||
                           line.find("] Processed file") != std::string::npos ||
                           line.rfind("Matching image", 0) == 0 ||
                           line.find("Matching image [") != std::string::npos ||
                           line.find("Processing image [") != std::string::npos;
   if (!is_counted) return -1;
   int i = 0, n = 0, j = 0, m = 0;
-  const char* const numbers = line.c_str() + line.rfind('[');
+  const char* const numbers = line.c_str() + (is_model ? bracket : line.rfind('['));
   if (std::sscanf(numbers, "[%d/%d, %d/%d]", &i, &n, &j, &m) == 4 && n > 0 && m > 0) {
     // Blocks of a half of the square of pairs count nearly the same.
     return std::clamp((static_cast<double>(i - 1) * m + j) / (static_cast<double>(n) * m), 0.0,
                       1.0);
   }
   if (std::sscanf(numbers, "[%d/%d]", &i, &n) == 2 && n > 0) {
+    if (is_model) --i;  // said before, not after
     return std::clamp(static_cast<double>(i) / n, 0.0, 1.0);
   }
   return -1;

@@ -39,7 +39,7 @@ class RemainingTime {
 std::string DurationText(double seconds);
 
 // How much of a step is done by a line that its program printed ("Processed file [3/12]", "Matching
-// block [1/4, 2/4]"); negative where it does not say.
+// block [1/4, 2/4]", "  sparse model [2/3]: sparse/1"); negative where it does not say.
 double ShareOfLine(const std::string& line);
 
 }  // namespace roomtex

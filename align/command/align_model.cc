@@ -153,7 +153,8 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
     attempt.is_alike = models[i].verdict.is_alike;
     const bool is_strict = models[i].options.strict;
     context.progress.Finish();
-    context.progress.Note(ShortName(attempt));
+    context.progress.Note(
+        fmt::format("sparse model [{}/{}]: {}", i + 1, models.size(), ShortName(attempt)));
     const Command::Context own{context.options, context.progress, attempt.report};
     try {
       const bool turns = may_turn && MayTurn(models[i].options, *reading);

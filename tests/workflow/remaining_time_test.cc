@@ -14,6 +14,11 @@ TEST(ShareOfLine, ReadsWhatColmapPrints) {
   EXPECT_DOUBLE_EQ(ShareOfLine("Matching image [5/10] in 0.1s"), 0.5);
 }
 
+TEST(ShareOfLine, ReadsWhichOfSeveralModelsIsAlignedNow) {
+  EXPECT_DOUBLE_EQ(ShareOfLine("  sparse model [1/4]: sparse/0 (12 photos)"), 0);
+  EXPECT_DOUBLE_EQ(ShareOfLine("  sparse model [4/4]: [1/2]/3 (12 photos)"), 0.75);
+}
+
 TEST(ShareOfLine, IsUnknownForOtherLines) {
   for (const char* line :
        {"", "  Features:        4114", "[1/2]", "Processed file [a/b]", "Processed file [1/0]"}) {
