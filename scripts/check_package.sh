@@ -133,10 +133,11 @@ cat >"$root/roomtex/pages.sh" <<'JOB'
 set -eu
 cd /roomtex
 ask() {  # COMMAND ... : starts it, and asks for its page
+  rm -f address  # or that of the last one is read, before this one's begins
   "$@" --quiet --port 0 >address &
   server=$!
   for _ in $(seq 200); do
-    grep -q ^http address && break
+    grep -q -s ^http address && break
     sleep 0.1
   done
   url=$(head -n 1 address)
