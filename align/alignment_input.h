@@ -52,6 +52,8 @@ struct AlignmentInput {
   // empty.
   std::string image_path = "";
   int num_threads = -1;  // for that; changes nothing
+  // What is added to places of the scan in messages: the scans were moved by as much.
+  Eigen::Vector3d scan_origin = Eigen::Vector3d::Zero();
 
   // The same of another model, other scans or picks; all must outlive the result.
   AlignmentInput With(const SparseModel& other_model, const SurveyedScans& other_scans,
@@ -61,6 +63,7 @@ struct AlignmentInput {
     other.lenses_refined = lenses_refined;
     other.image_path = image_path;
     other.num_threads = num_threads;
+    other.scan_origin = scan_origin;
     return other;
   }
 };

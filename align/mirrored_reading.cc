@@ -10,9 +10,7 @@ namespace {
 
 std::vector<Pick> MirrorPicks(std::vector<Pick> picks, const Rigid& scan_from_station) {
   for (Pick& pick : picks) {
-    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * pick.x_in_scan;
-    x_in_station.x() *= -1;
-    pick.x_in_scan = scan_from_station * x_in_station;
+    pick.x_in_scan = MirroredAt(scan_from_station, pick.x_in_scan);
   }
   return picks;
 }
@@ -73,12 +71,9 @@ AlignmentAttempt AttemptAlignment(const AlignmentInput& input, const AlignmentOp
 
 std::vector<Scan> MirrorScans(std::vector<Scan> scans) {
   for (Scan& scan : scans) {
-    const Rigid station_from_scan = scan.scan_from_station.Inverse();
     for (size_t i = 0; i < scan.points.size(); ++i) {
       if (scan.IsMissing(static_cast<int>(i))) continue;
-      Eigen::Vector3d x_in_station = station_from_scan * scan.points[i];
-      x_in_station.x() *= -1;
-      scan.points[i] = scan.scan_from_station * x_in_station;
+      scan.points[i] = MirroredAt(scan.scan_from_station, scan.points[i]);
     }
     for (Triangle& triangle : scan.triangles) std::swap(triangle[1], triangle[2]);
   }

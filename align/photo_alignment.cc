@@ -292,7 +292,7 @@ PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& p
   if (placed.empty()) {
     result.alignment.reasons.push_back(
         "None of the photos could be placed by what it shows of the scan's intensity (" +
-        first_problem +
+        (first_problem.empty() ? "none could be read" : first_problem) +
         "). Pick six points in one of them (roomtex-pick), or give the sparse model of more photos "
         "(--input_path).");
   }

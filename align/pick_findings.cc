@@ -16,9 +16,7 @@ std::vector<Eigen::Vector3d> Mirrored(const std::vector<Eigen::Vector3d>& points
                                       const Rigid& scan_from_station) {
   std::vector<Eigen::Vector3d> mirrored;
   for (const Eigen::Vector3d& point : points) {
-    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * point;
-    x_in_station.x() *= -1;
-    mirrored.push_back(scan_from_station * x_in_station);
+    mirrored.push_back(MirroredAt(scan_from_station, point));
   }
   return mirrored;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "align/alignment_fit.h"
 #include "align/search/up_directions.h"
 #include "align/trust/scan_cells.h"
 #include "core/parallel.h"
@@ -12,8 +13,6 @@
 namespace roomtex {
 namespace {
 
-// Pixels per coordinate, as in alignment.cc.
-constexpr double kLeastSearchNoise = 0.3;
 constexpr size_t kCloudPoints = 4000;  // that finalists are fitted with
 constexpr size_t kFirstPoints = 700;   // that every hypothesis is fitted with
 constexpr double kFirstSearchGate = 0.4, kLastSearchGate = 0.1;  // metres, of the fits
@@ -125,8 +124,7 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
                          const AlignmentOptions& options, const StartSearchOptions& search) {
   StartSearch found;
   SparseModel copy = input.model;
-  const double sigma_px =
-      std::max(kLeastSearchNoise, UpdateReprojectionErrors(&copy).rms_px / std::sqrt(2.0));
+  const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&copy).rms_px);
   found.cloud = MakeSearchCloud(input.model, sigma_px, kCloudPoints);
   const SearchCloud mirror_image = Mirrored(found.cloud);
   const UpDirections ups = FindModelUps(found.cloud);

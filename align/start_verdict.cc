@@ -71,9 +71,9 @@ void Choose(const StartSearch& search, const StartVerdictOptions& options, Start
   if (search.starts.size() > 1) verdict->second = verdict->best == 0 ? 1 : 0;
 }
 
-std::string Where(const StartSearch& search, int start) {
+std::string Where(const AlignmentInput& input, const StartSearch& search, int start) {
   const Similarity& s = search.starts[start].scan_from_sparse;
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Eigen::Vector3d middle = input.scan_origin;
   for (const Eigen::Vector3d& centre : search.cloud.centres) {
     middle += s * centre / static_cast<double>(search.cloud.centres.size());
   }
@@ -223,8 +223,8 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.kind = Kind::kAmbiguous;
     verdict.reason = score < options.min_ratio * second
                          ? "The sparse model fits the scan in more than one place: " +
-                               Where(search, verdict.best) + "; or " +
-                               Where(search, verdict.second) + "."
+                               Where(input, search, verdict.best) + "; or " +
+                               Where(input, search, verdict.second) + "."
                          : fmt::format(
                                "The sparse model fits the scan little better than its mirror image "
                                "does ({:.0f} and {:.0f} % of the photos' rays agree).",

@@ -146,6 +146,10 @@ ModelPlace PlaceOfModel(const std::string& folder) {
           place.enu_from_model.translation[static_cast<int>(i)] =
               rigid.at("translation").at(i).get<double>();
         }
+        if (!(std::abs(wxyz.norm() - 1) < 1e-3)) {
+          throw InputError(path, "geo.enu_from_scan", "holds a rotation that is none",
+                           "Run roomtex-align again");
+        }
         place.enu_from_model.rotation = QuaternionFromWxyz(wxyz).normalized();
       }
       place.geo.emplace(position);

@@ -137,6 +137,11 @@ void RequireSameFeatures(const Database& copy, const std::string& path,
   }
 }
 
+[[noreturn]] void ThrowNotWritten(const std::string& path, const SQLite::Exception& error) {
+  throw InputError(path, "", std::string("cannot be changed (") + error.what() + ")",
+                   "Make room in the folder of temporary files (TMPDIR)");
+}
+
 // The statement's parameters: model, width, height, params, prior_focal_length, camera_id.
 void ExecuteWith(uint32_t camera_id, const Camera& camera, SQLite::Statement* statement) {
   statement->bind(1, static_cast<int>(camera.model));
@@ -209,7 +214,8 @@ void Database::CopyWithMatches(const std::string& path,
   });
 }
 
-void Database::KeepPairsBetween(const std::string& copy_path, const std::set<uint32_t>& image_ids) {
+void Database::KeepPairsBetween(const std::string& copy_path,
+                                const std::set<uint32_t>& image_ids) try {
   SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
   std::vector<int64_t> others;
   SQLite::Statement read(copy, "SELECT pair_id FROM two_view_geometries");
@@ -228,10 +234,12 @@ void Database::KeepPairsBetween(const std::string& copy_path, const std::set<uin
     remove.reset();
   }
   transaction.commit();
+} catch (const SQLite::Exception& error) {
+  ThrowNotWritten(copy_path, error);
 }
 
 bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
-                          const std::map<uint32_t, DatabaseImage>& images) {
+                          const std::map<uint32_t, DatabaseImage>& images) try {
   SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
   if (copy.tableExists("rigs")) return false;
   SQLite::Transaction transaction(copy);
@@ -249,6 +257,8 @@ bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t,
   }
   transaction.commit();
   return true;
+} catch (const SQLite::Exception& error) {
+  ThrowNotWritten(copy_path, error);
 }
 
 }  // namespace roomtex

@@ -309,6 +309,7 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   const bool as_planned =
       plan.IsAsInDatabase() || Database::SetCameras(database_copy, plan.cameras(), plan.images());
   MappingPass pass(as_planned ? plan : LensPlan(images_.cameras(), images_.images()), refine);
+  pass.can_set_lenses = as_planned;
   pass.images = std::make_unique<MatchedImages>(
       pass.plan.cameras(), ImagesOf(pass.plan.images(), photos_), PairsOf(images_, photos_),
       [this](uint32_t image_id) { return database_.ReadKeypoints(image_id); });
@@ -357,6 +358,11 @@ std::vector<MappingPass> Mapping::Run() {
     }
     passes.push_back(std::move(pass));
   }
+  // The first was kept whatever it has, for it might have been the only one.
+  const bool any_better = std::any_of(passes.begin(), passes.end(), [](const MappingPass& pass) {
+    return pass.model().images.size() >= kFewestOfModel;
+  });
+  if (any_better && passes[0].model().images.size() < kFewestOfModel) passes.erase(passes.begin());
   const auto rank = [&](const MappingPass& pass) {
     size_t num_known = 0;
     for (const auto& [id, image] : pass.model().images) num_known += known_.cam_from_scan.count(id);
@@ -369,7 +375,8 @@ std::vector<MappingPass> Mapping::Run() {
 
 void Mapping::LearnLenses(const MappingPass& pass) {
   plan_ = pass.plan;
-  const bool knows = pass.refine && !pass.lenses.lenses.empty() && IsDetermined(pass.lenses);
+  const bool knows = pass.can_set_lenses && pass.refine && !pass.lenses.lenses.empty() &&
+                     IsDetermined(pass.lenses);
   if (knows) plan_->Calibrate(pass.model());
 }
 

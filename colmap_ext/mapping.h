@@ -59,6 +59,7 @@ struct MappingPass {
 
   LensPlan plan;  // of all photos
   bool refine;
+  bool can_set_lenses = true;             // of `plan`, in the copy of the database that COLMAP gets
   std::unique_ptr<MatchedImages> images;  // of the group, and the pairs between them
   std::unique_ptr<MapperRun> mapper;
   std::vector<MappingOutcome> best;  // at most one

@@ -40,12 +40,13 @@ class Join {
     const uint32_t wanted = camera.camera_id;
     const auto known = own->find(wanted);
     if (known != own->end()) return known->second;
-    const auto there = joined_.cameras.find(wanted);
-    const bool is_same = there != joined_.cameras.end() && there->second.model == camera.model &&
-                         there->second.width == camera.width &&
-                         there->second.height == camera.height &&
-                         there->second.params == camera.params;
-    const uint32_t id = is_same ? wanted : FreeId(joined_.cameras, wanted);
+    const auto there =
+        std::find_if(joined_.cameras.begin(), joined_.cameras.end(), [&camera](const auto& one) {
+          return one.second.model == camera.model && one.second.width == camera.width &&
+                 one.second.height == camera.height && one.second.params == camera.params;
+        });
+    const bool is_same = there != joined_.cameras.end();
+    const uint32_t id = is_same ? there->first : FreeId(joined_.cameras, wanted);
     own->emplace(wanted, id);
     if (is_same) return id;
     camera.camera_id = id;

@@ -42,6 +42,12 @@ Scan Thinned(const Scan& scan, int stride) {
   return thin;
 }
 
+Eigen::Vector3d MirroredAt(const Rigid& scan_from_station, const Eigen::Vector3d& x_in_scan) {
+  Eigen::Vector3d x_in_station = scan_from_station.Inverse() * x_in_scan;
+  x_in_station.x() *= -1;
+  return scan_from_station * x_in_station;
+}
+
 Bounds FindBounds(const Scan& scan) {
   Bounds bounds;
   for (const Eigen::Vector3d& point : scan.points) {

@@ -83,6 +83,10 @@ struct Bounds {
 };
 Bounds FindBounds(const Scan& scan);
 
+// Where a point (`scan`) is if the scan is read with the other sense of its azimuths: across the
+// station's plane of y and z.
+Eigen::Vector3d MirroredAt(const Rigid& scan_from_station, const Eigen::Vector3d& x_in_scan);
+
 // What of the intensities becomes black and what white.
 struct GreyScale {
   float low = 0, high = 1;

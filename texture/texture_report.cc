@@ -231,6 +231,12 @@ void JudgeColors(const std::vector<PhotoView>& photos, const ColorizeResult& res
         "photos that see the same sample differ in colour as much as at random. Is the model "
         "aligned? Run roomtex-align.");
   }
+  if (ContradictEachOther(result.agreement)) {
+    context.report.SetUntrusted(
+        "most photos show something else than the others do at the same places (photo_agreement): "
+        "some stand elsewhere than they were aligned. Did several projectors throw the same "
+        "pattern, or do rooms look alike? Look at the sparse model in COLMAP's window.");
+  }
 }
 
 void FillScansReport(const PlacedScans& placed, Report* report) {

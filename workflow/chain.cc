@@ -191,7 +191,9 @@ CommandLine Chain::AutoCommand() const {
   if (options_.video_frames > 0) {
     AddOption("--video_frames", std::to_string(options_.video_frames), &line);
   }
+  if (options_.accept_untrusted) AddOption("--accept_untrusted", "1", &line);
   if (options_.colmap != "colmap") AddOption("--colmap", options_.colmap, &line);
+  AddCommon(options_, &line);
   const PassedOptions& passed = options_.passed;
   for (const auto* more : {&passed.features, &passed.pairs, &passed.matches, &passed.mapper,
                            &passed.align, &passed.texture}) {

@@ -48,6 +48,10 @@ double RemainingTime::Expected(const std::string& step) const {
 void RemainingTime::Finish(const std::string& step, double seconds) {
   guessed_ += Guess(step);
   taken_ += seconds;
+  Drop(step);
+}
+
+void RemainingTime::Drop(const std::string& step) {
   steps_.erase(std::remove(steps_.begin(), steps_.end(), step), steps_.end());
 }
 

@@ -19,6 +19,8 @@ class RemainingTime {
   void SetSteps(const std::vector<std::string>& steps,
                 const std::map<std::string, double>& seconds_last_time);
   void Finish(const std::string& step, double seconds);
+  // It has not to run: says nothing of this machine.
+  void Drop(const std::string& step);
 
   // Seconds until everything is done; `share`: of the running step that is done, negative = not
   // known; `elapsed`: its seconds so far.
@@ -35,7 +37,7 @@ class RemainingTime {
   double guessed_ = 0, taken_ = 0;  // of the steps that ran
 };
 
-// "about 3 min", "about 20 s".
+// "3 min", "20 s".
 std::string DurationText(double seconds);
 
 // How much of a step is done by a line that its program printed ("Processed file [3/12]", "Matching

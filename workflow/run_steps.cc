@@ -117,7 +117,11 @@ class StepRunner {
     } else {
       context_.progress.Note(step.name + ": done before, nothing has changed");
     }
-    time_.Finish(step.name, why ? state_.Find(step.name)->seconds : 0);
+    if (why) {
+      time_.Finish(step.name, state_.Find(step.name)->seconds);
+    } else {
+      time_.Drop(step.name);
+    }
     Remember(&outcome);
     result_.steps.push_back(outcome);
     return GoesOnBehind(outcome);
@@ -169,7 +173,8 @@ class StepRunner {
         throw InputError(path, "", "does not exist, and the step " + step.name + " needs it",
                          "Check the path");
       }
-      from[FileName(path)] = signature;
+      // Two of one name, as scans in folders of their own: by their paths.
+      from[from.count(FileName(path)) == 0 ? FileName(path) : path] = signature;
     }
     for (const auto& [path, content] : step.files) from[FileName(path)] = HashText(content);
     if (step.name == "matches") {
@@ -280,6 +285,7 @@ class StepRunner {
     started_ = std::chrono::steady_clock::now();
     running_ = step.name;
     share_ = -1;
+    command_ = 0;
     if (step.action) {
       context_.progress.Note("$ " + record.commands[0]);
       step.action([this](double share) {
@@ -291,8 +297,11 @@ class StepRunner {
       RunCommands(step, &record);
     }
     record.seconds = Elapsed();
-    for (const std::string& path : step.outputs) {
-      if (!IsConsumed(step.name)) record.outputs[path] = Signature(path);
+    if (!IsConsumed(step.name)) {
+      // Asked again: how many models the mapper makes is known now.
+      for (const std::string& path : RowOf(step.name)->make(&chain_).outputs) {
+        record.outputs[path] = Signature(path);
+      }
     }
     state_.Set(step.name, record);
     context_.progress.Finish();
@@ -323,8 +332,8 @@ class StepRunner {
     record->state = StepState::kDone;
     for (const CommandLine& line : step.commands) {
       if (line[0] != "mv") context_.progress.Note("$ " + CommandText(line));
-      ++command_;
       const ChildRun run = RunOne(step, line);
+      ++command_;
       record->cpu_seconds += run.cpu_seconds;
       record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
       if (run.success) continue;
@@ -355,7 +364,7 @@ class StepRunner {
     settings.stop_signal = is_ours ? SIGTERM : SIGKILL;
     settings.on_line = [&](const std::string& text) {
       const double share = ShareOfLine(text);
-      if (share >= 0) share_ = share / static_cast<double>(step.commands.size());
+      if (share >= 0) share_ = (command_ + share) / static_cast<double>(step.commands.size());
       const bool is_warning = text.rfind("warning: ", 0) == 0;
       if (is_ours && is_warning) context_.Warn(step.name + ": " + text.substr(9));
     };
@@ -460,7 +469,8 @@ class StepRunner {
     }
     remedies.push_back("Then start again, it goes on from here: " + again);
     if (HasModel(step) && step != "associate") {
-      remedies.push_back("To go on all the same: " + again + " --accept_untrusted 1");
+      remedies.push_back("To go on all the same: " + again +
+                         (chain_.options().accept_untrusted ? "" : " --accept_untrusted 1"));
     }
     return remedies;
   }

@@ -101,6 +101,8 @@ std::string ScanFileOf(const std::string& path);
 Json ReadJsonFile(const std::string& path);  // null if it is not there or no JSON object
 // Nothing if the value is empty.
 void AddOption(const std::string& name, const std::string& value, CommandLine* line);
+// --num_threads and --random_seed.
+void AddCommon(const AutoOptions& options, CommandLine* line);
 // How the scans are read, as far as the user said it.
 void AddScanReading(const AutoOptions& options, CommandLine* line);
 

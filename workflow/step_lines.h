@@ -22,8 +22,6 @@ const Quality& QualityOf(const AutoOptions& options);
 
 // Options that the user handed on take the place of ours.
 void AddPassed(const std::vector<std::string>& passed, CommandLine* line);
-// --num_threads and --random_seed.
-void AddCommon(const AutoOptions& options, CommandLine* line);
 // The scans and how they are read; `inputs` gets the files.
 void AddScans(const AutoOptions& options, CommandLine* line, std::vector<std::string>* inputs);
 // COLMAP's names of one option, old and new: the one that this version has, if it has one.

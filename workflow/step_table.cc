@@ -182,7 +182,8 @@ Step MakeMapper(Chain* chain) {
     step.inputs.push_back(known);
     step.notes.emplace_back("the scanner's photos stand where the scan's file has them");
   }
-  step.outputs = {chain->At("sparse/0"), chain->At("sparse/init")};
+  step.outputs = chain->SparseModels();
+  step.outputs.push_back(chain->At("sparse/init"));
   return step;
 }
 

@@ -29,6 +29,7 @@ struct Attempt {
   bool is_alike = false;  // MapperVerdict's
   Report report;
   std::string refusal;
+  std::string azimuth;  // of the scans that it was put into, as they were read then
   std::optional<AlignedModel> aligned;
 
   bool trusted() const { return aligned.has_value() && report.trusted(); }
@@ -80,8 +81,11 @@ std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
   GiveOut(a, &models);
   for (ModelToAlign& one : models) {
     one.near = ReadHints(one.options, one.picks, one.model);
-    one.told = LookForPhotos(a, one.model, context);
   }
+  std::vector<const SparseModel*> all;
+  for (const ModelToAlign& one : models) all.push_back(&one.model);
+  const std::set<std::string> told = LookForPhotos(a, all, context);
+  for (ModelToAlign& one : models) one.told = told;
   return models;
 }
 
@@ -168,19 +172,21 @@ std::vector<Attempt> AlignEach(std::vector<ModelToAlign> models, const Database*
           "none of the picks is in its photos, and without --image_path its place cannot be "
           "searched for";
     }
+    attempt.azimuth = reading->azimuth();
     may_turn &= !attempt.trusted();
   }
   DoubtRivals(&attempts);
   return attempts;
 }
 
-// The one that the report is of: the first that is trusted, else the first that has a place.
-const Attempt& MainOf(const std::vector<Attempt>& attempts) {
+// The one that the report is of: the first that is trusted, else the first that has a place in the
+// scans as they are read now (a later one may have turned them, and was not trusted either).
+const Attempt& MainOf(const std::vector<Attempt>& attempts, const std::string& azimuth) {
   const auto trusted = std::find_if(attempts.begin(), attempts.end(),
                                     [](const Attempt& attempt) { return attempt.trusted(); });
   if (trusted != attempts.end()) return *trusted;
-  const auto placed = std::find_if(attempts.begin(), attempts.end(), [](const Attempt& attempt) {
-    return attempt.aligned.has_value();
+  const auto placed = std::find_if(attempts.begin(), attempts.end(), [&](const Attempt& attempt) {
+    return attempt.aligned.has_value() && attempt.azimuth == azimuth;
   });
   return placed != attempts.end() ? *placed : attempts[0];
 }
@@ -260,7 +266,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
     aligned = AlignOne(std::move(models[0]), matches, may_turn, &reading, &refusal, context);
   } else {
     std::vector<Attempt> attempts = AlignEach(std::move(models), matches, &reading, context);
-    const Attempt& main = MainOf(attempts);
+    const Attempt& main = MainOf(attempts, reading.azimuth());
     refusal = ShortName(main) + ": " + main.refusal;
     TakeOver(attempts, main, context);
     if (main.aligned) {
@@ -273,7 +279,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
     WriteScanPlanes(a.planes_path, reading.surveyed->scans(), PlanesOf(a, *reading.surveyed),
                     context.options.num_threads, reading.origin.offset());
   }
-  if (!aligned) return WriteRefusal(a, refusal, context);
+  if (!aligned) return WriteRefusal(a, refusal, reading.origin, context);
   WriteAligned(a, std::move(aligned->model), aligned->local_from_sparse, &reading, told, context);
 }
 

@@ -79,20 +79,25 @@ std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& c
 
 }  // namespace
 
-std::set<std::string> LookForPhotos(const AlignCommandOptions& a, const SparseModel& model,
+std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
+                                    const std::vector<const SparseModel*>& models,
                                     const Command::Context& context) {
   std::set<std::string> told;
   if (a.image_path.empty()) return told;
   std::vector<PhotoLeftOut> left_out;
   std::vector<std::string> notes;
-  for (const SparseImage* image : SpreadImages(model, static_cast<int>(model.images.size()))) {
-    const Camera& camera = model.cameras.at(image->camera_id);
-    const PhotoFit fit = FitPhotoToCamera(a.image_path + "/" + image->name, image->name,
-                                          camera.width, camera.height);
-    if (!fit.note.empty()) notes.push_back(fit.note);
-    if (fit.usable()) continue;
-    left_out.push_back({image->name, fit.problem});
-    told.insert(fit.problem);
+  std::set<std::string> names;
+  for (const SparseModel* model : models) {
+    for (const SparseImage* image : SpreadImages(*model, static_cast<int>(model->images.size()))) {
+      if (!names.insert(image->name).second) continue;
+      const Camera& camera = model->cameras.at(image->camera_id);
+      const PhotoFit fit = FitPhotoToCamera(a.image_path + "/" + image->name, image->name,
+                                            camera.width, camera.height);
+      if (!fit.note.empty()) notes.push_back(fit.note);
+      if (fit.usable()) continue;
+      left_out.push_back({image->name, fit.problem});
+      told.insert(fit.problem);
+    }
   }
   if (a.strict) ThrowIfAnyLeftOut(left_out, a.image_path);
   ReportPhotosLeftOut(left_out, context);
@@ -115,7 +120,8 @@ void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
-                  const Command::Context& context) {
+                  const LocalOrigin& origin, const Command::Context& context) {
+  origin.MoveBack(&context.report.keys());
   context.report.SetUntrusted(refusal);
   context.report["scan_from_sparse"] = nullptr;
   const std::string output_path = ChooseOutput(a, context);

@@ -13,9 +13,11 @@
 
 namespace roomtex {
 
-// The photos that can be compared with the scan; what there is to say about the others. Returns the
-// reasons that were told. Throws InputError with --strict 1.
-std::set<std::string> LookForPhotos(const AlignCommandOptions& a, const SparseModel& model,
+// The photos of the models that can be compared with the scan; what there is to say about the
+// others (the report's `photos_left_out`). Returns the reasons that were told. Throws InputError
+// with --strict 1.
+std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
+                                    const std::vector<const SparseModel*>& models,
                                     const Command::Context& context);
 // What photos and scan say about each other; the report's `agreement`. told: of LookForPhotos().
 void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
@@ -23,7 +25,7 @@ void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
                        const Command::Context& context);
 // Nothing but the report, which says why.
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
-                  const Command::Context& context);
+                  const LocalOrigin& origin, const Command::Context& context);
 // The aligned model and what belongs to it: overlays, similarity, `geo`. Without local_from_sparse
 // there was no sparse model. Model and scans are moved back to where the files have them.
 void WriteAligned(const AlignCommandOptions& a, SparseModel model,

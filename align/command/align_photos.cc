@@ -79,15 +79,15 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
   std::vector<Pick> picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
   CheckPickNames(a.picks_path, picks, {&photos.model});
-  const std::set<std::string> told = LookForPhotos(a, photos.model, context);
+  const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);
   reading.origin.MoveToLocal(&picks);
-  const AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path,
-                             reading.azimuth()};
+  AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
+  input.scan_origin = reading.origin.offset();
   std::string refusal;
   std::optional<PhotoAlignment> found = FindPhotoAlignment(a, input, photos, context, &refusal);
-  if (!found) return WriteRefusal(a, refusal, context);
+  if (!found) return WriteRefusal(a, refusal, reading.origin, context);
   WritePlacedPhotos(a, &*found, &reading, told, context);
 }
 
@@ -96,7 +96,7 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
   const std::vector<std::string> names =
       ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
   const PhotoModel photos = MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken);
-  const std::set<std::string> told = LookForPhotos(a, photos.model, context);
+  const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);
   const FoundPhotos found = SearchPhotos(a, photos, &reading, context);
@@ -105,7 +105,7 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
   PhotoAlignment placed = AlignFoundPhotos(input, photos, found, a.alignment.trust);
   if (found.views.empty()) {
     for (const std::string& warning : placed.alignment.warnings) context.Warn(warning);
-    return WriteRefusal(a, placed.alignment.reasons[0], context);
+    return WriteRefusal(a, placed.alignment.reasons[0], reading.origin, context);
   }
   WritePlacedPhotos(a, &placed, &reading, told, context);
 }

@@ -269,7 +269,14 @@ ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command:
   std::vector<std::string> face_warnings;
   one.model = ReadModelOfPanoramas(options.input_path, options.panoramas_path, &face_warnings);
   for (const std::string& warning : face_warnings) context.Warn(warning);
-  one.verdict = ReadMapperVerdict(options.input_path, one.model);
+  // The mapper judged the faces, where there are some; what it knows of single ones is theirs.
+  one.verdict = ReadMapperVerdict(options.input_path, options.panoramas_path.empty()
+                                                          ? one.model
+                                                          : ReadSparseModel(options.input_path));
+  if (!options.panoramas_path.empty()) {
+    one.verdict.photos_held.clear();
+    one.verdict.told_poses.clear();
+  }
   return one;
 }
 
@@ -326,6 +333,7 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   input.lenses_refined = verdict.refined;
   input.image_path = a.image_path;
   input.num_threads = context.options.num_threads;
+  input.scan_origin = reading->origin.offset();
   reading->search = Json();
   AlignScans(a, input, one.near, verdict.known_rms, one_place, may_turn, reading, context);
   if (verdict.known_rms && reading->search.is_null() && a.picks_path.empty()) {

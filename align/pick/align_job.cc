@@ -24,11 +24,14 @@ struct Stage {
   double seconds;
 };
 constexpr Stage kStages[] = {
-    {"read model", 0.1},      {"read photos", 0.05},       {"read scan", 0.3},
-    {"planes", 0.9},          {"scan surface", 0.1},       {"pose from picks", 0.05},
-    {"scale", 0.4},           {"surface refinement", 0.1}, {"trust", 0.05},
-    {"bundle adjustment", 6}, {"agreement", 0.9},          {"write", 0.1},
-    {"overlays", 0.9},
+    {"read model", 0.1},    {"read photos", 0.05},
+    {"read scan", 0.3},     {"stations", 0.3},
+    {"planes", 0.9},        {"scan surface", 0.1},
+    {"lenses", 0.2},        {"pose from picks", 0.05},
+    {"scale", 0.4},         {"surface refinement", 0.1},
+    {"trust", 0.05},        {"bundle adjustment", 6},
+    {"single photos", 0.1}, {"agreement", 0.9},
+    {"overlays", 0.9},      {"write", 0.1},
 };
 constexpr int kNumStages = sizeof kStages / sizeof kStages[0];
 
@@ -85,7 +88,8 @@ void AlignJob::Start() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     state_ = "running";
-    stages_done_ = 0;
+    stages_done_ = models_done_ = 0;
+    num_models_ = 1;
     log_.clear();
     errors_.clear();
     overlays_.clear();
@@ -114,6 +118,13 @@ void AlignJob::TakeLine(const std::string& line) {
   if (log_.size() > kMaxLog) log_.pop_front();
   const int stage = StageOf(line);
   if (stage >= 0) stages_done_ = std::max(stages_done_, stage + 1);
+  int model = 0, num_models = 0;
+  if (std::sscanf(line.c_str(), "  sparse model [%d/%d]", &model, &num_models) == 2 && model > 0 &&
+      num_models >= model) {
+    models_done_ = model - 1;
+    num_models_ = num_models;
+    stages_done_ = 0;
+  }
   if (line.rfind(kSpeaker, 0) == 0) {
     errors_.push_back(line.substr(std::strlen(kSpeaker)));
   } else if (!errors_.empty() && stage < 0) {
@@ -159,7 +170,8 @@ Json AlignJob::State() {
   Json json;
   json["state"] = state_;
   json["stage"] = running && stages_done_ < kNumStages ? kStages[stages_done_].name : "";
-  json["share"] = running ? Json(ShareDone(stages_done_)) : done ? Json(1.0) : Json();
+  const double share = (models_done_ + ShareDone(stages_done_)) / num_models_;
+  json["share"] = running ? Json(share) : done ? Json(1.0) : Json();
   json["log"] = log_;
   json["exit_code"] = done ? Json(exit_code_) : Json();
   json["verdict"] = verdict_.verdict;

@@ -53,7 +53,8 @@ class AlignJob {
 
   std::mutex mutex_;  // of all that follows
   std::string state_ = "idle";
-  int stages_done_ = 0;
+  int stages_done_ = 0;                   // of the model that is aligned now
+  int models_done_ = 0, num_models_ = 1;  // of several
   std::deque<std::string> log_;
   std::vector<std::string> errors_;
   int exit_code_ = 0;

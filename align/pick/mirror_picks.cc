@@ -16,18 +16,12 @@ std::string MirrorProblem(const PickScene& scene) {
 
 std::vector<SessionPick> MirrorPicks(const PickScene& scene, std::vector<SessionPick> picks) {
   constexpr double kNear = 0.05;  // metres
-  const auto scan_of = [&scene](const SessionPick& pick) -> const Scan& {
-    return scene.scans()[pick.spot ? pick.spot->scan : 0];
-  };
   std::vector<SessionPick> mirrored = picks;
   int near_as_they_are = 0, near_mirrored = 0;
   for (SessionPick& pick : mirrored) {
-    if (!pick.x_in_scan || !scan_of(pick).is_rtpi) continue;
-    const Rigid& scan_from_station = scan_of(pick).scan_from_station;
-    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * *pick.x_in_scan;
-    x_in_station.x() *= -1;
+    if (!pick.x_in_scan || !scene.ScanOf(pick).is_rtpi) continue;
     near_as_they_are += DistanceFromSurface(scene, *pick.x_in_scan) < kNear;
-    pick.x_in_scan = scan_from_station * x_in_station;
+    pick.x_in_scan = MirroredAt(scene.ScanOf(pick).scan_from_station, *pick.x_in_scan);
     near_mirrored += DistanceFromSurface(scene, *pick.x_in_scan) < kNear;
     pick.spot.reset();
   }

@@ -139,11 +139,9 @@ std::vector<std::string> SurfaceWarnings(const std::vector<SessionPick>& picks,
     const double off = DistanceFromSurface(scene, *pick.x_in_scan);
     if (!(off > kPickReach)) continue;
     ++num_off;
-    const Rigid& scan_from_station = scene.scans()[0].scan_from_station;
-    Eigen::Vector3d x_in_station = scan_from_station.Inverse() * *pick.x_in_scan;
-    x_in_station.x() *= -1;
-    num_mirrored_off +=
-        !(DistanceFromSurface(scene, scan_from_station * x_in_station) <= kPickReach);
+    const Eigen::Vector3d mirrored =
+        MirroredAt(scene.ScanOf(pick).scan_from_station, *pick.x_in_scan);
+    num_mirrored_off += !(DistanceFromSurface(scene, mirrored) <= kPickReach);
     warnings.push_back("The scan point of pick " + NumberOf(on[k]) + " lies " +
                        (std::isfinite(off) ? Number(off, 2) + " m" : std::string("far")) +
                        " off the scan's surface. Drag it to its place in the scan.");

@@ -200,6 +200,8 @@ void PickScene::Prepare() {
       Work();
     } catch (const std::exception&) {
       // Out of memory: the page works on, without what needs the rays.
+      failed_ = true;
+      changed_.notify_all();
     }
   });
 }
@@ -228,7 +230,7 @@ void PickScene::Work() {
 
 const ScanRays* PickScene::WaitForRays(const std::function<bool()>& give_up) const {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (rays_ready_ == nullptr && !give_up()) {
+  while (rays_ready_ == nullptr && !failed_ && !give_up()) {
     changed_.wait_for(lock, std::chrono::milliseconds(50));
   }
   return rays_ready_;
@@ -236,7 +238,7 @@ const ScanRays* PickScene::WaitForRays(const std::function<bool()>& give_up) con
 
 const PickScene::Edges* PickScene::WaitForEdges(const std::function<bool()>& give_up) const {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (edges_ready_ == nullptr && !give_up()) {
+  while (edges_ready_ == nullptr && !failed_ && !give_up()) {
     changed_.wait_for(lock, std::chrono::milliseconds(50));
   }
   return edges_ready_;

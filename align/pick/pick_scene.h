@@ -15,6 +15,7 @@
 #include "align/clicks/photo_model.h"
 #include "align/pick/scan_places.h"
 #include "align/pick/scan_rays.h"
+#include "align/pick/session_pick.h"
 #include "align/surveyed_scans.h"
 #include "align/trust/overlay.h"
 #include "colmap_ext/sparse_model.h"
@@ -79,6 +80,10 @@ class PickScene {
   // Whether its picks have to find the lens of a photo as well.
   FocalSource focal_source(const std::string& name) const;
   const std::vector<Scan>& scans() const { return scans_; }
+  // The scan that a pick's point is drawn in; the first where it is not drawn yet.
+  const Scan& ScanOf(const SessionPick& pick) const {
+    return scans_[pick.spot ? pick.spot->scan : 0];
+  }
   int num_scans() const { return static_cast<int>(scans_.size()); }
   // The grid that is picked on: the scan's own, or of a mesh what PanoramaOfMesh() makes of it.
   const ScanPlaces& places(int scan) const { return *places_[scan]; }
@@ -96,7 +101,7 @@ class PickScene {
     const FreeSpace& free_space;
     std::vector<ScanEdge> edges;
   };
-  // Null until they stand, or when give_up() became true while waiting for them.
+  // Null if they cannot be made (memory ran out), or when give_up() became true while waiting.
   const ScanRays* WaitForRays(const std::function<bool()>& give_up) const;
   const Edges* WaitForEdges(const std::function<bool()>& give_up) const;
 
@@ -121,7 +126,7 @@ class PickScene {
   std::vector<PickPhoto> photos_;
 
   std::thread worker_;
-  std::atomic<bool> stopping_{false};
+  std::atomic<bool> stopping_{false}, failed_{false};
   std::unique_ptr<ScanRays> rays_;
   std::unique_ptr<Edges> edges_;
   std::atomic<const ScanRays*> rays_ready_{nullptr};

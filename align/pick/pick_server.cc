@@ -56,6 +56,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
   if (reader.max_range != defaults.max_range) {
     add("--max_range", Exact(reader.max_range));
   }
+  if (!reader.e57_check) add("--E57.check", "0");
   if (input.num_threads > 0) add("--num_threads", std::to_string(input.num_threads));
   add("--overlays", std::to_string(kNumOverlays));
   return arguments;

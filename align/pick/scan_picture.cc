@@ -170,7 +170,7 @@ std::vector<std::string> ScanPicturesOf(const Scan& scan) {
     low = std::min(low, scan.intensity[i]);
     high = std::max(high, scan.intensity[i]);
   }
-  if (low == high) return {"shaded"};
+  if (!(low < high)) return {"shaded"};  // alike, or none
   return ScanPictureNames();
 }
 

@@ -97,6 +97,26 @@ TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
   EXPECT_NE(strict.err.find("photo_003.jpg"), std::string::npos) << strict.err;
 }
 
+// As where two projectors throw one pattern: each half agrees with itself, and no photo stands
+// apart.
+TEST_F(TextureCommand, HalfOfThePhotosInTheWrongPlaceIsNotTrusted) {
+  fs::create_directory(Path("folded"));
+  for (int i = 0; i < 12; ++i) {
+    const auto name = [](int k) {
+      return "photo_0" + std::string(k < 10 ? "0" : "") + std::to_string(k) + ".jpg";
+    };
+    const int shown = i < 6 ? i : 6 + (i - 3) % 6;
+    fs::copy_file(Capture() + "/photos/" + name(shown), Path("folded/" + name(i)));
+  }
+  const CommandResult result =
+      RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
+                     "/truth --image_path " + Path("folded") + " --scan_path " + Capture() +
+                     "/scan.rtpi --output_path " + Path("of_folded"));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("most photos show something else"), std::string::npos) << result.err;
+  EXPECT_FALSE(ReadJson(Path("of_folded/report.json"))["trusted"]);
+}
+
 TEST_F(TextureCommand, WhoStoodBeforeTheWallIsNamedAndGivesNoColour) {
   SimulatedRoomOptions options = RoomOptions();
   options.strangers = 0.5;

@@ -48,6 +48,17 @@ TEST(RemainingTime, ASlowMachineIsSlowInTheNextStepToo) {
   EXPECT_NEAR(time.Expected("matches"), 3 * before, 1e-9);
 }
 
+TEST(RemainingTime, StepsThatHaveNotToRunSayNothingOfTheMachine) {
+  RemainingTime time;
+  time.SetPhotos(20, 2);
+  time.SetSteps({"features", "matches", "mapper"}, {});
+  const double before = time.Expected("mapper");
+  time.Drop("features");
+  time.Drop("matches");
+  EXPECT_DOUBLE_EQ(time.Expected("mapper"), before);
+  EXPECT_DOUBLE_EQ(time.Seconds("mapper", -1, 0), before);
+}
+
 TEST(RemainingTime, BelievesTheLastRunMostOfAll) {
   RemainingTime time;
   time.SetSteps({"features", "matches"}, {{"matches", 77}});

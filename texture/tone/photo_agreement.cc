@@ -90,4 +90,19 @@ std::vector<int> FindForeignPhotos(const std::vector<PhotoAgreement>& agreement,
   return foreign;
 }
 
+bool ContradictEachOther(const std::vector<PhotoAgreement>& agreement) {
+  // Medians of sets whose photos stand where they were: correlations of 0.95 (kitchen, whose scan
+  // drifts) and more; of two folded rooms 0.55 and 0.73, with differences of 0.1.
+  constexpr double kLeastCorrelation = 0.85, kMostDifference = 0.03;
+  constexpr size_t kFewPhotos = 4;
+  std::vector<double> correlations, differences;
+  for (const PhotoAgreement& photo : agreement) {
+    if (photo.num_samples < kMinSamples) continue;
+    correlations.push_back(photo.correlation);
+    differences.push_back(photo.difference);
+  }
+  return correlations.size() >= kFewPhotos && Median(&correlations) < kLeastCorrelation &&
+         Median(&differences) > kMostDifference;
+}
+
 }  // namespace roomtex

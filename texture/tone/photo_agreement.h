@@ -31,4 +31,9 @@ std::vector<PhotoAgreement> MeasureAgreement(const ObservationStore& store,
 std::vector<int> FindForeignPhotos(const std::vector<PhotoAgreement>& agreement,
                                    double min_correlation);
 
+// Most photos contradict what the others show at the same places: some of them stand elsewhere than
+// they were aligned, in groups that agree among themselves. Two projectors that throw one pattern,
+// or rooms that look alike, fold a sparse model so that every residual is small.
+bool ContradictEachOther(const std::vector<PhotoAgreement>& agreement);
+
 }  // namespace roomtex

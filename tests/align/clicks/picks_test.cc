@@ -201,7 +201,7 @@ TEST(Picks, OfSeveralModelsBelongToTheOneThatHoldsTheirPhoto) {
   EXPECT_NO_THROW(CheckPickNames("p.csv", picks, {&left, &right}));
   std::vector<Pick> either = PicksOf("a.jpg", 1);
   NamePicksAsInModels({&left, &right}, &either);
-  EXPECT_INPUT_ERROR(CheckPickNames("p.csv", either, {&left, &right}), "nearest name: left/a.jpg");
+  EXPECT_INPUT_ERROR(CheckPickNames("p.csv", either, {&left, &right}), "the photo a.jpg is not in");
 }
 
 TEST(Picks, RefusesPixelOutsideThePhoto) {
