@@ -196,6 +196,19 @@ TEST_F(StepTableTest, PicksAreMadeInAllModels) {
   }
   EXPECT_THAT(pick(), HasSubstr("--input_path " + (folder_ / "result/sparse/0") + " --input_path " +
                                 (folder_ / "result/sparse/1")));
+  // Both are what the mapper left: without one it runs again.
+  EXPECT_THAT(Make("mapper").outputs, Contains(folder_ / "result/sparse/1"));
+}
+
+TEST_F(StepTableTest, TheCommandToStartAgainGivesTheSame) {
+  AddPhotos("a", 4, 64);
+  options_.random_seed = 7;
+  options_.num_threads = 2;
+  options_.accept_untrusted = true;
+  const std::string again = CommandText(Chain(options_).AutoCommand());
+  for (const char* option : {"--random_seed 7", "--num_threads 2", "--accept_untrusted 1"}) {
+    EXPECT_THAT(again, HasSubstr(option));
+  }
 }
 
 TEST_F(StepTableTest, LoosePhotosAreAllMatchedThoseInARowWithNeighbours) {
