@@ -442,6 +442,7 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
   result.agreement = MeasureAgreement(store, result.exposure.gains);
+  result.divided = FindDividedPhotos(store, result.exposure.gains);
   LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 

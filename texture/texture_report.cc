@@ -140,6 +140,10 @@ void FillColorReport(const std::vector<PhotoView>& photos, const ColorizeOptions
                                  {"moving", RoundedShare(result.photos[i].moving)}};
   }
   report["photo_agreement"] = agreement;
+  report["divided_photos"] = {
+      {"num_samples", result.divided.num_samples},
+      {"share", std::round(1e4 * result.divided.ShareOfAll()) / 1e4},
+      {"share_of_unlike", std::round(1e4 * result.divided.ShareOfUnlike()) / 1e4}};
   Json sharpness = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const PhotoSharpness& photo = result.sharpness[i];
@@ -231,11 +235,11 @@ void JudgeColors(const std::vector<PhotoView>& photos, const ColorizeResult& res
         "photos that see the same sample differ in colour as much as at random. Is the model "
         "aligned? Run roomtex-align.");
   }
-  if (ContradictEachOther(result.agreement)) {
+  if (result.divided.Fold(result.agreement)) {
     context.report.SetUntrusted(
-        "most photos show something else than the others do at the same places (photo_agreement): "
-        "some stand elsewhere than they were aligned. Did several projectors throw the same "
-        "pattern, or do rooms look alike? Look at the sparse model in COLMAP's window.");
+        "photos contradict each other in groups (divided_photos): some stand elsewhere than they "
+        "were aligned. Did several projectors throw the same pattern, or do rooms look alike? Look "
+        "at the sparse model in COLMAP's window.");
   }
 }
 

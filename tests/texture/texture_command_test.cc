@@ -97,24 +97,34 @@ TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
   EXPECT_NE(strict.err.find("photo_003.jpg"), std::string::npos) << strict.err;
 }
 
-// As where two projectors throw one pattern: each half agrees with itself, and no photo stands
-// apart.
-TEST_F(TextureCommand, HalfOfThePhotosInTheWrongPlaceIsNotTrusted) {
-  fs::create_directory(Path("folded"));
-  for (int i = 0; i < 12; ++i) {
-    const auto name = [](int k) {
-      return "photo_0" + std::string(k < 10 ? "0" : "") + std::to_string(k) + ".jpg";
-    };
-    const int shown = i < 6 ? i : 6 + (i - 3) % 6;
-    fs::copy_file(Capture() + "/photos/" + name(shown), Path("folded/" + name(i)));
+// As two projectors that throw one pattern fold a room: half of the photos stand together where
+// they would be if the room was turned by half a circle.
+TEST_F(TextureCommand, AGroupOfPhotosInTheWrongPlaceIsNotTrusted) {
+  SparseModel model = ReadSparseModel(Capture() + "/truth");
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const auto& [id, image] : model.images) {
+    middle +=
+        image.cam_from_model.TargetOriginInSource() / static_cast<double>(model.images.size());
   }
+  Rigid half_circle;
+  half_circle.rotation = Eigen::AngleAxisd(std::acos(-1.0), Eigen::Vector3d::UnitY());
+  half_circle.translation = middle - half_circle.rotation * middle;
+  for (auto& [id, image] : model.images) {
+    if (image.name >= "photo_006.jpg") image.cam_from_model = image.cam_from_model * half_circle;
+  }
+  WriteSparseModel(model, Path("folded"));
   const CommandResult result =
-      RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
-                     "/truth --image_path " + Path("folded") + " --scan_path " + Capture() +
-                     "/scan.rtpi --output_path " + Path("of_folded"));
+      RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Path("folded") +
+                     " --image_path " + Capture() + "/photos --scan_path " + Capture() +
+                     "/scan.rtpi --Blend.min_agreement 0 --output_path " + Path("of_folded"));
   EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_NE(result.err.find("most photos show something else"), std::string::npos) << result.err;
-  EXPECT_FALSE(ReadJson(Path("of_folded/report.json"))["trusted"]);
+  EXPECT_NE(result.err.find("contradict each other in groups"), std::string::npos) << result.err;
+  const json report = ReadJson(Path("of_folded/report.json")),
+             right = ReadJson(Path("textured/report.json"));
+  EXPECT_FALSE(report["trusted"]);
+  EXPECT_GT(report["divided_photos"]["share_of_unlike"], 0.3);
+  EXPECT_GT(right["divided_photos"]["num_samples"], 1000);
+  EXPECT_LT(right["divided_photos"]["share_of_unlike"], 0.1);
 }
 
 TEST_F(TextureCommand, WhoStoodBeforeTheWallIsNamedAndGivesNoColour) {

@@ -3,6 +3,7 @@
 // alike, of the room before it was furnished anew. Their poses may fit, so that only their colours
 // tell.
 
+#include <algorithm>
 #include <vector>
 
 #include <Eigen/Core>
@@ -31,9 +32,22 @@ std::vector<PhotoAgreement> MeasureAgreement(const ObservationStore& store,
 std::vector<int> FindForeignPhotos(const std::vector<PhotoAgreement>& agreement,
                                    double min_correlation);
 
-// Most photos contradict what the others show at the same places: some of them stand elsewhere than
-// they were aligned, in groups that agree among themselves. Two projectors that throw one pattern,
-// or rooms that look alike, fold a sparse model so that every residual is small.
-bool ContradictEachOther(const std::vector<PhotoAgreement>& agreement);
+// Samples at which photos stand against each other in groups: two and more that agree against two
+// and more that agree. What moves or mirrors differs from photo to photo; where part of the photos
+// stand elsewhere than they were aligned, groups do. Two projectors that throw one pattern, or
+// rooms that look alike, fold a sparse model so that every residual is small.
+struct DividedPhotos {
+  size_t num_samples = 0;  // that four photos and more show
+  size_t num_unlike = 0;   // of these, where any two photos differ
+  size_t num_divided = 0;  // of these, where groups do
+
+  double ShareOfAll() const { return num_divided / std::max(1.0, 1.0 * num_samples); }
+  double ShareOfUnlike() const { return num_divided / std::max(1.0, 1.0 * num_unlike); }
+  // So many that the poses are not to be trusted. agreement: in another light, too, photos stand
+  // against each other in groups, but what they show is alike.
+  bool Fold(const std::vector<PhotoAgreement>& agreement) const;
+};
+DividedPhotos FindDividedPhotos(const ObservationStore& store,
+                                const std::vector<Eigen::Vector3f>& gains);
 
 }  // namespace roomtex
