@@ -1,5 +1,6 @@
 #include "colmap_ext/mapping_trust.h"
 
+#include <algorithm>
 #include <set>
 #include <string>
 
@@ -132,6 +133,15 @@ void JudgeByOwnPhotos(const ModelCheck& check, const MatchedImages& images, Mode
 }
 
 // Whether the errors shrink when the lens may change.
+// A camera of a model that COLMAP's OPENCV would describe better.
+bool HasPlainLens(const SparseModel& model) {
+  return std::any_of(model.cameras.begin(), model.cameras.end(), [](const auto& one) {
+    const CameraModel kind = one.second.model;
+    return kind == CameraModel::kSimplePinhole || kind == CameraModel::kPinhole ||
+           kind == CameraModel::kSimpleRadial || kind == CameraModel::kRadial;
+  });
+}
+
 Json JudgeLens(const MappingPass& pass, const Command::Context& context, Json* reasons) {
   context.progress.Stage("check calibration");
   const CalibrationCheck check =
@@ -143,16 +153,18 @@ Json JudgeLens(const MappingPass& pass, const Command::Context& context, Json* r
   json["rms_fixed_px"] = check.rms_fixed_px;
   json["rms_free_px"] = check.rms_free_px;
   if (check.Fits()) return json;
-  Refuse(
-      "calibration",
-      fmt::format("the camera's calibration does not fit the photos: their error falls from {:.2f} "
-                  "to {:.2f} px "
-                  "when focal length and distortion may change, so the model is bent. {}",
-                  check.rms_fixed_px, check.rms_free_px,
-                  pass.refine ? "Extract the features with a camera model that can describe the "
-                                "lens (--ImageReader.camera_model OPENCV)."
-                              : "Calibrate the camera, or give --refine_intrinsics auto."),
-      reasons);
+  Refuse("calibration",
+         fmt::format(
+             "the camera's calibration does not fit the photos: their error falls from {:.2f} "
+             "to {:.2f} px "
+             "when focal length and distortion may change, so the model is bent. {}",
+             check.rms_fixed_px, check.rms_free_px,
+             !pass.refine ? "Calibrate the camera, or give --refine_intrinsics auto."
+             : HasPlainLens(pass.model())
+                 ? "Extract the features with a camera model that can describe the lens "
+                   "(--ImageReader.camera_model OPENCV)."
+                 : "Calibrate the camera (roomtex-calibrate), or add photos from more places."),
+         reasons);
   return json;
 }
 

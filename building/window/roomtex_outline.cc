@@ -52,7 +52,7 @@ void AddOutlineOptions(OutlineArguments* a, Command* command) {
                          "if need be. One that somebody edited is not replaced.");
   command->AddOutputPaths("model_path", &a->model_paths,
                           std::string("The buildings as solids, by extension: ") +
-                              BuildingExtensions() + ". May be repeated.",
+                              BuildingExtensions() + ".",
                           Command::Kind::kOptional);
   command->Add(FieldsOf(&a->input));
   command->Add(FieldsOf(&a->proposal));
