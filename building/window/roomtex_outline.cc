@@ -50,10 +50,10 @@ void AddOutlineOptions(OutlineArguments* a, Command* command) {
   command->AddOutputPath("output_path", &a->output_path,
                          "The buildings, outline.json: footprints, floors and roofs, to be edited "
                          "if need be. One that somebody edited is not replaced.");
-  command->AddOutputPaths("model_path", &a->model_paths,
-                          std::string("The buildings as solids, by extension: ") +
-                              BuildingExtensions() + ".",
-                          Command::Kind::kOptional);
+  command->AddOutputPaths(
+      "model_path", &a->model_paths,
+      std::string("The buildings as solids, by extension: ") + BuildingExtensions() + ".",
+      Command::Kind::kOptional);
   command->Add(FieldsOf(&a->input));
   command->Add(FieldsOf(&a->proposal));
   command->AddBool("accept_untrusted", &a->accept_untrusted, kAcceptUntrustedHelp);

@@ -13,7 +13,7 @@ constexpr size_t kMaxSamples = 1'000'000;  // that are looked at; more say nothi
 constexpr float kClipped = 0.99f;
 constexpr size_t kMinSamples = 1000;  // fewer say nothing
 constexpr double kFurther = 1.3;      // than the median photo
-constexpr float kUnlike = 0.1f;       // brightness, on a scale about even to the eye
+constexpr float kDifferent = 0.1f;    // brightness, on a scale about even to the eye
 
 // Sums over the samples of a photo, of its brightness p and the others' median o.
 struct Sums {
@@ -64,7 +64,7 @@ bool IsDivided(const std::vector<float>& values) {
     gap = values[k] - values[k - 1];
     spread = std::max(values[k - 1] - values.front(), values.back() - values[k]);
   }
-  return gap > kUnlike && gap > 2 * spread;
+  return gap > kDifferent && gap > 2 * spread;
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ DividedPhotos FindDividedPhotos(const ObservationStore& store,
     for (const auto& [photo, brightness] : seen) values.push_back(brightness);
     std::sort(values.begin(), values.end());
     ++divided.num_samples;
-    divided.num_unlike += values.back() - values.front() > kUnlike;
+    divided.num_unlike += values.back() - values.front() > kDifferent;
     divided.num_divided += IsDivided(values);
   }
   return divided;
