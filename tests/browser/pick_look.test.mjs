@@ -449,7 +449,7 @@ test('names of photos are told apart at every size', async () => {
       if (width >= 1280) assert.ok(box <= 1, `the table is ${box} pixels too wide at ${width}`);
       await screenshot(page.page, `pick-names-${width}`);
     }
-  }, {picksFile: fileOf(places.slice(0, 6)), alone: true});
+  }, {picksFile: fileOf(places.slice(0, 6)), models: []});
 });
 
 test('every control has a name, and shows when it has the focus', async () => {
