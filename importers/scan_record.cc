@@ -322,8 +322,11 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
 void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder) {
   std::error_code error;
   if (!paths.empty() || fs::exists(fs::path(model_folder) / "alignment.json", error)) return;
-  throw UsageError("--scan_path is required: " + model_folder +
-                   " is no model of roomtex-align, which would remember its scans");
+  throw UsageError("--scan_path is required: " +
+                   (model_folder.empty()
+                        ? "only a single model of roomtex-align remembers its scans"
+                        : model_folder + " is no model of roomtex-align, which "
+                                         "would remember its scans"));
 }
 
 PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest& request) {

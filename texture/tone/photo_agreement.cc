@@ -42,17 +42,23 @@ struct Sums {
   }
 };
 
-// The photos that show a sample, and its brightness there; those in doubt and clipped ones left
-// out.
-void ReadBrightness(const ObservationStore& store, size_t sample,
-                    const std::vector<Eigen::Vector3f>& gains,
-                    std::vector<std::pair<int, float>>* seen) {
-  const Observation* const first = store.Begin(sample);
-  seen->clear();
-  for (int i = 0; i < store.Count(sample); ++i) {
-    const Eigen::Vector3f color = UnpackColor(first[i].color);
-    if (first[i].in_doubt || color.maxCoeff() > kClipped) continue;
-    seen->emplace_back(first[i].photo, std::sqrt(color.cwiseProduct(gains[first[i].photo]).mean()));
+// visit: of samples, evenly chosen, that least_views photos and more show, each photo and its
+// brightness there; observations in doubt and clipped ones left out.
+template <typename Visit>
+void VisitSamples(const ObservationStore& store, const std::vector<Eigen::Vector3f>& gains,
+                  size_t least_views, const Visit& visit) {
+  std::vector<std::pair<int, float>> seen;
+  const size_t stride = store.num_samples() / kMaxSamples + 1;
+  for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
+    const Observation* const first = store.Begin(sample);
+    seen.clear();
+    for (int i = 0; i < store.Count(sample); ++i) {
+      const Eigen::Vector3f color = UnpackColor(first[i].color);
+      if (first[i].in_doubt || color.maxCoeff() > kClipped) continue;
+      seen.emplace_back(first[i].photo,
+                        std::sqrt(color.cwiseProduct(gains[first[i].photo]).mean()));
+    }
+    if (seen.size() >= least_views) visit(seen);
   }
 }
 
@@ -73,12 +79,8 @@ std::vector<PhotoAgreement> MeasureAgreement(const ObservationStore& store,
                                              const std::vector<Eigen::Vector3f>& gains) {
   const CpuTimer timer(CpuStage::kExposure, CpuTimer::Scope::kProcess);
   std::vector<Sums> sums(gains.size());
-  std::vector<std::pair<int, float>> seen;
   std::vector<float> others;
-  const size_t stride = store.num_samples() / kMaxSamples + 1;
-  for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
-    ReadBrightness(store, sample, gains, &seen);
-    if (seen.size() < 3) continue;
+  VisitSamples(store, gains, 3, [&](const std::vector<std::pair<int, float>>& seen) {
     for (const auto& [photo, brightness] : seen) {
       others.clear();
       for (const auto& [other, value] : seen) {
@@ -86,7 +88,7 @@ std::vector<PhotoAgreement> MeasureAgreement(const ObservationStore& store,
       }
       sums[photo].Add(brightness, Median(&others));
     }
-  }
+  });
   std::vector<PhotoAgreement> result;
   for (const Sums& sum : sums) result.push_back(sum.Agreement());
   return result;
@@ -113,19 +115,15 @@ DividedPhotos FindDividedPhotos(const ObservationStore& store,
                                 const std::vector<Eigen::Vector3f>& gains) {
   const CpuTimer timer(CpuStage::kExposure, CpuTimer::Scope::kProcess);
   DividedPhotos divided;
-  std::vector<std::pair<int, float>> seen;
   std::vector<float> values;
-  const size_t stride = store.num_samples() / kMaxSamples + 1;
-  for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
-    ReadBrightness(store, sample, gains, &seen);
-    if (seen.size() < 4) continue;
+  VisitSamples(store, gains, 4, [&](const std::vector<std::pair<int, float>>& seen) {
     values.clear();
     for (const auto& [photo, brightness] : seen) values.push_back(brightness);
     std::sort(values.begin(), values.end());
     ++divided.num_samples;
     divided.num_unlike += values.back() - values.front() > kDifferent;
     divided.num_divided += IsDivided(values);
-  }
+  });
   return divided;
 }
 
