@@ -115,6 +115,24 @@ cv::Mat ReadFittedPhoto(const std::string& path, const PhotoFit& fit, int camera
   return photo;
 }
 
+cv::Mat ReadFittedCells(const std::string& path, const PhotoFit& fit, int camera_width,
+                        int camera_height, int cell_px) {
+  // A cell has two pixels and more of what is decoded, in either direction: the whole cells end
+  // half a pixel from where they ought to, at most.
+  const double half_cell = 0.5 * cell_px * fit.width / camera_width;
+  const int shrink = half_cell >= 8 ? 8 : half_cell >= 4 ? 4 : half_cell >= 2 ? 2 : 1;
+  cv::Mat photo = fit.pixels == PhotoPixels::kAsStored ? ReadShrunkPhoto(path, shrink)
+                                                       : ReadPhoto(path, fit.pixels);
+  // What lies beyond the last whole cell is not squeezed into it.
+  const cv::Size cells(camera_width / cell_px, camera_height / cell_px);
+  const cv::Size whole(
+      static_cast<int>(std::lround(1.0 * photo.cols * cells.width * cell_px / camera_width)),
+      static_cast<int>(std::lround(1.0 * photo.rows * cells.height * cell_px / camera_height)));
+  cv::Mat result;
+  cv::resize(photo(cv::Rect({0, 0}, whole)), result, cells, 0, 0, cv::INTER_AREA);
+  return result;
+}
+
 void ReportPhotosLeftOut(const std::vector<PhotoLeftOut>& photos, const Command::Context& context) {
   Json list = Json::array();
   for (size_t i = 0; i < photos.size(); ++i) {

@@ -35,6 +35,10 @@ std::vector<std::string> FirstNotes(std::vector<std::string> notes);
 // The photo in its camera's pixels: turned as fit says, resized if it is scaled. Throws InputError.
 cv::Mat ReadFittedPhoto(const std::string& path, const PhotoFit& fit, int camera_width,
                         int camera_height);
+// The same in cells of cell_px x cell_px of these pixels, whole ones only, to a quarter of a cell:
+// a JPEG is made smaller while it is decoded.
+cv::Mat ReadFittedCells(const std::string& path, const PhotoFit& fit, int camera_width,
+                        int camera_height, int cell_px);
 
 // A photo that is left out, and why, in sentences.
 struct PhotoLeftOut {

@@ -441,8 +441,9 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
-  result.agreement = MeasureAgreement(store, result.exposure.gains);
-  result.divided = FindDividedPhotos(store, result.exposure.gains);
+  const PhotoComparison comparison = ComparePhotos(store, result.exposure.gains);
+  result.agreement = comparison.Agreement();
+  result.divided = comparison.Divided();
   LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 

@@ -19,8 +19,8 @@
 #include "texture/sampling/visibility.h"
 #include "texture/texels/colored_scan.h"
 #include "texture/texels/mesh_atlas.h"
+#include "texture/tone/compare_photos.h"
 #include "texture/tone/exposure.h"
-#include "texture/tone/photo_agreement.h"
 
 namespace roomtex {
 

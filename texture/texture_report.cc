@@ -140,10 +140,7 @@ void FillColorReport(const std::vector<PhotoView>& photos, const ColorizeOptions
                                  {"moving", RoundedShare(result.photos[i].moving)}};
   }
   report["photo_agreement"] = agreement;
-  report["divided_photos"] = {
-      {"num_samples", result.divided.num_samples},
-      {"share", std::round(1e4 * result.divided.ShareOfAll()) / 1e4},
-      {"share_of_unlike", std::round(1e4 * result.divided.ShareOfUnlike()) / 1e4}};
+  report["divided_photos"] = ToJson(result.divided);
   Json sharpness = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const PhotoSharpness& photo = result.sharpness[i];

@@ -51,8 +51,9 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
       "that is there is not replaced by an untrusted one, which goes to OUTPUT.untrusted.");
   command->AddInputPath("image_path", &a->image_path,
                         "Folder of the photos (the plain ones where a pattern was projected); with "
-                        "it the report says how well photos and scan intensity agree, and an "
-                        "alignment that they contradict is not trusted.",
+                        "it the report says how well photos and scan intensity agree, and the "
+                        "photos with each other where they see the same; an alignment that they "
+                        "contradict is not trusted.",
                         Command::Kind::kOptional);
   command->AddBool("strict", &a->strict, kStrictHelp);
   command->AddInt("overlays", &a->overlays,

@@ -9,6 +9,7 @@
 #include "align/trust/agreement.h"
 #include "align/trust/agreement_report.h"
 #include "align/trust/overlay.h"
+#include "align/trust/photo_comparison.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/model_output.h"
 #include "core/output_file.h"
@@ -117,6 +118,18 @@ void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
   WarnOfPhotos(a, warnings, "Agreement: ", told, context);
+  const PhotoComparison comparison =
+      ComparePhotosOnScan(aligned, a.image_path, surveyed.viewer(), PhotoComparisonOptions(),
+                          context.options.num_threads);
+  context.report["divided_photos"] = ToJson(comparison.Divided());
+  if (comparison.Divided().Fold(comparison.Agreement())) {
+    context.report.SetUntrusted(
+        "Photos contradict each other in groups where they see the same of the scan "
+        "(divided_photos): some stand elsewhere than they were aligned, so that the sparse model "
+        "is folded. Two projectors with one pattern or rooms that look alike do that: leave the "
+        "photos of one out, or map them apart. So do photos with and without a pattern in one "
+        "folder: give the plain ones.");
+  }
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,

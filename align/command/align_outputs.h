@@ -19,7 +19,8 @@ namespace roomtex {
 std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
                                     const std::vector<const SparseModel*>& models,
                                     const Command::Context& context);
-// What photos and scan say about each other; the report's `agreement`. told: of LookForPhotos().
+// What photos and scan, and photos and photos, say about each other; the report's `agreement` and
+// `divided_photos`. told: of LookForPhotos().
 void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
                        const SurveyedScans& surveyed, const std::set<std::string>& told,
                        const Command::Context& context);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <opencv2/imgproc.hpp>
+
 #include "align/trust/scan_view.h"
 #include "core/panorama_faces.h"
 
@@ -65,6 +67,21 @@ std::optional<cv::Mat> PerspectiveViews::Read(const SparseImage& image,
       ReadPhotoOf(panorama, model_.cameras.at(panorama.camera_id), image_path, warning);
   if (!photo) return std::nullopt;
   return CutFace(*photo, views_->cameras.at(image.camera_id), face->second.face_from_panorama);
+}
+
+std::optional<cv::Mat> PerspectiveViews::ReadCells(const SparseImage& image, int cell_px,
+                                                   const std::string& image_path,
+                                                   std::string* warning) const {
+  if (faces_.count(image.image_id) == 0) {
+    return ReadCellsOf(image, model_.cameras.at(image.camera_id), cell_px, image_path, warning);
+  }
+  const auto face = Read(image, image_path, warning);
+  if (!face) return std::nullopt;
+  const cv::Size size(face->cols / cell_px, face->rows / cell_px);
+  cv::Mat cells;
+  cv::resize((*face)(cv::Rect(0, 0, size.width * cell_px, size.height * cell_px)), cells, size, 0,
+             0, cv::INTER_AREA);
+  return cells;
 }
 
 }  // namespace roomtex

@@ -25,6 +25,9 @@ class PerspectiveViews {
   // has another size than its camera.
   std::optional<cv::Mat> Read(const SparseImage& image, const std::string& image_path,
                               std::string* warning) const;
+  // The same in cells, see ReadCellsOf().
+  std::optional<cv::Mat> ReadCells(const SparseImage& image, int cell_px,
+                                   const std::string& image_path, std::string* warning) const;
 
  private:
   struct Face {

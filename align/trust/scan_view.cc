@@ -66,6 +66,25 @@ double MeshSampleAngle(const Scan& scan) {
   return distance > 0 ? Median(&edges) / distance : 0;
 }
 
+// read(path, fit) of an image's photo; none, and a warning, if it cannot be used.
+template <typename Read>
+std::optional<cv::Mat> ReadFitting(const SparseImage& image, const Camera& camera,
+                                   const std::string& image_path, std::string* warning,
+                                   const Read& read) {
+  const std::string path = image_path + "/" + image.name;
+  const PhotoFit fit = FitPhotoToCamera(path, image.name, camera.width, camera.height);
+  if (!fit.usable()) {
+    *warning = fit.problem;
+    return std::nullopt;
+  }
+  try {
+    return read(path, fit);
+  } catch (const InputError& error) {
+    *warning = error.what();
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 RayLattice::RayLattice(const CameraProjection& projection, double step)
@@ -257,18 +276,18 @@ std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count
 
 std::optional<cv::Mat> ReadPhotoOf(const SparseImage& image, const Camera& camera,
                                    const std::string& image_path, std::string* warning) {
-  const std::string path = image_path + "/" + image.name;
-  const PhotoFit fit = FitPhotoToCamera(path, image.name, camera.width, camera.height);
-  if (!fit.usable()) {
-    *warning = fit.problem;
-    return std::nullopt;
-  }
-  try {
-    return ReadFittedPhoto(path, fit, camera.width, camera.height);
-  } catch (const InputError& error) {
-    *warning = error.what();
-    return std::nullopt;
-  }
+  return ReadFitting(image, camera, image_path, warning,
+                     [&](const std::string& path, const PhotoFit& fit) {
+                       return ReadFittedPhoto(path, fit, camera.width, camera.height);
+                     });
+}
+
+std::optional<cv::Mat> ReadCellsOf(const SparseImage& image, const Camera& camera, int cell_px,
+                                   const std::string& image_path, std::string* warning) {
+  return ReadFitting(image, camera, image_path, warning,
+                     [&](const std::string& path, const PhotoFit& fit) {
+                       return ReadFittedCells(path, fit, camera.width, camera.height, cell_px);
+                     });
 }
 
 }  // namespace roomtex

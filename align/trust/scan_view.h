@@ -102,5 +102,9 @@ std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count
 // used (FitPhotoToCamera).
 std::optional<cv::Mat> ReadPhotoOf(const SparseImage& image, const Camera& camera,
                                    const std::string& image_path, std::string* warning);
+// The same in cells of cell_px x cell_px of these pixels (whole ones only), as a ScanView has them;
+// a JPEG is made smaller while it is decoded.
+std::optional<cv::Mat> ReadCellsOf(const SparseImage& image, const Camera& camera, int cell_px,
+                                   const std::string& image_path, std::string* warning);
 
 }  // namespace roomtex

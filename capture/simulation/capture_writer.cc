@@ -283,10 +283,10 @@ std::string CommandsToType(bool paired, const std::string& scans) {
          mapped +
          " --output_path sparse\n"
          "roomtex-align --input_path sparse/0" +
-         scans +
-         " --picks_path picks.csv --output_path aligned\n"
+         scans + " --picks_path picks.csv --image_path " + plain +
+         " --output_path aligned\n"
          "roomtex-texture --input_path aligned --image_path " +
-         plain + scans + " --database_path database.db --output_path textured\n";
+         plain + scans + " --output_path textured\n";
 }
 
 void WriteReadme(const SimulatedRoom& room, const std::string& folder) {

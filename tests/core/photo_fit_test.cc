@@ -63,6 +63,29 @@ TEST_F(PhotoFits, ExifTurnsAPhotoOnlyWhereTheCameraIsTurned) {
   }
 }
 
+// Cells of 7 pixels: 17 x 11 of them, and a row of 3 and a column of 1 pixel that are left over.
+TEST_F(PhotoFits, CellsAreMeansOfThePixelsWhateverTheFilesSize) {
+  for (const int times : {1, 2, 3}) {
+    const std::string path = Write("a.png", 120 * times, 80 * times);
+    const PhotoFit fit = Fit(path);
+    ASSERT_TRUE(fit.usable()) << fit.problem;
+    const cv::Mat cells = ReadFittedCells(path, fit, 120, 80, 7);
+    ASSERT_EQ(cells.size(), cv::Size(17, 11));
+    // The quarter ends at 60 = 8 4/7 cells and at 40 = 5 5/7.
+    EXPECT_GT(cells.at<cv::Vec3b>(4, 7)[0], 215);
+    EXPECT_NEAR(cells.at<cv::Vec3b>(2, 8)[0], 20 + 200 * 4 / 7, 50);  // a quarter of a cell
+    EXPECT_NEAR(cells.at<cv::Vec3b>(5, 3)[0], 20 + 200 * 5 / 7, 50);
+    EXPECT_LT(cells.at<cv::Vec3b>(2, 9)[0], 25);
+    EXPECT_LT(cells.at<cv::Vec3b>(6, 3)[0], 25);
+  }
+  for (const auto& [orientation, x, y] : {std::tuple(6, 13, 2), {8, 3, 8}}) {
+    const std::string path = Write("a.jpg", 80, 120, orientation);
+    const cv::Mat cells = ReadFittedCells(path, Fit(path), 120, 80, 7);
+    EXPECT_GT(cells.at<cv::Vec3b>(y, x)[0], 200);
+    EXPECT_LT(cells.at<cv::Vec3b>(10 - y, 16 - x)[0], 50);
+  }
+}
+
 TEST_F(PhotoFits, TurnedWithoutExifIsNamed) {
   for (const int orientation : {0, 1, 3}) {
     const PhotoFit fit = Fit(Write("a.jpg", 80, 120, orientation));

@@ -24,7 +24,7 @@ struct PhotoPassInput {
 };
 
 // Photos that turned out to be unreadable when they were decoded (all were tried), or that
-// contradict the others (photo_agreement.h).
+// contradict the others (tone/compare_photos.h).
 class UnusablePhotos : public InputError {
  public:
   explicit UnusablePhotos(std::vector<PhotoLeftOut> photos)

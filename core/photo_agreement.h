@@ -1,14 +1,13 @@
 #pragma once
-// Photos that show something else than the others do at the same places: of another room that looks
-// alike, of the room before it was furnished anew. Their poses may fit, so that only their colours
-// tell.
+// Do photos show the same at the same places? Photos of another room that looks alike, or of the
+// room before it was furnished anew, fit by their poses, and so do the halves of a sparse model
+// that is folded: only their colours tell.
 
-#include <algorithm>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
-#include <Eigen/Core>
-
-#include "texture/sampling/observations.h"
+#include "core/report.h"
 
 namespace roomtex {
 
@@ -22,16 +21,6 @@ struct PhotoAgreement {
   double difference = 0;
 };
 
-// gains and result: one per photo. Observations in doubt and clipped ones do not count.
-std::vector<PhotoAgreement> MeasureAgreement(const ObservationStore& store,
-                                             const std::vector<Eigen::Vector3f>& gains);
-
-// Numbers of the photos that contradict the others: correlated by less than min_correlation, and
-// further from them than photos of this set usually are. A photo of a bare wall correlates with
-// nothing, but is near to all.
-std::vector<int> FindForeignPhotos(const std::vector<PhotoAgreement>& agreement,
-                                   double min_correlation);
-
 // Samples at which photos stand against each other in groups: two and more that agree against two
 // and more that agree. What moves or mirrors differs from photo to photo; where part of the photos
 // stand elsewhere than they were aligned, groups do. Two projectors that throw one pattern, or
@@ -41,13 +30,35 @@ struct DividedPhotos {
   size_t num_unlike = 0;   // of these, where any two photos differ
   size_t num_divided = 0;  // of these, where groups do
 
-  double ShareOfAll() const { return num_divided / std::max(1.0, 1.0 * num_samples); }
-  double ShareOfUnlike() const { return num_divided / std::max(1.0, 1.0 * num_unlike); }
+  double ShareOfAll() const;
+  double ShareOfUnlike() const;
   // So many that the poses are not to be trusted. agreement: in another light, too, photos stand
   // against each other in groups, but what they show is alike.
   bool Fold(const std::vector<PhotoAgreement>& agreement) const;
 };
-DividedPhotos FindDividedPhotos(const ObservationStore& store,
-                                const std::vector<Eigen::Vector3f>& gains);
+
+Json ToJson(const DividedPhotos& divided);  // the reports' `divided_photos`
+
+// Collects samples of the scan as photos show them.
+class PhotoComparison {
+ public:
+  explicit PhotoComparison(size_t num_photos) : sums_(num_photos) {}
+
+  // A sample: the number of each photo that sees it, and how bright it is there: 0..1, on a scale
+  // about even to the eye, exposures made equal.
+  void Add(const std::vector<std::pair<int, float>>& seen);
+
+  std::vector<PhotoAgreement> Agreement() const;  // per photo
+  const DividedPhotos& Divided() const { return divided_; }
+
+ private:
+  // Over the samples of a photo, of its brightness p and the others' median o.
+  struct Sums {
+    double n = 0, p = 0, o = 0, pp = 0, oo = 0, po = 0;
+  };
+  std::vector<Sums> sums_;
+  DividedPhotos divided_;
+  std::vector<float> values_;  // of the sample at hand
+};
 
 }  // namespace roomtex

@@ -1,0 +1,150 @@
+#include "align/trust/photo_comparison.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "align/trust/perspective_views.h"
+#include "core/camera_model.h"
+#include "core/parallel.h"
+#include "core/photo.h"
+#include "core/statistics.h"
+
+namespace roomtex {
+namespace {
+
+constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
+constexpr int kNodeCells = 3;  // cells between the rays that are cast
+// Bytes: where a channel is darker or brighter, it is clipped or only noise.
+constexpr int kDark = 2, kClipped = 253;
+// A sample is seen where the view is as deep, to so many metres and such a share of its depth.
+constexpr double kDepthTolerance = 0.02, kDepthShare = 0.02;
+constexpr int kGainRounds = 5;
+
+std::vector<Eigen::Vector3d> SpreadSamples(const std::vector<Scan>& scans, int count) {
+  size_t num_all = 0;
+  for (const Scan& scan : scans) num_all += scan.points.size();
+  const size_t stride = num_all / static_cast<size_t>(count) + 1;
+  std::vector<Eigen::Vector3d> samples;
+  size_t next = 0, before = 0;
+  for (const Scan& scan : scans) {
+    for (; next < before + scan.points.size(); next += stride) {
+      const size_t i = next - before;
+      if (!scan.IsMissing(static_cast<int>(i))) samples.push_back(scan.points[i]);
+    }
+    before += scan.points.size();
+  }
+  return samples;
+}
+
+// What all photos of one camera share.
+struct CoarseCamera {
+  CoarseCamera(const Camera& camera, const ScanViewer& viewer, int pixels_across)
+      : projection(camera),
+        cell_px(std::max(1, std::max(camera.width, camera.height) / pixels_across)),
+        lattice(projection, cell_px * (viewer.has_mesh() ? 1 : kNodeCells)) {}
+
+  CameraProjection projection;
+  int cell_px;  // of the view
+  RayLattice lattice;
+};
+
+// Natural logarithm of the linear light at every sample, mean of the channels; kUnseen where the
+// photo does not see it.
+std::vector<float> LightAt(const std::vector<Eigen::Vector3d>& samples, const cv::Mat& cells,
+                           const ScanView& view, const CameraProjection& projection,
+                           const Rigid& cam_from_scan) {
+  const std::array<float, 256>& linear = LinearFromSrgbByte();
+  std::vector<float> light(samples.size(), kUnseen);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const Eigen::Vector3d x_in_cam = cam_from_scan * samples[i];
+    if (!(x_in_cam.z() > 0)) continue;
+    const auto x_in_img = projection.ImgFromCam(x_in_cam);
+    if (!x_in_img) continue;
+    const double column = x_in_img->x() / view.cell_px, row = x_in_img->y() / view.cell_px;
+    if (!(column >= 0 && column < view.depth.cols && row >= 0 && row < view.depth.rows)) continue;
+    const int x = static_cast<int>(column), y = static_cast<int>(row);
+    if (!view.valid(y, x) ||
+        std::abs(view.depth(y, x) - x_in_cam.z()) > kDepthTolerance + kDepthShare * x_in_cam.z()) {
+      continue;
+    }
+    const cv::Vec3b& bytes = cells.at<cv::Vec3b>(y, x);
+    const auto [least, most] = std::minmax({bytes[0], bytes[1], bytes[2]});
+    if (least < kDark || most > kClipped) continue;
+    light[i] = std::log((linear[bytes[0]] + linear[bytes[1]] + linear[bytes[2]]) / 3);
+  }
+  return light;
+}
+
+// Makes the exposures equal: each photo is as bright as the median of all, in the median of what it
+// sees; the whole then has the mean that photos have.
+void MakeEven(std::vector<std::vector<float>>* light) {
+  if (light->empty()) return;
+  const size_t num_samples = light->front().size();
+  std::vector<double> values;
+  for (int round = 0; round < kGainRounds; ++round) {
+    std::vector<std::vector<double>> above(light->size());
+    for (size_t i = 0; i < num_samples; ++i) {
+      values.clear();
+      for (const std::vector<float>& photo : *light) {
+        if (!std::isnan(photo[i])) values.push_back(photo[i]);
+      }
+      if (values.size() < 2) continue;
+      const double usual = Median(&values);
+      for (size_t k = 0; k < light->size(); ++k) {
+        if (!std::isnan((*light)[k][i])) above[k].push_back((*light)[k][i] - usual);
+      }
+    }
+    for (size_t k = 0; k < light->size(); ++k) {
+      if (above[k].empty()) continue;
+      const float excess = static_cast<float>(Median(&above[k]));
+      for (float& value : (*light)[k]) value -= excess;
+    }
+  }
+}
+
+}  // namespace
+
+PhotoComparison ComparePhotosOnScan(const SparseModel& aligned, const std::string& image_path,
+                                    const ScanViewer& viewer, const PhotoComparisonOptions& options,
+                                    int num_threads) {
+  const PerspectiveViews views(aligned);
+  const std::vector<const SparseImage*> images = SpreadImages(views.model(), options.num_photos);
+  std::map<uint32_t, CoarseCamera> cameras;
+  for (const SparseImage* image : images) {
+    cameras.try_emplace(image->camera_id, views.model().cameras.at(image->camera_id), viewer,
+                        options.pixels_across);
+  }
+  const std::vector<Eigen::Vector3d> samples = SpreadSamples(viewer.scans(), options.num_samples);
+  std::vector<std::vector<float>> light(images.size());
+  ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int k) {
+    const SparseImage& image = *images[k];
+    const CoarseCamera& camera = cameras.at(image.camera_id);
+    const ScanView view = viewer.Look(camera.lattice, camera.projection.camera(),
+                                      image.cam_from_model, camera.cell_px);
+    std::string ignored;  // MeasureAgreement() says it
+    const auto cells = views.ReadCells(image, camera.cell_px, image_path, &ignored);
+    light[k] = cells ? LightAt(samples, *cells, view, camera.projection, image.cam_from_model)
+                     : std::vector<float>(samples.size(), kUnseen);
+  });
+  MakeEven(&light);
+
+  PhotoComparison comparison(images.size());
+  std::vector<std::pair<int, float>> seen;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    seen.clear();
+    for (size_t k = 0; k < light.size(); ++k) {
+      if (!std::isnan(light[k][i])) {
+        seen.emplace_back(static_cast<int>(k), std::exp(0.5f * light[k][i]));
+      }
+    }
+    comparison.Add(seen);
+  }
+  return comparison;
+}
+
+}  // namespace roomtex
