@@ -425,7 +425,6 @@ Json Command::Impl::MakeReport(const Report& report, const Progress& progress) c
     if (!paths.empty())
       json["inputs"][input.name] = paths.size() == 1 ? Json(paths[0]) : Json(paths);
   }
-  for (const auto& [key, value] : report.inputs().items()) json["inputs"][key] = value;
   json["seconds"] = Json::object();
   for (const auto& [stage, seconds] : progress.stage_seconds()) {
     json["seconds"][stage] = json["seconds"].value(stage, 0.0) + seconds;

@@ -30,19 +30,14 @@ struct DividedPhotos {
   size_t num_unlike = 0;   // of these, where any two photos differ
   size_t num_divided = 0;  // of these, where groups do
 
-  double ShareOfAll() const;
-  double ShareOfUnlike() const;
-  // So many that the poses are not to be trusted. agreement: in another light, too, photos stand
-  // against each other in groups, but what they show is alike.
-  bool Fold(const std::vector<PhotoAgreement>& agreement) const;
+  double ShareOfAll() const;     // divided ones of all
+  double ShareOfUnlike() const;  // divided ones of those that are unlike
 };
-
-Json ToJson(const DividedPhotos& divided);  // the reports' `divided_photos`
 
 // Collects samples of the scan as photos show them.
 class PhotoComparison {
  public:
-  explicit PhotoComparison(size_t num_photos) : sums_(num_photos) {}
+  explicit PhotoComparison(size_t num_photos = 0) : sums_(num_photos) {}
 
   // A sample: the number of each photo that sees it, and how bright it is there: 0..1, on a scale
   // about even to the eye, exposures made equal.
@@ -50,6 +45,10 @@ class PhotoComparison {
 
   std::vector<PhotoAgreement> Agreement() const;  // per photo
   const DividedPhotos& Divided() const { return divided_; }
+  // The photos do not stand where they were aligned: they show little alike (median over them), or
+  // stand against each other in groups. In another light they do so, too, but what they show is
+  // alike. False where too little can be compared.
+  bool Contradicts() const;
 
  private:
   // Over the samples of a photo, of its brightness p and the others' median o.
@@ -60,5 +59,7 @@ class PhotoComparison {
   DividedPhotos divided_;
   std::vector<float> values_;  // of the sample at hand
 };
+
+Json ToJson(const PhotoComparison& comparison);  // the reports' `divided_photos`
 
 }  // namespace roomtex

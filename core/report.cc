@@ -1,5 +1,7 @@
 #include "core/report.h"
 
+#include <cmath>
+
 #include "core/frames.h"
 #include "core/output_file.h"
 
@@ -7,6 +9,17 @@ namespace roomtex {
 
 void Report::SetUntrusted(const std::string& reason) {
   reason_ += (reason_.empty() ? "" : " ") + reason;
+}
+
+Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+double NumberAt(const Json& json, std::initializer_list<const char*> keys) {
+  const Json* at = &json;
+  for (const char* key : keys) {
+    if (!at->is_object() || !at->contains(key)) return std::nan("");
+    at = &(*at)[key];
+  }
+  return at->is_number() ? at->get<double>() : std::nan("");
 }
 
 Json ToJson(const Eigen::VectorXd& vector) {

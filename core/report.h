@@ -1,6 +1,7 @@
 #pragma once
 // The JSON report that every command writes with --report_path (docs/commands.md).
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -20,9 +21,6 @@ class Report {
   const Json& keys() const { return keys_; }
   Json& keys() { return keys_; }
 
-  void AddInput(const std::string& option, const std::string& path) {
-    inputs_[option].push_back(path);
-  }
   void AddWarning(const std::string& warning) { warnings_.push_back(warning); }
   // The answer is not to be trusted (exit 4); several reasons are joined.
   void SetUntrusted(const std::string& reason);
@@ -33,17 +31,18 @@ class Report {
   bool trusted() const { return reason_.empty(); }
   const std::string& reason() const { return reason_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
-  const Json& inputs() const { return inputs_; }
   const std::vector<std::string>& copies() const { return copies_; }
 
  private:
   Json keys_ = Json::object();
-  Json inputs_ = Json::object();
   std::vector<std::string> warnings_, copies_;
   std::string reason_;
 };
 
 // Vectors as JSON arrays.
+Json NumberOrNull(double value);  // null: not finite
+// The number at a path of keys; NaN where there is none.
+double NumberAt(const Json& json, std::initializer_list<const char*> keys);
 Json ToJson(const Eigen::VectorXd& vector);
 // {scale, rotation_wxyz, translation}.
 Json ToJson(const Similarity& similarity);

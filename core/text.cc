@@ -21,6 +21,12 @@ std::string Exact(double value) {
 
 std::string Percent(double share) { return Number(100 * share, 0) + " %"; }
 
+std::string Millimetres(double mm) {
+  if (!std::isfinite(mm)) return "unknown";
+  if (mm >= 1000) return Number(mm / 1000, 2) + " m";
+  return Number(mm, mm < 10 ? 1 : 0) + " mm";
+}
+
 std::optional<double> ParseNumber(std::string_view text) {
   const char* begin = text.data();
   const char* const end = begin + text.size();

@@ -17,6 +17,8 @@ std::string Significant(double value, int digits);
 std::string Exact(double value);
 // In whole per cent: Percent(0.254) is "25 %".
 std::string Percent(double share);
+// A length for people: "9.6 mm", "131 mm", "1.25 m"; "unknown" if it is not finite.
+std::string Millimetres(double mm);
 
 // A finite number in C notation ("-1.5e3", also "+2"); none if anything else stands there, be it a
 // blank.

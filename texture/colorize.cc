@@ -441,9 +441,8 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
 
   progress->Stage("exposure");
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
-  const PhotoComparison comparison = ComparePhotos(store, result.exposure.gains);
-  result.agreement = comparison.Agreement();
-  result.divided = comparison.Divided();
+  result.comparison = ComparePhotos(store, result.exposure.gains);
+  result.agreement = result.comparison.Agreement();
   LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
 

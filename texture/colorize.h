@@ -58,7 +58,7 @@ struct ColorizeResult {
   ExposureSolution exposure;  // gains as applied, output scale included
   Disagreement disagreement;
   std::vector<PhotoAgreement> agreement;  // per photo
-  DividedPhotos divided;
+  PhotoComparison comparison;
   std::vector<PhotoSharpness> sharpness;  // per photo
   Registration registration;
   std::vector<size_t> samples_seen;          // per photo

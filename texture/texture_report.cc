@@ -140,7 +140,7 @@ void FillColorReport(const std::vector<PhotoView>& photos, const ColorizeOptions
                                  {"moving", RoundedShare(result.photos[i].moving)}};
   }
   report["photo_agreement"] = agreement;
-  report["divided_photos"] = ToJson(result.divided);
+  report["divided_photos"] = ToJson(result.comparison);
   Json sharpness = Json::object();
   for (size_t i = 0; i < photos.size(); ++i) {
     const PhotoSharpness& photo = result.sharpness[i];
@@ -232,10 +232,10 @@ void JudgeColors(const std::vector<PhotoView>& photos, const ColorizeResult& res
         "photos that see the same sample differ in colour as much as at random. Is the model "
         "aligned? Run roomtex-align.");
   }
-  if (result.divided.Fold(result.agreement)) {
+  if (result.comparison.Contradicts()) {
     context.report.SetUntrusted(
-        "photos contradict each other in groups (divided_photos): some stand elsewhere than they "
-        "were aligned. Did several projectors throw the same pattern, or do rooms look alike? Look "
+        "photos contradict each other where they see the same (divided_photos): they, or some of "
+        "them, stand elsewhere than they were aligned. Did several projectors throw the same pattern, or do rooms look alike? Look "
         "at the sparse model in COLMAP's window.");
   }
 }

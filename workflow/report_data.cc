@@ -22,17 +22,6 @@ const Json& At(const Json& json, std::initializer_list<const char*> keys) {
   return *at;
 }
 
-// NaN where there is none.
-double NumberAt(const Json& json, std::initializer_list<const char*> keys) {
-  const Json& at = At(json, keys);
-  return at.is_number() ? at.get<double>() : std::nan("");
-}
-
-std::string Millimetres(double mm) {
-  if (mm >= 1000) return Number(mm / 1000, 2) + " m";
-  return Number(mm, mm < 10 ? 1 : 0) + " mm";
-}
-
 const StepOutcome* StepNamed(const RunResult& result, const std::string& name) {
   for (const StepOutcome& step : result.steps) {
     if (step.name == name && step.known) return &step;

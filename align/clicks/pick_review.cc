@@ -93,14 +93,6 @@ LeaveOneOut TryWithoutEach(const PoseSolver& solver, const PointPairs& pairs, co
   return result;
 }
 
-// Chance that leaving out the best of n picks lowers the sum of squares from `all` to `rest`
-// although all picks are equally good: F test with 2 and nu = 2 n - unknowns - 2 degrees of
-// freedom, whose tail is (rest / all)^(nu / 2), times n for the choice of the best (Bonferroni).
-double ChanceOfGain(double all, double rest, int n, int num_unknowns) {
-  if (!(all > 0)) return 1;
-  return n * std::pow(rest / all, 0.5 * (2 * n - num_unknowns - 2));
-}
-
 void FindExchanged(const PoseSolver& solver, const PointPairs& pairs,
                    const PickReviewOptions& options, PickReview* review) {
   const double rms_px = review->RmsPx();
@@ -148,6 +140,11 @@ std::vector<int> LeaveOutBadPicks(const PoseSolver& solver, const PointPairs& pa
 }
 
 }  // namespace
+
+double ChanceOfGain(double all, double rest, int n, int num_unknowns) {
+  if (!(all > 0)) return 1;
+  return n * std::pow(rest / all, 0.5 * (2 * n - num_unknowns - 2));
+}
 
 void PickReviewOptions::Declare(OptionFields* fields) {
   fields

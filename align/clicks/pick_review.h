@@ -70,6 +70,11 @@ struct PickReview {
   }
 };
 
+// Chance that leaving out the best of n picks lowers the sum of squares from `all` to `rest`
+// although all picks are equally good: F test with 2 and nu = 2 n - unknowns - 2 degrees of
+// freedom, whose tail is (rest / all)^(nu / 2), times n for the choice of the best (Bonferroni).
+double ChanceOfGain(double all, double rest, int n, int num_unknowns);
+
 // pairs: at least 6 that have no layout problem. One in six may be bad and is found by leaving out
 // each in turn.
 PickReview ReviewPicks(const CameraProjection& projection, const PointPairs& pairs,

@@ -121,12 +121,12 @@ void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
   const PhotoComparison comparison =
       ComparePhotosOnScan(aligned, a.image_path, surveyed.viewer(), PhotoComparisonOptions(),
                           context.options.num_threads);
-  context.report["divided_photos"] = ToJson(comparison.Divided());
-  if (comparison.Divided().Fold(comparison.Agreement())) {
+  context.report["divided_photos"] = ToJson(comparison);
+  if (comparison.Contradicts()) {
     context.report.SetUntrusted(
-        "Photos contradict each other in groups where they see the same of the scan "
-        "(divided_photos): some stand elsewhere than they were aligned, so that the sparse model "
-        "is folded. Two projectors with one pattern or rooms that look alike do that: leave the "
+        "Photos contradict each other where they see the same of the scan (divided_photos): they "
+        "stand elsewhere than they were aligned, all of them, or some, so that the sparse model is "
+        "folded. Two projectors with one pattern or rooms that look alike do that: leave the "
         "photos of one out, or map them apart. So do photos with and without a pattern in one "
         "folder: give the plain ones.");
   }

@@ -8,8 +8,6 @@
 namespace roomtex {
 namespace {
 
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json RmsOrNull(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value * value;

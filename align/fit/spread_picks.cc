@@ -152,13 +152,6 @@ BestWithout TryWithoutEach(const SpreadProblem& problem, const Similarity& all,
   return best;
 }
 
-// As of one photo (pick_review.cc): F test with 2 and nu degrees of freedom, times n for the choice
-// of the best.
-double ChanceOfGain(double all, double rest, int n) {
-  if (!(all > 0)) return 1;
-  return n * std::pow(rest / all, 0.5 * (2 * n - kUnknowns - 2));
-}
-
 // Leaves out bad picks one after the other.
 Solutions LeaveOutBadPicks(const SpreadProblem& problem, const PickReviewOptions& options,
                            SpreadPickFit* result) {
@@ -171,7 +164,7 @@ Solutions LeaveOutBadPicks(const SpreadProblem& problem, const PickReviewOptions
     if (left_out == num_on / 6 || n < kMinPicksPerPhoto || best.pick < 0) break;
     if (!(result->leave_one_out_px[best.pick] > options.min_bad_pick_px)) break;
     const double chance =
-        solutions.empty() ? 0 : ChanceOfGain(solutions[0].sum_px2, best.sum_px2, n);
+        solutions.empty() ? 0 : ChanceOfGain(solutions[0].sum_px2, best.sum_px2, n, kUnknowns);
     if (chance > options.max_chance) break;
     result->used[best.pick] = false;
     solutions = std::move(best.solutions);

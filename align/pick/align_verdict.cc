@@ -9,16 +9,6 @@
 namespace roomtex {
 namespace {
 
-// The number at a path of keys; NaN where there is none.
-double NumberAt(const Json& json, std::initializer_list<const char*> keys) {
-  const Json* at = &json;
-  for (const char* key : keys) {
-    if (!at->is_object() || !at->contains(key)) return std::nan("");
-    at = &(*at)[key];
-  }
-  return at->is_number() ? at->get<double>() : std::nan("");
-}
-
 // Of several models all picks, though `picks` is of the first that was placed.
 double NumberOfPicks(const Json& report, const char* key) {
   if (!report.contains("models") || !report["models"].is_array()) {
@@ -32,12 +22,6 @@ double NumberOfPicks(const Json& report, const char* key) {
     if (std::isfinite(number)) sum += number;
   }
   return any ? sum : std::nan("");
-}
-
-std::string Millimetres(double mm) {
-  if (!std::isfinite(mm)) return "unknown";
-  if (mm >= 1000) return Number(mm / 1000, 2) + " m";
-  return Number(mm, mm < 10 ? 1 : 0) + " mm";
 }
 
 class FactList {

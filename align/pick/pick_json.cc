@@ -210,7 +210,6 @@ Json SimilarityToJson(const ModelState& model) {
 
 }  // namespace
 
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 PutPicks ParsePutPicks(const Json& json, const PickScene& scene) {
   if (!json.is_object()) throw UsageError("The request must be an object.");

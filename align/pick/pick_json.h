@@ -20,7 +20,4 @@ PutPicks ParsePutPicks(const Json& json, const PickScene& scene);
 Json SessionToJson(const PickSession::Snapshot& snapshot, const PickScene& scene);
 Json ScanPointToJson(const ScanPlaces::Found& found);
 
-// null for a number that is none.
-Json NumberOrNull(double value);
-
 }  // namespace roomtex

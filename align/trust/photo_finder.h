@@ -49,9 +49,6 @@ class PhotoFinder {
   PhotoFinder(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
               const PhotoFinderOptions& options, int num_threads);
 
-  // No station with a grid, or nothing that could be compared.
-  bool IsBlind() const { return natural_.places.empty() && upright_.places.empty(); }
-
   // camera: as MakePhotoModel() has it, not a panorama. Its pose is not looked at.
   PhotoSighting Find(const SparseImage& image, const Camera& camera, FocalSource source,
                      const std::string& image_path) const;

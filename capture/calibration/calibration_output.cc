@@ -12,7 +12,6 @@ namespace {
 // Ten digits: 1e-6 of a pixel of a focal length, 1e-9 of a distortion.
 std::string Digits(double value) { return Significant(value, 10); }
 
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json Numbers(const std::vector<double>& values) {
   Json json = Json::array();

@@ -64,6 +64,7 @@ TEST(SeedBundle, ErrorsAreZeroAtTheTruthOfExactKeypoints) {
   SimulatedViewsOptions options = MakeOptions(Scene::kRoom, 0, 1);
   options.distortion = options.two_cameras = true;
   const TruePair pair(options);
+  ASSERT_GT(ObservationErrors(pair.truth, pair.observations).size(), 100u);
   for (const double error : ObservationErrors(pair.truth, pair.observations)) {
     EXPECT_NEAR(error, 0.0, 1e-5);
   }

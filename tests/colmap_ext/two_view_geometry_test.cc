@@ -271,6 +271,7 @@ TEST(Triangulation, FindsTheTruePointAndItsAngle) {
   const SimulatedViews views = SimulateViews(MakeOptions(Scene::kRoom, 0, 0, 6));
   const Rigid& left = views.cam_from_scene.at(1);
   const Rigid right_from_left = views.TrueRelativePose(1, 2);
+  ASSERT_GT(FirstPair(views).size(), 50u);
   for (const RayMatch& match : FirstPair(views)) {
     const int index = views.point_of_keypoint.at(1)[match.left_row];
     const Eigen::Vector3d truth = left * views.points_in_scene[index];

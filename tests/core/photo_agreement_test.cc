@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/random_stream.h"
+
 namespace roomtex {
 namespace {
 
@@ -46,7 +48,7 @@ TEST(DividedPhotos, OfTooFewSamplesAreNoFold) {
       comparison.Add({{0, a}, {1, a}, {2, b}, {3, b}});
     }
     EXPECT_EQ(comparison.Divided().ShareOfAll(), 1);
-    EXPECT_EQ(comparison.Divided().Fold(comparison.Agreement()), num > 1000);
+    EXPECT_EQ(comparison.Contradicts(), num > 1000);
   }
 }
 
@@ -58,7 +60,24 @@ TEST(DividedPhotos, InTwoLightsAreNoFold) {
     comparison.Add({{0, a}, {1, a}, {2, 0.5f * a}, {3, 0.5f * a}});
   }
   EXPECT_GT(comparison.Divided().ShareOfUnlike(), 0.3);
-  EXPECT_FALSE(comparison.Divided().Fold(comparison.Agreement()));
+  EXPECT_FALSE(comparison.Contradicts());
+}
+
+// A fold with more than two groups: everybody shows something else.
+TEST(PhotoComparison, PhotosThatShowNothingAlikeContradict) {
+  RandomStream random(7);
+  for (const double contrast : {0.02, 0.5}) {
+    PhotoComparison comparison(5);
+    for (int i = 0; i < 3000; ++i) {
+      std::vector<std::pair<int, float>> seen;
+      for (int photo = 0; photo < 5; ++photo) {
+        seen.emplace_back(photo, static_cast<float>(0.2 + contrast * random.Uniform()));
+      }
+      comparison.Add(seen);
+    }
+    // Of a bare wall there is nothing but noise.
+    EXPECT_EQ(comparison.Contradicts(), contrast > 0.1);
+  }
 }
 
 TEST(PhotoAgreement, IsThatWithTheMedianOfTheOthers) {

@@ -176,6 +176,7 @@ TEST_P(BoxInFrontOfWall, IsNotConnectedToIt) {
       },
       options);
   const std::vector<Triangle> triangles = BuildScanMesh(scan, {});
+  ASSERT_FALSE(triangles.empty());
   int num_across = 0;
   for (const Triangle& t : triangles) {
     double nearest = 1e9, farthest = 0;

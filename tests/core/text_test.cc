@@ -51,6 +51,10 @@ TEST(Text, ExactNumbersReadBackToTheLastBit) {
 TEST(Text, SharesArePerCents) {
   EXPECT_EQ(Percent(0.254), "25 %");
   EXPECT_EQ(Percent(1), "100 %");
+  EXPECT_EQ(Millimetres(9.64), "9.6 mm");
+  EXPECT_EQ(Millimetres(131.4), "131 mm");
+  EXPECT_EQ(Millimetres(1250), "1.25 m");
+  EXPECT_EQ(Millimetres(std::numeric_limits<double>::quiet_NaN()), "unknown");
 }
 
 TEST(Text, ParsesFiniteNumbersOnly) {

@@ -118,7 +118,7 @@ TEST_F(TextureCommand, AGroupOfPhotosInTheWrongPlaceIsNotTrusted) {
                      " --image_path " + Capture() + "/photos --scan_path " + Capture() +
                      "/scan.rtpi --Blend.min_agreement 0 --output_path " + Path("of_folded"));
   EXPECT_EQ(result.exit_code, 4) << result.err;
-  EXPECT_NE(result.err.find("contradict each other in groups"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("contradict each other where"), std::string::npos) << result.err;
   const json report = ReadJson(Path("of_folded/report.json")),
              right = ReadJson(Path("textured/report.json"));
   EXPECT_FALSE(report["trusted"]);

@@ -1,24 +1,11 @@
 #include "texture/view/view_shifts.h"
 
 #include <filesystem>
-#include <initializer_list>
-#include <optional>
 
 #include "core/json_text.h"
 
 namespace roomtex {
 namespace {
-
-std::optional<double> NumberAt(const Json& report, std::initializer_list<const char*> keys) {
-  const Json* at = &report;
-  for (const char* key : keys) {
-    const auto found = at->is_object() ? at->find(key) : at->end();
-    if (found == at->end()) return std::nullopt;
-    at = &*found;
-  }
-  if (!at->is_number() || at->get<double>() < 0) return std::nullopt;
-  return at->get<double>();
-}
 
 // Empty if anything in it is not as it should be.
 Json MapOf(const Json& image) {
@@ -46,14 +33,14 @@ std::map<std::string, Json> ReadViewShifts(const std::string& folder) {
   if (images == report.end() || !images->is_array()) return shifts;
   for (const Json& image : *images) {
     if (!image.is_object() || !image.contains("name") || !image["name"].is_string()) continue;
-    const auto before = NumberAt(image, {"shift_px", "before"});
-    const auto after = NumberAt(image, {"shift_px", "after"});
-    const auto mm = NumberAt(image, {"shift_before_mm"});
+    const double before = NumberAt(image, {"shift_px", "before"});
+    const double after = NumberAt(image, {"shift_px", "after"});
+    const double mm = NumberAt(image, {"shift_before_mm"});
     // Of a photo at which nothing could be compared 0 says nothing.
-    const auto share = NumberAt(image, {"share_measured"});
-    if (!before || !after || !mm || !share || *share == 0) continue;
+    if (!(before >= 0 && after >= 0 && mm >= 0 && NumberAt(image, {"share_measured"}) > 0))
+      continue;
     shifts[image["name"].get<std::string>()] = {
-        {"before_px", *before}, {"after_px", *after}, {"before_mm", *mm}, {"map_px", MapOf(image)}};
+        {"before_px", before}, {"after_px", after}, {"before_mm", mm}, {"map_px", MapOf(image)}};
   }
   return shifts;
 }

@@ -115,6 +115,7 @@ TEST(PoseCovariance, GrowsWithTheSquareOfTheNoise) {
   for (SurfaceConstraint& c : adjusted.bundle.constraints) c.sigma *= 2;
   // Residuals are smaller against the doubled noise, so that none counts less as an outlier.
   const PoseCovariances doubled = FindPoseCovariances(input, adjusted.bundle, {});
+  ASSERT_EQ(adjusted.covariances.size(), one.model.images.size());
   for (const auto& [id, covariance] : adjusted.covariances) {
     EXPECT_NEAR(doubled.at(id).trace() / covariance.trace(), 4, 0.4) << id;
   }

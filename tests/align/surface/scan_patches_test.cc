@@ -43,6 +43,7 @@ TEST(ScanPatches, FindTheNearestAsASearchThroughAllDoes) {
 TEST(ScanPatches, PointTheirNormalsTowardsTheScanner) {
   const SimulatedCase& one = MakeCase();
   const ScanPatches surface(one.scans, ScanPatchOptions());
+  ASSERT_GT(surface.patches().size(), 100u);
   for (const ScanPatch& patch : surface.patches()) {
     // Some samples of a cube may be seen at a grazing angle, so allow for a little.
     const Eigen::Vector3d to_scanner = (one.scans[0].Station() - patch.point).normalized();
