@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/core.h>
+
 namespace roomtex {
 namespace {
 
@@ -61,6 +63,16 @@ void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
   SetExpectedErrorAtCameras(result->photo_sigmas, result->disagreement, &result->expected_error);
   result->refined_pick_px = PickDistances(adjustment.bundle.model, input.picks, Similarity());
   result->refined_pick_rms_px = PickRms(result->start.picks, result->refined_pick_px);
+}
+
+std::string CornerWarning(const Alignment& alignment) {
+  const CornerAdjustment& corners = alignment.corners;
+  return fmt::format(
+      "{} corners of the scan's intensity that {} photos show hold these photos, too, since sparse "
+      "model and scan differ in shape: half of them came from {:.1f} to {:.1f} pixels by the other "
+      "half.",
+      corners.num_corners, corners.num_photos, corners.held_out_before_px,
+      corners.held_out_after_px);
 }
 
 // The input with its lenses as the photos have them.
@@ -121,7 +133,13 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   if (result.fit.refined && result.reasons.empty()) {
     progress->Stage("bundle adjustment");
     result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
+    if (result.adjusted() && result.disagreement.rms > kSameShape) {
+      progress->Stage("corners");
+      result.corners =
+          AdjustByCorners(input, start, result.fit, lenses, options, &result.adjustment);
+    }
     TakeAdjustment(input, &result);
+    if (result.corners.used) result.warnings.push_back(CornerWarning(result));
   }
   const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
   if (!reason.empty()) result.reasons.push_back(reason);

@@ -10,6 +10,7 @@
 
 #include "align/alignment_fit.h"
 #include "align/alignment_input.h"
+#include "align/corner_adjustment.h"
 #include "align/judgement.h"
 #include "align/pick_findings.h"
 #include "align/start.h"
@@ -31,6 +32,7 @@ struct Alignment {
   // The adjustment to the surface, tried where the similarity is refined and trusted.
   // adjustment.bundle.model is the answer if adjusted().
   ModelAdjustment adjustment;
+  CornerAdjustment corners;  // where model and scan differ in shape
   // Of the picks, where the sparse points lie on the surface (in the adjusted model, if there is
   // one), pixels; see AlignmentFit.
   std::vector<double> refined_pick_px;

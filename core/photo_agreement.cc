@@ -87,6 +87,11 @@ double DividedPhotos::ShareOfUnlike() const {
   return static_cast<double>(num_divided) / static_cast<double>(std::max<size_t>(1, num_unlike));
 }
 
+double PhotoComparison::MedianCorrelation() const {
+  std::vector<double> correlations = Correlations(Agreement());
+  return Quantile(&correlations, 0.5, std::nan(""));
+}
+
 bool PhotoComparison::Contradicts() const {
   // Right poses: the median photo correlates by 0.88 and more (the scan of a depth camera), the
   // best quarter by 0.89 and more (people in half of the photos), though a third of the samples is
@@ -99,7 +104,7 @@ bool PhotoComparison::Contradicts() const {
   std::vector<double> correlations = Correlations(Agreement());
   const double share_unlike =
       static_cast<double>(divided_.num_unlike) / static_cast<double>(divided_.num_samples);
-  const bool all = share_unlike > kLeastUnlike && Quantile(&correlations, 0.5, 1.0) < kLeastMedian;
+  const bool all = share_unlike > kLeastUnlike && MedianCorrelation() < kLeastMedian;
   const bool groups = divided_.ShareOfAll() > kLeastOfAll &&
                       divided_.ShareOfUnlike() > kLeastOfUnlike &&
                       Quantile(&correlations, 0.75, 1.0) < kLeastBest;
@@ -108,13 +113,11 @@ bool PhotoComparison::Contradicts() const {
 
 Json ToJson(const PhotoComparison& comparison) {
   const auto rounded = [](double share) { return std::round(1e4 * share) / 1e4; };
-  std::vector<double> correlations = Correlations(comparison.Agreement());
   const DividedPhotos& divided = comparison.Divided();
   return {{"num_samples", divided.num_samples},
           {"share", rounded(divided.ShareOfAll())},
           {"share_of_unlike", rounded(divided.ShareOfUnlike())},
-          {"correlation",
-           correlations.empty() ? Json(nullptr) : Json(rounded(Quantile(&correlations, 0.5)))}};
+          {"correlation", NumberOrNull(rounded(comparison.MedianCorrelation()))}};
 }
 
 }  // namespace roomtex

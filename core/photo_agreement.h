@@ -45,6 +45,8 @@ class PhotoComparison {
 
   std::vector<PhotoAgreement> Agreement() const;  // per photo
   const DividedPhotos& Divided() const { return divided_; }
+  // Of the median photo that can be compared, with the others; NaN if there is none.
+  double MedianCorrelation() const;
   // The photos do not stand where they were aligned: they show little alike (median over them), or
   // stand against each other in groups. In another light they do so, too, but what they show is
   // alike. False where too little can be compared.

@@ -27,6 +27,17 @@ Json BendToJson(const Alignment& alignment) {
   return json;
 }
 
+Json CornersToJson(const CornerAdjustment& corners) {
+  if (corners.num_corners == 0) return nullptr;
+  return {{"num_corners", corners.num_corners},
+          {"num_photos", corners.num_photos},
+          {"held_out_before_px", NumberOrNull(corners.held_out_before_px)},
+          {"held_out_after_px", NumberOrNull(corners.held_out_after_px)},
+          {"correlation_before", NumberOrNull(corners.correlation_before)},
+          {"correlation_after", NumberOrNull(corners.correlation_after)},
+          {"used", corners.used}};
+}
+
 }  // namespace
 
 Json PlaneBundleToJson(const Alignment& alignment) {
@@ -46,6 +57,7 @@ Json PlaneBundleToJson(const Alignment& alignment) {
     json["not_adjusted"].push_back(bundle.model.images.at(id).name);
   }
   json["scan_bend"] = BendToJson(alignment);
+  json["corners"] = CornersToJson(alignment.corners);
   return json;
 }
 

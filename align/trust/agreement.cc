@@ -17,42 +17,28 @@ namespace roomtex {
 namespace {
 
 constexpr double kParzenSigma = 2.0;     // thesis A.1.2
-constexpr int kNodeCells = 3;            // cells between the rays that are cast
 constexpr double kMinValidShare = 0.02;  // a photo that sees less of the scan says nothing
 
 constexpr int kMaxSets = 3;  // of photos, see AgreementOptions
 
 // What all photos of one camera share.
 struct CameraSetup {
-  explicit CameraSetup(const Camera& camera) : projection(camera) {}
-
-  CameraProjection projection;
-  int cell_px = 1;       // of the view
+  LookSetup look;
   int coarse_cells = 1;  // cells of the view per position of Appendix A, in a row
-  std::unique_ptr<RayLattice> lattice;
   // Per turn and direction: where the turned camera has each coarse position, for cv::remap of the
   // coarse photo.
-  std::vector<std::vector<cv::Mat2f>> turned_positions;
+  std::vector<std::vector<cv::Mat2f>> turned_positions = {};
 };
 
 CameraSetup SetUpCamera(const Camera& camera, const ScanViewer& viewer,
                         const AgreementOptions& options) {
-  CameraSetup setup(camera);
-  // Two cells per sample of the scan show all that it holds. Scans without a grid cost a ray per
-  // cell: not more than 320 in a row.
-  const double sample_px = viewer.sample_angle() * camera.MeanFocalLength();
-  setup.cell_px = std::max(1, static_cast<int>(std::lround(0.5 * sample_px)));
-  if (viewer.has_mesh()) setup.cell_px = std::max(setup.cell_px, (camera.width + 319) / 320);
-  setup.cell_px =
-      std::min({setup.cell_px, std::max(1, camera.width / 32), std::max(1, camera.height / 32)});
-  const int columns = camera.width / setup.cell_px, rows = camera.height / setup.cell_px;
+  CameraSetup setup{LookSetup(camera, viewer, FinestCell(camera, viewer))};
+  const int columns = camera.width / setup.look.cell_px, rows = camera.height / setup.look.cell_px;
   setup.coarse_cells = std::max(
       1, static_cast<int>(std::lround(static_cast<double>(columns) / options.pixels_across)));
   setup.coarse_cells = std::min({setup.coarse_cells, columns, rows});
-  setup.lattice = std::make_unique<RayLattice>(
-      setup.projection, setup.cell_px * (viewer.has_mesh() ? 1 : kNodeCells));
 
-  const double step = setup.cell_px * setup.coarse_cells;
+  const double step = setup.look.cell_px * setup.coarse_cells;
   const cv::Size size(columns / setup.coarse_cells, rows / setup.coarse_cells);
   for (const double turn_deg : options.turns_deg) {
     setup.turned_positions.emplace_back();
@@ -62,8 +48,9 @@ CameraSetup SetUpCamera(const Camera& camera, const ScanViewer& viewer,
       cv::Mat2f positions(size);
       for (int y = 0; y < size.height; ++y) {
         for (int x = 0; x < size.width; ++x) {
-          const Eigen::Vector2d ray = setup.lattice->RayAt({(x + 0.5) * step, (y + 0.5) * step});
-          const auto at = setup.projection.ImgFromCam(turn * ray.homogeneous());
+          const Eigen::Vector2d ray =
+              setup.look.lattice.RayAt({(x + 0.5) * step, (y + 0.5) * step});
+          const auto at = setup.look.projection.ImgFromCam(turn * ray.homogeneous());
           positions(y, x) = at ? cv::Vec2f(static_cast<float>(at->x() / step - 0.5),
                                            static_cast<float>(at->y() / step - 0.5))
                                : cv::Vec2f(-10, -10);
@@ -143,15 +130,15 @@ PhotoAgreement MeasurePhoto(const PerspectiveViews& views, const SparseImage& im
                             const std::string& image_path, const ScanViewer& viewer,
                             const CameraSetup& setup, const AgreementOptions& options) {
   PhotoAgreement result;
-  const Camera& camera = views.model().cameras.at(image.camera_id);
   const auto photo = views.Read(image, image_path, &result.warning);
   if (!photo) return result;
-  const ScanView view = viewer.Look(*setup.lattice, camera, image.cam_from_model, setup.cell_px);
+  const ScanView view = setup.look.Look(viewer, image.cam_from_model);
   if (view.valid_share < kMinValidShare) return result;
   result.valid = true;
   MeasureImages(view, *photo, setup, options, &result);
-  result.shifts = MeasureGradientShifts(view, *photo, setup.projection, viewer.sample_angle(),
+  result.shifts = MeasureGradientShifts(view, *photo, setup.look.projection, viewer.sample_angle(),
                                         options.gradient);
+  if (result.shifts.num_unclear_photos > 0) result.shifts.shifted_alike.clear();
   for (auto* const corners : {&result.shifts.corners, &result.shifts.shifted_alike}) {
     for (FittingCorner& corner : *corners) corner.image_id = image.image_id;
   }

@@ -133,10 +133,10 @@ class PhotoMatcher {
       result.shifts_deg.push_back(DegFromRad(shift * angle_per_cell_));
       result.at_pose.Add(shift <= tolerance_);
       result.ring.Add(shift > tolerance_ && shift <= 2 * tolerance_);
+      const Eigen::Vector2d x_in_img = view_.cell_px * (*found + Eigen::Vector2d(0.5, 0.5));
+      shifts.push_back({*found - at, {0, x_in_img, patches_[i].x_in_cam}});
       if (clear) {
         result.clear.Add(shift <= tolerance_);
-        const Eigen::Vector2d x_in_img = view_.cell_px * (*found + Eigen::Vector2d(0.5, 0.5));
-        shifts.push_back({*found - at, {0, x_in_img, patches_[i].x_in_cam}});
         if (shift <= tolerance_) result.corners.push_back(shifts.back().corner);
       }
       CompareAtOtherPoses(i, pattern, &result);
@@ -144,7 +144,7 @@ class PhotoMatcher {
       const auto chance = other ? BestPlace(pattern, *other) : std::nullopt;
       if (!chance) continue;
       result.elsewhere.Add((*chance - *other).norm() <= tolerance_);
-      if (clear) by_chance.push_back({*chance - *other, {}});
+      by_chance.push_back({*chance - *other, {}});
     }
     const std::vector<FittingCorner> alike = ShiftedAlike(shifts, tolerance_);
     const double num_by_chance =

@@ -78,9 +78,9 @@ struct GradientShifts {
   Tally elsewhere;  // patches compared with another place of the photo: chance
   double tolerance_deg = 0;
   std::vector<FittingCorner> corners;  // of clear photos, those within the tolerance
-  // Where a clear photo shows many more patches shifted alike than by chance: these patches, where
-  // the photo shows them. A pose that is a few degrees off, by drift or by a bent model, shifts all
-  // of what one photo shows.
+  // Where a photo shows many more patches shifted alike than by chance: these patches, where
+  // the photo shows them (MeasureAgreement() keeps those of clear photos). A pose that is a few
+  // degrees off, by drift or by a bent model, shifts all of what one photo shows.
   std::vector<FittingCorner> shifted_alike;
 
   void Add(const GradientShifts& other);

@@ -18,7 +18,6 @@ namespace roomtex {
 namespace {
 
 constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
-constexpr int kNodeCells = 3;  // cells between the rays that are cast
 // Bytes: where a channel is darker or brighter, it is clipped or only noise.
 constexpr int kDark = 2, kClipped = 253;
 // A sample is seen where the view is as deep, to so many metres and such a share of its depth.
@@ -40,18 +39,6 @@ std::vector<Eigen::Vector3d> SpreadSamples(const std::vector<Scan>& scans, int c
   }
   return samples;
 }
-
-// What all photos of one camera share.
-struct CoarseCamera {
-  CoarseCamera(const Camera& camera, const ScanViewer& viewer, int pixels_across)
-      : projection(camera),
-        cell_px(std::max(1, std::max(camera.width, camera.height) / pixels_across)),
-        lattice(projection, cell_px * (viewer.has_mesh() ? 1 : kNodeCells)) {}
-
-  CameraProjection projection;
-  int cell_px;  // of the view
-  RayLattice lattice;
-};
 
 // Natural logarithm of the linear light at every sample, mean of the channels; kUnseen where the
 // photo does not see it.
@@ -114,18 +101,18 @@ PhotoComparison ComparePhotosOnScan(const SparseModel& aligned, const std::strin
                                     int num_threads) {
   const PerspectiveViews views(aligned);
   const std::vector<const SparseImage*> images = SpreadImages(views.model(), options.num_photos);
-  std::map<uint32_t, CoarseCamera> cameras;
+  std::map<uint32_t, LookSetup> cameras;
   for (const SparseImage* image : images) {
-    cameras.try_emplace(image->camera_id, views.model().cameras.at(image->camera_id), viewer,
-                        options.pixels_across);
+    const Camera& camera = views.model().cameras.at(image->camera_id);
+    cameras.try_emplace(image->camera_id, camera, viewer,
+                        std::max(1, std::max(camera.width, camera.height) / options.pixels_across));
   }
   const std::vector<Eigen::Vector3d> samples = SpreadSamples(viewer.scans(), options.num_samples);
   std::vector<std::vector<float>> light(images.size());
   ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int k) {
     const SparseImage& image = *images[k];
-    const CoarseCamera& camera = cameras.at(image.camera_id);
-    const ScanView view = viewer.Look(camera.lattice, camera.projection.camera(),
-                                      image.cam_from_model, camera.cell_px);
+    const LookSetup& camera = cameras.at(image.camera_id);
+    const ScanView view = camera.Look(viewer, image.cam_from_model);
     std::string ignored;  // MeasureAgreement() says it
     const auto cells = views.ReadCells(image, camera.cell_px, image_path, &ignored);
     light[k] = cells ? LightAt(samples, *cells, view, camera.projection, image.cam_from_model)

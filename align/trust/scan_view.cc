@@ -21,6 +21,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kEdgeBend = 0.03f;
 // The same for the four corners of a cell of the ray lattice, which is several samples wide.
 constexpr float kCellBend = 0.03f;
+constexpr int kNodeCells = 3;  // cells between the rays that are cast
 
 // 1 / range of every sample; 0 where missing.
 std::vector<float> InverseRanges(const Scan& scan) {
@@ -259,6 +260,18 @@ ScanView ScanViewer::Look(const RayLattice& lattice, const Camera& camera,
   }
   view.valid_share = static_cast<double>(num_valid) / std::max(1, columns * rows);
   return view;
+}
+
+LookSetup::LookSetup(const Camera& camera, const ScanViewer& viewer, int view_cell_px)
+    : projection(camera),
+      cell_px(view_cell_px),
+      lattice(projection, cell_px * (viewer.has_mesh() ? 1 : kNodeCells)) {}
+
+int FinestCell(const Camera& camera, const ScanViewer& viewer) {
+  const double sample_px = viewer.sample_angle() * camera.MeanFocalLength();
+  int cell_px = std::max(1, static_cast<int>(std::lround(0.5 * sample_px)));
+  if (viewer.has_mesh()) cell_px = std::max(cell_px, (camera.width + 319) / 320);
+  return std::min({cell_px, std::max(1, camera.width / 32), std::max(1, camera.height / 32)});
 }
 
 std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count) {

@@ -90,6 +90,22 @@ class ScanViewer {
   bool has_mesh_ = false;
 };
 
+// What all photos of one camera share when the scan is looked at from them. Must not outlive the
+// camera.
+struct LookSetup {
+  LookSetup(const Camera& camera, const ScanViewer& viewer, int view_cell_px);
+  ScanView Look(const ScanViewer& viewer, const Rigid& cam_from_scan) const {
+    return viewer.Look(lattice, projection.camera(), cam_from_scan, cell_px);
+  }
+
+  CameraProjection projection;
+  int cell_px;  // of the view
+  RayLattice lattice;
+};
+// The cells that show all that the scan holds: two per sample. Scans without a grid cost a ray per
+// cell: not more than 320 in a row.
+int FinestCell(const Camera& camera, const ScanViewer& viewer);
+
 // 1 for samples that are measured and whose eight neighbours continue their surface: no missing
 // sample and no depth jump beside them. Grid order; a full turn is not closed (its seam counts as
 // an edge only where it is one).

@@ -179,6 +179,8 @@ TEST(AlignCommand, IsNotTrustedWithThePhotosOfAnotherRoom) {
   EXPECT_EQ(report["agreement"]["gradient_shift"]["moved"].size(), 3u);
   EXPECT_EQ(report["agreement"]["turned"].size(), 3u);
   EXPECT_EQ(report["overlays"].size(), 0u);
+  // Model and scan have the same shape.
+  EXPECT_TRUE(report["plane_bundle"]["corners"].is_null());
 
   const CommandResult wrong = files.Align("--image_path " + SmallRoom(1).folder.path());
   EXPECT_EQ(wrong.exit_code, 4);
