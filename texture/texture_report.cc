@@ -235,7 +235,8 @@ void JudgeColors(const std::vector<PhotoView>& photos, const ColorizeResult& res
   if (result.comparison.Contradicts()) {
     context.report.SetUntrusted(
         "photos contradict each other where they see the same (divided_photos): they, or some of "
-        "them, stand elsewhere than they were aligned. Did several projectors throw the same pattern, or do rooms look alike? Look "
+        "them, stand elsewhere than they were aligned. Did several projectors throw the same "
+        "pattern, or do rooms look alike? Look "
         "at the sparse model in COLMAP's window.");
   }
 }

@@ -210,7 +210,6 @@ Json SimilarityToJson(const ModelState& model) {
 
 }  // namespace
 
-
 PutPicks ParsePutPicks(const Json& json, const PickScene& scene) {
   if (!json.is_object()) throw UsageError("The request must be an object.");
   PutPicks put;

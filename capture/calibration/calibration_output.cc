@@ -12,7 +12,6 @@ namespace {
 // Ten digits: 1e-6 of a pixel of a focal length, 1e-9 of a distortion.
 std::string Digits(double value) { return Significant(value, 10); }
 
-
 Json Numbers(const std::vector<double>& values) {
   Json json = Json::array();
   for (const double value : values) json.push_back(NumberOrNull(value));

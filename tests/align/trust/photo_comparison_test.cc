@@ -157,8 +157,7 @@ TEST(AlignCommand, DoesNotTrustAFoldedModelThatItsPhotosShow) {
   EXPECT_EQ(blind.exit_code, 0) << blind.err;
   const CommandResult seeing = files.Align("--image_path " + Room().folder.path());
   EXPECT_EQ(seeing.exit_code, 4) << seeing.err;
-  EXPECT_NE(seeing.err.find("Photos contradict each other where"), std::string::npos)
-      << seeing.err;
+  EXPECT_NE(seeing.err.find("Photos contradict each other where"), std::string::npos) << seeing.err;
   const Json report = Json::parse(ReadBytes(files.folder / "aligned.untrusted/alignment.json"));
   EXPECT_EQ(report["trusted"], false);
   EXPECT_GT(report["divided_photos"]["share_of_unlike"], 0.3);
