@@ -12,20 +12,20 @@
 namespace roomtex {
 namespace {
 
-constexpr int kMostPhotos = 100;        // that are asked
-constexpr size_t kFewestCorners = 40;   // fewer say nothing
-constexpr size_t kMostCorners = 10000;  // more say nothing new
+constexpr int kPhotosForCorners = 100;  // that are asked
+constexpr size_t kFewestHolding = 40;   // fewer say nothing
+constexpr size_t kMostHolding = 10000;  // more say nothing new
 // Held-out corners must come nearer by this factor, and the reprojection errors of the sparse model
 // may grow by this one (four sets of a depth camera and a kitchen: 0.46 to 0.76, and 0.66 to 1.11).
 // Where photos show the scan less alike than before, they were nearer to their places on it, and
 // colours get worse: by 0.4 and 1.3 dB in two sets; in four others they got better by 0.3 to 2 dB.
-constexpr double kNearer = 0.9, kLargerErrors = 1.15;
+constexpr double kHeldOutNearer = 0.9, kMostGrowth = 1.15;
 
 // The adjustment with these corners as picks that are as exact as they turn out to be.
-ModelAdjustment AdjustBy(const std::vector<Pick>& corners, double sigma_px,
-                         const AlignmentInput& input, const AlignmentStart& start,
-                         const AlignmentFit& fit, const LensCheck& lenses,
-                         const AlignmentOptions& options) {
+ModelAdjustment AdjustByThese(const std::vector<Pick>& corners, double sigma_px,
+                              const AlignmentInput& input, const AlignmentStart& start,
+                              const AlignmentFit& fit, const LensCheck& lenses,
+                              const AlignmentOptions& options) {
   AlignmentStart held = start;
   std::vector<Pick> picks = input.picks;
   for (Pick corner : corners) {
@@ -42,7 +42,7 @@ ModelAdjustment AdjustBy(const std::vector<Pick>& corners, double sigma_px,
                          options);
 }
 
-double MedianDistance(const std::vector<Pick>& corners, const SparseModel& aligned) {
+double MedianPickDistance(const std::vector<Pick>& corners, const SparseModel& aligned) {
   std::vector<double> distances = PickDistances(aligned, corners, Similarity());
   return Median(&distances);
 }
@@ -56,14 +56,14 @@ CornerAdjustment AdjustByCorners(const AlignmentInput& input, const AlignmentSta
   if (input.image_path.empty() || options.bundle.fix_clicked_view) return result;
   const SparseModel& aligned = adjustment->bundle.model;
   const PhotoCorners found = FindPhotoCorners(aligned, input.image_path, input.surveyed.viewer(),
-                                              kMostPhotos, input.num_threads);
-  const std::vector<Pick> corners = PicksOf(found.corners, aligned, Similarity(), kMostCorners);
+                                              kPhotosForCorners, input.num_threads);
+  const std::vector<Pick> corners = PicksOf(found.corners, aligned, Similarity(), kMostHolding);
   result.num_corners = static_cast<int>(corners.size());
   result.num_photos = found.num_photos;
-  if (corners.size() < kFewestCorners) return result;
+  if (corners.size() < kFewestHolding) return result;
   const double sigma_px = CornerSigma(corners, aligned, Similarity());
   const auto adjust_by = [&](const std::vector<Pick>& some) {
-    return AdjustBy(some, sigma_px, input, start, fit, lenses, options);
+    return AdjustByThese(some, sigma_px, input, start, fit, lenses, options);
   };
   std::vector<Pick> holding, held_out;
   for (size_t i = 0; i < corners.size(); ++i) {
@@ -71,13 +71,12 @@ CornerAdjustment AdjustByCorners(const AlignmentInput& input, const AlignmentSta
   }
   const ModelAdjustment by_half = adjust_by(holding);
   if (!by_half.bundle.usable) return result;
-  result.held_out_before_px = MedianDistance(held_out, aligned);
-  result.held_out_after_px = MedianDistance(held_out, by_half.bundle.model);
-  if (!(result.held_out_after_px < kNearer * result.held_out_before_px)) return result;
+  result.held_out_before_px = MedianPickDistance(held_out, aligned);
+  result.held_out_after_px = MedianPickDistance(held_out, by_half.bundle.model);
+  if (!(result.held_out_after_px < kHeldOutNearer * result.held_out_before_px)) return result;
   ModelAdjustment by_all = adjust_by(corners);
   const double errors_before = adjustment->bundle.reprojection_rms_after;
-  if (!by_all.bundle.usable ||
-      by_all.bundle.reprojection_rms_after > kLargerErrors * errors_before) {
+  if (!by_all.bundle.usable || by_all.bundle.reprojection_rms_after > kMostGrowth * errors_before) {
     return result;
   }
   const auto correlation_at = [&input](const SparseModel& model) {

@@ -82,7 +82,7 @@ void AddMeasures(const ImageMeasures& other, double weight, ImageMeasures* sum) 
   sum->patch_ncc += weight * other.patch_ncc;
 }
 
-struct PhotoAgreement {
+struct PhotoMeasures {
   bool valid = false;
   std::string warning;
   long num_pixels = 0;
@@ -93,7 +93,7 @@ struct PhotoAgreement {
 
 // Appendix A: photo and scan at coarse positions.
 void MeasureImages(const ScanView& view, const cv::Mat& photo, const CameraSetup& setup,
-                   const AgreementOptions& options, PhotoAgreement* result) {
+                   const AgreementOptions& options, PhotoMeasures* result) {
   const int k = setup.coarse_cells;
   const cv::Size size(view.grey.cols / k, view.grey.rows / k);
   const cv::Rect whole(0, 0, size.width * k, size.height * k);
@@ -126,10 +126,10 @@ void MeasureImages(const ScanView& view, const cv::Mat& photo, const CameraSetup
   }
 }
 
-PhotoAgreement MeasurePhoto(const PerspectiveViews& views, const SparseImage& image,
-                            const std::string& image_path, const ScanViewer& viewer,
-                            const CameraSetup& setup, const AgreementOptions& options) {
-  PhotoAgreement result;
+PhotoMeasures MeasurePhoto(const PerspectiveViews& views, const SparseImage& image,
+                           const std::string& image_path, const ScanViewer& viewer,
+                           const CameraSetup& setup, const AgreementOptions& options) {
+  PhotoMeasures result;
   const auto photo = views.Read(image, image_path, &result.warning);
   if (!photo) return result;
   const ScanView view = setup.look.Look(viewer, image.cam_from_model);
@@ -218,7 +218,7 @@ Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_
   const int num_images = static_cast<int>(images.size());
   const int num_sets = std::max(1, (num_images + options.num_photos - 1) / options.num_photos);
   std::map<uint32_t, CameraSetup> setups;
-  std::vector<PhotoAgreement> photos(images.size());
+  std::vector<PhotoMeasures> photos(images.size());
   long num_patches = 0;
   for (int set = 0; set < num_sets && num_patches < options.enough_patches; ++set) {
     std::vector<int> members;
@@ -243,9 +243,9 @@ Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_
 
   Agreement agreement;
   GradientShifts shifts;
-  for (const PhotoAgreement& photo : photos) agreement.num_photos += photo.valid;
+  for (const PhotoMeasures& photo : photos) agreement.num_photos += photo.valid;
   for (const double turn_deg : options.turns_deg) agreement.turned.push_back({turn_deg, {}});
-  for (const PhotoAgreement& photo : photos) {
+  for (const PhotoMeasures& photo : photos) {
     if (!photo.warning.empty()) warnings->push_back("Agreement: " + photo.warning);
     if (!photo.valid) continue;
     agreement.num_pixels += photo.num_pixels;
