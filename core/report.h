@@ -39,10 +39,10 @@ class Report {
   std::string reason_;
 };
 
-// Vectors as JSON arrays.
 Json NumberOrNull(double value);  // null: not finite
 // The number at a path of keys; NaN where there is none.
 double NumberAt(const Json& json, std::initializer_list<const char*> keys);
+// Vectors as JSON arrays.
 Json ToJson(const Eigen::VectorXd& vector);
 // {scale, rotation_wxyz, translation}.
 Json ToJson(const Similarity& similarity);

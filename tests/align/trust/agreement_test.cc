@@ -4,10 +4,10 @@
 #include <memory>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/report.h"
 #include "tests/align/case_folder.h"
+#include "tests/align/photographed_room.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -79,32 +79,15 @@ TEST(PatchNcc, LeavesOutWhatIsInvalidFlatOrOpposite) {
   EXPECT_NEAR(PatchNcc(image, half, valid, 16), 1, 1e-12);
 }
 
-// Photos of a simulated room in a folder, and the aligned model with the true poses.
-struct PhotographedRoom {
-  explicit PhotographedRoom(const SimulatedRoomOptions& options) : room(options) {
-    sparse = model = room.MakeSparseModel(2000, 0.7);
-    TransformModel(room.ScanFromSparse(), &model);
-    for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-      cv::imwrite(folder / room.PhotoName(photo), room.RenderPhoto(photo));
-    }
-    scans = {room.MakeScan(0)};
-  }
-
-  Agreement Measure(const SparseModel& aligned, int num_threads = 2) const {
-    const FreeSpace free_space(scans, 100000);
-    std::vector<std::string> warnings;
-    const Agreement agreement =
-        MeasureAgreement(aligned, folder.path(), ScanViewer(scans, free_space), AgreementOptions(),
-                         num_threads, &warnings);
-    EXPECT_TRUE(warnings.empty()) << warnings[0];
-    return agreement;
-  }
-
-  TempFolder folder;
-  SimulatedRoom room;
-  SparseModel sparse, model;  // in the sparse frame, in the scan frame
-  std::vector<Scan> scans;
-};
+Agreement MeasureAt(const SparseModel& aligned, const PhotographedRoom& one, int num_threads = 2) {
+  const FreeSpace free_space(one.scans, 100000);
+  std::vector<std::string> warnings;
+  const Agreement agreement =
+      MeasureAgreement(aligned, one.folder.path(), ScanViewer(one.scans, free_space),
+                       AgreementOptions(), num_threads, &warnings);
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+  return agreement;
+}
 
 const PhotographedRoom& SmallRoom(int seed = 0) {
   static std::map<int, std::unique_ptr<PhotographedRoom>> rooms;
@@ -117,13 +100,13 @@ const PhotographedRoom& SmallRoom(int seed = 0) {
     options.photo_height = 480;
     options.scan_columns = 1200;
     options.scan_rows = 600;
-    room = std::make_unique<PhotographedRoom>(options);
+    room = std::make_unique<PhotographedRoom>(options, 2000, 0.7);
   }
   return *room;
 }
 
 TEST(Agreement, IsHighestAtTheTruePosesAndFallsWithTheTurn) {
-  const Agreement agreement = SmallRoom().Measure(SmallRoom().model);
+  const Agreement agreement = MeasureAt(SmallRoom().model, SmallRoom());
   EXPECT_EQ(agreement.num_photos, 6);
   EXPECT_GT(agreement.num_pixels, 100000);
   ASSERT_EQ(agreement.turned.size(), 3u);
@@ -139,8 +122,8 @@ TEST(Agreement, IsHighestAtTheTruePosesAndFallsWithTheTurn) {
 }
 
 TEST(Agreement, DoesNotDependOnTheNumberOfThreads) {
-  const Agreement one = SmallRoom().Measure(SmallRoom().model, 1);
-  const Agreement four = SmallRoom().Measure(SmallRoom().model, 4);
+  const Agreement one = MeasureAt(SmallRoom().model, SmallRoom(), 1);
+  const Agreement four = MeasureAt(SmallRoom().model, SmallRoom(), 4);
   EXPECT_EQ(one.at_pose.mutual_information, four.at_pose.mutual_information);
   EXPECT_EQ(one.at_pose.chi_square, four.at_pose.chi_square);
   EXPECT_EQ(one.at_pose.patch_ncc, four.at_pose.patch_ncc);

@@ -5,32 +5,24 @@
 #include <memory>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "align/trust/free_space.h"
 #include "core/report.h"
 #include "tests/align/case_folder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/align/photographed_room.h"
 
 namespace roomtex {
 namespace {
 
 // A room without furniture is the same after half a turn, but for its wallpaper. Of its twelve
 // photos half are put there, and show points of the others: by every residual they are right.
-struct FoldedRoom {
-  FoldedRoom() : room(Options()) {
-    sparse = room.MakeSparseModel(800, 0.5);
-    model = sparse;
-    TransformModel(room.ScanFromSparse(), &model);
+struct FoldedRoom : PhotographedRoom {
+  FoldedRoom() : PhotographedRoom(Options(), 800, 0.5) {
     const Rigid scan_from_room = room.ScanFromRoom();
     Rigid half_turn;
     half_turn.rotation = Eigen::AngleAxisd(std::acos(-1.0), Eigen::Vector3d::UnitZ());
     half_turn.translation = Eigen::Vector3d(Options().width, Options().depth, 0);
     folded = Fold(scan_from_room * half_turn * scan_from_room.Inverse());
-    for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-      cv::imwrite(folder / room.PhotoName(photo), room.RenderPhoto(photo));
-    }
-    scans = {room.MakeScan(0)};
   }
 
   static SimulatedRoomOptions Options() {
@@ -101,10 +93,7 @@ struct FoldedRoom {
                                PhotoComparisonOptions(), num_threads);
   }
 
-  TempFolder folder;
-  SimulatedRoom room;
-  SparseModel sparse, model, folded;  // in the sparse frame; the others in the scan frame
-  std::vector<Scan> scans;
+  SparseModel folded;  // in the scan frame
 };
 
 const FoldedRoom& Room() {

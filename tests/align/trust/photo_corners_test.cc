@@ -5,42 +5,27 @@
 #include <memory>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "align/trust/free_space.h"
 #include "core/report.h"
 #include "core/statistics.h"
 #include "tests/align/case_folder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/align/photographed_room.h"
 
 namespace roomtex {
 namespace {
 
-struct PhotographedCase {
-  explicit PhotographedCase(const SimulatedRoomOptions& options) : room(options) {
-    sparse = room.MakeSparseModel(2000, 0.5);
-    for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-      cv::imwrite(folder / room.PhotoName(photo), room.RenderPhoto(photo));
+// The model with the true poses, in the scan frame.
+SparseModel TrueModelOf(const PhotographedRoom& one) {
+  SparseModel model = one.model;
+  for (auto& [id, image] : model.images) {
+    for (int photo = 0; photo < one.room.NumPhotos(); ++photo) {
+      if (one.room.PhotoName(photo) == image.name)
+        image.cam_from_model = one.room.CamFromScan(photo);
     }
-    scans = {room.MakeScan(0)};
   }
-
-  SparseModel TrueModel() const {
-    SparseModel model = sparse;
-    TransformModel(room.ScanFromSparse(), &model);
-    for (auto& [id, image] : model.images) {
-      for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-        if (room.PhotoName(photo) == image.name) image.cam_from_model = room.CamFromScan(photo);
-      }
-    }
-    return model;
-  }
-
-  TempFolder folder;
-  SimulatedRoom room;
-  SparseModel sparse;
-  std::vector<Scan> scans;
-};
+  return model;
+}
 
 SimulatedRoomOptions SmallOptions() {
   SimulatedRoomOptions options;
@@ -52,14 +37,14 @@ SimulatedRoomOptions SmallOptions() {
   return options;
 }
 
-const PhotographedCase& Scanned() {
-  static const PhotographedCase one(SmallOptions());
+const PhotographedRoom& Scanned() {
+  static const PhotographedRoom one(SmallOptions(), 2000, 0.5);
   return one;
 }
 
 // Degrees between where a photo shows a corner and where its true pose has it, median.
 double MedianMiss(const PhotoCorners& found, const SparseModel& looked_from) {
-  const SparseModel truth = Scanned().TrueModel();
+  const SparseModel truth = TrueModelOf(Scanned());
   std::vector<double> misses;
   for (const FittingCorner& corner : found.corners) {
     const SparseImage& image = truth.images.at(corner.image_id);
@@ -76,7 +61,7 @@ TEST(PhotoCorners, AreWhereTheTruePosesHaveThemThoughLookedForBesideIt) {
   const FreeSpace free_space(Scanned().scans, 100000);
   const ScanViewer viewer(Scanned().scans, free_space);
   for (const double turn_deg : {0.0, 1.0}) {
-    SparseModel model = Scanned().TrueModel();
+    SparseModel model = TrueModelOf(Scanned());
     for (auto& [id, image] : model.images) {
       const Eigen::Vector3d axis = Eigen::Vector3d::Unit(id % 2);
       image.cam_from_model.rotation =
@@ -95,7 +80,7 @@ TEST(PhotoCorners, AreWhereTheTruePosesHaveThemThoughLookedForBesideIt) {
 TEST(PhotoCorners, AreOfSoManyPhotosAtMostAndTheSameWithAnyNumberOfThreads) {
   const FreeSpace free_space(Scanned().scans, 100000);
   const ScanViewer viewer(Scanned().scans, free_space);
-  const SparseModel model = Scanned().TrueModel();
+  const SparseModel model = TrueModelOf(Scanned());
   const PhotoCorners one = FindPhotoCorners(model, Scanned().folder.path(), viewer, 5, 1);
   const PhotoCorners four = FindPhotoCorners(model, Scanned().folder.path(), viewer, 5, 4);
   EXPECT_LE(one.num_photos, 5);
@@ -110,16 +95,18 @@ TEST(PhotoCorners, AreOfSoManyPhotosAtMostAndTheSameWithAnyNumberOfThreads) {
 
 // A room scanned by a depth camera, whose parts drift, so that no similarity brings the sparse
 // model onto all of it; the photos' rows are read one after the other.
-struct DriftingCase : PhotographedCase {
+struct DriftingCase : PhotographedRoom {
   explicit DriftingCase(int seed, double rolling_shutter_ms)
-      : PhotographedCase([&] {
-          SimulatedRoomOptions options = SmallOptions();
-          options.random_seed = seed;
-          options.num_photos = 16;
-          options.depth_camera = true;
-          options.rolling_shutter_ms = rolling_shutter_ms;
-          return options;
-        }()) {
+      : PhotographedRoom(
+            [&] {
+              SimulatedRoomOptions options = SmallOptions();
+              options.random_seed = seed;
+              options.num_photos = 16;
+              options.depth_camera = true;
+              options.rolling_shutter_ms = rolling_shutter_ms;
+              return options;
+            }(),
+            2000, 0.5) {
     SimulatedCase files_of_case;
     files_of_case.model = sparse;
     files_of_case.scans = scans;
@@ -137,7 +124,7 @@ struct DriftingCase : PhotographedCase {
 
   // Millimetres, median over the photos.
   double MedianOff(const SparseModel& aligned) const {
-    const SparseModel truth = TrueModel();
+    const SparseModel truth = TrueModelOf(*this);
     std::vector<double> offs;
     for (const auto& [id, image] : aligned.images) {
       offs.push_back(1000 * (image.cam_from_model.TargetOriginInSource() -
