@@ -112,6 +112,12 @@ bool PhotoComparison::Contradicts() const {
   return all || groups;
 }
 
+bool PhotoComparison::Agrees() const {
+  constexpr double kLeastMedian = 0.9;  // of right poses; see Contradicts()
+  return divided_.num_samples >= kMinSamples && MedianCorrelation() >= kLeastMedian &&
+         !Contradicts();
+}
+
 Json ToJson(const PhotoComparison& comparison) {
   const auto rounded = [](double share) { return std::round(1e4 * share) / 1e4; };
   const DividedPhotos& divided = comparison.Divided();

@@ -51,6 +51,9 @@ class PhotoComparison {
   // stand against each other in groups. In another light they do so, too, but what they show is
   // alike. False where too little can be compared.
   bool Contradicts() const;
+  // They do stand there: the median photo shows what the others show. False where too little can be
+  // compared. Of the places of the photos to each other, not of a scale or a place in the scan.
+  bool Agrees() const;
 
  private:
   // Over the samples of a photo, of its brightness p and the others' median o.

@@ -428,6 +428,10 @@ class StepRunner {
       context_.progress.Note("no pairs of patterned and plain photos: all are ordinary photos");
       return true;
     }
+    if (untrusted && IsLeftToAlign(outcome) && IndexOf("align") <= Last()) {
+      context_.progress.Note("roomtex-align, which knows the scan, has the last word on that");
+      return true;
+    }
     if (untrusted && options.accept_untrusted && !record.outputs.empty() &&
         HasModel(outcome.name)) {
       context_.Warn(outcome.name + " is not to be trusted: " + record.reason);
@@ -487,6 +491,17 @@ class StepRunner {
 };
 
 }  // namespace
+
+bool IsLeftToAlign(const StepOutcome& outcome) {
+  if (outcome.name != "mapper" || outcome.record.outputs.empty()) return false;
+  const Json reasons =
+      outcome.report.is_object() ? outcome.report.value("reasons", Json()) : Json();
+  if (!reasons.is_array() || reasons.empty()) return false;
+  return std::all_of(reasons.begin(), reasons.end(), [](const Json& reason) {
+    const Json about = reason.is_object() ? reason.value("about", Json()) : Json();
+    return about == "motion" || about == "calibration";
+  });
+}
 
 RunResult RunSteps(Chain* chain, const Command::Context& context) {
   return StepRunner(chain, context).Run();

@@ -22,6 +22,11 @@ struct StepOutcome {
   Json report;  // its command's own; null if there is none
 };
 
+// The mapper did not trust its model for nothing but what roomtex-align, which reads it, judges
+// anew by scan and photos: how the cameras moved, and the lenses (colmap_ext/mapper_verdict.h). Too
+// few photos are still too few.
+bool IsLeftToAlign(const StepOutcome& outcome);
+
 // Why a run ended before its last step.
 struct Stop {
   bool stopped = false;

@@ -106,10 +106,10 @@ std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
   return told;
 }
 
-void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+bool CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
                        const SurveyedScans& surveyed, const std::set<std::string>& told,
                        const Command::Context& context) {
-  if (a.image_path.empty()) return;
+  if (a.image_path.empty()) return false;
   context.progress.Stage("agreement");
   std::vector<std::string> warnings;
   const AgreementOptions options;
@@ -130,6 +130,7 @@ void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
         "photos of one out, or map them apart. So do photos with and without a pattern in one "
         "folder: give the plain ones.");
   }
+  return agreement.gradient.supports && comparison.Agrees();
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,

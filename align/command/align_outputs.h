@@ -20,8 +20,8 @@ std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
                                     const std::vector<const SparseModel*>& models,
                                     const Command::Context& context);
 // What photos and scan, and photos and photos, say about each other; the report's `agreement` and
-// `divided_photos`. told: of LookForPhotos().
-void CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+// `divided_photos`. told: of LookForPhotos(). Returns whether both speak for the alignment.
+bool CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
                        const SurveyedScans& surveyed, const std::set<std::string>& told,
                        const Command::Context& context);
 // Nothing but the report, which says why.

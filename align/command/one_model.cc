@@ -172,8 +172,10 @@ void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
 }
 
 // What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
-// that it refused, and photos are judged here, too.
-void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment,
+// that it refused, and photos are judged here, too. How the cameras moved it had to tell from
+// matches alone, which a narrow baseline, a rolling shutter or a wall leave open by degrees: scan
+// and photos together know better, where both show the same (photos_agree).
+void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment, bool photos_agree,
                         const Command::Context& context) {
   const std::string source = "roomtex-mapper did not trust the sparse model: ";
   const bool mended =
@@ -181,7 +183,15 @@ void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment
   for (const std::string& reason : verdict.calibration) {
     if (!mended) context.report.SetUntrusted(source + reason);
   }
-  for (const std::string& reason : verdict.motion) context.report.SetUntrusted(source + reason);
+  for (const std::string& reason : verdict.motion) {
+    if (photos_agree) {
+      context.Warn(source + reason +
+                   " It is believed all the same: the photos show the scan's intensity where it "
+                   "is, and each other's colours.");
+    } else {
+      context.report.SetUntrusted(source + reason);
+    }
+  }
   for (const std::string& reason : verdict.photos) context.Warn(source + reason);
 }
 
@@ -349,7 +359,6 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   Alignment& alignment = *reading->attempt.alignment;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
-  CarryMapperVerdict(verdict, alignment, context);
 
   if (alignment.lenses.mended) model = *alignment.lenses.mended;
   if (alignment.adjusted()) {
@@ -367,7 +376,8 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
       JudgeSinglePhotos(a, database, model, one.picks, *reading->surveyed, after.rms_px, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  CompareWithPhotos(a, model, *reading->surveyed, one.told, context);
+  const bool photos_agree = CompareWithPhotos(a, model, *reading->surveyed, one.told, context);
+  CarryMapperVerdict(verdict, alignment, photos_agree, context);
   PutDuplicatesBack(duplicates.input, duplicates.photos, alignment.scan_from_sparse.scale, &model);
   for (const auto& [id, of] : duplicates.photos) {
     // They stand and fall together.

@@ -206,6 +206,35 @@ TEST_F(AutoCommand, DoesNothingTwice) {
   EXPECT_EQ(TimeOf("database.db"), database);
 }
 
+// How cameras moved and their lens roomtex-align judges anew; that photos are missing it does not.
+TEST_F(AutoCommand, GoesOnBehindAModelOfWhichAlignmentHasTheLastWord) {
+  const std::string steps = ReadBytes(Result("steps.json")),
+                    mapped = ReadBytes(Result("log/mapper.json"));
+  json doubted = json::parse(steps);
+  doubted["steps"]["mapper"]["state"] = "untrusted";
+  doubted["steps"]["mapper"]["reason"] = "two pairs contradict it.";
+  WriteBytes(Result("steps.json"), doubted.dump());
+  const auto run = [&](const std::string& about, const std::string& more = "") {
+    json report = json::parse(mapped);
+    report["reasons"] = {{{"about", about}, {"reason", "two pairs contradict it."}}};
+    WriteBytes(Result("log/mapper.json"), report.dump());
+    return RunCommandLine(Arguments() + more);
+  };
+  const CommandResult motion = run("motion");
+  EXPECT_EQ(motion.exit_code, 0) << motion.err;
+  EXPECT_THAT(motion.err, HasSubstr("roomtex-align, which knows the scan, has the last word"));
+  EXPECT_THAT(motion.err, Not(HasSubstr("$ ")));
+  EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "trusted");
+
+  const CommandResult photos = run("photos");
+  EXPECT_EQ(photos.exit_code, 4) << photos.err;
+  EXPECT_THAT(photos.err, HasSubstr("stopped at the step mapper: two pairs contradict it."));
+  EXPECT_EQ(run("motion", " --until mapper").exit_code, 4);
+
+  WriteBytes(Result("steps.json"), steps);
+  WriteBytes(Result("log/mapper.json"), mapped);
+}
+
 TEST_F(AutoCommand, OnlyOneStepIsRunAgainWhenAskedFor) {
   const auto model = TimeOf("textured/model.ply"), aligned = TimeOf("aligned/images.bin");
   const CommandResult result = RunCommandLine(Arguments() + " --only texture");

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "align/trust/free_space.h"
+#include "core/frames.h"
 #include "core/report.h"
 #include "core/statistics.h"
 #include "tests/align/case_folder.h"

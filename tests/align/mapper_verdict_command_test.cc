@@ -1,0 +1,85 @@
+// What roomtex-mapper held against a sparse model, in roomtex-align as a user runs it.
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "colmap_ext/mapper_verdict.h"
+#include "core/report.h"
+#include "tests/align/case_folder.h"
+
+namespace roomtex {
+namespace {
+
+using testing::HasSubstr;
+
+const SimulatedCase& Photographed() {
+  static const SimulatedCase one = [] {
+    SimulatedRoomOptions options = CaseOptions(0);
+    options.num_photos = 10;
+    options.photo_width = 600;
+    options.photo_height = 400;
+    return MakeCase(options, 6);
+  }();
+  return one;
+}
+
+struct RefusedModel {
+  explicit RefusedModel(const std::string& about) {
+    std::filesystem::create_directories(photos);
+    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+      cv::imwrite(photos + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
+    }
+    const Json report = {{"num_reg_images", one.model.images.size()},
+                         {"num_points", one.model.points.size()},
+                         {"reasons", {{{"about", about}, {"reason", "two pairs contradict it."}}}}};
+    WriteBytes(files.input_path + "/" + kMapperReportName, report.dump());
+  }
+  Json Report(const std::string& output) const {
+    return Json::parse(ReadBytes(output + "/alignment.json"));
+  }
+
+  const SimulatedCase& one = Photographed();
+  CaseFolder files{one};
+  std::string photos = files.folder / "photos";
+  std::string untrusted = files.output_path + ".untrusted";
+};
+
+// From matches alone the mapper cannot know what scan and photos show.
+TEST(MapperVerdictCommand, OfTheCamerasMotionIsOverruledByPhotosThatShowTheScan) {
+  const RefusedModel model("motion");
+  const CommandResult blind = model.files.Align();
+  EXPECT_EQ(blind.exit_code, 4);
+  EXPECT_THAT(blind.err, HasSubstr("two pairs contradict it."));
+
+  const CommandResult seeing = model.files.Align("--image_path " + model.photos);
+  ASSERT_EQ(seeing.exit_code, 0) << seeing.err;
+  const Json report = model.Report(model.files.output_path);
+  EXPECT_TRUE(report["trusted"]);
+  EXPECT_THAT(report["warnings"].dump(), HasSubstr("two pairs contradict it. It is believed all"));
+}
+
+TEST(MapperVerdictCommand, OfTheCamerasMotionStandsWherePhotosShowSomethingElse) {
+  const RefusedModel model("motion");
+  // Each photo under the name of the next one.
+  const int count = model.one.room->NumPhotos();
+  for (int photo = 0; photo < count; ++photo) {
+    cv::imwrite(model.photos + "/" + model.one.room->PhotoName(photo),
+                model.one.room->RenderPhoto((photo + 1) % count));
+  }
+  const CommandResult result = model.files.Align("--image_path " + model.photos);
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("two pairs contradict it."));
+}
+
+TEST(MapperVerdictCommand, OfALensThatStaysIsNotOverruled) {
+  const RefusedModel model("calibration");
+  const CommandResult result =
+      model.files.Align("--refine_intrinsics 0 --image_path " + model.photos);
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("two pairs contradict it."));
+}
+
+}  // namespace
+}  // namespace roomtex
