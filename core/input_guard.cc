@@ -1,7 +1,5 @@
 #include "core/input_guard.h"
 
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -12,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/partial_path.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -66,9 +65,7 @@ bool IsSameFile(const std::string& a, const std::string& b) {
 
 // What a folder of inputs holds that commands read from it.
 bool LooksLikeInput(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = LowerCase(fs::path(path).extension().string());
   static const std::set<std::string> photos = {".jpg", ".jpeg", ".png",  ".tif", ".tiff", ".bmp",
                                                ".ppm", ".pgm",  ".webp", ".jp2", ".exr",  ".hdr"};
   const std::string stem = fs::path(path).stem().string();

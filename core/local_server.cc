@@ -31,6 +31,7 @@
 #include "core/local_server_http.h"
 #include "core/local_server_key.h"
 #include "core/option_fields.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/local_server_connection.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {

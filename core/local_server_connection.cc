@@ -12,6 +12,8 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include "core/text.h"
+
 namespace roomtex {
 namespace {
 using Clock = std::chrono::steady_clock;
@@ -91,11 +93,6 @@ const httplib::Headers& SafetyHeaders() {
                                            {"Cache-Control", "no-store"}};
   return headers;
 }
-std::string LowerCase(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 std::string ErrorText(const std::string& sentence) {
   return Json{{"error", sentence}}.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -24,7 +24,6 @@ const httplib::Headers& SafetyHeaders();
 inline constexpr int kMaxRequests = 1000;
 // {"error": sentence} as text; what is not UTF-8 is replaced.
 std::string ErrorText(const std::string& sentence);
-std::string LowerCase(std::string text);  // ASCII
 // Whether there is something to read within so many milliseconds.
 bool IsReadable(int fd, int milliseconds = 0);
 

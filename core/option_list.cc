@@ -28,10 +28,6 @@ constexpr uintmax_t kMaxProjectBytes = 1 << 20;
   throw UsageError("--" + option + " is \"" + text + "\", expected " + expected);
 }
 
-bool StartsWith(const std::string& text, const std::string& start) {
-  return text.compare(0, start.size(), start) == 0;
-}
-
 // Decimal number, the whole text; NaN if it is none. A leading + is allowed.
 double Number(const std::string& text) {
   const char* begin = text.data();
@@ -95,7 +91,7 @@ const Option* OptionList::Find(const std::string& name) const {
 
 const PassedThrough* OptionList::FindPassed(const std::string& argument) const {
   const auto found = std::find_if(passed_.begin(), passed_.end(), [&](const PassedThrough& p) {
-    return StartsWith(argument, p.prefix);
+    return BeginsWith(argument, p.prefix);
   });
   return found == passed_.end() ? nullptr : &*found;
 }
@@ -117,7 +113,7 @@ std::string OptionList::Unknown(const std::string& argument) const {
   // --image for --image_path, --input for what it needs.
   std::string needed;
   for (const Option& option : options_) {
-    if (StartsWith(option.name, name + "_")) return text + ". Did you mean --" + option.name + "?";
+    if (BeginsWith(option.name, name + "_")) return text + ". Did you mean --" + option.name + "?";
     const bool is_file =
         option.name.size() > 5 && option.name.rfind("_path") == option.name.size() - 5;
     if (is_file && option.name != "report_path" && option.name != "project_path") {
@@ -146,11 +142,11 @@ std::vector<OptionList::Given> OptionList::ReadArguments(
   for (size_t i = arguments.size(); i-- > 0;) {
     const std::string& argument = arguments[i];
     if (argument == "--") throw UsageError("\"--\" does not belong to an option");
-    const bool is_last = i + 1 == arguments.size() || StartsWith(arguments[i + 1], "--");
+    const bool is_last = i + 1 == arguments.size() || BeginsWith(arguments[i + 1], "--");
     const Option* alone =
-        is_last && StartsWith(argument, "--") ? Find(argument.substr(2)) : nullptr;
+        is_last && BeginsWith(argument, "--") ? Find(argument.substr(2)) : nullptr;
     if (alone != nullptr && !alone->may_stand_alone) throw UsageError(argument + " needs a value");
-    if (StartsWith(argument, "--") && argument.back() == '=') {
+    if (BeginsWith(argument, "--") && argument.back() == '=') {
       // To CLI11 "--name=" has no value; to us an empty one.
       reversed.push_back("");
       reversed.push_back(argument.substr(0, argument.size() - 1));
@@ -184,7 +180,7 @@ std::vector<OptionList::Given> OptionList::ReadPassedThrough(
     if (FindPassed(name) == nullptr) throw UsageError(Unknown(name));
     if (equals != std::string::npos) {
       all.push_back({name.substr(2), {argument.substr(equals + 1)}, ""});
-    } else if (i + 1 < arguments.size() && !StartsWith(arguments[i + 1], "--")) {
+    } else if (i + 1 < arguments.size() && !BeginsWith(arguments[i + 1], "--")) {
       all.push_back({name.substr(2), {arguments[++i]}, ""});
     } else {
       throw UsageError(name + " needs a value");

@@ -1,12 +1,12 @@
 #include "core/photo_files.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <set>
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -14,9 +14,7 @@ namespace fs = std::filesystem;
 bool IsPhotoName(const std::string& path) {
   static const std::set<std::string> kExtensions = {".jpg",  ".jpeg", ".png", ".tif",
                                                     ".tiff", ".bmp",  ".webp"};
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = LowerCase(fs::path(path).extension().string());
   return kExtensions.count(extension) > 0;
 }
 

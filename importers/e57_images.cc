@@ -80,9 +80,7 @@ std::string TakeName(const std::string& stem, const std::string& ending,
                      std::set<std::string>* taken) {
   for (int number = 1;; ++number) {
     const std::string name = stem + (number > 1 ? "_" + std::to_string(number) : "");
-    std::string key = name;
-    for (char& c : key) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (taken->insert(key).second) return name + ending;
+    if (taken->insert(LowerCase(name)).second) return name + ending;
   }
 }
 

@@ -1,7 +1,8 @@
 #include "importers/length_unit.h"
 
-#include <cctype>
 #include <map>
+
+#include "core/text.h"
 
 namespace roomtex {
 
@@ -28,9 +29,7 @@ std::optional<double> MetersPerUnit(const std::string& name) {
                                                         {"in", 0.0254},
                                                         {"inch", 0.0254},
                                                         {"inches", 0.0254}};
-  std::string lower;
-  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const auto found = kMeters.find(lower);
+  const auto found = kMeters.find(LowerCase(name));
   if (found == kMeters.end()) return std::nullopt;
   return found->second;
 }

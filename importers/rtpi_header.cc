@@ -1,7 +1,6 @@
 #include "importers/rtpi_header.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -283,11 +282,8 @@ std::string AzimuthOfScanner(const RtpiHeader& header) {
   const auto has = [&](const std::string& start) {
     return std::any_of(header.device.begin(), header.device.end(), [&](const std::string& line) {
       if (line.size() <= start.size()) return false;
-      const bool begins = std::equal(start.begin(), start.end(), line.begin(), [](char a, char b) {
-        return std::tolower(static_cast<unsigned char>(a)) ==
-               std::tolower(static_cast<unsigned char>(b));
-      });
-      return begins && line.find_first_not_of(" \t", start.size()) != std::string::npos;
+      return BeginsWith(LowerCase(line), LowerCase(start)) &&
+             line.find_first_not_of(" \t", start.size()) != std::string::npos;
     });
   };
   const bool is_scanners = has("# model: deltaSphere") && has("# serial_number:") &&

@@ -39,10 +39,6 @@ const char kKnownFormats[] =
     "Give an RTPI, a PTX, an E57, a PCD, a PLY, a LAS, an OBJ mesh or points as text (the "
     "content counts, not the name)";
 
-bool BeginsWith(std::string_view text, std::string_view start) {
-  return text.substr(0, start.size()) == start;
-}
-
 // The next line of the text, removed from it.
 std::string_view TakeLine(std::string_view* text) {
   const size_t newline = std::min(text->find('\n'), text->size());

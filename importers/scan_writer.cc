@@ -1,7 +1,6 @@
 #include "importers/scan_writer.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
 #include <opencv2/core/mat.hpp>
@@ -9,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/text.h"
 #include "importers/e57_writer.h"
 #include "importers/pcd.h"
 #include "importers/ply.h"
@@ -41,8 +41,7 @@ const std::vector<std::string>& ScanWriterExtensions() {
 }
 
 std::string ScanWriterExtension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = LowerCase(std::filesystem::path(path).extension().string());
   const auto& known = ScanWriterExtensions();
   return std::find(known.begin(), known.end(), extension) != known.end() ? extension : "";
 }

@@ -1,7 +1,6 @@
 #include "importers/xyz.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -82,8 +81,8 @@ struct XyzColumns {
         for (const char quote : {'"', '\'', '/', '#'}) {
           word.erase(std::remove(word.begin(), word.end(), quote), word.end());
         }
-        for (char& c : word) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-        if (std::find(names.begin(), names.end(), word) != names.end()) return static_cast<int>(i);
+        if (std::find(names.begin(), names.end(), LowerCase(word)) != names.end())
+          return static_cast<int>(i);
       }
       return -1;
     };

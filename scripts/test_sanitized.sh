@@ -6,11 +6,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tests=(colmap_ext_test core_test importers_test align_clicks_test)
-corpora=(alignment_record camera database e57 e57_images http_request las outline photo picks project_file room_files
-  scan_poses scan_reader sparse_model)
+corpora=(alignment_record camera database e57 e57_images http_request las photo picks project_file scan_poses
+  scan_reader sparse_model)
 if [ "${1:-}" = --all ]; then
-  # These need align, texture and view built: minutes, to read a few small files.
-  corpora+=(associations colored_ply glb pick_json result_files)
+  # These need align, texture, view, building and workflow built: minutes, to read a few small files.
+  corpora+=(associations colored_ply glb outline pick_json result_files room_files)
   mapfile -t tests < <(sed -n '/LABEL/d; s/^ *roomtex_test(\([a-z_]\+\).*/\1/p' tests/*/CMakeLists.txt)
 elif [ $# -gt 0 ]; then
   tests=("$@")

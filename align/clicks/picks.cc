@@ -1,7 +1,6 @@
 #include "align/clicks/picks.h"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <numeric>
 #include <set>
@@ -23,11 +22,6 @@ constexpr char kWeight[] = "weight";
 constexpr char kLabel[] = "label";
 const char* const kFieldNames[kNumFields] = {"image_name", "x", "y", "scan_x", "scan_y", "scan_z"};
 
-std::string Lowercase(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 // The columns that the header announces; -1 = it has none of them.
 struct Columns {
   int count = 0, weight = -1, label = -1;
@@ -41,7 +35,7 @@ Columns ReadHeader(const CsvReader& table) {
   columns.names = kHeader;
   bool matches = columns.count >= kNumFields;
   for (int i = 0; matches && i < columns.count; ++i) {
-    const std::string name = Lowercase((*fields)[i]);
+    const std::string name = LowerCase((*fields)[i]);
     if (i < kNumFields) {
       matches = name == kFieldNames[i];
       continue;
@@ -149,7 +143,7 @@ std::string NearestName(const std::vector<const SparseModel*>& models, const std
   for (const SparseModel* model : models) {
     for (const auto& [id, image] : model->images) {
       const int distance =
-          EditDistance(Lowercase(image.name.substr(0, 256)), Lowercase(name.substr(0, 256)));
+          EditDistance(LowerCase(image.name.substr(0, 256)), LowerCase(name.substr(0, 256)));
       if (nearest_distance >= 0 && distance >= nearest_distance) continue;
       nearest = image.name;
       nearest_distance = distance;

@@ -1,7 +1,6 @@
 // roomtex-pattern: the pattern that projectors throw onto bare walls.
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -19,6 +18,7 @@
 #include "core/parallel.h"
 #include "core/photo.h"
 #include "core/resource_limits.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -131,9 +131,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   PatternOptions options = arguments.pattern;
   options.random_seed = context.options.random_seed;
   std::vector<std::string> problems = options.Problems();
-  std::string extension = std::filesystem::path(arguments.output_path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (extension != ".png")
+  if (LowerCase(std::filesystem::path(arguments.output_path).extension().string()) != ".png")
     problems.push_back("--output_path must end in .png: that is what is written");
   ThrowIfProblems(problems);
   if (ThreadsNotStarted() == 0) cv::setNumThreads(EffectiveThreads(num_threads));

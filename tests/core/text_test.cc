@@ -98,5 +98,19 @@ TEST(Base64, OfTheVectorsOfItsRfc) {
   EXPECT_EQ(encode("\xff\xfe\xfd"), "//79");
 }
 
+TEST(LowerCase, ChangesTheLettersOfAsciiOnly) {
+  EXPECT_EQ(LowerCase("Photo_01.JPG"), "photo_01.jpg");
+  EXPECT_EQ(LowerCase("K\xc3\x9cCHE @[`{"),
+            "k\xc3\x9c"
+            "che @[`{");
+}
+
+TEST(BeginsWith, WantsAllOfTheStart) {
+  EXPECT_TRUE(BeginsWith("--help", "--"));
+  EXPECT_TRUE(BeginsWith("", ""));
+  EXPECT_FALSE(BeginsWith("-", "--"));
+  EXPECT_FALSE(BeginsWith("a--", "--"));
+}
+
 }  // namespace
 }  // namespace roomtex

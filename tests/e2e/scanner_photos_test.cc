@@ -145,24 +145,6 @@ TEST_F(ScannerPhotos, PutModelAndAlignmentIntoTheScanWithoutAPick) {
   EXPECT_NEAR(report["scan_from_sparse"]["scale"].get<double>(), 1, 0.005);
 }
 
-TEST_F(ScannerPhotos, RoomtexAutoTakesThemByItself) {
-  const std::string line = "roomtex-auto --quiet --scan_path " + Path("site/model.e57") +
-                           " --cameras_path " + Path("capture/cameras.txt") +
-                           " --quality low --SiftExtraction.max_num_features 2048 --until align "
-                           "--image_path " +
-                           Path("photos/mine") + " --output_path ";
-  const CommandResult result = RunCommandLine(line + Path("auto"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const SparseModel model = ReadSparseModel(Path("auto/aligned"));
-  EXPECT_EQ(model.images.size(), kNumPhotos);
-  EXPECT_LT(MedianError(model, ""), 0.005);
-  EXPECT_NE(model.FindImage("scanner/photo_001.jpg"), nullptr);
-  const json report = json::parse(ReadBytes(Path("auto/log/align.json")));
-  EXPECT_EQ(report["search"]["method"], "known_poses");
-  EXPECT_THAT(ReadBytes(Path("auto/report.html")),
-              HasSubstr("--known_path " + Path("auto/with_scanner/scanner/sparse")));
-}
-
 TEST_F(ScannerPhotos, RoomtexAutoColoursByThemAlone) {
   const CommandResult result =
       RunCommandLine("roomtex-auto --quiet --quality low --scan_path " + Path("site/model.e57") +
@@ -177,8 +159,9 @@ TEST_F(ScannerPhotos, RoomtexAutoColoursByThemAlone) {
 }
 
 // As scanners take them: a panorama from one place. Its faces, which COLMAP maps beside the user's
-// photos, leave the scale open; the scan, seen in them, tells it.
-TEST_F(ScannerPhotos, OfOneStandpointPutTheModelIntoTheScan) {
+// photos, leave the scale open; the scan, seen in them, tells it. roomtex-auto takes them out of
+// the E57 and hands them on.
+TEST_F(ScannerPhotos, OfOneStandpointPutTheModelIntoTheScanByThemselves) {
   const CommandResult simulated = RunCommandLine(
       "roomtex-simulate --quiet --output_path " + Path("panorama") +
       " --num_photos 1 --camera_model EQUIRECTANGULAR --photo_width 2400 --photo_height 1200 "
@@ -205,6 +188,8 @@ TEST_F(ScannerPhotos, OfOneStandpointPutTheModelIntoTheScan) {
   // Also where rays of faces meet in their own camera: such points stop no adjustment.
   EXPECT_TRUE(report["plane_bundle"]["used"]);
   EXPECT_LT(MedianError(ReadSparseModel(Path("auto_one_place/aligned")), ""), 0.005);
+  EXPECT_THAT(ReadBytes(Path("auto_one_place/report.html")),
+              HasSubstr("--known_path " + Path("auto_one_place/with_scanner/scanner/sparse")));
 }
 
 // roomtex-auto has the scanner's photos in a folder of their own; picks of roomtex-import name them

@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 
 #include "core/local_server_connection.h"
+#include "core/text.h"
 
 namespace {
 

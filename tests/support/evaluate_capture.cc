@@ -103,7 +103,7 @@ int main(int argc, char** argv) {
                        Command::Kind::kOptional);
   command.AddInputPaths("scan_path", &scan_paths,
                         "scans of the capture, for what needs their grid: edges, detail, low "
-                        "frequencies",
+                        "frequencies.",
                         Command::Kind::kOptional);
   command.AddOutputPath("error_path", &error_path,
                         "PNG with the colour error per sample of the first scan, white = 0.2",

@@ -235,6 +235,9 @@ TEST_F(TextureCommand, SeveralScansShareOneSolutionAndOneModel) {
 TEST_F(TextureCommand, TakesManyStationsOneByOne) {
   SimulatedRoomOptions options = RoomOptions();
   options.num_stations = 3;
+  options.num_photos = 8;
+  options.photo_width = 720;
+  options.photo_height = 480;
   options.scan_columns = 400;
   options.scan_rows = 152;
   Progress progress(true);

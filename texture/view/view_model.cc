@@ -1,7 +1,6 @@
 #include "texture/view/view_model.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/report.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/ply_header.h"
 
@@ -126,9 +126,7 @@ ViewModel ReadViewModel(const std::string& path) {
                        "Give the folder that roomtex-texture wrote");
     }
   }
-  std::string extension = fs::path(file).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = LowerCase(fs::path(file).extension().string());
   RequireFile(file, "Give what roomtex-texture wrote");
   if (extension == ".glb" || extension == ".ply") {
     const std::optional<size_t> supplement = FirstSupplementVertex(file);
