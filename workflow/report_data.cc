@@ -67,6 +67,12 @@ class ReportMaker {
     });
   }
 
+  bool HasOverruledMapper() const {
+    return std::any_of(result_.steps.begin(), result_.steps.end(), [](const StepOutcome& step) {
+      return step.known && step.record.state == StepState::kUntrusted && IsLeftToAlign(step);
+    });
+  }
+
   std::vector<std::string> Outdated() const {
     std::vector<std::string> sentences;
     for (const StepOutcome& step : result_.steps) {
@@ -122,6 +128,11 @@ class ReportMaker {
       if (std::isfinite(coverage)) {
         sentences.push_back(Percent(coverage) +
                             " of the scan's samples have a colour from a photo.");
+      }
+      if (HasOverruledMapper()) {
+        sentences.emplace_back(
+            "The step mapper alone was not sure of its model; roomtex-align, which knows the scan, "
+            "is.");
       }
     }
     verdict["sentences"] = sentences;
