@@ -110,12 +110,14 @@ TEST(PhotoComparison, PhotosInTheirPlacesShowTheSame) {
   EXPECT_GT(right.Divided().num_samples, 5000u);
   EXPECT_LT(right.Divided().ShareOfAll(), 0.01);
   EXPECT_FALSE(right.Contradicts());
+  EXPECT_TRUE(right.Agrees());
 }
 
 TEST(PhotoComparison, AFoldDividesThem) {
   const PhotoComparison wrong = Room().Compare(Room().folded);
   EXPECT_GT(wrong.Divided().ShareOfUnlike(), 0.3);
   EXPECT_TRUE(wrong.Contradicts());
+  EXPECT_FALSE(wrong.Agrees());
 }
 
 TEST(PhotoComparison, DoesNotDependOnTheNumberOfThreads) {
@@ -132,6 +134,7 @@ TEST(PhotoComparison, PhotosThatAreMissingSayNothing) {
   const PhotoComparison none = Room().Compare(elsewhere);
   EXPECT_EQ(none.Divided().num_samples, 0u);
   EXPECT_FALSE(none.Contradicts());
+  EXPECT_FALSE(none.Agrees());
 }
 
 // By picks and sparse points all is well; the photos know better.
