@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -16,7 +17,7 @@ constexpr char kInstallRemedy[] =
 ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_path)
     : path_(FindProgram(program, kInstallRemedy)), log_path_(log_path) {
   const ColmapRun help = RunArguments({"help"}, -1, [&](const std::string& line) {
-    if (version_.empty() && line.rfind("COLMAP ", 0) == 0) version_ = line;
+    if (version_.empty() && BeginsWith(line, "COLMAP ")) version_ = line;
   });
   if (!help.success || version_.empty()) {
     throw InputError(path_, "", "does not answer `help` as COLMAP does (" + help.LastLines() + ")",

@@ -282,7 +282,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
       << "roomtex-mapper " << Version() << "\n";
   const std::vector<std::string>& passed = options.mapper.mapper_arguments;
   for (size_t i = 0; i < passed.size(); i += 2) {
-    if (passed[i].rfind("--Mapper.init_", 0) != 0) continue;
+    if (!BeginsWith(passed[i], "--Mapper.init_")) continue;
     context.Warn(passed[i] + " has no effect: the first pair is chosen here, by --Init.*");
   }
 

@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 
 // What editors of Windows put before the first line of a text.
 inline void DropByteOrderMark(std::string* first_line) {
-  if (first_line->rfind("\xef\xbb\xbf", 0) == 0) first_line->erase(0, 3);
+  if (BeginsWith(*first_line, "\xef\xbb\xbf")) first_line->erase(0, 3);
 }
 
 class CsvReader {

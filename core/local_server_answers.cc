@@ -87,7 +87,7 @@ std::string Literally(const std::string& path) {
 }
 
 bool IsJson(const httplib::Request& request) {
-  return LowerCase(request.get_header_value("Content-Type")).rfind("application/json", 0) == 0;
+  return BeginsWith(LowerCase(request.get_header_value("Content-Type")), "application/json");
 }
 
 LocalServer::Query QueryOf(const httplib::Request& request) {

@@ -45,7 +45,7 @@ int MillisecondsTo(Clock::time_point deadline) {
 // A GET has no body that anybody would read. What of the body is not taken (the request was
 // answered without it) is no failure.
 void SendRequest(const LocalRequest& request, int http) {
-  const bool has_body = request.head.rfind("GET ", 0) != 0 && request.head.rfind("HEAD ", 0) != 0;
+  const bool has_body = !BeginsWith(request.head, "GET ") && !BeginsWith(request.head, "HEAD ");
   const std::string_view body = has_body ? std::string_view(request.body) : "";
   const std::string text = request.head + "content-length: " + std::to_string(body.size()) +
                            kHeadEnd + std::string(body);
@@ -66,7 +66,7 @@ bool EndsWith(std::string_view text, std::string_view end) {
 size_t BodyBytes(const std::string& head, const LocalRequest& request) {
   const std::string field = "\r\nContent-Length: ";
   const size_t begin = head.find(field);
-  if (begin == std::string::npos || request.head.rfind("HEAD ", 0) == 0) return 0;
+  if (begin == std::string::npos || BeginsWith(request.head, "HEAD ")) return 0;
   return static_cast<size_t>(std::strtoull(head.c_str() + begin + field.size(), nullptr, 10));
 }
 

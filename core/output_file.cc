@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/partial_path.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -38,7 +39,7 @@ bool IsDevice(const std::string& path) {
   std::error_code error;
   const fs::path parent = fs::path(path).parent_path();
   const std::string folder = fs::weakly_canonical(parent.empty() ? "." : parent, error).string();
-  return folder == "/dev" || folder == "/proc" || folder.rfind("/proc/", 0) == 0;
+  return folder == "/dev" || folder == "/proc" || BeginsWith(folder, "/proc/");
 }
 
 // The new file is as readable as the old one was.

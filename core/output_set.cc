@@ -20,6 +20,7 @@
 #include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/set_journal.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -30,7 +31,7 @@ InputError CannotBeFilled(const std::string& folder, const std::string& reason) 
           "Check the rights of this folder and the space on the disk"};
 }
 
-bool IsPartialName(const std::string& name) { return name.rfind(kPartialPrefix, 0) == 0; }
+bool IsPartialName(const std::string& name) { return BeginsWith(name, kPartialPrefix); }
 
 // A folder that changes places must be an ordinary one: where somebody works in it, where another
 // disk begins or where access lists hang on it, it stays.
@@ -42,7 +43,7 @@ bool MayChangePlaces(const fs::path& folder) {
   }
   std::error_code error;
   const std::string work = fs::current_path(error).string() + "/";
-  const bool works_here = error || work.rfind(folder.string() + "/", 0) == 0;
+  const bool works_here = error || BeginsWith(work, folder.string() + "/");
   const bool has_lists = getxattr(folder.c_str(), "system.posix_acl_default", nullptr, 0) > 0 ||
                          getxattr(folder.c_str(), "system.posix_acl_access", nullptr, 0) > 0;
   return here.st_dev == above.st_dev && !works_here && !has_lists &&

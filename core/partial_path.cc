@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "core/set_journal.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -110,7 +111,7 @@ class Leftovers {
     fs::directory_iterator entry(folder, error), end;
     for (; !error && entry != end; entry.increment(error)) {
       const std::string name = entry->path().filename().string();
-      if (name.rfind(kPartialPrefix, 0) == 0) paths.push_back(entry->path().string());
+      if (BeginsWith(name, kPartialPrefix)) paths.push_back(entry->path().string());
     }
     return paths;
   }
@@ -145,7 +146,7 @@ class Leftovers {
     const std::string record = fs::canonical(path, error).string();
     bool may_go = true;
     for (const std::string& set : *sets) {
-      if (fs::path(set).filename().string().rfind(kPartialPrefix, 0) != 0) continue;
+      if (!BeginsWith(fs::path(set).filename().string(), kPartialPrefix)) continue;
       if (RecordWaitedFor(set) == record) may_go &= TidyUp(set, [&] { return FinishSet(set); });
     }
     return may_go;

@@ -26,7 +26,7 @@ std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::st
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error)) {
     const std::string file = it->path().filename().string();
-    const bool is_hidden = file.rfind('.', 0) == 0;
+    const bool is_hidden = BeginsWith(file, ".");
     if (is_hidden || !below) it.disable_recursion_pending();
     if (is_hidden || !IsPhotoName(file) || !it->is_regular_file(unknown)) continue;
     names.push_back(it->path().lexically_relative(folder).generic_string());

@@ -17,6 +17,7 @@
 #include <sys/resource.h>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -30,7 +31,7 @@ int64_t NumberOf(const char* path, const std::string& word) {
   std::ifstream stream(path);
   std::string name;
   for (std::string line; std::getline(stream, line);) {
-    if (line.rfind(word, 0) != 0) continue;
+    if (!BeginsWith(line, word)) continue;
     const long long value = std::atoll(line.c_str() + word.size());
     return value >= 0 ? value : kUnlimited;
   }

@@ -15,6 +15,7 @@
 
 #include "core/disk_sync.h"
 #include "core/stays_inside.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -108,7 +109,7 @@ class SetMover {
     for (const std::string& path : journal_.removes) {
       // A folder of the set comes into the place of the file.
       const auto below = moves.lower_bound(path + "/");
-      if (below != moves.end() && below->rfind(path + "/", 0) == 0) Remove(path);
+      if (below != moves.end() && BeginsWith(*below, path + "/")) Remove(path);
     }
     for (const std::string& path : journal_.moves) Move(path);
     if (failure_ != 0) return failure_;  // nothing old goes before all new is there

@@ -114,7 +114,7 @@ ColmapFacts ReadColmapFacts(const std::string& program) {
   ChildSettings settings;
   bool has_cuda = false;
   settings.on_line = [&](const std::string& line) {
-    if (facts.version.empty() && line.rfind("COLMAP ", 0) == 0) facts.version = line;
+    if (facts.version.empty() && BeginsWith(line, "COLMAP ")) facts.version = line;
     has_cuda |= line.find("with CUDA") != std::string::npos;
   };
   const ChildRun run = RunChild({facts.path, "help"}, settings);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "workflow/step_lines.h"
 
 namespace roomtex {
@@ -102,7 +103,7 @@ CommandLine ScannerLine(const CommandLine& start, const Json& camera, bool is_to
 std::vector<std::string> WithoutLenses(const std::vector<std::string>& passed) {
   std::vector<std::string> kept;
   for (size_t i = 0; i + 1 < passed.size(); i += 2) {
-    if (passed[i].rfind("--ImageReader.", 0) == 0) continue;
+    if (BeginsWith(passed[i], "--ImageReader.")) continue;
     kept.insert(kept.end(), {passed[i], passed[i + 1]});
   }
   return kept;

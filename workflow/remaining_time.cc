@@ -79,11 +79,11 @@ std::string DurationText(double seconds) {
 double ShareOfLine(const std::string& line) {
   const size_t bracket = line.find('[');
   if (bracket == std::string::npos) return -1;
-  const bool is_block = line.rfind("Matching block", 0) == 0;
-  const bool is_model = line.rfind("  sparse model [", 0) == 0;
-  const bool is_counted = is_block || is_model || line.rfind("Processed file", 0) == 0 ||
+  const bool is_block = BeginsWith(line, "Matching block");
+  const bool is_model = BeginsWith(line, "  sparse model [");
+  const bool is_counted = is_block || is_model || BeginsWith(line, "Processed file") ||
                           line.find("] Processed file") != std::string::npos ||
-                          line.rfind("Matching image", 0) == 0 ||
+                          BeginsWith(line, "Matching image") ||
                           line.find("Matching image [") != std::string::npos ||
                           line.find("Processing image [") != std::string::npos;
   if (!is_counted) return -1;

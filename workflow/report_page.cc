@@ -95,7 +95,7 @@ class Page {
     if (!pictures_.is_object() || !pictures_.contains("pictures")) return;
     for (const Json& picture : pictures_["pictures"]) {
       const std::string file = picture["file"];
-      if (file.rfind("photo_", 0) != 0) continue;
+      if (!BeginsWith(file, "photo_")) continue;
       Figure(chain_.At("pictures/") + file, kWide, "Photo and coloured scan beside each other",
              picture["shows"]);
     }

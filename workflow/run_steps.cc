@@ -337,7 +337,7 @@ class StepRunner {
       record->cpu_seconds += run.cpu_seconds;
       record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
       if (run.success) continue;
-      const bool is_ours = line[0].rfind("roomtex-", 0) == 0;
+      const bool is_ours = BeginsWith(line[0], "roomtex-");
       const bool without_picks =
           step.name == "align" && chain_.PicksPath().empty() && run.exit_code == kExitUsage;
       record->reason =
@@ -354,7 +354,7 @@ class StepRunner {
 
   ChildRun RunOne(const Step& step, const CommandLine& line) {
     CommandLine arguments = line;
-    const bool is_ours = line[0].rfind("roomtex-", 0) == 0;
+    const bool is_ours = BeginsWith(line[0], "roomtex-");
     arguments[0] = line[0] == chain_.options().colmap
                        ? chain_.Colmap().path
                        : FindProgram(is_ours ? BesideThisProgram(line[0]) : line[0],
@@ -365,7 +365,7 @@ class StepRunner {
     settings.on_line = [&](const std::string& text) {
       const double share = ShareOfLine(text);
       if (share >= 0) share_ = (command_ + share) / static_cast<double>(step.commands.size());
-      const bool is_warning = text.rfind("warning: ", 0) == 0;
+      const bool is_warning = BeginsWith(text, "warning: ");
       if (is_ours && is_warning) context_.Warn(step.name + ": " + text.substr(9));
     };
     settings.on_wait = [this] { ShowTime(); };
@@ -380,7 +380,7 @@ class StepRunner {
     }
     for (size_t i = run.last.size(); i-- > 0;) {
       const std::string prefix = step.commands[0][0] + ": ";
-      if (run.last[i].rfind(prefix, 0) == 0) return run.last[i].substr(prefix.size());
+      if (BeginsWith(run.last[i], prefix)) return run.last[i].substr(prefix.size());
     }
     return run.failure + (run.last.empty() ? "" : ": " + run.last.back());
   }

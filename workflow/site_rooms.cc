@@ -81,7 +81,7 @@ class RoomMaker {
     std::ifstream stream(folder_ + "/log/features.run.log");
     std::string line, last;
     while (std::getline(stream, line)) {
-      if (line.rfind("roomtex-auto: ", 0) == 0) last = line.substr(14);
+      if (BeginsWith(line, "roomtex-auto: ")) last = line.substr(14);
     }
     return last;
   }

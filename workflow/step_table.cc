@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/text.h"
 #include "workflow/step_lines.h"
 #include "workflow/video_frames.h"
 
@@ -96,7 +97,7 @@ std::string ChooseMatcher(Chain* chain, std::vector<std::string>* notes) {
   const std::string number = std::to_string(photos.size()) + " loose photos: ";
   const bool may_choose = std::none_of(
       options.passed.matches.begin(), options.passed.matches.end(),
-      [](const std::string& word) { return word.rfind("--ExhaustiveMatching.", 0) == 0; });
+      [](const std::string& word) { return BeginsWith(word, "--ExhaustiveMatching."); });
   if (options.pairs == "1" ||
       (options.pairs == "auto" && may_choose && photos.size() > kManyPhotos)) {
     if (std::none_of(photos.begin(), photos.end(), HasBlank)) {

@@ -1,5 +1,7 @@
 #include "align/command/local_origin.h"
 
+#include "core/text.h"
+
 namespace roomtex {
 namespace {
 
@@ -53,7 +55,7 @@ void LocalOrigin::MoveBack(Json* report) const {
     for (int k = 0; k < 3; ++k) (*place)[k] = (*place)[k].get<double>() + offset_[k];
   };
   for (const auto& [key, value] : report->items()) {
-    const bool is_similarity = key.rfind("scan_from_sparse", 0) == 0 && value.is_object();
+    const bool is_similarity = BeginsWith(key, "scan_from_sparse") && value.is_object();
     if (is_similarity && value.contains("translation")) {
       move(&value["translation"]);
     } else if (key == "point" || key == "far_corner") {

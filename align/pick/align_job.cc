@@ -9,6 +9,7 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/json_text.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -125,7 +126,7 @@ void AlignJob::TakeLine(const std::string& line) {
     num_models_ = num_models;
     stages_done_ = 0;
   }
-  if (line.rfind(kSpeaker, 0) == 0) {
+  if (BeginsWith(line, kSpeaker)) {
     errors_.push_back(line.substr(std::strlen(kSpeaker)));
   } else if (!errors_.empty() && stage < 0) {
     errors_.push_back(line);  // a message of several lines

@@ -12,6 +12,7 @@
 #include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace {
@@ -30,7 +31,7 @@ void CheckLinksPath(const Arguments& arguments) {
   const fs::path images = fs::weakly_canonical(arguments.options.image_path);
   const fs::path links = fs::weakly_canonical(arguments.links_path);
   const auto below = links.lexically_relative(images).generic_string();
-  if (!below.empty() && below.rfind("..", 0) != 0) {
+  if (!below.empty() && !BeginsWith(below, "..")) {
     throw UsageError("--links_path lies in --image_path: the links would be taken for photos");
   }
 }

@@ -350,18 +350,29 @@ TEST(AutomaticAlignCommand, PhotosSeeSeveralStationsAsWellAsOne) {
   EXPECT_GT(valid_share(), one);
 }
 
-// The same walls and much of the same furniture: only the photos know.
+// The same walls and much of the same furniture: only the photos know. The scan is in UTM, and so
+// are the places that were tried.
 TEST(AutomaticAlignCommand, RefusesTheScanOfASimilarRoom) {
   const FolderWithPhotos& folder = FolderWithPhotos::Get();
-  const CaseFolder similar(MakeCase(FolderWithPhotos::SmallPhotos(7), 6));
-  const std::string output = folder.files.folder / "similar";
-  const CommandResult result =
-      folder.Align(" --scan_path " + similar.scan_path + " --output_path " + output);
+  const Eigen::Vector3d utm(412345, 5654321, 120);
+  Scan scan = MakeCase(FolderWithPhotos::SmallPhotos(7), 6).scans[0];
+  for (Eigen::Vector3d& point : scan.points) point += utm;
+  scan.scan_from_station.translation += utm;
+  const std::string path = folder.files.folder / "similar.ptx",
+                    output = folder.files.folder / "similar";
+  WriteScan(scan, {}, path);
+  const CommandResult result = folder.Align(" --scan_path " + path + " --output_path " + output);
   EXPECT_EQ(result.exit_code, 4) << result.err;
   const Json report = Json::parse(ReadBytes(output + "/alignment.json"));
   EXPECT_EQ(report["trusted"], false);
   EXPECT_THAT(report["reason"].get<std::string>(), HasSubstr("--near"));
   EXPECT_NE(report["search"]["verdict"], "trusted");
+  ASSERT_FALSE(report["search"]["hypotheses"].empty());
+  for (const Json& place : report["search"]["hypotheses"]) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(place["scan_from_sparse"]["translation"][k].get<double>(), utm[k], 20);
+    }
+  }
 }
 
 // Few samples show frames and furniture, which rooms of one plan have in common, and little of what

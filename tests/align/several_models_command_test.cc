@@ -86,6 +86,19 @@ TEST_F(SeveralModels, AreWrittenAsOne) {
               1 / 0.3, 0.01);
 }
 
+// The first says how the scan is to be read, and the second stands in that scan.
+TEST_F(SeveralModels, AreTurnedTogetherWhereTheScanIsMirrored) {
+  ScanWriterOptions options;
+  options.counterclockwise = true;
+  WriteScan(case_.scans[0], {}, files_.scan_path, options);
+  const CommandResult result = AlignWith({PicksOf(first_), PicksOf(second_)});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Report();
+  EXPECT_EQ(report["scans"][0]["azimuth"], "counterclockwise");
+  for (const Json& one : report["models"]) EXPECT_TRUE(one["joined"].get<bool>());
+  EXPECT_LT(WorstPosition(ReadSparseModel(files_.output_path)), 0.01);
+}
+
 TEST_F(SeveralModels, OneThatCannotBePlacedIsLeftOutByName) {
   const CommandResult result = AlignWith({PicksOf(second_)});
   ASSERT_EQ(result.exit_code, 0) << result.err;

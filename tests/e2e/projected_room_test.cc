@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "colmap_ext/sparse_model.h"
+#include "core/text.h"
 #include "tests/e2e/colmap_steps.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -26,7 +27,7 @@ std::map<std::string, std::string> ReadPairs(const std::string& path) {
   std::istringstream lines(ReadBytes(path));
   std::map<std::string, std::string> pairs;
   for (std::string line; std::getline(lines, line);) {
-    if (line.empty() || line[0] == '#' || line.rfind("patterned_image", 0) == 0) continue;
+    if (line.empty() || line[0] == '#' || BeginsWith(line, "patterned_image")) continue;
     const size_t comma = line.find(',');
     const std::string rest = line.substr(comma + 1);
     pairs[line.substr(0, comma)] = rest.substr(0, rest.find_first_of(",\r"));

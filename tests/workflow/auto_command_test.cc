@@ -282,6 +282,26 @@ TEST_F(AutoCommand, AReportAloneSaysWhichStepsItPassedOverAreOutOfDate) {
   EXPECT_EQ(verdict()["state"], "trusted");
 }
 
+TEST_F(AutoCommand, ScansOfOneNameInOtherFoldersAreTwoInputs) {
+  const std::string first = *folder_ / "capture/scan.rtpi", second = *folder_ / "twin/scan.rtpi";
+  fs::create_directories(*folder_ / "twin");
+  fs::copy_file(first, second);
+  const std::string poses = *folder_ / "scan_poses.txt";
+  WriteBytes(poses, first + " 1 0 0 0 0 0 0\n" + second + " 1 0 0 0 0 0 0\n");
+  const std::string both = Arguments() + " --scan_path " + second + " --scan_poses " + poses;
+  const CommandResult result = RunCommandLine(both + " --until align");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto sentences = [&both] {
+    EXPECT_EQ(RunCommandLine(both + " --only report").exit_code, 0);
+    return ReadJson(Result("report.json"))["verdict"]["sentences"].dump();
+  };
+  EXPECT_THAT(sentences(), Not(HasSubstr("The step align")));
+  WriteBytes(second, ReadBytes(second) + " ");
+  EXPECT_THAT(sentences(), HasSubstr("(changed: " + second + ")"));
+  WriteBytes(first, ReadBytes(first) + " ");
+  EXPECT_THAT(sentences(), HasSubstr("(changed: " + second + ", scan.rtpi)"));
+}
+
 TEST_F(AutoCommand, OneRunAtATime) {
   WriteBytes(*folder_ / "lock.sh", "exec 9>" + Result("log/lock") + "\nflock 9\n" + BinFolder() +
                                        "/" + Arguments() + "\n");

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "core/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -219,7 +220,7 @@ std::map<std::string, int> AskedOf(const std::string& dry_run, const std::string
   std::istringstream lines(dry_run);
   std::string rule;
   for (std::string line; std::getline(lines, line);) {
-    if (line.rfind("rule ", 0) == 0) rule = line.substr(5, line.find(':') - 5);
+    if (BeginsWith(line, "rule ")) rule = line.substr(5, line.find(':') - 5);
     const size_t at = line.find(" " + resource + "=");
     if (line.find("resources:") == std::string::npos || at == std::string::npos) continue;
     asked[rule] = std::stoi(line.substr(at + resource.size() + 2));

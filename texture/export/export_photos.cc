@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/text.h"
 #include "texture/export/moving_things.h"
 
 namespace roomtex {
@@ -224,7 +225,7 @@ std::vector<ExportedPhoto> ExportPhotos(const ExportScene& scene,
       results[i] = PhotoExporter(scene, photos[i], format, options, folder).Export();
     } catch (const InputError& error) {
       // Of the photo itself: what cannot be written is nobody's fault but the disk's.
-      if (std::string(error.what()).rfind(folder, 0) == 0) throw;
+      if (BeginsWith(error.what(), folder)) throw;
       problems[i] = error.what();
     }
     progress->Tick();
