@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -111,7 +112,7 @@ void JudgeScale(const AlignmentStart& start, const TrustOptions& trust,
 constexpr double kLeastSurfaceShare = 0.3;
 
 void JudgePlacement(const Placement& placement, const TrustOptions& trust,
-                    std::vector<std::string>* reasons, std::string* sparse_on_surface) {
+                    std::vector<std::string>* reasons, Judgement::Doubt* doubt) {
   const int judged = placement.num_on_surface + placement.num_floating + placement.num_hidden;
   if (judged < kMinJudged) {
     reasons->push_back("Only " + std::to_string(judged) +
@@ -124,18 +125,19 @@ void JudgePlacement(const Placement& placement, const TrustOptions& trust,
         Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
         Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.";
     if (placement.SurfaceShare() >= kLeastSurfaceShare) {
-      *sparse_on_surface = reason;
+      *doubt = {reason, false};
     } else {
       reasons->push_back(reason);
     }
   } else if (!(placement.ChangedShare() <= trust.max_changed_share)) {
     const double percent = 100.0 / judged;
-    reasons->push_back(
+    *doubt = {
         Number(percent * placement.num_floating, 0) +
-        " % of the sparse points float in space that the scanner saw to be empty, and " +
-        Number(percent * placement.num_hidden, 0) + " % lie behind its surface (at most " +
-        Number(100 * trust.max_changed_share, 0) +
-        " % of each): the scan is of another room, or much was moved between scan and photos.");
+            " % of the sparse points float in space that the scanner saw to be empty, and " +
+            Number(percent * placement.num_hidden, 0) + " % lie behind its surface (at most " +
+            Number(100 * trust.max_changed_share, 0) +
+            " % of each): the scan is of another room, or much was moved between scan and photos.",
+        true};
   }
   if (!(placement.CameraShare() >= trust.min_camera_share)) {
     reasons->push_back(std::to_string(placement.num_cameras - placement.num_cameras_free) + " of " +
@@ -200,6 +202,17 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
   JudgeScale(start, trust, reasons);
 }
 
+// Whether photos overrule points that float. In rooms of one plan and furniture corners are alike,
+// so that photos of one support the scan of another; but they show 5 to 20 % of its corners, those
+// of the right one 58 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
+// Real rooms have 21 % and more: enough where points are merely few.
+bool Overrules(const GradientAgreement& photos, bool changed) {
+  constexpr double kClearlyShown = 0.4, kShown = 0.2;
+  const std::optional<double> shown = photos.shifts.ShownShare();
+  if (changed) return shown && *shown >= kClearlyShown;
+  return photos.supports && (!shown || *shown >= kShown);
+}
+
 }  // namespace
 
 double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface) {
@@ -230,20 +243,20 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
       CheckPlacement(input.model, fit.points, fit.scan_from_sparse, input.surveyed.patches(),
                      input.surveyed.free_space(), trust);
   if (by_picks) JudgeStart(input, start, fit, trust, &judgement.reasons);
-  JudgePlacement(judgement.placement, trust, &judgement.reasons, &judgement.sparse_on_surface);
+  JudgePlacement(judgement.placement, trust, &judgement.reasons, &judgement.doubt);
   return judgement;
 }
 
 void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement) {
-  if (judgement->sparse_on_surface.empty()) return;
-  const std::string reason = std::exchange(judgement->sparse_on_surface, "");
+  if (judgement->doubt.reason.empty()) return;
+  const auto [reason, changed] = std::exchange(judgement->doubt, {});
   if (!input.image_path.empty() && judgement->reasons.empty()) {
     SparseModel aligned = input.model;
     TransformModel(fit.scan_from_sparse, &aligned);
     std::vector<std::string> ignored;  // comes again when the result is compared
     const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
                                                  AgreementOptions(), input.num_threads, &ignored);
-    if (agreement.gradient.supports) {
+    if (Overrules(agreement.gradient, changed)) {
       judgement->warnings.push_back(
           reason +
           " It is believed all the same: the photos show the scan's intensity where it "
@@ -251,11 +264,14 @@ void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* 
       return;
     }
   }
-  judgement->reasons.push_back(
-      reason + " If the scan is coarse, say how coarse (--Trust.surface_tolerance)" +
-      (input.image_path.empty() ? ", or give --image_path: photos that show the scan's intensity "
-                                  "where it is speak for the alignment."
-                                : "."));
+  std::string remedy;
+  if (!changed) remedy = " If the scan is coarse, say how coarse (--Trust.surface_tolerance).";
+  if (input.image_path.empty()) {
+    remedy +=
+        " Give --image_path: photos that show the scan's intensity where it is speak for the "
+        "alignment.";
+  }
+  judgement->reasons.push_back(reason + remedy);
 }
 
 std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,

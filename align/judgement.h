@@ -25,9 +25,12 @@ struct Judgement {
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted; empty = trusted.
   std::vector<std::string> reasons;
-  // One more reason, or "": too few points on the surface for a laser scan. Photos that show the
-  // scan's intensity where it is overrule it (AskPhotos).
-  std::string sparse_on_surface;
+  // One more reason, or "", that photos can overrule (AskPhotos): too few points on the surface for
+  // a laser scan, or too many before it and behind.
+  struct Doubt {
+    std::string reason;
+    bool changed = false;  // the latter
+  } doubt;
 };
 
 // Metres; a sparse point this near to the surface is on it.
@@ -38,8 +41,8 @@ double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface);
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
                    const AlignmentFit& fit, const AlignmentOptions& options);
 
-// Decides on Judgement::sparse_on_surface: by photos and intensity (agreement.h), where there are
-// both; else it is a reason like the others.
+// Decides on Judgement::doubt: by photos and intensity (agreement.h), where there are both; else it
+// is a reason like the others.
 void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement);
 
 // What speaks against an adjustment, or should be known of it. All of it warnings: the similarity

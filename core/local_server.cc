@@ -31,6 +31,7 @@
 #include "core/local_server_http.h"
 #include "core/local_server_key.h"
 #include "core/option_fields.h"
+#include "core/resource_limits.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -301,7 +302,7 @@ void LocalServer::Impl::Accept() {
 
 void LocalServer::Impl::StartThreads() {
   const std::lock_guard<std::mutex> lock(starting);
-  acceptor = std::thread([this] {
+  acceptor = StartThread([this] {
     starting.lock();  // until there are threads to give visitors to
     starting.unlock();
     Accept();

@@ -39,8 +39,8 @@ Workers::Workers(size_t count) {
   try {
     while (threads_.size() < count) threads_.emplace_back([this] { Work(); });
   } catch (const std::system_error&) {
-    if (threads_.empty()) throw;
     NoteThreadNotStarted();
+    if (threads_.empty()) throw;
   }
 }
 
@@ -109,7 +109,7 @@ void HiddenHttp::Start(int num_threads) {
     listens->set_value();
     return workers->release();  // httplib owns them
   };
-  listener_ = std::thread([this] { server_.listen_after_bind(); });
+  listener_ = StartThread([this] { server_.listen_after_bind(); });
   listens->get_future().wait();
 }
 

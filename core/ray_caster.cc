@@ -24,6 +24,8 @@ struct RayCaster::Scene {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 
   ~Scene() {
+    // Embree would wait for threads that could not be started; the process is about to end.
+    if (ThreadsNotStarted() > 0) return;
     if (scene != nullptr) rtcReleaseScene(scene);
     if (device != nullptr) rtcReleaseDevice(device);
   }

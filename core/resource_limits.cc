@@ -10,6 +10,7 @@
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -134,6 +135,15 @@ std::string BytesPerSampleHelp(double bytes, bool bounded) {
 
 int ThreadsNotStarted() { return threads_not_started; }
 void NoteThreadNotStarted() { ++threads_not_started; }
+
+std::thread StartThread(std::function<void()> work) {
+  try {
+    return std::thread(std::move(work));
+  } catch (const std::system_error&) {
+    NoteThreadNotStarted();
+    throw;
+  }
+}
 
 void ProbeThreads(int count) {
   std::vector<std::thread> threads;

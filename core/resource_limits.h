@@ -2,8 +2,10 @@
 // What the machine does not give: memory and threads.
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
+#include <thread>
 
 namespace roomtex {
 
@@ -49,6 +51,8 @@ std::string BytesPerSampleHelp(double bytes, bool bounded = false);
 // limit): the work was done by fewer.
 int ThreadsNotStarted();
 void NoteThreadNotStarted();
+// Throws std::system_error, and notes it, where the system does not give another thread.
+std::thread StartThread(std::function<void()> work);
 // Tries whether so many threads can run side by side. Libraries that have threads of their own end
 // with the first that is missing: they are told to do without.
 void ProbeThreads(int count);

@@ -106,10 +106,10 @@ std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
   return told;
 }
 
-bool CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
-                       const SurveyedScans& surveyed, const std::set<std::string>& told,
-                       const Command::Context& context) {
-  if (a.image_path.empty()) return false;
+WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+                                const SurveyedScans& surveyed, const std::set<std::string>& told,
+                                const Command::Context& context) {
+  if (a.image_path.empty()) return {};
   context.progress.Stage("agreement");
   std::vector<std::string> warnings;
   const AgreementOptions options;
@@ -130,7 +130,8 @@ bool CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
         "photos of one out, or map them apart. So do photos with and without a pattern in one "
         "folder: give the plain ones.");
   }
-  return agreement.gradient.supports && comparison.Agrees();
+  return {agreement.gradient.supports && comparison.Agrees(),
+          agreement.gradient.shifts.ShownShare()};
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,

@@ -19,11 +19,15 @@ namespace roomtex {
 std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
                                     const std::vector<const SparseModel*>& models,
                                     const Command::Context& context);
-// What photos and scan, and photos and photos, say about each other; the report's `agreement` and
-// `divided_photos`. told: of LookForPhotos(). Returns whether both speak for the alignment.
-bool CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
-                       const SurveyedScans& surveyed, const std::set<std::string>& told,
-                       const Command::Context& context);
+// What photos and scan, and photos and photos, say about each other.
+struct WhatPhotosSay {
+  bool agree = false;                 // both speak for the alignment
+  std::optional<double> shown_share;  // GradientShifts::ShownShare()
+};
+// The report's `agreement` and `divided_photos`. told: of LookForPhotos().
+WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+                                const SurveyedScans& surveyed, const std::set<std::string>& told,
+                                const Command::Context& context);
 // Nothing but the report, which says why.
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
                   const LocalOrigin& origin, const Command::Context& context);

@@ -9,6 +9,7 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/json_text.h"
+#include "core/resource_limits.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -97,7 +98,7 @@ void AlignJob::Start() {
     verdict_ = {};
   }
   cancelled_ = false;
-  follower_ = std::thread([this, line] { Follow(line); });
+  follower_ = StartThread([this, line] { Follow(line); });
 }
 
 void AlignJob::Follow(const std::vector<std::string>& line) {

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo_files.h"
+#include "core/resource_limits.h"
 #include "core/surfels.h"
 #include "importers/scan_record.h"
 
@@ -195,7 +196,7 @@ const PickPhoto* PickScene::FindPhoto(const std::string& name) const {
 }
 
 void PickScene::Prepare() {
-  worker_ = std::thread([this] {
+  worker_ = StartThread([this] {
     try {
       Work();
     } catch (const std::exception&) {

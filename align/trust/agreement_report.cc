@@ -1,5 +1,7 @@
 #include "align/trust/agreement_report.h"
 
+#include <optional>
+
 namespace roomtex {
 namespace {
 
@@ -42,6 +44,8 @@ Json GradientAgreementToJson(const GradientAgreement& gradient,
     one["move_m"] = options.moves[k];
     json["moved"].push_back(one);
   }
+  const std::optional<double> shown = shifts.ShownShare();
+  json["shown_share"] = shown ? Json(*shown) : Json(nullptr);
   json["supports"] = gradient.supports;
   json["contradicts"] = gradient.contradicts;
   return json;

@@ -150,6 +150,10 @@ class PhotoMatcher {
     const double num_by_chance =
         static_cast<double>(ShiftedAlike(by_chance, tolerance_).size() * shifts.size()) /
         std::max<size_t>(1, by_chance.size());
+    if (clear) {
+      result.alike = {static_cast<long>(shifts.size()), static_cast<long>(alike.size())};
+      result.num_alike_by_chance = num_by_chance;
+    }
     if (alike.size() >= std::max<double>(kLeastAlike, kAlikeOverChance * num_by_chance)) {
       result.shifted_alike = alike;
     }
@@ -312,6 +316,13 @@ double Tally::High(double sigmas) const {
   return (p + z2 / (2 * n) + sigmas * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n))) / (1 + z2 / n);
 }
 
+std::optional<double> GradientShifts::ShownShare() const {
+  const double num = static_cast<double>(alike.num);
+  if (alike.num < kMinPatches || num_alike_by_chance >= num) return std::nullopt;
+  const double beyond = static_cast<double>(alike.hits) - num_alike_by_chance;
+  return std::max(0.0, beyond) / (num - num_alike_by_chance);
+}
+
 void GradientShifts::Add(const GradientShifts& other) {
   num_photos += other.num_photos;
   num_unclear_photos += other.num_unclear_photos;
@@ -327,6 +338,8 @@ void GradientShifts::Add(const GradientShifts& other) {
   far.Add(other.far);
   elsewhere.Add(other.elsewhere);
   tolerance_deg = std::max(tolerance_deg, other.tolerance_deg);
+  alike.Add(other.alike);
+  num_alike_by_chance += other.num_alike_by_chance;
   corners.insert(corners.end(), other.corners.begin(), other.corners.end());
   shifted_alike.insert(shifted_alike.end(), other.shifted_alike.begin(), other.shifted_alike.end());
 }

@@ -10,6 +10,7 @@
 // (chance).
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -82,6 +83,14 @@ struct GradientShifts {
   // the photo shows them (MeasureAgreement() keeps those of clear photos). A pose that is a few
   // degrees off, by drift or by a bent model, shifts all of what one photo shows.
   std::vector<FittingCorner> shifted_alike;
+  // Of clear photos, the patches, and those that are shifted alike in their photo (as above,
+  // however few); and how many are so by chance.
+  Tally alike;
+  double num_alike_by_chance = 0;
+
+  // Share of the clear photos' patches that are where the scan has them, but for what its photo is
+  // off as a whole: beyond chance, 0 (none) to 1 (all). None with fewer patches than tell anything.
+  std::optional<double> ShownShare() const;
 
   void Add(const GradientShifts& other);
 };

@@ -18,9 +18,15 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // A step of the inverse range that changes by more than this share of the inverse range from one
 // sample to the next is a depth edge. A corner of two walls changes it by twice the sample angle
 // (0.006 at 0.18 degrees) times the slopes; range noise of 2 mm at 0.3 m by 0.016.
-constexpr float kEdgeBend = 0.03f;
+constexpr double kEdgeBend = 0.03;
 // The same for the four corners of a cell of the ray lattice, which is several samples wide.
-constexpr float kCellBend = 0.03f;
+constexpr double kCellBend = 0.03;
+// Standard deviations of what the noise of three samples, or four corners, makes of either; a depth
+// camera's at some metres is more than the above.
+constexpr double kNoiseReach = 3;
+const double kBendOfThree = std::sqrt(6.0), kBendOfFour = 2;
+// Of a normal distribution, the size that two fifths of the deviations do not reach (RangeNoise).
+constexpr double kTwoFifths = 0.524;
 constexpr int kNodeCells = 3;  // cells between the rays that are cast
 
 // 1 / range of every sample; 0 where missing.
@@ -31,6 +37,25 @@ std::vector<float> InverseRanges(const Scan& scan) {
     if (range > 0) inverse[i] = static_cast<float>(1 / range);
   }
   return inverse;
+}
+
+// From what three samples in a row bend, which a smooth surface hardly does.
+RangeNoise FindSampleNoise(const Scan& scan) {
+  if (!scan.organised) return {};
+  std::vector<std::pair<float, float>> observations;
+  const size_t stride = scan.points.size() / 100000 + 1;
+  const auto range_at = [&scan](int i) { return (scan.points[i] - scan.Station()).norm(); };
+  for (size_t i = 0; i < scan.points.size(); i += stride) {
+    const int index = static_cast<int>(i), column = index % scan.num_columns;
+    if (column == 0 || column + 1 >= scan.num_columns) continue;
+    if (scan.IsMissing(index) || scan.IsMissing(index - 1) || scan.IsMissing(index + 1)) continue;
+    const double range = range_at(index);
+    const double bend = 1 / range_at(index - 1) - 2 / range + 1 / range_at(index + 1);
+    observations.emplace_back(
+        static_cast<float>(range),
+        static_cast<float>(std::abs(bend) * range * range / (kBendOfThree * kTwoFifths)));
+  }
+  return RangeNoise(std::move(observations));
 }
 
 double GridSampleAngle(const Scan& scan) {
@@ -118,11 +143,16 @@ std::vector<uint8_t> FindSmoothSamples(const Scan& scan) {
   std::vector<uint8_t> smooth(scan.points.size(), 0);
   if (!scan.organised) return smooth;
   const std::vector<float> inverse = InverseRanges(scan);
+  const RangeNoise noise = FindSampleNoise(scan);
   const int columns = scan.num_columns, rows = scan.num_rows;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const int i = scan.Index(column, row);
       bool is_smooth = inverse[i] > 0;
+      if (!is_smooth) continue;
+      const double most =
+          std::max(kEdgeBend * inverse[i],
+                   kNoiseReach * kBendOfThree * inverse[i] * inverse[i] * noise.At(1 / inverse[i]));
       // Lines through the sample: across, down, and the two diagonals.
       const int steps[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
       for (int k = 0; k < 4 && is_smooth; ++k) {
@@ -132,8 +162,7 @@ std::vector<uint8_t> FindSmoothSamples(const Scan& scan) {
         if (!inside) continue;
         const float before = inverse[i - dc - dr * columns],
                     behind = inverse[i + dc + dr * columns];
-        is_smooth = before > 0 && behind > 0 &&
-                    std::abs(before - 2 * inverse[i] + behind) <= kEdgeBend * inverse[i];
+        is_smooth = before > 0 && behind > 0 && std::abs(before - 2 * inverse[i] + behind) <= most;
       }
       smooth[i] = is_smooth;
     }
@@ -149,6 +178,7 @@ ScanViewer::ScanViewer(const std::vector<Scan>& scans, const FreeSpace& free_spa
         std::max(sample_angle_, scan.organised ? GridSampleAngle(scan) : MeshSampleAngle(scan));
     grey_.push_back(scan.organised ? IntensityAsGrey(scan) : std::vector<uint8_t>());
     smooth_.push_back(FindSmoothSamples(scan));
+    noise_.push_back(FindSampleNoise(scan));
   }
 }
 
@@ -184,12 +214,14 @@ std::vector<ScanViewer::Node> ScanViewer::CastRays(const RayLattice& lattice,
       if (!sight) continue;
       const double depth = (sight->x_in_scan - scan_from_cam.translation).norm() * ray.z();
       if (!(depth > 0)) continue;
+      const double range = (sight->x_in_scan - scans_[sight->scan].Station()).norm();
       nodes[row * lattice.columns() + column] = {true,
                                                  sight->scan,
                                                  static_cast<float>(sight->column),
                                                  static_cast<float>(sight->row),
                                                  static_cast<float>(1 / depth),
-                                                 sight->grey};
+                                                 sight->grey,
+                                                 static_cast<float>(noise_[sight->scan].At(range))};
     }
   }
   return nodes;
@@ -222,7 +254,8 @@ ScanView ScanViewer::Look(const RayLattice& lattice, const Camera& camera,
       const float largest =
           std::max({std::abs(n[1].inverse_depth - w), std::abs(n[2].inverse_depth - w),
                     std::abs(n[3].inverse_depth - w)});
-      if (std::abs(bend) > kCellBend * w || largest > 0.3f * w) continue;
+      const double most = std::max(kCellBend, kNoiseReach * kBendOfFour * n[0].noise * w);
+      if (std::abs(bend) > most * w || largest > 0.3f * w) continue;
       const Scan& scan = scans_[n[0].scan];
       for (int k = 1; k < 4 && scan.organised; ++k) {  // over the seam of a full turn
         if (n[k].column - n[0].column > 0.5f * scan.num_columns) n[k].column -= scan.num_columns;

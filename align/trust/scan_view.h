@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
+#include "align/surface/scan_surface.h"
 #include "align/trust/free_space.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/camera_model.h"
@@ -77,6 +78,7 @@ class ScanViewer {
     bool hit = false;
     int scan = 0;
     float column = 0, row = 0, inverse_depth = 0, grey = 0;
+    float noise = 0;  // of a sample there, metres
   };
   std::vector<Node> CastRays(const RayLattice& lattice, const Rigid& cam_from_scan) const;
   // Intensity between four samples; none if one of them is missing or lies at a depth edge.
@@ -86,6 +88,7 @@ class ScanViewer {
   const FreeSpace& free_space_;
   std::vector<std::vector<uint8_t>> grey_;
   std::vector<std::vector<uint8_t>> smooth_;  // 1 = measured, and no depth edge beside it
+  std::vector<RangeNoise> noise_;
   double sample_angle_ = 0;
   bool has_mesh_ = false;
 };

@@ -44,6 +44,14 @@ void TrustOptions::Declare(OptionFields* fields) {
       .AtLeast(0)
       .AtMost(1);
   fields
+      ->Number(
+          "Trust.min_shown_share", &min_shown_share,
+          "Share of the corners of the scan's intensity that the photos must show there, beyond "
+          "chance; photos of another room with the same walls and furniture show less. larger = "
+          "stricter.")
+      .AtLeast(0)
+      .AtMost(1);
+  fields
       ->Number("Trust.min_camera_share", &min_camera_share,
                "Share of the photos that must not lie behind the surface; larger = stricter.")
       .AtLeast(0)

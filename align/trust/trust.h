@@ -32,6 +32,10 @@ struct TrustOptions {
   // were; the scan of another room does so everywhere. The smaller of the two shares (of the points
   // near what the scanner saw) must not be larger than this. Larger = more tolerant.
   double max_changed_share = 0.08;
+  // Of the corners of the scan's intensity, the share that the photos must show where the scan has
+  // them (GradientShifts::ShownShare()), where picks alone say that the two belong together. Larger
+  // = stricter.
+  double min_shown_share = 0.2;
   // Share of the photos that must not have been taken from inside a wall or outside the scan.
   double min_camera_share = 0.5;
   // Metres; a pose of the picks less certain than this (one standard deviation) fixes nothing.

@@ -105,7 +105,7 @@ def prepared(base):
     return here
 
 
-TIMES = ("seconds", "cpu_seconds", "peak_memory_bytes", "options", "version", "commands")
+TIMES = ("seconds", "cpu_seconds", "peak_memory_bytes", "options", "version", "commands", "command_line")
 
 
 def without_times(value):

@@ -59,6 +59,7 @@ TEST(GradientShift, ForetellsWhatItMeasuresAtAPoseThatIsReallyTurned) {
 // and those of one photo are off alike.
 TEST(GradientShift, ShowsWhereThePatchesOfEachTurnedPhotoReallyAre) {
   const Exposed& one = Room(0);
+  GradientShifts all;
   for (int photo = 0; photo < Exposed::kNumPhotos; ++photo) {
     SCOPED_TRACE(photo);
     Rigid turn;
@@ -78,24 +79,28 @@ TEST(GradientShift, ShowsWhereThePatchesOfEachTurnedPhotoReallyAre) {
       distances.push_back((*x_in_img - corner.x_in_img).norm());
     }
     EXPECT_LT(Median(&distances), 1.5);
+    all.Add(shifts);
   }
+  ASSERT_TRUE(all.ShownShare());
+  EXPECT_GT(*all.ShownShare(), 0.4);
 }
 
 TEST(GradientShift, ShowsNothingShiftedAlikeInAnotherRoom) {
   const Exposed& one = Room(0);
-  size_t num_alike = 0;
-  long num_patches = 0;
+  GradientShifts all;
   for (int photo = 0; photo < Exposed::kNumPhotos; ++photo) {
     const ScanView view = Room(1).viewer->Look(*one.lattice, one.room->camera(),
                                                one.room->CamFromScan(photo), Exposed::kCell);
     const GradientShifts shifts =
         MeasureGradientShifts(view, one.photos[photo], *one.projection, one.viewer->sample_angle(),
                               GradientShiftOptions());
-    num_alike += shifts.shifted_alike.size();
-    num_patches += shifts.at_pose.num;
+    all.Add(shifts);
   }
-  ASSERT_GT(num_patches, 100);
-  EXPECT_LT(static_cast<double>(num_alike), 0.1 * static_cast<double>(num_patches));
+  ASSERT_GT(all.at_pose.num, 100);
+  EXPECT_LT(static_cast<double>(all.shifted_alike.size()),
+            0.1 * static_cast<double>(all.at_pose.num));
+  ASSERT_TRUE(all.ShownShare());
+  EXPECT_LT(*all.ShownShare(), 0.1);
 }
 
 TEST(GradientShift, TheShiftIsTheTurnOfTheCamera) {
@@ -153,6 +158,21 @@ TEST(GradientShift, DoesNotContradictUnderAProjectedPattern) {
   const GradientAgreement judged = one.Judge(Similarity(), patterned);
   EXPECT_EQ(judged.shifts.num_unclear_photos, Exposed::kNumPhotos);
   EXPECT_FALSE(judged.contradicts);
+}
+
+TEST(GradientShifts, ShownShareIsWhatChanceDoesNotExplain) {
+  GradientShifts shifts;
+  EXPECT_FALSE(shifts.ShownShare());
+  shifts.alike = {99, 90};
+  EXPECT_FALSE(shifts.ShownShare()) << "too few";
+  shifts.alike = {200, 60};
+  EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 0.3);
+  shifts.num_alike_by_chance = 20;
+  EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 40.0 / 180);
+  shifts.num_alike_by_chance = 80;
+  EXPECT_EQ(*shifts.ShownShare(), 0);
+  shifts.num_alike_by_chance = 200;
+  EXPECT_FALSE(shifts.ShownShare()) << "all are alike by chance: nothing can be told";
 }
 
 TEST(GradientShift, SaysNothingOnFewPatches) {

@@ -1,0 +1,128 @@
+// What photos and the scan's intensity say of whether an alignment by picks is to be believed.
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "align/trust/free_space.h"
+#include "core/camera_model.h"
+#include "tests/align/case_folder.h"
+#include "tests/support/matchers.h"
+
+namespace roomtex {
+namespace {
+using testing::HasSubstr;
+using testing::Not;
+
+SimulatedRoomOptions SmallPhotos(int seed) {
+  SimulatedRoomOptions options = CaseOptions(seed);
+  options.photo_width = 720;
+  options.photo_height = 480;
+  return options;
+}
+
+// A depth camera's scan, its tracking off by 4 cm per coordinate, its ranges by 36 mm at 3 m.
+SimulatedRoomOptions RoughScan(int seed) {
+  SimulatedRoomOptions options = CaseOptions(seed);
+  options.photo_width = 640;
+  options.photo_height = 480;
+  options.depth_camera = true;
+  options.depth_drift = 0.04;
+  options.range_noise = 0.004;
+  options.scan_columns = 800;
+  options.scan_rows = 340;
+  return options;
+}
+
+// A capture of one room, to be aligned to its scan or to that of another one.
+struct Captured {
+  explicit Captured(const SimulatedRoomOptions& options) : one(MakeCase(options, 6)), files(one) {
+    std::filesystem::create_directories(image_path);
+    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+      cv::imwrite(image_path + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
+    }
+  }
+
+  // With photos, to the scan of a room with the same walls, by picks of what lies there where the
+  // photo has it.
+  CommandResult AlignToRoom(const SimulatedRoomOptions& options, const std::string& more = "") {
+    const SimulatedRoom other(options);
+    const std::vector<Scan> scans = {other.MakeScan(0)};
+    const FreeSpace seen(scans, 1000000);
+    const int photo = one.room->BestPhotoForPicks();
+    const Rigid scan_from_cam = other.ScanFromRoom() * one.room->ScanFromRoom().Inverse() *
+                                one.room->CamFromScan(photo).Inverse();
+    const CameraProjection projection(one.room->camera());
+    std::vector<Pick> picks;
+    for (const double x : {0.1, 0.5, 0.9}) {
+      for (const double y : {0.15, 0.5, 0.85}) {
+        const Eigen::Vector2d x_in_img(x * options.photo_width, y * options.photo_height);
+        const Eigen::Vector3d ray = projection.CamFromImg(x_in_img)->homogeneous().normalized();
+        const auto sight = seen.Look(scan_from_cam.translation, scan_from_cam.rotation * ray);
+        if (!sight) continue;
+        picks.push_back({one.room->PhotoName(photo), x_in_img, sight->x_in_scan,
+                         2 + static_cast<long>(picks.size())});
+      }
+    }
+    EXPECT_GE(picks.size(), 6u);
+    CaseFolder wrong(one);
+    WriteScan(scans[0], {}, wrong.scan_path);
+    WritePicks(wrong.picks_path, picks);
+    const CommandResult result = wrong.Align("--image_path " + image_path + more);
+    report = Json::parse(ReadBytes(
+        wrong.output_path + (std::filesystem::exists(wrong.output_path) ? "" : ".untrusted") +
+        "/alignment.json"));
+    return result;
+  }
+  CommandResult Align(const std::string& more) {
+    const CommandResult result = files.Align(more);
+    report = Json::parse(ReadBytes(files.output_path + "/alignment.json"));
+    return result;
+  }
+
+  const SimulatedCase one;
+  const CaseFolder files;
+  const std::string image_path = files.folder / "photos";
+  Json report;
+};
+
+double ShownShare(const Json& report) {
+  return report["agreement"]["gradient_shift"]["shown_share"].get<double>();
+}
+
+// Picks and points fit, since walls and furniture are the same.
+TEST(PhotoEvidence, TellsTheRoomFromAnotherOneOfItsPlan) {
+  Captured captured(SmallPhotos(0));
+  const CommandResult right = captured.Align("--image_path " + captured.image_path);
+  EXPECT_EQ(right.exit_code, 0) << right.err;
+  EXPECT_GT(ShownShare(captured.report), 0.4);
+  EXPECT_THAT(captured.report["warnings"].dump(), Not(HasSubstr("another room")));
+
+  const CommandResult wrong = captured.AlignToRoom(SmallPhotos(7));
+  EXPECT_EQ(wrong.exit_code, 4) << wrong.err;
+  EXPECT_LT(ShownShare(captured.report), 0.2);
+  EXPECT_THAT(wrong.err, HasSubstr("as photos of another room with the same walls and furniture"));
+  const CommandResult told = captured.AlignToRoom(SmallPhotos(7), " --Trust.min_shown_share 0");
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+}
+
+TEST(PhotoEvidence, OverrulesPointsThatARoughScanLeavesFloating) {
+  Captured captured(RoughScan(27));
+  const CommandResult alone = captured.Align("");
+  EXPECT_EQ(alone.exit_code, 4) << alone.err;
+  EXPECT_THAT(alone.err, HasSubstr("Give --image_path"));
+  const CommandResult shown = captured.Align("--image_path " + captured.image_path);
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(captured.report["warnings"].dump(), HasSubstr("It is believed all the same"));
+  const double off =
+      WorstPoseErrors(*captured.one.room, ReadSparseModel(captured.files.output_path), Similarity())
+          .position;
+  EXPECT_LT(1000 * off, 3 * captured.report["expected_error"]["at_cameras_mm"].get<double>());
+
+  EXPECT_EQ(captured.AlignToRoom(RoughScan(28)).exit_code, 4);
+}
+
+}  // namespace
+}  // namespace roomtex
