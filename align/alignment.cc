@@ -130,7 +130,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   Append(std::move(judgement.warnings), &result.warnings);
   result.reasons = std::move(judgement.reasons);
 
-  if (result.fit.refined && result.reasons.empty()) {
+  if (result.fit.refined && result.reasons.empty() && judgement.follows_surface) {
     progress->Stage("bundle adjustment");
     result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
     if (result.adjusted() && result.disagreement.rms > kSameShape) {

@@ -203,7 +203,7 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
 }
 
 // Whether photos overrule points that float. In rooms of one plan and furniture corners are alike,
-// so that photos of one support the scan of another; but they show 5 to 20 % of its corners, those
+// so that photos of one support the scan of another; but they show 0 to 20 % of its corners, those
 // of the right one 58 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
 // Real rooms have 21 % and more: enough where points are merely few.
 bool Overrules(const GradientAgreement& photos, bool changed) {
@@ -257,10 +257,13 @@ void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* 
     const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
                                                  AgreementOptions(), input.num_threads, &ignored);
     if (Overrules(agreement.gradient, changed)) {
+      judgement->follows_surface = !changed;
       judgement->warnings.push_back(
           reason +
-          " It is believed all the same: the photos show the scan's intensity where it "
-          "is. A coarse scan, or things that it does not show.");
+          " It is believed all the same: the photos show the scan's intensity where it is. " +
+          (changed ? "A scan that drifts, or things that were moved: one similarity for all photos "
+                     "is used, they are not adjusted to the surface."
+                   : "A coarse scan, or things that it does not show."));
       return;
     }
   }

@@ -31,6 +31,10 @@ struct Judgement {
     std::string reason;
     bool changed = false;  // the latter
   } doubt;
+  // Photos overruled the latter: the surface is where the room is, but not as the photos have it.
+  // Following it brings photos out of place: in scans that drift by 4 cm per coordinate from 51 and
+  // 88 mm to 141 and 110, for no better colours (docs/real-rooms.md).
+  bool follows_surface = true;
 };
 
 // Metres; a sparse point this near to the surface is on it.

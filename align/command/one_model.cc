@@ -196,7 +196,7 @@ void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment
 }
 
 // Where picks alone say that scan and photos belong together. Photos of another room with the same
-// walls and furniture show 5 to 20 % of what the scan shows, those of the right one 58 % and more
+// walls and furniture show 0 to 20 % of what the scan shows, those of the right one 58 % and more
 // in simulated rooms; a real floor 43 %, a real kitchen and a desk 21 to 32 % (docs/real-rooms.md),
 // but these differ from their scans in shape by 25 mm and more: there it takes less to refuse.
 void DoubtRoom(const AlignCommandOptions& a, const WhatPhotosSay& photos_say, double disagreement,
