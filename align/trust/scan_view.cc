@@ -23,7 +23,7 @@ constexpr double kEdgeBend = 0.03;
 constexpr double kCellBend = 0.03;
 // Standard deviations of what the noise of three samples, or four corners, makes of either; a depth
 // camera's at some metres is more than the above.
-constexpr double kNoiseReach = 3;
+constexpr double kBendReach = 3;
 const double kBendOfThree = std::sqrt(6.0), kBendOfFour = 2;
 // Of a normal distribution, the size that two fifths of the deviations do not reach (RangeNoise).
 constexpr double kTwoFifths = 0.524;
@@ -152,7 +152,7 @@ std::vector<uint8_t> FindSmoothSamples(const Scan& scan) {
       if (!is_smooth) continue;
       const double most =
           std::max(kEdgeBend * inverse[i],
-                   kNoiseReach * kBendOfThree * inverse[i] * inverse[i] * noise.At(1 / inverse[i]));
+                   kBendReach * kBendOfThree * inverse[i] * inverse[i] * noise.At(1 / inverse[i]));
       // Lines through the sample: across, down, and the two diagonals.
       const int steps[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
       for (int k = 0; k < 4 && is_smooth; ++k) {
@@ -254,7 +254,7 @@ ScanView ScanViewer::Look(const RayLattice& lattice, const Camera& camera,
       const float largest =
           std::max({std::abs(n[1].inverse_depth - w), std::abs(n[2].inverse_depth - w),
                     std::abs(n[3].inverse_depth - w)});
-      const double most = std::max(kCellBend, kNoiseReach * kBendOfFour * n[0].noise * w);
+      const double most = std::max(kCellBend, kBendReach * kBendOfFour * n[0].noise * w);
       if (std::abs(bend) > most * w || largest > 0.3f * w) continue;
       const Scan& scan = scans_[n[0].scan];
       for (int k = 1; k < 4 && scan.organised; ++k) {  // over the seam of a full turn
