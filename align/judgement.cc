@@ -203,14 +203,14 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
 }
 
 // Whether photos overrule points that float. In rooms of one plan and furniture corners are alike,
-// so that photos of one support the scan of another; but they show 0 to 20 % of its corners, those
-// of the right one 58 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
+// so that photos of one support the scan of another; but they show 0 to 21 % of its corners, those
+// of the right one 59 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
 // Real rooms have 21 % and more: enough where points are merely few.
-bool Overrules(const GradientAgreement& photos, bool changed) {
-  constexpr double kClearlyShown = 0.4, kShown = 0.2;
+bool Overrules(const GradientAgreement& photos, bool changed, const TrustOptions& trust) {
+  constexpr double kClearlyShown = 0.4;
   const std::optional<double> shown = photos.shifts.ShownShare();
   if (changed) return shown && *shown >= kClearlyShown;
-  return photos.supports && (!shown || *shown >= kShown);
+  return photos.supports && (!shown || *shown >= trust.min_shown_share);
 }
 
 }  // namespace
@@ -247,7 +247,8 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
   return judgement;
 }
 
-void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement) {
+void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,
+               Judgement* judgement) {
   if (judgement->doubt.reason.empty()) return;
   const auto [reason, changed] = std::exchange(judgement->doubt, {});
   if (!input.image_path.empty() && judgement->reasons.empty()) {
@@ -256,7 +257,7 @@ void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* 
     std::vector<std::string> ignored;  // comes again when the result is compared
     const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
                                                  AgreementOptions(), input.num_threads, &ignored);
-    if (Overrules(agreement.gradient, changed)) {
+    if (Overrules(agreement.gradient, changed, trust)) {
       judgement->follows_surface = !changed;
       judgement->warnings.push_back(
           reason +

@@ -47,7 +47,8 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
 
 // Decides on Judgement::doubt: by photos and intensity (agreement.h), where there are both; else it
 // is a reason like the others.
-void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, Judgement* judgement);
+void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,
+               Judgement* judgement);
 
 // What speaks against an adjustment, or should be known of it. All of it warnings: the similarity
 // remains.

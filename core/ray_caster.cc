@@ -19,13 +19,14 @@ bool IsNear(const Eigen::Vector3d& point) { return point.cwiseAbs().maxCoeff() <
 }  // namespace
 
 struct RayCaster::Scene {
+  const bool had_threads = ThreadsNotStarted() == 0;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 
   ~Scene() {
-    // Embree would wait for threads that could not be started; the process is about to end.
-    if (ThreadsNotStarted() > 0) return;
+    // Made with threads that could not all be started since: Embree would wait for them.
+    if (had_threads && ThreadsNotStarted() > 0) return;
     if (scene != nullptr) rtcReleaseScene(scene);
     if (device != nullptr) rtcReleaseDevice(device);
   }

@@ -130,8 +130,9 @@ WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const SparseModel&
         "photos of one out, or map them apart. So do photos with and without a pattern in one "
         "folder: give the plain ones.");
   }
-  return {agreement.gradient.supports && comparison.Agrees(),
-          agreement.gradient.shifts.ShownShare()};
+  const std::optional<double> shown = agreement.gradient.shifts.ShownShare();
+  const bool is_this_room = !shown || *shown >= a.alignment.trust.min_shown_share;
+  return {agreement.gradient.supports && is_this_room && comparison.Agrees(), shown};
 }
 
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,

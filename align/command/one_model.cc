@@ -196,12 +196,12 @@ void CarryMapperVerdict(const MapperVerdict& verdict, const Alignment& alignment
 }
 
 // Where picks alone say that scan and photos belong together. Photos of another room with the same
-// walls and furniture show 0 to 20 % of what the scan shows, those of the right one 58 % and more
+// walls and furniture show 0 to 21 % of what the scan shows, those of the right one 59 % and more
 // in simulated rooms; a real floor 43 %, a real kitchen and a desk 21 to 32 % (docs/real-rooms.md),
 // but these differ from their scans in shape by 25 mm and more: there it takes less to refuse.
 void DoubtRoom(const AlignCommandOptions& a, const WhatPhotosSay& photos_say, double disagreement,
                const Command::Context& context) {
-  constexpr double kSameShape = 0.02;  // metres
+  constexpr double kAlikeInShape = 0.02;  // metres
   if (!photos_say.shown_share) return;
   const double least = a.alignment.trust.min_shown_share, shown = *photos_say.shown_share;
   if (shown >= least) return;
@@ -210,7 +210,7 @@ void DoubtRoom(const AlignCommandOptions& a, const WhatPhotosSay& photos_say, do
       "chance; --Trust.min_shown_share {:g}), as photos of another room with the same walls and "
       "furniture do. Check that scan and photos are of the same room.",
       Percent(shown), least);
-  if (disagreement <= kSameShape || shown < 0.5 * least) {
+  if (disagreement <= kAlikeInShape || shown < 0.5 * least) {
     context.report.SetUntrusted(finding);
   } else {
     context.Warn(finding);

@@ -140,10 +140,13 @@ Eigen::Vector2d RayLattice::RayAt(const Eigen::Vector2d& x_in_img) const {
 }
 
 std::vector<uint8_t> FindSmoothSamples(const Scan& scan) {
+  return FindSmoothSamples(scan, FindSampleNoise(scan));
+}
+
+std::vector<uint8_t> FindSmoothSamples(const Scan& scan, const RangeNoise& noise) {
   std::vector<uint8_t> smooth(scan.points.size(), 0);
   if (!scan.organised) return smooth;
   const std::vector<float> inverse = InverseRanges(scan);
-  const RangeNoise noise = FindSampleNoise(scan);
   const int columns = scan.num_columns, rows = scan.num_rows;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
@@ -177,8 +180,8 @@ ScanViewer::ScanViewer(const std::vector<Scan>& scans, const FreeSpace& free_spa
     sample_angle_ =
         std::max(sample_angle_, scan.organised ? GridSampleAngle(scan) : MeshSampleAngle(scan));
     grey_.push_back(scan.organised ? IntensityAsGrey(scan) : std::vector<uint8_t>());
-    smooth_.push_back(FindSmoothSamples(scan));
     noise_.push_back(FindSampleNoise(scan));
+    smooth_.push_back(FindSmoothSamples(scan, noise_.back()));
   }
 }
 

@@ -113,6 +113,7 @@ int FinestCell(const Camera& camera, const ScanViewer& viewer);
 // sample and no depth jump beside them. Grid order; a full turn is not closed (its seam counts as
 // an edge only where it is one).
 std::vector<uint8_t> FindSmoothSamples(const Scan& scan);
+std::vector<uint8_t> FindSmoothSamples(const Scan& scan, const RangeNoise& noise);
 
 // `count` images evenly taken from all, in the order of their names.
 std::vector<const SparseImage*> SpreadImages(const SparseModel& model, int count);

@@ -47,7 +47,7 @@ void TrustOptions::Declare(OptionFields* fields) {
       ->Number(
           "Trust.min_shown_share", &min_shown_share,
           "Share of the corners of the scan's intensity that the photos must show there, beyond "
-          "chance; photos of another room with the same walls and furniture show less. larger = "
+          "chance; photos of another room with the same walls and furniture show less; larger = "
           "stricter.")
       .AtLeast(0)
       .AtMost(1);

@@ -1,7 +1,6 @@
 #include "align/automatic_alignment.h"
 
 #include <gmock/gmock.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "align/start_appearance.h"
 #include "align/start_photos.h"
@@ -10,6 +9,7 @@
 #include "core/frames.h"
 #include "core/report.h"
 #include "tests/align/case_folder.h"
+#include "tests/align/photographed_room.h"
 #include "tests/align/simulated_alignment.h"
 
 namespace roomtex {
@@ -98,10 +98,7 @@ TEST(AutomaticAlignment, OnePickTellsTheEndsApart) {
 // The command, with photos that must confirm what is found.
 struct FolderWithPhotos {
   FolderWithPhotos() : one(MakeCase(SmallPhotos(0), 6)), files(one) {
-    std::filesystem::create_directories(image_path);
-    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
-      cv::imwrite(image_path + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
-    }
+    WritePhotos(*one.room, image_path);
   }
   static SimulatedRoomOptions SmallPhotos(int seed) {
     SimulatedRoomOptions options = CaseOptions(seed);

@@ -8,6 +8,7 @@
 #include "colmap_ext/mapper_verdict.h"
 #include "core/report.h"
 #include "tests/align/case_folder.h"
+#include "tests/align/photographed_room.h"
 
 namespace roomtex {
 namespace {
@@ -27,10 +28,7 @@ const SimulatedCase& Photographed() {
 
 struct RefusedModel {
   explicit RefusedModel(const std::string& about) {
-    std::filesystem::create_directories(photos);
-    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
-      cv::imwrite(photos + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
-    }
+    WritePhotos(*one.room, photos);
     const Json report = {{"num_reg_images", one.model.images.size()},
                          {"num_points", one.model.points.size()},
                          {"reasons", {{{"about", about}, {"reason", "two pairs contradict it."}}}}};

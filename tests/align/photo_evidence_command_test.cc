@@ -4,11 +4,11 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "align/trust/free_space.h"
 #include "core/camera_model.h"
 #include "tests/align/case_folder.h"
+#include "tests/align/photographed_room.h"
 #include "tests/support/matchers.h"
 
 namespace roomtex {
@@ -39,10 +39,7 @@ SimulatedRoomOptions RoughScan(int seed) {
 // A capture of one room, to be aligned to its scan or to that of another one.
 struct Captured {
   explicit Captured(const SimulatedRoomOptions& options) : one(MakeCase(options, 6)), files(one) {
-    std::filesystem::create_directories(image_path);
-    for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
-      cv::imwrite(image_path + "/" + one.room->PhotoName(photo), one.room->RenderPhoto(photo));
-    }
+    WritePhotos(*one.room, image_path);
   }
 
   // With photos, to the scan of a room with the same walls, by picks of what lies there where the

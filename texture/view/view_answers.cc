@@ -317,9 +317,8 @@ ViewAnswers::ViewAnswers(ViewContent content, int num_threads, std::function<boo
     : impl_(std::make_unique<Impl>(std::move(content), num_threads, std::move(stop))) {
   impl_->Add();
   try {
-    impl_->worker = std::thread([impl = impl_.get()] { impl->Prepare(); });
+    impl_->worker = StartThread([impl = impl_.get()] { impl->Prepare(); });
   } catch (const std::system_error&) {
-    NoteThreadNotStarted();
     impl_->Prepare();
   }
 }
