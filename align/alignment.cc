@@ -86,17 +86,28 @@ LensCheck FindLenses(const AlignmentInput& input, const AlignmentOptions& option
   return CheckLenses(input.model, input.photo_labels, options.refine_intrinsics);
 }
 
-// Lenses that the user holds although their photos contradict them: said, and not trusted where
-// that moves photos by more than an alignment is off.
-void JudgeHeldLenses(const LensCheck& lenses, Alignment* result) {
+// Lenses that stay as told although the photos contradict them: said, and not trusted where that
+// moves photos by more than an alignment is off. Those of models with panoramas or rigs can be
+// mended by the adjustment to the scan only.
+void JudgeLenses(const LensCheck& lenses, RefineIntrinsics refine, Alignment* result) {
   constexpr double kHarmlessShare = 0.003;  // of the focal length; 1 cm at 3 m
-  for (const LensFinding& lens : lenses.lenses) {
+  const bool is_held = refine == RefineIntrinsics::kNever;
+  if (!is_held && !lenses.only_looked_at) return;
+  for (LensFinding lens : lenses.lenses) {
     if (!lens.Contradicts()) continue;
+    lens.used = result->adjusted() && result->adjustment.freed;
     const double told_px = lens.told.MeanFocalLength();
     const bool harmful =
-        lens.FocalDeviations() > kSureFocalDeviations &&
+        !lens.used && lens.FocalDeviations() > kSureFocalDeviations &&
         std::abs(lens.found.MeanFocalLength() - told_px) > kHarmlessShare * told_px;
-    const std::string text = lens.Sentence() + " --refine_intrinsics auto uses the lens found.";
+    std::string text = lens.Sentence();
+    if (is_held) {
+      text += " --refine_intrinsics auto uses the lens found.";
+    } else if (!lens.used) {
+      text +=
+          " Of a model with rigs or panoramas the adjustment to the scan could mend it, and there "
+          "was none: map the photos with the focal length found.";
+    }
     (harmful ? result->reasons : result->warnings).push_back(text);
   }
 }
@@ -111,7 +122,6 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   for (const LensFinding& lens : lenses.lenses) {
     if (lens.used) result.warnings.push_back(lens.Sentence());
   }
-  if (!lenses.not_checked.empty()) result.warnings.push_back(lenses.not_checked);
   result.reprojection_rms_px = ReprojectionRms(input.model);
   const double sigma_px = KeypointSigma(result.reprojection_rms_px);
   result.fit = FitAlignment(input, start, sigma_px, options);
@@ -143,7 +153,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   }
   const std::string reason = JudgePicksLeftOut(input, start, result.refined_pick_px, options.trust);
   if (!reason.empty()) result.reasons.push_back(reason);
-  if (options.refine_intrinsics == RefineIntrinsics::kNever) JudgeHeldLenses(lenses, &result);
+  JudgeLenses(lenses, options.refine_intrinsics, &result);
   if (result.reasons.empty() && result.fit.refined) {
     Append(PicksOffWarnings(start, result.refined_pick_px, options.picks.min_bad_pick_px),
            &result.warnings);

@@ -73,10 +73,15 @@ bool IsCentreCalibrated(const LensCheck& lenses) {
 LensChoice ChooseLens(const AlignmentInput& input, const AlignmentFit& fit, const LensCheck& lenses,
                       RefineIntrinsics refine) {
   if (refine == RefineIntrinsics::kNever) return LensChoice::kHeld;
-  if (refine == RefineIntrinsics::kAuto && fit.disagreement.rms > kMaxCalibratingScan) {
+  // What nobody could mend before may be why model and scan differ in shape.
+  const bool is_wrong = lenses.only_looked_at &&
+                        std::any_of(lenses.lenses.begin(), lenses.lenses.end(),
+                                    [](const LensFinding& lens) { return lens.Contradicts(); });
+  if (refine == RefineIntrinsics::kAuto && !is_wrong &&
+      fit.disagreement.rms > kMaxCalibratingScan) {
     return LensChoice::kHeld;
   }
-  if (refine == RefineIntrinsics::kAlways || lenses.mended || input.lenses_refined) {
+  if (refine == RefineIntrinsics::kAlways || lenses.mended || is_wrong || input.lenses_refined) {
     return !input.lenses_refined && IsCentreCalibrated(lenses) ? LensChoice::kFreeButCentre
                                                                : LensChoice::kFree;
   }

@@ -82,33 +82,6 @@ std::map<uint32_t, uint32_t> FindDuplicates(const SparseModel& model,
   return duplicates;
 }
 
-SparseModel WithoutDuplicates(const SparseModel& model,
-                              const std::map<uint32_t, uint32_t>& duplicates) {
-  SparseModel rest;
-  rest.cameras = model.cameras;
-  for (const auto& [id, image] : model.images) {
-    if (duplicates.count(id) == 0) rest.images.emplace(id, image);
-  }
-  for (const auto& [id, point] : model.points) {
-    SparsePoint thinned = point;
-    std::set<uint32_t> photos;
-    thinned.track.clear();
-    for (const TrackElement& element : point.track) {
-      if (duplicates.count(element.image_id) > 0) continue;
-      thinned.track.push_back(element);
-      photos.insert(element.image_id);
-    }
-    if (photos.size() > 1) {
-      rest.points.emplace(id, std::move(thinned));
-      continue;
-    }
-    for (const TrackElement& element : thinned.track) {
-      rest.images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
-    }
-  }
-  return rest;
-}
-
 void PutDuplicatesBack(const SparseModel& input, const std::map<uint32_t, uint32_t>& duplicates,
                        double scale, SparseModel* model) {
   for (const auto& [id, of] : duplicates) {

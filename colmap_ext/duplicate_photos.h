@@ -18,12 +18,8 @@ namespace roomtex {
 std::map<uint32_t, uint32_t> FindDuplicates(const SparseModel& model,
                                             const std::set<std::string>& kept);
 
-// The model without these, and without points that fewer than two photos see then.
-SparseModel WithoutDuplicates(const SparseModel& model,
-                              const std::map<uint32_t, uint32_t>& duplicates);
-
-// Adds them to the model that was made of WithoutDuplicates(input), each as far from its photo as
-// in the input; scale: of that model in units of the input.
+// Adds them to the model that was made of the input without them (WithoutPhotos), each as far from
+// its photo as in the input; scale: of that model in units of the input.
 void PutDuplicatesBack(const SparseModel& input, const std::map<uint32_t, uint32_t>& duplicates,
                        double scale, SparseModel* model);
 

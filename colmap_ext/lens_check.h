@@ -57,8 +57,9 @@ struct LensCheck {
   std::optional<SparseModel> mended;
   // Of the mended model: cameras that are one lens have the same number.
   std::map<uint32_t, int> lens_of_camera;
-  // Why nobody looked at the lenses, in a sentence; empty if somebody did.
-  std::string not_checked;
+  // The model has panoramas or rigs, which a bundle adjustment of single photos cannot mend: its
+  // lenses stay as told whatever was found.
+  bool only_looked_at = false;
 
   // Of the mended model (or the input): what was told of each of its cameras.
   std::map<uint32_t, Camera> ToldCameras(const SparseModel& model) const;
@@ -71,7 +72,8 @@ Json LensToJson(const LensFinding& finding);
 // their camera and focal length, by image_id; may lack any) are one lens, as far as the photos
 // allow that: those that obey another focal length (by 1 %, and significantly) have their own. A
 // lens is used if its photos contradict what was told (auto), in any case (always), or in none
-// (never). Models with panoramas or rigs keep theirs, and these are not looked at.
+// (never). Models with panoramas or rigs keep theirs: the photos among them that have a lens are
+// looked at as if each stood by itself.
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine);
 
 }  // namespace roomtex

@@ -280,6 +280,9 @@ void Mapping::KeepCalibrated(MappingPass* pass) const {
 bool Mapping::IsContradicted(const MappingPass& pass) const {
   bool contradicted = false;
   for (const LensFinding& lens : pass.lenses.lenses) {
+    if (pass.lenses.only_looked_at && lens.Contradicts()) {
+      context_.Warn(lens.Sentence() + " It is for roomtex-align, which has the scan, to mend it.");
+    }
     if (!lens.used) continue;
     contradicted = true;
     context_.Warn(lens.Sentence() +

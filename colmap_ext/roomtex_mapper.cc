@@ -292,8 +292,6 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   context.report["pair_trials"] = mapping.trials();
   if (passes.empty()) ThrowNothingWorked(options.database_path, mapping.trials());
   FillMappingReport(passes, images, &context.report);
-  const std::string& not_checked = passes[0].lenses.not_checked;
-  if (!not_checked.empty()) context.Warn(not_checked);
   const std::vector<MappedModel> models = ListModels(passes);
   const std::vector<ModelTrust> trusts = JudgeModels(passes, images, known, context);
   context.report["check"] = trusts[0].check;

@@ -339,6 +339,32 @@ double MedianDepth(const SparseModel& model, const SparseImage& image) {
   return Median(&depths);
 }
 
+SparseModel WithoutPhotos(const SparseModel& model, const std::set<uint32_t>& image_ids) {
+  SparseModel rest;
+  rest.cameras = model.cameras;
+  for (const auto& [id, image] : model.images) {
+    if (image_ids.count(id) == 0) rest.images.emplace(id, image);
+  }
+  for (const auto& [id, point] : model.points) {
+    SparsePoint thinned = point;
+    std::set<uint32_t> photos;
+    thinned.track.clear();
+    for (const TrackElement& element : point.track) {
+      if (image_ids.count(element.image_id) > 0) continue;
+      thinned.track.push_back(element);
+      photos.insert(element.image_id);
+    }
+    if (photos.size() > 1) {
+      rest.points.emplace(id, std::move(thinned));
+      continue;
+    }
+    for (const TrackElement& element : thinned.track) {
+      rest.images.at(element.image_id).point3d_ids[element.point2d_index] = kInvalidPoint3dId;
+    }
+  }
+  return rest;
+}
+
 ReprojectionErrors UpdateReprojectionErrors(SparseModel* model) {
   std::map<uint32_t, CameraProjection> projections;
   for (const auto& [id, camera] : model->cameras) projections.emplace(id, camera);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,10 @@ void WriteSparseModelText(const SparseModel& model, const std::string& folder);
 
 // The model in another frame: points, and poses by CamFromScan (core/similarity.h).
 void TransformModel(const Similarity& target_from_model, SparseModel* model);
+
+// The model without these photos, and without points that fewer than two of the others see. All
+// cameras stay.
+SparseModel WithoutPhotos(const SparseModel& model, const std::set<uint32_t>& image_ids);
 
 // Median distance of a photo's points from its centre, in units of the model; 0 if it has none.
 double MedianDepth(const SparseModel& model, const SparseImage& image);

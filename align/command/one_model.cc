@@ -248,7 +248,9 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
                   aside.photos.size(), model->images.size(), model->images.at(id).name,
                   model->images.at(of).name));
   aside.input = std::move(*model);
-  *model = WithoutDuplicates(aside.input, aside.photos);
+  std::set<uint32_t> image_ids;
+  for (const auto& [duplicate, photo] : aside.photos) image_ids.insert(duplicate);
+  *model = WithoutPhotos(aside.input, image_ids);
   return aside;
 }
 

@@ -500,6 +500,29 @@ TEST(Alignment, AWrongLensIsNoticedAndMended) {
   EXPECT_FALSE(usual.lenses.lenses[0].used);
 }
 
+// Photos alone cannot mend the lens of a rig; they notice it, and the scan mends it.
+TEST(Alignment, AWrongLensOfARigIsMendedByTheScan) {
+  const SimulatedCase& right = MakeCase(0, 6);
+  SimulatedCase wrong = right;
+  Camera& camera = wrong.model.cameras.begin()->second;
+  const double focal_length = camera.MeanFocalLength();
+  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.01;
+  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  for (auto& [id, image] : wrong.model.images) image.frame_id = id;
+  const Alignment alignment = AlignCase(wrong);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  EXPECT_FALSE(alignment.lenses.mended);
+  EXPECT_THAT(alignment.warnings, testing::Contains(HasSubstr("The lens found is used")));
+  ASSERT_TRUE(alignment.adjusted());
+  EXPECT_TRUE(alignment.adjustment.freed);
+  const SparseModel& model = alignment.adjustment.bundle.model;
+  EXPECT_NEAR(model.cameras.begin()->second.MeanFocalLength() / focal_length, 1, 0.001);
+  EXPECT_LT(WorstPoseErrors(*wrong.room, model, Similarity()).position, 0.004);
+  AlignmentOptions options;
+  options.refine_intrinsics = RefineIntrinsics::kNever;
+  EXPECT_THAT(Reasons(AlignCase(wrong, options)), HasSubstr("The lens as told is kept"));
+}
+
 // The scan of a depth camera whose tracking drifts by centimetres lies about as near to the model
 // of either lens: the photos, which are sure, are believed.
 TEST(Alignment, AScanThatDriftsDoesNotOutvoteThePhotosAboutTheirLens) {

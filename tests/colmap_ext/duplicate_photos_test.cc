@@ -77,7 +77,9 @@ TEST(DuplicatePhotos, OfARigAreNone) {
 TEST(DuplicatePhotos, GoWithThePointsThatRestOnThemAndComeBackWithTheirPhoto) {
   const SparseModel input = Model(0.3);
   const Duplicates duplicates = FindDuplicates(input, {});
-  SparseModel model = WithoutDuplicates(input, duplicates);
+  std::set<uint32_t> image_ids;
+  for (const auto& [id, of] : duplicates) image_ids.insert(id);
+  SparseModel model = WithoutPhotos(input, image_ids);
   EXPECT_EQ(model.images.size(), 2u);
   EXPECT_EQ(model.points.size(), 100u);
   for (const auto& [id, point] : model.points) EXPECT_EQ(point.track.size(), 2u);

@@ -92,13 +92,34 @@ TEST(LensCheck, AWrongFocalLengthIsFoundAndMended) {
   EXPECT_FALSE(held.lenses[0].used);
 }
 
-TEST(LensCheck, ARigIsNotLookedAtWhichIsSaid) {
-  SparseModel rig = TrueModel(2);
-  rig.images.begin()->second.frame_id = 1;
-  const LensCheck check = CheckLenses(rig, {}, RefineIntrinsics::kAuto);
-  EXPECT_TRUE(check.lenses.empty());
-  EXPECT_THAT(check.not_checked, HasSubstr("rigs"));
-  EXPECT_EQ(CheckLenses(Mapped(TrueModel(2)), {}, RefineIntrinsics::kAuto).not_checked, "");
+// What a bundle adjustment of single photos cannot mend it can look at.
+TEST(LensCheck, LensesOfRigsAndBesidePanoramasAreLookedAt) {
+  SparseModel wrong = TrueModel(2);
+  const double f = wrong.cameras.at(1).MeanFocalLength();
+  Scale(1.01, &wrong.cameras.at(1));
+  wrong = Mapped(wrong);
+  SparseModel rig = wrong, beside = wrong;
+  for (auto& [id, image] : rig.images) image.frame_id = id;
+  Camera panorama;
+  panorama.camera_id = 2;
+  panorama.model = CameraModel::kEquirectangular;
+  panorama.width = 2000;
+  panorama.height = 1000;
+  beside.cameras[2] = panorama;
+  beside.images.begin()->second.camera_id = 2;
+  for (const SparseModel& model : {rig, beside}) {
+    const LensCheck check = CheckLenses(model, {}, RefineIntrinsics::kAuto);
+    ASSERT_EQ(check.lenses.size(), 1u);
+    EXPECT_TRUE(check.only_looked_at);
+    EXPECT_FALSE(check.mended);
+    EXPECT_FALSE(check.lenses[0].used);
+    EXPECT_TRUE(check.lenses[0].Contradicts());
+    EXPECT_NEAR(check.lenses[0].found.MeanFocalLength() / f, 1, 0.003);
+  }
+  SparseModel right = Mapped(TrueModel(2));
+  EXPECT_FALSE(CheckLenses(right, {}, RefineIntrinsics::kAuto).only_looked_at);
+  for (auto& [id, image] : right.images) image.frame_id = id;
+  EXPECT_FALSE(CheckLenses(right, {}, RefineIntrinsics::kAuto).lenses.at(0).Contradicts());
 }
 
 TEST(LensCheck, CamerasThatWereRefinedOneByOneAreOneLens) {
