@@ -30,6 +30,33 @@ ViewPose WithScanError(ViewPose pose, const FoundPhotoOptions& options) {
   return pose;
 }
 
+// Metres that a place may be off where a hint is held against it.
+constexpr double kHintSlack = 0.1;
+
+// Of this photo alone.
+PhotoHints HintsOf(const std::string& image_name, const PhotoHints& all) {
+  PhotoHints hints;
+  for (const Pick& pick : all.picks) {
+    if (pick.image_name == image_name && pick.weight > 0) hints.picks.push_back(pick);
+  }
+  for (const NearHint& hint : all.near) {
+    if (hint.image_name == image_name) hints.near.push_back(hint);
+  }
+  return hints;
+}
+
+// Whether a place of the photo has what it was said to show where it was said to be.
+bool Agrees(const PhotoHints& hints, const SparseImage& image, const Camera& camera,
+            const SeenPlace& place) {
+  SparseModel photo;
+  photo.images[image.image_id] = image;
+  photo.images[image.image_id].cam_from_model = Rigid();
+  photo.cameras[image.camera_id] = place.pose.lens ? *place.pose.lens : camera;
+  const Rigid scan_from_cam = place.pose.cam_from_scan.Inverse();
+  return Agrees(FindHintRays(photo, hints.picks, hints.near),
+                {1, scan_from_cam.rotation, scan_from_cam.translation}, kHintSlack);
+}
+
 // Why a photo has no pose, a clause; "" if it has one.
 std::string ProblemOf(const PhotoSighting& sighting, FocalSource source, const ViewPose& pose,
                       const FoundPhotoOptions& options, const TrustOptions& trust) {
@@ -88,9 +115,9 @@ void AddView(const SparseImage& image, const SeenPlace& place, const ViewPose& p
 }  // namespace
 
 FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
-                       const std::string& image_path, const FoundPhotoOptions& options,
-                       const TrustOptions& trust, int num_threads, Progress* progress,
-                       const std::function<bool(const FoundPhotos&)>& enough) {
+                       const std::string& image_path, const PhotoHints& hints,
+                       const FoundPhotoOptions& options, const TrustOptions& trust, int num_threads,
+                       Progress* progress, const std::function<bool(const FoundPhotos&)>& enough) {
   FoundPhotos found;
   const UpDirections ups = FindScanUps(surveyed.scans(), surveyed.patches());
   progress->Stage("features of the scan");
@@ -99,21 +126,32 @@ FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
   for (const auto& [id, image] : photos.model.images) {
     const Camera& camera = photos.model.cameras.at(image.camera_id);
     const FocalSource source = photos.focal_sources.at(image.name);
-    const PhotoSighting sighting = finder.Find(image, camera, source, image_path);
+    PhotoSighting sighting = finder.Find(image, camera, source, image_path);
     progress->Tick();
     if (!sighting.is_read) continue;
+    const PhotoHints said = HintsOf(image.name, hints);
+    std::vector<SeenPlace>& places = sighting.places;
+    const size_t num_seen = places.size();
+    places.erase(std::remove_if(places.begin(), places.end(),
+                                [&, &image = image](const SeenPlace& place) {
+                                  return !Agrees(said, image, camera, place);
+                                }),
+                 places.end());
     PhotoEvidence evidence;
     evidence.image_name = image.name;
-    found.num_places += static_cast<int>(sighting.places.size());
+    found.num_places += static_cast<int>(num_seen);
     ViewPose pose;
-    if (!sighting.places.empty()) {
-      evidence.num_cells = sighting.places[0].num_cells;
-      evidence.share = sighting.places[0].share;
-      pose = WithScanError(sighting.places[0].pose, options);
+    if (!places.empty()) {
+      evidence.num_cells = places[0].num_cells;
+      evidence.share = places[0].share;
+      pose = WithScanError(places[0].pose, options);
     }
-    if (sighting.places.size() > 1) evidence.num_cells_second = sighting.places[1].num_cells;
+    if (places.size() > 1) evidence.num_cells_second = places[1].num_cells;
     evidence.problem = ProblemOf(sighting, source, pose, options, trust);
-    if (evidence.problem.empty()) AddView(image, sighting.places[0], pose, &found);
+    if (places.empty() && num_seen > 0) {
+      evidence.problem = "what is said of it agrees with none of the places it may be at";
+    }
+    if (evidence.problem.empty()) AddView(image, places[0], pose, &found);
     found.photos.push_back(std::move(evidence));
     if (enough && enough(found)) break;
   }

@@ -1,6 +1,7 @@
 #pragma once
-// Where photos were taken that have neither a sparse model nor picks: each alone, by what it shows
-// of the scan's intensity (align/trust/photo_finder.h), and whether that is to be believed.
+// Where photos were taken that have neither a sparse model nor the picks for a pose: each alone, by
+// what it shows of the scan's intensity (align/trust/photo_finder.h), and whether that is to be
+// believed. A few picks, or a place that it shows, say which places are in question.
 
 #include <functional>
 #include <string>
@@ -8,6 +9,8 @@
 
 #include "align/clicks/photo_model.h"
 #include "align/clicks/pick_view.h"
+#include "align/clicks/picks.h"
+#include "align/search/search_hint.h"
 #include "align/surveyed_scans.h"
 #include "align/trust/photo_finder.h"
 #include "align/trust/trust.h"
@@ -46,12 +49,18 @@ struct FoundPhotos {
   std::vector<Pick> picks;
   std::vector<PickView> views;
 };
+// What a user says of some of the photos.
+struct PhotoHints {
+  std::vector<Pick> picks;
+  std::vector<NearHint> near;
+};
 // photos: those of image_path, asked in the order of their ids, until `enough` says so of what was
 // found up to there. Photos that are not read (PhotoModel, UnfitPhotos::kTaken) are left out
 // without a word.
 FoundPhotos FindPhotos(const PhotoModel& photos, const SurveyedScans& surveyed,
-                       const std::string& image_path, const FoundPhotoOptions& options,
-                       const TrustOptions& trust, int num_threads, Progress* progress,
+                       const std::string& image_path, const PhotoHints& hints,
+                       const FoundPhotoOptions& options, const TrustOptions& trust, int num_threads,
+                       Progress* progress,
                        const std::function<bool(const FoundPhotos&)>& enough = {});
 
 }  // namespace roomtex

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <Eigen/LU>
+#include <fmt/core.h>
 #include <opencv2/core.hpp>
 
 #include "core/frames.h"
@@ -28,6 +29,7 @@ constexpr double kFocalToName =
 struct PlacedPhoto {
   const PickView* view = nullptr;
   ViewPose pose;
+  bool by_features = false;  // instead of by clicks
   bool ambiguous = false;
   double to_second = 0;  // metres from the camera to that of the other pose
 };
@@ -49,7 +51,9 @@ PlacedPhoto Place(const AlignmentInput& input, const PickView& view, const Trust
     if (IsCameraFree(input, pose.cam_from_scan, trust)) free.push_back(&pose);
   }
   const std::vector<const ViewPose*>& candidates = free.empty() ? fitting : free;
-  PlacedPhoto placed{&view, *candidates[0]};
+  PlacedPhoto placed;
+  placed.view = &view;
+  placed.pose = *candidates[0];
   const Eigen::Vector3d centre = placed.pose.cam_from_scan.TargetOriginInSource();
   for (size_t i = 1; i < candidates.size() && !placed.ambiguous; ++i) {
     placed.to_second = (candidates[i]->cam_from_scan.TargetOriginInSource() - centre).norm();
@@ -128,13 +132,13 @@ std::vector<std::string> JudgePhoto(const AlignmentInput& input, const PlacedPho
   return reasons;
 }
 
-// What was found of a lens. by: picks or features.
-std::string LensSentence(const std::string& name, const ViewPose& pose, FocalSource source,
-                         double told, const std::string& by) {
+// What was found of a lens.
+std::string LensSentence(const PlacedPhoto& photo, FocalSource source, double told) {
+  const ViewPose& pose = photo.pose;
   const double focal = pose.lens->MeanFocalLength();
-  std::string sentence = "The focal length of " + name + " was found by its " + by + ": " +
-                         Number(focal, 0) + " pixels, known to " +
-                         Number(100 * pose.focal_sigma, 1) + " %";
+  std::string sentence = "The focal length of " + photo.view->image_name + " was found by its " +
+                         (photo.by_features ? "features: " : "picks: ") + Number(focal, 0) +
+                         " pixels, known to " + Number(100 * pose.focal_sigma, 1) + " %";
   if (source == FocalSource::kExif) sentence += " (its EXIF data: " + Number(told, 0) + ")";
   return sentence + (pose.focal_sigma > kFocalToName
                          ? "; give --camera_params where the camera is known."
@@ -196,28 +200,32 @@ double RotationSigma(const ViewPose& pose) {
   return std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace());
 }
 
-void WarnOfFewPicks(const AlignmentInput& input, const std::vector<PickView>& views,
+// Photos that have fewer picks than a pose asks for, and were not found with them as a hint.
+void WarnOfFewPicks(const AlignmentInput& input, const FoundPhotos& found,
                     std::vector<std::string>* warnings) {
   for (const auto& entry : input.model.images) {
-    const SparseImage& image = entry.second;
-    const bool has_view = std::any_of(views.begin(), views.end(), [&](const PickView& view) {
-      return view.image == &image && view.HasPose();
-    });
-    if (has_view) continue;
+    const std::string& name = entry.second.name;
     const long count = std::count_if(input.picks.begin(), input.picks.end(), [&](const Pick& pick) {
-      return pick.image_name == image.name && pick.weight > 0;
+      return pick.image_name == name && pick.weight > 0;
     });
-    if (count >= kMinPicksPerPhoto) continue;  // why it has none is said already
-    warnings->push_back(image.name + " is left out: it has " + std::to_string(count) +
-                        " picks, and without a sparse model each photo needs " +
-                        std::to_string(kMinPicksPerPhoto) + " of its own.");
+    if (count >= kMinPicksPerPhoto) continue;  // why it has no pose is said already
+    const auto asked =
+        std::find_if(found.photos.begin(), found.photos.end(),
+                     [&](const PhotoEvidence& photo) { return photo.image_name == name; });
+    const bool was_asked = asked != found.photos.end();
+    if (was_asked && asked->problem.empty()) continue;
+    warnings->push_back(
+        fmt::format("{} is left out: it has {} {}, and without a sparse model each photo needs {} "
+                    "of its own",
+                    name, count, count == 1 ? "pick" : "picks", kMinPicksPerPhoto) +
+        (was_asked ? "; searched for with these as a hint, " + asked->problem + "." : "."));
   }
 }
 
-// What there is to say of the photos that have a pose. by: picks or features.
+// What there is to say of the photos that have a pose.
 void FillIn(const AlignmentInput& input, const PhotoModel& photos,
-            const std::vector<PlacedPhoto>& placed, const std::string& by,
-            const TrustOptions& trust, PhotoAlignment* result) {
+            const std::vector<PlacedPhoto>& placed, const TrustOptions& trust,
+            PhotoAlignment* result) {
   Alignment& alignment = result->alignment;
   std::vector<double> positions, rotations;
   for (const PlacedPhoto& photo : placed) {
@@ -230,7 +238,7 @@ void FillIn(const AlignmentInput& input, const PhotoModel& photos,
       std::vector<std::string>* const said =
           source == FocalSource::kPicks && pose.focal_sigma > kFocalToName ? &alignment.warnings
                                                                            : &result->notes;
-      said->push_back(LensSentence(image.name, pose, source, told, by));
+      said->push_back(LensSentence(photo, source, told));
       lens.focal_sigma = pose.focal_sigma * pose.lens->MeanFocalLength();
       lens.radial_sigma = pose.radial_sigma;
     }
@@ -251,7 +259,8 @@ void FillIn(const AlignmentInput& input, const PhotoModel& photos,
 }  // namespace
 
 PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos,
-                           const AlignmentOptions& options, Progress* progress) {
+                           const FoundPhotos& found, const AlignmentOptions& options,
+                           Progress* progress) {
   PhotoAlignment result;
   Alignment& alignment = result.alignment;
   progress->Stage("scan surface");
@@ -261,7 +270,7 @@ PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos
   for (std::string& warning : CheckPhotoViews(input, views)) {
     alignment.warnings.push_back(std::move(warning));
   }
-  WarnOfFewPicks(input, views, &alignment.warnings);
+  WarnOfFewPicks(input, found, &alignment.warnings);
 
   progress->Stage("trust");
   std::vector<PlacedPhoto> placed;
@@ -274,7 +283,13 @@ PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos
       alignment.reasons.push_back(std::move(reason));
     }
   }
-  FillIn(input, photos, placed, "picks", options.trust, &result);
+  // Their features are none of the picks.
+  std::vector<PickView> found_views = found.views;
+  for (PickView& view : found_views) {
+    view.picks.clear();
+    placed.push_back({&view, view.review.pose(), true});
+  }
+  FillIn(input, photos, placed, options.trust, &result);
   return result;
 }
 
@@ -282,7 +297,7 @@ PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& p
                                 const FoundPhotos& found, const TrustOptions& trust) {
   PhotoAlignment result;
   std::vector<PlacedPhoto> placed;
-  for (const PickView& view : found.views) placed.push_back({&view, view.review.pose()});
+  for (const PickView& view : found.views) placed.push_back({&view, view.review.pose(), true});
   std::string first_problem;
   for (const PhotoEvidence& photo : found.photos) {
     if (photo.problem.empty()) continue;
@@ -296,7 +311,7 @@ PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& p
         "). Pick six points in one of them (roomtex-pick), or give the sparse model of more photos "
         "(--input_path).");
   }
-  FillIn(input, photos, placed, "features", trust, &result);
+  FillIn(input, photos, placed, trust, &result);
   return result;
 }
 

@@ -28,10 +28,12 @@ struct PhotoAlignment {
   std::vector<std::string> notes;   // what was found of the lenses
 };
 
-// input.model: photos.model. Throws InputError for picks that fix no photo, Contradiction for picks
-// that are exchanged, not on the scan, or show that the scan is mirrored.
+// Photos by their picks, and those with too few by what was found of them. input.model:
+// photos.model. Throws InputError for picks that fix no photo, Contradiction for picks that are
+// exchanged, not on the scan, or show that the scan is mirrored.
 PhotoAlignment AlignPhotos(const AlignmentInput& input, const PhotoModel& photos,
-                           const AlignmentOptions& options, Progress* progress);
+                           const FoundPhotos& found, const AlignmentOptions& options,
+                           Progress* progress);
 
 // input.model: photos.model, input.picks: found.picks.
 PhotoAlignment AlignFoundPhotos(const AlignmentInput& input, const PhotoModel& photos,

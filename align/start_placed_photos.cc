@@ -120,7 +120,7 @@ void AskPhotosAlone(const AlignmentInput& input, const AlignmentOptions& options
   if (!search->placed_photos) {
     PlacedPhotoEvidence evidence;
     const PhotoModel photos = PhotosToAsk(input.model, placed);
-    FindPhotos(photos, input.surveyed, input.image_path, placed.photo, options.trust,
+    FindPhotos(photos, input.surveyed, input.image_path, {}, placed.photo, options.trust,
                input.num_threads, progress, [&](const FoundPhotos& found) {
                  evidence = Agree(found, input, options, placed);
                  const bool hopeless =

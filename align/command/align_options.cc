@@ -35,8 +35,9 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
       "weight: 1 = ordinary, "
       "more = more exact, 0 = off); six or more, in one photo or spread "
       "over several; pixels of the photo as taken, metres in the scan frame. "
-      "Without picks, or with one to five as a hint, the place is searched for, "
-      "which needs --image_path; a model that roomtex-mapper --known_path has put into the "
+      "Without picks, or with one to five as a hint (of photos without a sparse model: in each), "
+      "the place is searched for, which needs --image_path; a model that roomtex-mapper "
+      "--known_path has put into the "
       "scan's frame needs neither.",
       Command::Kind::kOptional);
   command->AddString("near", &a->near,
@@ -125,8 +126,10 @@ void CheckOptions(AlignCommandOptions* options) {
         "--camera_params is for photos without a sparse model: that of --input_path "
         "has cameras");
   }
-  if (a.input_path.empty() && !a.near.empty()) {
-    problems.push_back("--near is a hint for a search with --input_path");
+  if (a.input_path.empty() && !a.near.empty() && !a.picks_path.empty()) {
+    problems.push_back(
+        "--near and --picks_path cannot be had together for photos without a sparse model; give "
+        "one of them");
   }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {

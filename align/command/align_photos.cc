@@ -1,5 +1,6 @@
 #include "align/command/align_photos.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <set>
@@ -23,11 +24,11 @@ namespace {
 // None if the files contradict each other; `refusal` then says why.
 std::optional<PhotoAlignment> FindPhotoAlignment(const AlignCommandOptions& a,
                                                  const AlignmentInput& input,
-                                                 const PhotoModel& photos,
+                                                 const PhotoModel& photos, const FoundPhotos& found,
                                                  const Command::Context& context,
                                                  std::string* refusal) {
   try {
-    return AlignPhotos(input, photos, a.alignment, &context.progress);
+    return AlignPhotos(input, photos, found, a.alignment, &context.progress);
   } catch (const Contradiction& contradiction) {
     *refusal = contradiction.what();
     return std::nullopt;
@@ -51,16 +52,17 @@ void WritePlacedPhotos(const AlignCommandOptions& a, PhotoAlignment* found, Scan
   WriteAligned(a, found->model, std::nullopt, reading, told, context);
 }
 
-// Photos each by itself, without picks. Of RTPI scans the other reading, too, where in this one
-// none of them is found and nobody said how to read.
+// Photos each by itself, without the picks for a pose. Of RTPI scans the other reading, too, where
+// in this one none of them is found and nobody said how to read.
 FoundPhotos SearchPhotos(const AlignCommandOptions& a, const PhotoModel& photos,
-                         ScanReading* reading, const Command::Context& context) {
+                         const PhotoHints& hints, bool may_turn, ScanReading* reading,
+                         const Command::Context& context) {
   const auto find = [&](const SurveyedScans& surveyed) {
-    return FindPhotos(photos, surveyed, a.image_path, FoundPhotoOptions(), a.alignment.trust,
+    return FindPhotos(photos, surveyed, a.image_path, hints, FoundPhotoOptions(), a.alignment.trust,
                       context.options.num_threads, &context.progress);
   };
   FoundPhotos found = find(*reading->surveyed);
-  if (!found.views.empty() || !MayTurn(a, *reading)) return found;
+  if (!found.views.empty() || !may_turn || !MayTurn(a, *reading)) return found;
   MirroredReading other;
   other.scans = std::make_unique<const std::vector<Scan>>(MirrorScans(reading->surveyed->scans()));
   other.surveyed =
@@ -72,34 +74,29 @@ FoundPhotos SearchPhotos(const AlignCommandOptions& a, const PhotoModel& photos,
   return again;
 }
 
-}  // namespace
-
-void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& context) {
-  context.progress.Stage("read photos");
-  std::vector<Pick> picks = ReadPicks(a.picks_path);
-  const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
-  CheckPickNames(a.picks_path, picks, {&photos.model});
-  const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
-  context.progress.Stage("read scan");
-  ScanReading reading(a, context);
-  reading.origin.MoveToLocal(&picks);
-  AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
-  input.scan_origin = reading.origin.offset();
-  std::string refusal;
-  std::optional<PhotoAlignment> found = FindPhotoAlignment(a, input, photos, context, &refusal);
-  if (!found) return WriteRefusal(a, refusal, reading.origin, context);
-  WritePlacedPhotos(a, &*found, &reading, told, context);
+// Those with fewer picks than a pose asks for.
+PhotoModel WithFewPicks(const PhotoModel& photos, const std::vector<Pick>& picks) {
+  PhotoModel few = photos;
+  for (const auto& [id, image] : photos.model.images) {
+    const auto is_of_it = [&, &image = image](const Pick& pick) {
+      return pick.image_name == image.name && pick.weight > 0;
+    };
+    if (std::count_if(picks.begin(), picks.end(), is_of_it) < kMinPicksPerPhoto) continue;
+    few.model.images.erase(id);
+    few.model.cameras.erase(image.camera_id);
+  }
+  return few;
 }
 
-void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context& context) {
-  context.progress.Stage("read photos");
-  const std::vector<std::string> names =
-      ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
-  const PhotoModel photos = MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken);
+// Photos of which none has the picks for a pose.
+void AlignFoundPhotosOnly(const AlignCommandOptions& a, const PhotoModel& photos, PhotoHints hints,
+                          const Command::Context& context) {
   const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);
-  const FoundPhotos found = SearchPhotos(a, photos, &reading, context);
+  reading.origin.MoveToLocal(&hints.picks);
+  reading.origin.MoveToLocal(&hints.near);
+  const FoundPhotos found = SearchPhotos(a, photos, hints, hints.picks.empty(), &reading, context);
   context.report["search"] = FoundPhotosToJson(found);
   const AlignmentInput input{photos.model, *reading.surveyed, found.picks, "", reading.azimuth()};
   PhotoAlignment placed = AlignFoundPhotos(input, photos, found, a.alignment.trust);
@@ -108,6 +105,51 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
     return WriteRefusal(a, placed.alignment.reasons[0], reading.origin, context);
   }
   WritePlacedPhotos(a, &placed, &reading, told, context);
+}
+
+}  // namespace
+
+void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& context) {
+  context.progress.Stage("read photos");
+  std::vector<Pick> picks = ReadPicks(a.picks_path);
+  const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
+  CheckPickNames(a.picks_path, picks, {&photos.model});
+  const PhotoModel few = WithFewPicks(photos, picks);
+  if (few.model.images.size() == photos.model.images.size()) {
+    return AlignFoundPhotosOnly(a, photos, {picks, {}}, context);
+  }
+  const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
+  context.progress.Stage("read scan");
+  ScanReading reading(a, context);
+  reading.origin.MoveToLocal(&picks);
+  AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
+  input.scan_origin = reading.origin.offset();
+  FoundPhotos found;
+  if (!few.model.images.empty()) {
+    found = SearchPhotos(a, few, {picks, {}}, false, &reading, context);
+    context.report["search"] = FoundPhotosToJson(found);
+  }
+  std::string refusal;
+  std::optional<PhotoAlignment> placed =
+      FindPhotoAlignment(a, input, photos, found, context, &refusal);
+  if (!placed) return WriteRefusal(a, refusal, reading.origin, context);
+  WritePlacedPhotos(a, &*placed, &reading, told, context);
+}
+
+void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context& context) {
+  context.progress.Stage("read photos");
+  const std::vector<std::string> names =
+      ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
+  PhotoHints hints;
+  if (!a.near.empty()) {
+    hints.near.push_back(ParseNearHint(a.near));
+    const std::string& name = hints.near[0].image_name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) {
+      throw UsageError("--near names " + name + ", which is no photo of --image_path");
+    }
+  }
+  AlignFoundPhotosOnly(a, MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken),
+                       std::move(hints), context);
 }
 
 }  // namespace roomtex

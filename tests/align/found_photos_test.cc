@@ -44,9 +44,10 @@ struct PhotosOfARoom {
   FoundPhotos FindIn(const std::vector<Scan>& of, int num_threads = 2) const {
     return FindIn(of, photos, num_threads);
   }
-  FoundPhotos FindIn(const std::vector<Scan>& of, const PhotoModel& some, int num_threads) const {
+  FoundPhotos FindIn(const std::vector<Scan>& of, const PhotoModel& some, int num_threads,
+                     const PhotoHints& hints = {}) const {
     Progress quiet(true);
-    return FindPhotos(some, SurveyedScans(of), folder.path(), {}, {}, num_threads, &quiet);
+    return FindPhotos(some, SurveyedScans(of), folder.path(), hints, {}, {}, num_threads, &quiet);
   }
 
   TempFolder folder;

@@ -42,7 +42,7 @@ PhotoAlignment AlignThese(const SimulatedCase& one, const std::vector<int>& phot
   const PhotoModel model = PhotosOf(*one.room, photos, source);
   Progress progress(true);
   return AlignPhotos({model.model, Survey(one.scans), one.picks, "picks.csv", one.azimuth}, model,
-                     AlignmentOptions(), &progress);
+                     FoundPhotos(), AlignmentOptions(), &progress);
 }
 
 double PositionError(const SimulatedRoom& room, const PhotoAlignment& found, int photo) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -108,6 +109,58 @@ TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   EXPECT_EQ(report["images"][0]["focal_length_from"], "params");
   EXPECT_EQ(report["agreement"]["gradient_shift"]["contradicts"], false);
 
+  // Six picks in one photo, one in the other, which says of the places that it may be at which is
+  // meant.
+  const std::vector<Pick> picks = ReadPicks(room + "/picks.csv");
+  ASSERT_EQ(picks.size(), 6u);
+  const SparseImage* other = nullptr;
+  for (const auto& [id, image] : truth.images) {
+    if (image.name != picks[0].image_name) other = &image;
+  }
+  const CameraProjection projection(camera);
+  const auto line = [&](const Eigen::Vector2d& x, const Eigen::Vector3d& x_in_scan) {
+    return fmt::format("{},{},{},{},{},{}\n", other->name, x.x(), x.y(), x_in_scan.x(),
+                       x_in_scan.y(), x_in_scan.z());
+  };
+  std::string one_more, wrong;
+  for (const Pick& pick : picks) {
+    const Eigen::Vector3d x_in_cam = other->cam_from_model * pick.x_in_scan;
+    const auto x = projection.ImgFromCam(x_in_cam);
+    if (x_in_cam.z() < 0.5 || !x || x->minCoeff() < 0 || x->x() > camera.width ||
+        x->y() > camera.height) {
+      continue;
+    }
+    one_more = line(*x, pick.x_in_scan);
+    wrong = line(Eigen::Vector2d(camera.width, camera.height) - *x, pick.x_in_scan);
+  }
+  ASSERT_NE(one_more, "");
+  const std::string some = folder / "some";
+  const auto with_picks = [&](const std::string& text) {
+    WriteBytes(folder / "some.csv", text);
+    std::filesystem::remove_all(some);
+    const std::string to_some = command.substr(0, command.rfind(' ')) + " " + some;
+    const CommandResult placed = RunCommandLine(to_some + " --picks_path " + (folder / "some.csv"));
+    return std::make_pair(placed, Json::parse(ReadBytes(some + "/alignment.json")));
+  };
+  const auto [mixed, mixed_report] = with_picks(ReadBytes(room + "/picks.csv") + one_more);
+  ASSERT_EQ(mixed.exit_code, 0) << mixed.err;
+  const SparseModel both = ReadSparseModel(some);
+  ASSERT_EQ(both.images.size(), 2u);
+  EXPECT_EQ(mixed_report["picks"]["num_used"], 6);
+  EXPECT_EQ(mixed_report["search"]["photos"].size(), 1u);
+  const double off = (both.FindImage(other->name)->cam_from_model.TargetOriginInSource() -
+                      other->cam_from_model.TargetOriginInSource())
+                         .norm();
+  for (const Json& image : mixed_report["images"]) {
+    if (image["name"] != other->name) continue;
+    EXPECT_LT(1000 * off, 2 * image["position_sigma_mm"].get<double>());
+  }
+  const auto [wronged, wronged_report] = with_picks(ReadBytes(room + "/picks.csv") + wrong);
+  ASSERT_EQ(wronged.exit_code, 0) << wronged.err;
+  EXPECT_EQ(ReadSparseModel(some).images.size(), 1u);
+  EXPECT_THAT(wronged_report["warnings"].dump(),
+              HasSubstr("what is said of it agrees with none of the places it may be at"));
+
   // The trusted result stays.
   for (const auto& [id, image] : truth.images)
     std::filesystem::remove(room + "/photos/" + image.name);
@@ -116,7 +169,7 @@ TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   EXPECT_THAT(none.err, HasSubstr("None of the photos could be placed"));
   EXPECT_THAT(none.err, HasSubstr("roomtex-pick"));
   EXPECT_EQ(ReadSparseModel(output).images.size(), 2u);
-  EXPECT_EQ(RunCommandLine(command + " --near stranger.png,1,1,1").exit_code, 2);
+  EXPECT_EQ(RunCommandLine(command + " --near nobody.png,1,1,1").exit_code, 2);
 }
 
 TEST(PhotosAloneCommand, SaysInASentenceWhatIsMissing) {
