@@ -356,6 +356,13 @@ Scene MakeScene(const std::vector<Scan>& scans, const std::vector<PhotoView>& ph
   return scene;
 }
 
+// Whether there are samples or texels that lie beside others, as detail needs it.
+bool HasNeighbors(const Scene& scene) {
+  return scene.has_atlas ||
+         std::any_of(scene.grids.begin(), scene.grids.end(),
+                     [](const GridOfSamples& grid) { return grid.num_rows > 1; });
+}
+
 std::vector<size_t> SumsOf(const std::vector<std::vector<size_t>>& counts) {
   std::vector<size_t> sums;
   for (const std::vector<size_t>& of_photo : counts) {
@@ -376,7 +383,9 @@ void Blend(const std::vector<Scan>& scans, const std::vector<PhotoView>& photos,
     input.occluders.clear();
   }
   progress->Stage("blend");
-  const PhotoChoice choice = ChoosePhotos(input, *store, gains, photos, options.blend, num_threads);
+  const PhotoChoice choice =
+      HasNeighbors(*scene) ? ChoosePhotos(input, *store, gains, photos, options.blend, num_threads)
+                           : PhotoChoice();
   std::vector<int> numbers(photos.size());
   std::iota(numbers.begin(), numbers.end(), 0);
   for (size_t s = 0; s < scans.size(); ++s) {

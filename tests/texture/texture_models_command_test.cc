@@ -79,8 +79,10 @@ TEST_F(TextureCommand, ACloudIsColouredPointByPoint) {
   scan.up = Eigen::Vector3d::UnitZ();  // about it the angles show no grid
   for (int i = 0; i < 2; ++i) {        // the second time the station has to be found
     WriteScan(scan, {}, Path("cloud.ply"));
-    const CommandResult result = Texture("cloud", "--output_e57 1", Path("cloud.ply"));
+    const std::string select = i == 0 ? "" : " --Blend.mode select";  // needs neighbours: no effect
+    const CommandResult result = Texture("cloud", "--output_e57 1" + select, Path("cloud.ply"));
     ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err.find("--Blend.mode") != std::string::npos, i == 1) << result.err;
     const PlyVertices model = ReadPly(Path("cloud/model.ply"));
     ScanReaderOptions with_colors;
     with_colors.colors = true;

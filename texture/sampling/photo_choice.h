@@ -2,7 +2,7 @@
 // Which photo gives the detail where photos disagree: one per place, chosen so that neighbours
 // choose alike unless their photos show the same (after Lempitsky and Ivanov 2007, "Seamless
 // Mosaicing of Image-Based Texture Maps", with cells of space in place of triangles). Cells serve
-// samples of grids, clouds and meshes and the texels between them alike.
+// samples of grids and the texels of grids and meshes alike.
 
 #include <array>
 #include <cstdint>
