@@ -108,7 +108,7 @@ void JudgeScale(const AlignmentStart& start, const TrustOptions& trust,
   }
 }
 
-// Fewer points on the surface cannot be excused by a rough scan.
+// Fewer points on the surface cannot be excused by a coarse scan.
 constexpr double kLeastSurfaceShare = 0.3;
 
 void JudgePlacement(const Placement& placement, const TrustOptions& trust,
@@ -124,11 +124,7 @@ void JudgePlacement(const Placement& placement, const TrustOptions& trust,
         " % of the sparse points that the scanner could see lie within " +
         Number(trust.surface_tolerance, 3) + " m of the scan's surface (expected at least " +
         Number(100 * trust.min_surface_share, 0) + " %); the others float in empty space.";
-    if (placement.SurfaceShare() >= kLeastSurfaceShare) {
-      *doubt = {reason, false};
-    } else {
-      reasons->push_back(reason);
-    }
+    *doubt = {reason, placement.SurfaceShare() < kLeastSurfaceShare};
   } else if (!(placement.ChangedShare() <= trust.max_changed_share)) {
     const double percent = 100.0 / judged;
     *doubt = {
@@ -206,10 +202,10 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
 // so that photos of one support the scan of another; but they show 0 to 21 % of its corners, those
 // of the right one 59 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
 // Real rooms have 21 % and more: enough where points are merely few.
-bool Overrules(const GradientAgreement& photos, bool changed, const TrustOptions& trust) {
+bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions& trust) {
   constexpr double kClearlyShown = 0.4;
   const std::optional<double> shown = photos.shifts.ShownShare();
-  if (changed) return shown && *shown >= kClearlyShown;
+  if (differs) return shown && *shown >= kClearlyShown;
   return photos.supports && (!shown || *shown >= trust.min_shown_share);
 }
 
@@ -250,26 +246,26 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
 void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,
                Judgement* judgement) {
   if (judgement->doubt.reason.empty()) return;
-  const auto [reason, changed] = std::exchange(judgement->doubt, {});
+  const auto [reason, differs] = std::exchange(judgement->doubt, {});
   if (!input.image_path.empty() && judgement->reasons.empty()) {
     SparseModel aligned = input.model;
     TransformModel(fit.scan_from_sparse, &aligned);
     std::vector<std::string> ignored;  // comes again when the result is compared
     const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
                                                  AgreementOptions(), input.num_threads, &ignored);
-    if (Overrules(agreement.gradient, changed, trust)) {
-      judgement->follows_surface = !changed;
+    if (Overrules(agreement.gradient, differs, trust)) {
+      judgement->follows_surface = !differs;
       judgement->warnings.push_back(
           reason +
           " It is believed all the same: the photos show the scan's intensity where it is. " +
-          (changed ? "A scan that drifts, or things that were moved: one similarity for all photos "
+          (differs ? "A scan that drifts, or things that were moved: one similarity for all photos "
                      "is used, they are not adjusted to the surface."
                    : "A coarse scan, or things that it does not show."));
       return;
     }
   }
   std::string remedy;
-  if (!changed) remedy = " If the scan is coarse, say how coarse (--Trust.surface_tolerance).";
+  if (!differs) remedy = " If the scan is coarse, say how coarse (--Trust.surface_tolerance).";
   if (input.image_path.empty()) {
     remedy +=
         " Give --image_path: photos that show the scan's intensity where it is speak for the "

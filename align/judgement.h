@@ -26,14 +26,15 @@ struct Judgement {
   // Why the answer is not to be trusted; empty = trusted.
   std::vector<std::string> reasons;
   // One more reason, or "", that photos can overrule (AskPhotos): too few points on the surface for
-  // a laser scan, or too many before it and behind.
+  // a laser scan; or too few for a coarse one, or too many before it and behind, so that scan and
+  // photos differ.
   struct Doubt {
     std::string reason;
-    bool changed = false;  // the latter
+    bool differs = false;  // the latter
   } doubt;
-  // Photos overruled the latter: the surface is where the room is, but not as the photos have it.
-  // Following it brings photos out of place: in scans that drift by 4 cm per coordinate from 51 and
-  // 88 mm to 141 and 110, for no better colours (docs/real-rooms.md).
+  // Photos overruled that they differ: the surface is where the room is, but not as the photos have
+  // it. Following it brings photos out of place: in scans that drift by 4 cm per coordinate from 51
+  // and 88 mm to 141 and 110, for no better colours (docs/real-rooms.md).
   bool follows_surface = true;
 };
 

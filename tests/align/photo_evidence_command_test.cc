@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "align/judgement.h"
 #include "align/trust/free_space.h"
 #include "core/camera_model.h"
 #include "tests/align/case_folder.h"
@@ -119,6 +120,41 @@ TEST(PhotoEvidence, OverrulesPointsThatARoughScanLeavesFloating) {
   EXPECT_LT(1000 * off, 3 * captured.report["expected_error"]["at_cameras_mm"].get<double>());
 
   EXPECT_EQ(captured.AlignToRoom(RoughScan(28)).exit_code, 4);
+}
+
+// A depth camera that drifts has hardly any point within 5 cm of its scan in a large room: that is
+// no coarse scan, but photos know the room all the same.
+TEST(PhotoEvidence, OverrulesThatHardlyAnyPointLiesOnTheSurface) {
+  const Captured captured(SmallPhotos(0));
+  const SimulatedCase& one = captured.one;
+  const Alignment alignment = AlignCase(one);
+  ASSERT_TRUE(alignment.reasons.empty());
+  // Three points of four come 20 cm nearer to a photo.
+  SparseModel floating = one.model;
+  const double metre = 1 / alignment.scan_from_sparse.scale;
+  for (auto& [id, point] : floating.points) {
+    if (id % 4 == 0) continue;
+    const SparseImage& photo = floating.images.at(point.track[0].image_id);
+    const Eigen::Vector3d centre = photo.cam_from_model.TargetOriginInSource();
+    point.x_in_model += 0.2 * metre * (centre - point.x_in_model).normalized();
+  }
+  const AlignmentOptions options;
+  AlignmentFit fit = alignment.fit;
+  fit.points = FindSurfacePoints(floating, options.fit.min_track, 0.7);
+  AlignmentInput input{floating, Survey(one.scans), one.picks, "picks.csv", one.azimuth};
+  const auto judge = [&] {
+    Judgement judgement = JudgeFit(input, alignment.start, fit, options);
+    EXPECT_LT(judgement.placement.SurfaceShare(), 0.3);
+    EXPECT_THAT(judgement.doubt.reason, HasSubstr("float in empty space"));
+    AskPhotos(input, fit, options.trust, &judgement);
+    return judgement;
+  };
+  EXPECT_THAT(judge().reasons, testing::ElementsAre(HasSubstr("Give --image_path")));
+  input.image_path = captured.image_path;
+  const Judgement shown = judge();
+  EXPECT_THAT(shown.reasons, testing::IsEmpty());
+  EXPECT_THAT(shown.warnings, testing::Contains(HasSubstr("It is believed all the same")));
+  EXPECT_FALSE(shown.follows_surface);
 }
 
 }  // namespace
