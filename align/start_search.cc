@@ -120,6 +120,13 @@ std::vector<FittedStart> DistinctStarts(const SearchCloud& cloud, std::vector<Fi
   return kept;
 }
 
+Eigen::Vector3d PhotosMiddle(const StartSearch& search, int start) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& centre : search.cloud.centres) middle += centre;
+  return search.starts[start].scan_from_sparse *
+         (middle / static_cast<double>(search.cloud.centres.size()));
+}
+
 StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,
                          const AlignmentOptions& options, const StartSearchOptions& search) {
   StartSearch found;

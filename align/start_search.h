@@ -102,6 +102,9 @@ StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint
 std::vector<FittedStart> DistinctStarts(const SearchCloud& cloud, std::vector<FittedStart> starts,
                                         int most);
 
+// Where a start puts the middle of the photos' places.
+Eigen::Vector3d PhotosMiddle(const StartSearch& search, int start);
+
 // Metres: how far apart two starts put what the photos see, at the median over its points.
 double DistanceBetween(const SearchCloud& cloud, const Similarity& a, const Similarity& b);
 

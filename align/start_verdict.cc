@@ -6,14 +6,20 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/core.h>
 
+#include "align/pick_findings.h"
 #include "core/text.h"
 
 namespace roomtex {
 namespace {
 
-const char kRemedy[] =
+const char kHintRemedy[] =
     " Say where the photos belong: --near PHOTO,X,Y,Z with a place of the scan that the photo "
-    "shows, one to five picks, or six for an alignment by picks (--picks_path, roomtex-pick).";
+    "shows, or one to five picks (--picks_path, roomtex-pick).";
+const char kApartRemedy[] =
+    " One pick where these places differ tells them apart (--picks_path, roomtex-pick), and so "
+    "does --near PHOTO,X,Y,Z, a place of the scan that the photo shows, where they lie far apart.";
+// Where a hint is not enough.
+const char kPicksRemedy[] = " Six picks place it without a search (--picks_path, roomtex-pick).";
 
 // Share of the points on surfaces that face a way, below which nothing holds the model that way.
 constexpr double kLeastFacing = 0.02;
@@ -72,11 +78,7 @@ void Choose(const StartSearch& search, const StartVerdictOptions& options, Start
 }
 
 std::string Where(const AlignmentInput& input, const StartSearch& search, int start) {
-  const Similarity& s = search.starts[start].scan_from_sparse;
-  Eigen::Vector3d middle = input.scan_origin;
-  for (const Eigen::Vector3d& centre : search.cloud.centres) {
-    middle += s * centre / static_cast<double>(search.cloud.centres.size());
-  }
+  const Eigen::Vector3d middle = input.scan_origin + PhotosMiddle(search, start);
   return fmt::format("photos about ({:.2f}, {:.2f}, {:.2f}), {:.0f} % of their rays agree",
                      middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
 }
@@ -183,7 +185,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   StartVerdict verdict;
   if (search.starts.empty()) {
     verdict.reason =
-        std::string("No place was found where the sparse model fits the scan.") + kRemedy;
+        std::string("No place was found where the sparse model fits the scan.") + kPicksRemedy;
     return verdict;
   }
   Choose(search, options, &verdict);
@@ -201,8 +203,9 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     verdict.kind = Kind::kMirrored;
     verdict.reason = fmt::format(
         "The scan is a mirror image of the room: reflected, {} of the photos' rays meet its "
-        "surface where their points are, as it is {}.",
-        Percent(search.mirrored[0].sights.Share()), Percent(best.sights.Share()));
+        "surface where their points are, as it is {}. {}.",
+        Percent(search.mirrored[0].sights.Share()), Percent(best.sights.Share()),
+        MirrorRemedy(input));
     return verdict;
   }
   // What the surface leaves open the photos hold where they clearly confirm the place.
@@ -210,17 +213,21 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
       confirmed ? std::vector<Eigen::Vector3d>() : OpenSlides(input, search, best.scan_from_sparse);
   if (!open.empty()) {
     verdict.kind = Kind::kOpen;
-    verdict.reason = OpenReason(open) + kRemedy;
+    verdict.reason = OpenReason(open) + kPicksRemedy;
     return verdict;
   }
   if (!best.settled || score < min_score ||
       best.sights.ThroughShare() > options.max_through_share) {
     verdict.kind = Kind::kWeak;
-    verdict.reason = WeakReason(best, options) + kRemedy;
+    verdict.reason = WeakReason(best, options) + kPicksRemedy;
     return verdict;
   }
+  // Photos that could confirm it and do not: what a user says of the place changes nothing.
+  const bool denied = alone && best.photos && best.photos->shifts.clear.num >= kEnoughPatches;
   if (!confirmed && verdict.ratio < options.min_ratio) {
     verdict.kind = Kind::kAmbiguous;
+    // Of several places a hint leaves one; the mirror image is nowhere.
+    verdict.hint_decides = !denied && score >= options.min_ratio * verdict.mirrored_score;
     verdict.reason = score < options.min_ratio * second
                          ? "The sparse model fits the scan in more than one place: " +
                                Where(input, search, verdict.best) + "; or " +
@@ -229,23 +236,25 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
                                "The sparse model fits the scan little better than its mirror image "
                                "does ({:.0f} and {:.0f} % of the photos' rays agree).",
                                100 * best.sights.Share(), 100 * search.mirrored[0].sights.Share());
-    verdict.reason += kRemedy;
+    verdict.reason += verdict.hint_decides ? kApartRemedy : kPicksRemedy;
     return verdict;
   }
-  if (alone && best.photos && best.photos->shifts.clear.num >= kEnoughPatches) {
+  if (denied) {
     verdict.kind = Kind::kByPhotos;
     verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
         best.photos->contradicts ? best.photos->reason : UnconfirmedReason(best.photos->shifts);
-    verdict.reason += kRemedy;
+    verdict.reason += kPicksRemedy;
     return verdict;
   }
   if (!confirmed && !hinted) {
     verdict.kind = Kind::kUnconfirmed;
+    verdict.hint_decides = true;
     verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
-    verdict.reason = (alone ? kAloneReason : FaintReason(best.photos->shifts)) + kRemedy;
+    verdict.reason = (alone ? kAloneReason : FaintReason(best.photos->shifts)) + kHintRemedy;
     return verdict;
   }
+  verdict.chance_counted = confirmed;
   verdict.kind = Kind::kTrusted;
   return verdict;
 }

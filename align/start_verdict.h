@@ -57,6 +57,10 @@ struct StartVerdict {
   // How many of 1000 answers with evidence like this are wrong at most, over 1000. Where the photos
   // support the place it was counted (docs/automatic.md); else it is a guess by a curve.
   double chance_wrong = 1;
+  bool chance_counted = false;
+  // One pick more, or --near, is all that is missing: it says that scan and photos are of one room,
+  // or which of several places it is (for which --near is enough where they lie far apart).
+  bool hint_decides = false;
   std::string reason;  // in sentences, with a remedy; empty if trusted
 };
 

@@ -88,6 +88,9 @@ std::vector<std::string> AutoOptions::Problems() const {
     problems.push_back("--scanner_photos is 1, but " +
                        (why.empty() ? "no scan is an E57 that has photos with poses" : why));
   }
+  if (!near.empty() && num_sources == 0) {
+    problems.emplace_back("--near says where photos of yours belong: give --image_path");
+  }
   if (!camera_model.empty() && !CameraModelFromName(camera_model)) {
     problems.push_back("--camera_model " + camera_model + " is no model of COLMAP's");
   }

@@ -20,7 +20,7 @@ struct AutoOptions {
   std::string scan_poses, azimuth = "auto", up_axis = "auto", units;
   double max_range = 0;
   bool e57_check = true;
-  std::string output_path, picks_path;
+  std::string output_path, picks_path, near;
   std::string camera_model, camera_params, cameras_path;
   std::string quality = "medium", patterned = "auto", use_gpu = "auto", sequence = "auto";
   std::string pairs = "auto", scanner_photos = "auto";

@@ -172,6 +172,7 @@ CommandLine Chain::AutoCommand() const {
   AddScanReading(options_, &line);
   AddOption("--output_path", options_.output_path, &line);
   AddOption("--picks_path", options_.picks_path, &line);
+  AddOption("--near", options_.near, &line);
   AddOption("--camera_model", options_.camera_model, &line);
   AddOption("--camera_params", options_.camera_params, &line);
   AddOption("--cameras_path", options_.cameras_path, &line);

@@ -14,6 +14,7 @@
 #include "core/child_program.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/near_hint.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/partial_path.h"
@@ -52,6 +53,7 @@ void AddOptions(AutoOptions* o, Command* command) {
                         "Picks of roomtex-pick; not given = picks.csv in the output folder if it "
                         "is there, else without clicks.",
                         optional);
+  command->AddString("near", &o->near, kNearHelp);
   command->AddInputPath("cameras_path", &o->cameras_path,
                         "The calibrated camera: cameras.txt of roomtex-calibrate.", optional);
   command->AddString("camera_model", &o->camera_model,
@@ -145,6 +147,16 @@ void RequireApart(const std::string& output_path, const std::string& photos) {
   }
 }
 
+// What is not there cannot be in the sparse model, either. Photos of a video have no names yet, and
+// those of which every place was taken twice get common ones.
+void CheckNear(const AutoOptions& o) {
+  const std::string name = ParseNearHint(o.near).image_name;
+  const std::string& folder = o.image_path.empty() ? o.panoramas_path : o.image_path;
+  if (folder.empty() || IsThere(folder + "/" + name)) return;
+  if (IsThere(o.output_path + "/linked/plain/" + name)) return;
+  throw UsageError("--near names " + name + ", which is not in " + folder);
+}
+
 void CheckInputs(const AutoOptions& o) {
   if (!o.image_path.empty()) RequireFolder(o.image_path, "Give the folder of the photos");
   if (!o.panoramas_path.empty()) RequireFolder(o.panoramas_path, "Give the panoramas' folder");
@@ -152,6 +164,7 @@ void CheckInputs(const AutoOptions& o) {
   if (!o.picks_path.empty()) {
     RequireFile(o.picks_path, "Make it with roomtex-pick, or leave --picks_path out");
   }
+  if (!o.near.empty()) CheckNear(o);
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
   if (!o.scan_poses.empty()) RequireFile(o.scan_poses, "Give the file with the stations' poses");
   for (const std::string& photos : {o.image_path, o.panoramas_path}) {

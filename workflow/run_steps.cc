@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/text.h"
+#include "workflow/align_remedies.h"
 #include "workflow/remaining_time.h"
 
 namespace roomtex {
@@ -338,8 +339,8 @@ class StepRunner {
       record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
       if (run.success) continue;
       const bool is_ours = BeginsWith(line[0], "roomtex-");
-      const bool without_picks =
-          step.name == "align" && chain_.PicksPath().empty() && run.exit_code == kExitUsage;
+      const bool without_picks = step.name == "align" && chain_.PicksPath().empty() &&
+                                 chain_.options().near.empty() && run.exit_code == kExitUsage;
       record->reason =
           is_ours ? ReasonOf(step, run) : line[0] + " " + run.failure + ": " + run.LastLines();
       const bool untrusted = is_ours && (run.exit_code == kExitUntrusted || without_picks);
@@ -460,18 +461,17 @@ class StepRunner {
       return remedies;
     }
     if (step == "align") {
-      const bool has_picks = !chain_.PicksPath().empty();
-      remedies.push_back((has_picks ? "Look at the picks and mend them: "
-                                    : "Pick six points that photo and scan both show: ") +
-                         CommandText(chain_.PickCommand()));
-    } else if (step == "mapper") {
-      remedies.emplace_back(
-          "Add photos where it says that they are missing: between photos that do not see the "
-          "same, taken from another place, not only turned");
-    } else if (step == "associate") {
-      remedies.emplace_back("If these are ordinary photos, start again with --patterned 0");
+      remedies = AlignRemedies(chain_, ReadJsonFile(chain_.ReportOf(step)));
+    } else {
+      if (step == "mapper") {
+        remedies.emplace_back(
+            "Add photos where it says that they are missing: between photos that do not see the "
+            "same, taken from another place, not only turned");
+      } else if (step == "associate") {
+        remedies.emplace_back("If these are ordinary photos, start again with --patterned 0");
+      }
+      remedies.push_back("Then start again, it goes on from here: " + again);
     }
-    remedies.push_back("Then start again, it goes on from here: " + again);
     if (HasModel(step) && step != "associate") {
       remedies.push_back("To go on all the same: " + again +
                          (chain_.options().accept_untrusted ? "" : " --accept_untrusted 1"));

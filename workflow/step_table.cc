@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "core/text.h"
 #include "workflow/step_lines.h"
 #include "workflow/video_frames.h"
@@ -195,6 +196,11 @@ Step MakeAlign(Chain* chain) {
   Step step;
   CommandLine line = {"roomtex-align"};
   if (PhotosStandAlone(chain)) {
+    if (!options.near.empty()) {
+      throw UsageError(
+          "--near is a hint for where a sparse model belongs, and so few photos make none: give "
+          "six picks");
+    }
     AddLensOfPhotosAlone(chain, &line);
     step.notes.emplace_back("so few photos make no sparse model: each is placed by itself");
   } else {
@@ -216,12 +222,16 @@ Step MakeAlign(Chain* chain) {
   step.inputs.push_back(chain->ColorFolder());
   AddScans(options, &line, &step.inputs);
   const std::string picks = chain->PicksPath();
-  if (picks.empty() && !chain->KnownPath().empty()) {
+  AddOption("--near", options.near, &line);
+  if (!options.near.empty()) {
+    step.notes.emplace_back("the search keeps to where --near puts the photos");
+  } else if (picks.empty() && !chain->KnownPath().empty()) {
     step.notes.emplace_back(
         "no picks: where the scanner's photos stand, if the mapper could use it");
   } else if (picks.empty()) {
     step.notes.emplace_back("no picks: without clicks");
-  } else {
+  }
+  if (!picks.empty()) {
     AddOption("--picks_path", picks, &line);
     step.inputs.push_back(picks);
   }

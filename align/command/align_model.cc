@@ -80,7 +80,7 @@ std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
   if (!any_known) RequirePicksOrPhotos(a);
   GiveOut(a, &models);
   for (ModelToAlign& one : models) {
-    one.near = ReadHints(one.options, one.picks, one.model);
+    one.near = ReadHints(one.options, one.picks, one.model, context);
   }
   std::vector<const SparseModel*> all;
   for (const ModelToAlign& one : models) all.push_back(&one.model);

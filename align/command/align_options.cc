@@ -7,6 +7,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/input_guard.h"
+#include "core/near_hint.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo_fit.h"
@@ -40,9 +41,7 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
       "--known_path has put into the "
       "scan's frame needs neither.",
       Command::Kind::kOptional);
-  command->AddString("near", &a->near,
-                     "PHOTO,X,Y,Z: a photo and a place of the scan that it shows (metres, scan "
-                     "frame), a hint for the search without picks.");
+  command->AddString("near", &a->near, kNearHelp);
   command->AddOutputPath(
       "output_path", &a->output_path,
       "Folder for the aligned model, alignment.json (the report), scan_from_sparse.txt (scale, "

@@ -58,7 +58,7 @@ void LocalOrigin::MoveBack(Json* report) const {
     const bool is_similarity = BeginsWith(key, "scan_from_sparse") && value.is_object();
     if (is_similarity && value.contains("translation")) {
       move(&value["translation"]);
-    } else if (key == "point" || key == "far_corner") {
+    } else if (key == "point" || key == "far_corner" || key == "photos_middle") {
       move(&value);
     } else if (key != "options" && key != "inputs") {
       MoveBack(&value);

@@ -315,7 +315,7 @@ ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command:
 }
 
 std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,
-                                const SparseModel& model) {
+                                const SparseModel& model, const Command::Context& context) {
   if (a.picks_path.empty() || (AreHints(picks) && !a.image_path.empty())) {
     CheckPickNames(a.picks_path, picks, {&model});
   } else {
@@ -323,9 +323,12 @@ std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<
   }
   if (a.near.empty()) return {};
   const NearHint near = ParseNearHint(a.near);
-  if (!AreHints(picks)) throw UsageError("--near is a hint for a search, which six picks need not");
   if (model.FindImage(near.image_name) == nullptr) {
     throw UsageError("--near names " + near.image_name + ", which is not in the sparse model");
+  }
+  if (!AreHints(picks)) {
+    context.Warn("--near is not used: six picks place the model without a search");
+    return {};
   }
   return {near};
 }

@@ -32,7 +32,7 @@ ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command:
 // Where the photos belong, besides the picks, which are checked: fewer than six are a hint where
 // there are photos to confirm what is found.
 std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<Pick>& picks,
-                                const SparseModel& model);
+                                const SparseModel& model, const Command::Context& context);
 // Moves picks and hints to where the scans are held.
 void MoveToLocal(const ScanReading& reading, ModelToAlign* one);
 

@@ -35,6 +35,7 @@ Json StartToJson(const AutomaticAlignment& found, int index) {
   const FittedStart& start = found.search.starts[index];
   Json json;
   json["scan_from_sparse"] = ToJson(start.scan_from_sparse);
+  json["photos_middle"] = ToJson(PhotosMiddle(found.search, index));
   json["settled"] = start.settled;
   json["correlation"] = start.score;
   json["num_on_surface"] = start.num_on_surface;
@@ -89,6 +90,8 @@ Json SearchToJson(const AutomaticAlignment& found) {
   json["placed_photos"] = PlacedPhotosToJson(found.search);
   json["agreement"] = verdict.looks_alike || verdict.support != PhotoSupport::kNone;
   json["chance_wrong"] = verdict.chance_wrong;
+  json["chance_counted"] = verdict.chance_counted;
+  json["hint_decides"] = verdict.hint_decides;
   json["hypotheses"] = Json::array();
   for (size_t i = 0; i < found.search.starts.size(); ++i) {
     json["hypotheses"].push_back(StartToJson(found, static_cast<int>(i)));
@@ -104,6 +107,7 @@ Json FoundPhotosToJson(const FoundPhotos& found) {
   json["best"] = json["second"] = nullptr;
   json["agreement"] = !found.views.empty();
   json["chance_wrong"] = found.views.empty() ? kChanceNone : kChanceFoundPhoto;
+  json["chance_counted"] = !found.views.empty();
   json["photos"] = Json::array();
   for (const PhotoEvidence& photo : found.photos) {
     Json one;

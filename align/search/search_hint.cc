@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "core/camera_model.h"
-#include "core/error.h"
 #include "core/frames.h"
 
 namespace roomtex {
@@ -21,30 +19,6 @@ double HalfView(const Camera& camera) {
 }
 
 }  // namespace
-
-NearHint ParseNearHint(const std::string& text) {
-  const auto fail = [&text]() -> UsageError {
-    return UsageError("--near is \"" + text +
-                      "\": expected PHOTO,X,Y,Z, a photo and a place of the scan that it shows "
-                      "(metres, scan frame)");
-  };
-  std::vector<size_t> commas;
-  for (size_t at = text.size(); at-- > 0 && commas.size() < 3;) {
-    if (text[at] == ',') commas.push_back(at);
-  }
-  if (commas.size() < 3 || commas[2] == 0) throw fail();
-  NearHint hint;
-  hint.image_name = text.substr(0, commas[2]);
-  for (int k = 0; k < 3; ++k) {
-    const size_t begin = commas[2 - k] + 1;
-    const size_t end = k < 2 ? commas[1 - k] : text.size();
-    const std::string number = text.substr(begin, end - begin);
-    char* rest = nullptr;
-    hint.x_in_scan[k] = std::strtod(number.c_str(), &rest);
-    if (number.empty() || *rest != '\0' || !std::isfinite(hint.x_in_scan[k])) throw fail();
-  }
-  return hint;
-}
 
 std::vector<HintRay> FindHintRays(const SparseModel& model, const std::vector<Pick>& picks,
                                   const std::vector<NearHint>& near) {

@@ -10,17 +10,10 @@
 #include "align/clicks/picks.h"
 #include "align/search/search_cloud.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/near_hint.h"
 #include "core/similarity.h"
 
 namespace roomtex {
-
-// A photo shows a place: `--near PHOTO,X,Y,Z`.
-struct NearHint {
-  std::string image_name;
-  Eigen::Vector3d x_in_scan = Eigen::Vector3d::Zero();
-};
-// Of the text of the option. Throws UsageError.
-NearHint ParseNearHint(const std::string& text);
 
 // A ray that must come near a place of the scan.
 struct HintRay {

@@ -135,8 +135,17 @@ TEST(AutomaticAlignCommand, FindsThePlaceAndReportsTheEvidence) {
   EXPECT_EQ(search["best"]["photos"]["supports"], true);
   EXPECT_GT(search["best"]["rays"]["score"], search["second"]["rays"]["score"]);
   EXPECT_EQ(search["chance_wrong"], kChanceClear);
+  EXPECT_EQ(search["chance_counted"], true);
+  EXPECT_EQ(search["hint_decides"], false);
   EXPECT_EQ(report["picks"]["count"], 0);
   const SparseModel aligned = ReadSparseModel(folder.files.output_path);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const auto& [id, image] : aligned.images) {
+    middle += image.cam_from_model.TargetOriginInSource() / aligned.images.size();
+  }
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(search["best"]["photos_middle"][k].get<double>(), middle[k], 0.02);
+  }
   EXPECT_LT(WorstPoseErrors(*folder.one.room, aligned, Similarity()).position, 0.005);
 }
 
@@ -362,12 +371,13 @@ TEST(AutomaticAlignCommand, RefusesTheScanOfASimilarRoom) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
   const Json report = Json::parse(ReadBytes(output + "/alignment.json"));
   EXPECT_EQ(report["trusted"], false);
-  EXPECT_THAT(report["reason"].get<std::string>(), HasSubstr("--near"));
+  EXPECT_THAT(report["reason"].get<std::string>(), HasSubstr("Six picks place it"));
   EXPECT_NE(report["search"]["verdict"], "trusted");
   ASSERT_FALSE(report["search"]["hypotheses"].empty());
   for (const Json& place : report["search"]["hypotheses"]) {
     for (int k = 0; k < 3; ++k) {
       EXPECT_NEAR(place["scan_from_sparse"]["translation"][k].get<double>(), utm[k], 20);
+      EXPECT_NEAR(place["photos_middle"][k].get<double>(), utm[k], 20);
     }
   }
 }
@@ -395,6 +405,16 @@ TEST(AutomaticAlignCommand, TheNearHintIsChecked) {
                    " --near nobody.jpg,1,2,3 --output_path " + folder.files.output_path);
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("not in the sparse model"));
+}
+
+TEST(AutomaticAlignCommand, SixPicksNeedNoHint) {
+  const FolderWithPhotos& folder = FolderWithPhotos::Get();
+  const std::string output = folder.files.folder / "picked";
+  const CommandResult result = folder.Align(
+      " --scan_path " + folder.files.scan_path + " --picks_path " + folder.files.picks_path +
+      " --output_path " + output + " --near " + folder.one.picks[0].image_name + ",1,2,3");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(ReadBytes(output + "/alignment.json"), HasSubstr("--near is not used"));
 }
 
 }  // namespace

@@ -82,5 +82,46 @@ TEST(StartVerdict, FewCornersConfirmOnlyWhereMostOfThemFit) {
   EXPECT_EQ(Judge({Asked(Start(970, kExact), 70, 45, true), second}, 600).kind, Kind::kTrusted);
 }
 
+// What a hint does: places that it contradicts are gone, and a user has said that it is this room.
+TEST(StartVerdict, AHintIsAdvisedWhereItDecidesAndOnlyThere) {
+  const FittedStart best = Start(900, kExact), weak = Start(500, kExact),
+                    rival = Start(850, kExact);
+  const auto denied = [](const FittedStart& start) { return Asked(start, 400, 8, false); };
+  struct Case {
+    Kind kind;
+    std::vector<FittedStart> starts;
+    int mirrored;
+    bool decides;
+  };
+  for (const Case& one : std::vector<Case>{{Kind::kUnconfirmed, {best, weak}, 500, true},
+                                           {Kind::kAmbiguous, {best, rival}, 500, true},
+                                           {Kind::kAmbiguous, {best, rival}, 800, false},
+                                           {Kind::kAmbiguous, {best, weak}, 800, false},
+                                           {Kind::kAmbiguous, {denied(best), rival}, 500, false},
+                                           {Kind::kByPhotos, {denied(best), weak}, 500, false},
+                                           {Kind::kWeak, {weak}, 100, false},
+                                           {Kind::kMirrored, {Start(700, kExact)}, 950, false}}) {
+    const StartVerdict verdict = Judge(one.starts, one.mirrored);
+    SCOPED_TRACE(verdict.reason);
+    EXPECT_EQ(verdict.kind, one.kind);
+    EXPECT_EQ(verdict.hint_decides, one.decides);
+    const StartVerdict hinted = Judge({one.starts[0]}, one.mirrored, true);
+    EXPECT_EQ(hinted.kind == Kind::kTrusted, one.decides);
+    EXPECT_EQ(Judge(one.starts, one.mirrored, true).hint_decides,
+              one.decides && one.kind == Kind::kAmbiguous)
+        << "one that tells them apart";
+    EXPECT_EQ(verdict.reason.find("--near") != std::string::npos, one.decides);
+  }
+}
+
+// Of answers by geometry and a hint nobody has counted how many are wrong.
+TEST(StartVerdict, SaysWhereItsChanceWasCounted) {
+  const FittedStart second = Start(300, kExact);
+  const FittedStart clear = Asked(Start(900, kExact), 800, 400, true);
+  EXPECT_TRUE(Judge({clear, second}, 300).chance_counted);
+  EXPECT_FALSE(Judge({Start(900, kExact), second}, 300, true).chance_counted);
+  EXPECT_FALSE(Judge({Start(900, kExact), second}, 300).chance_counted);
+}
+
 }  // namespace
 }  // namespace roomtex

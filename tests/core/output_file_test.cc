@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/partial_path.h"
 #include "core/report.h"
 #include "tests/core/failing_calls.h"
 #include "tests/support/temp_folder.h"

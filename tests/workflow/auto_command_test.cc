@@ -113,6 +113,12 @@ TEST_F(AutoCommand, PrintsTheCommandsWithoutRunningThem) {
 TEST_F(AutoCommand, RefusesBadOptionsAndMissingFiles) {
   EXPECT_EQ(RunCommandLine(Arguments() + " --from nowhere").exit_code, 2);
   EXPECT_EQ(RunCommandLine(Arguments() + " --quality best").exit_code, 2);
+  const CommandResult near = RunCommandLine(Arguments() + " --near photo_000.jpg,1,2");
+  EXPECT_EQ(near.exit_code, 2);
+  EXPECT_THAT(near.err, HasSubstr("expected PHOTO,X,Y,Z"));
+  const CommandResult stranger = RunCommandLine(Arguments() + " --near nobody.jpg,1,2,3");
+  EXPECT_EQ(stranger.exit_code, 2);
+  EXPECT_THAT(stranger.err, HasSubstr("names nobody.jpg, which is not in"));
   const CommandResult result = RunCommandLine(Arguments("no.e57"));
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("does not exist"));
@@ -151,11 +157,30 @@ TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   EXPECT_THAT(result.err, HasSubstr("mapper: done before"));
   EXPECT_THAT(result.err, HasSubstr("roomtex-pick --input_path " + Result("sparse/0")));
   EXPECT_THAT(result.err, HasSubstr("start again"));
+  // Nothing but a word of the user would be missing, if it were the right room.
+  EXPECT_EQ(ReadJson(Result("log/align.json"))["search"]["hint_decides"], true);
+  EXPECT_THAT(result.err, HasSubstr("If photos and scan are of one room, pick one point"));
+  EXPECT_THAT(result.err, HasSubstr("--near PHOTO,X,Y,Z"));
   EXPECT_FALSE(fs::exists(Result("textured")));
   const json report = ReadJson(Result("report.json"));
   EXPECT_EQ(report["trusted"], false);
   EXPECT_EQ(report["verdict"]["state"], "untrusted");
   EXPECT_THAT(ReadBytes(Result("report.html")), HasSubstr("What to do now"));
+}
+
+TEST_F(AutoCommand, AlignsAgainWhereAPhotoIsSaidToBelongElsewhere) {
+  const auto run = [](const std::string& near) {
+    const CommandResult result = RunCommandLine(Arguments() + " --until align --near " + near);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  // Of capture/picks.csv.
+  const std::string near = "photo_001.jpg,-0.5455,0.5579,-1.9426";
+  EXPECT_THAT(run(near), HasSubstr("$ roomtex-align "));
+  EXPECT_EQ(ReadJson(Result("log/align.json"))["options"]["near"], near);
+  EXPECT_THAT(run(near), HasSubstr("align: done before"));
+  EXPECT_THAT(run("photo_001.jpg,-1.2431,-0.6965,1.1159"), HasSubstr("$ roomtex-align "));
+  EXPECT_THAT(ReadBytes(Result("log/align.log")), HasSubstr("align, changed: options"));
 }
 
 TEST_F(AutoCommand, GoesOnFromThereWithPicks) {

@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/child_program.h"
+#include "core/error.h"
 #include "core/photo.h"
 #include "tests/support/temp_folder.h"
 #include "workflow/scanner_photos.h"
@@ -249,6 +250,17 @@ TEST_F(StepTableTest, ThePicksThatAreThereAreUsed) {
   EXPECT_THAT(Line("align"), HasSubstr("--picks_path mine.csv"));
 }
 
+TEST_F(StepTableTest, APlaceThatAPhotoShowsGoesToTheSearch) {
+  AddPhotos("a", 3, 64);
+  EXPECT_THAT(Line("align"), Not(HasSubstr("--near")));
+  options_.near = "a100.jpg,1,-2.5,0";
+  EXPECT_THAT(Line("align"), HasSubstr("--near a100.jpg,1,-2.5,0"));
+  EXPECT_THAT(CommandText(Chain(options_).AutoCommand()), HasSubstr("--near a100.jpg,1,-2.5,0"));
+  EXPECT_THAT(options_.Problems(), IsEmpty());
+  options_.image_path.clear();
+  EXPECT_THAT(options_.Problems(), Contains(HasSubstr("--near says where photos of yours")));
+}
+
 TEST_F(StepTableTest, AllModelsOfTheMapperArePutIntoTheScan) {
   AddPhotos("a", 12, 64);
   const auto model = [&](int number) {
@@ -272,6 +284,9 @@ TEST_F(StepTableTest, OnePhotoIsPlacedByItselfWithoutAModel) {
   EXPECT_THAT(Applying(), ElementsAre("align", "texture", "pictures", "report"));
   EXPECT_THAT(Line("align"), Not(HasSubstr("--input_path")));
   EXPECT_THAT(Line("align"), HasSubstr("--camera_model OPENCV --camera_params 70,70,32,20"));
+  options_.near = "a100.jpg,1,-2.5,0";
+  EXPECT_THROW(Make("align"), UsageError);
+  options_.near.clear();
   // Two, and picks in one of them: by a model, which picks in one photo place.
   AddPhotos("b", 1, 64);
   EXPECT_THAT(Applying(), Not(Contains("mapper")));

@@ -29,6 +29,10 @@ const kInstead = [
     'Set six pairs: then the place need not be searched for.',
   ],
   [
+    /^One pick where these places differ .*/,
+    'Set a pair where these places differ, or six: then the place need not be searched for.',
+  ],
+  [
     /^Read it with --azimuth .*/,
     'Press Mirror above the scan: it is read the other way round then, and the picks stay.',
   ],

@@ -4,14 +4,11 @@
 
 #include "align/search/translation_search.h"
 #include "align/search/up_directions.h"
-#include "core/error.h"
 #include "core/random_stream.h"
 #include "tests/align/simulated_alignment.h"
 
 namespace roomtex {
 namespace {
-
-using testing::HasSubstr;
 
 ScanVolume VolumeOf(const SimulatedCase& one) {
   return ScanVolume(one.scans, one.scans[0].up, ScanVolumeOptions());
@@ -138,20 +135,6 @@ TEST(SearchHint, APickAgreesWithTheTruthAndNotWithAnotherPlace) {
   EXPECT_TRUE(Agrees(hints, truth, 0));
   truth.translation.x() += 1.5;
   EXPECT_FALSE(Agrees(hints, truth, 0));
-}
-
-TEST(SearchHint, IsReadWithCommasInTheName) {
-  const NearHint hint = ParseNearHint("a, b.jpg,1.5,-2,0.25");
-  EXPECT_EQ(hint.image_name, "a, b.jpg");
-  EXPECT_EQ(hint.x_in_scan, Eigen::Vector3d(1.5, -2, 0.25));
-  for (const char* text : {"", "a.jpg", "a.jpg,1,2", "a.jpg,1,2,x", ",1,2,3", "a.jpg,1,2,nan"}) {
-    try {
-      ParseNearHint(text);
-      ADD_FAILURE() << text;
-    } catch (const UsageError& error) {
-      EXPECT_THAT(error.what(), HasSubstr("expected PHOTO,X,Y,Z"));
-    }
-  }
 }
 
 }  // namespace
