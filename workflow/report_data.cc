@@ -8,6 +8,7 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "workflow/search_evidence.h"
 
 namespace roomtex {
 namespace {
@@ -49,6 +50,7 @@ class ReportMaker {
     keys["remedies"] = Remedies();
     keys["facts"] = Facts();
     keys["notices"] = Notices();
+    keys["searches"] = SearchEvidence(align_);
     keys["photos"] = Photos();
     keys["steps"] = Steps();
     keys["total"] = Total();

@@ -10,6 +10,7 @@
 #include "workflow/html_text.h"
 #include "workflow/room_coverage.h"
 #include "workflow/room_plan.h"
+#include "workflow/search_evidence.h"
 
 namespace roomtex {
 namespace {
@@ -29,6 +30,7 @@ class Page {
       FromOutside();
       BesidePhotos();
     }
+    Searches();
     if (HasStep("align")) Overlays();
     if (HasStep("texture") && HasStep("pictures")) Plans();
     Notices();
@@ -99,6 +101,12 @@ class Page {
       Figure(chain_.At("pictures/") + file, kWide, "Photo and coloured scan beside each other",
              picture["shows"]);
     }
+  }
+
+  void Searches() {
+    if (keys_["searches"].empty()) return;
+    Heading("How the place was found");
+    body_ += SearchHtml(keys_["searches"]);
   }
 
   void Overlays() {

@@ -80,6 +80,7 @@ td.untrusted, td.unfinished { color: var(--warn); }
 td.failed { color: var(--bad); }
 a { color: var(--accent); }
 tr.out td { color: var(--bad); }
+tr.best td { font-weight: 600; }
 tr.sum td { font-weight: 600; border-bottom: 0; }
 ul { padding-left: 22px; margin: 6px 0; }
 @media (max-width: 640px) {
@@ -98,6 +99,9 @@ ul { padding-left: 22px; margin: 6px 0; }
   h2, h3, h2 + p, h3 + p { break-after: avoid; }
   h2 { margin-top: 26px; }
   tr, .todo, dl.facts div, pre { break-inside: avoid; }
+  .table { overflow: visible; }
+  table { font-size: 7.5pt; }
+  th, td { padding-right: 6px; }
   figure { margin-bottom: 10px; }
   figure img { width: auto; max-width: 100%; max-height: 44mm; }
   .two figure img { max-height: none; }

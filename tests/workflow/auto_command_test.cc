@@ -165,7 +165,17 @@ TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   const json report = ReadJson(Result("report.json"));
   EXPECT_EQ(report["trusted"], false);
   EXPECT_EQ(report["verdict"]["state"], "untrusted");
-  EXPECT_THAT(ReadBytes(Result("report.html")), HasSubstr("What to do now"));
+  const std::string page = ReadBytes(Result("report.html"));
+  EXPECT_THAT(page, HasSubstr("What to do now"));
+  // What was found, and what else there is.
+  const json& search = report["searches"][0];
+  EXPECT_EQ(search["verdict"], "unconfirmed");
+  EXPECT_EQ(search["chance_counted"], false);
+  EXPECT_EQ(search["places"][0]["place"], "best");
+  EXPECT_EQ(search["places"][1]["place"], "second");
+  EXPECT_LT(search["places"][1]["score"], search["places"][0]["score"]);
+  EXPECT_THAT(page, HasSubstr("How the place was found"));
+  EXPECT_THAT(page, HasSubstr("that is a guess"));
 }
 
 TEST_F(AutoCommand, AlignsAgainWhereAPhotoIsSaidToBelongElsewhere) {
@@ -213,6 +223,8 @@ TEST_F(AutoCommand, ReportsInOneFileThatNeedsNoOther) {
   EXPECT_EQ(report["command"], "roomtex-auto");
   EXPECT_EQ(report["trusted"], true);
   EXPECT_EQ(report["verdict"]["state"], "trusted");
+  EXPECT_TRUE(report["searches"].empty());  // six picks
+  EXPECT_THAT(page, Not(HasSubstr("How the place was found")));
   EXPECT_EQ(report["photos"].size(), 12u);
   EXPECT_GT(report["photos"][0]["expected_error_mm"], 0);
   EXPECT_EQ(report["steps"].size(), 6u);
