@@ -52,6 +52,7 @@ class ReportMaker {
     keys["notices"] = Notices();
     keys["searches"] = SearchEvidence(align_);
     keys["photos"] = Photos();
+    keys["registration"] = At(texture_, {"registration", "applied"});
     keys["steps"] = Steps();
     keys["total"] = Total();
     keys["versions"] = {{"roomtex", Version()}};
@@ -245,6 +246,7 @@ class ReportMaker {
       }
       photos[name]["samples_seen"] = At(texture_, {"samples_seen", name.c_str()});
     }
+    AddWhatTextureFound(&photos);
     Json list = Json::array();
     for (const auto& [name, photo] : photos) {
       Json one = {{"name", name}};
@@ -252,6 +254,25 @@ class ReportMaker {
       list.push_back(one);
     }
     return list;
+  }
+
+  // How each photo lies on the others, and how sharp it is beside them.
+  void AddWhatTextureFound(std::map<std::string, Json>* photos) const {
+    const Json& images = At(texture_, {"images"});
+    for (const Json& image : images.is_array() ? images : Json::array()) {
+      Json& photo = (*photos)[image.at("name")];
+      for (const char* key : {"shift_px", "shift_map_px", "row_turned_deg", "corrected"}) {
+        photo[key] = image.value(key, Json());
+      }
+    }
+    const Json& told = At(texture_, {"photo_sharpness"});
+    const Json sharpness = told.is_object() ? told : Json::object();
+    for (const auto& [name, one] : sharpness.items()) {
+      Json& photo = (*photos)[name];
+      photo["sharpness"] = one.value("sharpness", Json());
+      photo["blurred"] = NumberAt(one, {"weight"}) < 1;
+      photo["agreement"] = At(texture_, {"photo_agreement", name.c_str(), "correlation"});
+    }
   }
 
   Json Steps() const {

@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "workflow/evidence_points.h"
 #include "workflow/html_text.h"
+#include "workflow/misregistration_map.h"
 #include "workflow/room_coverage.h"
 #include "workflow/room_plan.h"
 #include "workflow/search_evidence.h"
@@ -226,25 +227,59 @@ class Page {
     Heading("Photos");
     body_ +=
         "<p class=\"quiet\">Registered: seed = of the first photos, mapper = by COLMAP, chained = "
-        "by its "
-        "neighbours alone, model 1 and on = in another sparse model. Error: expected, one standard "
-        "deviation. Support: share of its matches "
-        "that obey the model. Exposure: brighter (+) or darker (-) than the reference photo.</p>"
-        "<div class=\"table\"><table><thead><tr><th class=\"n\">No.</th><th>Photo</th>"
-        "<th>Registered</th><th class=\"n\">Error, mm</th><th class=\"n\">Support, %</th>"
-        "<th class=\"n\">Exposure, EV</th><th class=\"n\">Samples</th><th>Left out because</th>"
-        "</tr></thead><tbody>";
+        "by its neighbours alone, model 1 and on = in another sparse model. Error: expected, one "
+        "standard deviation. Support: share of its matches that obey the model. Exposure: brighter "
+        "(+) or darker (-) than the reference photo. Off: how far it lies beside what the other "
+        "photos show, pixels of the photo, median, as it came and as it was coloured with. Sharp: "
+        "its detail beside that of the sharp photos. Where off: parts of the photo as it came, "
+        "<span class=\"ramp\"></span> 0 to " +
+        Number(kWorstShift, 0) + " px and more, empty where nothing could be compared.</p>\n";
+    Corrections();
+    Blurred();
+    body_ +=
+        "<div class=\"table\"><table><thead><tr><th class=\"n\">No.</th>"
+        "<th>Photo</th><th>Registered</th><th class=\"n\">Error,<br>mm</th>"
+        "<th class=\"n\">Support,<br>%</th><th class=\"n\">Exposure,<br>EV</th>"
+        "<th class=\"n\">Samples</th><th class=\"n\">Off,<br>px</th>"
+        "<th class=\"n\">then,<br>px</th><th class=\"n\">Sharp,<br>%</th><th>Where off</th>"
+        "<th>Left out because</th></tr></thead><tbody>";
     for (const Json& photo : photos) {
       const std::string name = photo["name"];
       const std::string left_out = photo.value("left_out", "");
+      const Json shift = photo.value("shift_px", Json::object());
       body_ += left_out.empty() ? "<tr>" : "<tr class=\"out\">";
       body_ += "<td class=\"n\">" + NumberOf(name) + "</td>" + HtmlTag("td", name) +
                HtmlTag("td", photo.value("registered_by", "–")) +
                HtmlCell(photo, "expected_error_mm", 1, 1) +
                HtmlCell(photo, "match_support", 100, 0) + HtmlCell(photo, "exposure_ev", 1, 1) +
-               HtmlCell(photo, "samples_seen", 1, 0) + HtmlTag("td", left_out) + "</tr>";
+               HtmlCell(photo, "samples_seen", 1, 0) + HtmlCell(shift, "before", 1, 2) +
+               HtmlCell(shift, "after", 1, 2) + HtmlCell(photo, "sharpness", 100, 0) + "<td>" +
+               MisregistrationMap(photo.value("shift_map_px", Json())) + "</td>" +
+               HtmlTag("td", left_out) + "</tr>";
     }
     body_ += "</tbody></table></div>\n";
+  }
+
+  // What was done about photos that are off.
+  void Corrections() {
+    const Json& applied = keys_["registration"];
+    if (!applied.is_string()) return;
+    const std::string how = applied == "none"           ? ""
+                            : applied == "pose_by_scan" ? "their poses and the scan's intensity"
+                            : applied == "warp"         ? "their poses and a slight bend of each"
+                                                        : "their poses";
+    body_ += HtmlTag("p", how.empty() ? "Colours come from the photos as they stood."
+                                      : "Photos that were off were corrected by " + how + ".");
+  }
+
+  void Blurred() {
+    std::string names;
+    for (const Json& photo : keys_["photos"]) {
+      if (!photo.value("blurred", false)) continue;
+      names += (names.empty() ? "" : ", ") + photo["name"].get<std::string>();
+    }
+    if (names.empty()) return;
+    body_ += HtmlTag("p", "Blurred beside the others, so that they count less: " + names + ".");
   }
 
   void Steps() {

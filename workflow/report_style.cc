@@ -73,6 +73,7 @@ table { border-collapse: collapse; width: 100%; font-size: .875rem; font-variant
 th { text-align: left; font-weight: 600; color: var(--quiet); border-bottom: 2px solid var(--line); padding: 6px 10px 6px 0; vertical-align: bottom; }
 td { border-bottom: 1px solid var(--line); padding: 5px 10px 5px 0; vertical-align: top; }
 td.n, th.n { text-align: right; white-space: nowrap; }
+svg.map { display: block; background: var(--raised); border: 1px solid var(--line); }
 td.state { font-weight: 600; white-space: nowrap; }
 td.notes { min-width: 10rem; }
 td.trusted { color: var(--good); }

@@ -100,6 +100,12 @@ TEST(AutoOptions, HoldEveryGroupOfOptionsOfTheCommandsThatItRuns) {
   }
 }
 
+size_t NumTimes(const std::string& text, const std::string& part) {
+  size_t count = 0;
+  for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
 TEST_F(AutoCommand, PrintsTheCommandsWithoutRunningThem) {
   const CommandResult result = RunCommandLine(Arguments() + " --dry_run");
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -214,11 +220,7 @@ TEST_F(AutoCommand, ReportsInOneFileThatNeedsNoOther) {
     EXPECT_THAT(page, Not(HasSubstr(text)));
   }
   // Four photos beside the scan, four overlays, two views from outside.
-  size_t num_pictures = 0;
-  for (size_t at = page.find("<img "); at != std::string::npos; at = page.find("<img ", at + 1)) {
-    ++num_pictures;
-  }
-  EXPECT_EQ(num_pictures, 10u);
+  EXPECT_EQ(NumTimes(page, "<img "), 10u);
   const json report = ReadJson(Result("report.json"));
   EXPECT_EQ(report["command"], "roomtex-auto");
   EXPECT_EQ(report["trusted"], true);
@@ -231,6 +233,38 @@ TEST_F(AutoCommand, ReportsInOneFileThatNeedsNoOther) {
   EXPECT_GT(report["total"]["peak_memory_bytes"], 10'000'000);
   EXPECT_GT(report["coverage"]["all"], 0.5);
   EXPECT_LE(report["coverage"]["all"], 1.0);
+}
+
+TEST_F(AutoCommand, TellsWhatTheColoursShowedOfEachPhoto) {
+  const std::string measured = ReadBytes(Result("log/texture.json"));
+  json texture = json::parse(measured);
+  const json photos = ReadJson(Result("report.json"))["photos"];
+  ASSERT_EQ(photos.size(), texture["images"].size());
+  size_t num_maps = 0;
+  for (const json& image : texture["images"]) {
+    const std::string name = image["name"];
+    const auto photo = std::find_if(photos.begin(), photos.end(),
+                                    [&](const json& one) { return one["name"] == name; });
+    ASSERT_NE(photo, photos.end()) << name;
+    for (const char* key : {"shift_px", "shift_map_px", "row_turned_deg", "corrected"}) {
+      EXPECT_EQ((*photo)[key], image[key]) << name << " " << key;
+    }
+    EXPECT_EQ((*photo)["sharpness"], texture["photo_sharpness"][name]["sharpness"]);
+    EXPECT_EQ((*photo)["agreement"], texture["photo_agreement"][name]["correlation"]);
+    num_maps += image["shift_map_px"].dump().find('.') != std::string::npos;
+  }
+  EXPECT_GT(num_maps, 6u);
+  const auto page = [] { return ReadBytes(Result("report.html")); };
+  EXPECT_EQ(NumTimes(page(), "<svg class=\"map\""), num_maps);
+  EXPECT_THAT(page(), Not(HasSubstr("Blurred beside the others")));
+
+  texture["photo_sharpness"]["photo_003.jpg"] = {{"sharpness", 0.41}, {"weight", 0.3}};
+  WriteBytes(Result("log/texture.json"), texture.dump());
+  ASSERT_EQ(RunCommandLine(Arguments() + " --only report").exit_code, 0);
+  EXPECT_THAT(page(), HasSubstr("so that they count less: photo_003.jpg."));
+  EXPECT_EQ(ReadJson(Result("report.json"))["photos"][3]["blurred"], true);
+  WriteBytes(Result("log/texture.json"), measured);
+  ASSERT_EQ(RunCommandLine(Arguments() + " --only report").exit_code, 0);
 }
 
 TEST_F(AutoCommand, DoesNothingTwice) {
