@@ -117,10 +117,10 @@ class Page {
     Heading("The scan's edges on the photos");
     body_ +=
         "<p class=\"quiet\">Photo, the scan's intensity from its place, and the scan's edges on "
-        "the "
-        "photo; below, parts of it three times as large. Cyan: creases, to a tenth of a sample; a "
-        "misfit of a pixel shows there. Yellow and magenta lines lie anywhere between two "
-        "samples.</p>\n";
+        "the photo; below, parts of it three times as large. Rings: corners of the intensity that "
+        "the photo shows where the scan has them; crosses: those that it does not. Cyan lines: "
+        "creases, to a tenth of a sample; a misfit of a pixel shows there. Yellow and magenta "
+        "lines lie anywhere between two samples.</p>\n";
     for (const Json& path : paths) {
       if (!path.is_string()) continue;
       const std::string text = path;

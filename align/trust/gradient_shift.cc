@@ -137,7 +137,11 @@ class PhotoMatcher {
       shifts.push_back({*found - at, {0, x_in_img, patches_[i].x_in_cam}});
       if (clear) {
         result.clear.Add(shift <= tolerance_);
-        if (shift <= tolerance_) result.corners.push_back(shifts.back().corner);
+        if (shift <= tolerance_) {
+          result.corners.push_back(shifts.back().corner);
+        } else {
+          result.corners_amiss.push_back(view_.cell_px * (at + Eigen::Vector2d(0.5, 0.5)));
+        }
       }
       CompareAtOtherPoses(i, pattern, &result);
       const auto other = OtherPlace(i);
@@ -341,6 +345,7 @@ void GradientShifts::Add(const GradientShifts& other) {
   alike.Add(other.alike);
   num_alike_by_chance += other.num_alike_by_chance;
   corners.insert(corners.end(), other.corners.begin(), other.corners.end());
+  corners_amiss.insert(corners_amiss.end(), other.corners_amiss.begin(), other.corners_amiss.end());
   shifted_alike.insert(shifted_alike.end(), other.shifted_alike.begin(), other.shifted_alike.end());
 }
 

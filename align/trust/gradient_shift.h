@@ -79,6 +79,8 @@ struct GradientShifts {
   Tally elsewhere;  // patches compared with another place of the photo: chance
   double tolerance_deg = 0;
   std::vector<FittingCorner> corners;  // of clear photos, those within the tolerance
+  // Of these photos, the others, where the scan has them; `img`.
+  std::vector<Eigen::Vector2d> corners_amiss;
   // Where a photo shows many more patches shifted alike than by chance: these patches, where
   // the photo shows them (MeasureAgreement() keeps those of clear photos). A pose that is a few
   // degrees off, by drift or by a bent model, shifts all of what one photo shows.

@@ -62,6 +62,24 @@ void DrawEdges(const std::vector<ImgEdge>& edges, const Eigen::Vector2d& corner,
   }
 }
 
+const cv::Scalar kInPlace(255, 200, 0), kAmiss(60, 60, 255);
+
+// Rings and crosses into a picture of the whole photo, `scale` times as large.
+void DrawCorners(const GradientShifts& shifts, double scale, cv::Mat* picture) {
+  constexpr int kRadius = 6, kThickness = 2;  // pixels of the picture
+  const auto at = [scale](const Eigen::Vector2d& x_in_img) {
+    const Eigen::Vector2d x = OpenCvFromImg(scale * x_in_img);
+    return cv::Point(static_cast<int>(std::lround(x.x())), static_cast<int>(std::lround(x.y())));
+  };
+  for (const FittingCorner& corner : shifts.corners) {
+    cv::circle(*picture, at(corner.x_in_img), kRadius, kInPlace, kThickness, cv::LINE_AA);
+  }
+  for (const Eigen::Vector2d& x_in_img : shifts.corners_amiss) {
+    cv::drawMarker(*picture, at(x_in_img), kAmiss, cv::MARKER_TILTED_CROSS, 2 * kRadius, kThickness,
+                   cv::LINE_AA);
+  }
+}
+
 void Write(const std::string& text, int x, int y, const cv::Scalar& color, cv::Mat* picture) {
   cv::putText(*picture, text, {x, y}, cv::FONT_HERSHEY_SIMPLEX, 0.55, color, 1, cv::LINE_AA);
 }
@@ -165,18 +183,23 @@ std::vector<cv::Rect> ChooseCrops(const std::vector<ImgEdge>& edges, const cv::S
 void DrawCaptions(const std::string& name, int panel_width, cv::Mat* sheet) {
   const cv::Scalar white(255, 255, 255);
   Write(name, 6, 18, white, sheet);
-  Write("scan intensity from the photo's pose", panel_width + 6, 18, white, sheet);
-  int x = 2 * panel_width + 6;
-  const std::pair<const char*, cv::Scalar> legend[] = {
-      {"scan edges on the photo:", white},
-      {"crease", ColorOf(ScanEdge::Kind::kCrease)},
-      {"intensity", ColorOf(ScanEdge::Kind::kIntensity)},
-      {"rim", ColorOf(ScanEdge::Kind::kDepth)},
-      {"(these two: to a sample)", white}};
-  for (const auto& [text, color] : legend) {
-    Write(text, x, 18, color, sheet);
-    x += TextWidth(text) + 14;
-  }
+  using Legend = std::vector<std::pair<std::string, cv::Scalar>>;
+  const auto write = [sheet](const Legend& legend, int x) {
+    for (const auto& [text, color] : legend) {
+      Write(text, x, 18, color, sheet);
+      x += TextWidth(text) + 14;
+    }
+  };
+  write({{"scan intensity from the photo's pose; its corners:", white},
+         {"ring = in place", kInPlace},
+         {"cross = not", kAmiss}},
+        panel_width + 6);
+  write({{"scan edges on the photo:", white},
+         {"crease", ColorOf(ScanEdge::Kind::kCrease)},
+         {"intensity", ColorOf(ScanEdge::Kind::kIntensity)},
+         {"rim", ColorOf(ScanEdge::Kind::kDepth)},
+         {"(these two: to a sample)", white}},
+        2 * panel_width + 6);
 }
 
 }  // namespace
@@ -237,7 +260,8 @@ std::vector<ImgEdge> SeeEdges(const std::vector<ScanEdge>& edges, const FreeSpac
 }
 
 cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vector<ImgEdge>& edges,
-                    const std::string& name, const OverlayOptions& options) {
+                    const GradientShifts& shifts, const std::string& name,
+                    const OverlayOptions& options) {
   const double scale = static_cast<double>(options.panel_width) / photo.cols;
   const cv::Size panel(options.panel_width,
                        std::max(1, static_cast<int>(std::lround(scale * photo.rows))));
@@ -255,7 +279,11 @@ cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vecto
   for (int k = 0; k < 3; ++k) {
     cv::Mat place = sheet(cv::Rect({k * panel.width, kCaption}, panel));
     panels[k].copyTo(place);
-    if (k == 2) DrawEdges(edges, Eigen::Vector2d::Zero(), scale, &place);
+    if (k == 2) {
+      DrawEdges(edges, Eigen::Vector2d::Zero(), scale, &place);
+    } else {
+      DrawCorners(shifts, scale, &place);
+    }
     for (size_t c = 0; c < crops.size(); ++c) {
       const cv::Rect2d frame(scale * crops[c].x, scale * crops[c].y, scale * crops[c].width,
                              scale * crops[c].height);
@@ -299,6 +327,7 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     CameraProjection projection;
     int cell_px;
     RayLattice lattice;
+    LookSetup corners;  // as the alignment's agreement is measured
   };
   std::map<uint32_t, Setup> setups;
   std::set<std::string> taken;
@@ -320,7 +349,8 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     cell_px = std::min({cell_px, camera.width, camera.height});
     const CameraProjection projection(camera);
     const double step = viewer.has_mesh() ? cell_px : kOverlayNodeCells * cell_px;
-    setups.emplace(image->camera_id, Setup{projection, cell_px, RayLattice(projection, step)});
+    setups.emplace(image->camera_id, Setup{projection, cell_px, RayLattice(projection, step),
+                                           LookSetup(camera, viewer, FinestCell(camera, viewer))});
   }
   MakeFolder(folder);
   std::vector<std::string> problems(images.size());
@@ -331,9 +361,12 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     const auto photo = views.Read(image, image_path, &problems[i]);
     if (!photo) return;
     const ScanView view = viewer.Look(setup.lattice, camera, image.cam_from_model, setup.cell_px);
+    const GradientShifts shifts =
+        MeasureGradientShifts(setup.corners.Look(viewer, image.cam_from_model), *photo,
+                              setup.projection, viewer.sample_angle(), options.gradient);
     const cv::Mat sheet = DrawOverlay(
         *photo, view, SeeEdges(edges, viewer.free_space(), setup.projection, image.cam_from_model),
-        image.name, options);
+        shifts, image.name, options);
     std::vector<uchar> bytes;
     cv::imencode(".jpg", sheet, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
     OutputFile file(paths[i]);

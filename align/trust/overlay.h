@@ -9,6 +9,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "align/trust/free_space.h"
+#include "align/trust/gradient_shift.h"
 #include "align/trust/scan_edges.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
@@ -21,6 +22,7 @@ struct OverlayOptions {
   int num_crops = 3;              // cut-outs below the panels, each plain and with edges
   int crop_scale = 3;             // a pixel of the photo is this many pixels wide in a cut-out
   double max_view_cells = 2.5e6;  // the intensity is rendered at no more positions than this
+  GradientShiftOptions gradient;
   ScanEdgeOptions edges;
 };
 
@@ -41,9 +43,12 @@ std::vector<ImgEdge> SeeEdges(const std::vector<ScanEdge>& edges, const FreeSpac
                               const CameraProjection& projection, const Rigid& cam_from_scan);
 
 // photo: 8-bit BGR of the size of the camera. Left to right: photo, scan intensity (blue where the
-// scan shows nothing), edges on the grey photo; below, cut-outs where edges are many.
+// scan shows nothing), edges on the grey photo; below, cut-outs where edges are many. On the first
+// two, corners of the intensity that the photo shows where the scan has them (rings), and those
+// that it does not (crosses).
 cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vector<ImgEdge>& edges,
-                    const std::string& name, const OverlayOptions& options);
+                    const GradientShifts& shifts, const std::string& name,
+                    const OverlayOptions& options);
 
 // Writes folder/NAME.jpg for `count` photos evenly taken from all; a slash in a name becomes an
 // underscore. Gives the paths written. Photos that cannot be read are named in `warnings`.

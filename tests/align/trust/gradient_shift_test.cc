@@ -34,6 +34,9 @@ TEST(GradientShift, SupportsTheTruePosesWithAMedianShiftBelowAPixel) {
   EXPECT_LT(right.shifts.far.Share(), 0.05);
   EXPECT_LT(right.median_shift_px, 1.0);
   EXPECT_EQ(right.shifts.num_unclear_photos, 0);
+  EXPECT_EQ(right.shifts.corners.size(), static_cast<size_t>(right.shifts.clear.hits));
+  EXPECT_EQ(right.shifts.corners.size() + right.shifts.corners_amiss.size(),
+            static_cast<size_t>(right.shifts.clear.num));
 }
 
 // The patches of poses turned or moved by little are a statement about what a measurement at those

@@ -170,7 +170,7 @@ TEST(DrawOverlay, DrawsTheEdgesWhereTheyAre) {
   ImgEdge edge{Kind::kIntensity, {{300.5, 200.5}, {300.5, 280.5}, {380.5, 280.5}}};
   OverlayOptions options;
   options.panel_width = 800;
-  const cv::Mat sheet = DrawOverlay(photo, view, {edge}, "photo.jpg", options);
+  const cv::Mat sheet = DrawOverlay(photo, view, {edge}, {}, "photo.jpg", options);
   EXPECT_EQ(sheet.cols, 2400);
   // Right panel, below the line of text: the middle of pixel (300, y) is img 300.5.
   const int left = 1600, top = 26;
@@ -180,6 +180,33 @@ TEST(DrawOverlay, DrawsTheEdgesWhereTheyAre) {
   EXPECT_GT(sheet.at<cv::Vec3b>(top + 280, left + 350)[2], 200);
   // The left panel is the photo alone.
   EXPECT_LT(sheet.at<cv::Vec3b>(top + 240, 300)[2], 30);
+}
+
+// On photo and intensity alike, in place and not told apart; the panel with the edges has none.
+TEST(DrawOverlay, MarksTheCornersThatThePhotoShowsAndThoseThatItDoesNot) {
+  const cv::Mat photo(600, 800, CV_8UC3, cv::Scalar(0, 0, 0));
+  ScanView view;
+  view.grey = cv::Mat1f(600, 800, 50.0f);
+  view.valid = cv::Mat1b(600, 800, static_cast<uchar>(255));
+  GradientShifts shifts;
+  shifts.corners.push_back({0, {300.5, 200.5}, {}});
+  shifts.corners_amiss.emplace_back(500.5, 400.5);
+  OverlayOptions options;
+  options.panel_width = 800;
+  const cv::Mat with = DrawOverlay(photo, view, {}, shifts, "photo.jpg", options),
+                without = DrawOverlay(photo, view, {}, {}, "photo.jpg", options);
+  constexpr int kTop = 26;
+  for (const int left : {0, 800}) {
+    const auto at = [&](int x, int y) { return with.at<cv::Vec3b>(kTop + y, left + x); };
+    const auto ground = [&](int x, int y) { return without.at<cv::Vec3b>(kTop + y, left + x); };
+    EXPECT_GT(at(306, 200)[0], 200) << "the ring, blue and more";
+    EXPECT_LT(at(306, 200)[2], 120);
+    EXPECT_EQ(at(300, 200), ground(300, 200)) << "open in its middle";
+    EXPECT_GT(at(500, 400)[2], 200) << "the cross, red";
+    EXPECT_LT(at(500, 400)[0], 120);
+  }
+  const cv::Rect edges(1600, kTop, 800, 600);
+  EXPECT_EQ(cv::norm(with(edges), without(edges), cv::NORM_INF), 0);
 }
 
 TEST(AlignCommand, WritesAsManyOverlaysAsAskedFor) {
