@@ -20,12 +20,14 @@ constexpr size_t kMaxLine = 4000;               // characters
 constexpr char kSpeaker[] = "roomtex-align: ";  // before what it has to say
 
 // The stages that roomtex-align prints, in their order, with their seconds on a scan of 2 M samples
-// and 30 photos: what a share of the whole is measured by. A stage prints when it is done.
+// and 30 photos (those of a search: 320 000 samples and 12 photos): what a share of the whole is
+// measured by. A stage prints when it is done.
 struct Stage {
   const char* name;
   double seconds;
 };
-constexpr Stage kStages[] = {
+using Stages = std::vector<Stage>;
+const Stages kStagesByPicks = {
     {"read model", 0.1},    {"read photos", 0.05},
     {"read scan", 0.3},     {"stations", 0.3},
     {"planes", 0.9},        {"scan surface", 0.1},
@@ -35,25 +37,43 @@ constexpr Stage kStages[] = {
     {"single photos", 0.1}, {"agreement", 0.9},
     {"overlays", 0.9},      {"write", 0.1},
 };
-constexpr int kNumStages = sizeof kStages / sizeof kStages[0];
+const Stages kStagesOfSearch = {
+    {"read model", 0.1},
+    {"read scan", 0.1},
+    {"stations", 0.3},
+    {"planes", 1.2},
+    {"search", 12},
+    {"search verdict", 1.5},
+    {"search by appearance", 0.7},
+    {"features of the scan", 0.9},
+    {"features of the photos", 1},
+    {"scan surface", 0.1},
+    {"lenses", 0.4},
+    {"surface refinement", 0.1},
+    {"trust", 0.05},
+    {"bundle adjustment", 4},
+    {"single photos", 0.1},
+    {"agreement", 1.5},
+    {"overlays", 0.9},
+    {"write", 0.1},
+};
+const Stages& StagesOf(bool searches) { return searches ? kStagesOfSearch : kStagesByPicks; }
 
 // Index of the stage whose line this is; -1 if it is none.
-int StageOf(const std::string& line) {
-  for (int i = 0; i < kNumStages; ++i) {
-    const std::string name = kStages[i].name;
-    const bool is_stage = line.size() > name.size() + 2 &&
-                          line.compare(0, name.size(), name) == 0 && line[name.size()] == ' ' &&
-                          line.compare(line.size() - 2, 2, " s") == 0;
-    if (is_stage) return i;
+int StageOf(const std::string& line, const Stages& stages) {
+  for (size_t i = 0; i < stages.size(); ++i) {
+    const std::string start = std::string(stages[i].name) + "  ";
+    const bool is_stage = BeginsWith(line, start) && line.compare(line.size() - 2, 2, " s") == 0;
+    if (is_stage) return static_cast<int>(i);
   }
   return -1;
 }
 
-double ShareDone(int stages_done) {
+double ShareDone(int stages_done, const Stages& stages) {
   double done = 0, all = 0;
-  for (int i = 0; i < kNumStages; ++i) {
-    all += kStages[i].seconds;
-    if (i < stages_done) done += kStages[i].seconds;
+  for (size_t i = 0; i < stages.size(); ++i) {
+    all += stages[i].seconds;
+    if (static_cast<int>(i) < stages_done) done += stages[i].seconds;
   }
   return done / all;
 }
@@ -70,15 +90,14 @@ std::string FolderOfRun(const std::string& aligned_path) {
 
 }  // namespace
 
-AlignJob::AlignJob(std::string program, std::vector<std::string> arguments,
-                   std::string aligned_path)
+AlignJob::AlignJob(std::string program, std::string aligned_path, TakeReport take_report)
     : program_(std::move(program)),
-      arguments_(std::move(arguments)),
-      aligned_path_(std::move(aligned_path)) {}
+      aligned_path_(std::move(aligned_path)),
+      take_report_(std::move(take_report)) {}
 
 AlignJob::~AlignJob() { Cancel(); }
 
-void AlignJob::Start() {
+void AlignJob::Start(std::vector<std::string> arguments, bool searches) {
   const std::lock_guard<std::mutex> starting(starting_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -86,10 +105,12 @@ void AlignJob::Start() {
   }
   if (follower_.joinable()) follower_.join();
   std::vector<std::string> line = {FindProgram(program_, "It belongs beside roomtex-pick")};
-  line.insert(line.end(), arguments_.begin(), arguments_.end());
+  line.insert(line.end(), arguments.begin(), arguments.end());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     state_ = "running";
+    arguments_ = std::move(arguments);
+    searches_ = searches;
     stages_done_ = models_done_ = 0;
     num_models_ = 1;
     log_.clear();
@@ -118,7 +139,7 @@ void AlignJob::TakeLine(const std::string& line) {
   const std::lock_guard<std::mutex> lock(mutex_);
   log_.push_back(line.substr(0, kMaxLine));
   if (log_.size() > kMaxLog) log_.pop_front();
-  const int stage = StageOf(line);
+  const int stage = StageOf(line, StagesOf(searches_));
   if (stage >= 0) stages_done_ = std::max(stages_done_, stage + 1);
   int model = 0, num_models = 0;
   if (std::sscanf(line.c_str(), "  sparse model [%d/%d]", &model, &num_models) == 2 && model > 0 &&
@@ -139,6 +160,8 @@ void AlignJob::Finish(int exit_code) {
   const bool has_report = exit_code == kExitDone || exit_code == kExitUntrusted;
   const std::string written = has_report ? FolderOfRun(aligned_path_) : aligned_path_;
   const Json report = has_report ? ReadJsonIfAny(written + "/alignment.json") : Json();
+  const std::string sentence =
+      has_report && !cancelled_ ? take_report_(written, report) : std::string();
   const std::lock_guard<std::mutex> lock(mutex_);
   written_path_ = written;
   if (cancelled_) {
@@ -149,6 +172,7 @@ void AlignJob::Finish(int exit_code) {
     } catch (const Json::exception&) {
       verdict_ = JudgeRun(exit_code, Json(), errors_);
     }
+    if (!sentence.empty()) verdict_.sentences.push_back(sentence);
     if (report.is_object() && report.contains("overlays") && report["overlays"].is_array()) {
       for (const Json& path : report["overlays"]) {
         if (!path.is_string()) continue;
@@ -171,8 +195,10 @@ Json AlignJob::State() {
   const bool running = state_ == "running", done = state_ == "done";
   Json json;
   json["state"] = state_;
-  json["stage"] = running && stages_done_ < kNumStages ? kStages[stages_done_].name : "";
-  const double share = (models_done_ + ShareDone(stages_done_)) / num_models_;
+  const Stages& stages = StagesOf(searches_);
+  const bool in_stage = running && stages_done_ < static_cast<int>(stages.size());
+  json["stage"] = in_stage ? stages[stages_done_].name : "";
+  const double share = (models_done_ + ShareDone(stages_done_, stages)) / num_models_;
   json["share"] = running ? Json(share) : done ? Json(1.0) : Json();
   json["log"] = log_;
   json["exit_code"] = done ? Json(exit_code_) : Json();
@@ -185,7 +211,7 @@ Json AlignJob::State() {
   }
   std::vector<std::string> line = {"roomtex-align"};
   line.insert(line.end(), arguments_.begin(), arguments_.end());
-  json["command"] = CommandText(line);
+  json["command"] = state_ == "idle" ? "" : CommandText(line);
   json["overlays"] = overlays_;
   return json;
 }

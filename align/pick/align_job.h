@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -26,12 +27,17 @@ AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::
 // One run at a time. Safe from several threads.
 class AlignJob {
  public:
-  // program: the executable. arguments: all of its options. aligned_path: where it writes.
-  AlignJob(std::string program, std::vector<std::string> arguments, std::string aligned_path);
+  // The report of a run that came to its end, and the folder that it has written. Gives a sentence
+  // to say beside the verdict, or "".
+  using TakeReport = std::function<std::string(const std::string& folder, const Json& report)>;
+
+  // program: the executable. aligned_path: where it writes.
+  AlignJob(std::string program, std::string aligned_path, TakeReport take_report);
   ~AlignJob();  // ends a running one
 
-  // Throws UsageError if it runs already, InputError if there is no such program.
-  void Start();
+  // arguments: all options. searches: for want of picks. Throws UsageError if it runs already,
+  // InputError if there is no such program.
+  void Start(std::vector<std::string> arguments, bool searches);
   // Ends a running one (SIGTERM, after some seconds SIGKILL) and waits for it.
   void Cancel();
   // As GET align of align/pick/README.md.
@@ -45,14 +51,16 @@ class AlignJob {
   void Finish(int exit_code);
 
   const std::string program_;
-  const std::vector<std::string> arguments_;
   const std::string aligned_path_;
+  const TakeReport take_report_;
   std::mutex starting_;  // Start, Cancel: one at a time
   std::thread follower_;
   std::atomic<bool> cancelled_{false};
 
   std::mutex mutex_;  // of all that follows
   std::string state_ = "idle";
+  std::vector<std::string> arguments_;    // of the last run
+  bool searches_ = false;                 // the last run
   int stages_done_ = 0;                   // of the model that is aligned now
   int models_done_ = 0, num_models_ = 1;  // of several
   std::deque<std::string> log_;

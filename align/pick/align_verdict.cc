@@ -44,7 +44,7 @@ void AddFacts(const Json& report, AlignVerdict* verdict) {
   const double count = NumberOfPicks(report, "count");
   const double used = NumberOfPicks(report, "num_used");
   const double rms_px = NumberAt(report, {"picks", "rms_px"});
-  facts.Add("Picks used", count, Number(used, 0) + " of " + Number(count, 0));
+  if (count > 0) facts.Add("Picks used", count, Number(used, 0) + " of " + Number(count, 0));
   facts.Add("Picks miss by (rms)", rms_px, Number(rms_px, 2) + " px");
   const double refined_px = NumberAt(report, {"picks", "refined_rms_px"});
   facts.Add("The same after the refinement", refined_px, Number(refined_px, 2) + " px");
@@ -117,9 +117,11 @@ AlignVerdict JudgeRun(int exit_code, const Json& report, const std::vector<std::
   } else {
     verdict.verdict = "untrusted";
     const bool has_model = has_report && report.contains("images") && report["images"].is_array();
-    verdict.headline = has_model ? "Not to be trusted: look at the reasons before you use it."
-                                 : "There is no alignment: the picks contradict the scan or each "
-                                   "other.";
+    const bool searched = has_report && report.contains("search") && report["search"].is_object();
+    verdict.headline = has_model  ? "Not to be trusted: look at the reasons before you use it."
+                       : searched ? "There is no alignment: the search found no place."
+                                  : "There is no alignment: the picks contradict the scan or each "
+                                    "other.";
     if (has_report && report.contains("reason") && report["reason"].is_string()) {
       verdict.sentences.push_back(report["reason"].get<std::string>());
     } else {

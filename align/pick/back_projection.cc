@@ -116,7 +116,8 @@ std::shared_ptr<const std::string> BackProjections::Tile(const Key& key, int lev
   std::shared_ptr<Picture> picture;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    pictures_.remove_if([&](const auto& other) { return other->key.revision < key.revision; });
+    pictures_.remove_if(
+        [&](const auto& other) { return other->key.solution_number < key.solution_number; });
     const auto found = std::find_if(pictures_.begin(), pictures_.end(),
                                     [&](const auto& other) { return other->key == key; });
     if (found == pictures_.end()) {

@@ -31,16 +31,16 @@ cv::Mat HalvedWithAlpha(const cv::Mat& image);
 class BackProjections {
  public:
   struct Key {
-    int photo = 0, scan = 0, revision = 0;
+    int photo = 0, scan = 0, solution_number = 0;
     bool operator==(const Key& other) const {
-      return photo == other.photo && scan == other.scan && revision == other.revision;
+      return photo == other.photo && scan == other.scan && solution_number == other.solution_number;
     }
   };
   using Draw = std::function<cv::Mat()>;
 
   explicit BackProjections(int tile_size) : tile_size_(tile_size) {}
 
-  // A PNG, or null if draw() gave nothing or there is no such tile. Pictures of other revisions are
+  // A PNG, or null if draw() gave nothing or there is no such tile. Pictures of other solutions are
   // forgotten.
   std::shared_ptr<const std::string> Tile(const Key& key, int level, int x, int y,
                                           const Draw& draw);

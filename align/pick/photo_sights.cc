@@ -46,11 +46,12 @@ Json EdgesToJson(const std::vector<ImgEdge>& edges) {
 }  // namespace
 
 std::shared_ptr<const Json> PhotoSights::Edges(const PickPhoto& photo, const PhotoState& state,
-                                               int revision, const std::function<bool()>& give_up) {
+                                               int solution_number,
+                                               const std::function<bool()>& give_up) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const Seen& seen : seen_) {
-      if (seen.photo == photo.id && seen.revision == revision) return seen.edges;
+      if (seen.photo == photo.id && seen.solution_number == solution_number) return seen.edges;
     }
   }
   const PickScene::Edges* edges = scene_.WaitForEdges(give_up);
@@ -58,20 +59,22 @@ std::shared_ptr<const Json> PhotoSights::Edges(const PickPhoto& photo, const Pho
   auto json = std::make_shared<const Json>(EdgesToJson(
       SeeEdges(edges->edges, edges->free_space, state.projection(photo), state.cam_from_scan)));
   const std::lock_guard<std::mutex> lock(mutex_);
-  seen_.push_front({photo.id, revision, json});
+  seen_.push_front({photo.id, solution_number, json});
   if (seen_.size() > kMaxSeen) seen_.pop_back();
   return json;
 }
 
-std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int revision) {
+std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int solution_number) {
   const ScanRays* rays = scene_.rays();
-  const bool any_placed =
-      std::any_of(solution.models.begin(), solution.models.end(),
-                  [](const ModelState& model) { return model.scan_from_sparse.has_value(); });
+  const auto is_placed = [&solution](const PickPhoto& photo) {
+    return solution.models[photo.model].scan_from_sparse ||
+           solution.photos.at(photo.name()).by == PhotoState::By::kSearch;
+  };
+  const bool any_placed = std::any_of(scene_.photos().begin(), scene_.photos().end(), is_placed);
   if (!any_placed || rays == nullptr) return {};
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (shares_revision_ == revision) return shares_;
+    if (shares_number_ == solution_number) return shares_;
   }
   std::vector<Eigen::Vector3d> samples;
   for (int scan = 0; scan < scene_.num_scans(); ++scan) {
@@ -84,7 +87,7 @@ std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int re
   const std::vector<PickPhoto>& photos = scene_.photos();
   std::vector<double> shares(photos.size(), kNoNumber);
   ParallelFor(scene_.input().num_threads, 0, static_cast<int>(photos.size()), [&](int i) {
-    if (!solution.models[photos[i].model].scan_from_sparse) return;
+    if (!is_placed(photos[i])) return;
     const Rigid& cam_from_scan = solution.photos.at(photos[i].name()).cam_from_scan;
     const Eigen::Vector3d centre = cam_from_scan.TargetOriginInSource();
     int num_seen = 0;
@@ -96,7 +99,7 @@ std::vector<double> PhotoSights::ScanShares(const PickSolution& solution, int re
     shares[i] = 1.0 * num_seen / std::max<size_t>(samples.size(), 1);
   });
   const std::lock_guard<std::mutex> lock(mutex_);
-  shares_revision_ = revision;
+  shares_number_ = solution_number;
   shares_ = shares;
   return shares;
 }

@@ -19,24 +19,24 @@ class PhotoSights {
 
   // The scan's edges in the photo as the page takes them, lines simplified to half a pixel.
   // Null when give_up() became true before the edges stood.
-  std::shared_ptr<const Json> Edges(const PickPhoto& photo, const PhotoState& state, int revision,
-                                    const std::function<bool()>& give_up);
+  std::shared_ptr<const Json> Edges(const PickPhoto& photo, const PhotoState& state,
+                                    int solution_number, const std::function<bool()>& give_up);
 
   // Share of all scans' samples that each photo sees, in the order of PickScene::photos(); NaN of
-  // photos whose model has no place yet, and empty where no model has one. From a few thousand
-  // samples, one computation per revision.
-  std::vector<double> ScanShares(const PickSolution& solution, int revision);
+  // photos whose model has no place yet, and empty where none has one. From a few thousand
+  // samples, one computation per solution.
+  std::vector<double> ScanShares(const PickSolution& solution, int solution_number);
 
  private:
   struct Seen {
-    int photo = 0, revision = 0;
+    int photo = 0, solution_number = 0;
     std::shared_ptr<const Json> edges;
   };
 
   const PickScene& scene_;
   std::mutex mutex_;  // of what is kept
   std::list<Seen> seen_;
-  int shares_revision_ = -1;
+  int shares_number_ = -1;
   std::vector<double> shares_;
 };
 

@@ -201,8 +201,9 @@ std::string NextOfFew(const Tally& tally, int needed, const PickSolution& soluti
   if (tally.most < 3) {
     return more + " to go" + where + "; spread them over the photo and in depth.";
   }
-  if (!photo.solved() && !solution.with_rays) return more + " to go; the scan is being prepared.";
-  if (!photo.solved()) {
+  if (!photo.solved_by_picks() && !solution.with_rays)
+    return more + " to go; the scan is being prepared.";
+  if (!photo.solved_by_picks()) {
     return more + " to go. These alone fix no pose: " +
            (photo.warnings.empty() ? "pick another point." : photo.warnings[0]);
   }
@@ -232,7 +233,7 @@ std::string NextWithEnough(const std::vector<SessionPick>& picks, const Tally& t
   const PhotoState& photo = solution.photos.at(tally.name);
   const int wrong = WrongPick(picks, model_index, solution, scene);
   const bool is_whole = tally.most >= kMinPicksPerPhoto || !scene.has_model();
-  if (!photo.solved() || (!is_whole && !model.scan_from_sparse)) {
+  if (!photo.solved_by_picks() || (!is_whole && !model.scan_from_sparse)) {
     if (!is_whole && !solution.with_rays) return "Enough picks; the scan is being prepared.";
     if (!model.warnings.empty()) return model.warnings[0];
     return photo.warnings.empty() ? "These picks fix no pose: check them." : photo.warnings[0];
@@ -284,10 +285,35 @@ Advice AdviceOf(int model, const std::vector<SessionPick>& picks, const PickSolu
   return advice;
 }
 
+// Where the search has put the photos, as long as no picks do; "" = it has not.
+std::string NextAfterSearch(const std::vector<SessionPick>& picks, const PickSolution& solution) {
+  const bool by_picks =
+      std::any_of(solution.photos.begin(), solution.photos.end(),
+                  [](const auto& photo) { return photo.second.solved_by_picks(); });
+  const bool is_half = std::any_of(picks.begin(), picks.end(),
+                                   [](const SessionPick& pick) { return !pick.complete(); });
+  if (!solution.found || by_picks || is_half) return "";
+  if (solution.found->trusted) {
+    return "The search has placed the photos: compare photo and scan by the back-projection.";
+  }
+  const std::string& confirm_in = solution.found->confirm_in;
+  if (!confirm_in.empty() && picks.empty()) {
+    return "The search has placed the photos, and one pair decides whether that is right: set it "
+           "in " +
+           confirm_in + ".";
+  }
+  if (!confirm_in.empty()) return "Align again: the search goes on with what you have set.";
+  if (!picks.empty()) return "";
+  return "The search has placed the photos, but is not to be trusted: compare photo and scan, and "
+         "set six pairs.";
+}
+
 }  // namespace
 
 std::string NextStep(const std::vector<SessionPick>& picks, const PickSolution& solution,
                      const PickScene& scene) {
+  const std::string after_search = NextAfterSearch(picks, solution);
+  if (!after_search.empty()) return after_search;
   std::string done, others;  // what is said of the models that have enough, and names of the rest
   for (size_t model = 0; model < scene.models().size(); ++model) {
     const int index = static_cast<int>(model);

@@ -29,8 +29,17 @@ const char* StatusName(PickState::Status status) {
 }
 
 const char* ByName(PhotoState::By by) {
-  if (by == PhotoState::By::kPicks) return "picks";
-  return by == PhotoState::By::kSparseModel ? "sparse_model" : "";
+  switch (by) {
+    case PhotoState::By::kNothing:
+      return "";
+    case PhotoState::By::kPicks:
+      return "picks";
+    case PhotoState::By::kSparseModel:
+      return "sparse_model";
+    case PhotoState::By::kSearch:
+      return "search";
+  }
+  return "";
 }
 
 const char* ReasonName(ScanPlaces::Reason reason) {
@@ -189,12 +198,20 @@ Json PhotoToJson(const PhotoState& photo) {
   json["rms_mm"] = NumberOrNull(1000 * photo.rms);
   json["position_sigma_mm"] = NumberOrNull(1000 * photo.position_sigma);
   json["focal_length_px"] = nullptr;
-  if (photo.found_projection) {
+  if (photo.found_projection && photo.solved_by_picks()) {
     json["focal_length_px"] = photo.found_projection->camera().MeanFocalLength();
   }
   json["focal_length_sigma_px"] = NumberOrNull(photo.focal_sigma);
   json["warnings"] = photo.warnings;
   json["ambiguous"] = photo.ambiguous;
+  return json;
+}
+
+Json FoundToJson(const FoundPlaces* found) {
+  if (found == nullptr) return nullptr;
+  Json json;
+  json["trusted"] = found->trusted;
+  json["confirm_in"] = found->confirm_in.empty() ? Json() : Json(found->confirm_in);
   return json;
 }
 
@@ -230,6 +247,7 @@ Json SessionToJson(const PickSession::Snapshot& snapshot, const PickScene& scene
   const PickSolution& solution = snapshot.solution;
   Json json;
   json["revision"] = snapshot.revision;
+  json["solution_number"] = snapshot.solution_number;
   json["saved"] = snapshot.saved;
   json["save_error"] = snapshot.save_error;
   json["picks"] = Json::array();
@@ -244,6 +262,7 @@ Json SessionToJson(const PickSession::Snapshot& snapshot, const PickScene& scene
   for (const ModelState& model : solution.models) {
     json["similarities"].push_back(SimilarityToJson(model));
   }
+  json["found"] = FoundToJson(solution.found.get());
   json["check_points"] = nullptr;
   if (solution.num_check_points > 0) {
     json["check_points"] = {{"count", solution.num_check_points},

@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "align/pick/found_places.h"
 #include "align/pick/mirror_picks.h"
 #include "align/pick/photo_corner.h"
 #include "align/pick/pick_json.h"
@@ -28,7 +29,19 @@ constexpr int kThumbnailWidth = 240;  // pixels
 constexpr int kThumbnailQuality = 82;
 constexpr int kNumOverlays = 4;
 
-// What roomtex-align is given: what this command was given.
+bool HasPairs(const PickSession::Snapshot& snapshot) {
+  return std::any_of(snapshot.picks.begin(), snapshot.picks.end(),
+                     [](const SessionPick& pick) { return pick.complete(); });
+}
+
+// Fewer than place a model.
+bool IsHint(const PickSession::Snapshot& snapshot) {
+  return std::count_if(snapshot.picks.begin(), snapshot.picks.end(), [](const SessionPick& pick) {
+           return pick.complete() && pick.weight > 0;
+         }) < kMinPicksPerPhoto;
+}
+
+// What roomtex-align is given: what this command was given. Without picks it searches.
 std::vector<std::string> AlignArguments(const PickScene& scene, const PickSession& session,
                                         const PickServer::Setup& setup) {
   const PickSceneInput& input = scene.input();
@@ -39,7 +52,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
   };
   for (const std::string& path : input.input_paths) add("--input_path", path);
   for (const std::string& path : input.scan_paths) add("--scan_path", path);
-  add("--picks_path", session.picks_path());
+  if (HasPairs(*session.Now())) add("--picks_path", session.picks_path());
   add("--output_path", setup.aligned_path);
   add("--image_path", input.image_path);
   const PhotoCameraOptions no_camera;
@@ -101,7 +114,10 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
       tiles_(ImageTilesOptions()),
       back_projections_(ImageTilesOptions().tile_size),
       sights_(scene),
-      align_(setup.align_program, AlignArguments(scene, *session, setup), setup.aligned_path),
+      align_(setup.align_program, setup.aligned_path,
+             [this](const std::string& folder, const Json& report) {
+               return TakeReport(folder, report);
+             }),
       server_(setup.server) {
   AddPictures();
   AddPage(page, &server_);
@@ -130,10 +146,10 @@ void PickServer::AddAlign() {
   server_.AddPost("/align", [this](const Json&) {
     if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
     const auto now = session_->Now();
-    const bool any = std::any_of(now->picks.begin(), now->picks.end(),
-                                 [](const SessionPick& pick) { return pick.complete(); });
-    if (!any) throw UsageError("There are no pairs yet: set six of them first.");
-    align_.Start();
+    if (!scene_.has_model() && !HasPairs(*now)) {
+      throw UsageError("There are no pairs yet: set six of them first.");
+    }
+    align_.Start(AlignArguments(scene_, *session_, setup_), scene_.has_model() && IsHint(*now));
     return align_.State();
   });
   server_.AddJson("/align", [this](const Query&) { return align_.State(); });
@@ -142,6 +158,21 @@ void PickServer::AddAlign() {
     return align_.State();
   });
   server_.AddContent("/overlay", [this](const Query& query) { return Overlay(query); });
+}
+
+std::string PickServer::TakeReport(const std::string& folder, const Json& report) {
+  std::shared_ptr<const FoundPlaces> found;
+  std::string problem;
+  try {
+    found = ReadFoundPlaces(folder, report, scene_);
+  } catch (const InputError& error) {
+    problem = error.what();
+  }
+  session_->TakeFound(std::move(found));
+  if (!problem.empty()) return problem;
+  if (!IsMirroredReading(report, scene_)) return "";
+  return "This page still shows the mirror image: press Mirror above the scan and align again, to "
+         "look at the photos there.";
 }
 
 void PickServer::Wait() {
@@ -190,7 +221,8 @@ int PickServer::SelectedPhoto() const {
 
 // In the order of the strip: the best to pick in first.
 Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
-  const std::vector<double> shares = sights_.ScanShares(snapshot.solution, snapshot.revision);
+  const std::vector<double> shares =
+      sights_.ScanShares(snapshot.solution, snapshot.solution_number);
   Json json = Json::array();
   std::set<int> suggested;  // the models whose best photo was passed
   for (const PickPhoto* photo : scene_.Ranked(shares)) {
@@ -249,28 +281,28 @@ Json PickServer::State() {
   return json;
 }
 
-std::shared_ptr<const PickSession::Snapshot> PickServer::SolvedRevision(const PickPhoto& photo,
-                                                                        int revision) {
+std::shared_ptr<const PickSession::Snapshot> PickServer::Solved(const PickPhoto& photo,
+                                                                int solution) {
   auto snapshot = session_->Refresh();
-  if (snapshot->revision != revision) return nullptr;
+  if (snapshot->solution_number != solution) return nullptr;
   return snapshot->solution.photos.at(photo.name()).solved() ? snapshot : nullptr;
 }
 
 std::optional<LocalServer::Content> PickServer::BackTile(const Query& query, int photo_id) {
-  const auto scan = WholeOf(query, "scan"), revision = WholeOf(query, "revision");
+  const auto scan = WholeOf(query, "scan"), solution = WholeOf(query, "solution");
   const auto level = WholeOf(query, "level"), x = WholeOf(query, "x"), y = WholeOf(query, "y");
   const bool exists = photo_id >= 0 && photo_id < static_cast<int>(scene_.photos().size()) &&
                       scan && *scan >= 0 && *scan < scene_.num_scans();
-  if (!exists || !revision || !level || !x || !y) return std::nullopt;
+  if (!exists || !solution || !level || !x || !y) return std::nullopt;
   const PickPhoto& photo = scene_.photos()[photo_id];
-  const auto give_up = [this, revision] {
-    return server_.stopping() || session_->Now()->revision != *revision;
+  const auto give_up = [this, solution] {
+    return server_.stopping() || session_->Now()->solution_number != *solution;
   };
   const ScanRays* rays = scene_.WaitForRays(give_up);
-  const auto snapshot = SolvedRevision(photo, *revision);
+  const auto snapshot = Solved(photo, *solution);
   if (photo.missing || rays == nullptr || !snapshot) return std::nullopt;
   auto bytes =
-      back_projections_.Tile({photo_id, *scan, *revision}, *level, *x, *y, [&]() -> cv::Mat {
+      back_projections_.Tile({photo_id, *scan, *solution}, *level, *x, *y, [&]() -> cv::Mat {
         const PhotoState& state = snapshot->solution.photos.at(photo.name());
         return DrawBackProjection(scene_, *rays, photo, state.projection(photo),
                                   state.cam_from_scan, *scan, give_up);
@@ -280,16 +312,16 @@ std::optional<LocalServer::Content> PickServer::BackTile(const Query& query, int
 }
 
 Json PickServer::Edges(const Query& query) {
-  const auto id = WholeOf(query, "photo"), revision = WholeOf(query, "revision");
-  if (!id || *id < 0 || *id >= static_cast<int>(scene_.photos().size()) || !revision) {
+  const auto id = WholeOf(query, "photo"), solution = WholeOf(query, "solution");
+  if (!id || *id < 0 || *id >= static_cast<int>(scene_.photos().size()) || !solution) {
     throw UsageError("There is no such photo.");
   }
   const PickPhoto& photo = scene_.photos()[*id];
-  const auto snapshot = SolvedRevision(photo, *revision);
-  if (!snapshot) throw UsageError("The picks have changed, or do not place this photo.");
-  const auto edges =
-      sights_.Edges(photo, snapshot->solution.photos.at(photo.name()), *revision,
-                    [&] { return server_.stopping() || session_->Now()->revision != *revision; });
+  const auto snapshot = Solved(photo, *solution);
+  if (!snapshot) throw UsageError("The picks have changed, or this photo is not placed.");
+  const auto edges = sights_.Edges(
+      photo, snapshot->solution.photos.at(photo.name()), *solution,
+      [&] { return server_.stopping() || session_->Now()->solution_number != *solution; });
   if (!edges) throw UsageError("The picks have changed.");
   return *edges;
 }

@@ -46,15 +46,17 @@ class PickServer {
   using Content = LocalServer::Content;
   void AddPictures();
   void AddAlign();
+  // Of a run of roomtex-align: what it has found is shown. A sentence where it cannot be.
+  std::string TakeReport(const std::string& folder, const Json& report);
   Json State();
   Json Photos(const PickSession::Snapshot& snapshot);
   std::optional<Content> Tile(const Query& query);
   std::optional<Content> BackTile(const Query& query, int photo_id);
   Json Edges(const Query& query);
   std::optional<Content> Overlay(const Query& query);
-  // The solution of a revision; null if that is no longer the session's, or does not place the
+  // The solution of this number; null if that is no longer the session's, or does not place the
   // photo.
-  std::shared_ptr<const PickSession::Snapshot> SolvedRevision(const PickPhoto& photo, int revision);
+  std::shared_ptr<const PickSession::Snapshot> Solved(const PickPhoto& photo, int solution);
   std::optional<Content> Thumbnail(const Query& query);
   Json ScanPoint(const Query& query) const;
   Json Corner(const Query& query);

@@ -121,11 +121,21 @@ std::shared_ptr<const PickSession::Snapshot> PickSession::Put(int revision,
   }
   Snapshot next;
   next.revision = revision + 1;
+  next.solution_number = now->solution_number + 1;
   next.picks = std::move(picks);
   next.save_error = Save(next.picks);
   next.saved = next.save_error.empty();
   SolveInto(&next);
   return Publish(std::move(next));
+}
+
+void PickSession::TakeFound(std::shared_ptr<const FoundPlaces> found) {
+  const std::lock_guard<std::mutex> lock(changing_);
+  Snapshot next = *Now();
+  solver_.TakeFound(std::move(found));
+  ++next.solution_number;
+  SolveInto(&next);
+  Publish(std::move(next));
 }
 
 bool PickSession::SaveAgain() {

@@ -18,8 +18,9 @@ class PickSession {
     int revision = 1;
     std::vector<SessionPick> picks;
     PickSolution solution;
-    bool saved = true;       // the file holds these picks
-    std::string save_error;  // why it does not
+    int solution_number = 1;  // another one: another solution
+    bool saved = true;        // the file holds these picks
+    std::string save_error;   // why it does not
     double milliseconds = 0;
   };
 
@@ -36,6 +37,9 @@ class PickSession {
   // that is no longer the revision, or if the picks are none that a file could hold (a pixel twice
   // ...). A file that cannot be written is said in the snapshot.
   std::shared_ptr<const Snapshot> Put(int revision, std::vector<SessionPick> picks);
+  // What the search of roomtex-align has found, in place of what it found before; null = nothing.
+  // The revision stays.
+  void TakeFound(std::shared_ptr<const FoundPlaces> found);
   // Tries to write picks that could not be saved before. False: still not.
   bool SaveAgain();
 

@@ -246,6 +246,19 @@ void PickSolver::FitModel(const Complete& complete, const Views& views,
   }
 }
 
+// Photos that no picks place stand where the search has put them.
+void PickSolver::PlaceFound(PickSolution* solution) const {
+  solution->found = found_;
+  if (!found_) return;
+  for (const auto& [name, found] : found_->photos) {
+    const auto at = solution->photos.find(name);
+    if (at == solution->photos.end() || at->second.solved()) continue;
+    at->second.by = PhotoState::By::kSearch;
+    at->second.cam_from_scan = found.cam_from_scan;
+    at->second.found_projection = found.projection;
+  }
+}
+
 // Residuals of all complete picks, and what they add up to.
 void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const {
   struct Sums {
@@ -265,10 +278,10 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
     PickState& state = solution->picks[i];
     PhotoState& photo = solution->photos[pick.image_name];
     if (!pick.complete()) continue;
-    if (!photo.solved()) {
-      if (state.status == PickState::Status::kUsed) state.status = PickState::Status::kWaiting;
-      continue;
+    if (!photo.solved_by_picks() && state.status == PickState::Status::kUsed) {
+      state.status = PickState::Status::kWaiting;
     }
+    if (!photo.solved()) continue;
     const PickPhoto& where = *scene_.FindPhoto(pick.image_name);
     const CameraProjection& projection = photo.projection(where);
     const auto error = projection.ImgError(photo.cam_from_scan * *pick.x_in_scan, *pick.x_in_img);
@@ -302,13 +315,13 @@ void PickSolver::Measure(const std::vector<SessionPick>& picks, PickSolution* so
   solution->check_rms = WeightedRms(check.metres2, check.weights);
 }
 
-// The other side of half-finished pairs.
+// The other side of half-finished pairs. Not by the search: picks are to say whether it is right.
 void PickSolver::Predict(const std::vector<SessionPick>& picks, const ScanRays* rays,
                          PickSolution* solution) const {
   for (size_t i = 0; i < picks.size(); ++i) {
     const SessionPick& pick = picks[i];
     const PhotoState& photo = solution->photos[pick.image_name];
-    if (pick.complete() || !photo.solved()) continue;
+    if (pick.complete() || !photo.solved_by_picks()) continue;
     PickState& state = solution->picks[i];
     const CameraProjection& projection = photo.projection(*scene_.FindPhoto(pick.image_name));
     if (pick.x_in_scan) {
@@ -363,6 +376,7 @@ PickSolution PickSolver::Solve(const std::vector<SessionPick>& picks) {
   for (const Complete& complete : CompletePicks(picks, &solution)) {
     solved.push_back(SolveModel(complete, rays, &solution));
   }
+  PlaceFound(&solution);
   Measure(picks, &solution);
   for (const Views& views : solved) Warn(views, &solution);
   Predict(picks, rays, &solution);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "align/alignment.h"
+#include "align/pick/found_places.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/session_pick.h"
 
@@ -39,21 +40,22 @@ struct PickState {
 };
 
 struct PhotoState {
-  enum class By { kNothing, kPicks, kSparseModel };
+  enum class By { kNothing, kPicks, kSparseModel, kSearch };
   int num_complete = 0, num_used = 0;
   By by = By::kNothing;
   Rigid cam_from_scan;        // only if solved()
   double rms_px = kNoNumber;  // weighted, of the used picks
   double rms = kNoNumber;     // metres, the same
   double position_sigma = kNoNumber;
-  // With a lens that the picks found, without a sparse model: its projection, and one standard
-  // deviation of the focal length in pixels.
+  // Of a lens that the search adjusted, or that the picks found, without a sparse model; then with
+  // one standard deviation of the focal length in pixels.
   std::shared_ptr<const CameraProjection> found_projection;
   double focal_sigma = kNoNumber;
   bool ambiguous = false;
   std::vector<std::string> warnings;
 
   bool solved() const { return by != By::kNothing; }
+  bool solved_by_picks() const { return solved() && by != By::kSearch; }
   const CameraProjection& projection(const PickPhoto& photo) const {
     return found_projection ? *found_projection : *photo.projection;
   }
@@ -76,6 +78,8 @@ struct PickSolution {
   // Of the check points (weight 0) in photos that are solved; metres.
   int num_check_points = 0;
   double check_rms_px = kNoNumber, check_rms = kNoNumber;
+  // Where the search has put the photos, null if it has not: counts for those that no picks place.
+  std::shared_ptr<const FoundPlaces> found;
   bool with_rays = false;  // the ray caster stood
   std::string next;        // what to do now
 };
@@ -84,6 +88,8 @@ class PickSolver {
  public:
   explicit PickSolver(const PickScene& scene) : scene_(scene) {}
 
+  // From here on; may be null.
+  void TakeFound(std::shared_ptr<const FoundPlaces> found) { found_ = std::move(found); }
   // One call at a time.
   PickSolution Solve(const std::vector<SessionPick>& picks);
 
@@ -115,12 +121,14 @@ class PickSolver {
   void FitModel(const Complete& complete, const Views& views, const ScaleOfPhoto& scale_of_photo,
                 PickSolution* solution) const;
   void TakeSpread(const Complete& complete, const PickStart& found, PickSolution* solution) const;
+  void PlaceFound(PickSolution* solution) const;
   void Measure(const std::vector<SessionPick>& picks, PickSolution* solution) const;
   void Predict(const std::vector<SessionPick>& picks, const ScanRays* rays,
                PickSolution* solution) const;
 
   const PickScene& scene_;
   const AlignmentOptions options_;
+  std::shared_ptr<const FoundPlaces> found_;
   // The review of a photo whose picks have not changed is not made again.
   struct Reviewed {
     PointPairs pairs;

@@ -2,6 +2,7 @@
 // would not have: COLMAP's model of it without running COLMAP, and places.json, the places that
 // one sees both in a photo and in the scan. No click noise: the test clicks where it wants.
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -14,6 +15,7 @@
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
 #include "colmap_ext/sparse_model.h"
+#include "importers/scan_writer.h"
 #include "tests/align/model_part.h"
 
 namespace roomtex {
@@ -64,6 +66,10 @@ void WriteAll(const std::string& folder) {
   const SparseModel model = room.MakeSparseModel(2500, 0.5);
   WriteSparseModel(model, folder + "/sparse");
   const Scan scan = room.MakeScan(0);
+  // Without anything that photos could confirm: the search stays undecided.
+  Scan blank = scan;
+  std::fill(blank.intensity.begin(), blank.intensity.end(), 100.0f);
+  WriteScan(blank, {}, folder + "/blank.rtpi");
   const int best = room.BestPhotoForPicks();
   nlohmann::json places;
   places["photo"] = room.PhotoName(best);

@@ -5,7 +5,7 @@ import {readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, run, screenshot} from './browser.mjs';
-import {capture, distance, fileOf, kSampleSpacing, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
+import {capture, colorsAt, distance, fileOf, kSampleSpacing, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
 
 let browser;
 let places;  // of the photo that suits best, those that can be picked
@@ -516,15 +516,129 @@ test('too few picks: Align says so without running', async () => {
   }, {picksFile: fileOf(places.slice(0, 3))});
 });
 
+// Presses Find it for me, and waits for what it says.
+async function findIt(page) {
+  await page.page.click('#align-open');
+  const button = page.page.locator('#align .body button', {hasText: 'Find it for me'});
+  await button.waitFor();
+  await screenshot(page.page, 'pick-find');
+  await button.click();
+  await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+}
+
 test('a few picks: the place is found by them', async () => {
   await pageOn(async (page) => {
     await page.rowsAre(4);
-    await page.page.click('#align-open');
-    await page.page.locator('#align .body button', {hasText: 'Find it for me'}).click();
-    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    await findIt(page);
     await screenshot(page.page, 'pick-found');
     assert.match(await page.text('#align .verdict'), /Trusted/);
   }, {picksFile: fileOf(places.slice(0, 4))});
+});
+
+const upperQuartile = (numbers) => [...numbers].sort((a, b) => a - b)[Math.floor(0.75 * numbers.length)];
+
+test('without a pick: found, and seen on the scan until picks place the photo', async () => {
+  await pageOn(async (page, {folder}) => {
+    const eight = places.slice(0, 8);
+    const onScan = () => colorsAt(page, 'scan', eight.map(({scan}) => scan));
+    const onPhoto = () => colorsAt(page, 'photo', eight.map(({img}) => img));
+    assert.ok(await page.page.isDisabled('#back-mode'), 'nothing says where the photos are');
+    await findIt(page);
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+    assert.doesNotMatch(await page.text('#align code'), /--picks_path/);
+    assert.doesNotMatch(await page.text('#align .body'), /One pair decides/);
+    await screenshot(page.page, 'pick-searched');
+    const poses = await posesOf(folder.path('aligned'));
+    assert.equal(poses.num_registered, 12);
+    assert.ok(poses.position_max_mm < 15, `${poses.position_max_mm}`);
+
+    await page.page.locator('#align button', {hasText: 'Look at them'}).click();
+    await until(async () => !await page.page.isVisible('#align'), 'the dialog makes way');
+    assert.equal(await page.page.inputValue('#back-mode'), 'over');
+    assert.match(await page.text('#photo-fit'), /^placed by the search$/);
+    assert.match(await page.text('#scan-legend'), /^placed by the search$/);
+    assert.match(await page.text('#summary-body'), /the search, trusted/);
+    assert.match(await page.text('#next'), /The search has placed the photos/);
+    await until(async () => /crease/.test(await page.text('#photo-legend')), 'edges on the photo');
+    await page.redrawn();
+    await screenshot(page.page, 'pick-searched-over');
+    // Left of the line lies the photo, and each place of it where the scan has it.
+    const differences = async () => {
+      const [scan, photo] = [await onScan(), await onPhoto()];
+      return scan.map((color, i) => distance(color, photo[i]));
+    };
+    await page.page.locator('#edges').uncheck();
+    await page.page.selectOption('#back-mode', 'swipe');
+    await page.page.locator('#back-range').fill('0');
+    await until(async () => upperQuartile(await differences()) > 60, 'the scan itself is another');
+    await page.page.locator('#back-range').fill('100');
+    await until(async () => upperQuartile(await differences()) < 40, 'the photo lies on the scan');
+    await page.page.locator('#back-range').fill('80');
+    await page.redrawn();
+    await screenshot(page.page, 'pick-searched-swipe');
+
+    // Picks of one's own take over, and give way again. (A tile that is asked for while a pick is
+    // set is not found any more.)
+    await page.page.selectOption('#back-mode', 'off');
+    for (const place of places.slice(0, 4)) await page.pick(place);
+    await until(
+        async () => /^placed by your picks, .* px rms$/.test(await page.text('#photo-fit')),
+        'by the picks');
+    assert.match(await page.text('#summary-body'), /its own picks/);
+    for (let index = 3; index >= 0; --index) {
+      await page.page.locator('#rows tr').nth(index).locator('button.icon').click();
+    }
+    await until(
+        async () => await page.text('#photo-fit') === 'placed by the search', 'by the search again');
+    // Again, from the answer.
+    await page.saved();
+    await findIt(page);
+    const first = readFileSync(folder.path('aligned', 'alignment.json'), 'utf8');
+    await page.page.locator('#align footer button', {hasText: 'Run again'}).click();
+    await page.page.waitForSelector('#align progress');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.notEqual(readFileSync(folder.path('aligned', 'alignment.json'), 'utf8'), first);
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+  });
+});
+
+test('an undecided search asks for one pair, and goes on with it', async () => {
+  await pageOn(async (page, {folder}) => {
+    await findIt(page);
+    assert.match(await page.text('#align .verdict'), /Not trusted/);
+    const body = await page.text('#align .body');
+    const [, name] = /One pair decides: click a corner in (\S+) /.exec(body) ?? [];
+    assert.ok(name, body);
+    assert.doesNotMatch(body, /six pairs/i);
+    await screenshot(page.page, 'pick-undecided');
+    assert.ok((await lowestContrast(page.page, '#align')).ratio >= 4.5);
+    await page.page.locator('#align button', {hasText: 'Set the pair'}).click();
+    await until(async () => !await page.page.isVisible('#align'), 'the dialog makes way');
+    assert.equal((await page.text('#photo-name')).replace('\u200e', ''), name);
+    assert.equal(await page.text('#photo-fit'), 'placed by the search, not trusted');
+    assert.ok((await page.text('#next')).endsWith(`set it in ${name}.`));
+    // In another photo it does as well. Where the search has the other half is not shown.
+    await page.page.locator(`.thumb[title^="${places[0].image_name}:"]`).click();
+    await page.click('photo', places[0].img);
+    await page.rowIs(0, (row) => row.status === 'half', 'half');
+    await page.saved();
+    const [half] = (await page.session()).picks;
+    assert.equal(half.predicted_scan, null);
+    await screenshot(page.page, 'pick-undecided-half');
+    await page.click('scan', places[0].scan);
+    await page.page.waitForSelector('#align[open] progress');
+    await page.page.waitForSelector('#align .verdict', {timeout: 240000});
+    assert.match(await page.text('#align .verdict'), /Trusted/);
+    assert.doesNotMatch(await page.text('#align .verdict'), /Not trusted/);
+    assert.match(await page.text('#align code'), /--picks_path/);
+    await screenshot(page.page, 'pick-confirmed');
+    const poses = await posesOf(folder.path('aligned'));
+    assert.ok(poses.position_max_mm < 30, `${poses.position_max_mm}`);
+    await page.page.keyboard.press('Escape');
+    const [row] = await page.rows();
+    assert.ok(row.px < 5, `the pick is ${row.px} px from where the search has it`);
+    assert.equal(await page.text('#photo-fit'), 'placed by the search');
+  }, {scan: capture('blank.rtpi')});
 });
 
 test('Align can be cancelled, and run again', async () => {

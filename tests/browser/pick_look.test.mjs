@@ -6,7 +6,7 @@ import {renameSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
 import {launchBrowser, makeFolder, screenshot} from './browser.mjs';
-import {distance, fileOf, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
+import {colorsAt, distance, fileOf, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
 
 let browser;
 let places;
@@ -22,20 +22,6 @@ after(async () => {
 
 const pageOn = (body, options = {}) =>
     onPage(browser, body, {image_name: places[0].image_name, ...options});
-
-// The colours of the pane's canvas at places of its picture: [[r, g, b]...].
-async function colorsAt(page, side, list) {
-  const points = [];
-  const {box} = await page.view(side);
-  for (const img of list) {
-    const [x, y] = await page.toScreen(side, img);
-    points.push([Math.floor(x - box.x), Math.floor(y - box.y)]);
-  }
-  return page.page.evaluate(([id, where]) => {
-    const context = document.querySelector(`#${id}-pane canvas`).getContext('2d');
-    return where.map(([x, y]) => [...context.getImageData(x, y, 1, 1).data].slice(0, 3));
-  }, [side, points]);
-}
 
 // The colours of the tiles of level 0 themselves, below the middles of the pixels.
 function tileColors(page, address, list) {

@@ -45,14 +45,15 @@ export function capture(...parts) {
 }
 
 // Starts roomtex-pick on it. models: none = on its photos alone; ['first', 'second'] = its photos in
-// two models.
-export function servePicks(picksPath, more = [], port = 0, models = ['sparse']) {
+// two models. scan: the first one.
+export function servePicks(
+    picksPath, more = [], port = 0, models = ['sparse'], scan = capture('capture', 'scan.rtpi')) {
   return serve('roomtex-pick', [
     ...models.flatMap((model) => ['--input_path', capture(model)]),
     '--image_path',
     capture('capture', 'photos'),
     '--scan_path',
-    capture('capture', 'scan.rtpi'),
+    scan,
     '--output_path',
     picksPath,
     '--port',
@@ -210,15 +211,29 @@ export class PickPage {
   }
 }
 
+// The colours of the pane's canvas at places of its picture: [[r, g, b]...].
+export async function colorsAt(page, side, list) {
+  const points = [];
+  const {box} = await page.view(side);
+  for (const img of list) {
+    const [x, y] = await page.toScreen(side, img);
+    points.push([Math.floor(x - box.x), Math.floor(y - box.y)]);
+  }
+  return page.page.evaluate(([id, where]) => {
+    const context = document.querySelector(`#${id}-pane canvas`).getContext('2d');
+    return where.map(([x, y]) => [...context.getImageData(x, y, 1, 1).data].slice(0, 3));
+  }, [side, points]);
+}
+
 // Runs `body` on a fresh roomtex-pick and its page; nothing may go wrong on the page meanwhile but
 // what `allowed` names. picksFile: what the picks file holds before; more: options of the command;
-// models: as servePicks() has them.
+// models, scan: as servePicks() has them.
 export async function onPage(
-    browser, body, {image_name, picksFile = '', allowed = [], more = [], models = ['sparse']}) {
+    browser, body, {image_name, picksFile = '', allowed = [], more = [], models, scan}) {
   const folder = makeFolder();
   const picksPath = folder.path('picks.csv');
   if (picksFile) writeFileSync(picksPath, picksFile);
-  const server = await servePicks(picksPath, ['--image_name', image_name, ...more], 0, models);
+  const server = await servePicks(picksPath, ['--image_name', image_name, ...more], 0, models, scan);
   // Small: without a graphics processor the time goes into pixels.
   const page = await PickPage.open(browser, server, picksPath, {width: 1280, height: 720});
   try {

@@ -23,11 +23,9 @@ function lines(sentences) {
       .filter(Boolean);
 }
 // Options of the command line help nobody here: what the page has instead, or nothing.
+const kSixPairs = 'Set six pairs: then the place need not be searched for.';
 const kInstead = [
-  [
-    /^Say where the photos belong: --near .*/,
-    'Set six pairs: then the place need not be searched for.',
-  ],
+  [/^Say where the photos belong: --near .*/, kSixPairs],
   [
     /^One pick where these places differ .*/,
     'Set a pair where these places differ, or six: then the place need not be searched for.',
@@ -44,16 +42,26 @@ function withoutOptions(sentence) {
   return kInstead.reduce((text, [from, to]) => text.replace(from, to), sentence);
 }
 
+function offer(text, name, action) {
+  return el(
+      'div', {class: 'offer'}, el('p', {}, text),
+      el('button', {type: 'button', class: 'main', onclick: action}, name));
+}
+
 export class AlignDialog {
   #status = null;  // the server's last answer
   #revision = -1;  // of the picks that it rests on
   #parts = {};
   #timer = 0;
+  #confirming = false;  // a pair was asked for: with it the search goes on
 
   // picks: Picks; facts: {min_picks, models, photos, aligned_path}
-  constructor(picks, facts) {
+  // on: {look() at the photos on the scan, pickIn(name) shows that photo}
+  constructor(picks, facts, on) {
     this.picks = picks;
     this.facts = facts;
+    this.on = on;
+    picks.addEventListener('sync', () => this.#confirm());
     this.dialog = byId('align');
     this.button = byId('align-open');
     this.button.addEventListener('click', () => this.open());
@@ -99,7 +107,11 @@ export class AlignDialog {
              `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
                  `there are ${count} so far${where}.`),
           el('p', {}, this.picks.session.next));
-      if (hasModel && count > 0) body.append(this.#offerSearch());
+      if (hasModel) {
+        const how = count > 0 ? 'Or by what there is:' :
+                                'Or it searches for the place of the photos without a pick:';
+        body.append(offer(how, 'Find it for me', () => this.#start({hint: true})));
+      }
       return;
     }
     this.#message('Saving the picks…');
@@ -112,6 +124,8 @@ export class AlignDialog {
       return;
     }
     this.#revision = this.picks.session.revision;
+    this.#status = null;
+    this.#confirming = false;
     try {
       await api.startAlign();
     } catch (error) {
@@ -135,13 +149,6 @@ export class AlignDialog {
     const count = begun.length > 0 ? Math.min(...begun) : 0;
     const several = models.length > 1 && count > 0;
     return {count, where: several ? ` in photos of ${models[counts.indexOf(count)]}` : ''};
-  }
-
-  #offerSearch() {
-    return el(
-        'p', {}, 'Or, by what there is: ',
-        el('button', {type: 'button', class: 'main', onclick: () => this.#start({hint: true})},
-           'Find it for me'));
   }
 
   async #end() {
@@ -170,8 +177,13 @@ export class AlignDialog {
 
   async #poll() {
     clearTimeout(this.#timer);
+    const before = this.#status?.state;
     try {
       this.#status = await api.align();
+      // What it has found is shown in place of picks.
+      if (this.#status.state === 'done' && before !== 'done') {
+        this.picks.refresh((await api.state()).session);
+      }
     } catch (error) {
       if (!(error instanceof ServerError)) throw error;
       this.#timer = setTimeout(() => this.#poll(), 4 * kPoll);
@@ -228,10 +240,14 @@ export class AlignDialog {
          el('span', {class: 'sign', 'aria-hidden': 'true'}, verdict.sign),
          el('div', {}, el('strong', {}, verdict.text), el('p', {class: 'headline'}, headline))),
     ];
-    if (status.sentences.length > 0) {
-      parts.push(el(
-          'ul', {class: 'sentences'}, ...lines(status.sentences).map((one) => el('li', {}, one))));
+    const {found} = this.picks.session;
+    const confirmIn = found?.confirm_in;
+    const sentences = lines(status.sentences).filter((one) => !confirmIn || one !== kSixPairs);
+    if (sentences.length > 0) {
+      parts.push(el('ul', {class: 'sentences'}, ...sentences.map((one) => el('li', {}, one))));
     }
+    if (confirmIn) parts.push(this.#askForPair(confirmIn));
+    if (found) parts.push(this.#offerLook());
     if (status.facts.length > 0) {
       parts.push(
           el('dl', {class: 'facts'},
@@ -251,6 +267,37 @@ export class AlignDialog {
     }
     this.#parts.body.replaceChildren(...parts);
     this.#parts.body.scrollTop = 0;
+  }
+
+  #askForPair(name) {
+    const begin = () => {
+      this.#confirming = true;
+      this.dialog.close();
+      this.on.pickIn(name);
+    };
+    return offer(
+        `One pair decides: click a corner in ${name} that you recognise in the scan, too. The ` +
+            'search then goes on with it.',
+        'Set the pair', begin);
+  }
+
+  // The pair that was asked for is there.
+  #confirm() {
+    const {picks} = this;
+    if (!this.#confirming || picks.state !== 'saved') return;
+    if (!picks.session.picks.some(({complete, weight}) => complete && weight > 0)) return;
+    if (!this.dialog.open) this.dialog.showModal();
+    this.#start({hint: true});
+  }
+
+  #offerLook() {
+    const look = () => {
+      this.dialog.close();
+      this.on.look();
+    };
+    return offer(
+        'The photos are shown where the search has placed them, until your picks place them.',
+        'Look at them on the scan', look);
   }
 
   #command(line) {

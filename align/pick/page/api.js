@@ -60,7 +60,7 @@ export const api = {
   scanPoint: (scan, x, y) => ask(`scan_point?scan=${scan}&x=${x}&y=${y}`),
   corner: (photo, [x, y], reach) => ask(`corner?photo=${photo}&x=${x}&y=${y}&reach=${reach}`),
   putPicks: (revision, picks) => askBriefly('picks', bodyOf('PUT', {revision, picks})),
-  edges: (photo, revision, signal) => ask(`edges?photo=${photo}&revision=${revision}`, {signal}),
+  edges: (photo, solution, signal) => ask(`edges?photo=${photo}&solution=${solution}`, {signal}),
   startAlign: () => ask('align', bodyOf('POST', {})),
   endAlign: () => ask('align', bodyOf('DELETE', {})),
   align: () => askBriefly('align'),
@@ -69,8 +69,8 @@ export const api = {
   photoTile: (photo) => (level, x, y) => `tile?photo=${photo}&level=${level}&x=${x}&y=${y}`,
   scanTile: (scan, picture) => (level, x, y) =>
       `tile?scan=${scan}&picture=${picture}&level=${level}&x=${x}&y=${y}`,
-  backTile: (photo, scan, revision) => (level, x, y) =>
-      `tile?back=${photo}&scan=${scan}&revision=${revision}&level=${level}&x=${x}&y=${y}`,
+  backTile: (photo, scan, solution) => (level, x, y) =>
+      `tile?back=${photo}&scan=${scan}&solution=${solution}&level=${level}&x=${x}&y=${y}`,
   thumbnail: (photo) => `thumbnail?photo=${photo}`,
   overlay: (name) => `overlay?name=${encodeURIComponent(name)}`,
 };

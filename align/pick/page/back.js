@@ -1,6 +1,6 @@
 // What a solution lets us see: the photo back-projected onto the scan (thesis figure 7.2), and the
-// scan's edges over the photo. Both belong to a revision of the picks; they follow once the picks
-// rest for a moment, and until the new one has come the old one stays.
+// scan's edges over the photo. Both belong to one solution; they follow once the picks rest for a
+// moment, and until the new one has come the old one stays.
 
 import {api, ServerError} from './api.js';
 import {byId, clamp, setText} from './dom.js';
@@ -13,7 +13,7 @@ const kBlink = 500;   // milliseconds on, and off
 export class BackProjection {
   mode = 'off';   // "over", "swipe", "blink"
   #shown = null;  // picture, see tiles.js
-  #next = null;   // the picture of a newer revision, while its tiles come
+  #next = null;   // the picture of a newer solution, while its tiles come
   #canvas = new OffscreenCanvas(1, 1);
   #opacity = 0.6;
   #line = 0.5;  // of the swipe, share of the pane's width
@@ -53,8 +53,8 @@ export class BackProjection {
   }
 
   // picture: of the scan; null: no solution for this photo.
-  show(photo, scan, revision) {
-    if (!scan || revision === null) {
+  show(photo, scan, solution) {
+    if (!scan || solution === null) {
       this.#shown = this.#next = null;
     } else {
       const {width, height, tile_size, num_levels} = scan;
@@ -65,11 +65,11 @@ export class BackProjection {
         num_levels,
         photo: photo.id,
         scan: scan.id,
-        revision,
-        url: api.backTile(photo.id, scan.id, revision)
+        solution,
+        url: api.backTile(photo.id, scan.id, solution)
       };
       const now = this.#next ?? this.#shown;
-      if (now && now.photo === next.photo && now.scan === next.scan && now.revision === revision) {
+      if (now && now.photo === next.photo && now.scan === next.scan && now.solution === solution) {
         return;
       }
       if (this.#shown && (this.#shown.photo !== next.photo || this.#shown.scan !== next.scan)) {
@@ -195,9 +195,9 @@ export class EdgeLayer {
     context.drawImage(this.#canvas, 0, 0, width / ratio, height / ratio);
   }
 
-  // revision null: no solution.
-  async show(photo, revision) {
-    const key = revision === null || !this.on ? '' : `${photo.id} ${revision}`;
+  // solution null: no solution.
+  async show(photo, solution) {
+    const key = solution === null || !this.on ? '' : `${photo.id} ${solution}`;
     if (key === this.#key) return;
     if (!key.startsWith(`${photo.id} `)) this.edges = [];
     this.#key = key;
@@ -206,7 +206,7 @@ export class EdgeLayer {
     if (!key) return;
     this.#asking = new AbortController();
     try {
-      const edges = await api.edges(photo.id, revision, this.#asking.signal);
+      const edges = await api.edges(photo.id, solution, this.#asking.signal);
       if (this.#key !== key) return;
       this.edges = edges;
       this.#drawn = '';

@@ -7,14 +7,14 @@ import {app, kSides} from './app.js';
 import {BackProjection, EdgeLayer, settled} from './back.js';
 import {kKeys} from './commands.js';
 import {listenToDividers} from './dividers.js';
-import {byId, el, number, say, setText} from './dom.js';
+import {byId, el, say, setText} from './dom.js';
 import {Editor} from './editor.js';
 import {listenToKeys} from './keys.js';
 import {Loupe} from './loupe.js';
 import {markerAt} from './markers.js';
 import {Pane} from './pane.js';
 import {Results, showSummary} from './results.js';
-import {drawPicks, showLoupe} from './scene.js';
+import {drawPicks, placedBy, showLoupe} from './scene.js';
 import {showHint, showSync} from './status.js';
 import {Strip} from './strip.js';
 import {listenToTargets} from './targets.js';
@@ -128,9 +128,9 @@ const follow = settled(() => {
   const {editor, picks} = app;
   if (!editor.photo || !editor.scan || editor.dragging || picks.pending) return;
   const solved = picks.session.photos[editor.photo.name]?.solved === true;
-  const revision = solved ? picks.session.revision : null;
-  app.back.show(editor.photo, editor.scan, revision);
-  app.edges.show(editor.photo, revision);
+  const solution = solved ? picks.session.solution_number : null;
+  app.back.show(editor.photo, editor.scan, solution);
+  app.edges.show(editor.photo, solution);
 });
 
 let frame = 0;
@@ -150,8 +150,7 @@ function showAll() {
   const counts = new Map();
   for (const {image_name} of picks.list) counts.set(image_name, (counts.get(image_name) ?? 0) + 1);
   app.strip.update(editor.photo.id, session.photos, counts);
-  const solution = session.photos[editor.photo.name];
-  setText(byId('photo-fit'), solution?.solved ? `${number(solution.rms_px, 2)} px rms` : '');
+  setText(byId('photo-fit'), placedBy(session, editor.photo));
   setText(byId('next'), session.next);
   byId('next').title = session.next;
   const steps = [['undo', 'Undo', picks.undoLabel], ['redo', 'Redo', picks.redoLabel]];
@@ -335,7 +334,13 @@ async function start() {
   byId('scan-select')
       .append(...server.scans.map((scan) => el('option', {value: scan.id}, scan.name)));
   listen();
-  new AlignDialog(app.picks, server);
+  new AlignDialog(app.picks, server, {
+    look: () => {
+      app.back.setMode('over');
+      if (!byId('edges').checked) byId('edges').click();
+    },
+    pickIn: (name) => choosePhoto(server.photos.find((photo) => photo.name === name).id),
+  });
   chooseScan(server.scans[0].id);
   choosePhoto(server.selected_photo ?? server.photos[0]?.id);
   showSync();

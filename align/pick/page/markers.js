@@ -163,12 +163,12 @@ export function drawCrosshairCursor(context, view, place) {
 }
 
 // From clicks to projections, longer than they are by a factor that is returned (and shown): the
-// largest round one with which no used vector is longer than a twentieth of the photo.
+// largest round one with which none that may be right is longer than a twentieth of the photo.
 // picks: [{place, residual: [dx, dy] pixels, status}].
 export function drawResiduals(context, view, picks) {
   const longest = Math.max(
       0,
-      ...picks.filter((pick) => pick.status === 'used')
+      ...picks.filter(({status}) => status === 'used' || status === 'waiting')
           .map((pick) => Math.hypot(...pick.residual)));
   const limit = Math.hypot(view.pictureWidth, view.pictureHeight) / 20;
   const factor = [200, 100, 50, 20, 10, 5, 2].find((one) => one * longest <= limit) ?? 1;

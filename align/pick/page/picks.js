@@ -360,7 +360,8 @@ export class Picks extends EventTarget {
       this.#differs(now, this.list);
       return;
     }
-    if (this.state === 'unsaved' && now.saved && !this.pending) {
+    const solved = now.solution_number !== this.session.solution_number;  // by another tab's search
+    if ((solved || (this.state === 'unsaved' && now.saved)) && !this.pending) {
       this.#take(now, this.list);
     } else if (this.state === 'gone' || this.state === 'restarted') {
       this.#setState(

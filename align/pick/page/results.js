@@ -131,7 +131,11 @@ export function showSummary(photo, session, {min_picks, models}) {
   const counted =
       solution?.num_complete ? `${solution.num_used} used of ${solution.num_complete}` : 'none yet';
   add('Picks', counted);
-  if (solution?.solved) {
+  if (solution?.by === 'search') {
+    add('Placed by',
+        `the search, ${session.found.trusted ? 'trusted' : 'not trusted'}; your picks take over ` +
+            'once they place it');
+  } else if (solution?.solved) {
     add('Solved by',
         solution.by === 'sparse_model' ? 'the picks with the sparse model\u2019s help' :
                                          'its own picks');

@@ -1,8 +1,19 @@
 // What is drawn over the two pictures, and where their loupes look.
 
 import {app} from './app.js';
-import {byId, el} from './dom.js';
+import {byId, el, number, setText} from './dom.js';
 import * as markers from './markers.js';
+
+// What says where a photo is, for the views that show it there; '' = nothing does.
+export function placedBy(session, photo) {
+  const solution = session.photos[photo.name];
+  if (!solution?.solved) return '';
+  if (solution.by === 'search') {
+    return `placed by the search${session.found.trusted ? '' : ', not trusted'}`;
+  }
+  const rms = typeof solution.rms_px === 'number' ? `, ${number(solution.rms_px, 2)} px rms` : '';
+  return `placed by your picks${rms}`;
+}
 
 export function drawPicks(side, context, view) {
   const {editor, picks} = app;
@@ -14,6 +25,7 @@ export function drawPicks(side, context, view) {
   for (const pick of all) {
     if (!pick.selected) markers.drawMarker(context, view, pick);
   }
+  if (side === 'scan') showPlacedBy();
   const half = editor.half;
   const ghost = editor.ghostOf(half, side);
   if (ghost && !(side === 'scan' && editor.tried)) {
@@ -33,6 +45,15 @@ export function crossShown(side) {
   const {editor, picks, panes, lastInput} = app;
   return lastInput[side] === 'keys' && document.activeElement === panes[side].element &&
       editor.placeOf(picks.find(editor.selected), side) === null;
+}
+
+// Beside the photo that lies on the scan.
+function showPlacedBy() {
+  const {back, editor, picks} = app;
+  const legend = byId('scan-legend');
+  const text = placedBy(picks.session, editor.photo);
+  legend.hidden = back.mode === 'off' || !back.available || text === '';
+  setText(legend, text);
 }
 
 function showLegend(factor) {

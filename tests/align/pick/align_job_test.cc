@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <thread>
 
+#include "colmap_ext/sparse_model.h"
 #include "core/error.h"
+#include "importers/rtpi_header.h"
 #include "tests/align/pick/pick_page.h"
 #include "tests/support/folders.h"
 #include "tests/support/run_command.h"
@@ -16,6 +18,7 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 const std::string kAlign = BinFolder() + "/roomtex-align";
 
@@ -42,12 +45,13 @@ TEST_F(AlignButton, AlignsAndSaysHowGoodItIs) {
   const Json idle = Get("align").json();
   EXPECT_EQ(idle["state"], "idle");
   EXPECT_TRUE(idle["exit_code"].is_null());
-  EXPECT_EQ(Post("align").status, 422);  // there are no pairs yet
-  EXPECT_THAT(idle["command"].get<std::string>(),
-              HasSubstr("roomtex-align --input_path " + ThePickRoom().input().input_paths[0]));
+  EXPECT_EQ(idle["command"], "");
   ASSERT_EQ(Put(1, ToJson(TruePicks(8))).status, 200);
   const Json state = Align();
   EXPECT_EQ(state["exit_code"], 0) << state.dump(1);
+  EXPECT_THAT(state["command"].get<std::string>(),
+              HasSubstr("roomtex-align --input_path " + ThePickRoom().input().input_paths[0]));
+  EXPECT_THAT(state["command"].get<std::string>(), HasSubstr("--picks_path " + picks_path_));
   EXPECT_EQ(state["verdict"], "trusted");
   EXPECT_THAT(state["headline"].get<std::string>(), HasSubstr("Trusted: the photos are placed to"));
   EXPECT_EQ(state["share"], 1.0);
@@ -66,6 +70,7 @@ TEST_F(AlignButton, AlignsAndSaysHowGoodItIs) {
     EXPECT_EQ(Get(std::string("overlay?name=") + name).status, 404) << name;
   }
   EXPECT_TRUE(std::filesystem::exists(folder_ / "aligned/images.bin"));
+  EXPECT_TRUE(Get("state").json()["session"]["found"].is_null()) << "nothing was searched for";
   // The same numbers on the page and in the report.
   const Json report = Json::parse(ReadBytes(folder_ / "aligned/alignment.json"));
   const Json session = Get("state").json()["session"];
@@ -107,12 +112,12 @@ TEST_F(AlignButton, FewerThanSixPicksAreAHint) {
 class FakeProgram : public PickPage {
  protected:
   void SetUp() override {}
-  void ServeWith(const std::string& script) {
+  void ServeWith(const std::string& script, size_t num_picks = 1) {
     const std::string program = folder_ / "program";
     WriteBytes(program, "#!/bin/sh\n" + script);
     std::filesystem::permissions(program, std::filesystem::perms::owner_all);
     Serve("", program);
-    Put(1, ToJson(TruePicks(1)));
+    Put(1, ToJson(TruePicks(num_picks)));
   }
   Json WaitFor(const std::string& key, const Json& value) {
     for (int i = 0; i < 400; ++i) {
@@ -188,6 +193,144 @@ TEST_F(FakeProgram, AReportOfAnEarlierRunIsNotThisOnes) {
   EXPECT_EQ(state["verdict"], "failed");
   EXPECT_THAT(state["sentences"].dump(), HasSubstr("too few picks"));
   EXPECT_THAT(state["facts"], IsEmpty());
+}
+
+// A run that finds the model where it is, without a pick.
+class FoundPlace : public FakeProgram {
+ protected:
+  void SetUp() override {
+    const SimulatedRoom& room = ThePickRoom().room();
+    SparseModel model = room.MakeSparseModel(1500, 0.0);
+    TransformModel(room.ScanFromSparse(), &model);
+    std::filesystem::create_directories(folder_ / "aligned");
+    WriteSparseModel(model, folder_ / "aligned");
+    ServeWith("exit 4\n", 0);
+    photo_ = ThePickRoom().scene().photos()[ThePickRoom().clicked_photo()].name();
+  }
+  // Runs it with this report; the session afterwards.
+  Json Find(const Json& report) {
+    WriteBytes(folder_ / "aligned/alignment.json", report.dump());
+    EXPECT_EQ(Post("align").status, 200);
+    done_ = WaitFor("state", "done");
+    EXPECT_EQ(done_["exit_code"], 4);
+    return Get("state").json()["session"];
+  }
+  static Json Undecided() {
+    return {{"trusted", false},
+            {"reason", "Only geometry speaks for it."},
+            {"images", Json::array()},
+            {"search", {{"verdict", "unconfirmed"}, {"hint_decides", true}}},
+            {"scans", {{{"azimuth", ThePickRoom().scene().azimuth()}}}}};
+  }
+  std::string BackTile(int solution) const {
+    return "tile?back=" + std::to_string(ThePickRoom().clicked_photo()) +
+           "&scan=0&level=0&x=0&y=0&solution=" + std::to_string(solution);
+  }
+  std::string photo_;
+  Json done_;
+};
+
+TEST_F(FoundPlace, IsShownUntilPicksPlaceThePhotos) {
+  Json session = Get("state").json()["session"];
+  const int before = session["solution_number"], revision = session["revision"];
+  EXPECT_TRUE(session["found"].is_null());
+  EXPECT_EQ(session["photos"][photo_]["solved"], false);
+  EXPECT_EQ(Get(BackTile(before)).status, 404);
+
+  session = Find(Undecided());
+  EXPECT_THAT(done_["command"].get<std::string>(), Not(HasSubstr("--picks_path")));
+  EXPECT_EQ(session["revision"], revision) << "the picks are the same";
+  EXPECT_EQ(session["solution_number"], before + 1);
+  EXPECT_EQ(session["found"]["trusted"], false);
+  EXPECT_EQ(session["photos"][photo_]["by"], "search");
+  EXPECT_EQ(session["photos"][photo_]["solved"], true);
+  EXPECT_TRUE(session["photos"][photo_]["rms_px"].is_null());
+  EXPECT_TRUE(session["photos"][photo_]["focal_length_px"].is_null()) << "no picks found it";
+  EXPECT_TRUE(session["similarities"][0].is_null());
+  EXPECT_EQ(Get(BackTile(before + 1)).status, 200);
+  EXPECT_EQ(Get(BackTile(before)).status, 404);
+  const Json edges = Get("edges?photo=" + std::to_string(ThePickRoom().clicked_photo()) +
+                         "&solution=" + std::to_string(before + 1))
+                         .json();
+  EXPECT_GT(edges.size(), 30u);
+  const Json photos = Get("state").json()["photos"];
+  for (const Json& photo : photos) EXPECT_GT(photo["scan_share"], 0.01);
+
+  // Six picks of one's own take over; without them it is back.
+  session = Put(revision, ToJson(TruePicks(6))).json();
+  EXPECT_EQ(session["photos"][photo_]["by"], "picks");
+  for (const auto& [name, photo] : session["photos"].items()) EXPECT_NE(photo["by"], "search");
+  EXPECT_THAT(session["next"].get<std::string>(), HasSubstr("Enough picks"));
+  session = Put(revision + 1, Json::array()).json();
+  EXPECT_EQ(session["photos"][photo_]["by"], "search");
+}
+
+TEST_F(FoundPlace, ThatIsUndecidedIsConfirmedByOnePairAndDoesNotSayItself) {
+  Json session = Find(Undecided());
+  const std::string confirm_in = session["found"]["confirm_in"];
+  const PickPhoto* const photo = ThePickRoom().scene().FindPhoto(confirm_in);
+  ASSERT_NE(photo, nullptr);
+  EXPECT_FALSE(photo->missing);
+  EXPECT_THAT(session["next"].get<std::string>(), HasSubstr("set it in " + confirm_in));
+  // The other half is not shown: it would confirm whatever was found.
+  Json half = ToJson(TruePicks(1), true);
+  half[0].erase("scan");
+  const int revision = session["revision"];
+  session = Put(revision, half).json();
+  EXPECT_TRUE(session["picks"][0]["predicted_scan"].is_null());
+  session = Put(revision + 1, ToJson(TruePicks(1))).json();
+  EXPECT_EQ(session["picks"][0]["status"], "waiting") << "nothing rests on it yet";
+  EXPECT_LT(session["picks"][0]["residual_px"], 0.01) << "how far off the search has it";
+  EXPECT_EQ(session["photos"][photo_]["num_used"], 0);
+  EXPECT_THAT(session["next"].get<std::string>(), HasSubstr("Align again"));
+
+  session = Find(Undecided());
+  EXPECT_THAT(done_["command"].get<std::string>(), HasSubstr("--picks_path " + picks_path_));
+  // Of a run that no pick would help nobody asks for one.
+  Json contradicted = Undecided();
+  contradicted["search"] = {{"verdict", "photos contradict"}, {"hint_decides", false}};
+  session = Find(contradicted);
+  EXPECT_TRUE(session["found"]["confirm_in"].is_null());
+}
+
+TEST_F(FoundPlace, OfSeveralModelsIsConfirmedInAPhotoOfTheUndecidedOne) {
+  const Json decided = {{"search", {{"verdict", "none"}, {"hint_decides", false}}}};
+  const Json undecided = {{"search", Undecided()["search"]}};
+  Json report = Undecided();
+  report["models"] = {undecided, decided};
+  EXPECT_TRUE(Find(report)["found"]["confirm_in"].is_string());
+  report["models"] = {decided, undecided};  // the page shows no photo of the second
+  EXPECT_TRUE(Find(report)["found"]["confirm_in"].is_null());
+  report["models"] = {undecided, decided};
+  report["trusted"] = true;
+  EXPECT_TRUE(Find(report)["found"]["confirm_in"].is_null());
+}
+
+TEST_F(FoundPlace, IsNotThatOfAnotherRun) {
+  EXPECT_FALSE(Find(Undecided())["found"].is_null());
+  // The scan was turned into its mirror image, which is not what the page shows.
+  Json turned = Undecided();
+  turned["scans"][0]["azimuth"] = OtherAzimuth(ThePickRoom().scene().azimuth());
+  EXPECT_TRUE(Find(turned)["found"].is_null());
+  EXPECT_THAT(done_["sentences"].dump(), HasSubstr("press Mirror"));
+  EXPECT_FALSE(Find(Undecided())["found"].is_null());
+  // A refusal leaves the model of the run before it in the folder.
+  Json refused = Undecided();
+  refused.erase("images");
+  const Json session = Find(refused);
+  EXPECT_TRUE(session["found"].is_null());
+  EXPECT_EQ(session["photos"][photo_]["solved"], false);
+  EXPECT_THAT(done_["headline"].get<std::string>(), HasSubstr("the search found no place"));
+  // Six picks place the photos without a search.
+  Json by_picks = Undecided();
+  by_picks["search"] = nullptr;
+  EXPECT_TRUE(Find(by_picks)["found"].is_null());
+}
+
+TEST_F(FoundPlace, OfABrokenModelIsSaid) {
+  WriteBytes(folder_ / "aligned/images.bin", "nonsense");
+  EXPECT_TRUE(Find(Undecided())["found"].is_null());
+  EXPECT_THAT(done_["sentences"].dump(), HasSubstr("images.bin"));
 }
 
 TEST_F(FakeProgram, OneThatIsNotThereIsSaid) {

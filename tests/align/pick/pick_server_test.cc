@@ -121,8 +121,8 @@ TEST_F(PickPage, WhatIsNotThereIsNotFound) {
                            "tile?scan=0&picture=../intensity&level=0&x=0&y=0",
                            "tile?scan=1&picture=intensity&level=0&x=0&y=0",
                            "tile?scan=0&level=0&x=0&y=0",
-                           "tile?back=2&scan=0&revision=1&level=0&x=0&y=0",  // nothing is solved
-                           "tile?back=99&scan=0&revision=1&level=0&x=0&y=0",
+                           "tile?back=2&scan=0&solution=1&level=0&x=0&y=0",  // nothing is solved
+                           "tile?back=99&scan=0&solution=1&level=0&x=0&y=0",
                            "thumbnail",
                            "thumbnail?photo=0",
                            "thumbnail?photo=-1",
@@ -395,7 +395,7 @@ TEST(PickSession, RefusesAPicksFileOfAnotherModel) {
 TEST_F(PickPage, ThePhotoIsSeenOnTheScan) {
   ASSERT_EQ(Put(1, ToJson(TruePicks(6))).status, 200);
   const int photo = ThePickRoom().clicked_photo();
-  const std::string path = "tile?back=" + std::to_string(photo) + "&scan=0&revision=2&level=0&";
+  const std::string path = "tile?back=" + std::to_string(photo) + "&scan=0&solution=2&level=0&";
   cv::Mat4b whole(500, 1000);
   for (int x = 0; x < 2; ++x) {
     const Answer tile = Get(path + "y=0&x=" + std::to_string(x));
@@ -434,7 +434,7 @@ TEST_F(PickPage, ThePhotoIsSeenOnTheScan) {
   }
   EXPECT_GT(hidden, 3000);
   EXPECT_EQ(wrong, 0);
-  // Forgotten with its revision.
+  // Forgotten with its solution.
   ASSERT_EQ(Put(2, ToJson(TruePicks(5))).status, 200);
   EXPECT_EQ(Get(path + "x=0&y=0").status, 404);
 }
@@ -453,7 +453,7 @@ TEST(BackProjection, LevelsWeightColoursByTheirAlpha) {
 TEST_F(PickPage, EdgesOfTheScanLieOnThoseOfThePhoto) {
   ASSERT_EQ(Put(1, ToJson(TruePicks(6))).status, 200);
   const std::string photo = std::to_string(ThePickRoom().clicked_photo());
-  const Json edges = Get("edges?photo=" + photo + "&revision=2").json();
+  const Json edges = Get("edges?photo=" + photo + "&solution=2").json();
   ASSERT_TRUE(edges.is_array());
   ASSERT_GT(edges.size(), 30u);
   std::map<std::string, int> kinds;
@@ -465,8 +465,8 @@ TEST_F(PickPage, EdgesOfTheScanLieOnThoseOfThePhoto) {
     }
   }
   EXPECT_EQ(kinds.size(), 3u);
-  for (const std::string& path : {"edges?photo=" + photo + "&revision=1", std::string("edges"),
-                                  std::string("edges?photo=99&revision=2")}) {
+  for (const std::string& path : {"edges?photo=" + photo + "&solution=1", std::string("edges"),
+                                  std::string("edges?photo=99&solution=2")}) {
     EXPECT_EQ(Get(path).status, 422) << path;
   }
 }
@@ -479,10 +479,10 @@ TEST_F(PickPage, ManyRequestsAtOnceAllGetTheirAnswer) {
   for (int t = 0; t < 8; ++t) {
     threads.emplace_back([&, t] {
       for (int i = 0; i < 6; ++i) {
-        const std::string revision = std::to_string(session_->Now()->revision);
+        const std::string solution = std::to_string(session_->Now()->solution_number);
         const int status[] = {
-            Get("tile?back=" + photo + "&scan=0&level=1&x=0&y=0&revision=" + revision).status,
-            Get("edges?photo=" + photo + "&revision=" + revision).status,
+            Get("tile?back=" + photo + "&scan=0&level=1&x=0&y=0&solution=" + solution).status,
+            Get("edges?photo=" + photo + "&solution=" + solution).status,
             Get("tile?scan=0&picture=local&level=0&x=1&y=0").status,
             Get("state").status,
         };
