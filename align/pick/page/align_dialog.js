@@ -102,15 +102,18 @@ export class AlignDialog {
     if (count < min_picks && !hint) {
       this.#status = null;
       this.#buttons(false);
-      body.replaceChildren(
-          el('p', {},
-             `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
-                 `there are ${count} so far${where}.`),
-          el('p', {}, this.picks.session.next));
-      if (hasModel) {
-        const how = count > 0 ? 'Or by what there is:' :
-                                'Or it searches for the place of the photos without a pick:';
-        body.append(offer(how, 'Find it for me', () => this.#start({hint: true})));
+      const search = (text) => offer(text, 'Find it for me', () => this.#start({hint: true}));
+      const needed = `roomtex-align needs ${min_picks} picks${hasModel ? '' : ' in a photo'}; ` +
+          `there are ${count} so far${where}.`;
+      const {found, next: sentence} = this.picks.session;
+      const next = el('p', {}, sentence);
+      if (hasModel && count === 0) {
+        body.replaceChildren(
+            search('roomtex-align can search for the place of the photos without a pick.'),
+            el('p', {}, `Or show it by ${min_picks} picks.`), ...(found ? [] : [next]));
+      } else {
+        body.replaceChildren(el('p', {}, needed), next);
+        if (hasModel) body.append(search('Or by what there is:'));
       }
       return;
     }

@@ -114,7 +114,13 @@ export class Results {
     setText(cells.leftOut, number(numbers.leave_one_out_px, 2));
     const share = status === 'used' ? (numbers.residual_px ?? 0) / largest : 0;
     cells.bar.style.width = `${Math.round(share * 44)}px`;
-    setText(cells.state, worst ? '▲ worst' : kStates[status] ?? status);
+    const compared =
+        status === 'waiting' && picks.session.photos[pick.image_name]?.by === 'search';
+    setText(
+        cells.state,
+        worst        ? '▲ worst' :
+            compared ? 'compared with the search' :
+                       kStates[status] ?? status);
     cells.on.checked = pick.weight !== 0;
     cells.on.disabled = status === 'half';
     cells.on.setAttribute('aria-label', `Count pick ${index}`);
@@ -128,8 +134,9 @@ export function showSummary(photo, session, {min_picks, models}) {
   const body = byId('summary-body');
   const facts = [];
   const add = (name, value) => facts.push(el('dt', {}, name), el('dd', {}, value));
-  const counted =
-      solution?.num_complete ? `${solution.num_used} used of ${solution.num_complete}` : 'none yet';
+  const counted = !solution?.num_complete ? 'none yet' :
+      solution.by === 'search'            ? `${solution.num_complete}, compared with the search` :
+                                 `${solution.num_used} used of ${solution.num_complete}`;
   add('Picks', counted);
   if (solution?.by === 'search') {
     add('Placed by',
