@@ -180,13 +180,13 @@ export class AlignDialog {
 
   async #poll() {
     clearTimeout(this.#timer);
-    const before = this.#status?.state;
     try {
-      this.#status = await api.align();
+      const status = await api.align();
       // What it has found is shown in place of picks.
-      if (this.#status.state === 'done' && before !== 'done') {
+      if (status.state === 'done' && this.#status?.state !== 'done') {
         this.picks.refresh((await api.state()).session);
       }
+      this.#status = status;
     } catch (error) {
       if (!(error instanceof ServerError)) throw error;
       this.#timer = setTimeout(() => this.#poll(), 4 * kPoll);
