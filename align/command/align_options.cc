@@ -125,11 +125,6 @@ void CheckOptions(AlignCommandOptions* options) {
         "--camera_params is for photos without a sparse model: that of --input_path "
         "has cameras");
   }
-  if (a.input_path.empty() && !a.near.empty() && !a.picks_path.empty()) {
-    problems.push_back(
-        "--near and --picks_path cannot be had together for photos without a sparse model; give "
-        "one of them");
-  }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {
     problems.push_back("--overlays needs the photos: give --image_path");

@@ -107,26 +107,40 @@ void AlignFoundPhotosOnly(const AlignCommandOptions& a, const PhotoModel& photos
   WritePlacedPhotos(a, &placed, &reading, told, context);
 }
 
+// What --near says of one of these photos.
+std::vector<NearHint> ReadNear(const AlignCommandOptions& a, const PhotoModel& photos) {
+  if (a.near.empty()) return {};
+  const NearHint near = ParseNearHint(a.near);
+  if (photos.model.FindImage(near.image_name) == nullptr) {
+    throw UsageError("--near names " + near.image_name + ", which is none of the photos");
+  }
+  return {near};
+}
+
 }  // namespace
 
 void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& context) {
   context.progress.Stage("read photos");
-  std::vector<Pick> picks = ReadPicks(a.picks_path);
-  const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, picks, a.camera);
-  CheckPickNames(a.picks_path, picks, {&photos.model});
-  const PhotoModel few = WithFewPicks(photos, picks);
+  PhotoHints hints;
+  hints.picks = ReadPicks(a.picks_path);
+  const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, hints.picks, a.camera);
+  CheckPickNames(a.picks_path, hints.picks, {&photos.model});
+  hints.near = ReadNear(a, photos);
+  const PhotoModel few = WithFewPicks(photos, hints.picks);
   if (few.model.images.size() == photos.model.images.size()) {
-    return AlignFoundPhotosOnly(a, photos, {picks, {}}, context);
+    return AlignFoundPhotosOnly(a, photos, hints, context);
   }
   const std::set<std::string> told = LookForPhotos(a, {&photos.model}, context);
   context.progress.Stage("read scan");
   ScanReading reading(a, context);
-  reading.origin.MoveToLocal(&picks);
-  AlignmentInput input{photos.model, *reading.surveyed, picks, a.picks_path, reading.azimuth()};
+  reading.origin.MoveToLocal(&hints.picks);
+  reading.origin.MoveToLocal(&hints.near);
+  AlignmentInput input{photos.model, *reading.surveyed, hints.picks, a.picks_path,
+                       reading.azimuth()};
   input.scan_origin = reading.origin.offset();
   FoundPhotos found;
   if (!few.model.images.empty()) {
-    found = SearchPhotos(a, few, {picks, {}}, false, &reading, context);
+    found = SearchPhotos(a, few, hints, false, &reading, context);
     context.report["search"] = FoundPhotosToJson(found);
   }
   std::string refusal;
@@ -140,16 +154,8 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
   context.progress.Stage("read photos");
   const std::vector<std::string> names =
       ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
-  PhotoHints hints;
-  if (!a.near.empty()) {
-    hints.near.push_back(ParseNearHint(a.near));
-    const std::string& name = hints.near[0].image_name;
-    if (std::find(names.begin(), names.end(), name) == names.end()) {
-      throw UsageError("--near names " + name + ", which is no photo of --image_path");
-    }
-  }
-  AlignFoundPhotosOnly(a, MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken),
-                       std::move(hints), context);
+  const PhotoModel photos = MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken);
+  AlignFoundPhotosOnly(a, photos, {{}, ReadNear(a, photos)}, context);
 }
 
 }  // namespace roomtex
