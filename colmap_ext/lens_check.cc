@@ -341,6 +341,12 @@ std::optional<FreedLenses> FreeLenses(const SparseModel& thinned, const LensLabe
   if (!freed.full.usable) return std::nullopt;
   freed.noise =
       spread * spread * std::max(1.0, freed.full.cost / std::max(1.0, freed.full.redundancy));
+  // A rolling shutter looks like a wrong principal point in one photo and like tangential
+  // distortion in the next one: photos that differ by that know a lens less well than their
+  // keypoints say.
+  if (freed.full.model.images.size() >= kMinPhotosOfSpread) {
+    freed.noise = std::max(freed.noise, freed.full.scatter_by_photo);
+  }
   if (freed.sparing.cost - freed.full.cost > kMinCentreGain * freed.noise) {
     freed.sparing = freed.full;
   }

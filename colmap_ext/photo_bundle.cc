@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include <Eigen/Cholesky>
 #include <ceres/loss_function.h>
 #include <ceres/normal_prior.h>
 #include <ceres/ordered_groups.h>
@@ -27,6 +28,9 @@ namespace {
 // lens each dense matrices take two thirds of the time (tests/benchmark/scale/lens_cost.cc).
 constexpr size_t kMaxDensePhotos = 200;
 constexpr int kMaxBundleSteps = 60;
+// Of what photos differ by, the share that lenses leave over, at least: of fewer photos than
+// parameters nothing is left.
+constexpr double kLeastFreeShare = 0.3;
 // Fewer leave a photo's pose open.
 constexpr int kMinObservations = 6;
 // How exactly the scale is held, a share.
@@ -252,12 +256,11 @@ class PhotoNormal {
     size_t num_observations = 0;
     for (const auto& [id, seen] : observed_) {
       std::vector<NormalTerms> observations;
-      for (const Observed& one : seen) {
-        NormalTerms terms;
-        if (!AddCost(one, result_.model.points.at(id).x_in_model, &terms)) continue;
-        ++num_observations;
-        observations.push_back(std::move(terms));
+      for (const Term& term : TermsOf(id, seen)) {
+        result_.cost += term.cost;
+        observations.push_back(term.normal);
       }
+      num_observations += observations.size();
       if (wanted && observations.size() >= 2) {
         normal.AddPoint(observations, Eigen::Matrix3d::Zero());
       }
@@ -270,32 +273,51 @@ class PhotoNormal {
   }
 
  private:
-  bool AddCost(const Observed& one, const Eigen::Vector3d& x_in_model, NormalTerms* terms) {
+  // An observation's part of the normal equations, by the weight of Huber's cost.
+  struct Term {
+    uint32_t image_id = 0;
+    NormalTerms normal;
+    Eigen::Vector2d residual;
+    double cost = 0;
+  };
+
+  std::vector<Term> TermsOf(uint64_t point_id, const std::vector<Observed>& seen) const {
+    const Eigen::Vector3d& x_in_model = result_.model.points.at(point_id).x_in_model;
+    std::vector<Term> terms;
+    for (const Observed& one : seen) {
+      Term term;
+      if (FindTerm(one, x_in_model, &term)) terms.push_back(std::move(term));
+    }
+    return terms;
+  }
+
+  bool FindTerm(const Observed& one, const Eigen::Vector3d& x_in_model, Term* term) const {
     const int index = result_.lenses.of_image.at(one.image_id);
     const Lens& lens = result_.lenses.lenses[index];
-    const ReprojectionCost cost(poses_.at(one.image_id), lens.camera, one.x_in_img, 1 / sigma_px_,
-                                lens.free);
-    const double* const parameters[3] = {poses_.at(one.image_id).values, x_in_model.data(),
-                                         lens.camera.params.data()};
-    Eigen::Vector2d residual;
+    const PoseParameters& pose = poses_.at(one.image_id);
+    const ReprojectionCost cost(pose, lens.camera, one.x_in_img, 1 / sigma_px_, lens.free);
+    const double* const parameters[3] = {pose.values, x_in_model.data(), lens.camera.params.data()};
+    NormalTerms& normal = term->normal;
     Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
     NormalTerms::Block by_lens;
     by_lens.by.setZero(2, static_cast<int>(lens.camera.params.size()));
-    double* jacobians[3] = {by_pose.data(), terms->by_point.data(), by_lens.by.data()};
-    if (!cost.Evaluate(parameters, residual.data(), jacobians)) return false;
-    const double deviations = residual.norm();
-    result_.cost += HuberCost(deviations, kReprojectionHuber);
+    double* jacobians[3] = {by_pose.data(), normal.by_point.data(), by_lens.by.data()};
+    if (!cost.Evaluate(parameters, term->residual.data(), jacobians)) return false;
+    term->image_id = one.image_id;
+    const double deviations = term->residual.norm();
+    term->cost = HuberCost(deviations, kReprojectionHuber);
     const double weight = std::sqrt(HuberWeight(deviations, kReprojectionHuber));
     const auto offset = pose_offset_.find(one.image_id);
     if (offset != pose_offset_.end()) {
-      terms->blocks.push_back({offset->second, weight * by_pose});
+      normal.blocks.push_back({offset->second, weight * by_pose});
     }
     if (lens_offset_[index] >= 0) {
       by_lens.offset = lens_offset_[index];
       by_lens.by *= weight;
-      terms->blocks.push_back(std::move(by_lens));
+      normal.blocks.push_back(std::move(by_lens));
     }
-    terms->by_point *= weight;
+    normal.by_point *= weight;
+    term->residual *= weight;
     return true;
   }
 
@@ -323,6 +345,56 @@ class PhotoNormal {
     }
     const std::vector<Eigen::MatrixXd> covariances = normal->Covariances(blocks);
     for (size_t k = 0; k < covariances.size(); ++k) result_.covariances[freed[k]] = covariances[k];
+    if (!covariances.empty()) FindScatter(*normal, blocks);
+  }
+
+  // To first order the residuals of a photo move the lenses by `lenses_by` times its part of the
+  // gradient, points eliminated.
+  void FindScatter(const ReducedNormal& normal, const std::vector<UnknownBlock>& blocks) {
+    const Eigen::MatrixXd lenses_by = normal.CovarianceColumns(blocks);
+    if (lenses_by.size() == 0) return;
+    const Eigen::Index count = lenses_by.cols();
+    Eigen::MatrixXd covariance(count, count);
+    Eigen::Index row = 0;
+    for (const UnknownBlock& block : blocks) {
+      covariance.middleRows(row, block.size) = lenses_by.middleRows(block.offset, block.size);
+      row += block.size;
+    }
+    std::map<uint32_t, Eigen::VectorXd> moved;
+    for (const uint32_t id : held_) moved.emplace(id, Eigen::VectorXd::Zero(count));
+    for (const auto& [id, seen] : observed_) {
+      const std::vector<Term> terms = TermsOf(id, seen);
+      Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+      std::vector<Eigen::MatrixXd> by_lenses;  // of each residual
+      Eigen::MatrixXd point_by = Eigen::MatrixXd::Zero(3, count);
+      for (const Term& term : terms) {
+        Eigen::MatrixXd by = Eigen::MatrixXd::Zero(2, count);
+        for (const NormalTerms::Block& block : term.normal.blocks) {
+          by += block.by * lenses_by.middleRows(block.offset, block.by.cols());
+        }
+        information += term.normal.by_point.transpose() * term.normal.by_point;
+        point_by += term.normal.by_point.transpose() * by;
+        by_lenses.push_back(std::move(by));
+      }
+      if (terms.size() < 2) continue;
+      const Eigen::Matrix3d inverse = information.inverse();
+      if (!inverse.allFinite()) continue;
+      point_by = inverse * point_by;
+      for (size_t k = 0; k < terms.size(); ++k) {
+        const auto at = moved.find(terms[k].image_id);
+        if (at == moved.end()) continue;
+        at->second +=
+            (by_lenses[k] - terms[k].normal.by_point * point_by).transpose() * terms[k].residual;
+      }
+    }
+    const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
+    std::vector<double> squares;
+    for (const auto& [id, move] : moved) squares.push_back(move.dot(factor.solve(move)));
+    const double num = static_cast<double>(squares.size()), dims = static_cast<double>(count);
+    const double median_of_chi_square = dims * std::pow(1 - 2 / (9 * dims), 3);
+    // The lenses have taken up a part of what the photos differ by.
+    const double free_share = std::max(1 - dims / num, kLeastFreeShare);
+    result_.scatter_by_photo = num * Median(std::move(squares)) / median_of_chi_square / free_share;
   }
 
   const ObservedPoints& observed_;

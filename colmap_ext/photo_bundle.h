@@ -34,6 +34,12 @@ struct PhotoBundle {
   // Of the parameters of each lens: what the photos leave open, with LensPrior. 0 x 0 for a lens
   // that is held, and where something stays open.
   std::vector<Eigen::MatrixXd> covariances;
+  // How many times as much as that (variances, all parameters of the free lenses together) they
+  // scatter if the errors of a photo go together: each photo's share in the lenses, found from what
+  // its residuals are, against what independent keypoints of sigma_px would have (a sandwich
+  // estimate with photos as clusters: Liang and Zeger 1986, "Longitudinal Data Analysis Using
+  // Generalized Linear Models", by the median photo). 0 = not known.
+  double scatter_by_photo = 0;
 };
 
 // Standard deviation of a keypoint's coordinate, pixels: from the median of the residuals, because

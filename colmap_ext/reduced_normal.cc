@@ -60,27 +60,59 @@ void ReducedNormal::AddInformation(int offset, const Eigen::MatrixXd& informatio
   matrix_.block(offset, offset, information.rows(), information.cols()) += information;
 }
 
+namespace {
+
+// The factor of a normal matrix with ones on its diagonal, and what scales it so.
+struct ScaledFactor {
+  explicit ScaledFactor(const Eigen::MatrixXd& matrix) {
+    const Eigen::VectorXd size = matrix.diagonal().cwiseSqrt();
+    if (size.size() == 0 || !matrix.allFinite() || !(size.minCoeff() > 0)) return;
+    scale = size.cwiseInverse();
+    factor.compute(scale.asDiagonal() * matrix * scale.asDiagonal());
+    usable = factor.info() == Eigen::Success;
+  }
+
+  Eigen::VectorXd scale;
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  bool usable = false;  // false: something stays open
+};
+
+}  // namespace
+
 std::vector<Eigen::MatrixXd> ReducedNormal::Covariances(
     const std::vector<UnknownBlock>& blocks) const {
-  const Eigen::VectorXd size = matrix_.diagonal().cwiseSqrt();
-  if (size.size() == 0 || !matrix_.allFinite() || !(size.minCoeff() > 0)) return {};
-  const Eigen::VectorXd scale = size.cwiseInverse();
-  const Eigen::LLT<Eigen::MatrixXd> factor(scale.asDiagonal() * matrix_ * scale.asDiagonal());
-  if (factor.info() != Eigen::Success) return {};
+  const ScaledFactor scaled(matrix_);
+  if (!scaled.usable) return {};
   std::vector<Eigen::MatrixXd> covariances;
   for (const UnknownBlock& block : blocks) {
     // With A = L L^T the block is Y^T Y of L Y = (the block's unit vectors), and Y is 0 above them:
     // all blocks together take a third of n^3, the whole inverse two.
     const auto rest = static_cast<Eigen::Index>(matrix_.rows() - block.offset);
     Eigen::MatrixXd solved = Eigen::MatrixXd::Identity(rest, block.size);
-    factor.matrixLLT()
+    scaled.factor.matrixLLT()
         .bottomRightCorner(rest, rest)
         .triangularView<Eigen::Lower>()
         .solveInPlace(solved);
-    const auto by = scale.segment(block.offset, block.size).asDiagonal();
+    const auto by = scaled.scale.segment(block.offset, block.size).asDiagonal();
     covariances.emplace_back(by * (solved.transpose() * solved) * by);
   }
   return covariances;
+}
+
+Eigen::MatrixXd ReducedNormal::CovarianceColumns(const std::vector<UnknownBlock>& blocks) const {
+  const ScaledFactor scaled(matrix_);
+  if (!scaled.usable) return {};
+  Eigen::Index count = 0;
+  for (const UnknownBlock& block : blocks) count += block.size;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(matrix_.rows(), count);
+  Eigen::Index next = 0;
+  for (const UnknownBlock& block : blocks) {
+    for (int k = 0; k < block.size; ++k) {
+      columns(block.offset + k, next++) = scaled.scale[block.offset + k];
+    }
+  }
+  scaled.factor.solveInPlace(columns);
+  return scaled.scale.asDiagonal() * columns;
 }
 
 }  // namespace roomtex

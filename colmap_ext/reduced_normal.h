@@ -38,6 +38,9 @@ class ReducedNormal {
   // The covariances of these blocks of unknowns, where all the others are unknown, too; none where
   // something stays open.
   std::vector<Eigen::MatrixXd> Covariances(const std::vector<UnknownBlock>& blocks) const;
+  // The columns of these blocks, one after the other, in the covariance of all unknowns; 0 x 0
+  // where something stays open.
+  Eigen::MatrixXd CovarianceColumns(const std::vector<UnknownBlock>& blocks) const;
 
  private:
   Eigen::MatrixXd matrix_;

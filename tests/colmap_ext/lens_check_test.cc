@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,35 @@ TEST(LensCheck, ALensThatIsToldRightStays) {
     EXPECT_LT(check.lenses[0].deviations, 5);
     EXPECT_LT(check.lenses[0].FocalDeviations(), 4);
   }
+}
+
+// As a rolling shutter of 20 ms in a moving hand: the rows of each photo are shifted, up to 4
+// pixels at the top and the bottom, another way each.
+SparseModel WithShiftedRows(SparseModel model) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> shift(-4, 4);
+  for (auto& [id, image] : model.images) {
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const Eigen::Vector2d at_edge(shift(random), shift(random));
+    for (Eigen::Vector2d& x : image.points2d) x += (2 * x.y() / camera.height - 1) * at_edge;
+  }
+  return model;
+}
+
+TEST(LensCheck, WhatDiffersFromPhotoToPhotoIsNoReasonForAnotherLens) {
+  const SparseModel shifted = WithShiftedRows(TrueModel(2));
+  const double f = shifted.cameras.at(1).MeanFocalLength();
+  const LensCheck right = CheckLenses(Mapped(shifted), {}, RefineIntrinsics::kAuto);
+  ASSERT_EQ(right.lenses.size(), 1u);
+  EXPECT_FALSE(right.lenses[0].used) << right.lenses[0].deviations;
+  EXPECT_LT(std::abs(right.lenses[0].found.MeanFocalLength() - f), 3 * right.lenses[0].focal_sigma);
+  // A lens that is wrong is wrong in all of them.
+  SparseModel wrong = shifted;
+  Scale(1.03, &wrong.cameras.at(1));
+  const LensCheck mended = CheckLenses(Mapped(wrong), {}, RefineIntrinsics::kAuto);
+  EXPECT_TRUE(mended.lenses[0].used);
+  EXPECT_LT(std::abs(mended.lenses[0].found.MeanFocalLength() - f),
+            3 * mended.lenses[0].focal_sigma);
 }
 
 TEST(LensCheck, AWrongFocalLengthIsFoundAndMended) {

@@ -59,12 +59,18 @@ TEST(ReducedNormal, BlocksAreThoseOfTheWholeInverse) {
     const Eigen::MatrixXd expected = inverse.block(offset, offset, size, size);
     EXPECT_LT((covariances[i] - expected).norm(), 1e-9 * expected.norm()) << "block " << i;
   }
+  const Eigen::MatrixXd columns = equations.normal.CovarianceColumns({blocks[0], blocks[2]});
+  Eigen::MatrixXd expected(kNumUnknowns, kLens + kPose);
+  expected << inverse.block(0, blocks[0].offset, kNumUnknowns, kLens),
+      inverse.block(0, blocks[2].offset, kNumUnknowns, kPose);
+  EXPECT_LT((columns - expected).norm(), 1e-9 * expected.norm());
 }
 
 TEST(ReducedNormal, SaysNothingWhereSomethingStaysOpen) {
   ReducedNormal normal(kPose + kLens);
   normal.AddInformation(0, Eigen::MatrixXd::Identity(kPose, kPose));
   EXPECT_TRUE(normal.Covariances({{0, kPose}}).empty());
+  EXPECT_EQ(normal.CovarianceColumns({{0, kPose}}).size(), 0);
   normal.AddInformation(kPose, Eigen::MatrixXd::Identity(kLens, kLens));
   EXPECT_EQ(normal.Covariances({{0, kPose}}).size(), 1u);
 }
