@@ -20,10 +20,10 @@ constexpr double kSameShape = 0.01;
 // Where they differ by more, another lens has to differ from the one as told in its focal length by
 // so many standard deviations: distortion alone is too little to go by there. And it has to bring
 // them nearer by this factor, ...
-constexpr double kSameFocalDeviations = 3, kClearlyNearer = 0.95;
+constexpr double kSameFocalDeviations = 2.5, kClearlyNearer = 0.95;
 // ... or the photos have to be this sure of its focal length. A scan that is itself off by
 // centimetres may lie a few per cent nearer to the wrong lens; it has to lie far nearer then.
-constexpr double kSureFocalDeviations = 6, kFarNearer = 0.6;
+constexpr double kSureFocalDeviations = 3.5, kFarNearer = 0.6;
 
 // RMS over all observations, pixels.
 double ReprojectionRms(SparseModel model) { return UpdateReprojectionErrors(&model).rms_px; }

@@ -33,7 +33,7 @@ constexpr size_t kMinObservationsApart = 40;
 constexpr size_t kMinPhotosOfSpread = 5;
 // By this much, in units of the noise's variance, principal point and tangential distortion must
 // lower the cost to be freed; two to four parameters.
-constexpr double kMinCentreGain = 30;
+constexpr double kMinCentreGain = 20;
 // By this much, in units of the noise's variance and per parameter, the cost may rise when cameras
 // that were told differently share a lens.
 constexpr double kMaxRisePerParam = 6;

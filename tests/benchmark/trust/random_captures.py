@@ -75,7 +75,13 @@ def scans_of(folder, tools, extension):
     path = os.path.join(folder, "scan" + extension)
     if not os.path.exists(path):
         run(folder, tools, "roomtex-import", "--input_path", os.path.join(capture, scans[0]), "--output_path", path)
-    return [path], None
+    if extension != ".e57":
+        return [path], None
+    # An E57 has its z up; the truth is in the frame of the capture.
+    poses = os.path.join(folder, "poses.txt")
+    with open(poses, "w") as file:
+        file.write("scan.e57 1 0 0 0  0 0 1 0  0 -1 0 0  0 0 0 1\n")
+    return [path], poses
 
 
 def measure(folder, tools, seed, until):
