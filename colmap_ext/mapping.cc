@@ -142,10 +142,10 @@ constexpr double kMaxFocalSigma = 0.03;
 // A calibrated lens stays unless the photos know theirs so well, or are so sure that it is wrong:
 // of one plane, or of a walk along a wall, they take a bent room for another lens.
 constexpr double kMaxFocalSigmaOfCalibrated = 0.004;
-constexpr double kSureDeviations = 10;  // LensFinding::deviations
+constexpr double kSureDeviations = 15;  // LensFinding::deviations
 // Nor for a focal length that it has already and a little more distortion: a camera that turns on
 // the spot leaves that open by more than it seems.
-constexpr double kSameFocalDeviations = 2, kOtherLensDeviations = 12;
+constexpr double kSameFocalDeviations = 2, kOtherLensDeviations = 40;
 
 constexpr int kMaxMoreMappings = 2;
 

@@ -589,7 +589,8 @@ test('without a pick: found, and seen on the scan until picks place the photo', 
     await until(
         async () => /^placed by your picks, .* px rms$/.test(await page.text('#photo-fit')),
         'by the picks');
-    assert.match(await page.text('#summary-body'), /its own picks/);
+    await until(
+        async () => /its own picks/.test(await page.text('#summary-body')), 'by its own picks');
     for (let index = 3; index >= 0; --index) {
       await page.page.locator('#rows tr').nth(index).locator('button.icon').click();
     }
