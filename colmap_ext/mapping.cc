@@ -142,7 +142,7 @@ constexpr double kMaxFocalSigma = 0.03;
 // A calibrated lens stays unless the photos know theirs so well, or are so sure that it is wrong:
 // of one plane, or of a walk along a wall, they take a bent room for another lens.
 constexpr double kMaxFocalSigmaOfCalibrated = 0.004;
-constexpr double kSureDeviations = 15;  // LensFinding::deviations
+constexpr double kSureDeviations = 15, kClearFocalDeviations = 5;  // LensFinding's
 // Nor for a focal length that it has already and a little more distortion: a camera that turns on
 // the spot leaves that open by more than it seems.
 constexpr double kSameFocalDeviations = 2, kOtherLensDeviations = 40;
@@ -265,7 +265,8 @@ void Mapping::KeepCalibrated(MappingPass* pass) const {
     if (refine_ != RefineIntrinsics::kAuto || !lens.used || lens.apart) continue;
     if (!told.has_prior_focal_length) continue;
     const double sigma = lens.focal_sigma / told.MeanFocalLength();
-    const bool vague = sigma >= kMaxFocalSigmaOfCalibrated && lens.deviations <= kSureDeviations;
+    const bool vague = sigma >= kMaxFocalSigmaOfCalibrated && lens.deviations <= kSureDeviations &&
+                       lens.FocalDeviations() < kClearFocalDeviations;
     const bool same =
         lens.FocalDeviations() < kSameFocalDeviations && lens.deviations < kOtherLensDeviations;
     if (!vague && !same) continue;
