@@ -31,7 +31,7 @@ ViewPose WithScanError(ViewPose pose, const FoundPhotoOptions& options) {
 }
 
 // Metres that a place may be off where a hint is held against it.
-constexpr double kHintSlack = 0.1;
+constexpr double kPhotoHintSlack = 0.1;
 
 // Of this photo alone.
 PhotoHints HintsOf(const std::string& image_name, const PhotoHints& all) {
@@ -54,7 +54,7 @@ bool Agrees(const PhotoHints& hints, const SparseImage& image, const Camera& cam
   photo.cameras[image.camera_id] = place.pose.lens ? *place.pose.lens : camera;
   const Rigid scan_from_cam = place.pose.cam_from_scan.Inverse();
   return Agrees(FindHintRays(photo, hints.picks, hints.near),
-                {1, scan_from_cam.rotation, scan_from_cam.translation}, kHintSlack);
+                {1, scan_from_cam.rotation, scan_from_cam.translation}, kPhotoHintSlack);
 }
 
 // Why a photo has no pose, a clause; "" if it has one.

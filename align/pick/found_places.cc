@@ -35,7 +35,8 @@ bool IsMirroredReading(const Json& report, const PickScene& scene) {
   const Json scans = KeyOf(report, "scans");
   return std::any_of(scans.begin(), scans.end(), [&scene](const Json& scan) {
     const Json azimuth = KeyOf(scan, "azimuth");
-    return azimuth.is_string() && azimuth != "" && azimuth != scene.azimuth();
+    const std::string read = azimuth.is_string() ? azimuth.get<std::string>() : "";
+    return !read.empty() && read != scene.azimuth();
   });
 }
 
