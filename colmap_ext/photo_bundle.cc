@@ -256,9 +256,10 @@ class PhotoNormal {
     size_t num_observations = 0;
     for (const auto& [id, seen] : observed_) {
       std::vector<NormalTerms> observations;
-      for (const Term& term : TermsOf(id, seen)) {
+      std::vector<Term> terms = TermsOf(id, seen);
+      for (Term& term : terms) {
         result_.cost += term.cost;
-        observations.push_back(term.normal);
+        observations.push_back(std::move(term.normal));
       }
       num_observations += observations.size();
       if (wanted && observations.size() >= 2) {
@@ -345,7 +346,11 @@ class PhotoNormal {
     }
     const std::vector<Eigen::MatrixXd> covariances = normal->Covariances(blocks);
     for (size_t k = 0; k < covariances.size(); ++k) result_.covariances[freed[k]] = covariances[k];
-    if (!covariances.empty()) FindScatter(*normal, blocks);
+    int num_params = 0;
+    for (const UnknownBlock& block : blocks) num_params += block.size;
+    // With a lens for every photo nothing is left by which photos could differ.
+    const bool is_shared = num_params <= 2 * static_cast<int>(held_.size());
+    if (!covariances.empty() && is_shared) FindScatter(*normal, blocks);
   }
 
   // To first order the residuals of a photo move the lenses by `lenses_by` times its part of the

@@ -107,16 +107,6 @@ void AlignFoundPhotosOnly(const AlignCommandOptions& a, const PhotoModel& photos
   WritePlacedPhotos(a, &placed, &reading, told, context);
 }
 
-// What --near says of one of these photos.
-std::vector<NearHint> ReadNear(const AlignCommandOptions& a, const PhotoModel& photos) {
-  if (a.near.empty()) return {};
-  const NearHint near = ParseNearHint(a.near);
-  if (photos.model.FindImage(near.image_name) == nullptr) {
-    throw UsageError("--near names " + near.image_name + ", which is none of the photos");
-  }
-  return {near};
-}
-
 }  // namespace
 
 void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& context) {
@@ -125,8 +115,16 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
   hints.picks = ReadPicks(a.picks_path);
   const PhotoModel photos = MakePhotoModel(a.image_path, a.picks_path, hints.picks, a.camera);
   CheckPickNames(a.picks_path, hints.picks, {&photos.model});
-  hints.near = ReadNear(a, photos);
   const PhotoModel few = WithFewPicks(photos, hints.picks);
+  if (!a.near.empty()) {
+    const NearHint near = ParseNearHint(a.near);
+    if (few.model.FindImage(near.image_name) != nullptr) {
+      hints.near = {near};
+    } else {
+      context.Warn("--near is not used: " + near.image_name +
+                   " is none of the photos that are searched for with fewer picks");
+    }
+  }
   if (few.model.images.size() == photos.model.images.size()) {
     return AlignFoundPhotosOnly(a, photos, hints, context);
   }
@@ -155,7 +153,15 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
   const std::vector<std::string> names =
       ListPhotoFiles(a.image_path, "Check --image_path", /*below=*/true);
   const PhotoModel photos = MakePhotoModel(a.image_path, names, a.camera, UnfitPhotos::kTaken);
-  AlignFoundPhotosOnly(a, photos, {{}, ReadNear(a, photos)}, context);
+  PhotoHints hints;
+  if (!a.near.empty()) {
+    hints.near.push_back(ParseNearHint(a.near));
+    const std::string& name = hints.near[0].image_name;
+    if (photos.model.FindImage(name) == nullptr) {
+      throw UsageError("--near names " + name + ", which is none of the photos");
+    }
+  }
+  AlignFoundPhotosOnly(a, photos, std::move(hints), context);
 }
 
 }  // namespace roomtex

@@ -467,15 +467,20 @@ TEST(Alignment, AStartTakesTheFewPicksThereAre) {
   EXPECT_LT(alignment.refined_pick_rms_px, 5);
 }
 
+// What a mapper makes of the photos that holds a lens told too long by this factor.
+SimulatedCase MappedWithLongLens(SimulatedCase one, double factor) {
+  Camera& camera = one.model.cameras.begin()->second;
+  for (size_t k = 0; k < 2; ++k) camera.params[k] *= factor;
+  one.model = AdjustedByPhotos(one.model, 0.7);
+  return one;
+}
+
 // A mapper that holds a wrong lens bends the model; the photos know the lens, and the scan knows it
 // better.
 TEST(Alignment, AWrongLensIsNoticedAndMended) {
   const SimulatedCase& right = MakeCase(0, 6);
-  SimulatedCase wrong = right;
-  Camera& camera = wrong.model.cameras.begin()->second;
-  const double focal_length = camera.MeanFocalLength();
-  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.03;
-  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  const double focal_length = right.model.cameras.begin()->second.MeanFocalLength();
+  const SimulatedCase wrong = MappedWithLongLens(right, 1.03);
   const Alignment alignment = AlignCase(wrong);
   EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
   ASSERT_TRUE(alignment.lenses.mended);
@@ -503,11 +508,8 @@ TEST(Alignment, AWrongLensIsNoticedAndMended) {
 // Photos alone cannot mend the lens of a rig; they notice it, and the scan mends it.
 TEST(Alignment, AWrongLensOfARigIsMendedByTheScan) {
   const SimulatedCase& right = MakeCase(0, 6);
-  SimulatedCase wrong = right;
-  Camera& camera = wrong.model.cameras.begin()->second;
-  const double focal_length = camera.MeanFocalLength();
-  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.01;
-  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  const double focal_length = right.model.cameras.begin()->second.MeanFocalLength();
+  SimulatedCase wrong = MappedWithLongLens(right, 1.01);
   for (auto& [id, image] : wrong.model.images) image.frame_id = id;
   const Alignment alignment = AlignCase(wrong);
   EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
@@ -528,11 +530,9 @@ TEST(Alignment, AWrongLensOfARigIsMendedByTheScan) {
 TEST(Alignment, AScanThatDriftsDoesNotOutvoteThePhotosAboutTheirLens) {
   SimulatedRoomOptions room = CaseOptions(1);
   room.depth_camera = true;
-  SimulatedCase wrong = MakeCase(room, 6);
-  Camera& camera = wrong.model.cameras.begin()->second;
-  const double focal_length = camera.MeanFocalLength();
-  for (int k = 0; k < 2; ++k) camera.params[static_cast<size_t>(k)] *= 1.02;
-  wrong.model = AdjustedByPhotos(wrong.model, 0.7);
+  const SimulatedCase right = MakeCase(room, 6);
+  const double focal_length = right.model.cameras.begin()->second.MeanFocalLength();
+  const SimulatedCase wrong = MappedWithLongLens(right, 1.02);
   const Alignment alignment = AlignCase(wrong);
   EXPECT_GT(alignment.disagreement.rms, 0.015);
   ASSERT_TRUE(alignment.lenses.mended) << testing::PrintToString(alignment.warnings);
