@@ -8,6 +8,9 @@
 
 #include <fmt/core.h>
 
+#include "core/frames.h"
+#include "core/statistics.h"
+
 namespace roomtex {
 namespace {
 
@@ -161,6 +164,41 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   return result;
 }
 
+std::string RollingShutterWarning(const RollingShutter& rolling) {
+  std::vector<double> turns, moves;
+  for (const auto& [id, motion] : rolling.motions) {
+    turns.push_back(DegFromRad(motion.turn.norm()));
+    moves.push_back(1000 * motion.move.norm());
+  }
+  return fmt::format(
+      "The photos have a rolling shutter: from the first row to the last their camera turned by "
+      "{:.2f} degrees and moved by {:.0f} mm (medians), which explains {:.0f} % of what they "
+      "disagreed by. Poses are those of the middle row.",
+      Median(turns), Median(moves), 100 * (1 - rolling.cost_moving / rolling.cost_still));
+}
+
+// The same; of photos that turn out to have a rolling shutter with what they would show without it.
+Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
+                           const AlignmentStart& start, const AlignmentOptions& options,
+                           Progress* progress) {
+  Alignment rolled = FitAndJudge(input, lenses, start, options, progress);
+  if (!rolled.adjusted() || !options.bundle.rolling_shutter) return rolled;
+  progress->Stage("rolling shutter");
+  std::optional<RollingShutter> rolling =
+      FindRollingShutter(input, start, rolled.fit, lenses, options);
+  if (!rolling) return rolled;
+  AlignmentStart still_start = start;
+  for (size_t i = 0; i < start.picks.size(); ++i) still_start.picks[i].pick = rolling->picks[i];
+  const AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
+  Alignment still = FitAndJudge(still_input, lenses, still_start, options, progress);
+  if (!still.adjusted()) return rolled;
+  still.start = start;  // picks as they were made
+  still.adjustment.freed |= rolling->freed;
+  still.warnings.push_back(RollingShutterWarning(*rolling));
+  still.rolling_shutter = std::move(rolling);
+  return still;
+}
+
 // How far model and scan differ in shape, metres; infinite where the picks lead nowhere.
 double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& options,
                        Progress* progress) {
@@ -231,7 +269,7 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentOptions& optio
   }
   const AlignmentInput aligned = WithLensesOf(lenses, input);
   const AlignmentStart start = FindStart(aligned, options, progress, &warnings);
-  Alignment result = FitAndJudge(aligned, lenses, start, options, progress);
+  Alignment result = FitWithStillRows(aligned, lenses, start, options, progress);
   result.lenses = std::move(lenses);
   Append(std::move(result.warnings), &warnings);
   result.warnings = std::move(warnings);
@@ -244,7 +282,7 @@ Alignment AlignToScan(const AlignmentInput& input, const AlignmentStart& start,
   input.surveyed.patches();
   LensCheck lenses = FindLenses(input, options, progress);
   const AlignmentInput aligned = WithLensesOf(lenses, input);
-  Alignment result = FitAndJudge(aligned, lenses, start, options, progress);
+  Alignment result = FitWithStillRows(aligned, lenses, start, options, progress);
   result.lenses = std::move(lenses);
   return result;
 }

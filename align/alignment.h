@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "align/corner_adjustment.h"
 #include "align/judgement.h"
 #include "align/pick_findings.h"
+#include "align/rolling_shutter.h"
 #include "align/start.h"
 #include "colmap_ext/lens_check.h"
 #include "core/progress.h"
@@ -32,6 +34,9 @@ struct Alignment {
   // The adjustment to the surface, tried where the similarity is refined and trusted.
   // adjustment.bundle.model is the answer if adjusted().
   ModelAdjustment adjustment;
+  // Photos whose rows were read one after the other: what was aligned is the model as it would be
+  // had they been read at once, and so are the keypoints of adjustment.bundle.model.
+  std::optional<RollingShutter> rolling_shutter;
   CornerAdjustment corners;  // where model and scan differ in shape
   // Of the picks, where the sparse points lie on the surface (in the adjusted model, if there is
   // one), pixels; see AlignmentFit.

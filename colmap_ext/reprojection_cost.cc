@@ -29,19 +29,21 @@ Rigid PoseParameters::CamFromScan() const {
 
 ReprojectionCost::ReprojectionCost(const PoseParameters& pose, const Camera& camera,
                                    const Eigen::Vector2d& x_in_img, double weight,
-                                   bool refine_intrinsics, const Rigid& cam_from_rig)
+                                   bool refine_intrinsics, const Rigid& cam_from_rig, bool rolls)
     : pose_(pose),
       cam_from_rig_(cam_from_rig.rotation.toRotationMatrix()),
       rig_in_cam_(cam_from_rig.translation),
       camera_(camera),
       x_in_img_(x_in_img),
       weight_(weight),
-      refine_intrinsics_(refine_intrinsics) {
+      refine_intrinsics_(refine_intrinsics),
+      rolls_(rolls) {
   set_num_residuals(2);
   *mutable_parameter_block_sizes() = {6, 3};
   if (refine_intrinsics) {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.params.size()));
   }
+  if (rolls) mutable_parameter_block_sizes()->push_back(6);
 }
 
 bool ReprojectionCost::Evaluate(double const* const* parameters, double* residuals,
@@ -52,7 +54,17 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   const RotationAndJacobian turn = RotationWithJacobian(w);
   const Eigen::Matrix3d rotation = turn.rotation * pose_.start_matrix;
   const Eigen::Vector3d p_in_rig = rotation * (q - centre);
-  const Eigen::Vector3d p = cam_from_rig_ * p_in_rig + rig_in_cam_;
+  const Eigen::Vector3d still = cam_from_rig_ * p_in_rig + rig_in_cam_;
+  const int rolls_at = refine_intrinsics_ ? 3 : 2;
+  const double share = rolls_ ? RowShare(camera_, x_in_img_.y()) : 0;
+  Eigen::Vector3d p = still;
+  Eigen::Matrix3d p_by_still = Eigen::Matrix3d::Identity();
+  if (rolls_) {
+    const Eigen::Map<const Eigen::Vector3d> turned(parameters[rolls_at]),
+        moved(parameters[rolls_at] + 3);
+    p = RowMotion{turned, moved}(share, still);
+    p_by_still += share * CrossMatrix(turned);
+  }
   if (!((camera_.IsPerspective() ? p.z() : p.norm()) > kMinDepth)) return false;
   const int num_params = static_cast<int>(camera_.params.size());
   const auto seen = ErrorOfPoint<0>(camera_.model, intrinsics, num_params, p, x_in_img_);
@@ -61,7 +73,8 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   if (!residual.allFinite()) return false;
   if (jacobians == nullptr) return true;
 
-  const RowMatrix23 by_p = weight_ * seen.by_point * cam_from_rig_;
+  const RowMatrix23 by_seen = weight_ * seen.by_point;
+  const RowMatrix23 by_p = by_seen * p_by_still * cam_from_rig_;
   const RowMatrix23 by_q = by_p * rotation;
   if (jacobians[0] != nullptr) {
     Eigen::Map<RowMatrix26> by_pose(jacobians[0]);
@@ -76,6 +89,11 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
         ErrorOfPoint<kMaxCameraParams>(camera_.model, intrinsics, num_params, p, x_in_img_);
     Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
         weight_ * seen_by.by_params.leftCols(num_params);
+  }
+  if (rolls_ && jacobians[rolls_at] != nullptr) {
+    Eigen::Map<RowMatrix26> by_motion(jacobians[rolls_at]);
+    by_motion.leftCols<3>() = -share * by_seen * CrossMatrix(still);
+    by_motion.rightCols<3>() = share * by_seen;
   }
   return true;
 }

@@ -25,15 +25,31 @@ struct PoseParameters {
   Rigid CamFromScan() const;
 };
 
+// How a camera moves from the reading of a photo's first row to that of the last one, about its
+// pose at the middle row (Hedborg et al. 2012, "Rolling Shutter Bundle Adjustment"): row y of h
+// sees x + s (turn x x + move) in place of the point x, with s = y / h - 1/2; `cam`.
+struct RowMotion {
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // radians
+  Eigen::Vector3d move = Eigen::Vector3d::Zero();  // metres, of the points
+
+  Eigen::Vector3d operator()(double row_share, const Eigen::Vector3d& x_in_cam) const {
+    return x_in_cam + row_share * (turn.cross(x_in_cam) + move);
+  }
+};
+// s of the row at y in `img`.
+inline double RowShare(const Camera& camera, double y_in_img) {
+  return y_in_img / camera.height - 0.5;
+}
+
 // weight * CameraProjection::ImgError, pixels. Parameters: the pose (6, PoseParameters) of the
-// camera, or of the rig that holds it (cam_from_rig is fixed), the point (3, `scan`) and, with
-// refine_intrinsics, those of the camera. Fails for a point that is not in front of the camera.
-// `pose` and `camera` must outlive it.
+// camera, or of the rig that holds it (cam_from_rig is fixed), the point (3, `scan`), with
+// refine_intrinsics those of the camera, and with `rolls` the photo's RowMotion (turn, move). Fails
+// for a point that is not in front of the camera. `pose` and `camera` must outlive it.
 class ReprojectionCost : public ceres::CostFunction {
  public:
   ReprojectionCost(const PoseParameters& pose, const Camera& camera,
                    const Eigen::Vector2d& x_in_img, double weight, bool refine_intrinsics,
-                   const Rigid& cam_from_rig = Rigid());
+                   const Rigid& cam_from_rig = Rigid(), bool rolls = false);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
@@ -45,6 +61,7 @@ class ReprojectionCost : public ceres::CostFunction {
   Eigen::Vector2d x_in_img_;
   double weight_;
   bool refine_intrinsics_;
+  bool rolls_;
 };
 
 }  // namespace roomtex

@@ -4,6 +4,7 @@
 
 #include "align/command/plane_bundle_report.h"
 #include "core/frames.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -95,6 +96,22 @@ Json PlacementToJson(const Placement& placement) {
   return json;
 }
 
+// Of Alignment::rolling_shutter.
+Json RollingShutterToJson(const Alignment& alignment) {
+  if (!alignment.rolling_shutter) return nullptr;
+  const RollingShutter& rolling = *alignment.rolling_shutter;
+  std::vector<double> turns, moves;
+  for (const auto& [id, motion] : rolling.motions) {
+    turns.push_back(DegFromRad(motion.turn.norm()));
+    moves.push_back(1000 * motion.move.norm());
+  }
+  return {{"num_photos", rolling.motions.size()},
+          {"median_turn_deg", Median(turns)},
+          {"median_move_mm", Median(moves)},
+          {"cost_still", rolling.cost_still},
+          {"cost_moving", rolling.cost_moving}};
+}
+
 }  // namespace
 
 void FillReport(const Alignment& alignment, double reprojection_rms_after, Report* report) {
@@ -123,6 +140,7 @@ void FillReport(const Alignment& alignment, double reprojection_rms_after, Repor
   r["plane_bundle"] = PlaneBundleToJson(alignment);
   r["reprojection_rms_px"]["before"] = alignment.reprojection_rms_px;
   r["reprojection_rms_px"]["after"] = reprojection_rms_after;
+  r["rolling_shutter"] = RollingShutterToJson(alignment);
   r["placement"] = PlacementToJson(alignment.placement);
   r["expected_error"] = ExpectedErrorToJson(alignment.expected_error);
   r["expected_error"]["disagreement_mm"] = NumberOrNull(1000 * alignment.disagreement.rms);
@@ -140,6 +158,14 @@ Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
     one["position_sigma_mm"] = known ? NumberOrNull(1000 * at->second.position) : Json(nullptr);
     one["rotation_sigma_deg"] =
         known ? NumberOrNull(DegFromRad(at->second.rotation)) : Json(nullptr);
+    if (alignment.rolling_shutter) {
+      const auto& motions = alignment.rolling_shutter->motions;
+      const auto motion = motions.find(image_id);
+      const bool moves = motion != motions.end();
+      // Turn and centre, from the first row to the last, in the camera's frame.
+      one["row_turn_deg"] = moves ? ToJson(motion->second.turn * DegFromRad(1.0)) : Json(nullptr);
+      one["row_move_mm"] = moves ? ToJson(-1000 * motion->second.move) : Json(nullptr);
+    }
     json.push_back(one);
   }
   return json;

@@ -387,6 +387,10 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
 
+  std::map<uint32_t, std::vector<Eigen::Vector2d>> keypoints;
+  for (const auto& [id, image] : model.images) {
+    if (alignment.rolling_shutter) keypoints[id] = image.points2d;
+  }
   if (alignment.lenses.mended) model = *alignment.lenses.mended;
   if (alignment.adjusted()) {
     model = alignment.adjustment.bundle.model;
@@ -407,6 +411,8 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
       CompareWithPhotos(a, model, *reading->surveyed, one.told, context);
   CarryMapperVerdict(verdict, alignment, photos_say.agree, context);
   if (reading->search.is_null()) DoubtRoom(a, photos_say, alignment.disagreement.rms, context);
+  for (auto& [id, points2d] : keypoints) model.images.at(id).points2d = std::move(points2d);
+  if (alignment.rolling_shutter) UpdateReprojectionErrors(&model);
   PutDuplicatesBack(duplicates.input, duplicates.photos, alignment.scan_from_sparse.scale, &model);
   for (const auto& [id, of] : duplicates.photos) {
     // They stand and fall together.

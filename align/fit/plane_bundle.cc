@@ -315,6 +315,27 @@ void FindIdleImages(const PlaneBundleInput& input, const PlaneBundleOptions& opt
   }
 }
 
+// Keypoints where they would be had all rows been read with the middle one.
+void StopRows(PlaneBundle* result) {
+  SparseModel& model = result->model;
+  std::map<uint32_t, CameraProjection> projections;
+  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  for (const auto& [id, motion] : result->motions) {
+    SparseImage& image = model.images.at(id);
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const CameraProjection& projection = projections.at(image.camera_id);
+    for (size_t k = 0; k < image.points2d.size(); ++k) {
+      if (image.point3d_ids[k] == kInvalidPoint3dId) continue;
+      const auto point = model.points.find(image.point3d_ids[k]);
+      if (point == model.points.end()) continue;
+      const Eigen::Vector3d x = image.cam_from_model * point->second.x_in_model;
+      const auto still = projection.ImgFromCam(x);
+      const auto moved = projection.ImgFromCam(motion(RowShare(camera, image.points2d[k].y()), x));
+      if (still && moved) image.points2d[k] += *still - *moved;
+    }
+  }
+}
+
 // Runs the rounds; a sentence if one of them fails.
 std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& options,
                       PlaneBundle* result) {
@@ -323,6 +344,10 @@ std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& o
   association.surface = options.surface;
   association.surface_noise = options.surface_noise;
   FindIdleImages(input, options, result);
+  for (const auto& [id, image] : input.model.images) {
+    const bool alone = image.frame_id == kNoFrame && result->idle_images.count(id) == 0;
+    if (options.row_motion && alone) result->motions[id] = RowMotion();
+  }
   for (int round = 0; round < options.num_rounds; ++round) {
     association.gate = kGates[std::min<size_t>(round, std::size(kGates) - 1)];
     result->constraints = FindConstraints(input, options.min_track, association, *result);
@@ -335,7 +360,7 @@ std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& o
     const auto straight = Straightened(result->constraints, result->model, input.bend);
     const BundleRound problem_of_round{input, options, result->sigma_px, result->idle_images,
                                        straight};
-    if (!SolveRound(problem_of_round, &result->model)) {
+    if (!SolveRound(problem_of_round, &result->model, &result->motions)) {
       return "The adjustment to the scan's surface found no solution.";
     }
     result->num_rounds = round + 1;
@@ -385,6 +410,10 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
       ->Number("PlaneBA.min_bend", &min_bend,
                "Metres, rms over the sparse points; a smaller bend counts as none.")
       .NotNegative();
+  fields->Bool(
+      "PlaneBA.rolling_shutter", &rolling_shutter,
+      "Look for a rolling shutter (a camera that moves while the rows of a photo are read) "
+      "and place photos that have one by their middle row; 0 = all rows at once.");
   fields
       ->Int("PlaneBA.num_rounds", &num_rounds,
             "Rounds in which points are given to surfaces anew; fewer if nothing changes.")
@@ -403,6 +432,7 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
   result.reason = RunRounds(input, options, &result);
   if (result.reason.empty()) {
     MoveIdle(input, &result);
+    StopRows(&result);
     result.plane_rms_before = SurfaceRms(input.model, result.constraints);
     result.image_cost = ImageCost(result.model, result.sigma_px);
     result.model = BendModel(result.model, input.bend);

@@ -13,6 +13,7 @@
 #include "align/fit/scan_bend.h"
 #include "align/surface/scan_patches.h"
 #include "align/surface/scan_planes.h"
+#include "colmap_ext/reprojection_cost.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
@@ -37,10 +38,13 @@ struct PlaneBundleOptions {
   // LensPrior. No option of its own: see AlignmentOptions::refine_intrinsics.
   bool refine_intrinsics = false;
   bool hold_centre = false;  // LensPrior's
+  // Rolling shutters: photos move while their rows are read (RowMotion). No option of its own.
+  bool row_motion = false;
   // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
   // metres, rms over the points on the surface. Smaller ones are within the noise.
   bool bend = true;
   double min_bend = 0.001;
+  bool rolling_shutter = true;  // whether photos are asked for one (FindRollingShutter)
   int num_rounds = 5;       // points are given to surfaces anew this often, less if nothing changes
   int max_iterations = 25;  // of each round
 
@@ -77,6 +81,10 @@ struct PlaneBundle {
   // Metres. Both before the model is put onto a bent scan.
   Similarity adjusted_from_input;
   double max_bending = 0;
+
+  // With row_motion: of the photos that took part. Their keypoints in `model` are then where they
+  // would be had all rows been read with the middle one.
+  std::map<uint32_t, RowMotion> motions;
 
   // Photos that took no part, because too few points hold them or because they ran away; they
   // follow the similarity.

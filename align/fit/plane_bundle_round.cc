@@ -25,21 +25,31 @@ constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
 // one finds.
 constexpr double kFunctionTolerance = 1e-5;
+// How far a hand turns and moves a camera while a photo is read, standard deviation per axis:
+// radians (10 degrees per second for 30 ms) and metres.
+constexpr double kPriorRowTurn = 0.005, kPriorRowMove = 0.005;
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
 
 class RoundProblem {
  public:
-  RoundProblem(const BundleRound& round, const SparseModel& model)
+  RoundProblem(const BundleRound& round, const SparseModel& model,
+               const std::map<uint32_t, RowMotion>& motions)
       : round_(round), model_(model), reprojection_loss_(kReprojectionHuber * round.sigma_px) {
     ceres::Problem::Options options;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;
     problem_ = std::make_unique<ceres::Problem>(options);
     MakeParameters();
+    for (const auto& [id, motion] : motions) {
+      std::array<double, 6>& values = motions_[id];
+      Eigen::Map<Eigen::Vector3d>(values.data()) = motion.turn;
+      Eigen::Map<Eigen::Vector3d>(values.data() + 3) = motion.move;
+    }
     AddObservations();
     AddPicks();
     AddSurface();
+    AddMotionPriors();
     if (round.options.refine_intrinsics) AddIntrinsicsPriors();
     if (round.options.fix_clicked_view) FixClickedView();
   }
@@ -63,6 +73,7 @@ class RoundProblem {
     };
     for (Eigen::Vector3d& point : points_) order(point.data(), 0);
     for (PoseParameters& pose : poses_) order(pose.values, 1);
+    for (auto& [id, motion] : motions_) order(motion.data(), 1);
     for (auto& params : params_) order(params.data(), 2);
     for (Eigen::Vector3d& point : pick_points_) order(point.data(), 3);
     ceres::Solver::Summary summary;
@@ -70,7 +81,11 @@ class RoundProblem {
     return summary.IsSolutionUsable();
   }
 
-  void Write(SparseModel* model) const {
+  void Write(SparseModel* model, std::map<uint32_t, RowMotion>* motions) const {
+    for (const auto& [id, values] : motions_) {
+      motions->at(id) = {Eigen::Map<const Eigen::Vector3d>(values.data()),
+                         Eigen::Map<const Eigen::Vector3d>(values.data() + 3)};
+    }
     for (const auto& [id, index] : pose_index_) {
       const double* const pose = poses_[index].values;
       if (!problem_->HasParameterBlock(pose) || problem_->IsParameterBlockConstant(pose)) continue;
@@ -144,14 +159,14 @@ class RoundProblem {
     const Camera& camera = model_.cameras.at(model_.images.at(image_id).camera_id);
     PoseParameters& pose = poses_[pose_index_.at(image_id)];
     const bool refine = round_.options.refine_intrinsics;
-    auto* const cost =
-        new ReprojectionCost(pose, camera, x_in_img, weight, refine, cam_from_rig_.at(image_id));
-    if (refine) {
-      problem_->AddResidualBlock(cost, &reprojection_loss_, pose.values, point,
-                                 params_[camera_index_.at(camera.camera_id)].data());
-    } else {
-      problem_->AddResidualBlock(cost, &reprojection_loss_, pose.values, point);
-    }
+    const auto motion = motions_.find(image_id);
+    const bool rolls = motion != motions_.end();
+    std::vector<double*> blocks{pose.values, point};
+    if (refine) blocks.push_back(params_[camera_index_.at(camera.camera_id)].data());
+    if (rolls) blocks.push_back(motion->second.data());
+    problem_->AddResidualBlock(new ReprojectionCost(pose, camera, x_in_img, weight, refine,
+                                                    cam_from_rig_.at(image_id), rolls),
+                               &reprojection_loss_, blocks);
   }
 
   void AddObservations() {
@@ -200,6 +215,18 @@ class RoundProblem {
     }
   }
 
+  void AddMotionPriors() {
+    Eigen::VectorXd weights(6);
+    weights << Eigen::Vector3d::Constant(round_.sigma_px / kPriorRowTurn),
+        Eigen::Vector3d::Constant(round_.sigma_px / kPriorRowMove);
+    for (auto& [id, motion] : motions_) {
+      if (!problem_->HasParameterBlock(motion.data())) continue;
+      problem_->AddResidualBlock(
+          new ceres::NormalPrior(weights.asDiagonal().toDenseMatrix(), Eigen::VectorXd::Zero(6)),
+          nullptr, motion.data());
+    }
+  }
+
   // One per lens.
   void AddIntrinsicsPriors() {
     std::set<size_t> held;
@@ -230,6 +257,7 @@ class RoundProblem {
   std::map<uint32_t, size_t> camera_index_, pose_index_;
   std::map<uint32_t, Rigid> cam_from_rig_;  // by image; the rig is the first image of its frame
   std::map<uint64_t, size_t> point_index_;
+  std::map<uint32_t, std::array<double, 6>> motions_;  // RowMotion: turn, move
   std::vector<std::array<double, kMaxCameraParams>> params_;
   std::vector<PoseParameters> poses_;
   std::vector<Eigen::Vector3d> points_, pick_points_;
@@ -240,10 +268,11 @@ class RoundProblem {
 
 }  // namespace
 
-bool SolveRound(const BundleRound& round, SparseModel* model) {
-  RoundProblem problem(round, *model);
+bool SolveRound(const BundleRound& round, SparseModel* model,
+                std::map<uint32_t, RowMotion>* motions) {
+  RoundProblem problem(round, *model, *motions);
   if (!problem.Solve()) return false;
-  problem.Write(model);
+  problem.Write(model, motions);
   return true;
 }
 

@@ -2,6 +2,7 @@
 // One round of the plane-constrained bundle adjustment: the least squares problem itself.
 
 #include <cstdint>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -17,10 +18,12 @@ struct BundleRound {
   const std::vector<SurfaceConstraint>& constraints;  // of the room as it is: not bent
 };
 
-// Adjusts poses and points (and cameras, if refined) of the model by Ceres; what takes no part
-// stays. False, and the model as it was, without a solution. The same to the last bit every time:
-// Ceres orders parameters by their addresses and adds up in the order of its threads, so parameters
-// lie in arrays and it gets one thread.
-bool SolveRound(const BundleRound& round, SparseModel* model);
+// motions: of the photos whose rows are read one after the other, adjusted, too; others stand
+// still. Adjusts poses and points (and cameras, if refined) of the model by Ceres; what takes no
+// part stays. False, and the model as it was, without a solution. The same to the last bit every
+// time: Ceres orders parameters by their addresses and adds up in the order of its threads, so
+// parameters lie in arrays and it gets one thread.
+bool SolveRound(const BundleRound& round, SparseModel* model,
+                std::map<uint32_t, RowMotion>* motions);
 
 }  // namespace roomtex

@@ -148,6 +148,45 @@ TEST(ReprojectionCost, HasTheDerivativesOfAutomaticDifferencesForEveryCamera) {
   }
 }
 
+// Derivatives by everything of a camera that moves while its rows are read.
+TEST(ReprojectionCost, HasTheNumericDerivativesOfARollingShutter) {
+  for (const CameraModel model : {CameraModel::kOpenCv, CameraModel::kFisheye}) {
+    PickMaker maker(7, model);
+    Camera camera = maker.projection.camera();
+    const PointPairs pairs = maker.General(6);
+    PoseParameters pose(maker.cam_from_scan);
+    for (int i = 0; i < pairs.size(); ++i) {
+      const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(i), 1, true, Rigid(), true);
+      Eigen::Vector3d point = pairs.x_in_scan.col(i);
+      double motion[6] = {0.01, -0.006, 0.008, 0.02, 0.01, -0.03};
+      const std::vector<std::pair<double*, int>> blocks{
+          {pose.values, 6},
+          {point.data(), 3},
+          {camera.params.data(), static_cast<int>(camera.params.size())},
+          {motion, 6}};
+      const std::vector<const double*> parameters{pose.values, point.data(), camera.params.data(),
+                                                  motion};
+      const Evaluation own = Evaluate(cost, parameters);
+      for (size_t block = 0; block < blocks.size(); ++block) {
+        for (int k = 0; k < blocks[block].second; ++k) {
+          double& value = blocks[block].first[k];
+          const double before = value, step = 1e-6 * (1 + std::abs(before));
+          value = before + step;
+          const Eigen::VectorXd more = Evaluate(cost, parameters).residuals;
+          value = before - step;
+          const Eigen::VectorXd numeric =
+              (more - Evaluate(cost, parameters).residuals) / (2 * step);
+          value = before;
+          const double size = 1 + numeric.norm();
+          EXPECT_THAT(Eigen::VectorXd(own.jacobians[block].col(k)),
+                      IsNearMatrix(numeric, 1e-5 * size))
+              << CameraModelName(model) << ", block " << block << ", parameter " << k;
+        }
+      }
+    }
+  }
+}
+
 // Derivatives by the pose of the rig, for a camera that stands and looks elsewhere in it.
 TEST(ReprojectionCost, HasTheNumericDerivativesByThePoseOfARig) {
   for (const CameraModel model :

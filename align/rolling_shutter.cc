@@ -1,0 +1,96 @@
+#include "align/rolling_shutter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "colmap_ext/photo_bundle.h"
+
+namespace roomtex {
+namespace {
+
+// Of the cost of the photos, by which motion has to lower it. Simulated rooms with 20 and 30 ms of
+// rolling shutter: 0.4 to 0.6; without: 0.002 to 0.012; a drifting scan whose photos are in doubt
+// (kitchen): 0.11.
+constexpr double kMinGain = 0.25;
+// The first look: so many rounds of so many steps. It has to promise half of that.
+constexpr int kLookRounds = 1, kLookIterations = 6;
+constexpr double kLookShare = 0.5;
+// A lens is found anew when that lowers the cost by this share, and by this much (as in
+// model_adjustment.cc).
+constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
+
+double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
+  if (!still.usable || !moving.usable) return 0;
+  return 1 - moving.image_cost / still.image_cost;
+}
+
+}  // namespace
+
+std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
+                                                 const AlignmentStart& start,
+                                                 const AlignmentFit& fit, const LensCheck& lenses,
+                                                 const AlignmentOptions& options) {
+  if (std::any_of(input.model.images.begin(), input.model.images.end(),
+                  [](const auto& image) { return image.second.frame_id != kNoFrame; })) {
+    return std::nullopt;
+  }
+  SparseModel in_scan = input.model;
+  TransformModel(fit.scan_from_sparse, &in_scan);
+  PlaneBundleInput bundle_input{in_scan,
+                                input.surveyed.planes(),
+                                input.surveyed.patches(),
+                                input.picks,
+                                start.UsedPicks(),
+                                start.pick_sigma_px,
+                                start.image_name,
+                                ScanBend(),
+                                lenses.lens_of_camera,
+                                lenses.ToldCameras(input.model)};
+  bundle_input.pick_bend_px = fit.pick_bend_px;
+  PlaneBundleOptions standing = options.bundle;
+  standing.fix_clicked_view = false;
+  PlaneBundleOptions rolling = standing;
+  rolling.row_motion = true;
+  const auto glance = [&](PlaneBundleOptions bundle) {
+    bundle.num_rounds = kLookRounds;
+    bundle.max_iterations = kLookIterations;
+    return AdjustToSurface(bundle_input, bundle);
+  };
+  const double look = Gain(glance(standing), glance(rolling));
+  if (!(look > kLookShare * kMinGain)) return std::nullopt;
+  const PlaneBundle still = AdjustToSurface(bundle_input, standing);
+  PlaneBundle moving = AdjustToSurface(bundle_input, rolling);
+  if (!(Gain(still, moving) > kMinGain)) return std::nullopt;
+
+  RollingShutter found;
+  if (options.refine_intrinsics != RefineIntrinsics::kNever) {
+    rolling.refine_intrinsics = true;
+    PlaneBundle freed = AdjustToSurface(bundle_input, rolling);
+    found.freed = freed.usable && moving.image_cost - freed.image_cost >
+                                      std::max(kMinLensGain, kMinLensShare * moving.image_cost);
+    if (found.freed) moving = std::move(freed);
+  }
+  found.cost_still = still.image_cost;
+  found.cost_moving = moving.image_cost;
+  found.picks = input.picks;
+  for (Pick& pick : found.picks) {
+    const SparseImage* const image = moving.model.FindImage(pick.image_name);
+    if (image == nullptr || moving.motions.count(image->image_id) == 0) continue;
+    const Camera& camera = moving.model.cameras.at(image->camera_id);
+    const CameraProjection projection(camera);
+    const Eigen::Vector3d x = image->cam_from_model * pick.x_in_scan;
+    const double share = RowShare(camera, pick.x_in_img.y());
+    const auto seen_still = projection.ImgFromCam(x);
+    const auto seen = projection.ImgFromCam(moving.motions.at(image->image_id)(share, x));
+    if (seen_still && seen) pick.x_in_img += *seen_still - *seen;
+  }
+  found.motions = std::move(moving.motions);
+  found.model = std::move(moving.model);
+  TransformModel(fit.scan_from_sparse.Inverse(), &found.model);
+  // As the photos have it: on the surface nothing would show how far the two differ.
+  found.model = AdjustedByPhotos(found.model, KeypointNoise(found.model));
+  return found;
+}
+
+}  // namespace roomtex
