@@ -112,9 +112,12 @@ def measure(folder, tools, seed, until):
     off, said, color = "–", "–", "–"
     model = os.path.join(result, "textured", "model.ply")
     if os.path.exists(os.path.join(aligned, "images.bin")):
-        words = ["--input_path", aligned] + (["--ply_path", model] if os.path.exists(model) else [])
-        answer = subprocess.run([os.path.join(tools, "roomtex-evaluate"), "--truth_path", os.path.join(capture, "truth"),
-                                 *words], capture_output=True, text=True)
+        words = [os.path.join(tools, "roomtex-evaluate"), "--truth_path", os.path.join(capture, "truth"),
+                 "--input_path", aligned]
+        colors = ["--ply_path", model] if os.path.exists(model) else []
+        answer = subprocess.run(words + colors, capture_output=True, text=True)
+        if answer.returncode != 0:  # formats without a grid may have fewer samples
+            answer = subprocess.run(words, capture_output=True, text=True)
         if answer.returncode == 0:
             answer = json.loads(answer.stdout)
             off = "%.1f / %.1f, %d" % (answer["poses"]["position_median_mm"], answer["poses"]["position_max_mm"],
