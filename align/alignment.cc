@@ -9,7 +9,6 @@
 #include <fmt/core.h>
 
 #include "core/frames.h"
-#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -165,16 +164,12 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
 }
 
 std::string RollingShutterWarning(const RollingShutter& rolling) {
-  std::vector<double> turns, moves;
-  for (const auto& [id, motion] : rolling.motions) {
-    turns.push_back(DegFromRad(motion.turn.norm()));
-    moves.push_back(1000 * motion.move.norm());
-  }
   return fmt::format(
       "The photos have a rolling shutter: from the first row to the last their camera turned by "
       "{:.2f} degrees and moved by {:.0f} mm (medians), which explains {:.0f} % of what they "
       "disagreed by. Poses are those of the middle row.",
-      Median(turns), Median(moves), 100 * (1 - rolling.cost_moving / rolling.cost_still));
+      DegFromRad(rolling.MedianTurn()), 1000 * rolling.MedianMove(),
+      100 * (1 - rolling.cost_moving / rolling.cost_still));
 }
 
 // The same; of photos that turn out to have a rolling shutter with what they would show without it.

@@ -1,10 +1,10 @@
 #include "align/rolling_shutter.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "colmap_ext/photo_bundle.h"
+#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -26,6 +26,18 @@ double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
 }
 
 }  // namespace
+
+double RollingShutter::MedianTurn() const {
+  std::vector<double> turns;
+  for (const auto& [id, motion] : motions) turns.push_back(motion.turn.norm());
+  return Median(&turns);
+}
+
+double RollingShutter::MedianMove() const {
+  std::vector<double> moves;
+  for (const auto& [id, motion] : motions) moves.push_back(motion.move.norm());
+  return Median(&moves);
+}
 
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
@@ -77,13 +89,9 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
   for (Pick& pick : found.picks) {
     const SparseImage* const image = moving.model.FindImage(pick.image_name);
     if (image == nullptr || moving.motions.count(image->image_id) == 0) continue;
-    const Camera& camera = moving.model.cameras.at(image->camera_id);
-    const CameraProjection projection(camera);
-    const Eigen::Vector3d x = image->cam_from_model * pick.x_in_scan;
-    const double share = RowShare(camera, pick.x_in_img.y());
-    const auto seen_still = projection.ImgFromCam(x);
-    const auto seen = projection.ImgFromCam(moving.motions.at(image->image_id)(share, x));
-    if (seen_still && seen) pick.x_in_img += *seen_still - *seen;
+    const CameraProjection projection(moving.model.cameras.at(image->camera_id));
+    pick.x_in_img = KeypointOfStillRows(projection, moving.motions.at(image->image_id),
+                                        image->cam_from_model * pick.x_in_scan, pick.x_in_img);
   }
   found.motions = std::move(moving.motions);
   found.model = std::move(moving.model);

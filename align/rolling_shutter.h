@@ -21,8 +21,11 @@ struct RollingShutter {
   // Of the photos' observations after an adjustment to the surface (PlaneBundle::image_cost), with
   // cameras that stand still and that move.
   double cost_still = 0, cost_moving = 0;
-  bool freed =
-      false;  // the model's cameras are not the input's, but what explains the photos better
+  // The model's cameras are not the input's, but what explains the photos better.
+  bool freed = false;
+
+  double MedianTurn() const;  // radians, from the first row to the last
+  double MedianMove() const;  // metres
 };
 
 // Nothing where motion does not clearly explain the photos better: then it is no rolling shutter,

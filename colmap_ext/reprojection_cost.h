@@ -41,6 +41,12 @@ inline double RowShare(const Camera& camera, double y_in_img) {
   return y_in_img / camera.height - 0.5;
 }
 
+// Where a keypoint at x_in_img of a point (x_in_cam, in the camera of the middle row) would be had
+// its row been read with the middle one; where it is if that cannot be told.
+Eigen::Vector2d KeypointOfStillRows(const CameraProjection& projection, const RowMotion& motion,
+                                    const Eigen::Vector3d& x_in_cam,
+                                    const Eigen::Vector2d& x_in_img);
+
 // weight * CameraProjection::ImgError, pixels. Parameters: the pose (6, PoseParameters) of the
 // camera, or of the rig that holds it (cam_from_rig is fixed), the point (3, `scan`), with
 // refine_intrinsics those of the camera, and with `rolls` the photo's RowMotion (turn, move). Fails

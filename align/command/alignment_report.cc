@@ -4,7 +4,6 @@
 
 #include "align/command/plane_bundle_report.h"
 #include "core/frames.h"
-#include "core/statistics.h"
 
 namespace roomtex {
 namespace {
@@ -100,14 +99,9 @@ Json PlacementToJson(const Placement& placement) {
 Json RollingShutterToJson(const Alignment& alignment) {
   if (!alignment.rolling_shutter) return nullptr;
   const RollingShutter& rolling = *alignment.rolling_shutter;
-  std::vector<double> turns, moves;
-  for (const auto& [id, motion] : rolling.motions) {
-    turns.push_back(DegFromRad(motion.turn.norm()));
-    moves.push_back(1000 * motion.move.norm());
-  }
   return {{"num_photos", rolling.motions.size()},
-          {"median_turn_deg", Median(turns)},
-          {"median_move_mm", Median(moves)},
+          {"median_turn_deg", DegFromRad(rolling.MedianTurn())},
+          {"median_move_mm", 1000 * rolling.MedianMove()},
           {"cost_still", rolling.cost_still},
           {"cost_moving", rolling.cost_moving}};
 }
@@ -162,8 +156,8 @@ Json PhotosToJson(const Alignment& alignment, const SparseModel& aligned) {
       const auto& motions = alignment.rolling_shutter->motions;
       const auto motion = motions.find(image_id);
       const bool moves = motion != motions.end();
-      // Turn and centre, from the first row to the last, in the camera's frame.
-      one["row_turn_deg"] = moves ? ToJson(motion->second.turn * DegFromRad(1.0)) : Json(nullptr);
+      // How the camera turned and where its centre went: the other way than what it sees.
+      one["row_turn_deg"] = moves ? ToJson(-DegFromRad(1.0) * motion->second.turn) : Json(nullptr);
       one["row_move_mm"] = moves ? ToJson(-1000 * motion->second.move) : Json(nullptr);
     }
     json.push_back(one);

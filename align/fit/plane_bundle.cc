@@ -322,16 +322,13 @@ void StopRows(PlaneBundle* result) {
   for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
   for (const auto& [id, motion] : result->motions) {
     SparseImage& image = model.images.at(id);
-    const Camera& camera = model.cameras.at(image.camera_id);
     const CameraProjection& projection = projections.at(image.camera_id);
     for (size_t k = 0; k < image.points2d.size(); ++k) {
       if (image.point3d_ids[k] == kInvalidPoint3dId) continue;
       const auto point = model.points.find(image.point3d_ids[k]);
       if (point == model.points.end()) continue;
-      const Eigen::Vector3d x = image.cam_from_model * point->second.x_in_model;
-      const auto still = projection.ImgFromCam(x);
-      const auto moved = projection.ImgFromCam(motion(RowShare(camera, image.points2d[k].y()), x));
-      if (still && moved) image.points2d[k] += *still - *moved;
+      image.points2d[k] = KeypointOfStillRows(
+          projection, motion, image.cam_from_model * point->second.x_in_model, image.points2d[k]);
     }
   }
 }

@@ -5,6 +5,7 @@
 
 #include "core/frames.h"
 #include "core/report.h"
+#include "core/statistics.h"
 #include "importers/content_hash.h"
 #include "importers/scan_record.h"
 #include "tests/align/case_folder.h"
@@ -91,6 +92,41 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   }
   EXPECT_LT(WorstPoseErrors(*one.room, aligned, Similarity()).position, 0.003);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, written).position, 0.003);
+}
+
+// Placed by the middle rows; what is written are the photos' own keypoints.
+TEST(AlignCommand, ARollingShutterIsSaid) {
+  std::map<uint32_t, RowMotion> motions;
+  const SimulatedCase one = WithRollingShutter(MakeCase(2, 6), 1, &motions);
+  const CaseFolder files(one);
+  const CommandResult result = files.Align();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_EQ(report["rolling_shutter"]["num_photos"], one.model.images.size());
+  EXPECT_LT(report["rolling_shutter"]["cost_moving"],
+            0.75 * report["rolling_shutter"]["cost_still"].get<double>());
+  EXPECT_THAT(report["warnings"].dump(), HasSubstr("rolling shutter"));
+  EXPECT_EQ(report["picks"]["per_pick"][0]["x"], one.picks[0].x_in_img.x());
+  const SparseModel aligned = ReadSparseModel(files.folder / "aligned");
+  std::vector<double> off, size;
+  for (const Json& photo : report["images"]) {
+    const SparseImage* const image = aligned.FindImage(photo["name"].get<std::string>());
+    ASSERT_NE(image, nullptr);
+    EXPECT_EQ(image->points2d, one.model.images.at(image->image_id).points2d);
+    const Eigen::Vector3d turn(photo["row_turn_deg"][0], photo["row_turn_deg"][1],
+                               photo["row_turn_deg"][2]);
+    // The camera turns the other way than what it sees.
+    const Eigen::Vector3d truth = -DegFromRad(1.0) * motions.at(image->image_id).turn;
+    off.push_back((turn - truth).norm());
+    size.push_back(truth.norm());
+  }
+  EXPECT_LT(Median(off), 0.25 * Median(size));
+  EXPECT_LT(WorstPoseErrors(*one.room, aligned, Similarity()).position, 0.006);
+
+  ASSERT_EQ(files.Align("--PlaneBA.rolling_shutter 0").exit_code, 0);
+  const Json without = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
+  EXPECT_TRUE(without["rolling_shutter"].is_null());
+  EXPECT_FALSE(without["images"][0].contains("row_turn_deg"));
 }
 
 // Points alone, in UTM: aligned as the grid is, and the answer is in UTM.

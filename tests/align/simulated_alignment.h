@@ -12,6 +12,10 @@
 
 #include "align/alignment.h"
 #include "capture/simulation/simulated_room.h"
+#include "colmap_ext/photo_bundle.h"
+#include "colmap_ext/reprojection_cost.h"
+#include "core/frames.h"
+#include "core/random_stream.h"
 
 namespace roomtex {
 
@@ -65,6 +69,41 @@ inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
     one = any;
     one.picks = PicksOfPhoto(*one.room, one.room->BestPhotoForPicks(), num_picks);
   }
+  return one;
+}
+
+// The case as a mapper has it whose photos were read row by row while a hand turned the camera by
+// 0.3 degrees and moved it by 3 mm (standard deviations per axis); motions: by image_id.
+inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed,
+                                        std::map<uint32_t, RowMotion>* motions) {
+  const Camera& camera = one.room->camera();
+  const CameraProjection projection(camera);
+  const Similarity scan_from_sparse = one.room->ScanFromSparse();
+  TransformModel(scan_from_sparse, &one.model);
+  for (auto& [id, image] : one.model.images) {
+    RandomStream random(MixBits(seed, id));
+    RowMotion& motion = (*motions)[id];
+    for (int k = 0; k < 3; ++k) {
+      motion.turn[k] = RadFromDeg(0.3) * random.Gaussian();
+      motion.move[k] = 0.003 * random.Gaussian();
+    }
+    const auto shift = [&](const Eigen::Vector3d& x, Eigen::Vector2d* keypoint) {
+      const double share = RowShare(camera, keypoint->y());
+      const auto still = projection.ImgFromCam(x), seen = projection.ImgFromCam(motion(share, x));
+      if (still && seen) *keypoint += *seen - *still;
+    };
+    for (size_t k = 0; k < image.points2d.size(); ++k) {
+      const auto point = one.model.points.find(image.point3d_ids[k]);
+      if (point == one.model.points.end()) continue;
+      shift(image.cam_from_model * point->second.x_in_model, &image.points2d[k]);
+    }
+    for (Pick& pick : one.picks) {
+      if (pick.image_name != image.name) continue;
+      shift(image.cam_from_model * pick.x_in_scan, &pick.x_in_img);
+    }
+  }
+  TransformModel(scan_from_sparse.Inverse(), &one.model);
+  one.model = AdjustedByPhotos(one.model, KeypointNoise(one.model));
   return one;
 }
 
