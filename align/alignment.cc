@@ -180,7 +180,7 @@ Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
   if (!rolled.adjusted() || !options.bundle.rolling_shutter) return rolled;
   progress->Stage("rolling shutter");
   std::optional<RollingShutter> rolling =
-      FindRollingShutter(input, start, rolled.fit, lenses, options);
+      FindRollingShutter(input, start, rolled.fit, lenses, rolled.adjustment.bundle, options);
   if (!rolling) return rolled;
   AlignmentStart still_start = start;
   for (size_t i = 0; i < start.picks.size(); ++i) still_start.picks[i].pick = rolling->picks[i];

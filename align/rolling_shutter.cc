@@ -42,6 +42,7 @@ double RollingShutter::MedianMove() const {
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
                                                  const AlignmentFit& fit, const LensCheck& lenses,
+                                                 const PlaneBundle& still,
                                                  const AlignmentOptions& options) {
   if (std::any_of(input.model.images.begin(), input.model.images.end(),
                   [](const auto& image) { return image.second.frame_id != kNoFrame; })) {
@@ -71,7 +72,6 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
   };
   const double look = Gain(glance(standing), glance(rolling));
   if (!(look > kLookShare * kMinGain)) return std::nullopt;
-  const PlaneBundle still = AdjustToSurface(bundle_input, standing);
   PlaneBundle moving = AdjustToSurface(bundle_input, rolling);
   if (!(Gain(still, moving) > kMinGain)) return std::nullopt;
 
