@@ -140,7 +140,9 @@ struct DriftingCase : PhotographedRoom {
 
 TEST(AlignCommand, HoldsPhotosByCornersWhereModelAndScanDiffer) {
   const DriftingCase one(21, 40);
-  const double without = one.MedianOff(one.Align()), with = one.MedianOff(one.AlignWithPhotos());
+  const std::string rolled = "--PlaneBA.rolling_shutter 0 ";
+  const double without = one.MedianOff(one.Align(rolled)),
+               with = one.MedianOff(one.Align(rolled + "--image_path " + one.folder.path()));
   const Json report = one.Report(), corners = report["plane_bundle"]["corners"];
   ASSERT_TRUE(corners.is_object());
   EXPECT_EQ(corners["used"], true);
@@ -148,6 +150,9 @@ TEST(AlignCommand, HoldsPhotosByCornersWhereModelAndScanDiffer) {
   EXPECT_GE(corners["correlation_after"], corners["correlation_before"]);
   EXPECT_LT(with, 0.85 * without);
   EXPECT_LT(with, 2 * report["expected_error"]["at_cameras_mm"].get<double>());
+  // Most of the difference is the shutter's.
+  EXPECT_LT(one.MedianOff(one.AlignWithPhotos()), 0.8 * with);
+  EXPECT_TRUE(one.Report()["rolling_shutter"].is_object());
 }
 
 TEST(AlignCommand, LeavesPosesAsTheyAreWhereNotAllSpeaksForTheCorners) {
