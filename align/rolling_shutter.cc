@@ -1,6 +1,7 @@
 #include "align/rolling_shutter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "colmap_ext/photo_bundle.h"
@@ -23,6 +24,20 @@ constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
   if (!still.usable || !moving.usable) return 0;
   return 1 - moving.image_cost / still.image_cost;
+}
+
+// Another focal length down the rows than across them, which a camera that is told wrong has, looks
+// like a hand that nods alike in all photos: by so many times what the photos scatter.
+constexpr double kMostAlike = 1.5;
+
+bool AllNodAlike(const std::map<uint32_t, RowMotion>& motions) {
+  double sum = 0, squares = 0;
+  for (const auto& [id, motion] : motions) {
+    sum += motion.turn.x();
+    squares += motion.turn.x() * motion.turn.x();
+  }
+  const double count = static_cast<double>(motions.size()), mean = sum / count;
+  return std::abs(mean) > kMostAlike * std::sqrt(std::max(0.0, squares / count - mean * mean));
 }
 
 }  // namespace
@@ -83,6 +98,7 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                       std::max(kMinLensGain, kMinLensShare * moving.image_cost);
     if (found.freed) moving = std::move(freed);
   }
+  if (AllNodAlike(moving.motions)) return std::nullopt;
   found.cost_still = still.image_cost;
   found.cost_moving = moving.image_cost;
   found.picks = input.picks;

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/statistics.h"
@@ -533,6 +534,20 @@ TEST(Alignment, ARollingShutterIsFoundAndTakenOut) {
   EXPECT_EQ(alignment.start.picks[0].pick.x_in_img, one.picks[0].x_in_img);
   // Photos that were read at once have none.
   EXPECT_FALSE(AlignedCase(2, 6).rolling_shutter);
+}
+
+// Told wrong and never to be refined, a focal length down the rows that is another than across them
+// is no hand that nods alike in all photos.
+TEST(Alignment, AWrongLensIsNoRollingShutter) {
+  SimulatedCase one = MakeCase(2, 6);
+  for (auto& [id, camera] : one.model.cameras) {
+    ASSERT_FALSE(camera_formulas::HasOneFocalLength(camera.model));
+    camera.params[1] *= 1.03;
+  }
+  one.model = AdjustedByPhotos(one.model, KeypointNoise(one.model));
+  AlignmentOptions options;
+  options.refine_intrinsics = RefineIntrinsics::kNever;
+  EXPECT_FALSE(AlignCase(one, options).rolling_shutter);
 }
 
 // Photos alone cannot mend the lens of a rig; they notice it, and the scan mends it.
