@@ -114,9 +114,11 @@ void JudgeLenses(const LensCheck& lenses, RefineIntrinsics refine, Alignment* re
   }
 }
 
+// rolling: null, or what is found of a rolling shutter; then the result ends there, for it comes
+// again with still rows.
 Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
                       const AlignmentStart& start, const AlignmentOptions& options,
-                      Progress* progress) {
+                      Progress* progress, std::optional<RollingShutter>* rolling) {
   progress->Stage("surface refinement");
   Alignment result;
   result.start = start;
@@ -145,6 +147,12 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
   if (result.fit.refined && result.reasons.empty() && judgement.follows_surface) {
     progress->Stage("bundle adjustment");
     result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
+    if (rolling != nullptr && result.adjusted()) {
+      progress->Stage("rolling shutter");
+      *rolling =
+          FindRollingShutter(input, start, result.fit, lenses, result.adjustment.bundle, options);
+      if (*rolling) return result;
+    }
     if (result.adjusted() && result.disagreement.rms > kSameShape) {
       progress->Stage("corners");
       result.corners =
@@ -176,17 +184,15 @@ std::string RollingShutterWarning(const RollingShutter& rolling) {
 Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
                            const AlignmentStart& start, const AlignmentOptions& options,
                            Progress* progress) {
-  Alignment rolled = FitAndJudge(input, lenses, start, options, progress);
-  if (!rolled.adjusted() || !options.bundle.rolling_shutter) return rolled;
-  progress->Stage("rolling shutter");
-  std::optional<RollingShutter> rolling =
-      FindRollingShutter(input, start, rolled.fit, lenses, rolled.adjustment.bundle, options);
+  std::optional<RollingShutter> rolling;
+  Alignment rolled = FitAndJudge(input, lenses, start, options, progress,
+                                 options.bundle.rolling_shutter ? &rolling : nullptr);
   if (!rolling) return rolled;
   AlignmentStart still_start = start;
   for (size_t i = 0; i < start.picks.size(); ++i) still_start.picks[i].pick = rolling->picks[i];
   const AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
-  Alignment still = FitAndJudge(still_input, lenses, still_start, options, progress);
-  if (!still.adjusted()) return rolled;
+  Alignment still = FitAndJudge(still_input, lenses, still_start, options, progress, nullptr);
+  if (!still.adjusted()) return FitAndJudge(input, lenses, start, options, progress, nullptr);
   still.start = start;  // picks as they were made
   still.adjustment.freed |= rolling->freed;
   still.warnings.push_back(RollingShutterWarning(*rolling));

@@ -17,9 +17,6 @@ constexpr double kMinGain = 0.25;
 // The first look: so many rounds of so many steps. It has to promise half of that.
 constexpr int kLookRounds = 1, kLookIterations = 6;
 constexpr double kLookShare = 0.5;
-// A lens is found anew when that lowers the cost by this share, and by this much (as in
-// model_adjustment.cc).
-constexpr double kMinLensShare = 0.004, kMinLensGain = 50;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
   if (!still.usable || !moving.usable) return 0;
@@ -94,8 +91,7 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
   if (options.refine_intrinsics != RefineIntrinsics::kNever) {
     rolling.refine_intrinsics = true;
     PlaneBundle freed = AdjustToSurface(bundle_input, rolling);
-    found.freed = freed.usable && moving.image_cost - freed.image_cost >
-                                      std::max(kMinLensGain, kMinLensShare * moving.image_cost);
+    found.freed = IsLensBetter(moving, freed);
     if (found.freed) moving = std::move(freed);
   }
   if (AllNodAlike(moving.motions)) return std::nullopt;

@@ -90,7 +90,7 @@ class Adjuster {
     TrialPointer best = Try(start_, std::nullopt, first);
     if (input_.lens == LensChoice::kByScan || input_.lens == LensChoice::kFreeButCentre) {
       TrialPointer freed = Try(start_, std::nullopt, Freed::kAll);
-      if (IsBetter(best->bundle, freed->bundle, kMinLensShare, kMinLensGain)) {
+      if (IsLensBetter(best->bundle, freed->bundle)) {
         best = std::move(freed);
       }
     }
@@ -136,6 +136,10 @@ class Adjuster {
 };
 
 }  // namespace
+
+bool IsLensBetter(const PlaneBundle& held, const PlaneBundle& freed) {
+  return IsBetter(held, freed, kMinLensShare, kMinLensGain);
+}
 
 ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
                             const PlaneBundleOptions& options) {

@@ -50,6 +50,9 @@ struct ModelAdjustment {
   std::map<uint32_t, Eigen::MatrixXd> camera_covariances;
 };
 
+// Whether the photos ask for lenses of their own: freed, the adjustment costs clearly less.
+bool IsLensBetter(const PlaneBundle& held, const PlaneBundle& freed);
+
 // From a similarity that lies on the surface. With options.bend, and unless the clicked photo is
 // fixed, a bent scan is told from a bent model by the photos: straightening it must lower the cost
 // of their observations, below that of a straight scan with its lenses freed, too; on a bent scan

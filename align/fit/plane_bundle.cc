@@ -315,9 +315,11 @@ void FindIdleImages(const PlaneBundleInput& input, const PlaneBundleOptions& opt
   }
 }
 
-// Keypoints where they would be had all rows been read with the middle one.
+// Keypoints where they would be had all rows been read with the middle one. Photos that ran away
+// keep theirs: nothing is known of their motion.
 void StopRows(PlaneBundle* result) {
   SparseModel& model = result->model;
+  for (const uint32_t id : result->idle_images) result->motions.erase(id);
   std::map<uint32_t, CameraProjection> projections;
   for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
   for (const auto& [id, motion] : result->motions) {

@@ -151,6 +151,12 @@ inline Alignment AlignCaseFrom(const Similarity& scan_from_sparse, double positi
                      options, &progress);
 }
 
+inline std::string Reasons(const Alignment& alignment) {
+  std::string all;
+  for (const std::string& reason : alignment.reasons) all += reason + "\n";
+  return all;
+}
+
 // MakeCase(seed, num_picks) as it is, aligned: what tests compare with.
 inline const Alignment& AlignedCase(int seed = 0, int num_picks = 8) {
   static std::map<std::pair<int, int>, std::unique_ptr<Alignment>> alignments;
