@@ -190,12 +190,18 @@ Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
   if (!rolling) return rolled;
   AlignmentStart still_start = start;
   for (size_t i = 0; i < start.picks.size(); ++i) still_start.picks[i].pick = rolling->picks[i];
-  const AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
+  AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
+  still_input.row_motions = rolling->motions;
+  still_input.freed_with_rows = rolling->freed;
   Alignment still = FitAndJudge(still_input, lenses, still_start, options, progress, nullptr);
-  if (!still.adjusted()) return FitAndJudge(input, lenses, start, options, progress, nullptr);
-  still.start = start;  // picks as they were made
-  still.adjustment.freed |= rolling->freed;
   still.warnings.push_back(RollingShutterWarning(*rolling));
+  still.start = start;  // picks as they were made
+  if (!still.adjusted()) {
+    // What is not to be trusted without the shutter is not so with it, either.
+    if (!still.reasons.empty()) return still;
+    return FitAndJudge(input, lenses, start, options, progress, nullptr);
+  }
+  still.adjustment.freed |= rolling->freed;
   still.rolling_shutter = std::move(rolling);
   return still;
 }

@@ -27,11 +27,14 @@ double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
 // like a hand that nods alike in all photos: by so many times what the photos scatter.
 constexpr double kMostAlike = 1.5;
 
-bool AllNodAlike(const std::map<uint32_t, RowMotion>& motions) {
+bool AllNodAlike(const SparseModel& model, const RowMotions& motions) {
   double sum = 0, squares = 0;
   for (const auto& [id, motion] : motions) {
-    sum += motion.turn.x();
-    squares += motion.turn.x() * motion.turn.x();
+    const bool upright = RowsAreUpright(model.cameras.at(model.images.at(id).camera_id));
+    // Down the rows: about x, of upright ones the other way about y.
+    const double nod = upright ? -motion.turn.y() : motion.turn.x();
+    sum += nod;
+    squares += nod * nod;
   }
   const double count = static_cast<double>(motions.size()), mean = sum / count;
   return std::abs(mean) > kMostAlike * std::sqrt(std::max(0.0, squares / count - mean * mean));
@@ -94,7 +97,7 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     found.freed = IsLensBetter(moving, freed);
     if (found.freed) moving = std::move(freed);
   }
-  if (AllNodAlike(moving.motions)) return std::nullopt;
+  if (AllNodAlike(moving.model, moving.motions)) return std::nullopt;
   found.cost_still = still.image_cost;
   found.cost_moving = moving.image_cost;
   found.picks = input.picks;

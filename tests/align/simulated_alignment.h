@@ -88,7 +88,7 @@ inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed,
       motion.move[k] = 0.003 * random.Gaussian();
     }
     const auto shift = [&](const Eigen::Vector3d& x, Eigen::Vector2d* keypoint) {
-      const double share = RowShare(camera, keypoint->y());
+      const double share = RowShare(camera, *keypoint);
       const auto still = projection.ImgFromCam(x), seen = projection.ImgFromCam(motion(share, x));
       if (still && seen) *keypoint += *seen - *still;
     };

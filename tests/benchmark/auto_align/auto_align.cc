@@ -2,7 +2,7 @@
 // wrong places are believed: simulated rooms with known truth, in memory, the whole way of the
 // command (search, verdict, fit, adjustment).
 //   build/bin/auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED]
-//     [--walls plain|pattern] [--fine 1]
+//     [--walls plain|pattern|twofold] [--fine 1]
 // A line of rooms.csv for each room, written when it is done; rooms that have one already are left
 // out, so that a run that was ended goes on where it was, and several may write side by side to
 // files of their own. tests/benchmark/auto_align/auto_align_table.py makes tables of them. Ten of
@@ -92,8 +92,9 @@ bool HasAnswer(Kind kind) {
          kind != Kind::kMirrored;
 }
 
-// Of all rooms of a run.
-enum class Walls { kAsTheKindHasThem, kPlain, kPattern };
+// Of all rooms of a run. kTwofold: nothing stands or hangs in any, and their walls are plain, so
+// that each is the same from both ends; a projected pattern gives the points.
+enum class Walls { kAsTheKindHasThem, kPlain, kPattern, kTwofold };
 
 struct Settings {
   uint64_t first = kTuning;
@@ -110,11 +111,12 @@ SimulatedRoomOptions RoomOptions(uint64_t seed, Kind kind, const Settings& setti
   options.width = random.Uniform(4.6, 8.0);
   options.depth = random.Uniform(3.8, 6.5);
   options.height = random.Uniform(2.5, 3.4);
-  options.furnished = kind != Kind::kEmpty;
+  const bool twofold = settings.walls == Walls::kTwofold;
+  options.furnished = kind != Kind::kEmpty && !twofold;
   // Nothing would tell the ends of an empty room apart.
-  const Walls walls = kind == Kind::kEmpty ? Walls::kAsTheKindHasThem : settings.walls;
-  options.bare_walls = kind == Kind::kBareWalls || walls == Walls::kPlain;
-  options.bare = kind == Kind::kBare || walls == Walls::kPattern;
+  const Walls walls = kind == Kind::kEmpty && !twofold ? Walls::kAsTheKindHasThem : settings.walls;
+  options.bare_walls = kind == Kind::kBareWalls || walls == Walls::kPlain || twofold;
+  options.bare = kind == Kind::kBare || walls == Walls::kPattern || twofold;
   options.num_photos = static_cast<int>(random.Uniform(8, 61));
   if (kind == Kind::kFew) options.num_photos = 8;
   options.photo_width = settings.fine ? 1200 : 720;
@@ -259,7 +261,7 @@ Room MakeRoom(uint64_t seed, const Settings& settings) {
   const int num_points =
       room.kind == Kind::kFew ? 300 : static_cast<int>(random.Uniform(500, 4000));
   one.model = one.room->MakeSparseModel(num_points, noise_px);
-  if (options.bare_walls) ThinWalls(*one.room, &random, &one.model);
+  if (options.bare_walls && !options.bare) ThinWalls(*one.room, &random, &one.model);
   SimulatedRoomOptions scanned = options;
   if (!HasAnswer(room.kind)) scanned.num_stations = 1;
   if (room.kind == Kind::kSamePlan || room.kind == Kind::kSimilar) scanned.random_seed += 7919;
@@ -485,6 +487,8 @@ bool Parse(int argc, char** argv, Settings* settings) {
       settings->walls = Walls::kPlain;
     else if (option == "--walls" && value == "pattern")
       settings->walls = Walls::kPattern;
+    else if (option == "--walls" && value == "twofold")
+      settings->walls = Walls::kTwofold;
     else if (option == "--fine")
       settings->fine = value == "1";
     else if (option == "--first")
@@ -507,7 +511,7 @@ int main(int argc, char** argv) {
   if (!roomtex::Parse(argc, argv, &settings)) {
     std::fprintf(stderr,
                  "auto_align --output_path rooms.csv --set tuning|check [--rooms N] [--first SEED] "
-                 "[--walls plain|pattern] [--fine 1]\n");
+                 "[--walls plain|pattern|twofold] [--fine 1]\n");
     return 2;
   }
   roomtex::Run(settings);
