@@ -77,10 +77,31 @@ void Choose(const StartSearch& search, const StartVerdictOptions& options, Start
   if (search.starts.size() > 1) verdict->second = verdict->best == 0 ? 1 : 0;
 }
 
-std::string Where(const AlignmentInput& input, const StartSearch& search, int start) {
-  const Eigen::Vector3d middle = input.scan_origin + PhotosMiddle(search, start);
-  return fmt::format("photos about ({:.2f}, {:.2f}, {:.2f}), {:.0f} % of their rays agree",
-                     middle.x(), middle.y(), middle.z(), 100 * search.starts[start].sights.Share());
+Eigen::Vector3d CentreAt(const SparseImage& image, const FittedStart& start) {
+  return start.scan_from_sparse * image.cam_from_model.TargetOriginInSource();
+}
+
+// Both by the photo for which they differ most: the middle of all may be the same for two.
+std::string TwoPlaces(const AlignmentInput& input, const FittedStart& a, const FittedStart& b) {
+  const SparseImage* telling = nullptr;
+  double farthest = -1;
+  for (const auto& [id, image] : input.model.images) {
+    const double apart = (CentreAt(image, a) - CentreAt(image, b)).norm();
+    if (apart > farthest) {
+      farthest = apart;
+      telling = &image;
+    }
+  }
+  const auto place = [&](const FittedStart& start) {
+    const Eigen::Vector3d centre = input.scan_origin + CentreAt(*telling, start);
+    return fmt::format("at ({:.2f}, {:.2f}, {:.2f}), where {:.0f} % of the photos' rays agree",
+                       centre.x(), centre.y(), centre.z(), 100 * start.sights.Share());
+  };
+  const double turn =
+      DegFromRad(RotationAngle(a.scan_from_sparse.rotation, b.scan_from_sparse.rotation));
+  return fmt::format(
+      "The sparse model fits the scan in more than one place, {:.0f} degrees apart: {} {}; or {}.",
+      turn, telling->name, place(a), place(b));
 }
 
 // Where photos confirm a start, as counted. Else a logistic curve, set by hand: even odds where a
@@ -229,9 +250,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
     // Of several places a hint leaves one; the mirror image is nowhere.
     verdict.hint_decides = !denied && score >= options.min_ratio * verdict.mirrored_score;
     verdict.reason = score < options.min_ratio * second
-                         ? "The sparse model fits the scan in more than one place: " +
-                               Where(input, search, verdict.best) + "; or " +
-                               Where(input, search, verdict.second) + "."
+                         ? TwoPlaces(input, best, search.starts[verdict.second])
                          : fmt::format(
                                "The sparse model fits the scan little better than its mirror image "
                                "does ({:.0f} and {:.0f} % of the photos' rays agree).",

@@ -1,9 +1,11 @@
 #include "align/start_verdict.h"
 
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
 
 namespace roomtex {
@@ -80,6 +82,28 @@ TEST(StartVerdict, FewCornersConfirmOnlyWhereMostOfThemFit) {
   EXPECT_EQ(Judge({Asked(Start(970, kExact), 300, 120, true), second}, 600).kind, Kind::kTrusted);
   EXPECT_NE(Judge({Asked(Start(970, kExact), 70, 35, true), second}, 600).kind, Kind::kTrusted);
   EXPECT_EQ(Judge({Asked(Start(970, kExact), 70, 45, true), second}, 600).kind, Kind::kTrusted);
+}
+
+// The middle of the photos is the same in a room that is alike from both ends; what one photo would
+// see is not.
+TEST(StartVerdict, TwoPlacesAreToldByAPhotoAndTheTurnBetweenThem) {
+  const SparseModel& model = MakeCase().model;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const auto& [id, image] : model.images) {
+    middle +=
+        image.cam_from_model.TargetOriginInSource() / static_cast<double>(model.images.size());
+  }
+  FittedStart best = Start(900, kExact), rival = Start(850, kExact);
+  rival.scan_from_sparse.rotation = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitY());
+  rival.scan_from_sparse.translation = middle - rival.scan_from_sparse.rotation * middle;
+  const std::string reason = Judge({best, rival}, 500).reason;
+  EXPECT_NE(reason.find("180 degrees apart: photo_0"), std::string::npos) << reason;
+  std::vector<std::string> places;
+  for (size_t at = reason.find("at ("); at != std::string::npos; at = reason.find("at (", at + 1)) {
+    places.push_back(reason.substr(at, reason.find(')', at) - at));
+  }
+  ASSERT_EQ(places.size(), 2u) << reason;
+  EXPECT_NE(places[0], places[1]);
 }
 
 // What a hint does: places that it contradicts are gone, and a user has said that it is this room.
