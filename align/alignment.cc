@@ -180,6 +180,24 @@ std::string RollingShutterWarning(const RollingShutter& rolling) {
       100 * (1 - rolling.cost_moving / rolling.cost_still));
 }
 
+// Of what a rolling shutter had the photos off by, this share may stay when it is taken out: its
+// motion and the lens are told apart by each other (docs/commands.md: 7 to 28 % in eight captures).
+void AddWhatStays(const Alignment& rolled, Alignment* still) {
+  constexpr double kStays = 0.25;
+  const auto add = [](double with_shutter, double* without) {
+    const double taken_out = std::max(0.0, with_shutter * with_shutter - *without * *without);
+    *without = std::hypot(*without, kStays * std::sqrt(taken_out));
+  };
+  for (auto& [id, sigma] : still->photo_sigmas) {
+    const auto before = rolled.photo_sigmas.find(id);
+    if (before == rolled.photo_sigmas.end()) continue;
+    add(before->second.position, &sigma.position);
+    add(before->second.rotation, &sigma.rotation);
+  }
+  SetExpectedErrorAtCameras(still->photo_sigmas, ShapeDisagreement(), &still->expected_error);
+  add(rolled.expected_error.at_far_corner, &still->expected_error.at_far_corner);
+}
+
 // The same; of photos that turn out to have a rolling shutter with what they would show without it.
 Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
                            const AlignmentStart& start, const AlignmentOptions& options,
@@ -202,6 +220,7 @@ Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
     return FitAndJudge(input, lenses, start, options, progress, nullptr);
   }
   still.adjustment.freed |= rolling->freed;
+  AddWhatStays(rolled, &still);
   still.rolling_shutter = std::move(rolling);
   return still;
 }
