@@ -102,6 +102,25 @@ TEST(Alignment, ARollingShutterOfUprightPhotosIsFound) {
   EXPECT_LT(Median(off), 0.12);
 }
 
+// Too little to be found by itself, the motion of photos bends a sparse model, too: the straight
+// scan is not to blame.
+TEST(Alignment, ASmallRollingShutterIsNoBentScan) {
+  for (const int seed : {0, 2}) {
+    std::map<uint32_t, RowMotion> motions;
+    const SimulatedCase one = WithRollingShutter(MakeCase(seed, 6), 1, &motions, 0.25);
+    AlignmentOptions at_once;
+    at_once.bundle.rolling_shutter = false;
+    EXPECT_TRUE(AlignCase(one, at_once).adjustment.bend) << seed;
+    const Alignment alignment = AlignCase(one);
+    EXPECT_TRUE(alignment.rolling_shutter) << seed;
+    ASSERT_TRUE(alignment.adjusted()) << seed;
+    EXPECT_FALSE(alignment.adjustment.bend) << seed;
+    EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
+              0.005)
+        << seed;
+  }
+}
+
 // Told wrong and never to be refined, a focal length down the rows that is another than across them
 // is no hand that nods alike in all photos.
 TEST(Alignment, AWrongLensIsNoRollingShutter) {
