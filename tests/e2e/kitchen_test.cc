@@ -342,7 +342,7 @@ TEST_F(Kitchen, PhotosContradictWrongAlignments) {
     SparseModel model = ReadSparseModel(*folder_ / "aligned");
     TransformModel(wrong, &model);
     std::vector<std::string> warnings;
-    const Agreement agreement = MeasureAgreement({model, std::string(kKitchen) + "/images"}, viewer,
+    const Agreement agreement = MeasureAgreement(model, std::string(kKitchen) + "/images", viewer,
                                                  AgreementOptions(), -1, &warnings);
     EXPECT_FALSE(agreement.gradient.supports) << k;
     contradictions += agreement.gradient.contradicts;
