@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "align/pick_findings.h"
+#include "core/frames.h"
 #include "core/text.h"
 
 namespace roomtex {

@@ -261,7 +261,8 @@ Room MakeRoom(uint64_t seed, const Settings& settings) {
   const int num_points =
       room.kind == Kind::kFew ? 300 : static_cast<int>(random.Uniform(500, 4000));
   one.model = one.room->MakeSparseModel(num_points, noise_px);
-  if (options.bare_walls && !options.bare) ThinWalls(*one.room, &random, &one.model);
+  if (options.bare_walls && settings.walls != Walls::kTwofold)
+    ThinWalls(*one.room, &random, &one.model);
   SimulatedRoomOptions scanned = options;
   if (!HasAnswer(room.kind)) scanned.num_stations = 1;
   if (room.kind == Kind::kSamePlan || room.kind == Kind::kSimilar) scanned.random_seed += 7919;
