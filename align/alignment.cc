@@ -149,8 +149,8 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
     result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
     if (rolling != nullptr && result.adjusted()) {
       progress->Stage("rolling shutter");
-      *rolling =
-          FindRollingShutter(input, start, result.fit, lenses, result.adjustment.bundle, options);
+      *rolling = FindRollingShutter(input, start, result.fit, lenses, result.adjustment.bundle,
+                                    result.adjustment.bend.has_value(), options);
       if (*rolling) return result;
     }
     if (result.adjusted() && result.disagreement.rms > kSameShape) {
@@ -180,6 +180,24 @@ std::string RollingShutterWarning(const RollingShutter& rolling) {
       100 * (1 - rolling.cost_moving / rolling.cost_still));
 }
 
+// Of what a rolling shutter had the photos off by, this share may stay when it is taken out: its
+// motion and the lens are told apart by each other (docs/commands.md: 7 to 27 % in five captures).
+void AddWhatStays(const Alignment& rolled, Alignment* still) {
+  constexpr double kStays = 0.25;
+  const auto add = [](double with_shutter, double* without) {
+    const double taken_out = std::max(0.0, with_shutter * with_shutter - *without * *without);
+    *without = std::hypot(*without, kStays * std::sqrt(taken_out));
+  };
+  for (auto& [id, sigma] : still->photo_sigmas) {
+    const auto before = rolled.photo_sigmas.find(id);
+    if (before == rolled.photo_sigmas.end()) continue;
+    add(before->second.position, &sigma.position);
+    add(before->second.rotation, &sigma.rotation);
+  }
+  SetExpectedErrorAtCameras(still->photo_sigmas, ShapeDisagreement(), &still->expected_error);
+  add(rolled.expected_error.at_far_corner, &still->expected_error.at_far_corner);
+}
+
 // The same; of photos that turn out to have a rolling shutter with what they would show without it.
 Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
                            const AlignmentStart& start, const AlignmentOptions& options,
@@ -190,12 +208,19 @@ Alignment FitWithStillRows(const AlignmentInput& input, const LensCheck& lenses,
   if (!rolling) return rolled;
   AlignmentStart still_start = start;
   for (size_t i = 0; i < start.picks.size(); ++i) still_start.picks[i].pick = rolling->picks[i];
-  const AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
+  AlignmentInput still_input = input.With(rolling->model, input.surveyed, rolling->picks);
+  still_input.row_motions = rolling->motions;
+  still_input.freed_with_rows = rolling->freed;
   Alignment still = FitAndJudge(still_input, lenses, still_start, options, progress, nullptr);
-  if (!still.adjusted()) return FitAndJudge(input, lenses, start, options, progress, nullptr);
-  still.start = start;  // picks as they were made
-  still.adjustment.freed |= rolling->freed;
   still.warnings.push_back(RollingShutterWarning(*rolling));
+  still.start = start;  // picks as they were made
+  if (!still.adjusted()) {
+    // What is not to be trusted without the shutter is not so with it, either.
+    if (!still.reasons.empty()) return still;
+    return FitAndJudge(input, lenses, start, options, progress, nullptr);
+  }
+  still.adjustment.freed |= rolling->freed;
+  AddWhatStays(rolled, &still);
   still.rolling_shutter = std::move(rolling);
   return still;
 }

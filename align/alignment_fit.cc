@@ -100,11 +100,12 @@ ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStar
   const SurveyedScans& surveyed = input.surveyed;
   // The clicked view keeps the pose of its clicks, so that the model starts there, too.
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
-  return AdjustModel({input.model, fit.points, surveyed.scans(), surveyed.planes(),
-                      surveyed.patches(), input.picks, start.UsedPicks(), start.pick_sigma_px,
-                      start.image_name, ChooseLens(input, fit, lenses, options.refine_intrinsics),
-                      lenses.lens_of_camera, lenses.ToldCameras(input.model), fit.pick_bend_px},
-                     fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
+  return AdjustModel(
+      {input.model, fit.points, surveyed.scans(), surveyed.planes(), surveyed.patches(),
+       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name,
+       ChooseLens(input, fit, lenses, options.refine_intrinsics), lenses.lens_of_camera,
+       lenses.ToldCameras(input.model), fit.pick_bend_px, input.row_motions, input.freed_with_rows},
+      fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
 }
 
 }  // namespace roomtex

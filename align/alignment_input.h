@@ -16,6 +16,7 @@
 #include "align/trust/trust.h"
 #include "colmap_ext/lens_check.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/row_motion.h"
 #include "core/scan_mesh.h"
 
 namespace roomtex {
@@ -52,6 +53,10 @@ struct AlignmentInput {
   // empty.
   std::string image_path = "";
   int num_threads = -1;  // for that; changes nothing
+  // The model's keypoints and the picks are those that photos would show had they been read at
+  // once, while they were read like this (FindRollingShutter).
+  RowMotions row_motions = {};
+  bool freed_with_rows = false;  // lenses were adjusted when these motions were found
   // What is added to places of the scan in messages: the scans were moved by as much.
   Eigen::Vector3d scan_origin = Eigen::Vector3d::Zero();
 
@@ -63,6 +68,8 @@ struct AlignmentInput {
     other.lenses_refined = lenses_refined;
     other.image_path = image_path;
     other.num_threads = num_threads;
+    other.row_motions = row_motions;
+    other.freed_with_rows = freed_with_rows;
     other.scan_origin = scan_origin;
     return other;
   }

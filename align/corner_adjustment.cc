@@ -55,8 +55,9 @@ CornerAdjustment AdjustByCorners(const AlignmentInput& input, const AlignmentSta
   CornerAdjustment result;
   if (input.image_path.empty() || options.bundle.fix_clicked_view) return result;
   const SparseModel& aligned = adjustment->bundle.model;
-  const PhotoCorners found = FindPhotoCorners(aligned, input.image_path, input.surveyed.viewer(),
-                                              kPhotosForCorners, input.num_threads);
+  const PhotoCorners found =
+      FindPhotoCorners({aligned, input.image_path, input.row_motions}, input.surveyed.viewer(),
+                       kPhotosForCorners, input.num_threads);
   const std::vector<Pick> corners = PicksOf(found.corners, aligned, Similarity(), kMostHolding);
   result.num_corners = static_cast<int>(corners.size());
   result.num_photos = found.num_photos;
@@ -80,8 +81,8 @@ CornerAdjustment AdjustByCorners(const AlignmentInput& input, const AlignmentSta
     return result;
   }
   const auto correlation_at = [&input](const SparseModel& model) {
-    return ComparePhotosOnScan(model, input.image_path, input.surveyed.viewer(),
-                               PhotoComparisonOptions(), input.num_threads)
+    return ComparePhotosOnScan({model, input.image_path, input.row_motions},
+                               input.surveyed.viewer(), PhotoComparisonOptions(), input.num_threads)
         .MedianCorrelation();
   };
   result.correlation_before = correlation_at(aligned);

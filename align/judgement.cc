@@ -173,8 +173,12 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
     // In front of one wall corners that are off together, as by a lens, move, turn and scale all:
     // there they must hold the model well.
     constexpr double kHeldWell = 0.0025;  // metres
+    // What only they hold, and no better than this, is no alignment.
+    constexpr double kHeldAtAll = 0.1;
     const bool is_too_much =
-        by_photos && judgement->open.num_facings < 2 && judgement->open.slide_sigma > kHeldWell;
+        by_photos &&
+        ((judgement->open.num_facings < 2 && judgement->open.slide_sigma > kHeldWell) ||
+         judgement->expected_error.at_cameras > kHeldAtAll);
     (is_too_much ? judgement->reasons : judgement->warnings)
         .push_back(judgement->open.Sentence(by_photos));
   }
@@ -251,8 +255,9 @@ void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const Trust
     SparseModel aligned = input.model;
     TransformModel(fit.scan_from_sparse, &aligned);
     std::vector<std::string> ignored;  // comes again when the result is compared
-    const Agreement agreement = MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(),
-                                                 AgreementOptions(), input.num_threads, &ignored);
+    const Agreement agreement =
+        MeasureAgreement({aligned, input.image_path, input.row_motions}, input.surveyed.viewer(),
+                         AgreementOptions(), input.num_threads, &ignored);
     if (Overrules(agreement.gradient, differs, trust)) {
       judgement->follows_surface = !differs;
       judgement->warnings.push_back(

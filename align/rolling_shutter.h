@@ -7,8 +7,8 @@
 
 #include "align/alignment_fit.h"
 #include "align/alignment_input.h"
-#include "colmap_ext/reprojection_cost.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/row_motion.h"
 
 namespace roomtex {
 
@@ -16,8 +16,8 @@ struct RollingShutter {
   // The input's model, in its frame, had all rows of a photo been read with the middle one: poses,
   // points and keypoints of points.
   SparseModel model;
-  std::vector<Pick> picks;                // the input's, in the same way
-  std::map<uint32_t, RowMotion> motions;  // by image_id, metres; how each photo's camera moved
+  std::vector<Pick> picks;  // the input's, in the same way
+  RowMotions motions;       // by image_id, metres; how each photo's camera moved
   // Of the photos' observations after an adjustment to the surface (PlaneBundle::image_cost), with
   // cameras that stand still and that move.
   double cost_still = 0, cost_moving = 0;
@@ -31,11 +31,12 @@ struct RollingShutter {
 // Nothing where motion does not clearly explain the photos better: then it is no rolling shutter,
 // and would only take up what is wrong elsewhere. A lens that photos with moving rows found is not
 // that of the still ones: it is found anew where that explains the photos better, unless lenses are
-// never to be refined. still: the fit adjusted without motion.
+// never to be refined. still: the fit adjusted without motion; bent: to a scan that is taken for
+// bent, which motion must explain much better.
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
                                                  const AlignmentFit& fit, const LensCheck& lenses,
-                                                 const PlaneBundle& still,
+                                                 const PlaneBundle& still, bool bent,
                                                  const AlignmentOptions& options);
 
 }  // namespace roomtex

@@ -20,8 +20,8 @@ GradientAgreement AskAt(const AlignmentInput& input, const Similarity& scan_from
   SparseModel aligned = input.model;
   TransformModel(scan_from_sparse, &aligned);
   std::vector<std::string> ignored;  // comes again when the result is compared
-  return MeasureAgreement(aligned, input.image_path, input.surveyed.viewer(), AgreementOptions(),
-                          input.num_threads, &ignored)
+  return MeasureAgreement({aligned, input.image_path, input.row_motions}, input.surveyed.viewer(),
+                          AgreementOptions(), input.num_threads, &ignored)
       .gradient;
 }
 

@@ -27,16 +27,6 @@ Rigid PoseParameters::CamFromScan() const {
   return cam_from_scan;
 }
 
-Eigen::Vector2d KeypointOfStillRows(const CameraProjection& projection, const RowMotion& motion,
-                                    const Eigen::Vector3d& x_in_cam,
-                                    const Eigen::Vector2d& x_in_img) {
-  const double share = RowShare(projection.camera(), x_in_img.y());
-  const auto still = projection.ImgFromCam(x_in_cam);
-  const auto seen = projection.ImgFromCam(motion(share, x_in_cam));
-  if (!still || !seen) return x_in_img;
-  return x_in_img + *still - *seen;
-}
-
 ReprojectionCost::ReprojectionCost(const PoseParameters& pose, const Camera& camera,
                                    const Eigen::Vector2d& x_in_img, double weight,
                                    bool refine_intrinsics, const Rigid& cam_from_rig, bool rolls)
@@ -66,7 +56,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   const Eigen::Vector3d p_in_rig = rotation * (q - centre);
   const Eigen::Vector3d still = cam_from_rig_ * p_in_rig + rig_in_cam_;
   const int rolls_at = refine_intrinsics_ ? 3 : 2;
-  const double share = rolls_ ? RowShare(camera_, x_in_img_.y()) : 0;
+  const double share = rolls_ ? RowShare(camera_, x_in_img_) : 0;
   Eigen::Vector3d p = still;
   Eigen::Matrix3d p_by_still = Eigen::Matrix3d::Identity();
   if (rolls_) {

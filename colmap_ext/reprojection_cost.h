@@ -6,6 +6,7 @@
 #include <ceres/cost_function.h>
 
 #include "core/camera_model.h"
+#include "core/row_motion.h"
 #include "core/similarity.h"
 
 namespace roomtex {
@@ -24,28 +25,6 @@ struct PoseParameters {
   explicit PoseParameters(const Rigid& cam_from_scan);
   Rigid CamFromScan() const;
 };
-
-// How a camera moves from the reading of a photo's first row to that of the last one, about its
-// pose at the middle row (Hedborg et al. 2012, "Rolling Shutter Bundle Adjustment"): row y of h
-// sees x + s (turn x x + move) in place of the point x, with s = y / h - 1/2; `cam`.
-struct RowMotion {
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // radians
-  Eigen::Vector3d move = Eigen::Vector3d::Zero();  // metres, of the points
-
-  Eigen::Vector3d operator()(double row_share, const Eigen::Vector3d& x_in_cam) const {
-    return x_in_cam + row_share * (turn.cross(x_in_cam) + move);
-  }
-};
-// s of the row at y in `img`.
-inline double RowShare(const Camera& camera, double y_in_img) {
-  return y_in_img / camera.height - 0.5;
-}
-
-// Where a keypoint at x_in_img of a point (x_in_cam, in the camera of the middle row) would be had
-// its row been read with the middle one; where it is if that cannot be told.
-Eigen::Vector2d KeypointOfStillRows(const CameraProjection& projection, const RowMotion& motion,
-                                    const Eigen::Vector3d& x_in_cam,
-                                    const Eigen::Vector2d& x_in_img);
 
 // weight * CameraProjection::ImgError, pixels. Parameters: the pose (6, PoseParameters) of the
 // camera, or of the rig that holds it (cam_from_rig is fixed), the point (3, `scan`), with

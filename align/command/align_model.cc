@@ -272,6 +272,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
     if (main.aligned) {
       aligned = *main.aligned;
       aligned->model = JoinTrusted(attempts, main, &context.report["images"]);
+      aligned->row_motions.clear();  // by the images' numbers before
     }
   }
   CommitFilesAtEnd();
@@ -280,7 +281,8 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
                     context.options.num_threads, reading.origin.offset());
   }
   if (!aligned) return WriteRefusal(a, refusal, reading.origin, context);
-  WriteAligned(a, std::move(aligned->model), aligned->local_from_sparse, &reading, told, context);
+  WriteAligned(a, std::move(aligned->model), aligned->row_motions, aligned->local_from_sparse,
+               &reading, told, context);
 }
 
 }  // namespace roomtex

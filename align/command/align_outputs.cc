@@ -50,7 +50,7 @@ void WarnOfPhotos(const AlignCommandOptions& a, const std::vector<std::string>& 
 }
 
 // The report's `overlays`.
-void WriteOverlayPictures(const AlignCommandOptions& a, const SparseModel& aligned,
+void WriteOverlayPictures(const AlignCommandOptions& a, const AlignedPhotos& aligned,
                           const SurveyedScans& surveyed, const std::set<std::string>& told,
                           const OutputSet& outputs, const Command::Context& context) {
   context.report["overlays"] = Json::array();
@@ -58,8 +58,8 @@ void WriteOverlayPictures(const AlignCommandOptions& a, const SparseModel& align
   context.progress.Stage("overlays");
   std::vector<std::string> warnings;
   for (const std::string& path :
-       WriteOverlays(aligned, a.image_path, outputs.aside() + "/overlays", surveyed.viewer(),
-                     a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
+       WriteOverlays(aligned, outputs.aside() + "/overlays", surveyed.viewer(), a.overlays,
+                     OverlayOptions(), context.options.num_threads, &warnings)) {
     context.report["overlays"].push_back(outputs.folder() + path.substr(outputs.aside().size()));
   }
   WarnOfPhotos(a, warnings, "Overlay: ", told, context);
@@ -106,21 +106,20 @@ std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
   return told;
 }
 
-WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const AlignedPhotos& aligned,
                                 const SurveyedScans& surveyed, const std::set<std::string>& told,
                                 const Command::Context& context) {
   if (a.image_path.empty()) return {};
   context.progress.Stage("agreement");
   std::vector<std::string> warnings;
   const AgreementOptions options;
-  const Agreement agreement = MeasureAgreement(aligned, a.image_path, surveyed.viewer(), options,
-                                               context.options.num_threads, &warnings);
+  const Agreement agreement =
+      MeasureAgreement(aligned, surveyed.viewer(), options, context.options.num_threads, &warnings);
   context.report["agreement"] = AgreementToJson(agreement, options);
   if (agreement.gradient.contradicts) context.report.SetUntrusted(agreement.gradient.reason);
   WarnOfPhotos(a, warnings, "Agreement: ", told, context);
-  const PhotoComparison comparison =
-      ComparePhotosOnScan(aligned, a.image_path, surveyed.viewer(), PhotoComparisonOptions(),
-                          context.options.num_threads);
+  const PhotoComparison comparison = ComparePhotosOnScan(
+      aligned, surveyed.viewer(), PhotoComparisonOptions(), context.options.num_threads);
   context.report["divided_photos"] = ToJson(comparison);
   if (comparison.Contradicts()) {
     context.report.SetUntrusted(
@@ -145,7 +144,7 @@ void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
   context.report.AddCopy(output_path + "/alignment.json");
 }
 
-void WriteAligned(const AlignCommandOptions& a, SparseModel model,
+void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,
                   const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
   const std::string output_path = ChooseOutput(a, context);
@@ -153,7 +152,8 @@ void WriteAligned(const AlignCommandOptions& a, SparseModel model,
              matrix_name[] = "scan_from_sparse_matrix.txt";
   RequireNoRigs(output_path);
   const auto outputs = std::make_shared<OutputSet>(output_path);
-  WriteOverlayPictures(a, model, *reading->surveyed, told, *outputs, context);
+  WriteOverlayPictures(a, {model, a.image_path, row_motions}, *reading->surveyed, told, *outputs,
+                       context);
   context.progress.Stage("write");
   reading->origin.MoveBack(&model);
   reading->origin.MoveBack(&reading->placed.scans);

@@ -7,6 +7,7 @@
 
 #include "align/command/align_options.h"
 #include "align/command/scan_reading.h"
+#include "align/trust/perspective_views.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 #include "core/similarity.h"
@@ -24,8 +25,8 @@ struct WhatPhotosSay {
   bool agree = false;                 // both speak for the alignment
   std::optional<double> shown_share;  // GradientShifts::ShownShare()
 };
-// The report's `agreement` and `divided_photos`. told: of LookForPhotos().
-WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const SparseModel& aligned,
+// The report's `agreement` and `divided_photos`; of a.image_path. told: of LookForPhotos().
+WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const AlignedPhotos& aligned,
                                 const SurveyedScans& surveyed, const std::set<std::string>& told,
                                 const Command::Context& context);
 // Nothing but the report, which says why.
@@ -33,7 +34,7 @@ void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
                   const LocalOrigin& origin, const Command::Context& context);
 // The aligned model and what belongs to it: overlays, similarity, `geo`. Without local_from_sparse
 // there was no sparse model. Model and scans are moved back to where the files have them.
-void WriteAligned(const AlignCommandOptions& a, SparseModel model,
+void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,
                   const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
                   const std::set<std::string>& told, const Command::Context& context);
 

@@ -48,8 +48,8 @@ void WritePlacedPhotos(const AlignCommandOptions& a, PhotoAlignment* found, Scan
   NullWithoutModel(&context.report);
   context.report["images"] = PhotosToJson(found->alignment, found->model);
   AddLenses(*found, &context.report["images"]);
-  CompareWithPhotos(a, found->model, *reading->surveyed, told, context);
-  WriteAligned(a, found->model, std::nullopt, reading, told, context);
+  CompareWithPhotos(a, {found->model, a.image_path}, *reading->surveyed, told, context);
+  WriteAligned(a, found->model, {}, std::nullopt, reading, told, context);
 }
 
 // Photos each by itself, without the picks for a pose. Of RTPI scans the other reading, too, where

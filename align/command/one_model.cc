@@ -407,8 +407,9 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
       JudgeSinglePhotos(a, database, model, one.picks, *reading->surveyed, after.rms_px, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
-  const WhatPhotosSay photos_say =
-      CompareWithPhotos(a, model, *reading->surveyed, one.told, context);
+  if (alignment.rolling_shutter) aligned.row_motions = alignment.rolling_shutter->motions;
+  const WhatPhotosSay photos_say = CompareWithPhotos(a, {model, a.image_path, aligned.row_motions},
+                                                     *reading->surveyed, one.told, context);
   CarryMapperVerdict(verdict, alignment, photos_say.agree, context);
   if (reading->search.is_null()) DoubtRoom(a, photos_say, alignment.disagreement.rms, context);
   for (auto& [id, points2d] : keypoints) model.images.at(id).points2d = std::move(points2d);

@@ -39,6 +39,7 @@ void MoveToLocal(const ScanReading& reading, ModelToAlign* one);
 struct AlignedModel {
   SparseModel model;             // `scan`, about the local origin
   Similarity local_from_sparse;  // from the model as it was read
+  RowMotions row_motions;        // of its photos
 };
 
 // The report of the context gets what is said of the model. None: it has no place, and refusal says

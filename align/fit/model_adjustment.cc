@@ -52,6 +52,7 @@ struct Trial {
               adjustment.lens_of_camera,
               adjustment.told} {
     input.pick_bend_px = adjustment.pick_bend_px;
+    input.row_motions = adjustment.row_motions;
     options.refine_intrinsics = freed != Freed::kNothing;
     options.hold_centre = freed == Freed::kNotCentre;
     TransformModel(scan_from_sparse, &start);
@@ -151,7 +152,9 @@ ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity&
   result.bend = trial->bend;
   result.freed = trial->options.refine_intrinsics;
   result.scan_from_sparse = result.bundle.adjusted_from_input * trial->scan_from_sparse;
-  BundleCovariances covariances = FindCovariances(trial->input, result.bundle, trial->options);
+  PlaneBundleOptions open = trial->options;
+  open.refine_intrinsics |= input.freed_with_rows;
+  BundleCovariances covariances = FindCovariances(trial->input, result.bundle, open);
   result.covariances = std::move(covariances.poses);
   result.camera_covariances = std::move(covariances.cameras);
   return result;

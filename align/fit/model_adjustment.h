@@ -36,6 +36,8 @@ struct ModelAdjustmentInput {
   std::map<uint32_t, int> lens_of_camera = {};
   std::map<uint32_t, Camera> told = {};
   double pick_bend_px = 0;  // PlaneBundleInput
+  RowMotions row_motions = {};
+  bool freed_with_rows = false;  // lenses were, when these motions were found
 };
 
 struct ModelAdjustment {

@@ -69,6 +69,9 @@ struct PlaneBundleInput {
   double sigma_px = 0;
   // Pixels; how far picks are off, however well they are made, because model and scan disagree.
   double pick_bend_px = 0;
+  // Photos whose keypoints were put where they would be had all rows been read with the middle one:
+  // what such a motion leaves open is in the covariances.
+  RowMotions row_motions = {};
 };
 
 struct PlaneBundle {
@@ -84,7 +87,7 @@ struct PlaneBundle {
 
   // With row_motion: of the photos that took part. Their keypoints in `model` are then where they
   // would be had all rows been read with the middle one.
-  std::map<uint32_t, RowMotion> motions;
+  RowMotions motions;
 
   // Photos that took no part, because too few points hold them or because they ran away; they
   // follow the similarity.

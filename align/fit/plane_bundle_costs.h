@@ -27,4 +27,13 @@ class PlaneCost : public ceres::SizedCostFunction<2, 3> {
   Eigen::Vector3d point_, normal_;
 };
 
+// How far a hand turns and moves a camera while a photo is read: RowMotion over its standard
+// deviation per axis, radians (10 degrees per second for 30 ms) and metres.
+inline Eigen::Matrix<double, 6, 6> RowMotionPrior() {
+  constexpr double kTurn = 0.005, kMove = 0.002;
+  Eigen::Matrix<double, 6, 1> weights;
+  weights << Eigen::Vector3d::Constant(1 / kTurn), Eigen::Vector3d::Constant(1 / kMove);
+  return weights.asDiagonal();
+}
+
 }  // namespace roomtex

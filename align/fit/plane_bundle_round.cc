@@ -25,16 +25,12 @@ constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
 // one finds.
 constexpr double kFunctionTolerance = 1e-5;
-// How far a hand turns and moves a camera while a photo is read, standard deviation per axis:
-// radians (10 degrees per second for 30 ms) and metres.
-constexpr double kPriorRowTurn = 0.005, kPriorRowMove = 0.005;
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
 
 class RoundProblem {
  public:
-  RoundProblem(const BundleRound& round, const SparseModel& model,
-               const std::map<uint32_t, RowMotion>& motions)
+  RoundProblem(const BundleRound& round, const SparseModel& model, const RowMotions& motions)
       : round_(round), model_(model), reprojection_loss_(kReprojectionHuber * round.sigma_px) {
     ceres::Problem::Options options;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -81,7 +77,7 @@ class RoundProblem {
     return summary.IsSolutionUsable();
   }
 
-  void Write(SparseModel* model, std::map<uint32_t, RowMotion>* motions) const {
+  void Write(SparseModel* model, RowMotions* motions) const {
     for (const auto& [id, values] : motions_) {
       motions->at(id) = {Eigen::Map<const Eigen::Vector3d>(values.data()),
                          Eigen::Map<const Eigen::Vector3d>(values.data() + 3)};
@@ -216,14 +212,11 @@ class RoundProblem {
   }
 
   void AddMotionPriors() {
-    Eigen::VectorXd weights(6);
-    weights << Eigen::Vector3d::Constant(round_.sigma_px / kPriorRowTurn),
-        Eigen::Vector3d::Constant(round_.sigma_px / kPriorRowMove);
+    const Eigen::MatrixXd weights = round_.sigma_px * RowMotionPrior();
     for (auto& [id, motion] : motions_) {
       if (!problem_->HasParameterBlock(motion.data())) continue;
-      problem_->AddResidualBlock(
-          new ceres::NormalPrior(weights.asDiagonal().toDenseMatrix(), Eigen::VectorXd::Zero(6)),
-          nullptr, motion.data());
+      problem_->AddResidualBlock(new ceres::NormalPrior(weights, Eigen::VectorXd::Zero(6)), nullptr,
+                                 motion.data());
     }
   }
 
@@ -268,8 +261,7 @@ class RoundProblem {
 
 }  // namespace
 
-bool SolveRound(const BundleRound& round, SparseModel* model,
-                std::map<uint32_t, RowMotion>* motions) {
+bool SolveRound(const BundleRound& round, SparseModel* model, RowMotions* motions) {
   RoundProblem problem(round, *model, *motions);
   if (!problem.Solve()) return false;
   problem.Write(model, motions);

@@ -23,7 +23,6 @@ struct BundleRound {
 // part stays. False, and the model as it was, without a solution. The same to the last bit every
 // time: Ceres orders parameters by their addresses and adds up in the order of its threads, so
 // parameters lie in arrays and it gets one thread.
-bool SolveRound(const BundleRound& round, SparseModel* model,
-                std::map<uint32_t, RowMotion>* motions);
+bool SolveRound(const BundleRound& round, SparseModel* model, RowMotions* motions);
 
 }  // namespace roomtex

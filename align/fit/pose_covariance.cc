@@ -42,6 +42,7 @@ class ReducedSystem {
     }
     num_unknowns_ = 6 * num_poses_;
     PlaceLenses();
+    PlaceMotions();
   }
 
   size_t num_poses() const { return static_cast<size_t>(num_poses_); }
@@ -60,6 +61,9 @@ class ReducedSystem {
           LensPrior(told != input_.told.end() ? told->second : input_.model.cameras.at(camera_id),
                     hold_centre_);
       normal.AddInformation(offset, prior.transpose() * prior);
+    }
+    for (const auto& [id, offset] : motion_offset_) {
+      normal.AddInformation(offset, RowMotionPrior().transpose() * RowMotionPrior());
     }
     std::vector<UnknownBlock> blocks;
     for (const auto& [id, offset] : pose_offset_) blocks.push_back({offset, 6});
@@ -109,6 +113,16 @@ class ReducedSystem {
     }
   }
 
+  // Behind the lenses. Of more photos than that the motions are taken as known.
+  void PlaceMotions() {
+    if (2 * pose_offset_.size() > kMaxPosesWithCovariance) return;
+    for (const auto& [id, motion] : input_.row_motions) {
+      if (poses_.count(id) == 0) continue;
+      motion_offset_[id] = num_unknowns_;
+      num_unknowns_ += 6;
+    }
+  }
+
   // Inverse covariance of the points by what is known of their surfaces.
   std::map<uint64_t, Eigen::Matrix3d> SurfaceInformation() const {
     std::vector<Eigen::Vector3d> places, normals;
@@ -132,15 +146,28 @@ class ReducedSystem {
     const auto pose = poses_.find(image_id);
     if (pose == poses_.end()) return false;
     const Camera& camera = bundle_.model.cameras.at(bundle_.model.images.at(image_id).camera_id);
+    const auto motion = motion_offset_.find(image_id);
+    const bool rolls = motion != motion_offset_.end();
     const ReprojectionCost cost(pose->second, camera, x_in_img, 1 / sigma_px, with_lenses_,
-                                cam_from_rig_.at(image_id));
-    const double* const parameters[3] = {pose->second.values, x_in_scan.data(),
-                                         camera.params.data()};
+                                cam_from_rig_.at(image_id), rolls);
+    constexpr double kStill[6] = {0, 0, 0, 0, 0, 0};
+    const double* parameters[4] = {pose->second.values, x_in_scan.data(), nullptr, nullptr};
     Eigen::Vector2d residual;
     Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
     NormalTerms::Block by_lens;
     by_lens.by.setZero(2, static_cast<int>(camera.params.size()));
-    double* jacobians[3] = {by_pose.data(), terms->by_point.data(), by_lens.by.data()};
+    NormalTerms::Block by_motion;
+    by_motion.by.setZero(2, 6);
+    double* jacobians[4] = {by_pose.data(), terms->by_point.data(), nullptr, nullptr};
+    int next = 2;
+    if (with_lenses_) {
+      parameters[next] = camera.params.data();
+      jacobians[next++] = by_lens.by.data();
+    }
+    if (rolls) {
+      parameters[next] = kStill;
+      jacobians[next] = by_motion.by.data();
+    }
     if (!cost.Evaluate(parameters, residual.data(), jacobians)) return false;
     const double weight = std::sqrt(HuberWeight(residual.norm(), kReprojectionHuber));
     const auto offset = pose_offset_.find(image_id);
@@ -151,6 +178,11 @@ class ReducedSystem {
       by_lens.offset = camera_offset_.at(camera.camera_id);
       by_lens.by *= weight;
       terms->blocks.push_back(std::move(by_lens));
+    }
+    if (rolls) {
+      by_motion.offset = motion->second;
+      by_motion.by *= weight;
+      terms->blocks.push_back(std::move(by_motion));
     }
     terms->by_point *= weight;
     return by_pose.allFinite() && terms->by_point.allFinite();
@@ -191,7 +223,8 @@ class ReducedSystem {
   std::map<uint32_t, Rigid> cam_from_rig_;
   int num_poses_ = 0;
   std::map<uint32_t, int> pose_offset_, camera_offset_;
-  std::map<int, uint32_t> lenses_;  // offset of a lens, one of its cameras
+  std::map<int, uint32_t> lenses_;         // offset of a lens, one of its cameras
+  std::map<uint32_t, int> motion_offset_;  // by image
   int num_unknowns_ = 0;
 };
 

@@ -21,7 +21,8 @@ inline constexpr size_t kMaxPosesWithCovariance = 400;
 // By image_id, for the photos that took part. Image noise is that of the bundle; what stays unknown
 // of a surface is taken to be the same for all points within half a metre of it, so that thousands
 // of points on a wall do not make it exact. Empty for more than kMaxPosesWithCovariance photos, for
-// a bundle that is not usable, and where something stays open.
+// a bundle that is not usable, and where something stays open. What the rows' motions leave open is
+// in them for half as many photos.
 PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
                                     const PlaneBundleOptions& options);
 

@@ -127,16 +127,17 @@ void MeasureImages(const ScanView& view, const cv::Mat& photo, const CameraSetup
 }
 
 PhotoMeasures MeasurePhoto(const PerspectiveViews& views, const SparseImage& image,
-                           const std::string& image_path, const ScanViewer& viewer,
-                           const CameraSetup& setup, const AgreementOptions& options) {
+                           const ScanViewer& viewer, const CameraSetup& setup,
+                           const AgreementOptions& options) {
   PhotoMeasures result;
-  const auto photo = views.Read(image, image_path, &result.warning);
-  if (!photo) return result;
+  const auto read = views.Read(image, &result.warning);
+  if (!read) return result;
   const ScanView view = setup.look.Look(viewer, image.cam_from_model);
   if (view.valid_share < kMinValidShare) return result;
   result.valid = true;
-  MeasureImages(view, *photo, setup, options, &result);
-  result.shifts = MeasureGradientShifts(view, *photo, setup.look.projection, viewer.sample_angle(),
+  const cv::Mat photo = views.Still(image, view, setup.look, *read);
+  MeasureImages(view, photo, setup, options, &result);
+  result.shifts = MeasureGradientShifts(view, photo, setup.look.projection, viewer.sample_angle(),
                                         options.gradient);
   if (result.shifts.num_unclear_photos > 0) result.shifts.shifted_alike.clear();
   for (auto* const corners : {&result.shifts.corners, &result.shifts.shifted_alike}) {
@@ -208,9 +209,9 @@ double PatchNcc(const cv::Mat1b& a, const cv::Mat1b& b, const cv::Mat1b& valid, 
   return count > 0 ? sum / count : 0;
 }
 
-Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_path,
-                           const ScanViewer& viewer, const AgreementOptions& options,
-                           int num_threads, std::vector<std::string>* warnings) {
+Agreement MeasureAgreement(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                           const AgreementOptions& options, int num_threads,
+                           std::vector<std::string>* warnings) {
   const PerspectiveViews views(aligned);
   // Every num_sets-th of them make a set of its own that is spread over all.
   const std::vector<const SparseImage*> images =
@@ -230,8 +231,7 @@ Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_
     }
     ParallelFor(num_threads, 0, static_cast<int>(members.size()), [&](int k) {
       const int i = members[k];
-      photos[i] = MeasurePhoto(views, *images[i], image_path, viewer,
-                               setups.at(images[i]->camera_id), options);
+      photos[i] = MeasurePhoto(views, *images[i], viewer, setups.at(images[i]->camera_id), options);
     });
     bool any = false;
     for (const int i : members) {

@@ -11,6 +11,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "align/trust/gradient_shift.h"
+#include "align/trust/perspective_views.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
 
@@ -70,11 +71,10 @@ struct Agreement {
   GradientAgreement gradient;
 };
 
-// aligned: model in the scan frame. image_path: folder of the photos. Photos are read one by one (a
-// few side by side); those that cannot be read or have another size than their camera are named in
-// `warnings` and left out.
-Agreement MeasureAgreement(const SparseModel& aligned, const std::string& image_path,
-                           const ScanViewer& viewer, const AgreementOptions& options,
-                           int num_threads, std::vector<std::string>* warnings);
+// Photos are read one by one (a few side by side); those that cannot be read or have another size
+// than their camera are named in `warnings` and left out.
+Agreement MeasureAgreement(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                           const AgreementOptions& options, int num_threads,
+                           std::vector<std::string>* warnings);
 
 }  // namespace roomtex

@@ -312,9 +312,9 @@ cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vecto
   return sheet;
 }
 
-std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::string& image_path,
-                                       const std::string& folder, const ScanViewer& viewer,
-                                       int count, const OverlayOptions& options, int num_threads,
+std::vector<std::string> WriteOverlays(const AlignedPhotos& aligned, const std::string& folder,
+                                       const ScanViewer& viewer, int count,
+                                       const OverlayOptions& options, int num_threads,
                                        std::vector<std::string>* warnings) {
   std::vector<ScanEdge> edges;
   for (const Scan& scan : viewer.scans()) {
@@ -358,14 +358,15 @@ std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::st
     const SparseImage& image = *images[i];
     const Setup& setup = setups.at(image.camera_id);
     const Camera& camera = setup.projection.camera();
-    const auto photo = views.Read(image, image_path, &problems[i]);
-    if (!photo) return;
+    const auto read = views.Read(image, &problems[i]);
+    if (!read) return;
     const ScanView view = viewer.Look(setup.lattice, camera, image.cam_from_model, setup.cell_px);
-    const GradientShifts shifts =
-        MeasureGradientShifts(setup.corners.Look(viewer, image.cam_from_model), *photo,
-                              setup.projection, viewer.sample_angle(), options.gradient);
+    const ScanView corner_view = setup.corners.Look(viewer, image.cam_from_model);
+    const cv::Mat photo = views.Still(image, corner_view, setup.corners, *read);
+    const GradientShifts shifts = MeasureGradientShifts(corner_view, photo, setup.projection,
+                                                        viewer.sample_angle(), options.gradient);
     const cv::Mat sheet = DrawOverlay(
-        *photo, view, SeeEdges(edges, viewer.free_space(), setup.projection, image.cam_from_model),
+        photo, view, SeeEdges(edges, viewer.free_space(), setup.projection, image.cam_from_model),
         shifts, image.name, options);
     std::vector<uchar> bytes;
     cv::imencode(".jpg", sheet, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});

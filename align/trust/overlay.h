@@ -10,6 +10,7 @@
 
 #include "align/trust/free_space.h"
 #include "align/trust/gradient_shift.h"
+#include "align/trust/perspective_views.h"
 #include "align/trust/scan_edges.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
@@ -52,9 +53,9 @@ cv::Mat DrawOverlay(const cv::Mat& photo, const ScanView& view, const std::vecto
 
 // Writes folder/NAME.jpg for `count` photos evenly taken from all; a slash in a name becomes an
 // underscore. Gives the paths written. Photos that cannot be read are named in `warnings`.
-std::vector<std::string> WriteOverlays(const SparseModel& aligned, const std::string& image_path,
-                                       const std::string& folder, const ScanViewer& viewer,
-                                       int count, const OverlayOptions& options, int num_threads,
+std::vector<std::string> WriteOverlays(const AlignedPhotos& aligned, const std::string& folder,
+                                       const ScanViewer& viewer, int count,
+                                       const OverlayOptions& options, int num_threads,
                                        std::vector<std::string>* warnings);
 
 }  // namespace roomtex

@@ -4,7 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "align/trust/scan_view.h"
+#include "align/trust/still_photo.h"
 #include "core/panorama_faces.h"
 
 namespace roomtex {
@@ -24,7 +24,8 @@ std::string FaceName(const std::string& name, int number) {
 
 }  // namespace
 
-PerspectiveViews::PerspectiveViews(const SparseModel& model) : model_(model) {
+PerspectiveViews::PerspectiveViews(const AlignedPhotos& photos) : photos_(photos) {
+  const SparseModel& model = photos.model;
   if (std::none_of(model.cameras.begin(), model.cameras.end(),
                    [](const auto& camera) { return camera.second.IsPanorama(); })) {
     return;
@@ -56,32 +57,40 @@ PerspectiveViews::PerspectiveViews(const SparseModel& model) : model_(model) {
 }
 
 std::optional<cv::Mat> PerspectiveViews::Read(const SparseImage& image,
-                                              const std::string& image_path,
                                               std::string* warning) const {
+  const SparseModel& model = photos_.model;
+  const std::string& image_path = photos_.image_path;
   const auto face = faces_.find(image.image_id);
   if (face == faces_.end()) {
-    return ReadPhotoOf(image, model_.cameras.at(image.camera_id), image_path, warning);
+    return ReadPhotoOf(image, model.cameras.at(image.camera_id), image_path, warning);
   }
   const SparseImage& panorama = *face->second.panorama;
   const auto photo =
-      ReadPhotoOf(panorama, model_.cameras.at(panorama.camera_id), image_path, warning);
+      ReadPhotoOf(panorama, model.cameras.at(panorama.camera_id), image_path, warning);
   if (!photo) return std::nullopt;
   return CutFace(*photo, views_->cameras.at(image.camera_id), face->second.face_from_panorama);
 }
 
 std::optional<cv::Mat> PerspectiveViews::ReadCells(const SparseImage& image, int cell_px,
-                                                   const std::string& image_path,
                                                    std::string* warning) const {
   if (faces_.count(image.image_id) == 0) {
-    return ReadCellsOf(image, model_.cameras.at(image.camera_id), cell_px, image_path, warning);
+    return ReadCellsOf(image, photos_.model.cameras.at(image.camera_id), cell_px,
+                       photos_.image_path, warning);
   }
-  const auto face = Read(image, image_path, warning);
+  const auto face = Read(image, warning);
   if (!face) return std::nullopt;
   const cv::Size size(face->cols / cell_px, face->rows / cell_px);
   cv::Mat cells;
   cv::resize((*face)(cv::Rect(0, 0, size.width * cell_px, size.height * cell_px)), cells, size, 0,
              0, cv::INTER_AREA);
   return cells;
+}
+
+cv::Mat PerspectiveViews::Still(const SparseImage& image, const ScanView& view,
+                                const LookSetup& camera, const cv::Mat& picture) const {
+  const auto motion = photos_.row_motions.find(image.image_id);
+  if (motion == photos_.row_motions.end()) return picture;
+  return WithStillRows(picture, view, camera, motion->second);
 }
 
 }  // namespace roomtex

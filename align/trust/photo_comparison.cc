@@ -96,9 +96,8 @@ void MakeEven(std::vector<std::vector<float>>* light) {
 
 }  // namespace
 
-PhotoComparison ComparePhotosOnScan(const SparseModel& aligned, const std::string& image_path,
-                                    const ScanViewer& viewer, const PhotoComparisonOptions& options,
-                                    int num_threads) {
+PhotoComparison ComparePhotosOnScan(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                                    const PhotoComparisonOptions& options, int num_threads) {
   const PerspectiveViews views(aligned);
   const std::vector<const SparseImage*> images = SpreadImages(views.model(), options.num_photos);
   std::map<uint32_t, LookSetup> cameras;
@@ -114,8 +113,9 @@ PhotoComparison ComparePhotosOnScan(const SparseModel& aligned, const std::strin
     const LookSetup& camera = cameras.at(image.camera_id);
     const ScanView view = camera.Look(viewer, image.cam_from_model);
     std::string ignored;  // MeasureAgreement() says it
-    const auto cells = views.ReadCells(image, camera.cell_px, image_path, &ignored);
-    light[k] = cells ? LightAt(samples, *cells, view, camera.projection, image.cam_from_model)
+    const auto cells = views.ReadCells(image, camera.cell_px, &ignored);
+    light[k] = cells ? LightAt(samples, views.Still(image, view, camera, *cells), view,
+                               camera.projection, image.cam_from_model)
                      : std::vector<float>(samples.size(), kUnseen);
   });
   MakeEven(&light);

@@ -5,8 +5,8 @@
 
 #include <string>
 
+#include "align/trust/perspective_views.h"
 #include "align/trust/scan_view.h"
-#include "colmap_ext/sparse_model.h"
 #include "core/photo_agreement.h"
 
 namespace roomtex {
@@ -19,10 +19,8 @@ struct PhotoComparisonOptions {
   int pixels_across = 200;
 };
 
-// aligned: model in the scan frame. image_path: folder of the photos. Photos are read one by one (a
-// few side by side), small; those that cannot be used are left out.
-PhotoComparison ComparePhotosOnScan(const SparseModel& aligned, const std::string& image_path,
-                                    const ScanViewer& viewer, const PhotoComparisonOptions& options,
-                                    int num_threads);
+// Photos are read one by one (a few side by side), small; those that cannot be used are left out.
+PhotoComparison ComparePhotosOnScan(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                                    const PhotoComparisonOptions& options, int num_threads);
 
 }  // namespace roomtex

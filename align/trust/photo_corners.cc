@@ -8,8 +8,8 @@
 
 namespace roomtex {
 
-PhotoCorners FindPhotoCorners(const SparseModel& aligned, const std::string& image_path,
-                              const ScanViewer& viewer, int max_photos, int num_threads) {
+PhotoCorners FindPhotoCorners(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                              int max_photos, int num_threads) {
   const PerspectiveViews views(aligned);
   const std::vector<const SparseImage*> images = SpreadImages(views.model(), max_photos);
   std::map<uint32_t, LookSetup> cameras;
@@ -24,10 +24,11 @@ PhotoCorners FindPhotoCorners(const SparseModel& aligned, const std::string& ima
   ParallelFor(num_threads, 0, static_cast<int>(images.size()), [&](int i) {
     const SparseImage& image = *images[i];
     std::string ignored;  // MeasureAgreement() says it
-    const auto photo = views.Read(image, image_path, &ignored);
+    const auto photo = views.Read(image, &ignored);
     if (!photo) return;
     const LookSetup& camera = cameras.at(image.camera_id);
-    found[i] = MeasureGradientShifts(camera.Look(viewer, image.cam_from_model), *photo,
+    const ScanView view = camera.Look(viewer, image.cam_from_model);
+    found[i] = MeasureGradientShifts(view, views.Still(image, view, camera, *photo),
                                      camera.projection, viewer.sample_angle(), options)
                    .shifted_alike;
     for (FittingCorner& corner : found[i]) corner.image_id = image.image_id;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "align/trust/gradient_shift.h"
+#include "align/trust/perspective_views.h"
 #include "align/trust/scan_view.h"
-#include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
 
@@ -17,10 +17,10 @@ struct PhotoCorners {
   int num_photos = 0;  // with corners
 };
 
-// aligned: model in the scan frame, its photos a few degrees from where they belong at most.
-// image_path: folder of the photos; they are read one by one (a few side by side), those that
-// cannot be used are left out. max_photos: evenly taken from all, in the order of their names.
-PhotoCorners FindPhotoCorners(const SparseModel& aligned, const std::string& image_path,
-                              const ScanViewer& viewer, int max_photos, int num_threads);
+// aligned: photos a few degrees from where they belong at most. They are read one by one (a few
+// side by side), those that cannot be used are left out. max_photos: evenly taken from all, in the
+// order of their names.
+PhotoCorners FindPhotoCorners(const AlignedPhotos& aligned, const ScanViewer& viewer,
+                              int max_photos, int num_threads);
 
 }  // namespace roomtex

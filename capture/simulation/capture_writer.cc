@@ -208,16 +208,16 @@ void WriteProjectors(const SimulatedRoom& room, const std::string& folder) {
 // The motion of each camera while its photo was read.
 void WriteMotion(const SimulatedRoom& room, const std::string& folder) {
   if (room.options().rolling_shutter_ms == 0) return;
-  std::string text = "# from the upper border to the lower one, in the camera's frame\n" +
+  std::string text = "# from the first row to the last one, in the camera's frame\n" +
                      CsvLine({"image_name", "turn_x_deg", "turn_y_deg", "turn_z_deg", "move_x",
                               "move_y", "move_z"});
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-    const Rigid lower_from_upper =
-        room.CamFromRoomAt(photo, room.camera().height) * room.CamFromRoomAt(photo, 0).Inverse();
-    const Eigen::Vector3d turn = VectorFromRotation(lower_from_upper.rotation);
+    const Rigid last_from_first =
+        room.CamFromRoomAt(photo, 0.5) * room.CamFromRoomAt(photo, -0.5).Inverse();
+    const Eigen::Vector3d turn = VectorFromRotation(last_from_first.rotation);
     std::vector<std::string> fields = {room.PhotoName(photo)};
     for (const double x : turn) fields.push_back(Exact(DegFromRad(x)));
-    for (const double x : lower_from_upper.translation) fields.push_back(Exact(x));
+    for (const double x : last_from_first.translation) fields.push_back(Exact(x));
     text += CsvLine(fields);
   }
   WriteText(folder + "/rolling_shutter.csv", text);

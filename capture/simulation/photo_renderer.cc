@@ -161,12 +161,17 @@ LinearRgb PhotoRenderer::Reflection(const SceneHit& hit, const Eigen::Vector3d& 
 
 cv::Mat PhotoRenderer::Render(const RowPoses& poses, const PhotoSettings& settings,
                               int num_threads) const {
-  const auto room_from_row = [&](int y) -> Pose { return poses.At(y + 0.5).Inverse().Matrix(); };
+  const bool upright = height_ > width_;  // RowsAreUpright()
+  const int num_rows = upright ? width_ : height_;
+  std::vector<Pose> room_from_row(num_rows);
+  for (int i = 0; i < num_rows; ++i) {
+    room_from_row[i] = poses.At((i + 0.5) / num_rows - 0.5).Inverse().Matrix();
+  }
   cv::Mat linear(height_, width_, CV_32FC3);
   cv::Mat place(height_, width_, CV_32S);
   ParallelFor(num_threads, 0, height_, [&](int y) {
-    const Pose room_from_cam = room_from_row(y);
     for (int x = 0; x < width_; ++x) {
+      const Pose& room_from_cam = room_from_row[upright ? x : y];
       const Shot shot = Shoot(room_from_cam, x + 0.5, y + 0.5, 1, settings);
       linear.at<cv::Vec3f>(y, x) = {shot.color.z(), shot.color.y(), shot.color.x()};
       place.at<int>(y, x) = shot.place;
@@ -175,7 +180,6 @@ cv::Mat PhotoRenderer::Render(const RowPoses& poses, const PhotoSettings& settin
   // Where surfaces meet, a pixel is the mean of 3 x 3 rays; elsewhere the texture itself averages.
   constexpr int kSide = 3;
   ParallelFor(num_threads, 0, height_, [&](int y) {
-    const Pose room_from_cam = room_from_row(y);
     for (int x = 0; x < width_; ++x) {
       const int here = place.at<int>(y, x);
       bool border = false;
@@ -187,8 +191,8 @@ cv::Mat PhotoRenderer::Render(const RowPoses& poses, const PhotoSettings& settin
       if (!border) continue;
       LinearRgb sum = LinearRgb::Zero();
       for (int k = 0; k < kSide * kSide; ++k) {
-        sum += Shoot(room_from_cam, x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide,
-                     1.0 / kSide, settings)
+        sum += Shoot(room_from_row[upright ? x : y], x + (k % kSide + 0.5) / kSide,
+                     y + (k / kSide + 0.5) / kSide, 1.0 / kSide, settings)
                    .color;
       }
       sum /= kSide * kSide;

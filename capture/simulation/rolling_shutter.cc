@@ -4,6 +4,7 @@
 
 #include "core/frames.h"
 #include "core/random_stream.h"
+#include "core/row_motion.h"
 #include "core/twist.h"
 
 namespace roomtex {
@@ -16,9 +17,8 @@ Eigen::Vector3d RandomDirection(RandomStream* random) {
 
 }  // namespace
 
-Rigid RowPoses::At(double y_in_img) const {
-  const double share = y_in_img / height - 0.5;
-  const Rigid step{RotationFromVector(share * turn), share * shift};
+Rigid RowPoses::At(double row_share) const {
+  const Rigid step{RotationFromVector(row_share * turn), row_share * shift};
   return step * cam_from_room;
 }
 
@@ -29,9 +29,9 @@ std::optional<Eigen::Vector2d> RowPoses::Project(const CameraProjection& camera,
   auto place = camera.ImgFromCam(cam_from_room * x_in_room);
   if (turn.isZero() && shift.isZero()) return place;
   for (int i = 0; i < kMostSteps && place; ++i) {
-    const double row = place->y();
-    place = camera.ImgFromCam(At(row) * x_in_room);
-    if (place && std::abs(place->y() - row) < kExactPx) return place;
+    const Eigen::Vector2d before = *place;
+    place = camera.ImgFromCam(At(RowShare(camera.camera(), before)) * x_in_room);
+    if (place && (*place - before).cwiseAbs().maxCoeff() < kExactPx) return place;
   }
   return std::nullopt;
 }
@@ -44,7 +44,6 @@ std::vector<RowPoses> MoveByHand(const SimulatedRoomOptions& options,
     RandomStream random(MixBits(static_cast<uint64_t>(options.random_seed), 541, i));
     RowPoses photo;
     photo.cam_from_room = cam_from_room[i];
-    photo.height = options.photo_height;
     photo.turn = seconds * RadFromDeg(options.hand_turn_deg) * RandomDirection(&random);
     photo.shift = seconds * options.hand_move * RandomDirection(&random);
     photos.push_back(photo);

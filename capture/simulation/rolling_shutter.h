@@ -16,11 +16,11 @@ namespace roomtex {
 // Where a photo is taken from, row by row: turned and moved evenly.
 struct RowPoses {
   Rigid cam_from_room;  // when the middle of the photo is read
-  // From the upper border to the lower one, in `cam`: rotation vector, metres. Zero = all at once.
+  // From the first row to the last one, in `cam`: rotation vector, metres. Zero = all at once.
   Eigen::Vector3d turn = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
-  double height = 1;  // pixels
 
-  Rigid At(double y_in_img) const;
+  // The row read at share s, from -1/2 to 1/2: RowShare().
+  Rigid At(double row_share) const;
   // Where the photo shows a point, in the image or beyond it: the row that sees it while it is
   // read. None where the camera gives no position, or the motion is too fast to say.
   std::optional<Eigen::Vector2d> Project(const CameraProjection& camera,

@@ -6,6 +6,7 @@
 
 #include "core/photo.h"
 #include "core/random_stream.h"
+#include "core/row_motion.h"
 
 namespace roomtex {
 namespace {
@@ -24,7 +25,7 @@ std::optional<SurfacePoint> RandomPoint(const RoomPhotos& photos, RandomStream* 
                                  random->Uniform(0, camera.height));
   const auto ray = projection.RayFromImg(x_in_img);
   if (!ray) return std::nullopt;
-  const Rigid room_from_cam = photos.poses[photo].At(x_in_img.y()).Inverse();
+  const Rigid room_from_cam = photos.poses[photo].At(RowShare(camera, x_in_img)).Inverse();
   const auto hit =
       photos.scene.Cast(room_from_cam.translation, room_from_cam.rotation * ray->normalized());
   if (!hit || photos.scene.SurfaceOf(hit->patch).kind != Surface::Kind::kOpaque)
@@ -45,7 +46,8 @@ std::optional<Eigen::Vector2d> RoomPhotos::See(int photo, const Eigen::Vector3d&
   const CameraProjection& projection = CameraOf(photo);
   const auto x_in_img = poses[photo].Project(projection, x_in_room);
   if (!x_in_img || !projection.InImage(*x_in_img)) return std::nullopt;
-  const Eigen::Vector3d centre = poses[photo].At(x_in_img->y()).TargetOriginInSource();
+  const Eigen::Vector3d centre =
+      poses[photo].At(RowShare(projection.camera(), *x_in_img)).TargetOriginInSource();
   const Eigen::Vector3d view = (centre - x_in_room).normalized();
   // Flatter than 80 degrees nobody finds a feature again.
   if (std::abs(view.dot(normal_in_room)) < 0.17) return std::nullopt;
@@ -130,7 +132,8 @@ std::vector<PickCandidate> FindPickCandidates(const RoomPhotos& photos, const Ro
       if (sample.missing || sample.floats || sample.hit.patch != static_cast<int>(i)) continue;
       const auto x_in_img = photos.See(photo, sample.hit.point, patch.Normal());
       if (!x_in_img) continue;
-      const Rigid pose = photos.poses[photo].At(x_in_img->y());
+      const Rigid pose =
+          photos.poses[photo].At(RowShare(photos.CameraOf(photo).camera(), *x_in_img));
       candidates.push_back(
           {*x_in_img, sample.x_in_station, photos.camera.Depth(pose * sample.hit.point)});
     }

@@ -21,6 +21,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
+#include "core/row_motion.h"
 
 namespace roomtex {
 namespace {
@@ -123,8 +124,8 @@ std::string SimulatedRoom::PhotoName(int photo) const {
 Rigid SimulatedRoom::CamFromRoom(int photo) const {
   return impl_->cam_from_room.at(PlaceOf(photo));
 }
-Rigid SimulatedRoom::CamFromRoomAt(int photo, double y_in_img) const {
-  return impl_->row_poses.at(PlaceOf(photo)).At(y_in_img);
+Rigid SimulatedRoom::CamFromRoomAt(int photo, double row_share) const {
+  return impl_->row_poses.at(PlaceOf(photo)).At(row_share);
 }
 Rigid SimulatedRoom::CamFromScan(int photo) const {
   return CamFromRoom(photo) * impl_->room_from_station[0];
@@ -266,7 +267,8 @@ std::vector<Eigen::Vector2f> SimulatedRoom::TrueSightings(const TrueSamples& sam
       const Eigen::Vector3d& point = samples.points[i];
       const auto position = poses.Project(projection, point);
       if (!position || !projection.InImage(*position)) continue;
-      const Eigen::Vector3d centre = poses.At(position->y()).TargetOriginInSource();
+      const Eigen::Vector3d centre =
+          poses.At(RowShare(projection.camera(), *position)).TargetOriginInSource();
       const Eigen::Vector3d to_camera = (centre - point).normalized();
       if (!(to_camera.dot(samples.normals[i].cast<double>()) > kFlattest)) continue;
       if (impl_->scene.IsOccluded(centre, point)) continue;

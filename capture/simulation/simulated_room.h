@@ -50,8 +50,9 @@ class SimulatedRoom {
   bool IsPatterned(int photo) const;   // taken in the projectors' light
   int PlaceOf(int photo) const;        // the camera has not moved between photos of one place
   Rigid CamFromRoom(int photo) const;  // truth, of the middle row
-  // Truth, when the photo's row at y in `img` was read; differs with a rolling shutter.
-  Rigid CamFromRoomAt(int photo, double y_in_img) const;
+  // Truth, when the photo's row at share s was read (core/row_motion.h); differs with a rolling
+  // shutter.
+  Rigid CamFromRoomAt(int photo, double row_share) const;
   Rigid CamFromScan(int photo) const;             // truth, frame of station 0 = THE scan frame
   double ExposureEv(int photo) const;             // truth, 0 = nominal
   double ExposureTime(int photo) const;           // seconds, truth

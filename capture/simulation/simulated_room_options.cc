@@ -123,7 +123,8 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields
       ->Number("rolling_shutter_ms", &rolling_shutter_ms,
                "time from reading the first row of a photo to the last one, in which the hand "
-               "moves the camera on; the true pose is that of the middle row. 30 = a phone")
+               "moves the camera on; the true pose is that of the middle row. Rows lie along the "
+               "longer side, as a sensor has them. 30 = a phone")
       .Within(0, 1000, "ms");
   fields
       ->Number("hand_move", &hand_move,
@@ -135,9 +136,6 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "how fast the hand turns while a photo is read, degrees per second, about another "
                "axis each photo")
       .Within(0, 360, "degrees per second");
-  fields->Require(photo_height <= photo_width || rolling_shutter_ms == 0,
-                  "--rolling_shutter_ms needs photos that are at least as wide as high: rows lie "
-                  "along the longer side of a sensor");
   fields->Require(projectors == 0 || rolling_shutter_ms == 0,
                   "--rolling_shutter_ms needs a hand that moves, --projectors a camera that stands "
                   "still; give one of them");

@@ -96,7 +96,7 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
 
 // Placed by the middle rows; what is written are the photos' own keypoints.
 TEST(AlignCommand, ARollingShutterIsSaid) {
-  std::map<uint32_t, RowMotion> motions;
+  RowMotions motions;
   const SimulatedCase one = WithRollingShutter(MakeCase(2, 6), 1, &motions);
   const CaseFolder files(one);
   const CommandResult result = files.Align();

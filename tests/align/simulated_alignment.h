@@ -73,9 +73,10 @@ inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
 }
 
 // The case as a mapper has it whose photos were read row by row while a hand turned the camera by
-// 0.3 degrees and moved it by 3 mm (standard deviations per axis); motions: by image_id.
-inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed,
-                                        std::map<uint32_t, RowMotion>* motions) {
+// 0.3 degrees and moved it by 3 mm (standard deviations per axis), or this share of that; motions:
+// by image_id.
+inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed, RowMotions* motions,
+                                        double share = 1) {
   const Camera& camera = one.room->camera();
   const CameraProjection projection(camera);
   const Similarity scan_from_sparse = one.room->ScanFromSparse();
@@ -84,12 +85,12 @@ inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed,
     RandomStream random(MixBits(seed, id));
     RowMotion& motion = (*motions)[id];
     for (int k = 0; k < 3; ++k) {
-      motion.turn[k] = RadFromDeg(0.3) * random.Gaussian();
-      motion.move[k] = 0.003 * random.Gaussian();
+      motion.turn[k] = share * RadFromDeg(0.3) * random.Gaussian();
+      motion.move[k] = share * 0.003 * random.Gaussian();
     }
     const auto shift = [&](const Eigen::Vector3d& x, Eigen::Vector2d* keypoint) {
-      const double share = RowShare(camera, keypoint->y());
-      const auto still = projection.ImgFromCam(x), seen = projection.ImgFromCam(motion(share, x));
+      const double row = RowShare(camera, *keypoint);
+      const auto still = projection.ImgFromCam(x), seen = projection.ImgFromCam(motion(row, x));
       if (still && seen) *keypoint += *seen - *still;
     };
     for (size_t k = 0; k < image.points2d.size(); ++k) {

@@ -323,7 +323,8 @@ TEST_F(Kitchen, PhotosSupportTheAlignment) {
   EXPECT_TRUE(gradient["supports"]) << gradient;
   EXPECT_FALSE(gradient["contradicts"]) << gradient;
   EXPECT_GT(gradient["share"], 0.06);
-  EXPECT_LT(gradient["chance"]["share"], 0.04);
+  // Some 500 patches elsewhere: 0.03 to 0.045, from one model of COLMAP to the next.
+  EXPECT_GT(gradient["share"], 1.5 * gradient["chance"]["share"].get<double>());
 }
 
 TEST_F(Kitchen, PhotosContradictWrongAlignments) {
@@ -342,7 +343,7 @@ TEST_F(Kitchen, PhotosContradictWrongAlignments) {
     SparseModel model = ReadSparseModel(*folder_ / "aligned");
     TransformModel(wrong, &model);
     std::vector<std::string> warnings;
-    const Agreement agreement = MeasureAgreement(model, std::string(kKitchen) + "/images", viewer,
+    const Agreement agreement = MeasureAgreement({model, std::string(kKitchen) + "/images"}, viewer,
                                                  AgreementOptions(), -1, &warnings);
     EXPECT_FALSE(agreement.gradient.supports) << k;
     contradictions += agreement.gradient.contradicts;

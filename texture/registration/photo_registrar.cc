@@ -13,6 +13,7 @@
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/photo.h"
+#include "core/row_motion.h"
 #include "core/statistics.h"
 #include "core/twist.h"
 
@@ -28,13 +29,6 @@ constexpr int kMostPixels = 120;       // of a patch
 constexpr size_t kFewestPatches = 6;
 constexpr size_t kFewestOfPatch = 40;  // sightings
 constexpr double kNoShift = std::numeric_limits<double>::quiet_NaN();
-
-// When a place of a photo is read: -1/2 at the first row, 1/2 at the last one. Rows lie along the
-// longer side, also of photos that were turned.
-double RowShare(const Camera& camera, const Eigen::Vector2f& place) {
-  return camera.height > camera.width ? place.x() / camera.width - 0.5
-                                      : place.y() / camera.height - 0.5;
-}
 
 }  // namespace
 
@@ -397,7 +391,8 @@ std::optional<PhotoRegistrar::Seen> PhotoRegistrar::See(int i, const Sighting& s
   seen.place.by_pose.leftCols<6>() = (by_point * by_step).cast<float>();
   if (options_.row_turn_deg > 0) {
     seen.place.by_pose.rightCols<3>() =
-        (RowShare(view.camera, sighting.place) * by_point * -CrossMatrix(x_in_cam)).cast<float>();
+        (RowShare(view.camera, sighting.place.cast<double>()) * by_point * -CrossMatrix(x_in_cam))
+            .cast<float>();
   }
   registered_[i].warp.NodesAt(sighting.place.x(), sighting.place.y(), &seen.place.nodes,
                               &seen.place.node_weights);
@@ -470,7 +465,7 @@ void PhotoRegistrar::AddRowTurn(const Camera& camera, RegisteredPhoto* photo) {
     const auto ray = photo->camera->RayFromImg(place.cast<double>());
     if (!ray) continue;
     const auto shown = photo->camera->ImgFromCam(
-        RotationFromVector(RowShare(camera, place) * photo->row_turn) * *ray);
+        RotationFromVector(RowShare(camera, place.cast<double>()) * photo->row_turn) * *ray);
     if (shown) photo->shown.Shift(n) += shown->cast<float>() - place;
   }
 }

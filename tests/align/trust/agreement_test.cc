@@ -83,7 +83,7 @@ Agreement MeasureAt(const SparseModel& aligned, const PhotographedRoom& one, int
   const FreeSpace free_space(one.scans, 100000);
   std::vector<std::string> warnings;
   const Agreement agreement =
-      MeasureAgreement(aligned, one.folder.path(), ScanViewer(one.scans, free_space),
+      MeasureAgreement({aligned, one.folder.path()}, ScanViewer(one.scans, free_space),
                        AgreementOptions(), num_threads, &warnings);
   EXPECT_TRUE(warnings.empty()) << warnings[0];
   return agreement;
@@ -138,7 +138,7 @@ TEST(Agreement, NamesPhotosThatAreMissing) {
   const FreeSpace free_space(one.scans, 10000);
   std::vector<std::string> warnings;
   const Agreement agreement =
-      MeasureAgreement(one.model, folder.path(), ScanViewer(one.scans, free_space),
+      MeasureAgreement({one.model, folder.path()}, ScanViewer(one.scans, free_space),
                        AgreementOptions(), 1, &warnings);
   EXPECT_EQ(agreement.num_photos, 0);
   EXPECT_EQ(warnings.size(), 8u);

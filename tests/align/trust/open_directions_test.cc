@@ -10,6 +10,7 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 // The scan of which only samples on these planes of the room are left (axis, coordinate in `room`),
 // with picks on them in the photo that sees the most of them.
@@ -108,6 +109,27 @@ TEST(OpenDirections, WhatNoPicksHoldIsNotTrusted) {
   const Alignment lost = AlignCaseFrom(corner.room->ScanFromSparse(), 0.05, corner);
   EXPECT_THAT(lost.reasons, Contains(HasSubstr("from what the start gives")));
   EXPECT_FALSE(lost.adjusted());
+}
+
+// Corners that photos show take the place of picks; what they hold no better than 10 cm is nowhere.
+TEST(OpenDirections, WhatPhotosHoldBadlyIsNotTrusted) {
+  SimulatedCase corner = OnlyWalls({{1, 0.0}, {1, 4.0}, {0, 5.0}});
+  const auto align = [&](double weight) {
+    for (Pick& pick : corner.picks) pick.weight = weight;
+    const SurveyedScans surveyed(corner.scans);
+    const AlignmentInput input{corner.model, surveyed, corner.picks, "", corner.azimuth};
+    AlignmentStart start =
+        StartFromSimilarity(corner.model, corner.picks, corner.room->ScanFromSparse(), 0.05);
+    start.num_corners = static_cast<int>(corner.picks.size());
+    Progress quiet(true);
+    return AlignToScan(input, start, AlignmentOptions(), &quiet);
+  };
+  const Alignment held = align(1);
+  EXPECT_THAT(held.reasons, Not(Contains(HasSubstr("alone hold it"))));
+  EXPECT_LT(held.expected_error.at_cameras, 0.03);
+  const Alignment hardly = align(0.01);
+  EXPECT_GT(hardly.expected_error.at_cameras, 0.1);
+  EXPECT_THAT(hardly.reasons, Contains(HasSubstr("alone hold it")));
 }
 
 TEST(OpenDirections, AFitWithoutSolutionSaysNothing) {

@@ -89,7 +89,7 @@ struct FoldedRoom : PhotographedRoom {
 
   PhotoComparison Compare(const SparseModel& aligned, int num_threads = 2) const {
     const FreeSpace free_space(scans, 100000);
-    return ComparePhotosOnScan(aligned, folder.path(), ScanViewer(scans, free_space),
+    return ComparePhotosOnScan({aligned, folder.path()}, ScanViewer(scans, free_space),
                                PhotoComparisonOptions(), num_threads);
   }
 

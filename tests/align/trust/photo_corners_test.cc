@@ -70,7 +70,7 @@ TEST(PhotoCorners, AreWhereTheTruePosesHaveThemThoughLookedForBesideIt) {
       image.cam_from_model.translation =
           Eigen::AngleAxisd(RadFromDeg(turn_deg), axis) * image.cam_from_model.translation;
     }
-    const PhotoCorners found = FindPhotoCorners(model, Scanned().folder.path(), viewer, 100, 2);
+    const PhotoCorners found = FindPhotoCorners({model, Scanned().folder.path()}, viewer, 100, 2);
     EXPECT_GE(found.num_photos, 6);
     EXPECT_GE(found.corners.size(), 150u);
     // The scan has a sample every 0.45 degrees.
@@ -82,8 +82,8 @@ TEST(PhotoCorners, AreOfSoManyPhotosAtMostAndTheSameWithAnyNumberOfThreads) {
   const FreeSpace free_space(Scanned().scans, 100000);
   const ScanViewer viewer(Scanned().scans, free_space);
   const SparseModel model = TrueModelOf(Scanned());
-  const PhotoCorners one = FindPhotoCorners(model, Scanned().folder.path(), viewer, 5, 1);
-  const PhotoCorners four = FindPhotoCorners(model, Scanned().folder.path(), viewer, 5, 4);
+  const PhotoCorners one = FindPhotoCorners({model, Scanned().folder.path()}, viewer, 5, 1);
+  const PhotoCorners four = FindPhotoCorners({model, Scanned().folder.path()}, viewer, 5, 4);
   EXPECT_LE(one.num_photos, 5);
   EXPECT_GT(one.num_photos, 0);
   ASSERT_EQ(one.corners.size(), four.corners.size());
@@ -91,7 +91,7 @@ TEST(PhotoCorners, AreOfSoManyPhotosAtMostAndTheSameWithAnyNumberOfThreads) {
     EXPECT_EQ(one.corners[i].x_in_img, four.corners[i].x_in_img);
   }
   const TempFolder empty;
-  EXPECT_EQ(FindPhotoCorners(model, empty.path(), viewer, 100, 1).num_photos, 0);
+  EXPECT_EQ(FindPhotoCorners({model, empty.path()}, viewer, 100, 1).num_photos, 0);
 }
 
 // A room scanned by a depth camera, whose parts drift, so that no similarity brings the sparse

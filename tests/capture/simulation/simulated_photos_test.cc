@@ -255,8 +255,8 @@ SimulatedRoomOptions HeldByHand() {
 }
 
 // Each row is what a photo taken at once from the pose of that row shows there.
-TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) {
-  const SimulatedRoomOptions options = HeldByHand();
+void ExpectRowsOfAMovingHand(const SimulatedRoomOptions& options) {
+  const bool upright = options.photo_height > options.photo_width;
   const SimulatedRoom room(options);
   const cv::Mat photo = room.RenderPhoto(1);
   const CameraProjection camera(room.camera());
@@ -267,8 +267,9 @@ TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) {
   for (size_t i = 0; i < seen.size(); ++i) {
     if (!(seen[i].x() >= 0)) continue;
     ++num_seen;
-    const double y = seen[i].y();
-    const auto at_row = camera.ImgFromCam(room.CamFromRoomAt(1, y) * samples.points[i]);
+    const double share = upright ? seen[i].x() / options.photo_width - 0.5
+                                 : seen[i].y() / options.photo_height - 0.5;
+    const auto at_row = camera.ImgFromCam(room.CamFromRoomAt(1, share) * samples.points[i]);
     const auto at_once = camera.ImgFromCam(room.CamFromRoom(1) * samples.points[i]);
     ASSERT_TRUE(at_row && at_once);
     EXPECT_LT((at_row->cast<float>() - seen[i]).norm(), 1e-3);
@@ -276,8 +277,8 @@ TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) {
   }
   EXPECT_GT(num_seen, 10000u);
   EXPECT_GT(most_turned, 4);
-  const double turn = DegFromRad(RotationAngle(room.CamFromRoomAt(1, options.photo_height).rotation,
-                                               room.CamFromRoomAt(1, 0).rotation));
+  const double turn = DegFromRad(
+      RotationAngle(room.CamFromRoomAt(1, 0.5).rotation, room.CamFromRoomAt(1, -0.5).rotation));
   EXPECT_NEAR(turn, 60 * 0.030, 1e-6);
 
   // Colours of the points, in the places where the photo shows them by its rows.
@@ -305,6 +306,15 @@ TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) {
   });
   EXPECT_LT(by_rows, 0.035);
   EXPECT_LT(by_rows, 0.7 * by_the_middle);
+}
+
+TEST(SimulatedPhotos, AreReadRowByRowWhileTheHandMoves) { ExpectRowsOfAMovingHand(HeldByHand()); }
+
+// Rows lie along the longer side.
+TEST(SimulatedPhotos, TakenUprightAreReadFromTheLeft) {
+  SimulatedRoomOptions options = HeldByHand();
+  std::swap(options.photo_width, options.photo_height);
+  ExpectRowsOfAMovingHand(options);
 }
 
 TEST(SimulatedPhotos, AreBlurredAsOftenAsAsked) {
