@@ -14,7 +14,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -31,6 +30,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "tests/align/simulated_alignment.h"
+#include "tests/support/cpu_seconds.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -330,8 +330,6 @@ void DrawPhotos(const Room& room, const std::string& folder) {
     cv::imwrite(folder + "/" + of.PhotoName(photo), of.RenderPhoto(photo));
   }
 }
-
-double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 const char kHeader[] =
     "seed,kind,has_answer,trusted,verdict,start_m,start_deg,position_m,turn_deg,expected_m,"

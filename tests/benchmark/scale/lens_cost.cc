@@ -6,15 +6,13 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 
 #include "capture/simulation/simulated_room.h"
 #include "colmap_ext/calibration_check.h"
 #include "colmap_ext/lens_check.h"
+#include "tests/support/cpu_seconds.h"
 
 namespace {
-
-double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 void Measure(int seed, int num_photos) {
   roomtex::SimulatedRoomOptions options;
@@ -29,13 +27,13 @@ void Measure(int seed, int num_photos) {
       camera.params[0] *= factor;
       camera.params[1] *= factor;
     }
-    double begin = CpuSeconds();
+    double begin = roomtex::CpuSeconds();
     model = roomtex::AdjustedByPhotos(model, kNoise);
-    const double mapped = CpuSeconds() - begin;
-    begin = CpuSeconds();
+    const double mapped = roomtex::CpuSeconds() - begin;
+    begin = roomtex::CpuSeconds();
     const roomtex::LensCheck check =
         roomtex::CheckLenses(model, {}, roomtex::RefineIntrinsics::kAuto);
-    const double seconds = CpuSeconds() - begin;
+    const double seconds = roomtex::CpuSeconds() - begin;
     size_t observations = 0, thinned = 0;
     for (const auto& [id, point] : model.points) observations += point.track.size();
     for (const auto& [id, point] : roomtex::ThinnedModel(model, 150).points) {

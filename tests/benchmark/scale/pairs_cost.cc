@@ -6,18 +6,16 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 
 #include "colmap_ext/pair_selection.h"
 #include "colmap_ext/photo_signature.h"
 #include "core/random_stream.h"
 #include "tests/colmap_ext/room_database.h"
+#include "tests/support/cpu_seconds.h"
 
 namespace roomtex {
 namespace {
-
-double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Of photos whose signatures have nothing in common.
 double SecondsOfSignatures(int num_photos) {
