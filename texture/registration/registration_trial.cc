@@ -50,7 +50,7 @@ RegistrationTrial JudgeTrial(const std::string& mode, const std::vector<Registra
                                     [](const RegistrationTrial& one) { return one.kept; });
   // Shares of the disagreement that may be left. What the photos say by themselves is not given up
   // for a scan whose shape is not that of the room.
-  constexpr double kPoses = 0.85, kWarps = 0.95, kByScan = 1.03;
+  constexpr double kPoses = 0.85, kWarps = 0.95, kByScan = 1.02;
   if (any_kept && mode == "pose_by_scan") {
     trial.kept = along_scan > kLikely && left < kByScan;
   } else {

@@ -148,8 +148,22 @@ PhotoColor LookUpPhoto(const cv::Mat& photo, float x, float y, float side) {
 
 namespace {
 
-constexpr float kFits = 0.5f;   // agreement
-constexpr int kMostViews = 64;  // BlendOptions::Problems
+constexpr float kFits = 0.5f;                         // agreement
+constexpr float kHalf = 0.5f, kClearMajority = 0.7f;  // three of four have it
+constexpr int kMostViews = 64;                        // BlendOptions::Problems
+
+// The observation that most weight agrees with (of equals the heavier one), and the share of all
+// observations that do.
+struct Consensus {
+  int central = 0;
+  float share = 0;
+
+  // How much of its weight what contradicts it loses: at an edge that photos show beside its place
+  // they are divided, and the mean of both sides is nearer to either than the wrong one is.
+  float Decided() const {
+    return std::clamp((share - kHalf) / (kClearMajority - kHalf), 0.0f, 1.0f);
+  }
+};
 
 // The observations of one sample, brought to one exposure.
 struct SampleViews {
@@ -172,19 +186,21 @@ struct SampleViews {
     return 1 / (1 + ratio * ratio);
   }
 
-  // The observation that most weight agrees with; of equals the heavier one.
-  int Central(float outlier) const {
-    int central = 0;
+  Consensus FindConsensus(float outlier) const {
+    Consensus consensus;
     float most = -1;
     for (int i = 0; i < count; ++i) {
       float sum = 0;
       for (int j = 0; j < count; ++j) sum += weights[j] * Agreement(i, j, outlier);
       if (sum > most) {
         most = sum;
-        central = i;
+        consensus.central = i;
       }
     }
-    return central;
+    float num_agree = 0;
+    for (int i = 0; i < count; ++i) num_agree += Agreement(consensus.central, i, outlier);
+    consensus.share = num_agree / static_cast<float>(count);
+    return consensus;
   }
 };
 
@@ -215,7 +231,7 @@ void CastVotes(const Observation* observations, int count,
   if (count < 2) return;
   const SampleViews views = UnpackViews(observations, count, gains);
   const auto scale = static_cast<float>(outlier);
-  const int central = views.Central(scale);
+  const int central = views.FindConsensus(scale).central;
   int num_agree = 0;
   for (int i = 0; i < count; ++i) {
     const bool agrees = views.Agreement(central, i, scale) > kFits;
@@ -243,11 +259,13 @@ BlendedSample BlendSample(const Observation* observations, int count,
   result.dominant_fits = views.reliability[0] > 0.5f;
   if (outlier > 0 && views.count > 1) {
     const auto scale = static_cast<float>(outlier);
-    const int central = views.Central(scale);
-    result.dominant_fits = result.dominant_fits && views.Agreement(central, 0, scale) > kFits;
+    const Consensus consensus = views.FindConsensus(scale);
+    result.dominant_fits =
+        result.dominant_fits && views.Agreement(consensus.central, 0, scale) > kFits;
+    const float lost = consensus.Decided();
     for (int i = 0; i < views.count; ++i) {
-      const float share = views.Agreement(central, i, scale);
-      views.weights[i] *= share * share;
+      const float share = views.Agreement(consensus.central, i, scale);
+      views.weights[i] *= 1 - lost * (1 - share * share);
     }
   }
   float sum = 0;

@@ -21,7 +21,7 @@ struct BlendOptions {
   // the photos disagree there. `detail` goes without: it takes that of the dominant photo.
   std::string mode = "average";
   // Photos kept per sample, the best by weight; 8 bytes each. Larger = smoother, more memory.
-  int max_views = 6;
+  int max_views = 8;
   // A photo that sees a sample at a slant, away from where the scanner stood, gets less weight:
   // what is left of the range noise and of the misalignment shifts its colour most. Departure from
   // the thesis.

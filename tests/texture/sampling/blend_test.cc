@@ -107,9 +107,17 @@ TEST(BlendSample, LeavesOutAColorThatTheOthersContradict) {
   EXPECT_GT(plain.blend[0], 0.3);
 }
 
-// White paper is clipped in every photo that sees it, and one photo with a wrong pose sees
-// something dark there: clipped photos weigh little in the mean, but they are as good witnesses as
-// any other.
+// At an edge that photos show beside its place as many see one side as the other. Who is right
+// cannot be known; the mean is off by half of what the wrong side is, whoever weighs more.
+TEST(BlendSample, TakesTheMeanWherePhotosAreDivided) {
+  const Observation seen[4] = {Seen(0.8f, 0.8f, 0.8f, 0.9f, 0), Seen(0.8f, 0.8f, 0.8f, 0.7f, 1),
+                               Seen(0.1f, 0.1f, 0.1f, 0.8f, 2), Seen(0.1f, 0.1f, 0.1f, 0.4f, 3)};
+  const BlendedSample plain = BlendSample(seen, 4, kUnitGains, 0);
+  EXPECT_NEAR(BlendSample(seen, 4, kUnitGains, 0.3).blend[0], plain.blend[0], 0.01);
+  EXPECT_NEAR(BlendSample(seen, 3, kUnitGains, 0.3).blend[0], 0.8, 0.15);
+  EXPECT_LT(BlendSample(seen, 3, kUnitGains, 0).blend[0], 0.6);
+}
+
 TEST(CastVotes, MostPhotosOutvoteTheRestAndHalfOfThemDoNot) {
   using Votes = std::vector<Vote>;
   const auto cast = [](std::vector<Observation> seen) {
@@ -129,6 +137,9 @@ TEST(CastVotes, MostPhotosOutvoteTheRestAndHalfOfThemDoNot) {
   EXPECT_EQ(cast({wall, coat, doubtful}), (Votes{Vote::kOpen, Vote::kOpen, Vote::kNone}));
 }
 
+// White paper is clipped in every photo that sees it, and one photo with a wrong pose sees
+// something dark there: clipped photos weigh little in the mean, but they are as good witnesses as
+// any other.
 TEST(BlendSample, ClippedPhotosOutvoteOneThatContradictsThem) {
   std::vector<Observation> observations(4);
   std::vector<Eigen::Vector3f> gains;
