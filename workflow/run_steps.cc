@@ -376,7 +376,7 @@ class StepRunner {
   // The command's own reason, or what it said last.
   std::string ReasonOf(const Step& step, const ChildRun& run) const {
     const Json report = ReadJsonFile(chain_.ReportOf(step.name));
-    if (report.is_object() && report.value("reason", std::string()) != "") {
+    if (report.is_object() && !report.value("reason", std::string()).empty()) {
       return report["reason"].get<std::string>();
     }
     for (size_t i = run.last.size(); i-- > 0;) {
