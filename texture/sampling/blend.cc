@@ -67,7 +67,7 @@ void BlendOptions::Declare(OptionFields* fields) {
   fields
       ->Number("Blend.outlier", &outlier,
                "Colour difference (0..1) from the other photos at which half the weight is "
-               "lost; 0 = never.")
+               "lost, where most photos agree; 0 = never.")
       .NotNegative();
   fields->Bool("Blend.leave_out_moving", &leave_out_moving,
                "What stands before the surface in one photo and is outvoted by others (people, "

@@ -33,9 +33,10 @@ struct BlendOptions {
   // photo_sharpness.h. Departure from the thesis.
   bool sharpness_weight = true;
   // Colours that contradict the others at a sample (people, moved chairs, shadows of the
-  // photographer, reflections) lose their weight: the distance at which half of it is lost, on a
-  // scale of 0..1 that is about even to the eye. Larger = more tolerant; below 0.2, shiny surfaces,
-  // which look different in every photo, come out in blotches. 0 = never (thesis).
+  // photographer, reflections) lose their weight where most of them agree: the distance at which
+  // half of it is lost, on a scale of 0..1 that is about even to the eye. Larger = more tolerant;
+  // below 0.2, shiny surfaces, which look different in every photo, come out in blotches. 0 = never
+  // (thesis).
   double outlier = 0.3;
   // What stands before the surface in one photo, and not in those that outvote it, gives no colour
   // anywhere in that photo (contradicted_parts.h). Departure from the thesis.
