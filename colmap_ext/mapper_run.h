@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/colmap_program.h"
 #include "colmap_ext/initializer.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/colmap_program.h"
 
 namespace roomtex {
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -11,7 +9,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/child_program.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
@@ -20,13 +17,6 @@
 #include "core/text.h"
 
 namespace roomtex {
-namespace fs = std::filesystem;
-namespace {
-
-constexpr char kColmapRemedy[] =
-    "Install COLMAP (apt install colmap), or name the program with --colmap";
-
-}  // namespace
 
 std::vector<PhotoFacts> ReadPhotoFacts(const std::string& folder) {
   std::vector<PhotoFacts> photos;
@@ -100,45 +90,6 @@ std::vector<KnownCamera> ReadKnownCameras(const std::string& path) {
     throw InputError(path, "", "holds no camera", "Give the cameras.txt of roomtex-calibrate");
   }
   return cameras;
-}
-
-int ColmapFacts::VersionNumber() const {
-  int major = 0, minor = 0;
-  if (std::sscanf(version.c_str(), "COLMAP %d.%d", &major, &minor) != 2) return 0;
-  return 100 * major + minor;
-}
-
-ColmapFacts ReadColmapFacts(const std::string& program) {
-  ColmapFacts facts;
-  facts.path = FindProgram(program, kColmapRemedy);
-  ChildSettings settings;
-  bool has_cuda = false;
-  settings.on_line = [&](const std::string& line) {
-    if (facts.version.empty() && BeginsWith(line, "COLMAP ")) facts.version = line;
-    has_cuda |= line.find("with CUDA") != std::string::npos;
-  };
-  const ChildRun run = RunChild({facts.path, "help"}, settings);
-  if (!run.success || facts.version.empty()) {
-    throw InputError(facts.path, "", "does not answer `help` as COLMAP does", kColmapRemedy);
-  }
-  std::error_code ignored;
-  facts.can_use_gpu = has_cuda && fs::exists("/dev/nvidia0", ignored);
-  return facts;
-}
-
-std::set<std::string> ReadColmapOptions(const std::string& path, const std::string& command) {
-  std::set<std::string> options;
-  ChildSettings settings;
-  settings.on_line = [&](const std::string& line) {
-    const size_t begin = line.find("--");
-    if (begin == std::string::npos || line.find_first_not_of(" \t") != begin) return;
-    options.insert(line.substr(begin, line.find_first_of(" \t=", begin) - begin));
-  };
-  RunChild({path, command, "-h"}, settings);
-  if (options.count("--database_path") == 0) {
-    throw InputError(path, "", "has no command `" + command + "`", "Use COLMAP 3.7 or newer");
-  }
-  return options;
 }
 
 namespace {

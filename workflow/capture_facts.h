@@ -3,7 +3,6 @@
 // choices.
 
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -39,17 +38,6 @@ struct KnownCamera {
   std::string params;  // with commas, as --ImageReader.camera_params has them
 };
 std::vector<KnownCamera> ReadKnownCameras(const std::string& path);  // throws InputError
-
-// The installed COLMAP.
-struct ColmapFacts {
-  std::string path, version;  // "COLMAP 3.8 (Commit ...)"
-  bool can_use_gpu = false;   // built with CUDA, and there is a card
-  int VersionNumber() const;  // 308; 0 if it cannot be read
-};
-// Throws InputError.
-ColmapFacts ReadColmapFacts(const std::string& program);
-// The options of a command of it, with their dashes.
-std::set<std::string> ReadColmapOptions(const std::string& path, const std::string& command);
 
 // Whether neighbouring photos come in pairs of the same view in different light, as they do where a
 // pattern was projected: from small pictures.

@@ -115,18 +115,9 @@ const std::vector<PhotoFacts>& Chain::Photos(const std::string& folder) {
   return photos_.back().second;
 }
 
-const ColmapFacts& Chain::Colmap() {
-  if (!colmap_) colmap_ = ReadColmapFacts(options_.colmap);
+ColmapProgram& Chain::Colmap() {
+  if (!colmap_) colmap_.emplace(options_.colmap);
   return *colmap_;
-}
-
-const std::set<std::string>& Chain::ColmapOptions(const std::string& command) {
-  const auto known = std::find_if(colmap_options_.begin(), colmap_options_.end(),
-                                  [&](const auto& one) { return one.first == command; });
-  if (known != colmap_options_.end()) return known->second;
-  colmap_options_.reserve(8);
-  colmap_options_.emplace_back(command, ReadColmapOptions(Colmap().path, command));
-  return colmap_options_.back().second;
 }
 
 bool Chain::SeemsPatterned() {

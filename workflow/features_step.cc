@@ -59,7 +59,7 @@ void AddCamera(const PhotoGroup& group, const PhotoGroup& largest, const AutoOpt
 CommandLine ExtractorLine(Chain* chain, bool uses_gpu) {
   const AutoOptions& options = chain->options();
   const Quality& quality = QualityOf(options);
-  const std::set<std::string>& known = chain->ColmapOptions("feature_extractor");
+  const std::set<std::string>& known = chain->Colmap().Options("feature_extractor");
   CommandLine line = {options.colmap,    "feature_extractor",
                       "--database_path", chain->At(kPartialDatabase),
                       "--image_path",    chain->ColmapFolder()};

@@ -56,7 +56,7 @@ class ReportMaker {
     keys["steps"] = Steps();
     keys["total"] = Total();
     keys["versions"] = {{"roomtex", Version()}};
-    if (!chain_.OnlyScanner()) keys["versions"]["colmap"] = chain_.Colmap().version;
+    if (!chain_.OnlyScanner()) keys["versions"]["colmap"] = chain_.Colmap().version();
     keys["command_line"] = CommandText(chain_.AutoCommand());
     return keys;
   }

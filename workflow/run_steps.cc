@@ -167,7 +167,7 @@ class StepRunner {
           EssentialText(step.commands[i]);
       uses_colmap |= step.commands[i][0] == chain_.options().colmap;
     }
-    if (uses_colmap) from["COLMAP"] = chain_.Colmap().version;
+    if (uses_colmap) from["COLMAP"] = chain_.Colmap().version();
     for (const std::string& path : step.inputs) {
       const std::string signature = Signature(path);
       if (signature.empty()) {
@@ -357,7 +357,7 @@ class StepRunner {
     CommandLine arguments = line;
     const bool is_ours = BeginsWith(line[0], "roomtex-");
     arguments[0] = line[0] == chain_.options().colmap
-                       ? chain_.Colmap().path
+                       ? chain_.Colmap().path()
                        : FindProgram(is_ours ? BesideThisProgram(line[0]) : line[0],
                                      "Install all commands of roomtex together");
     ChildSettings settings;

@@ -4,11 +4,11 @@
 
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/colmap_program.h"
 #include "core/report.h"
 #include "workflow/auto_options.h"
 #include "workflow/capture_facts.h"
@@ -66,8 +66,7 @@ class Chain {
 
   // Read when they are first asked for.
   const std::vector<PhotoFacts>& Photos(const std::string& folder);
-  const ColmapFacts& Colmap();
-  const std::set<std::string>& ColmapOptions(const std::string& command);
+  ColmapProgram& Colmap();
   bool SeemsPatterned();
 
   // What a person types to pick points.
@@ -79,8 +78,7 @@ class Chain {
   const AutoOptions& options_;
   std::string scanner_scan_;
   std::vector<std::pair<std::string, std::vector<PhotoFacts>>> photos_;
-  std::optional<ColmapFacts> colmap_;
-  std::vector<std::pair<std::string, std::set<std::string>>> colmap_options_;
+  std::optional<ColmapProgram> colmap_;
   std::optional<bool> seems_patterned_;
 };
 

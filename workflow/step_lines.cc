@@ -54,7 +54,7 @@ void AddSpelled(const std::set<std::string>& options, const std::vector<std::str
 
 bool UsesGpu(Chain* chain, std::vector<std::string>* notes) {
   const std::string& word = chain->options().use_gpu;
-  const bool uses = word == "1" || (word == "auto" && chain->Colmap().can_use_gpu);
+  const bool uses = word == "1" || (word == "auto" && chain->Colmap().CanUseGpu());
   if (word == "auto") {
     notes->push_back(uses ? "COLMAP is built with CUDA and a graphics card is there: it is used"
                           : "no graphics card that this COLMAP can use: on the processor");

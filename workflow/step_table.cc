@@ -131,7 +131,7 @@ Step MakeMatches(Chain* chain) {
   const bool uses_gpu = UsesGpu(chain, &step.notes);
   step.notes.clear();  // said with the features
   const std::string matcher = ChooseMatcher(chain, &step.notes);
-  const std::set<std::string>& known = chain->ColmapOptions(matcher);
+  const std::set<std::string>& known = chain->Colmap().Options(matcher);
   CommandLine line = {options.colmap, matcher, "--database_path", chain->At(kPartialDatabase)};
   AddSpelled(known, {"FeatureMatching.use_gpu", "SiftMatching.use_gpu"}, uses_gpu ? "1" : "0",
              &line);

@@ -122,20 +122,5 @@ TEST(LooksPatterned, NotWhereEveryPhotoShowsAnotherView) {
   EXPECT_FALSE(LooksPatterned(folder.path(), ReadPhotoFacts(folder.path())));
 }
 
-TEST(ColmapFacts, KnowsItsVersion) {
-  ColmapFacts facts;
-  facts.version = "COLMAP 3.8 (Commit Unknown)";
-  EXPECT_EQ(facts.VersionNumber(), 308);
-  facts.version = "COLMAP 4.1.0";
-  EXPECT_EQ(facts.VersionNumber(), 401);
-  facts.version = "else";
-  EXPECT_EQ(facts.VersionNumber(), 0);
-}
-
-TEST(ReadColmapFacts, SaysThatColmapIsNotThere) {
-  EXPECT_INPUT_ERROR(ReadColmapFacts("no-such-colmap"), "is not on the PATH");
-  EXPECT_INPUT_ERROR(ReadColmapFacts("/bin/true"), "does not answer");
-}
-
 }  // namespace
 }  // namespace roomtex

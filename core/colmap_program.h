@@ -17,16 +17,20 @@ using ColmapOptions = std::vector<std::pair<std::string, std::string>>;
 
 using ColmapRun = ChildRun;
 
+// Major * 100 + minor of "COLMAP 3.8 (Commit ...)", e.g. 308; 0 if it cannot be read.
+int ColmapVersionNumber(const std::string& version);
+
 class ColmapProgram {
  public:
   // program: a path, or a name to look for on PATH. Throws InputError if it is not there, cannot be
-  // run or is not COLMAP. All that runs print is appended to the file log_path.
-  ColmapProgram(const std::string& program, const std::string& log_path);
+  // run or is not COLMAP. All that runs print is appended to the file log_path; "" = nowhere.
+  explicit ColmapProgram(const std::string& program, const std::string& log_path = "");
 
   const std::string& path() const { return path_; }
   const std::string& version() const { return version_; }  // "COLMAP 3.8 (Commit ...)"
-  // Major * 100 + minor, e.g. 308; 0 if the version cannot be read.
-  int VersionNumber() const;
+  int VersionNumber() const { return ColmapVersionNumber(version_); }
+  // Built with CUDA, and there is a card.
+  bool CanUseGpu() const { return can_use_gpu_; }
   const std::string& log_path() const { return log_path_; }
 
   // The options `colmap COMMAND -h` lists, with their dashes. Throws InputError if it has no such
@@ -45,6 +49,7 @@ class ColmapProgram {
                          const std::function<void(const std::string&)>& on_line);
 
   std::string path_, log_path_, version_;
+  bool can_use_gpu_ = false;
   std::map<std::string, std::set<std::string>> options_of_command_;
 };
 

@@ -1,6 +1,7 @@
-#include "colmap_ext/colmap_program.h"
+#include "core/colmap_program.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <utility>
 
 #include "core/error.h"
@@ -14,21 +15,25 @@ constexpr char kInstallRemedy[] =
 
 }  // namespace
 
+int ColmapVersionNumber(const std::string& version) {
+  int major = 0, minor = 0;
+  if (std::sscanf(version.c_str(), "COLMAP %d.%d", &major, &minor) != 2) return 0;
+  return 100 * major + minor;
+}
+
 ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_path)
     : path_(FindProgram(program, kInstallRemedy)), log_path_(log_path) {
+  bool has_cuda = false;
   const ColmapRun help = RunArguments({"help"}, -1, [&](const std::string& line) {
     if (version_.empty() && BeginsWith(line, "COLMAP ")) version_ = line;
+    has_cuda |= line.find("with CUDA") != std::string::npos;
   });
   if (!help.success || version_.empty()) {
     throw InputError(path_, "", "does not answer `help` as COLMAP does (" + help.LastLines() + ")",
                      kInstallRemedy);
   }
-}
-
-int ColmapProgram::VersionNumber() const {
-  int major = 0, minor = 0;
-  if (std::sscanf(version_.c_str(), "COLMAP %d.%d", &major, &minor) != 2) return 0;
-  return 100 * major + minor;
+  std::error_code ignored;
+  can_use_gpu_ = has_cuda && std::filesystem::exists("/dev/nvidia0", ignored);
 }
 
 const std::set<std::string>& ColmapProgram::Options(const std::string& command) {
@@ -40,7 +45,7 @@ const std::set<std::string>& ColmapProgram::Options(const std::string& command) 
     if (begin == std::string::npos || line.find_first_not_of(" \t") != begin) return;
     options.insert(line.substr(begin, line.find_first_of(" \t=", begin) - begin));
   });
-  if (options.count("--input_path") == 0) {
+  if (options.empty()) {
     throw InputError(path_, "", "has no command `" + command + "` (" + version_ + ")",
                      "Use COLMAP 3.7 or newer");
   }
