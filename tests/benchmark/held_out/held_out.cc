@@ -21,6 +21,7 @@
 #include "core/report.h"
 #include "core/twist.h"
 #include "tests/benchmark/held_out/held_out_score.h"
+#include "tests/benchmark/held_out/picture_sheet.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 
@@ -28,9 +29,10 @@ namespace roomtex {
 namespace {
 
 struct HeldOutOptions {
-  std::string input_path, image_path, scan_path, hold_out, methods_path, pictures_path;
+  std::string input_path, image_path, scan_path, hold_out, methods_path, pictures_path, sheet_path;
   bool one_by_one = false, refine_pose = true;
   double turn_deg = 0, move = 0;
+  int num_places = 6;
 };
 
 std::vector<std::string> SplitAt(const std::string& text, char separator) {
@@ -141,6 +143,15 @@ class HeldOutTable {
     context_.report["methods"].push_back(entry);
   }
 
+  void WriteSheet() const {
+    if (options_.sheet_path.empty()) return;
+    const cv::Mat3b sheet = sheet_.Draw(options_.num_places);
+    if (sheet.empty() || !cv::imwrite(options_.sheet_path, sheet)) {
+      throw InputError(options_.sheet_path, "", "cannot be written, or nothing was predicted",
+                       "Name a PNG in a folder that exists");
+    }
+  }
+
  private:
   // Returns the CPU seconds of the program that colours.
   double AddGroup(const Method& method, const std::vector<std::string>& group, Json* photos) {
@@ -173,6 +184,7 @@ class HeldOutTable {
     if (options_.refine_pose) pose = predictor.RefinePose(camera, pose, photo);
     const Prediction prediction = predictor.Predict(camera, pose);
     const HeldOutScore score = ScorePrediction(prediction, photo);
+    if (!options_.sheet_path.empty()) sheet_.Add(method, name, photo, prediction);
     if (!options_.pictures_path.empty()) WritePictures(method, name, photo, prediction.picture);
     const Rigid moved = pose * image.cam_from_model.Inverse();
     return {{"name", name},
@@ -223,6 +235,7 @@ class HeldOutTable {
   const HeldOutOptions& options_;
   const SparseModel& model_;
   const Command::Context& context_;
+  PictureSheet sheet_;
   bool is_first_ = true;
 };
 
@@ -258,6 +271,7 @@ void HoldOut(const HeldOutOptions& options, const Command::Context& context) {
     table.AddMethod(ReadMethod(method), names);
     context.progress.Tick();
   }
+  table.WriteSheet();
 }
 
 }  // namespace
@@ -290,5 +304,10 @@ int main(int argc, char** argv) {
   command.AddOutputPath("pictures_path", &o.pictures_path,
                         "folder for pictures to look at: photo, prediction, twice their difference",
                         Command::Kind::kOptional);
+  command.AddOutputPath("sheet_path", &o.sheet_path,
+                        "a PNG to look at: the places of the photos that hold the most detail, and "
+                        "what each method predicts there",
+                        Command::Kind::kOptional);
+  command.AddInt("num_places", &o.num_places, "places of the sheet");
   return command.Run(argc, argv, [&o](const Command::Context& context) { HoldOut(o, context); });
 }

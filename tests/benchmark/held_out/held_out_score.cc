@@ -169,7 +169,7 @@ cv::Mat3d PhotoPredictor::PointsSeen(const Camera& camera, const Rigid& cam_from
 Rigid PhotoPredictor::RefinePose(const Camera& camera, const Rigid& cam_from_scan,
                                  const cv::Mat& photo) const {
   const Prediction prediction = Predict(camera, cam_from_scan);
-  const cv::Mat picture = WithGains(prediction.picture, ChannelGains(prediction, photo));
+  const cv::Mat picture = WithPhotoGains(prediction, photo);
   const cv::Mat3d points = PointsSeen(camera, cam_from_scan);
   cv::Mat1b inner;
   cv::erode(prediction.seen, inner, cv::Mat(), {-1, -1}, 3);
@@ -208,6 +208,10 @@ Rigid PhotoPredictor::RefinePose(const Camera& camera, const Rigid& cam_from_sca
   return last_cost < first_cost ? pose : cam_from_scan;
 }
 
+cv::Mat3b WithPhotoGains(const Prediction& prediction, const cv::Mat& photo) {
+  return WithGains(prediction.picture, ChannelGains(prediction, photo));
+}
+
 HeldOutScore ScorePrediction(const Prediction& prediction, const cv::Mat& photo) {
   HeldOutScore score;
   cv::Mat1b mask;
@@ -215,7 +219,7 @@ HeldOutScore ScorePrediction(const Prediction& prediction, const cv::Mat& photo)
   const int count = cv::countNonZero(mask);
   score.share_seen = static_cast<double>(count) / static_cast<double>(mask.total());
   if (count == 0) return score;
-  const cv::Mat picture = WithGains(prediction.picture, ChannelGains(prediction, photo));
+  const cv::Mat picture = WithPhotoGains(prediction, photo);
   cv::Mat3f difference = cv::Mat3f(picture) - cv::Mat3f(cv::Mat3b(photo));
   const cv::Scalar squares = cv::mean(difference.mul(difference), mask);
   const double mean_square = std::max((squares[0] + squares[1] + squares[2]) / 3, 1e-6);

@@ -46,6 +46,9 @@ struct HeldOutScore {
   double share_seen = 0;  // of the photo
 };
 
+// The prediction after the gain per channel that brings its light to the photo's.
+cv::Mat3b WithPhotoGains(const Prediction& prediction, const cv::Mat& photo);
+
 // Over the pixels that the prediction shows, three pixels away from where it does not.
 HeldOutScore ScorePrediction(const Prediction& prediction, const cv::Mat& photo);
 

@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
 #include "core/random_stream.h"
 #include "core/twist.h"
 #include "tests/benchmark/held_out/held_out_score.h"
+#include "tests/benchmark/held_out/picture_sheet.h"
 #include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -90,6 +92,45 @@ TEST(PhotoPredictor, FindsAPoseThatIsOff) {
   EXPECT_LT(found.translation.norm(), 3e-3);
 }
 
+TEST(RichestSquares, LieWhereTheDetailIsAndTheScanIsSeen) {
+  cv::Mat3b photo(160, 240, cv::Vec3b(90, 90, 90));
+  RandomStream random(5);
+  const auto fill = [&](const cv::Rect& area, double range) {
+    for (cv::Vec3b& pixel : cv::Mat3b(photo(area))) {
+      pixel = cv::Vec3b::all(static_cast<uint8_t>(random.Uniform(90 - range, 90 + range)));
+    }
+  };
+  fill({0, 0, 60, 60}, 80);     // the richest, and not seen
+  fill({120, 15, 60, 60}, 60);  // both on the steps of a quarter of the square
+  fill({30, 90, 60, 60}, 30);
+  cv::Mat1b seen(photo.size(), uint8_t{255});
+  seen(cv::Rect(0, 0, 60, 60)).setTo(0);
+  const std::vector<cv::Rect> squares = RichestSquares(photo, seen, 2);
+  ASSERT_EQ(squares.size(), 2u);
+  EXPECT_EQ(squares[0], cv::Rect(120, 15, 60, 60));
+  EXPECT_EQ(squares[1], cv::Rect(30, 90, 60, 60));
+}
+
+TEST(PictureSheet, HasAColumnForThePhotoAndEachMethod) {
+  const ColoredMesh mesh = MakeCorner();
+  const Prediction prediction = PhotoPredictor(mesh, 1).Predict(SmallCamera(), Rigid());
+  Prediction plain = prediction;
+  plain.picture = cv::Mat3b(plain.picture.size(), cv::Vec3b(128, 128, 128));
+  PictureSheet sheet;
+  EXPECT_TRUE(sheet.Draw(6).empty());
+  sheet.Add("same", "a.png", prediction.picture, prediction);
+  sheet.Add("plain", "a.png", prediction.picture, plain);
+  const cv::Mat3b drawn = sheet.Draw(1);
+  ASSERT_FALSE(drawn.empty());
+  constexpr int kGap = 6;
+  const int width = (drawn.cols - kGap) / 3;
+  const auto panel = [&](int column) {
+    return drawn(cv::Rect(width * column + kGap, drawn.rows / 4, width - kGap, drawn.rows / 2));
+  };
+  EXPECT_EQ(cv::norm(panel(0), panel(1), cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(panel(0), panel(2), cv::NORM_INF), 30);
+}
+
 TEST(HeldOut, PrintsARowForEveryMethod) {
   const TempFolder folder;
   const CommandResult capture = RunCommandLine(
@@ -101,13 +142,17 @@ TEST(HeldOut, PrintsARowForEveryMethod) {
   WriteBytes(folder / "methods",
              "# name: options\ndefault:\nblurred: --Blend.footprint 4\nother! '" + BinFolder() +
                  "/roomtex-texture' --quiet\n");
-  const CommandResult result =
-      RunCommandLine("held_out --quiet --input_path " + (folder / "capture/truth") +
-                     " --image_path " + (folder / "capture/photos") + " --scan_path " +
-                     (folder / "capture/scan.rtpi") + " --hold_out 002,005 --methods_path " +
-                     (folder / "methods") + " --report_path " + (folder / "report.json"));
+  const CommandResult result = RunCommandLine(
+      "held_out --quiet --input_path " + (folder / "capture/truth") + " --image_path " +
+      (folder / "capture/photos") + " --scan_path " + (folder / "capture/scan.rtpi") +
+      " --hold_out 002,005 --methods_path " + (folder / "methods") + " --report_path " +
+      (folder / "report.json") + " --sheet_path " + (folder / "sheet.png"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("| default |"), std::string::npos) << result.out;
+  // Six rows would be more places than two photos have.
+  const cv::Mat sheet = cv::imread(folder / "sheet.png");
+  EXPECT_EQ(sheet.cols / 320, 4);
+  EXPECT_EQ(sheet.rows / 340, 4);
   const auto report = nlohmann::json::parse(ReadBytes(folder / "report.json"));
   ASSERT_EQ(report["methods"].size(), 3u);
   for (const auto& method : report["methods"]) {
