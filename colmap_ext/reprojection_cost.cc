@@ -7,6 +7,9 @@ namespace roomtex {
 namespace {
 
 constexpr double kMinDepth = 1e-3;  // metres in front of the camera
+// From the keypoint's row to the one that sees the point; each is nearer by the share of the photo
+// that the motion shifts what it shows, some thousandths.
+constexpr int kRowSteps = 2;
 
 using RowMatrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using RowMatrix26 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
@@ -56,24 +59,45 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   const Eigen::Vector3d p_in_rig = rotation * (q - centre);
   const Eigen::Vector3d still = cam_from_rig_ * p_in_rig + rig_in_cam_;
   const int rolls_at = refine_intrinsics_ ? 3 : 2;
-  const double share = rolls_ ? RowShare(camera_, x_in_img_) : 0;
-  Eigen::Vector3d p = still;
-  Eigen::Matrix3d p_by_still = Eigen::Matrix3d::Identity();
-  if (rolls_) {
-    const Eigen::Map<const Eigen::Vector3d> turned(parameters[rolls_at]),
-        moved(parameters[rolls_at] + 3);
-    p = RowMotion{turned, moved}(share, still);
-    p_by_still += share * CrossMatrix(turned);
-  }
-  if (!((camera_.IsPerspective() ? p.z() : p.norm()) > kMinDepth)) return false;
   const int num_params = static_cast<int>(camera_.params.size());
+  const auto is_before = [&](const Eigen::Vector3d& x) {
+    return (camera_.IsPerspective() ? x.z() : x.norm()) > kMinDepth;
+  };
+  double share = 0;
+  RowMotion motion;
+  Eigen::Vector3d p = still;
+  if (rolls_) {
+    motion.turn = Eigen::Map<const Eigen::Vector3d>(parameters[rolls_at]);
+    motion.move = Eigen::Map<const Eigen::Vector3d>(parameters[rolls_at] + 3);
+    // The row that sees the point. That of the keypoint has the keypoint's noise, which a motion
+    // could make smaller: all photos would nod alike and the focal length down the rows shrink.
+    share = RowShare(camera_, x_in_img_);
+    for (int k = 0; k < kRowSteps; ++k) {
+      p = motion(share, still);
+      if (!is_before(p)) return false;
+      const auto error = ErrorOfPoint<0>(camera_.model, intrinsics, num_params, p, x_in_img_).error;
+      share = RowShare(camera_, x_in_img_ + error);
+    }
+    p = motion(share, still);
+  }
+  if (!is_before(p)) return false;
   const auto seen = ErrorOfPoint<0>(camera_.model, intrinsics, num_params, p, x_in_img_);
   Eigen::Map<Eigen::Vector2d> residual(residuals);
   residual = weight_ * seen.error;
   if (!residual.allFinite()) return false;
   if (jacobians == nullptr) return true;
 
-  const RowMatrix23 by_seen = weight_ * seen.by_point;
+  Eigen::Matrix3d p_by_still = Eigen::Matrix3d::Identity();
+  Eigen::Matrix2d settled = Eigen::Matrix2d::Identity();
+  if (rolls_) {
+    p_by_still += share * CrossMatrix(motion.turn);
+    // What shifts the point's picture shifts the row that sees it, too.
+    const Eigen::Vector2d by_share = seen.by_point * (motion.turn.cross(still) + motion.move);
+    settled -= by_share * RowShareByImg(camera_).transpose();
+    settled = settled.inverse().eval();
+  }
+  const Eigen::Matrix2d weight = weight_ * settled;
+  const RowMatrix23 by_seen = weight * seen.by_point;
   const RowMatrix23 by_p = by_seen * p_by_still * cam_from_rig_;
   const RowMatrix23 by_q = by_p * rotation;
   if (jacobians[0] != nullptr) {
@@ -88,7 +112,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
     const auto seen_by =
         ErrorOfPoint<kMaxCameraParams>(camera_.model, intrinsics, num_params, p, x_in_img_);
     Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
-        weight_ * seen_by.by_params.leftCols(num_params);
+        weight * seen_by.by_params.leftCols(num_params);
   }
   if (rolls_ && jacobians[rolls_at] != nullptr) {
     Eigen::Map<RowMatrix26> by_motion(jacobians[rolls_at]);

@@ -33,6 +33,11 @@ inline double RowShare(const Camera& camera, const Eigen::Vector2d& x_in_img) {
   return RowsAreUpright(camera) ? x_in_img.x() / camera.width - 0.5
                                 : x_in_img.y() / camera.height - 0.5;
 }
+// What it changes by with the position; 1 / pixels.
+inline Eigen::Vector2d RowShareByImg(const Camera& camera) {
+  return RowsAreUpright(camera) ? Eigen::Vector2d(1.0 / camera.width, 0)
+                                : Eigen::Vector2d(0, 1.0 / camera.height);
+}
 
 // How often a row is found from the position that the row before it gives. Each time is nearer by
 // the share of the photo that the motion shifts what it shows, a few hundredths.

@@ -187,6 +187,47 @@ TEST(ReprojectionCost, HasTheNumericDerivativesOfARollingShutter) {
   }
 }
 
+// At the truth noise of keypoints pulls a motion and a lens nowhere. The row of the keypoint, in
+// place of the one that sees the point, would have its noise in the derivatives: cameras would nod
+// as far as that makes the noise look smaller (here by 12 standard deviations).
+TEST(ReprojectionCost, NoiseOfKeypointsNodsNoCameraWithARollingShutter) {
+  constexpr double kNoisePx = 10;
+  PickMaker maker(11, CameraModel::kOpenCv);
+  const Camera camera = maker.projection.camera();
+  const PointPairs still = maker.General(200000);
+  const RowMotion motion{{0.01, -0.006, 0.008}, {0.02, 0.01, -0.03}};
+  PointPairs pairs = still;
+  for (int i = 0; i < pairs.size(); ++i) {
+    pairs.x_in_img.col(i) =
+        ImgFromMovingCam(maker.projection, motion, maker.cam_from_scan * pairs.x_in_scan.col(i))
+            .value();
+  }
+  pairs = maker.WithNoise(pairs, kNoisePx);
+  PoseParameters pose(maker.cam_from_scan);
+  double moved[6];
+  Eigen::Map<Eigen::Vector3d>{moved} = motion.turn;
+  Eigen::Map<Eigen::Vector3d>{moved + 3} = motion.move;
+  std::vector<Eigen::VectorXd> pulls(4), squares(4);
+  for (int i = 0; i < pairs.size(); ++i) {
+    const Eigen::Vector3d point = pairs.x_in_scan.col(i);
+    const ReprojectionCost cost(pose, camera, pairs.x_in_img.col(i), 1, true, Rigid(), true);
+    const Evaluation one = Evaluate(cost, {pose.values, point.data(), camera.params.data(), moved});
+    for (size_t block = 0; block < one.jacobians.size(); ++block) {
+      if (block == 1) continue;  // each point's own
+      const Eigen::MatrixXd& by = one.jacobians[block];
+      if (i == 0) pulls[block] = squares[block] = Eigen::VectorXd::Zero(by.cols());
+      pulls[block] += by.transpose() * one.residuals;
+      squares[block] += kNoisePx * kNoisePx * by.colwise().squaredNorm().transpose();
+    }
+  }
+  for (const size_t block : {0, 2, 3}) {
+    for (int k = 0; k < pulls[block].size(); ++k) {
+      EXPECT_LT(std::abs(pulls[block][k]), 4 * std::sqrt(squares[block][k]))
+          << "block " << block << ", parameter " << k;
+    }
+  }
+}
+
 // Derivatives by the pose of the rig, for a camera that stands and looks elsewhere in it.
 TEST(ReprojectionCost, HasTheNumericDerivativesByThePoseOfARig) {
   for (const CameraModel model :
