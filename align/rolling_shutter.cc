@@ -29,7 +29,8 @@ double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
 }
 
 // Another focal length down the rows than across them, which a camera that is told wrong has, looks
-// like a hand that nods alike in all photos: by so many times what the photos scatter.
+// like a hand that nods alike in all photos: by so many times what the photos scatter. Then motion
+// has to explain what a lens does not.
 constexpr double kMostAlike = 1.5;
 
 bool AllNodAlike(const SparseModel& model, const RowMotions& motions) {
@@ -76,7 +77,7 @@ class StraightAdjustment {
 
   PlaneBundleOptions Options(bool row_motion) const {
     PlaneBundleOptions options = options_;
-    options.row_motion = row_motion;
+    options.row_motion = options.rolled = row_motion;
     return options;
   }
   PlaneBundle Adjust(const PlaneBundleOptions& options) const {
@@ -133,7 +134,12 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     found.freed = IsLensBetter(moving, freed);
     if (found.freed) moving = std::move(freed);
   }
-  if (AllNodAlike(moving.model, moving.motions)) return std::nullopt;
+  if (AllNodAlike(moving.model, moving.motions)) {
+    PlaneBundleOptions lens_alone = standing;
+    lens_alone.refine_intrinsics = lens_alone.rolled = true;
+    const double beyond_lens = Gain(straight.Adjust(lens_alone), moving);
+    if (!(beyond_lens > kMinGain)) return std::nullopt;
+  }
   found.cost_still = unbent.image_cost;
   found.cost_moving = moving.image_cost;
   found.picks = input.picks;

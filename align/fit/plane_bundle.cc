@@ -36,7 +36,7 @@ constexpr double kMaxScaleChange = 0.10, kMaxMove = 0.5;  // share; metres, of t
 // no part; if more than this share of the photos do, the adjustment is not used.
 constexpr double kMaxBending = 0.04, kMinBendingLimit = 0.05, kMaxTurn_deg = 3;
 constexpr double kMaxShareRunaway = 0.05;
-// ... times this with rows that move: a rolling shutter has bent the model that comes.
+// ... times this where a rolling shutter has bent the model that comes.
 constexpr double kMoreRolled = 4;
 // The rms reprojection error may grow by this factor, or by these pixels if that is more ...
 constexpr double kMaxReprojectionGrowth = 4, kMaxReprojectionRise_px = 4;
@@ -175,7 +175,7 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
       FitModels(input.model, result->model, result->constraints, result->idle_images);
   const Similarity& moved = result->adjusted_from_input;
   const double limit =
-      (options.row_motion ? kMoreRolled : 1) *
+      (options.rolled ? kMoreRolled : 1) *
       std::max(kMinBendingLimit, kMaxBending * Extent(input.model, result->constraints));
   std::vector<double> moves;
   double widest_turn = 0;

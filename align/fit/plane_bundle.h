@@ -40,6 +40,8 @@ struct PlaneBundleOptions {
   bool hold_centre = false;  // LensPrior's
   // Rolling shutters: photos move while their rows are read (RowMotion). No option of its own.
   bool row_motion = false;
+  // One may have bent the model, which may go farther then.
+  bool rolled = false;
   // Whether a smooth bend of the scan is looked for (FitScanBend), and the least one that counts:
   // metres, rms over the points on the surface. Smaller ones are within the noise.
   bool bend = true;
