@@ -133,6 +133,18 @@ TEST(Alignment, AWrongLensIsNoRollingShutter) {
   EXPECT_FALSE(AlignCase(one, options).rolling_shutter);
 }
 
+// What a lens does not explain is a hand, however alike it moves.
+TEST(Alignment, AHandThatNodsAlikeInAllPhotosIsARollingShutter) {
+  RowMotions motions;
+  const SimulatedCase one = WithRollingShutter(MakeCase(2, 6), 1, &motions, 1, 0.7);
+  const Alignment alignment = AlignCase(one);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  ASSERT_TRUE(alignment.rolling_shutter);
+  ASSERT_TRUE(alignment.adjusted());
+  EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
+            0.01);
+}
+
 // Photos alone cannot mend the lens of a rig; they notice it, and the scan mends it.
 TEST(Alignment, AWrongLensOfARigIsMendedByTheScan) {
   const SimulatedCase& right = MakeCase(0, 6);

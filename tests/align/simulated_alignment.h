@@ -73,10 +73,10 @@ inline const SimulatedCase& MakeCase(int seed = 0, int num_picks = 8) {
 }
 
 // The case as a mapper has it whose photos were read row by row while a hand turned the camera by
-// 0.3 degrees and moved it by 3 mm (standard deviations per axis), or this share of that; motions:
-// by image_id.
+// 0.3 degrees and moved it by 3 mm (standard deviations per axis), or this share of that, and made
+// it nod by so many degrees in every photo; motions: by image_id.
 inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed, RowMotions* motions,
-                                        double share = 1) {
+                                        double share = 1, double nod_deg = 0) {
   const Camera& camera = one.room->camera();
   const CameraProjection projection(camera);
   const Similarity scan_from_sparse = one.room->ScanFromSparse();
@@ -88,9 +88,10 @@ inline SimulatedCase WithRollingShutter(SimulatedCase one, uint64_t seed, RowMot
       motion.turn[k] = share * RadFromDeg(0.3) * random.Gaussian();
       motion.move[k] = share * 0.003 * random.Gaussian();
     }
+    motion.turn.x() += RadFromDeg(nod_deg);
     const auto shift = [&](const Eigen::Vector3d& x, Eigen::Vector2d* keypoint) {
-      const double row = RowShare(camera, *keypoint);
-      const auto still = projection.ImgFromCam(x), seen = projection.ImgFromCam(motion(row, x));
+      const auto still = projection.ImgFromCam(x);
+      const auto seen = ImgFromMovingCam(projection, motion, x);
       if (still && seen) *keypoint += *seen - *still;
     };
     for (size_t k = 0; k < image.points2d.size(); ++k) {
