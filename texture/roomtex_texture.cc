@@ -370,7 +370,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     context.report["supplement"] = SupplementReport(scans, result.scans, options.supplement_path);
   }
   JudgeColors(list.photos, result, context);
-  const bool wants_detail = colorize.blend.mode != "average" || colorize.blend.detail;
+  const bool wants_detail = colorize.blend.mode == "select" || colorize.blend.detail;
   for (size_t i = 0; i < scans.size(); ++i) {
     if (wants_detail && scans[i].kind() != Scan::Kind::kGrid && result.scans[i].atlas.empty()) {
       context.Warn(scans[i].path +

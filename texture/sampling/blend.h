@@ -19,7 +19,7 @@ struct BlendOptions {
   // Where the detail of a place comes from; what is coarser is blended from all photos kept.
   // "average": from all of them. "select": from one, see photo_choice.h. "auto": from one as far as
   // the photos disagree there. `detail` goes without: it takes that of the dominant photo.
-  std::string mode = "average";
+  std::string mode = "auto";
   // Photos kept per sample, the best by weight; 8 bytes each. Larger = smoother, more memory.
   int max_views = 8;
   // A photo that sees a sample at a slant, away from where the scanner stood, gets less weight:
