@@ -17,11 +17,9 @@ void Append(std::vector<std::string> more, std::vector<std::string>* all) {
   std::move(more.begin(), more.end(), std::back_inserter(*all));
 }
 
-// Metres; model and scan that differ by less leave nothing to mend.
-constexpr double kSameShape = 0.01;
-// Where they differ by more, another lens has to differ from the one as told in its focal length by
-// so many standard deviations: distortion alone is too little to go by there. And it has to bring
-// them nearer by this factor, ...
+// Where model and scan differ in shape, another lens has to differ from the one as told in its
+// focal length by so many standard deviations: distortion alone is too little to go by there. And
+// it has to bring them nearer by this factor, ...
 constexpr double kSameFocalDeviations = 2.5, kClearlyNearer = 0.95;
 // ... or the photos have to be this sure of its focal length. A scan that is itself off by
 // centimetres may lie a few per cent nearer to the wrong lens; it has to lie far nearer then.

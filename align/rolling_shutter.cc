@@ -20,7 +20,8 @@ constexpr double kLookShare = 0.5;
 
 // Where the scan is taken for bent this much is enough, if it is so many times what the bend lowers
 // it by: a shutter of 10 ms bends the sparse model, too (random capture 130: 0.075, the bend
-// 0.015).
+// 0.015). Not where model and scan differ in shape by more than that: motion takes up drift, too
+// (kitchen: 0.11, and what is said of its photos would be too little).
 constexpr double kMinGainBent = 0.05, kMuchMore = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
@@ -119,7 +120,8 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     return straight.Adjust(bundle);
   };
   const double look = Gain(glance(standing), glance(rolling));
-  const double least_gain = bent ? kMinGainBent : kMinGain;
+  const bool small_counts = bent && fit.disagreement.rms <= kSameShape;
+  const double least_gain = small_counts ? kMinGainBent : kMinGain;
   if (!(look > kLookShare * least_gain)) return std::nullopt;
   const PlaneBundle unbent = bent ? straight.Adjust(standing) : still;
   PlaneBundle moving = straight.Adjust(rolling);

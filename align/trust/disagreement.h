@@ -19,6 +19,9 @@ struct PhotoDisagreement {
   double rotation = 0;  // radians: the same seen from the photo
 };
 
+// Metres; model and scan that differ by less (ShapeDisagreement::rms) leave nothing to mend.
+inline constexpr double kSameShape = 0.01;
+
 struct ShapeDisagreement {
   double rms = 0;  // metres, over the surface that the sparse points lie on
   int num_cells = 0;
