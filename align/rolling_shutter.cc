@@ -20,8 +20,8 @@ constexpr double kLookShare = 0.5;
 
 // Where the scan is taken for bent this much is enough, if it is so many times what the bend lowers
 // it by: a shutter of 10 ms bends the sparse model, too (random capture 130: 0.075, the bend
-// 0.015). Not where model and scan differ in shape by more than that: motion takes up drift, too
-// (kitchen: 0.11, and what is said of its photos would be too little).
+// 0.015). Not where model and scan differ in shape by more than kSameShape: motion takes up drift,
+// too (kitchen: 0.11, and what is said of its photos would be too little).
 constexpr double kMinGainBent = 0.05, kMuchMore = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
