@@ -11,18 +11,19 @@ namespace roomtex {
 namespace {
 
 // Of the cost of the photos, by which motion has to lower it. Simulated rooms with 20 and 30 ms of
-// rolling shutter: 0.4 to 0.6; without: 0.002 to 0.012; a drifting scan whose photos are in doubt
-// (kitchen): 0.11.
+// rolling shutter: 0.2 to 0.75; without: 0.002 to 0.012; a drifting scan whose photos are in doubt
+// (kitchen): 0.10.
 constexpr double kMinGain = 0.25;
-// The first look: so many rounds of so many steps. It has to promise half of that.
+// The first look: so many rounds of so many steps. It has to promise half of what is asked for.
 constexpr int kLookRounds = 1, kLookIterations = 6;
 constexpr double kLookShare = 0.5;
 
-// Where the scan is taken for bent this much is enough, if it is so many times what the bend lowers
-// it by: a shutter of 10 ms bends the sparse model, too (random capture 130: 0.075, the bend
-// 0.015). Not where model and scan differ in shape by more than kSameShape: motion takes up drift,
-// too (kitchen: 0.11, and what is said of its photos would be too little).
-constexpr double kMinGainBent = 0.05, kMuchMore = 2;
+// This much is enough where without its shutter the model has the shape of the scan (kSameShape):
+// 10 to 20 ms (random captures 129, 130, 203: 0.21, 0.075, 0.08), or 30 ms of bare walls (185:
+// 0.13). Drift that motion takes up (kitchen: 0.10) leaves the two different in shape. Where the
+// scan is taken for bent it must also be so many times what the bend lowers the cost by: a shutter
+// bends the sparse model, too.
+constexpr double kMinGainOfOneShape = 0.05, kMuchMore = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
   if (!still.usable || !moving.usable) return 0;
@@ -91,6 +92,15 @@ class StraightAdjustment {
   PlaneBundleInput input_;
 };
 
+bool HasShapeOfScan(const AlignmentInput& input, const AlignmentStart& start,
+                    const RollingShutter& rolling, const AlignmentOptions& options) {
+  SparseModel still = rolling.model;
+  const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&still).rms_px);
+  const AlignmentFit fit =
+      FitAlignment(input.With(still, input.surveyed, rolling.picks), start, sigma_px, options);
+  return fit.surface.converged && fit.disagreement.rms <= kSameShape;
+}
+
 }  // namespace
 
 double RollingShutter::MedianTurn() const {
@@ -120,13 +130,11 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     return straight.Adjust(bundle);
   };
   const double look = Gain(glance(standing), glance(rolling));
-  const bool small_counts = bent && fit.disagreement.rms <= kSameShape;
-  const double least_gain = small_counts ? kMinGainBent : kMinGain;
-  if (!(look > kLookShare * least_gain)) return std::nullopt;
+  if (!(look > kLookShare * kMinGainOfOneShape)) return std::nullopt;
   const PlaneBundle unbent = bent ? straight.Adjust(standing) : still;
   PlaneBundle moving = straight.Adjust(rolling);
   const double gain = Gain(unbent, moving);
-  if (!(gain > least_gain)) return std::nullopt;
+  if (!(gain > kMinGainOfOneShape)) return std::nullopt;
   if (bent && !(gain > kMuchMore * Gain(unbent, still))) return std::nullopt;
 
   RollingShutter found;
@@ -157,6 +165,7 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
   TransformModel(fit.scan_from_sparse.Inverse(), &found.model);
   // As the photos have it: on the surface nothing would show how far the two differ.
   found.model = AdjustedByPhotos(found.model, KeypointNoise(found.model));
+  if (!(gain > kMinGain) && !HasShapeOfScan(input, start, found, options)) return std::nullopt;
   return found;
 }
 

@@ -116,6 +116,15 @@ TEST(Alignment, ASmallRollingShutterIsNoBentScan) {
     EXPECT_LT(WorstPoseErrors(*one.room, alignment.adjustment.bundle.model, Similarity()).position,
               0.005)
         << seed;
+    // Nor does it need a bend to be looked for.
+    AlignmentOptions straight;
+    straight.bundle.bend = false;
+    const Alignment unbent = AlignCase(one, straight);
+    EXPECT_TRUE(unbent.rolling_shutter) << seed;
+    ASSERT_TRUE(unbent.adjusted()) << seed;
+    EXPECT_LT(WorstPoseErrors(*one.room, unbent.adjustment.bundle.model, Similarity()).position,
+              0.005)
+        << seed;
   }
 }
 
