@@ -7,6 +7,11 @@ wrong lens on scans of rooms of the same plan and of similar size, which it simu
 many starts were drawn to the photos is not told apart: the verdict is what counts.
 
   tests/benchmark/trust/wrong_rooms.py --bin build/bin SETS
+
+With --captures, FOLDER is that of random_captures.py: every model on the scans of the next captures, --neighbours of
+them, and on its own scan mirrored where that is one .rtpi.
+
+  tests/benchmark/trust/wrong_rooms.py --bin build/bin --captures FOLDER
 """
 
 import argparse
@@ -57,24 +62,57 @@ def pairs(cases, neighbours):
             yield f"{name} on {room}", cases[name], [scan], []
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--bin", default="build/bin")
-    parser.add_argument("--out", default="/tmp/wrong_rooms")
-    parser.add_argument("sets", help="folder of trust_sets.py")
-    args = parser.parse_args()
-    args.without_picks, args.option = True, []
+def capture_cases(folder):
+    """The first model of every capture that has one, with its photos and scans."""
+    cases = []
+    for seed in sorted((name for name in os.listdir(folder) if name.isdigit()), key=int):
+        capture = os.path.join(folder, seed, "capture")
+        model = os.path.join(folder, seed, "result", "sparse", "0")
+        if not os.path.exists(os.path.join(model, "images.bin")):
+            continue
+        scans = sorted(name for name in os.listdir(capture) if name.endswith(".rtpi"))
+        poses = os.path.join(capture, "scan_poses.txt")
+        cases.append({"name": seed, "model": model, "photos": os.path.join(capture, "photos"),
+                      "scans": [os.path.join(capture, name) for name in scans],
+                      "poses": ["--scan_poses", poses] if len(scans) > 1 else []})
+    return cases
+
+
+def capture_pairs(cases, neighbours):
+    for i, case in enumerate(cases):
+        for k in range(1, neighbours + 1):
+            other = cases[(i + k) % len(cases)]
+            yield f"{case['name']} on {other['name']}", case, other["scans"], other["poses"]
+        if not case["poses"]:
+            yield f"{case['name']} mirrored", case, case["scans"], ["--azimuth", "counterclockwise"]
+
+
+def pairs_of(args):
+    if args.captures:
+        return capture_pairs(capture_cases(args.captures), args.neighbours)
     cases = {}
     for file in sorted(os.listdir(args.sets)):
         if file.endswith(".case.json"):
             case = json.load(open(os.path.join(args.sets, file)))
             cases[case["name"]] = case
+    return pairs(cases, simulate(args.sets, args.bin))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--bin", default="build/bin")
+    parser.add_argument("--out", default="/tmp/wrong_rooms")
+    parser.add_argument("--captures", help="folder of random_captures.py, instead of sets")
+    parser.add_argument("--neighbours", type=int, default=1)
+    parser.add_argument("sets", nargs="?", help="folder of trust_sets.py")
+    args = parser.parse_args()
+    args.without_picks, args.option = True, []
     num, trusted = 0, 0
-    for title, case, scans, options in pairs(cases, simulate(args.sets, args.bin)):
+    for title, case, scans, options in pairs_of(args):
         out = os.path.join(args.out, title.replace(" ", "_"))
         os.makedirs(out, exist_ok=True)
         code, report, _, message = align({**case, "scans": scans, "options": options}, args, out)
-        search = report.get("search", {})
+        search = report.get("search") or {}
         num += 1
         trusted += code == 0
         print(f"{title}: exit {code}, {search.get('verdict', message)}, {search.get('ratio', 0):.2f} times the next",
