@@ -202,17 +202,6 @@ void JudgeStart(const AlignmentInput& input, const AlignmentStart& start, const 
   JudgeScale(start, trust, reasons);
 }
 
-// Whether photos overrule points that float. In rooms of one plan and furniture corners are alike,
-// so that photos of one support the scan of another; but they show 0 to 21 % of its corners, those
-// of the right one 59 % and more where a depth camera's scan drifts by 4 cm (docs/real-rooms.md).
-// Real rooms have 21 % and more: enough where points are merely few.
-bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions& trust) {
-  constexpr double kClearlyShown = 0.4;
-  const std::optional<double> shown = photos.shifts.ShownShare();
-  if (differs) return shown && *shown >= kClearlyShown;
-  return photos.supports && (!shown || *shown >= trust.min_shown_share);
-}
-
 }  // namespace
 
 double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface) {
@@ -245,6 +234,23 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
   if (by_picks) JudgeStart(input, start, fit, trust, &judgement.reasons);
   JudgePlacement(judgement.placement, trust, &judgement.reasons, &judgement.doubt);
   return judgement;
+}
+
+// In rooms of one plan and furniture corners are alike, so that photos of one support the scan of
+// another; but they show 0 to 21 % of its corners, those of the right one 59 % and more where a
+// depth camera's scan drifts by 4 cm (docs/real-rooms.md). Real rooms have 21 % and more: enough
+// where points are merely few.
+bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions& trust) {
+  constexpr double kClearlyShown = 0.4;
+  // Where photos show too few corners each to say how far they are off, those in place must do. In
+  // a coarse scan they are of frames and furniture, of which another room of the plan has up to
+  // half; the right one has 73 % and more of them.
+  constexpr double kClearlyInPlace = 0.6;
+  const GradientShifts& shifts = photos.shifts;
+  const std::optional<double> shown = shifts.ShownShare();
+  if (!differs) return photos.supports && (!shown || *shown >= trust.min_shown_share);
+  if (shown) return *shown >= kClearlyShown;
+  return photos.supports && shifts.at_pose.Share() - shifts.elsewhere.Share() >= kClearlyInPlace;
 }
 
 void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,

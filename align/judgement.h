@@ -10,6 +10,7 @@
 #include "align/start.h"
 #include "align/trust/disagreement.h"
 #include "align/trust/expected_error.h"
+#include "align/trust/gradient_shift.h"
 #include "align/trust/open_directions.h"
 
 namespace roomtex {
@@ -45,6 +46,10 @@ double SurfaceTolerance(const TrustOptions& trust, const ScanPatches& surface);
 // which brings points to the surface that do not belong there, too.
 Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
                    const AlignmentFit& fit, const AlignmentOptions& options);
+
+// Whether photos overrule such a doubt. differs: points float, or hardly any lies on the surface;
+// else they are merely few.
+bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions& trust);
 
 // Decides on Judgement::doubt: by photos and intensity (agreement.h), where there are both; else it
 // is a reason like the others.

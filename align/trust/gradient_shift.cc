@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <fmt/core.h>
@@ -17,6 +18,9 @@ namespace {
 // nearly everywhere. Ordinary photos of simulated and real rooms have 0.09 to 0.13, under a
 // projected pattern 0.28 to 0.42.
 constexpr double kBusy = 0.2;
+// Above this nothing can be told by a photo. Of depth cameras' scans of large rooms photos are
+// looked at small, and have 0.14 to 0.29 (random captures 120, 220).
+constexpr double kPatterned = 0.25;
 // Grey levels per cell; with a 95th percentile below this a photo is blank. Ordinary: 11 to 22.
 constexpr double kBlank = 1;
 
@@ -51,11 +55,12 @@ cv::Mat1f GradientMagnitude(const cv::Mat1f& grey) {
   return magnitude;
 }
 
-bool IsClear(const cv::Mat1f& gradient) {
+// Median over 95th percentile; infinite where the photo is blank.
+double Busyness(const cv::Mat1f& gradient) {
   std::vector<float> values(gradient.begin(), gradient.end());
-  if (values.empty()) return false;
-  const double high = Quantile(&values, 0.95);
-  return high >= kBlank && Quantile(&values, 0.5) <= kBusy * high;
+  const double high = values.empty() ? 0 : Quantile(&values, 0.95);
+  if (!(high >= kBlank)) return std::numeric_limits<double>::infinity();
+  return Quantile(&values, 0.5) / high;
 }
 
 // How far the peak lies beside the middle one of three equally spaced values, -0.5 to 0.5
@@ -121,7 +126,8 @@ class PhotoMatcher {
     result.tolerance_deg = DegFromRad(tolerance_ * angle_per_cell_);
     result.turned.resize(options_.turns_deg.size());
     result.moved.resize(options_.moves.size());
-    const bool clear = IsClear(photo_gradient_);
+    const double busyness = Busyness(photo_gradient_);
+    const bool clear = busyness <= kBusy;
     std::vector<Shift> shifts, by_chance;
     for (size_t i = 0; i < patches_.size(); ++i) {
       const cv::Mat1f pattern = PatternOf(patches_[i]);
@@ -154,10 +160,12 @@ class PhotoMatcher {
     const double num_by_chance =
         static_cast<double>(ShiftedAlike(by_chance, tolerance_).size() * shifts.size()) /
         std::max<size_t>(1, by_chance.size());
-    if (clear) {
-      result.alike = {static_cast<long>(shifts.size()), static_cast<long>(alike.size())};
-      result.num_alike_by_chance = num_by_chance;
+    if (busyness <= kPatterned) {
+      result.alike_of_plain.patches = {static_cast<long>(shifts.size()),
+                                       static_cast<long>(alike.size())};
+      result.alike_of_plain.num_by_chance = num_by_chance;
     }
+    if (clear) result.alike_of_clear = result.alike_of_plain;
     if (alike.size() >= std::max<double>(kLeastAlike, kAlikeOverChance * num_by_chance)) {
       result.shifted_alike = alike;
     }
@@ -321,10 +329,13 @@ double Tally::High(double sigmas) const {
 }
 
 std::optional<double> GradientShifts::ShownShare() const {
-  const double num = static_cast<double>(alike.num);
-  if (alike.num < kMinPatches || num_alike_by_chance >= num) return std::nullopt;
-  const double beyond = static_cast<double>(alike.hits) - num_alike_by_chance;
-  return std::max(0.0, beyond) / (num - num_alike_by_chance);
+  for (const Alike* alike : {&alike_of_clear, &alike_of_plain}) {
+    const double num = static_cast<double>(alike->patches.num);
+    if (alike->patches.num < kMinPatches || alike->num_by_chance >= num) continue;
+    const double beyond = static_cast<double>(alike->patches.hits) - alike->num_by_chance;
+    return std::max(0.0, beyond) / (num - alike->num_by_chance);
+  }
+  return std::nullopt;
 }
 
 void GradientShifts::Add(const GradientShifts& other) {
@@ -342,8 +353,8 @@ void GradientShifts::Add(const GradientShifts& other) {
   far.Add(other.far);
   elsewhere.Add(other.elsewhere);
   tolerance_deg = std::max(tolerance_deg, other.tolerance_deg);
-  alike.Add(other.alike);
-  num_alike_by_chance += other.num_alike_by_chance;
+  alike_of_clear.Add(other.alike_of_clear);
+  alike_of_plain.Add(other.alike_of_plain);
   corners.insert(corners.end(), other.corners.begin(), other.corners.end());
   corners_amiss.insert(corners_amiss.end(), other.corners_amiss.begin(), other.corners_amiss.end());
   shifted_alike.insert(shifted_alike.end(), other.shifted_alike.begin(), other.shifted_alike.end());

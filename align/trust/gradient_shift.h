@@ -85,13 +85,21 @@ struct GradientShifts {
   // the photo shows them (MeasureAgreement() keeps those of clear photos). A pose that is a few
   // degrees off, by drift or by a bent model, shifts all of what one photo shows.
   std::vector<FittingCorner> shifted_alike;
-  // Of clear photos, the patches, and those that are shifted alike in their photo (as above,
-  // however few); and how many are so by chance.
-  Tally alike;
-  double num_alike_by_chance = 0;
+  // The patches, and those that are shifted alike in their photo (as above, however few); and how
+  // many are so by chance.
+  struct Alike {
+    Tally patches;
+    double num_by_chance = 0;
+    void Add(const Alike& other) {
+      patches.Add(other.patches);
+      num_by_chance += other.num_by_chance;
+    }
+  };
+  Alike alike_of_clear, alike_of_plain;  // plain: clear, or not as busy as under a pattern
 
-  // Share of the clear photos' patches that are where the scan has them, but for what its photo is
-  // off as a whole: beyond chance, 0 (none) to 1 (all). None with fewer patches than tell anything.
+  // Share of the patches that are where the scan has them, but for what their photo is off as a
+  // whole: beyond chance, 0 (none) to 1 (all). Of clear photos; of all plain ones where those
+  // have fewer patches than tell anything; none where these have, too.
   std::optional<double> ShownShare() const;
 
   void Add(const GradientShifts& other);

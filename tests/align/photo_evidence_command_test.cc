@@ -157,5 +157,26 @@ TEST(PhotoEvidence, OverrulesThatHardlyAnyPointLiesOnTheSurface) {
   EXPECT_FALSE(shown.follows_surface);
 }
 
+// Too few corners to say how far each photo is off: 91 of a depth camera's scan of a large room, and
+// 82 of a coarse one.
+TEST(PhotoEvidence, FewCornersOverruleFloatingPointsOnlyWhereMostAreInPlace) {
+  GradientShifts shifts;
+  shifts.elsewhere = {60, 3};
+  shifts.far = {120, 0};
+  const auto overrules = [&](long num, long in_place, bool differs) {
+    shifts.at_pose = {num, in_place};
+    return Overrules(JudgeGradientShifts(shifts), differs, TrustOptions());
+  };
+  EXPECT_TRUE(overrules(91, 83, true));
+  EXPECT_FALSE(overrules(82, 46, true)) << "as in another room of the plan";
+  EXPECT_TRUE(overrules(82, 46, false)) << "points are merely few";
+  EXPECT_FALSE(overrules(20, 18, true));
+  // Where it can be said, that decides.
+  shifts.alike_of_clear.patches = {200, 70};
+  EXPECT_FALSE(overrules(200, 170, true));
+  shifts.alike_of_clear.patches = {200, 90};
+  EXPECT_TRUE(overrules(200, 90, true));
+}
+
 }  // namespace
 }  // namespace roomtex

@@ -161,21 +161,29 @@ TEST(GradientShift, DoesNotContradictUnderAProjectedPattern) {
   const GradientAgreement judged = one.Judge(Similarity(), patterned);
   EXPECT_EQ(judged.shifts.num_unclear_photos, Exposed::kNumPhotos);
   EXPECT_FALSE(judged.contradicts);
+  EXPECT_FALSE(judged.shifts.ShownShare());
 }
 
 TEST(GradientShifts, ShownShareIsWhatChanceDoesNotExplain) {
   GradientShifts shifts;
+  GradientShifts::Alike& alike = shifts.alike_of_clear;
   EXPECT_FALSE(shifts.ShownShare());
-  shifts.alike = {99, 90};
+  alike.patches = {99, 90};
   EXPECT_FALSE(shifts.ShownShare()) << "too few";
-  shifts.alike = {200, 60};
+  alike.patches = {200, 60};
   EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 0.3);
-  shifts.num_alike_by_chance = 20;
+  alike.num_by_chance = 20;
   EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 40.0 / 180);
-  shifts.num_alike_by_chance = 80;
+  alike.num_by_chance = 80;
   EXPECT_EQ(*shifts.ShownShare(), 0);
-  shifts.num_alike_by_chance = 200;
+  alike.num_by_chance = 200;
   EXPECT_FALSE(shifts.ShownShare()) << "all are alike by chance: nothing can be told";
+  // Where clear photos have too few, those count that are nearly clear.
+  shifts.alike_of_plain.patches = {300, 150};
+  alike = {{99, 90}, 0};
+  EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 0.5);
+  alike = {{100, 90}, 0};
+  EXPECT_DOUBLE_EQ(*shifts.ShownShare(), 0.9);
 }
 
 TEST(GradientShift, SaysNothingOnFewPatches) {
