@@ -157,8 +157,8 @@ TEST(PhotoEvidence, OverrulesThatHardlyAnyPointLiesOnTheSurface) {
   EXPECT_FALSE(shown.follows_surface);
 }
 
-// Too few corners to say how far each photo is off: 91 of a depth camera's scan of a large room, and
-// 82 of a coarse one.
+// Too few corners to say how far each photo is off: 91 of a depth camera's scan of a large room,
+// and 82 of a coarse one.
 TEST(PhotoEvidence, FewCornersOverruleFloatingPointsOnlyWhereMostAreInPlace) {
   GradientShifts shifts;
   shifts.elsewhere = {60, 3};
