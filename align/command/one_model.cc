@@ -208,7 +208,8 @@ void DoubtRoom(const AlignCommandOptions& a, const WhatPhotosSay& photos_say, do
   const std::string finding = fmt::format(
       "Of the corners of the scan's intensity the photos show {} where the scan has them (beyond "
       "chance; --Trust.min_shown_share {:g}), as photos of another room with the same walls and "
-      "furniture do. Check that scan and photos are of the same room.",
+      "furniture do. Check that scan and photos are of the same room; of photos under a projected "
+      "pattern give the plain ones.",
       Percent(shown), least);
   if (disagreement <= kAlikeInShape || shown < 0.5 * least) {
     context.report.SetUntrusted(finding);

@@ -23,6 +23,9 @@ constexpr double kBusy = 0.2;
 constexpr double kPatterned = 0.25;
 // Grey levels per cell; with a 95th percentile below this a photo is blank. Ordinary: 11 to 22.
 constexpr double kBlank = 1;
+// In a bare room photos have 0.7 to 2.8. What a scan shows there are edges and its own noise, which
+// say little of which room it is.
+constexpr double kBare = 5;
 
 // Smallest eigenvalue of a corner's gradients, (grey levels per cell)^2: one grey level over a
 // patch is no structure, even when the scan has no noise at all.
@@ -55,13 +58,17 @@ cv::Mat1f GradientMagnitude(const cv::Mat1f& grey) {
   return magnitude;
 }
 
-// Median over 95th percentile; infinite where the photo is blank.
-double Busyness(const cv::Mat1f& gradient) {
-  std::vector<float> values(gradient.begin(), gradient.end());
-  const double high = values.empty() ? 0 : Quantile(&values, 0.95);
-  if (!(high >= kBlank)) return std::numeric_limits<double>::infinity();
-  return Quantile(&values, 0.5) / high;
-}
+struct Contrast {
+  double high = 0;                                            // 95th percentile
+  double busyness = std::numeric_limits<double>::infinity();  // median over that
+
+  explicit Contrast(const cv::Mat1f& gradient) {
+    std::vector<float> values(gradient.begin(), gradient.end());
+    if (values.empty()) return;
+    high = Quantile(&values, 0.95);
+    if (high > 0) busyness = Quantile(&values, 0.5) / high;
+  }
+};
 
 // How far the peak lies beside the middle one of three equally spaced values, -0.5 to 0.5
 // (parabola).
@@ -126,8 +133,8 @@ class PhotoMatcher {
     result.tolerance_deg = DegFromRad(tolerance_ * angle_per_cell_);
     result.turned.resize(options_.turns_deg.size());
     result.moved.resize(options_.moves.size());
-    const double busyness = Busyness(photo_gradient_);
-    const bool clear = busyness <= kBusy;
+    const Contrast contrast(photo_gradient_);
+    const bool clear = contrast.high >= kBlank && contrast.busyness <= kBusy;
     std::vector<Shift> shifts, by_chance;
     for (size_t i = 0; i < patches_.size(); ++i) {
       const cv::Mat1f pattern = PatternOf(patches_[i]);
@@ -160,7 +167,7 @@ class PhotoMatcher {
     const double num_by_chance =
         static_cast<double>(ShiftedAlike(by_chance, tolerance_).size() * shifts.size()) /
         std::max<size_t>(1, by_chance.size());
-    if (busyness <= kPatterned) {
+    if (contrast.high >= kBare && contrast.busyness <= kPatterned) {
       result.alike_of_plain.patches = {static_cast<long>(shifts.size()),
                                        static_cast<long>(alike.size())};
       result.alike_of_plain.num_by_chance = num_by_chance;

@@ -95,7 +95,8 @@ struct GradientShifts {
       num_by_chance += other.num_by_chance;
     }
   };
-  Alike alike_of_clear, alike_of_plain;  // plain: clear, or not as busy as under a pattern
+  // Of photos that are not bare: clear ones; plain ones are not as busy as under a pattern.
+  Alike alike_of_clear, alike_of_plain;
 
   // Share of the patches that are where the scan has them, but for what their photo is off as a
   // whole: beyond chance, 0 (none) to 1 (all). Of clear photos; of all plain ones where those

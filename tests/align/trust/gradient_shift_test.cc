@@ -164,6 +164,22 @@ TEST(GradientShift, DoesNotContradictUnderAProjectedPattern) {
   EXPECT_FALSE(judged.shifts.ShownShare());
 }
 
+// A bare room, of which photos have next to no contrast: corners that the scan's intensity has
+// there are edges and noise.
+TEST(GradientShift, ShowsNothingOfTheRoomByBarePhotos) {
+  const Exposed& one = Room(0);
+  EXPECT_GT(*one.Judge(Similarity(), one.photos).shifts.ShownShare(), 0.4);
+  std::vector<cv::Mat> bare;
+  for (const cv::Mat& photo : one.photos) {
+    cv::Mat faint;
+    photo.convertTo(faint, -1, 0.12, 110);
+    bare.push_back(faint);
+  }
+  const GradientAgreement judged = one.Judge(Similarity(), bare);
+  EXPECT_GT(judged.shifts.at_pose.num, 100);
+  EXPECT_FALSE(judged.shifts.ShownShare());
+}
+
 TEST(GradientShifts, ShownShareIsWhatChanceDoesNotExplain) {
   GradientShifts shifts;
   GradientShifts::Alike& alike = shifts.alike_of_clear;
