@@ -242,9 +242,10 @@ Judgement JudgeFit(const AlignmentInput& input, const AlignmentStart& start,
 // where points are merely few.
 bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions& trust) {
   constexpr double kClearlyShown = 0.4;
-  // Where photos show too few corners each to say how far they are off, those in place must do. In
-  // a coarse scan they are of frames and furniture, of which another room of the plan has up to
-  // half; the right one has 73 % and more of them.
+  // Where photos show too few corners to say how far they are off, those in place must do, beyond
+  // chance. In a coarse scan they are of frames and furniture: of 65 to 82 another room of the plan
+  // had up to 56 % in place, the right one 63 % (docs/automatic.md); of a depth camera's 91 and
+  // more others 15 %, right ones 73 % (docs/real-rooms.md).
   constexpr double kClearlyInPlace = 0.6;
   const GradientShifts& shifts = photos.shifts;
   const std::optional<double> shown = shifts.ShownShare();

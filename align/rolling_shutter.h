@@ -29,7 +29,8 @@ struct RollingShutter {
 };
 
 // Nothing where motion does not clearly explain the photos better: then it is no rolling shutter,
-// and would only take up what is wrong elsewhere. A lens that photos with moving rows found is not
+// and would only take up what is wrong elsewhere. Less is enough where the model then has the shape
+// of the scan. A lens that photos with moving rows found is not
 // that of the still ones: it is found anew where that explains the photos better, unless lenses are
 // never to be refined. still: the fit adjusted without motion; bent: to a scan that is taken for
 // bent, which motion must explain much better.

@@ -103,9 +103,11 @@ def main():
     parser.add_argument("--bin", default="build/bin")
     parser.add_argument("--out", default="/tmp/wrong_rooms")
     parser.add_argument("--captures", help="folder of random_captures.py, instead of sets")
-    parser.add_argument("--neighbours", type=int, default=1)
+    parser.add_argument("--neighbours", type=int, default=1, help="captures on whose scans each model is tried")
     parser.add_argument("sets", nargs="?", help="folder of trust_sets.py")
     args = parser.parse_args()
+    if not args.captures and not args.sets:
+        parser.error("a folder is needed: that of trust_sets.py, or --captures FOLDER")
     args.without_picks, args.option = True, []
     num, trusted = 0, 0
     for title, case, scans, options in pairs_of(args):
