@@ -1,14 +1,13 @@
 #include "colmap_ext/third_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/eigen.hpp>
-
 #include "core/frames.h"
+#include "core/three_point_pose.h"
 #include "core/twist.h"
 
 namespace roomtex {
@@ -16,32 +15,15 @@ namespace {
 
 using Points = std::vector<std::optional<InverseDepthPoint>>;
 
-// Poses of a view that sees three points (Ke and Roumeliotis 2017 through OpenCV).
+// Poses of a view that sees three points.
 std::vector<Rigid> SolveThreePoints(const Points& points,
-                                    const std::vector<const ThirdView::Sighting*>& sample) {
-  std::vector<cv::Point3d> x_in_left;
-  std::vector<cv::Point2d> x_in_view;
-  for (const ThirdView::Sighting* sighting : sample) {
-    const Eigen::Vector3d x = PointInLeft(*points[sighting->match]);
-    x_in_left.emplace_back(x.x(), x.y(), x.z());
-    x_in_view.emplace_back(sighting->ray.x.x(), sighting->ray.x.y());
+                                    const std::array<const ThirdView::Sighting*, 3>& sample) {
+  std::array<Eigen::Vector3d, 3> x_in_left, rays;
+  for (int i = 0; i < 3; ++i) {
+    x_in_left[i] = PointInLeft(*points[sample[i]->match]);
+    rays[i] = sample[i]->ray.x.homogeneous();
   }
-  std::vector<cv::Mat> rotations, translations;
-  std::vector<Rigid> poses;
-  try {
-    cv::solveP3P(x_in_left, x_in_view, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations,
-                 translations, cv::SOLVEPNP_AP3P);
-  } catch (const cv::Exception&) {
-    return poses;  // degenerate sample
-  }
-  for (size_t i = 0; i < rotations.size(); ++i) {
-    Eigen::Vector3d axis, translation;
-    cv::cv2eigen(rotations[i], axis);
-    cv::cv2eigen(translations[i], translation);
-    if (!axis.allFinite() || !translation.allFinite()) continue;
-    poses.push_back({RotationFromVector(axis), translation});
-  }
-  return poses;
+  return SolveThreePointPose(x_in_left, rays);
 }
 
 // Truncated cost of a view's sightings.

@@ -1,12 +1,13 @@
 #include "align/pick/few_picks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/LU>
-#include <opencv2/calib3d.hpp>
 
+#include "core/three_point_pose.h"
 #include "core/twist.h"
 
 namespace roomtex {
@@ -20,7 +21,6 @@ constexpr double kSameRotation = 1e-4, kSamePosition = 1e-4;
 // nowhere.
 constexpr double kMaxStartShare = 0.3;
 constexpr size_t kMaxStarts = 6;
-constexpr double kMinForward = 0.02;  // z of a ray that the closed form can take
 
 PointPairs Chosen(const PointPairs& pairs, const std::vector<int>& indices) {
   const int n = static_cast<int>(indices.size());
@@ -75,58 +75,22 @@ void Polish(const CameraProjection& projection, const PointPairs& pairs, Rigid* 
   }
 }
 
-// A direction that has three unit vectors (columns) before it, as far as can be: their sum, or the
-// axis of the cone through them where they point apart.
-Eigen::Vector3d AxisBefore(const Eigen::Matrix3d& directions) {
-  const Eigen::Vector3d sum = directions.rowwise().sum().normalized();
-  Eigen::Vector3d axis = (directions.col(1) - directions.col(0))
-                             .cross(directions.col(2) - directions.col(0))
-                             .normalized();
-  if (axis.dot(directions.col(0)) < 0) axis = -axis;
-  const double before_sum = (sum.transpose() * directions).minCoeff();
-  const double before_axis = (axis.transpose() * directions).minCoeff();
-  return before_axis > before_sum ? axis : sum;
-}
-
 }  // namespace
 
 std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs) {
   const Eigen::Vector3d centre = pairs.x_in_scan.rowwise().mean();
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> rays;
-  Eigen::Matrix3d directions;
+  std::array<Eigen::Vector3d, 3> points, rays;
   for (int i = 0; i < 3; ++i) {
     const auto ray = projection.RayFromImg(pairs.x_in_img.col(i));
     if (!ray) return {};
-    directions.col(i) = *ray;
+    rays[i] = *ray;
+    points[i] = pairs.x_in_scan.col(i) - centre;
   }
-  // The closed form wants rays that point forward: a camera that sees all around is turned to them.
-  Eigen::Quaterniond ahead_from_cam = Eigen::Quaterniond::Identity();
-  if (!projection.camera().IsPerspective()) {
-    ahead_from_cam.setFromTwoVectors(AxisBefore(directions), Eigen::Vector3d::UnitZ());
-  }
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d ray = ahead_from_cam * directions.col(i);
-    if (!(ray.z() > kMinForward)) return {};
-    const Eigen::Vector3d p = pairs.x_in_scan.col(i) - centre;
-    points.emplace_back(p.x(), p.y(), p.z());
-    rays.emplace_back(ray.x() / ray.z(), ray.y() / ray.z());
-  }
-  std::vector<cv::Mat> rotations, translations;
-  cv::solveP3P(points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations,
-               cv::SOLVEPNP_AP3P);
   std::vector<ViewPose> poses;
-  for (size_t i = 0; i < rotations.size(); ++i) {
-    Eigen::Vector3d axis, translation;
-    for (int k = 0; k < 3; ++k) {
-      axis[k] = rotations[i].at<double>(k);
-      translation[k] = translations[i].at<double>(k);
-    }
-    if (!axis.allFinite() || !translation.allFinite()) continue;
+  for (const Rigid& cam_from_centre : SolveThreePointPose(points, rays)) {
     ViewPose pose;
-    pose.cam_from_scan.rotation = ahead_from_cam.conjugate() * RotationFromVector(axis);
-    pose.cam_from_scan.translation =
-        ahead_from_cam.conjugate() * translation - pose.cam_from_scan.rotation * centre;
+    pose.cam_from_scan = cam_from_centre;
+    pose.cam_from_scan.translation -= cam_from_centre.rotation * centre;
     Polish(projection, pairs, &pose.cam_from_scan);
     pose.residual_px = PickResiduals(projection, pairs, pose.cam_from_scan);
     if (!pose.residual_px.allFinite()) continue;  // a point behind the camera

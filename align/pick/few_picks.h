@@ -9,7 +9,7 @@
 namespace roomtex {
 
 // Every pose that sees three picks exactly where they were clicked, with the points in front of the
-// camera (P3P; Ke and Roumeliotis 2017, OpenCV's SOLVEPNP_AP3P); up to four, in no order of merit.
+// camera (three_point_pose.h); up to four, in no order of merit.
 // pairs: 3, not collinear. Residuals are rounding, covariances infinite.
 std::vector<ViewPose> SolveThreePicks(const CameraProjection& projection, const PointPairs& pairs);
 

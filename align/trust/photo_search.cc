@@ -16,6 +16,7 @@
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
+#include "core/three_point_pose.h"
 #include "core/twist.h"
 
 namespace roomtex {
@@ -85,20 +86,8 @@ class PhotoRays {
       const double angle = AngleBetween(rays_[i], rays_[j]);
       if (angle < RadFromDeg(kLeastAngle) || angle > RadFromDeg(kMostAngle)) return {};
     }
-    cv::Mat1d places(3, 3), planes(3, 2);
-    for (int k = 0; k < 3; ++k) {
-      for (int c = 0; c < 3; ++c) places(k, c) = places_[one[k]][c];
-      for (int c = 0; c < 2; ++c) planes(k, c) = planes_[one[k]][c];
-    }
-    std::vector<cv::Mat> turns, moves;
-    cv::solveP3P(places, planes, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turns, moves,
-                 cv::SOLVEPNP_AP3P);
-    std::vector<Rigid> poses;
-    for (size_t k = 0; k < turns.size(); ++k) {
-      const Rigid pose = RigidOf(turns[k], moves[k]);
-      if (pose.rotation.coeffs().allFinite() && pose.translation.allFinite()) poses.push_back(pose);
-    }
-    return poses;
+    return SolveThreePointPose({places_[one[0]], places_[one[1]], places_[one[2]]},
+                               {rays_[one[0]], rays_[one[1]], rays_[one[2]]});
   }
 
   // Matches within the tolerance.

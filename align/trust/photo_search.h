@@ -1,7 +1,7 @@
 #pragma once
 // Where one photo was taken, by features that it has in common with the scan
-// (appearance_features.h): RANSAC (Fischler and Bolles 1981) with three matches a sample (P3P; Ke
-// and Roumeliotis 2017), without a sparse model and without a click. Frames: `scan`, `cam`, `img`.
+// (appearance_features.h): RANSAC (Fischler and Bolles 1981) with three matches a sample
+// (three_point_pose.h), without a sparse model and without a click. Frames: `scan`, `cam`, `img`.
 
 #include <vector>
 
