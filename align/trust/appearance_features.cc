@@ -62,48 +62,22 @@ float KeypointAngle(const Eigen::Vector2d& direction) {
 
 cv::Ptr<cv::SIFT> MakeSift() { return cv::SIFT::create(0, 3, 0.02, 12, 1.6); }
 
-// RootSIFT (Arandjelovic and Zisserman 2012).
-void TakeRoots(cv::Mat1f* sift) {
-  for (int i = 0; i < sift->rows; ++i) {
-    float* const row = sift->ptr<float>(i);
-    float sum = 0;
-    for (int k = 0; k < sift->cols; ++k) sum += row[k];
-    for (int k = 0; k < sift->cols; ++k) row[k] = std::sqrt(row[k] / std::max(sum, 1e-6f));
-  }
-}
-
-// Opposite gradients as one: half of the eight directions of each cell.
-cv::Mat1f Folded(const cv::Mat1f& root_sift) {
-  cv::Mat1f folded(root_sift.rows, 64);
-  for (int i = 0; i < root_sift.rows; ++i) {
-    for (int cell = 0; cell < 16; ++cell) {
-      for (int k = 0; k < 4; ++k) {
-        const float a = root_sift(i, 8 * cell + k), b = root_sift(i, 8 * cell + k + 4);
-        folded(i, 4 * cell + k) = std::sqrt(a * a + b * b);
-      }
-    }
-  }
-  return folded;
-}
-
 double PixelAngle(const ScanViewer& viewer) {
   return std::clamp(DegFromRad(viewer.sample_angle()), kFinestPixel, kCoarsestPixel);
 }
 
-// Views overlap, so that the next best may be the
-// same place of the scan.
-void AddMatches(const cv::Mat1f& photos, const cv::Mat1f& scan,
+// Views overlap, so that the next best may be the same place of the scan.
+void AddMatches(const Descriptors& photos, const Descriptors& scan,
                 const std::vector<Eigen::Vector3d>& places, double max_ratio,
                 std::vector<std::pair<int, int>>* pairs) {
-  std::vector<std::vector<cv::DMatch>> nearest;
-  cv::BFMatcher(cv::NORM_L2).knnMatch(photos, scan, nearest, kNearest);
-  for (const std::vector<cv::DMatch>& near : nearest) {
-    const auto elsewhere = std::find_if(near.begin(), near.end(), [&](const cv::DMatch& one) {
-      return (places[one.trainIdx] - places[near[0].trainIdx]).norm() > kElsewhere;
+  const auto nearest = FindNearestDescriptors(photos, scan, kNearest);
+  for (size_t i = 0; i < nearest.size(); ++i) {
+    const std::vector<NearDescriptor>& near = nearest[i];
+    const auto elsewhere = std::find_if(near.begin(), near.end(), [&](const NearDescriptor& one) {
+      return (places[one.row] - places[near[0].row]).norm() > kElsewhere;
     });
-    const cv::DMatch* const other = elsewhere == near.end() ? nullptr : &*elsewhere;
-    if (other == nullptr || near[0].distance > max_ratio * other->distance) continue;
-    pairs->emplace_back(near[0].queryIdx, near[0].trainIdx);
+    if (elsewhere == near.end() || near[0].distance > max_ratio * elsewhere->distance) continue;
+    pairs->emplace_back(static_cast<int>(i), near[0].row);
   }
 }
 
@@ -149,8 +123,7 @@ AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
   }
   cv::Mat descriptors;
   if (!used.empty()) MakeSift()->compute(picture, used, descriptors);
-  features.sift = descriptors;
-  TakeRoots(&features.sift);
+  features.sift = RootSift(descriptors);
   return features;
 }
 
@@ -165,7 +138,7 @@ AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,
   std::sort(order.begin(), order.end());
   if (order.size() > most) order.resize(most);
   AppearanceFeatures all;
-  all.sift = cv::Mat1f(static_cast<int>(order.size()), 128);
+  all.sift = Descriptors(static_cast<int>(order.size()), 128);
   for (const auto& [response, i, k] : order) {
     parts[i]
         .sift.row(static_cast<int>(k))
@@ -296,19 +269,17 @@ cv::Mat1b ReadPictureOf(const SparseImage& image, const Camera& camera,
 std::vector<std::pair<int, int>> MatchNear(const AppearanceFeatures& photo,
                                            const AppearanceFeatures& view, double reach,
                                            double max_ratio) {
-  const cv::Mat1f folded[2] = {Folded(photo.sift), Folded(view.sift)};
+  const Descriptors folded[2] = {FoldGradients(photo.sift), FoldGradients(view.sift)};
   std::vector<std::pair<int, int>> pairs;
   const double elsewhere = kElsewhereNear * reach;
   for (int i = 0; i < photo.sift.rows; ++i) {
     for (const bool fold : {false, true}) {
-      const cv::Mat1f& of_photo = fold ? folded[0] : photo.sift;
-      const cv::Mat1f& of_view = fold ? folded[1] : view.sift;
-      const Eigen::Map<const Eigen::VectorXf> a(of_photo.ptr<float>(i), of_photo.cols);
+      const Descriptors& of_photo = fold ? folded[0] : photo.sift;
+      const Descriptors& of_view = fold ? folded[1] : view.sift;
       std::vector<std::pair<float, int>> near;
       for (int k = 0; k < view.sift.rows; ++k) {
         if ((view.in_img[k] - photo.in_img[i]).squaredNorm() > reach * reach) continue;
-        const Eigen::Map<const Eigen::VectorXf> b(of_view.ptr<float>(k), of_view.cols);
-        near.emplace_back((a - b).norm(), k);
+        near.emplace_back(DescriptorDistance(of_photo, i, of_view, k), k);
       }
       if (near.empty()) continue;
       const auto best = *std::min_element(near.begin(), near.end());
@@ -332,7 +303,7 @@ std::vector<std::pair<int, int>> MatchFeatures(const AppearanceFeatures& photos,
   std::vector<std::pair<int, int>> pairs;
   if (scan.places.empty() || photos.places.empty()) return {};
   AddMatches(photos.sift, scan.sift, scan.places, max_ratio, &pairs);
-  AddMatches(Folded(photos.sift), Folded(scan.sift), scan.places, max_ratio, &pairs);
+  AddMatches(FoldGradients(photos.sift), FoldGradients(scan.sift), scan.places, max_ratio, &pairs);
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;

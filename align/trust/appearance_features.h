@@ -13,18 +13,19 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
+#include "align/trust/descriptors.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/sparse_model.h"
 
 namespace roomtex {
 
-// Features of several pictures: a row of `sift` each, unit length.
+// Features of several pictures: a row of `sift` each.
 struct AppearanceFeatures {
   std::vector<Eigen::Vector3d> places;  // what they are features of: `scan`, or as a photo says
   std::vector<Eigen::Vector2d> in_img;  // of a photo: in the photo as it is
   std::vector<uint32_t> image_ids;      // of a photo, after JoinFeatures()
   std::vector<float> responses;
-  cv::Mat1f sift;
+  Descriptors sift;
 };
 
 // Where a keypoint is and, if known, which way is down there, in its picture.
