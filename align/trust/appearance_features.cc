@@ -175,77 +175,112 @@ Camera ViewCamera(double pixel) {
   return camera;
 }
 
+// The scan drawn from one place, and the keypoints found there.
+class DrawnView {
+ public:
+  DrawnView(const ScanViewer& viewer, const Camera& camera, const Rigid& cam_from_scan)
+      : viewer_(viewer),
+        projection_(camera),
+        cam_from_scan_(cam_from_scan),
+        scan_from_cam_(cam_from_scan.Inverse()),
+        view_(viewer.Look(RayLattice(projection_, viewer.has_mesh() ? 1 : 4), camera, cam_from_scan,
+                          1)),
+        picture_(LocallyNormalised(view_.grey, view_.valid,
+                                   kNormalised * RadFromDeg(1.0) * camera.MeanFocalLength())),
+        keypoints_(FindKeypoints(picture_, view_.valid)) {}
+
+  // Upright if up_in_scan is given.
+  AppearanceFeatures Describe(const std::optional<Eigen::Vector3d>& up_in_scan, int most) const {
+    return DescribeFeatures(picture_, keypoints_, up_in_scan.has_value(), most,
+                            [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
+                              const auto plane = projection_.CamFromImg(at);
+                              const auto x = PlaceAt(at);
+                              if (!plane || !x) return std::nullopt;
+                              if (!viewer_.has_mesh() && IsSeenFromBehind(at, *x))
+                                return std::nullopt;
+                              FeaturePlace place = {*x, {}, at};
+                              if (up_in_scan) {
+                                place.down = DirectionInImg(projection_, *plane,
+                                                            cam_from_scan_.rotation * -*up_in_scan);
+                                if (!place.down) return std::nullopt;
+                              }
+                              return place;
+                            });
+  }
+
+ private:
+  cv::Point CellOf(const Eigen::Vector2d& at) const {
+    return {std::min(static_cast<int>(at.x()), view_.depth.cols - 1),
+            std::min(static_cast<int>(at.y()), view_.depth.rows - 1)};
+  }
+
+  std::optional<Eigen::Vector3d> PlaceAt(const Eigen::Vector2d& at) const {
+    if (!projection_.InImage(at)) return std::nullopt;
+    const float depth = view_.depth(CellOf(at));
+    const auto plane = projection_.CamFromImg(at);
+    if (!(depth > 0) || !plane) return std::nullopt;
+    return scan_from_cam_ * (depth * plane->homogeneous());
+  }
+
+  // From behind, the mirror image of a wall looks like the wall.
+  bool IsSeenFromBehind(const Eigen::Vector2d& at, const Eigen::Vector3d& x) const {
+    const auto right = PlaceAt(at + Eigen::Vector2d(kBeside, 0)),
+               left = PlaceAt(at - Eigen::Vector2d(kBeside, 0)),
+               below = PlaceAt(at + Eigen::Vector2d(0, kBeside)),
+               above = PlaceAt(at - Eigen::Vector2d(0, kBeside));
+    if (!right || !left || !below || !above) return true;  // an edge: no side at all
+    const Eigen::Vector3d normal = (*right - *left).cross(*below - *above);
+    const Eigen::Vector3d station = viewer_.scans()[view_.scan(CellOf(at))].Station();
+    return normal.dot(station - x) * normal.dot(scan_from_cam_.translation - x) < 0;
+  }
+
+  const ScanViewer& viewer_;
+  CameraProjection projection_;
+  Rigid cam_from_scan_, scan_from_cam_;
+  ScanView view_;
+  cv::Mat1b picture_;
+  std::vector<cv::KeyPoint> keypoints_;
+};
+
 }  // namespace
 
 AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera,
                                   const Rigid& cam_from_scan,
                                   const std::optional<Eigen::Vector3d>& up_in_scan, int most) {
-  const CameraProjection projection(camera);
-  const int cell = viewer.has_mesh() ? 1 : 4;
-  const ScanView view = viewer.Look(RayLattice(projection, cell), camera, cam_from_scan, 1);
-  const double px_per_deg = RadFromDeg(1.0) * camera.MeanFocalLength();
-  const cv::Mat1b picture = LocallyNormalised(view.grey, view.valid, kNormalised * px_per_deg);
-  const Rigid scan_from_cam = cam_from_scan.Inverse();
-  const auto place_at = [&](const Eigen::Vector2d& at) -> std::optional<Eigen::Vector3d> {
-    if (!projection.InImage(at)) return std::nullopt;
-    const float depth = view.depth(std::min(static_cast<int>(at.y()), camera.height - 1),
-                                   std::min(static_cast<int>(at.x()), camera.width - 1));
-    const auto plane = projection.CamFromImg(at);
-    if (!(depth > 0) || !plane) return std::nullopt;
-    return scan_from_cam * (depth * plane->homogeneous());
-  };
-  // From behind, the mirror image of a wall looks like the wall.
-  const auto is_seen_from_behind = [&](const Eigen::Vector2d& at, const Eigen::Vector3d& x) {
-    const auto right = place_at(at + Eigen::Vector2d(kBeside, 0)),
-               left = place_at(at - Eigen::Vector2d(kBeside, 0)),
-               below = place_at(at + Eigen::Vector2d(0, kBeside)),
-               above = place_at(at - Eigen::Vector2d(0, kBeside));
-    if (!right || !left || !below || !above) return true;  // an edge: no side at all
-    const Eigen::Vector3d normal = (*right - *left).cross(*below - *above);
-    const int scan = view.scan(std::min(static_cast<int>(at.y()), camera.height - 1),
-                               std::min(static_cast<int>(at.x()), camera.width - 1));
-    const Eigen::Vector3d station = viewer.scans()[scan].Station();
-    return normal.dot(station - x) * normal.dot(cam_from_scan.TargetOriginInSource() - x) < 0;
-  };
-  return DescribeFeatures(picture, FindKeypoints(picture, view.valid), up_in_scan.has_value(), most,
-                          [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
-                            const auto plane = projection.CamFromImg(at);
-                            const auto x = place_at(at);
-                            if (!plane || !x) return std::nullopt;
-                            if (!viewer.has_mesh() && is_seen_from_behind(at, *x))
-                              return std::nullopt;
-                            FeaturePlace place = {*x, {}, at};
-                            if (up_in_scan) {
-                              place.down = DirectionInImg(projection, *plane,
-                                                          cam_from_scan.rotation * -*up_in_scan);
-                              if (!place.down) return std::nullopt;
-                            }
-                            return place;
-                          });
+  return DrawnView(viewer, camera, cam_from_scan).Describe(up_in_scan, most);
 }
 
-AppearanceFeatures FeaturesOfScan(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
-                                  bool upright, int max_stations, int most, int num_threads) {
+std::vector<AppearanceFeatures> FeaturesOfScan(const ScanViewer& viewer,
+                                               const Eigen::Vector3d& up_in_scan,
+                                               const std::vector<bool>& upright, int max_stations,
+                                               int most, int num_threads) {
   std::vector<const Scan*> stations;
   for (const Scan& scan : viewer.scans()) {
     if (scan.organised) stations.push_back(&scan);
   }
-  if (stations.empty()) return {};
+  if (stations.empty()) return std::vector<AppearanceFeatures>(upright.size());
   const int per_turn = static_cast<int>(std::lround(360 / kViewTurn));
   const int num_stations = std::min<int>(max_stations, static_cast<int>(stations.size()));
   const int per_station = per_turn * static_cast<int>(kViewLean.size());
   const int num_views = num_stations * per_station;
   const Camera camera = ViewCamera(PixelAngle(viewer));
-  std::vector<AppearanceFeatures> of_views(num_views);
+  std::vector<std::vector<AppearanceFeatures>> of_views(upright.size(),
+                                                        std::vector<AppearanceFeatures>(num_views));
   ParallelFor(num_threads, 0, num_views, [&](int i) {
     const Scan& scan = *stations[static_cast<size_t>(i / per_station) * stations.size() /
                                  static_cast<size_t>(num_stations)];
     const int k = i % per_station;
-    of_views[i] = FeaturesOfView(
-        viewer, camera, PoseOfView(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]),
-        upright ? std::optional<Eigen::Vector3d>(up_in_scan) : std::nullopt, 2 * most / num_views);
+    const DrawnView view(viewer, camera,
+                         PoseOfView(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]));
+    for (size_t way = 0; way < upright.size(); ++way) {
+      of_views[way][i] =
+          view.Describe(upright[way] ? std::optional<Eigen::Vector3d>(up_in_scan) : std::nullopt,
+                        2 * most / num_views);
+    }
   });
-  return JoinFeatures(std::move(of_views), {}, most);
+  std::vector<AppearanceFeatures> features;
+  for (auto& of_way : of_views) features.push_back(JoinFeatures(std::move(of_way), {}, most));
+  return features;
 }
 
 cv::Mat1b ReadPictureOf(const SparseImage& image, const Camera& camera,

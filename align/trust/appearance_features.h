@@ -48,11 +48,13 @@ AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
 AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,
                                 const std::vector<uint32_t>& part_ids, size_t most);
 
-// Features of sixteen views of the scan from each of up to max_stations stations, evenly taken.
-// up_in_scan: unit length. Scans without a grid have no station to look from, and no features. The
-// same for every number of threads.
-AppearanceFeatures FeaturesOfScan(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
-                                  bool upright, int max_stations, int most, int num_threads);
+// Features of sixteen views of the scan from each of up to max_stations stations, evenly taken;
+// once for each entry of `upright` (as in DescribeFeatures). up_in_scan: unit length. Scans without
+// a grid have no station to look from, and no features. The same for every number of threads.
+std::vector<AppearanceFeatures> FeaturesOfScan(const ScanViewer& viewer,
+                                               const Eigen::Vector3d& up_in_scan,
+                                               const std::vector<bool>& upright, int max_stations,
+                                               int most, int num_threads);
 
 // Features of one view; upright if up_in_scan is given. in_img: in the view.
 AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera,

@@ -89,8 +89,8 @@ AppearanceMatcher::AppearanceMatcher(const SparseModel& model, const std::string
 std::vector<AppearanceMatch> AppearanceMatcher::Match(
     const std::optional<Eigen::Vector3d>& up_in_sparse, const Eigen::Vector3d& up_in_scan) const {
   const AppearanceFeatures scan =
-      FeaturesOfScan(viewer_, up_in_scan, up_in_sparse.has_value(), options_.max_stations,
-                     options_.max_scan_features, num_threads_);
+      FeaturesOfScan(viewer_, up_in_scan, {up_in_sparse.has_value()}, options_.max_stations,
+                     options_.max_scan_features, num_threads_)[0];
   if (scan.places.empty()) return {};
   std::vector<AppearanceFeatures> of_photos(images_.size());
   std::vector<uint32_t> image_ids;

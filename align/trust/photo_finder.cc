@@ -99,26 +99,25 @@ PhotoFinder::PhotoFinder(const ScanViewer& viewer, const Eigen::Vector3d& up_in_
       up_in_scan_(up_in_scan),
       options_(options),
       num_threads_(num_threads),
-      natural_(FeaturesOfScan(viewer, up_in_scan, false, options.max_stations,
-                              options.max_scan_features, num_threads)),
-      upright_(FeaturesOfScan(viewer, up_in_scan, true, options.max_stations,
-                              options.max_scan_features, num_threads)) {}
+      features_(FeaturesOfScan(viewer, up_in_scan, {false, true}, options.max_stations,
+                               options.max_scan_features, num_threads)) {}
 
 std::vector<PhotoMatch> PhotoFinder::MatchPicture(const Picture& picture,
                                                   const Camera& camera) const {
   const Eigen::Vector2d size(camera.width, camera.height),
       small(picture.grey.cols, picture.grey.rows);
   std::vector<PhotoMatch> matches;
-  for (const AppearanceFeatures* scan : {&natural_, &upright_}) {
-    // Photos are mostly held level or upright.
+  // As their own gradients are turned, and upright: photos are mostly held level.
+  for (const bool upright : {false, true}) {
+    const AppearanceFeatures& scan = features_[upright];
     const AppearanceFeatures photo =
-        DescribeFeatures(picture.grey, picture.keypoints, scan == &upright_,
-                         options_.max_photo_features, [&](const Eigen::Vector2d& at) {
+        DescribeFeatures(picture.grey, picture.keypoints, upright, options_.max_photo_features,
+                         [&](const Eigen::Vector2d& at) {
                            return FeaturePlace{Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 1),
                                                at.cwiseProduct(size.cwiseQuotient(small))};
                          });
-    for (const auto& [i, k] : MatchFeatures(photo, *scan, options_.max_ratio)) {
-      matches.push_back({photo.in_img[i], scan->places[k]});
+    for (const auto& [i, k] : MatchFeatures(photo, scan, options_.max_ratio)) {
+      matches.push_back({photo.in_img[i], scan.places[k]});
     }
   }
   return matches;

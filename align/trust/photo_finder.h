@@ -67,8 +67,8 @@ class PhotoFinder {
   const Eigen::Vector3d up_in_scan_;
   const PhotoFinderOptions options_;
   const int num_threads_;
-  // Turned as their own gradients say, and by gravity.
-  AppearanceFeatures natural_, upright_;
+  // Of the scan: turned as their own gradients say, and by gravity.
+  std::vector<AppearanceFeatures> features_;
 };
 
 }  // namespace roomtex
