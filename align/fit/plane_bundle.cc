@@ -227,14 +227,17 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
 
 // RMS error of the used picks over its limit.
 double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
+  std::map<uint32_t, CameraProjection> projections;
+  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
   double sum = 0, diagonal = 0;
   int count = 0;
   for (size_t i = 0; i < input.picks.size(); ++i) {
     const SparseImage* const image = model.FindImage(input.picks[i].image_name);
     if (!input.used[i] || image == nullptr) continue;
-    const Camera& camera = model.cameras.at(image->camera_id);
-    const auto error = CameraProjection(camera).ImgError(
-        image->cam_from_model * input.picks[i].x_in_scan, input.picks[i].x_in_img);
+    const CameraProjection& projection = projections.at(image->camera_id);
+    const Camera& camera = projection.camera();
+    const auto error = projection.ImgError(image->cam_from_model * input.picks[i].x_in_scan,
+                                           input.picks[i].x_in_img);
     diagonal = std::max(diagonal, std::hypot(camera.width, camera.height));
     sum += error ? error->squaredNorm() : diagonal * diagonal;
     ++count;

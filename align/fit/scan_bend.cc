@@ -5,6 +5,7 @@
 #include <map>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include "core/frames.h"
 #include "core/robust_kernel.h"
@@ -15,6 +16,7 @@ namespace roomtex {
 namespace {
 
 constexpr int kMaxDegree = 4;
+constexpr double kStep = 1e-6;  // of numeric derivatives
 constexpr int kNumBend = ScanBend::kNumCoefficients;
 constexpr int kNumUnknowns = 7 + kNumBend;
 using Vector = Eigen::Matrix<double, kNumUnknowns, 1>;
@@ -236,28 +238,63 @@ class BendSolver {
     *normal = normal->selfadjointView<Eigen::Lower>();
   }
 
-  std::optional<Eigen::Vector2d> PickError(size_t i, const State& state) const {
+  // straight: where the pick's place of the scan is in the room.
+  std::optional<Eigen::Vector2d> PickError(size_t i, const Similarity& scan_from_sparse,
+                                           const Eigen::Vector3d& straight) const {
     const SparseImage* const image = model_.FindImage(picks_[i].image_name);
-    const Rigid cam_from_scan = CamFromScan(image->cam_from_model, state.scan_from_sparse);
-    return projections_.at(image->camera_id)
-        .ImgError(cam_from_scan * state.bend.Straighten(picks_[i].x_in_scan), picks_[i].x_in_img);
+    const Rigid cam_from_scan = CamFromScan(image->cam_from_model, scan_from_sparse);
+    return projections_.at(image->camera_id).ImgError(cam_from_scan * straight, picks_[i].x_in_img);
+  }
+
+  // Derivatives of bend.Straighten() by the coefficients, where it gives `straight`. Bend() leaves
+  // the pick's place where it is: what the coefficients move it by, `straight` moves it back by.
+  static Eigen::Matrix<double, 3, kNumBend> StraightenJacobian(const ScanBend& bend,
+                                                               const Eigen::Vector3d& straight) {
+    Eigen::Matrix3d by_place;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(k);
+      by_place.col(k) = (bend.Bend(straight + step) - bend.Bend(straight - step)) / (2 * kStep);
+    }
+    Eigen::Matrix<double, 3, kNumBend> by_bend;
+    ScanBend moved = bend;
+    for (int k = 0; k < kNumBend; ++k) {
+      double& coefficient = moved.coefficients[k];
+      coefficient = bend.coefficients[k] + kStep;
+      by_bend.col(k) = moved.Bend(straight);
+      coefficient = bend.coefficients[k] - kStep;
+      by_bend.col(k) = (by_bend.col(k) - moved.Bend(straight)) / (2 * kStep);
+      coefficient = bend.coefficients[k];
+    }
+    return -by_place.inverse() * by_bend;
   }
 
   void AddPicks(const State& state, Matrix* normal, Vector* gradient) const {
-    constexpr double kStep = 1e-6;
     for (size_t i = 0; i < picks_.size(); ++i) {
       if (!used_[i]) continue;
-      const auto error = PickError(i, state);
+      const Eigen::Vector3d straight = state.bend.Straighten(picks_[i].x_in_scan);
+      const auto error = PickError(i, state.scan_from_sparse, straight);
       if (!error) continue;
-      Eigen::Matrix<double, 2, kNumUnknowns> jacobian;
       bool valid = true;
-      for (int k = 0; k < kNumUnknowns && valid; ++k) {
-        const Vector step = kStep * Vector::Unit(k);
-        const auto more = PickError(i, Moved(state, step)),
-                   less = PickError(i, Moved(state, -step));
-        valid = more && less;
-        if (valid) jacobian.col(k) = (*more - *less) / (2 * kStep);
+      const auto difference = [&](const auto& more, const auto& less) -> Eigen::Vector2d {
+        valid = valid && more && less;
+        return valid ? Eigen::Vector2d((*more - *less) / (2 * kStep)) : Eigen::Vector2d::Zero();
+      };
+      Eigen::Matrix<double, 2, kNumUnknowns> jacobian;
+      for (int k = 0; k < 7; ++k) {
+        const Eigen::Matrix<double, 7, 1> step = kStep * Eigen::Matrix<double, 7, 1>::Unit(k);
+        const auto moved = [&](double side) {
+          return roomtex::Moved(state.scan_from_sparse, pivot_, side * step);
+        };
+        jacobian.col(k) =
+            difference(PickError(i, moved(1), straight), PickError(i, moved(-1), straight));
       }
+      Eigen::Matrix<double, 2, 3> by_place;
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(k);
+        by_place.col(k) = difference(PickError(i, state.scan_from_sparse, straight + step),
+                                     PickError(i, state.scan_from_sparse, straight - step));
+      }
+      jacobian.rightCols<kNumBend>() = by_place * StraightenJacobian(state.bend, straight);
       if (!valid) continue;
       const double sigma_px = pick_sigma_px_ / picks_[i].weight;
       const double deviations = error->norm() / sigma_px;
