@@ -50,15 +50,18 @@ def simulate(sets, tools):
 
 def pairs(cases, neighbours):
     """title, case, scans and options that are not its own."""
+    wanted = {*OTHERS, *ON_KITCHEN, *(name for names in ON_NEIGHBOURS.values() for name in names), "kitchen"}
+    for missing in sorted(wanted - set(cases)):
+        print(f"no set {missing}: its pairs are left out")
     kitchens = [n for n in cases if n.startswith("kitchen") and "picks" not in n]
     for kitchen in kitchens:
-        for other in OTHERS:
+        for other in filter(cases.get, OTHERS):
             yield f"{kitchen} on {other}", cases[kitchen], cases[other]["scans"][:1], []
         yield f"{kitchen} mirrored", cases[kitchen], cases[kitchen]["scans"], ["--azimuth", "clockwise"]
-    for name in ON_KITCHEN:
+    for name in filter(cases.get, ON_KITCHEN if "kitchen" in cases else ()):
         yield f"{name} on kitchen", cases[name], cases["kitchen"]["scans"], []
     for room, scan in neighbours.items():
-        for name in ON_NEIGHBOURS[room[0]]:
+        for name in filter(cases.get, ON_NEIGHBOURS[room[0]]):
             yield f"{name} on {room}", cases[name], [scan], []
 
 
