@@ -15,8 +15,9 @@ constexpr double kSameRay = 1e-12;   // 1 - cosine
 // Imaginary part of a root over its size: of two poses that nearly are one a root is exact to half
 // the digits.
 constexpr double kNearlyReal = 1e-4;
-constexpr double kExact = 1e-9;  // of the sides' squares
-constexpr double kSame = 1e-7;   // of the distances
+constexpr double kVanishing = 1e-14;  // of the largest coefficient
+constexpr double kExact = 1e-9;       // of the sides' squares
+constexpr double kSame = 1e-7;        // of the distances
 constexpr int kNewtonSteps = 8;
 
 // Sides and angles of the tetrahedron of the camera and the points: of each side, that between its
@@ -26,15 +27,20 @@ struct Tetrahedron {
   Eigen::Vector3d cosines;  // of the angles between the rays
 };
 
-// Of c[4] x^4 + ... + c[0], those that are real or nearly so.
+// Of c[4] x^4 + ... + c[0], those that are real or nearly so. Where the camera and the points are
+// symmetric the first terms vanish, and with them roots that are infinite.
 std::vector<double> RealRoots(const std::array<double, 5>& c) {
-  const double largest = std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2]), std::abs(c[3])});
+  double largest = 0;
+  for (const double one : c) largest = std::max(largest, std::abs(one));
+  int degree = 4;
+  while (degree > 0 && !(std::abs(c[degree]) > kVanishing * largest)) --degree;
   std::vector<double> roots;
-  if (!(std::abs(c[4]) > 1e-14 * largest)) return roots;
-  Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
+  if (degree == 0) return roots;
+  using Companion = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
+  Companion companion = Companion::Zero(degree, degree);
   companion.diagonal<-1>().setOnes();
-  for (int k = 0; k < 4; ++k) companion(k, 3) = -c[k] / c[4];
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver(companion, false);
+  for (int k = 0; k < degree; ++k) companion(k, degree - 1) = -c[k] / c[degree];
+  const Eigen::EigenSolver<Companion> solver(companion, false);
   for (const auto& root : solver.eigenvalues()) {
     if (std::abs(root.imag()) <= kNearlyReal * std::abs(root)) roots.push_back(root.real());
   }

@@ -80,6 +80,19 @@ TEST(ThreePointPose, RaysBehindTheCameraAsAPanoramaHasThem) {
   EXPECT_GE(num_found, 1990);
 }
 
+// Of a regular tetrahedron the quartic is a cubic.
+TEST(ThreePointPose, FromTheTipOfARegularTetrahedron) {
+  Sample sample;
+  for (int i = 0; i < 3; ++i) {
+    sample.points[i] = std::sqrt(0.5) * Eigen::Vector3d::Unit(i);
+    sample.rays[i] = sample.points[i] - std::sqrt(0.5) * Eigen::Vector3d::Ones();
+  }
+  const std::vector<Rigid> poses = SolveThreePointPose(sample.points, sample.rays);
+  EXPECT_TRUE(std::any_of(poses.begin(), poses.end(), [&](const Rigid& pose) {
+    return RotationAngle(pose.rotation, sample.truth.rotation) < 1e-6;
+  }));
+}
+
 TEST(ThreePointPose, AsManyAsOpenCvFinds) {
   RandomStream random(5);
   int num_missed = 0, num_theirs = 0;
