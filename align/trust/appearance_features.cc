@@ -103,27 +103,37 @@ std::vector<cv::KeyPoint> FindKeypoints(const cv::Mat1b& picture, const cv::Mat1
   return found;
 }
 
-AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
-                                    const std::vector<cv::KeyPoint>& keypoints, bool upright,
-                                    int most, const PlaceOfKeypoint& place_of) {
-  std::vector<cv::KeyPoint> used;
-  AppearanceFeatures features;
-  for (const cv::KeyPoint& one : keypoints) {
-    if (static_cast<int>(used.size()) == most) break;
-    const bool is_again = !used.empty() && used.back().pt == one.pt && used.back().size == one.size;
-    if (upright && is_again) continue;  // several directions of its gradients
-    const std::optional<FeaturePlace> place =
-        place_of(Eigen::Vector2d(one.pt.x + 0.5, one.pt.y + 0.5));
-    if (!place) continue;
-    used.push_back(one);
-    if (place->down) used.back().angle = KeypointAngle(*place->down);
-    features.places.push_back(place->x);
-    features.in_img.push_back(place->in_img);
-    features.responses.push_back(one.response);
+std::vector<AppearanceFeatures> DescribeFeatures(const cv::Mat1b& picture,
+                                                 const std::vector<cv::KeyPoint>& keypoints,
+                                                 const std::vector<KeypointUse>& uses, int most) {
+  std::vector<AppearanceFeatures> features(uses.size());
+  std::vector<cv::KeyPoint> used;  // of all uses, one after the other
+  for (size_t use = 0; use < uses.size(); ++use) {
+    AppearanceFeatures& of_use = features[use];
+    const size_t first = used.size();
+    for (const cv::KeyPoint& one : keypoints) {
+      if (static_cast<int>(of_use.places.size()) == most) break;
+      const bool is_again =
+          used.size() > first && used.back().pt == one.pt && used.back().size == one.size;
+      if (uses[use].upright && is_again) continue;  // several directions of its gradients
+      const std::optional<FeaturePlace> place =
+          uses[use].place_of(Eigen::Vector2d(one.pt.x + 0.5, one.pt.y + 0.5));
+      if (!place) continue;
+      used.push_back(one);
+      if (place->down) used.back().angle = KeypointAngle(*place->down);
+      of_use.places.push_back(place->x);
+      of_use.in_img.push_back(place->in_img);
+      of_use.responses.push_back(one.response);
+    }
   }
-  cv::Mat descriptors;
+  cv::Mat descriptors(0, 128, CV_32F);
   if (!used.empty()) MakeSift()->compute(picture, used, descriptors);
-  features.sift = RootSift(descriptors);
+  int row = 0;
+  for (AppearanceFeatures& of_use : features) {
+    const int end = row + static_cast<int>(of_use.places.size());
+    of_use.sift = RootSift(descriptors.rowRange(row, end));
+    row = end;
+  }
   return features;
 }
 
@@ -189,26 +199,32 @@ class DrawnView {
                                    kNormalised * RadFromDeg(1.0) * camera.MeanFocalLength())),
         keypoints_(FindKeypoints(picture_, view_.valid)) {}
 
-  // Upright if up_in_scan is given.
-  AppearanceFeatures Describe(const std::optional<Eigen::Vector3d>& up_in_scan, int most) const {
-    return DescribeFeatures(picture_, keypoints_, up_in_scan.has_value(), most,
-                            [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
-                              const auto plane = projection_.CamFromImg(at);
-                              const auto x = PlaceAt(at);
-                              if (!plane || !x) return std::nullopt;
-                              if (!viewer_.has_mesh() && IsSeenFromBehind(at, *x))
-                                return std::nullopt;
-                              FeaturePlace place = {*x, {}, at};
-                              if (up_in_scan) {
-                                place.down = DirectionInImg(projection_, *plane,
-                                                            cam_from_scan_.rotation * -*up_in_scan);
-                                if (!place.down) return std::nullopt;
-                              }
-                              return place;
-                            });
+  std::vector<AppearanceFeatures> Describe(const Eigen::Vector3d& up_in_scan,
+                                           const std::vector<bool>& upright, int most) const {
+    std::vector<KeypointUse> uses;
+    for (const bool is_upright : upright) {
+      uses.push_back({is_upright, [this, is_upright, &up_in_scan](const Eigen::Vector2d& at) {
+                        return FeatureAt(at, is_upright ? &up_in_scan : nullptr);
+                      }});
+    }
+    return DescribeFeatures(picture_, keypoints_, uses, most);
   }
 
  private:
+  // up_in_scan: of upright ones, else null.
+  std::optional<FeaturePlace> FeatureAt(const Eigen::Vector2d& at,
+                                        const Eigen::Vector3d* up_in_scan) const {
+    const auto plane = projection_.CamFromImg(at);
+    const auto x = PlaceAt(at);
+    if (!plane || !x) return std::nullopt;
+    if (!viewer_.has_mesh() && IsSeenFromBehind(at, *x)) return std::nullopt;
+    FeaturePlace place = {*x, {}, at};
+    if (!up_in_scan) return place;
+    place.down = DirectionInImg(projection_, *plane, cam_from_scan_.rotation * -*up_in_scan);
+    if (!place.down) return std::nullopt;
+    return place;
+  }
+
   cv::Point CellOf(const Eigen::Vector2d& at) const {
     return {std::min(static_cast<int>(at.x()), view_.depth.cols - 1),
             std::min(static_cast<int>(at.y()), view_.depth.rows - 1)};
@@ -245,9 +261,9 @@ class DrawnView {
 }  // namespace
 
 AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera,
-                                  const Rigid& cam_from_scan,
-                                  const std::optional<Eigen::Vector3d>& up_in_scan, int most) {
-  return DrawnView(viewer, camera, cam_from_scan).Describe(up_in_scan, most);
+                                  const Rigid& cam_from_scan, const Eigen::Vector3d& up_in_scan,
+                                  int most) {
+  return DrawnView(viewer, camera, cam_from_scan).Describe(up_in_scan, {true}, most)[0];
 }
 
 std::vector<AppearanceFeatures> FeaturesOfScan(const ScanViewer& viewer,
@@ -272,11 +288,8 @@ std::vector<AppearanceFeatures> FeaturesOfScan(const ScanViewer& viewer,
     const int k = i % per_station;
     const DrawnView view(viewer, camera,
                          PoseOfView(scan, up_in_scan, kViewTurn * (k / 2), kViewLean[k % 2]));
-    for (size_t way = 0; way < upright.size(); ++way) {
-      of_views[way][i] =
-          view.Describe(upright[way] ? std::optional<Eigen::Vector3d>(up_in_scan) : std::nullopt,
-                        2 * most / num_views);
-    }
+    std::vector<AppearanceFeatures> ways = view.Describe(up_in_scan, upright, 2 * most / num_views);
+    for (size_t way = 0; way < upright.size(); ++way) of_views[way][i] = std::move(ways[way]);
   });
   std::vector<AppearanceFeatures> features;
   for (auto& of_way : of_views) features.push_back(JoinFeatures(std::move(of_way), {}, most));

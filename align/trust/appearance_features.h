@@ -39,11 +39,15 @@ using PlaceOfKeypoint = std::function<std::optional<FeaturePlace>(const Eigen::V
 
 // The strongest first; several of one place have different directions. Empty valid: everywhere.
 std::vector<cv::KeyPoint> FindKeypoints(const cv::Mat1b& picture, const cv::Mat1b& valid);
-// The `most` strongest of FindKeypoints() that have a place. upright: place_of says which way is
-// down; else features are turned as their own gradients say.
-AppearanceFeatures DescribeFeatures(const cv::Mat1b& picture,
-                                    const std::vector<cv::KeyPoint>& keypoints, bool upright,
-                                    int most, const PlaceOfKeypoint& place_of);
+struct KeypointUse {
+  bool upright;  // place_of says which way is down; else they are turned as their gradients say
+  PlaceOfKeypoint place_of;
+};
+// For each use the `most` strongest of FindKeypoints() that have a place. What is slow, the
+// pyramid of the picture, is made once for all uses.
+std::vector<AppearanceFeatures> DescribeFeatures(const cv::Mat1b& picture,
+                                                 const std::vector<cv::KeyPoint>& keypoints,
+                                                 const std::vector<KeypointUse>& uses, int most);
 // The `most` strongest of all. part_ids: of the photos, or none.
 AppearanceFeatures JoinFeatures(std::vector<AppearanceFeatures> parts,
                                 const std::vector<uint32_t>& part_ids, size_t most);
@@ -56,10 +60,10 @@ std::vector<AppearanceFeatures> FeaturesOfScan(const ScanViewer& viewer,
                                                const std::vector<bool>& upright, int max_stations,
                                                int most, int num_threads);
 
-// Features of one view; upright if up_in_scan is given. in_img: in the view.
+// Upright features of one view. in_img: in the view.
 AppearanceFeatures FeaturesOfView(const ScanViewer& viewer, const Camera& camera,
-                                  const Rigid& cam_from_scan,
-                                  const std::optional<Eigen::Vector3d>& up_in_scan, int most);
+                                  const Rigid& cam_from_scan, const Eigen::Vector3d& up_in_scan,
+                                  int most);
 
 // How a direction goes in the picture at a place (x/z, y/z) of it; none where the lens has no ray.
 std::optional<Eigen::Vector2d> DirectionInImg(const CameraProjection& projection,

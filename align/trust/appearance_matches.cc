@@ -38,35 +38,36 @@ AppearanceFeatures FeaturesOfPhoto(const SparseModel& model, const SparseImage& 
         .push_back(static_cast<int>(i));
   }
   const CameraProjection projection(camera);
-  return DescribeFeatures(
-      picture, FindKeypoints(picture, cv::Mat1b()), up_in_sparse.has_value(), most,
+  const PlaceOfKeypoint place_of =
       [&](const Eigen::Vector2d& small_at) -> std::optional<FeaturePlace> {
-        const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
-        int nearest = -1;
-        double least = reach * reach;
-        const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
-        for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
-          for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1); ++c) {
-            for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
-              const double distance = (image.points2d[i] - at).squaredNorm();
-              if (distance < least) {
-                least = distance;
-                nearest = i;
-              }
-            }
+    const Eigen::Vector2d at = small_at.cwiseProduct(size.cwiseQuotient(small));
+    int nearest = -1;
+    double least = reach * reach;
+    const int row = cell_of(at.y(), rows), column = cell_of(at.x(), columns);
+    for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r) {
+      for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1); ++c) {
+        for (const int i : cells[static_cast<size_t>(r) * columns + c]) {
+          const double distance = (image.points2d[i] - at).squaredNorm();
+          if (distance < least) {
+            least = distance;
+            nearest = i;
           }
         }
-        if (nearest < 0) return std::nullopt;
-        FeaturePlace place = {model.points.at(image.point3d_ids[nearest]).x_in_model, {}, at};
-        if (!up_in_sparse) return place;
-        const auto ray = projection.RayFromImg(at);
-        if (!ray) return std::nullopt;
-        const Eigen::Vector3d down = image.cam_from_model.rotation * -*up_in_sparse;
-        const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
-        if (!lower) return std::nullopt;
-        place.down = *lower - at;
-        return place;
-      });
+      }
+    }
+    if (nearest < 0) return std::nullopt;
+    FeaturePlace place = {model.points.at(image.point3d_ids[nearest]).x_in_model, {}, at};
+    if (!up_in_sparse) return place;
+    const auto ray = projection.RayFromImg(at);
+    if (!ray) return std::nullopt;
+    const Eigen::Vector3d down = image.cam_from_model.rotation * -*up_in_sparse;
+    const auto lower = projection.ImgFromCam(ray->normalized() + 1e-3 * down);
+    if (!lower) return std::nullopt;
+    place.down = *lower - at;
+    return place;
+  };
+  return DescribeFeatures(picture, FindKeypoints(picture, cv::Mat1b()),
+                          {{up_in_sparse.has_value(), place_of}}, most)[0];
 }
 
 }  // namespace

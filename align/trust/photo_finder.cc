@@ -1,6 +1,7 @@
 #include "align/trust/photo_finder.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -30,6 +31,7 @@ constexpr double kRivalShare = 0.5;
 constexpr int kCloserSamples = 3200;
 constexpr int kMostFeatures = 2500;  // of a photo and of a view that are compared closely
 constexpr int kFewestMatches = 8;    // that are worth another look
+constexpr double kStill = 0.5;       // pixels of the view, median: a pose that has not moved
 constexpr double kMostMedians = 3;   // times the median residual: what misses by more is left out
 constexpr double kHiddenBy = 0.05;   // metres, as TrustOptions::surface_tolerance
 
@@ -91,6 +93,72 @@ std::optional<ViewPose> SolveWithout(const Camera& camera, FocalSource source,
   return pose;
 }
 
+// A place that is looked at more closely: what is known of it so far, and its last view.
+struct CloserPlace {
+  SeenPlace seen;
+  Camera lens;
+  bool is_done = false;
+
+  std::optional<CameraProjection> projection;  // of the view, in pixels of the picture
+  Rigid cam_from_scan;
+  std::vector<PhotoMatch> matches;
+
+  void SetView(const cv::Size& size) {
+    Camera small = lens;
+    small.Resize(size.width, size.height);
+    projection.emplace(small);
+    cam_from_scan = seen.pose.cam_from_scan;
+  }
+
+  // Of the photo's keypoints, when it is taken as the view is.
+  PlaceOfKeypoint UprightPlaces(const Eigen::Vector3d& up_in_scan) const {
+    const Eigen::Vector3d down = cam_from_scan.rotation * -up_in_scan;
+    return [this, down](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
+      const auto plane = projection->CamFromImg(at);
+      if (!plane) return std::nullopt;
+      FeaturePlace one = {Eigen::Vector3d::Zero(), DirectionInImg(*projection, *plane, down), at};
+      if (!one.down) return std::nullopt;
+      return one;
+    };
+  }
+
+  // The pose has hardly moved since the view was drawn: another one would show the same.
+  bool IsStill() const {
+    Camera small = lens;
+    small.Resize(projection->camera().width, projection->camera().height);
+    const CameraProjection now(small);
+    std::vector<double> moved;
+    for (Eigen::Index i = 0; i < seen.pairs.x_in_scan.cols(); ++i) {
+      const Eigen::Vector3d x = seen.pairs.x_in_scan.col(i);
+      const auto was_at = projection->ImgFromCam(cam_from_scan * x),
+                 is_at = now.ImgFromCam(seen.pose.cam_from_scan * x);
+      moved.push_back(was_at && is_at ? (*is_at - *was_at).norm()
+                                      : std::numeric_limits<double>::infinity());
+    }
+    return Median(&moved) <= kStill;
+  }
+
+  // Of the matches; without a pose that they agree on it is done, and nothing is seen.
+  void Solve(FocalSource source, const PhotoSearchOptions& search, int num_threads) {
+    const std::vector<PhotoPlace> found = SearchPhotoPlaces(matches, lens, search, num_threads);
+    std::optional<ViewPose> solved;
+    if (!found.empty()) {
+      seen.pairs = PairsOf(matches, found[0].agreeing);
+      solved = SolveWithout(lens, source, found[0].cam_from_scan, &seen.pairs);
+    }
+    if (!solved) {
+      seen = {};
+      is_done = true;
+      return;
+    }
+    seen.num_cells = found[0].num_cells;
+    seen.share = static_cast<double>(found[0].agreeing.size()) /
+                 std::max(1, CountCells(matches, search.cell));
+    seen.pose = *solved;
+    if (solved->lens) lens = *solved->lens;
+  }
+};
+
 }  // namespace
 
 PhotoFinder::PhotoFinder(const ScanViewer& viewer, const Eigen::Vector3d& up_in_scan,
@@ -104,73 +172,81 @@ PhotoFinder::PhotoFinder(const ScanViewer& viewer, const Eigen::Vector3d& up_in_
 
 std::vector<PhotoMatch> PhotoFinder::MatchPicture(const Picture& picture,
                                                   const Camera& camera) const {
-  const Eigen::Vector2d size(camera.width, camera.height),
-      small(picture.grey.cols, picture.grey.rows);
-  std::vector<PhotoMatch> matches;
+  const Eigen::Vector2d grow =
+      Eigen::Vector2d(camera.width, camera.height)
+          .cwiseQuotient(Eigen::Vector2d(picture.grey.cols, picture.grey.rows));
+  const auto place_of = [&grow](const std::optional<Eigen::Vector2d>& down) {
+    return [grow, down](const Eigen::Vector2d& at) {
+      return FeaturePlace{Eigen::Vector3d::Zero(), down, at.cwiseProduct(grow)};
+    };
+  };
   // As their own gradients are turned, and upright: photos are mostly held level.
+  const std::vector<AppearanceFeatures> photo =
+      DescribeFeatures(picture.grey, picture.keypoints,
+                       {{false, place_of(std::nullopt)}, {true, place_of(Eigen::Vector2d(0, 1))}},
+                       options_.max_photo_features);
+  std::vector<PhotoMatch> matches;
   for (const bool upright : {false, true}) {
-    const AppearanceFeatures& scan = features_[upright];
-    const AppearanceFeatures photo =
-        DescribeFeatures(picture.grey, picture.keypoints, upright, options_.max_photo_features,
-                         [&](const Eigen::Vector2d& at) {
-                           return FeaturePlace{Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 1),
-                                               at.cwiseProduct(size.cwiseQuotient(small))};
-                         });
-    for (const auto& [i, k] : MatchFeatures(photo, scan, options_.max_ratio)) {
-      matches.push_back({photo.in_img[i], scan.places[k]});
+    for (const auto& [i, k] :
+         MatchFeatures(photo[upright], features_[upright], options_.max_ratio)) {
+      matches.push_back({photo[upright].in_img[i], features_[upright].places[k]});
     }
   }
   return matches;
 }
 
-SeenPlace PhotoFinder::LookCloser(const Picture& picture, const Camera& camera, FocalSource source,
-                                  const PhotoPlace& place) const {
-  SeenPlace seen;
-  Camera lens = WithFocalScale(camera, place.focal_scale);
-  seen.pose.cam_from_scan = place.cam_from_scan;
+std::vector<SeenPlace> PhotoFinder::LookCloser(const Picture& picture, const Camera& camera,
+                                               FocalSource source,
+                                               const std::vector<PhotoPlace>& places) const {
+  const cv::Size size = picture.grey.size();
+  const Eigen::Vector2d grow = Eigen::Vector2d(camera.width, camera.height)
+                                   .cwiseQuotient(Eigen::Vector2d(size.width, size.height));
   PhotoSearchOptions search = options_.search;
   search.num_samples = kCloserSamples;
   search.focal_scales = {1};
   search.num_kept = 1;
-  const Eigen::Vector2d grow =
-      Eigen::Vector2d(camera.width, camera.height)
-          .cwiseQuotient(Eigen::Vector2d(picture.grey.cols, picture.grey.rows));
+  std::vector<CloserPlace> all(places.size());
+  for (size_t k = 0; k < places.size(); ++k) {
+    all[k].lens = WithFocalScale(camera, places[k].focal_scale);
+    all[k].seen.pose.cam_from_scan = places[k].cam_from_scan;
+  }
+  const CloserLook* before = nullptr;
   for (const CloserLook& look : kLooks) {
-    Camera small = lens;
-    small.Resize(picture.grey.cols, picture.grey.rows);
-    const CameraProjection projection(small);
-    const Rigid now = seen.pose.cam_from_scan;
-    const Eigen::Vector3d down = now.rotation * -up_in_scan_;
-    const AppearanceFeatures view = FeaturesOfView(viewer_, small, now, up_in_scan_, kMostFeatures);
-    const AppearanceFeatures photo =
-        DescribeFeatures(picture.grey, picture.keypoints, true, kMostFeatures,
-                         [&](const Eigen::Vector2d& at) -> std::optional<FeaturePlace> {
-                           const auto plane = projection.CamFromImg(at);
-                           if (!plane) return std::nullopt;
-                           FeaturePlace one = {Eigen::Vector3d::Zero(),
-                                               DirectionInImg(projection, *plane, down), at};
-                           if (!one.down) return std::nullopt;
-                           return one;
-                         });
-    const double reach = look.reach * RadFromDeg(1.0) * small.MeanFocalLength();
-    std::vector<PhotoMatch> matches;
-    for (const auto& [i, k] : MatchNear(photo, view, reach, options_.max_ratio_near)) {
-      matches.push_back({photo.in_img[i].cwiseProduct(grow), view.places[k]});
+    std::vector<CloserPlace*> redrawn;
+    std::vector<KeypointUse> uses;
+    for (CloserPlace& one : all) {
+      if (one.is_done || (before && before->reach == look.reach && one.IsStill())) continue;
+      one.SetView(size);
+      redrawn.push_back(&one);
+      uses.push_back({true, one.UprightPlaces(up_in_scan_)});
+    }
+    const std::vector<AppearanceFeatures> photo =
+        DescribeFeatures(picture.grey, picture.keypoints, uses, kMostFeatures);
+    for (size_t k = 0; k < redrawn.size(); ++k) {
+      CloserPlace* const one = redrawn[k];
+      const Camera& small = one->projection->camera();
+      const AppearanceFeatures view =
+          FeaturesOfView(viewer_, small, one->cam_from_scan, up_in_scan_, kMostFeatures);
+      const double reach = look.reach * RadFromDeg(1.0) * small.MeanFocalLength();
+      one->matches.clear();
+      for (const auto& [i, j] : MatchNear(photo[k], view, reach, options_.max_ratio_near)) {
+        one->matches.push_back({photo[k].in_img[i].cwiseProduct(grow), view.places[j]});
+      }
     }
     search.tolerance_deg = look.tolerance;
-    const std::vector<PhotoPlace> found = SearchPhotoPlaces(matches, lens, search, num_threads_);
-    if (found.empty()) return {};
-    seen.num_cells = found[0].num_cells;
-    seen.share = static_cast<double>(found[0].agreeing.size()) /
-                 std::max(1, CountCells(matches, search.cell));
-    seen.pairs = PairsOf(matches, found[0].agreeing);
-    const auto solved = SolveWithout(lens, source, found[0].cam_from_scan, &seen.pairs);
-    if (!solved) return {};
-    seen.pose = *solved;
-    if (solved->lens) lens = *solved->lens;
-    if (seen.num_cells < look.fewest) break;
+    for (CloserPlace& one : all) {
+      if (one.is_done) continue;
+      one.Solve(source, search, num_threads_);
+      one.is_done |= one.seen.num_cells < look.fewest;
+    }
+    before = &look;
   }
-  if (!seen.pose.lens && source != FocalSource::kGiven) seen.pose.lens = lens;
+  std::vector<SeenPlace> seen;
+  for (CloserPlace& one : all) {
+    const bool tells_lens = one.seen.num_cells > 0 && source != FocalSource::kGiven;
+    if (tells_lens && !one.seen.pose.lens) one.seen.pose.lens = one.lens;
+    seen.push_back(std::move(one.seen));
+  }
   return seen;
 }
 
@@ -186,13 +262,17 @@ PhotoSighting PhotoFinder::Find(const SparseImage& image, const Camera& camera, 
   sighting.is_read = !picture.grey.empty();
   if (!sighting.is_read) return sighting;
   picture.keypoints = FindKeypoints(picture.grey, cv::Mat1b());
-  const std::vector<PhotoPlace> found =
+  std::vector<PhotoPlace> found =
       SearchPhotoPlaces(MatchPicture(picture, camera), camera, search, num_threads_);
   if (found.empty() || found[0].num_cells < options_.min_cells_of_views) return sighting;
-  for (size_t k = 0; k < found.size(); ++k) {
-    const PhotoPlace& place = found[k];
-    if (k >= kFewestLooks && place.num_cells < kRivalShare * found[0].num_cells) break;
-    SeenPlace seen = LookCloser(picture, camera, source, place);
+  size_t num_looks = 0;
+  while (num_looks < found.size() &&
+         (num_looks < kFewestLooks ||
+          found[num_looks].num_cells >= kRivalShare * found[0].num_cells)) {
+    ++num_looks;
+  }
+  found.resize(num_looks);
+  for (SeenPlace& seen : LookCloser(picture, camera, source, found)) {
     const Eigen::Vector3d centre = seen.pose.cam_from_scan.TargetOriginInSource();
     // From behind, a mirrored wall looks like the wall.
     if (seen.num_cells == 0 ||

@@ -60,8 +60,10 @@ class PhotoFinder {
   };
 
   std::vector<PhotoMatch> MatchPicture(const Picture& picture, const Camera& camera) const;
-  SeenPlace LookCloser(const Picture& picture, const Camera& camera, FocalSource source,
-                       const PhotoPlace& place) const;
+  // One for each place; of those that lead to no pose num_cells is 0.
+  std::vector<SeenPlace> LookCloser(const Picture& picture, const Camera& camera,
+                                    FocalSource source,
+                                    const std::vector<PhotoPlace>& places) const;
 
   const ScanViewer& viewer_;
   const Eigen::Vector3d up_in_scan_;

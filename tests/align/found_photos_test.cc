@@ -1,6 +1,8 @@
 // Photos without a sparse model and without picks.
 #include "align/found_photos.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -8,6 +10,7 @@
 
 #include "align/mirrored_reading.h"
 #include "align/photo_alignment.h"
+#include "core/frames.h"
 #include "core/text.h"
 #include "tests/align/simulated_alignment.h"
 #include "tests/support/temp_folder.h"
@@ -19,7 +22,8 @@ constexpr int kNumPhotos = 3;
 
 // A room, its scan by a laser, whose intensity is not the brightness, and photos.
 struct PhotosOfARoom {
-  explicit PhotosOfARoom(int seed) : room(Options(seed)), scans{room.MakeScan(0)} {
+  explicit PhotosOfARoom(int seed, double roll_deg = 0)
+      : room(Options(seed, roll_deg)), scans{room.MakeScan(0)} {
     std::vector<std::string> names;
     for (int photo = 0; photo < room.NumPhotos(); ++photo) {
       names.push_back(room.PhotoName(photo));
@@ -32,8 +36,9 @@ struct PhotosOfARoom {
     }
     photos = MakePhotoModel(folder.path(), names, camera);
   }
-  static SimulatedRoomOptions Options(int seed) {
+  static SimulatedRoomOptions Options(int seed, double roll_deg = 0) {
     SimulatedRoomOptions options = CaseOptions(seed);
+    if (roll_deg > 0) options.roll_deg = roll_deg;
     options.num_photos = kNumPhotos;
     options.photo_width = 640;
     options.photo_height = 480;
@@ -86,6 +91,27 @@ TEST(FoundPhotos, StandWhereTheyWereTakenWithinTwiceTheExpectedError) {
   for (size_t i = 0; i < again.picks.size(); ++i) {
     EXPECT_EQ(again.picks[i].x_in_img, found.picks[i].x_in_img);
   }
+}
+
+// Nothing says which way is down in them: features are turned as their own gradients say.
+TEST(FoundPhotos, AreFoundHeldSidewaysOrUpsideDown) {
+  const PhotosOfARoom one(3, 180);
+  const FoundPhotos found = one.FindIn(one.scans);
+  ASSERT_EQ(found.views.size(), static_cast<size_t>(kNumPhotos));
+  const SurveyedScans surveyed(one.scans);
+  const AlignmentInput input{one.photos.model, surveyed, found.picks, "", ""};
+  const PhotoAlignment placed = AlignFoundPhotos(input, one.photos, found, {});
+  double most_turned = 0;
+  for (int photo = 0; photo < one.room.NumPhotos(); ++photo) {
+    const SparseImage* image = placed.model.FindImage(one.room.PhotoName(photo));
+    ASSERT_NE(image, nullptr);
+    const Rigid truth = one.room.CamFromScan(photo);
+    EXPECT_LT((image->cam_from_model.TargetOriginInSource() - truth.TargetOriginInSource()).norm(),
+              0.06);
+    const Eigen::Vector3d down = truth.rotation * -Eigen::Vector3d::UnitZ();
+    most_turned = std::max(most_turned, DegFromRad(std::atan2(std::abs(down.x()), down.y())));
+  }
+  EXPECT_GT(most_turned, 60);
 }
 
 TEST(FoundPhotos, AreNotPlacedInARoomWithSomeOfTheSameFurnitureNorInTheMirrorImageOfTheirs) {
