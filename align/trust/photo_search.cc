@@ -4,13 +4,14 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <opencv2/calib3d.hpp>
 
 #include "align/trust/scan_cells.h"
 #include "core/frames.h"
@@ -30,13 +31,8 @@ constexpr double kSampleReach = 1.5;  // times the tolerance, before a sample is
 constexpr double kLeastLength = 0.2;  // metres between the places of a sample
 constexpr double kLeastAngle = 2, kMostAngle = 150;  // degrees between its rays
 constexpr double kLeastDepth = 0.1;                  // metres
-
-Rigid RigidOf(const cv::Mat& rvec, const cv::Mat& tvec) {
-  Rigid pose;
-  pose.rotation = RotationFromVector({rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2)});
-  pose.translation = {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)};
-  return pose;
-}
+constexpr int kFitSteps = 20;
+constexpr double kMostDamping = 1e6, kFitGain = 1e-4;  // of the sum of squares, for another step
 
 // The matches under one focal length, in the order of the scan's cells.
 class PhotoRays {
@@ -148,18 +144,57 @@ class PhotoRays {
   }
 
  private:
-  Rigid Fitted(const Rigid& start, const std::vector<int>& matches) const {
-    cv::Mat1d places(static_cast<int>(matches.size()), 3), planes(places.rows, 2);
-    for (int k = 0; k < places.rows; ++k) {
-      for (int c = 0; c < 3; ++c) places(k, c) = places_[matches[k]][c];
-      for (int c = 0; c < 2; ++c) planes(k, c) = planes_[matches[k]][c];
+  // Least squares of x/z and y/z, by Levenberg and Marquardt.
+  Rigid Fitted(Rigid pose, const std::vector<int>& matches) const {
+    double damping = 1e-3;
+    NormalEquations normal = NormalAt(pose, matches);
+    for (int step = 0; step < kFitSteps && damping < kMostDamping; ++step) {
+      Eigen::Matrix<double, 6, 6> damped = normal.matrix;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::Matrix<double, 6, 1> change = -damped.ldlt().solve(normal.gradient);
+      Rigid moved;
+      moved.rotation = (RotationFromVector(change.head<3>()) * pose.rotation).normalized();
+      moved.translation = pose.translation + change.tail<3>();
+      const NormalEquations there = NormalAt(moved, matches);
+      if (!(there.sum < normal.sum)) {
+        damping *= 10;
+        continue;
+      }
+      const bool is_done = there.sum > (1 - kFitGain) * normal.sum;
+      pose = moved;
+      normal = there;
+      damping /= 10;
+      if (is_done) break;
     }
-    const Eigen::Vector3d w = VectorFromRotation(start.rotation);
-    cv::Mat1d rvec = (cv::Mat1d(3, 1) << w.x(), w.y(), w.z());
-    cv::Mat1d tvec =
-        (cv::Mat1d(3, 1) << start.translation.x(), start.translation.y(), start.translation.z());
-    cv::solvePnPRefineLM(places, planes, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec, tvec);
-    return RigidOf(rvec, tvec);
+    return pose;
+  }
+
+  // Of a turn about the axes of `cam`, and a shift along them.
+  struct NormalEquations {
+    Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
+    double sum = 0;  // of squares; infinite where a place is not in front
+  };
+  NormalEquations NormalAt(const Rigid& pose, const std::vector<int>& matches) const {
+    NormalEquations normal;
+    const Eigen::Matrix3d turn = pose.rotation.toRotationMatrix();
+    for (const int i : matches) {
+      const Eigen::Vector3d turned = turn * places_[i], x = turned + pose.translation;
+      if (!(x.z() > kLeastDepth)) {
+        normal.sum = std::numeric_limits<double>::infinity();
+        return normal;
+      }
+      const Eigen::Vector2d at = x.hnormalized(), residual = at - planes_[i];
+      Eigen::Matrix<double, 2, 3> by_x;
+      by_x << 1, 0, -at.x(), 0, 1, -at.y();
+      by_x /= x.z();
+      Eigen::Matrix<double, 2, 6> jacobian;
+      jacobian << by_x * -CrossMatrix(turned), by_x;
+      normal.matrix.noalias() += jacobian.transpose() * jacobian;
+      normal.gradient.noalias() += jacobian.transpose() * residual;
+      normal.sum += residual.squaredNorm();
+    }
+    return normal;
   }
 
   const PhotoSearchOptions& options_;
