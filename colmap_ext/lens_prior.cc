@@ -18,6 +18,8 @@ bool IsTangential(CameraModel model, int param) {
       return param == 6 || param == 7;
     case CameraModel::kThinPrismFisheye:  // and the thin prism's
       return param == 6 || param == 7 || param >= 10;
+    case CameraModel::kRadTanThinPrismFisheye:  // and the thin prism's
+      return param >= 10;
     default:
       return false;
   }

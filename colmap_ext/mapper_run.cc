@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "colmap_ext/photo_bundle.h"
 #include "core/error.h"
 #include "core/output_file.h"
 
@@ -33,6 +34,25 @@ std::string OptionRefusal(const ColmapRun& run) {
     }
   }
   return "";
+}
+
+// Adjusts the model with these cameras as they are given, the others refined. False, and nothing
+// done, where there is none of them, or where that fails.
+bool HoldCameras(const std::map<uint32_t, Camera>& held, SparseModel* model) {
+  LensSet lenses = LensesOf(*model);
+  bool any = false;
+  for (Lens& lens : lenses.lenses) {
+    const auto one = held.find(lens.camera.camera_id);
+    lens.free = one == held.end();
+    if (lens.free) continue;
+    lens.camera = lens.told = one->second;
+    any = true;
+  }
+  if (!any) return false;
+  PhotoBundle bundle = AdjustPhotos(*model, lenses, KeypointNoise(*model));
+  if (!bundle.usable) return false;
+  *model = PutBack(WithLenses(bundle.model, bundle.lenses), *model);
+  return true;
 }
 
 }  // namespace
@@ -234,6 +254,9 @@ MapperResult MapperRun::Close(const std::string& folder, bool two_view_tracks) {
 
   result.folder = adjusted;
   result.model = ReadSparseModel(adjusted);
+  if (options_.refine_intrinsics && HoldCameras(options_.held_cameras, &result.model)) {
+    WriteSparseModel(result.model, adjusted);
+  }
   result.mean_reprojection_error_px = MeanPointError(&result.model);
   return result;
 }

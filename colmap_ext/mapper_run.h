@@ -2,7 +2,9 @@
 // A seed through COLMAP: triangulated, continued by `colmap mapper`, triangulated and adjusted once
 // more.
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,10 @@ struct MapperOptions {
   // --Mapper.* options of the user: {"--Mapper.min_num_matches", "20", ...}.
   std::vector<std::string> mapper_arguments;
   bool refine_intrinsics = false;  // focal length and distortion, never the principal point
-  int num_threads = -1;            // -1 = all
+  // Cameras that are held all the same, by camera_id. COLMAP refines all or none: its models are
+  // adjusted once more by ours, with these as they are here.
+  std::map<uint32_t, Camera> held_cameras;
+  int num_threads = -1;  // -1 = all
   int random_seed = 0;
 };
 

@@ -236,6 +236,18 @@ bool Mapping::IsCalibrated(const LensPlan& plan) const {
   });
 }
 
+std::map<uint32_t, Camera> Mapping::CalibratedAsTold(const LensPlan& plan) const {
+  std::map<uint32_t, Camera> calibrated;
+  if (refine_ != RefineIntrinsics::kAuto) return calibrated;
+  for (const auto& [id, camera] : plan.cameras()) {
+    const auto told = plan_->cameras().find(id);
+    const bool is_as_told = told != plan_->cameras().end() && told->second.model == camera.model &&
+                            told->second.params == camera.params;
+    if (camera.has_prior_focal_length && is_as_told) calibrated.emplace(id, camera);
+  }
+  return calibrated;
+}
+
 MappingPass Mapping::MapAsLensesAre() {
   if (!plan_) {
     plan_ = PlanLenses();
@@ -321,6 +333,7 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   MakeFolder(folder);
   mapper_options_ = options_.mapper;
   mapper_options_.refine_intrinsics = refine;
+  mapper_options_.held_cameras = as_planned ? CalibratedAsTold(plan) : std::map<uint32_t, Camera>();
   mapper_options_.num_threads = context_.options.num_threads;
   mapper_options_.random_seed = context_.options.random_seed;
   pass.mapper = std::make_unique<MapperRun>(&colmap_, database_copy, options_.image_path, folder,

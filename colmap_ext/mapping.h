@@ -117,6 +117,8 @@ class Mapping {
   MappingPass MapAsLensesAre();
   LensPlan PlanLenses() const;
   bool IsCalibrated(const LensPlan& plan) const;
+  // Lenses that a pass with others to be refined holds, by camera_id: --refine_intrinsics auto.
+  std::map<uint32_t, Camera> CalibratedAsTold(const LensPlan& plan) const;
   // Photos to start from that are told are those of their own group.
   InitOptions InitOfGroup(const MatchedImages& images) const;
   // False: nothing was to be left out, or could be.

@@ -9,11 +9,10 @@
 namespace roomtex {
 namespace {
 
-// In a map by id: the one that is wanted, or the next one that is free.
+// In a map by id: the one that is wanted, or one behind all that are taken.
 template <typename Map>
 auto FreeId(const Map& taken, typename Map::key_type wanted) {
-  while (taken.count(wanted) > 0) ++wanted;
-  return wanted;
+  return taken.count(wanted) == 0 ? wanted : taken.rbegin()->first + 1;
 }
 
 class Join {

@@ -102,7 +102,8 @@ void CheckDatabase(const MatchedImages& images, const MappingOptions& options,
                          missing,
                      "Give the folder that was given to colmap feature_extractor");
   }
-  if (RefineIntrinsicsFromWord(options.refine_intrinsics) != RefineIntrinsics::kNever) return;
+  const bool refines =
+      RefineIntrinsicsFromWord(options.refine_intrinsics) != RefineIntrinsics::kNever;
   for (const auto& [camera_id, camera] : images.cameras()) {
     if (camera.IsPanorama()) {
       throw InputError(path, "camera " + std::to_string(camera_id),
@@ -110,7 +111,7 @@ void CheckDatabase(const MatchedImages& images, const MappingOptions& options,
                        "Cut them into faces with roomtex-import, or use colmap mapper of COLMAP "
                        "4.1");
     }
-    if (camera.has_prior_focal_length) continue;
+    if (camera.has_prior_focal_length || refines) continue;
     context.Warn(
         "camera " + std::to_string(camera_id) +
         " has prior_focal_length = 0: COLMAP guessed its focal length and verified its pairs "

@@ -89,6 +89,12 @@ struct Found {
   CharucoLayout layout;
 };
 
+// A board of this size may be what a photo shows of the named one.
+bool IsPartOf(const Board& board, const std::array<int, 2>& size) {
+  return std::max(size[0], size[1]) <= std::max(board.columns, board.rows) &&
+         std::min(size[0], size[1]) <= std::min(board.columns, board.rows);
+}
+
 void DetectCheckerboard(const cv::Mat& gray, const Board& board, Found* found) {
   BoardPhoto& photo = found->photo;
   for (const int long_side : kLongSides) {
@@ -115,6 +121,7 @@ void DetectCheckerboard(const cv::Mat& gray, const Board& board, Found* found) {
   if (found->other_size[0] > 0) {
     photo.reason += ", but one of " + std::to_string(found->other_size[0]) + "x" +
                     std::to_string(found->other_size[1]);
+    if (IsPartOf(board, found->other_size)) photo.reason += ", as if it hangs out of the picture";
   }
 }
 
@@ -339,7 +346,7 @@ std::vector<BoardPhoto> FindBoards(const std::string& folder, const std::vector<
   int num_with_board = 0, num_with_other = 0;
   for (const Found& one : found) {
     num_with_board += one.photo.reason.empty();
-    num_with_other += one.other_size[0] > 0;
+    num_with_other += one.other_size[0] > 0 && !IsPartOf(board, one.other_size);
   }
   if (num_with_board == 0 || num_with_other > num_with_board) {
     FailWithoutBoards(folder, board, found);

@@ -193,9 +193,9 @@ void DescribeCoverage(Calibration* result) {
 }
 
 void JudgeCalibration(const CalibrationOptions& options, Calibration* result) {
-  int num_found = 0;
+  int num_fitted = 0;  // those with too few corners contradict nobody
   for (const CalibratedPhoto& photo : result->photos) {
-    if (photo.num_corners > 0) ++num_found;
+    if (std::isfinite(photo.rms_px)) ++num_fitted;
     if (!photo.used) result->warnings.push_back(photo.name + " is left out: " + photo.reason);
   }
   const int num_used = result->NumUsed();
@@ -204,9 +204,9 @@ void JudgeCalibration(const CalibrationOptions& options, Calibration* result) {
         "only " + std::to_string(num_used) + " photos of the board took part, at least " +
         std::to_string(options.min_photos) + " are wanted (ten to twenty are good)");
   }
-  if (num_found - num_used > kManyDropped * num_found) {
+  if (num_fitted - num_used > kManyDropped * num_fitted) {
     result->reasons.push_back(
-        std::to_string(num_found - num_used) + " of " + std::to_string(num_found) +
+        std::to_string(num_fitted - num_used) + " of " + std::to_string(num_fitted) +
         " photos with boards contradict the others: check that focus and zoom "
         "were not touched and the board is flat");
   }
