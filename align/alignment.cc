@@ -60,6 +60,7 @@ void TakeAdjustment(const AlignmentInput& input, Alignment* result) {
   result->expected_error = PropagateError(result->fit.surface, centres, input.surveyed.scans());
   result->photo_sigmas =
       FindPhotoSigmas(adjustment.covariances, centres, result->fit.surface, result->disagreement);
+  for (const uint32_t id : adjustment.bundle.ran_away) result->photo_sigmas.erase(id);
   SetExpectedErrorAtCameras(result->photo_sigmas, result->disagreement, &result->expected_error);
   result->refined_pick_px = PickDistances(adjustment.bundle.model, input.picks, Similarity());
   result->refined_pick_rms_px = PickRms(result->start.picks, result->refined_pick_px);

@@ -99,7 +99,9 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
                                       const std::vector<NearHint>& near,
                                       const AlignmentOptions& options, Progress* progress) {
   AutomaticAlignment found;
-  const bool hinted = !near.empty() || !input.picks.empty();
+  const bool hinted =
+      !near.empty() || std::any_of(input.picks.begin(), input.picks.end(),
+                                   [](const Pick& pick) { return pick.weight > 0; });
   StartSearchOptions search;
   search.num_threads = input.num_threads;
   const auto judge = [&] {
@@ -124,7 +126,8 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     judge();
   };
   look();
-  if (found.verdict.kind == StartVerdict::Kind::kWeak ||
+  if (found.verdict.kind == StartVerdict::Kind::kNone ||
+      found.verdict.kind == StartVerdict::Kind::kWeak ||
       found.verdict.kind == StartVerdict::Kind::kOpen) {
     // A model of the whole room fits a scan of a part of it best when it is small enough to lie in
     // that part: so many are in the way that what is best for each scale has to be asked for.

@@ -144,6 +144,13 @@ void JudgePlacement(const Placement& placement, const TrustOptions& trust,
 }
 
 // What the similarity leaves open, as numbers.
+// Of the seven numbers of the similarity those that the surface leaves open.
+int NumOpen(const Judgement& judgement, bool has_covariance) {
+  const OpenDirections& open = judgement.open;
+  if (!has_covariance) return 7;
+  return static_cast<int>(open.slides.size() + open.turns.size()) + (open.scale ? 1 : 0);
+}
+
 void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, const AlignmentFit& fit,
                   const AlignmentOptions& options, Judgement* judgement) {
   const SimilarityFit by_picks =
@@ -167,8 +174,13 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
   if (!fit.refined) return;
   judgement->open = FindOpenDirections(fit.surface, middle);
   const std::vector<bool> used = start.UsedPicks();
-  const bool held = std::count(used.begin(), used.end(), true) > 0;
+  const auto num_used = std::count(used.begin(), used.end(), true);
   const bool by_photos = start.num_corners > 0;
+  const bool is_finite = fit.surface.covariance.allFinite();  // not where it is wholly open
+  // Hints may be hurried: what they alone hold must leave one of them over to say so.
+  const bool are_hints = !by_photos && start.source != AlignmentStart::Source::kPicks;
+  const bool held =
+      num_used > 0 && (!are_hints || 2 * num_used >= NumOpen(*judgement, is_finite) + 2);
   if (held && !judgement->open.None()) {
     // In front of one wall corners that are off together, as by a lens, move, turn and scale all:
     // there they must hold the model well.
@@ -182,11 +194,12 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
     (is_too_much ? judgement->reasons : judgement->warnings)
         .push_back(judgement->open.Sentence(by_photos));
   }
-  // What is wholly open has no covariance at all.
-  if (!held && !(judgement->open.None() && fit.surface.covariance.allFinite())) {
+  if (!held && !(judgement->open.None() && is_finite)) {
     judgement->reasons.push_back(
-        "The scan's surface leaves open where the model lies, how it is turned or how large it is, "
-        "and there are no picks to hold it there.");
+        std::string("The scan's surface leaves open where the model lies, how it is turned or how "
+                    "large it is, and ") +
+        (num_used > 0 ? "so few picks hold it there that none of them checks the others. Give six."
+                      : "there are no picks to hold it there."));
   }
 }
 
@@ -309,6 +322,7 @@ std::vector<std::string> AdjustmentWarnings(const ModelAdjustment& adjustment,
         ", and the expected error holds the difference. Look at the overlays (--overlays).");
   }
   for (const uint32_t id : bundle.idle_images) {
+    if (bundle.ran_away.count(id) > 0) continue;  // doubted, and named there
     warnings.push_back(model.images.at(id).name +
                        " was not adjusted to the scan's surface: too few sparse points "
                        "hold it. It follows the other photos.");

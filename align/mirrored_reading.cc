@@ -43,7 +43,7 @@ bool FitEitherWay(const AlignmentInput& input, const PickReviewOptions& options)
 }
 
 bool IsBelieved(const AlignmentAttempt& mirrored, const AlignmentAttempt& as_read) {
-  return mirrored.trusted() && ShareOff(mirrored) <= 0.5 * ShareOff(as_read);
+  return mirrored.trusted() && ShareOff(mirrored) < 0.5 * ShareOff(as_read);
 }
 
 std::string Evidence(const AlignmentAttempt& mirrored, const AlignmentAttempt& as_read) {

@@ -27,7 +27,7 @@ constexpr double kMinGainOfOneShape = 0.05, kMuchMore = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
   if (!still.usable || !moving.usable) return 0;
-  return 1 - moving.image_cost / still.image_cost;
+  return 1 - SharedImageCost(moving, still) / SharedImageCost(still, moving);
 }
 
 // Another focal length down the rows than across them, which a camera that is told wrong has, looks
@@ -150,8 +150,8 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     const double beyond_lens = Gain(straight.Adjust(lens_alone), moving);
     if (!(beyond_lens > kMinGain)) return std::nullopt;
   }
-  found.cost_still = unbent.image_cost;
-  found.cost_moving = moving.image_cost;
+  found.cost_still = SharedImageCost(unbent, moving);
+  found.cost_moving = SharedImageCost(moving, unbent);
   found.picks = input.picks;
   for (Pick& pick : found.picks) {
     const SparseImage* const image = moving.model.FindImage(pick.image_name);

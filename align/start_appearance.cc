@@ -1,6 +1,7 @@
 #include "align/start_appearance.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -42,17 +43,33 @@ AppearanceEvidence LookForPlaces(const AlignmentInput& input, const StartSearch&
   const AppearanceMatcher matcher(input.model, input.image_path, input.surveyed.viewer(),
                                   AppearanceOptions(), input.num_threads);
   AppearanceEvidence best;
+  std::vector<AppearancePlace> all;
+  int most_cells = 0;
   for (const Eigen::Vector3d& up_in_scan : search.ups_in_scan) {
     for (const std::optional<Eigen::Vector3d>& up_in_sparse : ups) {
       const std::vector<AppearanceMatch> matches = matcher.Match(up_in_sparse, up_in_scan);
       std::vector<AppearancePlace> places = SearchByAppearance(
           matches, up_in_sparse, up_in_scan, AppearanceSearchOptions(), input.num_threads);
       if (places.empty()) continue;
-      if (!best.places.empty() && places[0].num_cells <= best.places[0].num_cells) continue;
-      best.agreeing = AgreeingPicks(matches, places[0].scan_from_sparse, input.model);
-      best.spread = FindCellSpread(best.agreeing);
-      best.places = std::move(places);
+      if (places[0].num_cells > most_cells) {
+        most_cells = places[0].num_cells;
+        best.agreeing = AgreeingPicks(matches, places[0].scan_from_sparse, input.model);
+        best.spread = FindCellSpread(best.agreeing);
+      }
+      std::move(places.begin(), places.end(), std::back_inserter(all));
     }
+  }
+  // The same place comes again with another direction up; a rival may come with another only.
+  std::stable_sort(all.begin(), all.end(), [](const AppearancePlace& a, const AppearancePlace& b) {
+    return a.num_cells > b.num_cells;
+  });
+  for (AppearancePlace& place : all) {
+    const bool is_new =
+        std::all_of(best.places.begin(), best.places.end(), [&](const AppearancePlace& other) {
+          return DistanceBetween(search.cloud, place.scan_from_sparse, other.scan_from_sparse) >=
+                 kSameStart;
+        });
+    if (is_new) best.places.push_back(std::move(place));
   }
   return best;
 }

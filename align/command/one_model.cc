@@ -256,12 +256,10 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
 }
 
 // Photos that agree with nobody are named; too many of them, and the model is not to be trusted.
-std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
-                                                   const Database* database,
-                                                   const SparseModel& aligned,
-                                                   const std::vector<Pick>& picks,
-                                                   const SurveyedScans& surveyed, double rms_px,
-                                                   const Command::Context& context) {
+std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
+    const AlignCommandOptions& a, const Database* database, const SparseModel& aligned,
+    const std::vector<Pick>& picks, const std::set<uint32_t>& ran_away,
+    const SurveyedScans& surveyed, double rms_px, const Command::Context& context) {
   constexpr double kMostDoubtful = 0.34;
   context.progress.Stage("single photos");
   std::map<uint32_t, double> support;
@@ -280,6 +278,12 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(const AlignCommandOptions& a,
   auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),
                             KeypointSigma(rms_px), support, picked);
+  for (const uint32_t id : ran_away) {
+    if (!photos.at(id).doubt.empty()) continue;
+    photos.at(id).doubt =
+        "its points want it elsewhere than the sparse model has it, so that it was not adjusted to "
+        "the scan, and how far it is off is not known";
+  }
   size_t num_doubtful = 0;
   for (const auto& [id, photo] : photos) {
     if (photo.doubt.empty()) continue;
@@ -405,7 +409,8 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   FillReport(alignment, after.rms_px, &context.report);
   context.report["cameras"] = CamerasToJson(alignment);
   auto photos =
-      JudgeSinglePhotos(a, database, model, one.picks, *reading->surveyed, after.rms_px, context);
+      JudgeSinglePhotos(a, database, model, one.picks, alignment.adjustment.bundle.ran_away,
+                        *reading->surveyed, after.rms_px, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   if (alignment.rolling_shutter) aligned.row_motions = alignment.rolling_shutter->motions;

@@ -65,7 +65,9 @@ using TrialPointer = std::unique_ptr<Trial>;
 // Of the photos' cost: b's is lower than a's by more than this share and this much.
 bool IsBetter(const PlaneBundle& a, const PlaneBundle& b, double share, double gain) {
   if (!b.usable) return false;
-  return !a.usable || a.image_cost - b.image_cost > std::max(gain, share * a.image_cost);
+  if (!a.usable) return true;
+  const double before = SharedImageCost(a, b), after = SharedImageCost(b, a);
+  return before - after > std::max(gain, share * before);
 }
 
 // Keypoints are noisy, so that a sparse model is bent a little, too; adjusting its poses takes that
@@ -110,7 +112,8 @@ class Adjuster {
     BendFit drift = *bent->bend;
     drift.followed = kFollowedOfDrift;
     drift.bend.coefficients *= kFollowedOfDrift;
-    return Try(start, std::move(drift), Freed::kNothing);
+    TrialPointer followed = Try(start, std::move(drift), Freed::kNothing);
+    return followed->bundle.usable ? std::move(followed) : std::move(bent);
   }
 
  private:

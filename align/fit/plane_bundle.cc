@@ -46,29 +46,21 @@ constexpr double kMaxPickDeviations = 6, kMaxPickShare = 0.004;
 // ... or this many times what model and scan disagree in anyway.
 constexpr double kMaxBendDeviations = 3;
 
-// Of every observation, pixels.
-std::vector<double> ReprojectionDistances(const SparseModel& model) {
+// By image_id.
+std::map<uint32_t, double> PhotoCosts(const SparseModel& model, double sigma_px) {
   std::map<uint32_t, CameraProjection> projections;
   for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
-  std::vector<double> distances;
+  std::map<uint32_t, double> costs;
   for (const auto& [id, point] : model.points) {
     for (const TrackElement& element : point.track) {
       const SparseImage& image = model.images.at(element.image_id);
       const auto error = projections.at(image.camera_id)
                              .ImgError(image.cam_from_model * point.x_in_model,
                                        image.points2d[element.point2d_index]);
-      if (error) distances.push_back(error->norm());
+      if (error) costs[image.image_id] += HuberCost(error->norm() / sigma_px, kReprojectionHuber);
     }
   }
-  return distances;
-}
-
-double ImageCost(const SparseModel& model, double sigma_px) {
-  double cost = 0;
-  for (const double distance : ReprojectionDistances(model)) {
-    cost += HuberCost(distance / sigma_px, kReprojectionHuber);
-  }
-  return cost;
+  return costs;
 }
 
 // How far a round moved the cameras.
@@ -167,6 +159,12 @@ void MoveIdle(const PlaneBundleInput& input, PlaneBundle* result) {
   }
 }
 
+// Tells photos that move by themselves from those of one frame of a rig, which move as one.
+uint64_t FrameOf(const SparseImage& image) {
+  constexpr uint64_t kFrames = uint64_t{1} << 32;
+  return image.frame_id == kNoFrame ? image.image_id : kFrames + image.frame_id;
+}
+
 // Compares the adjusted model with the input; a sentence if it went farther than a correction can.
 // Single photos that did are put back and take no part from then on.
 std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions& options,
@@ -203,8 +201,14 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
            Number(Median(moves), 2) + " m and changes the scale by " +
            Number(100 * (moved.scale - 1), 1) + " %.";
   }
-  const double share = static_cast<double>(runaway.size()) / static_cast<double>(moves.size());
-  if (runaway.size() > 1 && share > kMaxShareRunaway) {
+  // The cameras of a rig move as one.
+  std::set<uint64_t> frames, frames_away;
+  for (const auto& [id, image] : input.model.images) {
+    if (result->idle_images.count(id) == 0) frames.insert(FrameOf(image));
+  }
+  for (const uint32_t id : runaway) frames_away.insert(FrameOf(input.model.images.at(id)));
+  const double share = static_cast<double>(frames_away.size()) / static_cast<double>(frames.size());
+  if (frames_away.size() > 1 && share > kMaxShareRunaway) {
     return "The adjustment to the scan's surface bends the model: it moves " +
            std::to_string(runaway.size()) + " of " + std::to_string(moves.size()) +
            " photos against the others by more than " + Number(limit, 3) + " m or " +
@@ -212,11 +216,12 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
   }
   for (const uint32_t id : runaway) {
     const uint32_t frame_id = input.model.images.at(id).frame_id;
-    result->idle_images.insert(id);
+    result->ran_away.insert(id);
     for (const auto& [other, image] : input.model.images) {
-      if (frame_id != kNoFrame && image.frame_id == frame_id) result->idle_images.insert(other);
+      if (frame_id != kNoFrame && image.frame_id == frame_id) result->ran_away.insert(other);
     }
   }
+  result->idle_images.insert(result->ran_away.begin(), result->ran_away.end());
   if (!runaway.empty()) {
     result->adjusted_from_input =
         FitModels(input.model, result->model, result->constraints, result->idle_images);
@@ -225,12 +230,11 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
   return "";
 }
 
-// RMS error of the used picks over its limit.
+// RMS error of the used picks, by their weights, over its limit.
 double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
   std::map<uint32_t, CameraProjection> projections;
   for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
-  double sum = 0, diagonal = 0;
-  int count = 0;
+  double sum = 0, sum_of_weights = 0, diagonal = 0;
   for (size_t i = 0; i < input.picks.size(); ++i) {
     const SparseImage* const image = model.FindImage(input.picks[i].image_name);
     if (!input.used[i] || image == nullptr) continue;
@@ -239,12 +243,13 @@ double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
     const auto error = projection.ImgError(image->cam_from_model * input.picks[i].x_in_scan,
                                            input.picks[i].x_in_img);
     diagonal = std::max(diagonal, std::hypot(camera.width, camera.height));
-    sum += error ? error->squaredNorm() : diagonal * diagonal;
-    ++count;
+    const double weight = input.picks[i].weight * input.picks[i].weight;
+    sum += weight * (error ? error->squaredNorm() : diagonal * diagonal);
+    sum_of_weights += weight;
   }
   const double limit = std::max({kMaxPickDeviations * input.pick_sigma_px, kMaxPickShare * diagonal,
                                  kMaxBendDeviations * input.pick_bend_px});
-  return count > 0 ? std::sqrt(sum / count) / limit : 0;
+  return sum_of_weights > 0 ? std::sqrt(sum / sum_of_weights) / limit : 0;
 }
 
 // What is wrong with the result as a whole; empty if nothing is.
@@ -296,12 +301,6 @@ std::vector<SurfaceConstraint> Straightened(std::vector<SurfaceConstraint> const
     c.point -= bend.Bend(x_in_scan) - x_in_scan;
   }
   return constraints;
-}
-
-// Tells photos that move by themselves from those of one frame of a rig, which move as one.
-uint64_t FrameOf(const SparseImage& image) {
-  constexpr uint64_t kFrames = uint64_t{1} << 32;
-  return image.frame_id == kNoFrame ? image.image_id : kFrames + image.frame_id;
 }
 
 // Photos that the sparse points do not hold, those of one frame together.
@@ -428,6 +427,14 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
 
 std::vector<std::string> PlaneBundleOptions::Problems() const { return ProblemsOf(*this); }
 
+double SharedImageCost(const PlaneBundle& bundle, const PlaneBundle& other) {
+  double cost = 0;
+  for (const auto& [id, of_photo] : bundle.photo_costs) {
+    if (bundle.idle_images.count(id) == 0 && other.idle_images.count(id) == 0) cost += of_photo;
+  }
+  return cost;
+}
+
 PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOptions& options) {
   PlaneBundle result;
   result.model = input.model;
@@ -439,7 +446,8 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
     MoveIdle(input, &result);
     StopRows(&result);
     result.plane_rms_before = SurfaceRms(input.model, result.constraints);
-    result.image_cost = ImageCost(result.model, result.sigma_px);
+    result.photo_costs = PhotoCosts(result.model, result.sigma_px);
+    for (const auto& [id, cost] : result.photo_costs) result.image_cost += cost;
     result.model = BendModel(result.model, input.bend);
     result.plane_rms_after = SurfaceRms(result.model, result.constraints);
     result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;

@@ -94,6 +94,7 @@ struct PlaneBundle {
   // Photos that took no part, because too few points hold them or because they ran away; they
   // follow the similarity.
   std::set<uint32_t> idle_images;
+  std::set<uint32_t> ran_away;  // of these: their points want them elsewhere
 
   std::vector<SurfaceConstraint> constraints;  // of the last round
   std::vector<int> num_points_of_plane;        // of these, one per plane
@@ -105,8 +106,13 @@ struct PlaneBundle {
   // Sum over all observations of Huber's cost of the reprojection error in units of sigma_px, of
   // the adjusted model before it is put onto a bent scan: twice the negative log likelihood.
   double image_cost = 0;
+  std::map<uint32_t, double> photo_costs;  // what of it is of each photo, by image_id
   int num_rounds = 0;
 };
+
+// Of the image cost of `bundle` what is of photos that take part in it and in `other`: a photo that
+// only one of them puts back must not decide between the two.
+double SharedImageCost(const PlaneBundle& bundle, const PlaneBundle& other);
 
 // Minimises reprojection errors (Huber) + distances of the points from their surfaces (Cauchy) +
 // errors of the picks (Huber) over all poses and points. Points are given to surfaces anew from

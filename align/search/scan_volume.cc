@@ -70,9 +70,14 @@ void ScanVolume::MarkFree(const Scan& scan) {
     const Eigen::Vector3d step = ray * (0.7 * cell_ / range);
     const int count = static_cast<int>((range - cell_) / (0.7 * cell_));
     Eigen::Vector3d at = station;
+    bool is_inside = false;
     for (int i = 0; i <= count; ++i, at += step) {
       const Eigen::Vector3i cell = CellOf(at);
-      if (!Contains(cell)) break;
+      if (!Contains(cell)) {
+        if (is_inside) break;
+        continue;  // the scanner may stand outside of all that it measured
+      }
+      is_inside = true;
       state_[Index(cell)] = State::kFree;
     }
   }

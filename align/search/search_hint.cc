@@ -12,10 +12,24 @@ namespace {
 const double kPickAngle = RadFromDeg(1.5);
 const double kAnyWhere = RadFromDeg(80.0);  // a photo that shows all around
 
-// Half of what the photo shows along its diagonal.
+// The largest angle from the optical axis at which the photo shows anything: at its border.
 double HalfView(const Camera& camera) {
   if (camera.IsPanorama()) return kPi;
-  return std::atan(0.5 * std::hypot(camera.width, camera.height) / camera.MeanFocalLength());
+  const CameraProjection projection(camera);
+  constexpr int kSteps = 8;  // along each side
+  double most = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double x = camera.width * static_cast<double>(i) / kSteps,
+                 y = camera.height * static_cast<double>(i) / kSteps;
+    const double right = camera.width, bottom = camera.height;
+    for (const Eigen::Vector2d& at : {Eigen::Vector2d(x, 0), Eigen::Vector2d(x, bottom),
+                                      Eigen::Vector2d(0, y), Eigen::Vector2d(right, y)}) {
+      const auto ray = projection.RayFromImg(at);
+      if (!ray) return projection.max_angle();  // shows all that the lens does
+      most = std::max(most, AngleBetween(*ray, Eigen::Vector3d::UnitZ()));
+    }
+  }
+  return most;
 }
 
 }  // namespace

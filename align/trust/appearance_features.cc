@@ -76,7 +76,10 @@ void AddMatches(const Descriptors& photos, const Descriptors& scan,
     const auto elsewhere = std::find_if(near.begin(), near.end(), [&](const NearDescriptor& one) {
       return (places[one.row] - places[near[0].row]).norm() > kElsewhere;
     });
-    if (elsewhere == near.end() || near[0].distance > max_ratio * elsewhere->distance) continue;
+    if (near.empty()) continue;
+    // Where all of the nearest are the same place, elsewhere is no nearer than the last of them.
+    const NearDescriptor& other = elsewhere == near.end() ? near.back() : *elsewhere;
+    if (near[0].distance > max_ratio * other.distance) continue;
     pairs->emplace_back(static_cast<int>(i), near[0].row);
   }
 }

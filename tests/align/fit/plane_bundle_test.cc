@@ -356,6 +356,24 @@ TEST(PlaneBundle, TheFixedBetaOfTheThesisCanBeUsed) {
   }
 }
 
+TEST(PlaneBundle, APhotoThatStandsElsewhereThanItsPointsWantItIsPutBackAndItsCostNotCompared) {
+  const Reconstruction& one = StraightRoom();
+  SparseModel start = OnSurface(one.room, one.model);
+  start.images.at(5).cam_from_model.translation.x() += 0.25;
+  const PlaneBundle bundle = AdjustToSurface(one.room.Input(start), PlaneBundleOptions());
+  ASSERT_TRUE(bundle.usable) << bundle.reason;
+  EXPECT_THAT(bundle.ran_away, testing::ElementsAre(5));
+  EXPECT_THAT(bundle.idle_images, testing::ElementsAre(5));
+  const PlaneBundle right =
+      AdjustToSurface(one.room.Input(OnSurface(one.room, one.model)), PlaneBundleOptions());
+  ASSERT_TRUE(right.usable) << right.reason;
+  EXPECT_TRUE(right.ran_away.empty());
+  EXPECT_NEAR(SharedImageCost(right, bundle), right.image_cost - right.photo_costs.at(5),
+              1e-9 * right.image_cost);
+  EXPECT_NEAR(SharedImageCost(bundle, right), bundle.image_cost - bundle.photo_costs.at(5),
+              1e-9 * bundle.image_cost);
+}
+
 TEST(PlaneBundle, APhotoThatNothingHoldsFollowsTheOthers) {
   const Reconstruction& one = StraightRoom();
   SparseModel start = OnSurface(one.room, one.model);

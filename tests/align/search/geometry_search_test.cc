@@ -1,7 +1,10 @@
 #include "align/search/geometry_search.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 
+#include "align/search/search_hint.h"
 #include "align/search/translation_search.h"
 #include "align/search/up_directions.h"
 #include "core/random_stream.h"
@@ -135,6 +138,26 @@ TEST(SearchHint, APickAgreesWithTheTruthAndNotWithAnotherPlace) {
   EXPECT_TRUE(Agrees(hints, truth, 0));
   truth.translation.x() += 1.5;
   EXPECT_FALSE(Agrees(hints, truth, 0));
+}
+
+// A corner of a fisheye's photo is seen far farther from the axis than atan(half diagonal / f).
+TEST(SearchHint, AFisheyeShowsWhatIsNearlyBesideIt) {
+  SparseModel model;
+  Camera& camera = model.cameras[1];
+  camera.camera_id = 1;
+  camera.model = CameraModel::kOpenCvFisheye;
+  camera.width = 1000;
+  camera.height = 700;
+  camera.params = {400, 400, 500, 350, 0, 0, 0, 0};
+  model.images[1] = {1, 1, "a.jpg", Rigid(), {}, {}};
+  const double corner = std::hypot(500, 350) / 400;  // radians: equidistant
+  const auto at = [](double angle) -> Eigen::Vector3d {
+    return Eigen::Vector3d(std::sin(angle), 0, std::cos(angle)) * 3;
+  };
+  const auto hints = FindHintRays(model, {}, {{"a.jpg", at(1.2)}});
+  ASSERT_EQ(hints.size(), 1u);
+  EXPECT_NEAR(hints[0].max_angle, corner, 1e-6);
+  EXPECT_TRUE(Agrees(hints, Similarity(), 0));
 }
 
 }  // namespace
