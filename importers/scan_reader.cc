@@ -449,8 +449,8 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     const int count = static_cast<int>(file.scans.size());
     PlacedScans::File read{path, file.azimuth, file.up_axis, file.meters_per_unit, {}, options};
     if (!file.azimuth_note.empty()) placed.notes.push_back(file.azimuth_note);
-    if (file.format != "RTPI") {  // whose notes are on the azimuth
-      for (const std::string& note : file.notes) placed.notes.push_back(path + ": " + note + ".");
+    for (const std::string& note : file.notes) {
+      if (note != file.azimuth_note) placed.notes.push_back(path + ": " + note + ".");
     }
     for (int k = 0; k < count; ++k) {
       Scan& scan = file.scans[k];

@@ -29,7 +29,10 @@ SharedSamples::SharedSamples(const PhotoPassInput& input, const std::vector<Grid
         const int column = tile.index[i] % grid.num_columns, row = tile.index[i] / grid.num_columns;
         const size_t slot = static_cast<size_t>(tile.first_slot) + i;
         const Observation* const seen = store.Begin(slot);
-        if (column % stride != 0 || row % stride != 0) continue;
+        const bool is_line = grid.num_rows == 1;  // a cloud or mesh has no rows to thin
+        if (is_line ? column % (stride * stride) != 0 : column % stride != 0 || row % stride != 0) {
+          continue;
+        }
         if (store.Count(slot) < 2 || seen[1].in_doubt != 0) continue;
         const auto sample = static_cast<int>(normals_.size());
         for (int k = 0; k < store.Count(slot) && seen[k].in_doubt == 0; ++k) {

@@ -5,6 +5,7 @@ a depth camera's scan. Then the photos of one simulated room on the scans of oth
 image of their own: there nothing may be placed. A Markdown table.
 
   tests/benchmark/auto_align/photos_alone_table.py --bin build/bin --out DIR [--data DATA] [--first SEED] [--rooms N]
+    [--kinds laser ...]
 """
 
 import argparse
@@ -23,10 +24,12 @@ REAL = {
     "iphone_floor": ("PINHOLE", "1453.54,1453.54,973.7,715.2", "photos"),
 }
 CAPTURE = ["--photo_width", "640", "--photo_height", "480", "--photo_noise", "3", "--blur_px", "0.6"]
-SCANS = {
+KINDS = {
     "laser": ["--scan_columns", "1600", "--scan_rows", "600"],
     "coarse laser": ["--scan_columns", "800", "--scan_rows", "340"],
     "depth camera": ["--scan_columns", "800", "--scan_rows", "340", "--depth_camera", "1"],
+    # Photos held in any way, and nothing that says so.
+    "rolled": ["--scan_columns", "1600", "--scan_rows", "600", "--roll_deg", "180"],
 }
 
 
@@ -45,7 +48,7 @@ def simulated_case(args, seed, kind, num_photos=12):
     folder = os.path.join(args.out, "rooms", f"{kind.replace(' ', '_')}_{seed}")
     if not os.path.exists(os.path.join(folder, "truth")):
         subprocess.run([os.path.join(args.bin, "roomtex-simulate"), "--output_path", folder, "--quiet", "1",
-                        "--random_seed", str(seed), "--num_photos", str(num_photos), *CAPTURE, *SCANS[kind]],
+                        "--random_seed", str(seed), "--num_photos", str(num_photos), *CAPTURE, *KINDS[kind]],
                        check=True, stdout=subprocess.DEVNULL)
     words = open(os.path.join(folder, "cameras.txt")).read().splitlines()[-1].split()
     return {"photos": os.path.join(folder, "photos"), "scan": os.path.join(folder, "scan.rtpi"), "azimuth": "clockwise",
@@ -100,6 +103,7 @@ def main():
     parser.add_argument("--data", default="")
     parser.add_argument("--first", type=int, default=171)
     parser.add_argument("--rooms", type=int, default=3)
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
     args = parser.parse_args()
     print("| case | placed | fewest cells, least share | most cells left out | off, median / worst, mm | degrees | said, mm "
           "| < 1, 2, 3 x | exit |")
@@ -107,11 +111,11 @@ def main():
     for name, case in real_cases(args.data):
         row(args, name, case)
     seeds = range(args.first, args.first + args.rooms)
-    for kind in SCANS:
+    for kind in args.kinds:
         for seed in seeds:
             row(args, f"{kind}, {seed}", simulated_case(args, seed, kind))
     wrong = [0, 0]
-    for kind in SCANS:
+    for kind in args.kinds:
         for seed in seeds:
             case = simulated_case(args, seed, kind)
             scans = [(f"on {other}", {"scan": simulated_case(args, other, kind)["scan"]})
