@@ -18,7 +18,7 @@ struct RollingShutter {
   SparseModel model;
   std::vector<Pick> picks;  // the input's, in the same way
   RowMotions motions;       // by image_id, metres; how each photo's camera moved
-  // Of the photos' observations after an adjustment to the surface (PlaneBundle::image_cost), with
+  // Of the photos' observations after an adjustment to the surface (SharedImageCost()), with
   // cameras that stand still and that move.
   double cost_still = 0, cost_moving = 0;
   // The model's cameras are not the input's, but what explains the photos better.
