@@ -93,8 +93,9 @@ class Database {
   // photos.
   static void KeepPairsBetween(const std::string& copy_path, const std::set<uint32_t>& image_ids);
 
-  // Gives the images of a copy that CopyForMapper made these cameras. False, and nothing done,
-  // where rigs name the cameras, too (COLMAP 4.x).
+  // Gives the images of a copy that CopyForMapper made these cameras, and each camera a rig of its
+  // own where the copy has rigs (COLMAP 3.12 to 4.x). False, and nothing done, where a rig holds
+  // several cameras.
   static bool SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
                          const std::map<uint32_t, DatabaseImage>& images);
 

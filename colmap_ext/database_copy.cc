@@ -155,6 +155,49 @@ void ExecuteWith(uint32_t camera_id, const Camera& camera, SQLite::Statement* st
   statement->reset();
 }
 
+// Whether every camera of a database of COLMAP 3.12 to 4.x is a rig of its own and every photo a
+// frame: what its feature_extractor writes.
+bool HasOnlyTrivialRigs(const SQLite::Database& sqlite) {
+  const auto has_rows = [&](const std::string& query) {
+    SQLite::Statement statement(sqlite, query);
+    return statement.executeStep();
+  };
+  if (sqlite.tableExists("rig_sensors") && has_rows("SELECT 1 FROM rig_sensors")) return false;
+  return !sqlite.tableExists("frame_data") ||
+         !has_rows("SELECT 1 FROM frame_data GROUP BY frame_id HAVING COUNT(*) > 1");
+}
+
+// Makes every camera a rig of its own, and every photo a frame, with the camera's and the photo's
+// number, as COLMAP numbers those of models without rigs.
+void MakeTrivialRigs(const std::map<uint32_t, Camera>& cameras,
+                     const std::map<uint32_t, DatabaseImage>& images, SQLite::Database* sqlite) {
+  constexpr char kCameraSensor[] = "0";  // COLMAP's SensorType::CAMERA
+  for (const char* table : {"rigs", "frames", "frame_data"}) {
+    if (sqlite->tableExists(table)) sqlite->exec(std::string("DELETE FROM ") + table);
+  }
+  for (const auto& [camera_id, camera] : cameras) {
+    const std::string id = std::to_string(camera_id);
+    sqlite->exec("INSERT INTO rigs(rig_id, ref_sensor_id, ref_sensor_type) VALUES(" + id + ", " +
+                 id + ", " + kCameraSensor + ")");
+  }
+  const bool has_frames = sqlite->tableExists("frames") && sqlite->tableExists("frame_data");
+  const std::vector<TableColumn> columns = ColumnsOf(*sqlite, "pose_priors");
+  const bool has_priors =
+      std::any_of(columns.begin(), columns.end(),
+                  [](const TableColumn& column) { return column.name == "corr_sensor_id"; });
+  for (const auto& [image_id, image] : images) {
+    const std::string id = std::to_string(image_id), camera = std::to_string(image.camera_id);
+    if (has_priors) {
+      sqlite->exec("UPDATE pose_priors SET corr_sensor_id = " + camera +
+                   " WHERE corr_data_id = " + id + " AND corr_sensor_type = " + kCameraSensor);
+    }
+    if (!has_frames) continue;
+    sqlite->exec("INSERT INTO frames(frame_id, rig_id) VALUES(" + id + ", " + camera + ")");
+    sqlite->exec("INSERT INTO frame_data(frame_id, data_id, sensor_id, sensor_type) VALUES(" + id +
+                 ", " + id + ", " + camera + ", " + kCameraSensor + ")");
+  }
+}
+
 }  // namespace
 
 void Database::CopyForMapper(const std::string& path, Schema schema) const {
@@ -241,8 +284,10 @@ void Database::KeepPairsBetween(const std::string& copy_path,
 bool Database::SetCameras(const std::string& copy_path, const std::map<uint32_t, Camera>& cameras,
                           const std::map<uint32_t, DatabaseImage>& images) try {
   SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE);
-  if (copy.tableExists("rigs")) return false;
+  const bool has_rigs = copy.tableExists("rigs");
+  if (has_rigs && !HasOnlyTrivialRigs(copy)) return false;
   SQLite::Transaction transaction(copy);
+  if (has_rigs) MakeTrivialRigs(cameras, images, &copy);
   copy.exec("DELETE FROM cameras");
   SQLite::Statement add(copy,
                         "INSERT INTO cameras(model, width, height, params, prior_focal_length, "

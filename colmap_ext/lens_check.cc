@@ -387,6 +387,25 @@ SparseModel SinglePhotos(const SparseModel& model) {
   return photos;
 }
 
+// Holds a lens as it was told: each of its cameras as its own, if they were told differently.
+void HoldAsTold(const SparseModel& model, const LensFinding& finding, int index, LensSet* set) {
+  std::map<uint32_t, int> lens_of_camera;
+  for (const uint32_t id : finding.camera_ids) {
+    if (!lens_of_camera.empty() && !finding.told_alike) {
+      const Lens copy = set->lenses[static_cast<size_t>(index)];
+      set->lenses.push_back(copy);
+    }
+    const bool keeps = lens_of_camera.empty() || finding.told_alike;
+    const int lens = keeps ? index : static_cast<int>(set->lenses.size()) - 1;
+    lens_of_camera[id] = lens;
+    set->lenses[static_cast<size_t>(lens)].free = false;
+    set->lenses[static_cast<size_t>(lens)].camera = model.cameras.at(id);
+  }
+  for (auto& [image_id, lens] : set->of_image) {
+    if (lens == index) lens = lens_of_camera.at(model.images.at(image_id).camera_id);
+  }
+}
+
 }  // namespace
 
 LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, RefineIntrinsics refine) {
@@ -404,7 +423,8 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
   if (!freed) return check;
   const bool too_dear = SharingIsTooDear(thinned, *freed, sigma_px);
   LensSet mended = freed->sparing.lenses;
-  for (size_t i = 0; i < mended.lenses.size(); ++i) {
+  const size_t num_lenses = mended.lenses.size();
+  for (size_t i = 0; i < num_lenses; ++i) {
     LensFinding finding =
         FindingOf(model, freed->full, static_cast<int>(i), freed->noise, i >= freed->num_shared);
     finding.used = refine == RefineIntrinsics::kAlways ||
@@ -413,7 +433,7 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
     const bool never = refine == RefineIntrinsics::kNever;
     if (finding.sigmas.size() == 0 || too_dear || never) finding.used = false;
     mended.lenses[i].free = finding.used;
-    if (!finding.used) mended.lenses[i].camera = model.cameras.at(finding.camera_ids[0]);
+    if (!finding.used) HoldAsTold(model, finding, static_cast<int>(i), &mended);
     check.lenses.push_back(std::move(finding));
   }
   if (refine == RefineIntrinsics::kNever) return check;
@@ -425,7 +445,7 @@ LensCheck CheckLenses(const SparseModel& model, const LensLabels& labels, Refine
     for (LensFinding& finding : check.lenses) finding.used = false;
     return check;
   }
-  for (size_t i = 0; i < mended.lenses.size(); ++i) {
+  for (size_t i = 0; i < num_lenses; ++i) {
     if (check.lenses[i].used) check.lenses[i].found = adjusted.lenses.lenses[i].camera;
   }
   check.mended = PutBack(WithLenses(adjusted.model, adjusted.lenses), model);

@@ -271,6 +271,18 @@ MappingPass Mapping::MapAsLensesAre() {
   return best;
 }
 
+void Mapping::KeepCamerasOfRigs(LensCheck* check) const {
+  bool any = false;
+  for (LensFinding& lens : check->lenses) {
+    any = any || lens.used;
+    lens.used = false;
+  }
+  context_.Warn(
+      std::string("The database holds rigs of several cameras: photos are mapped with its cameras, "
+                  "not with the lenses that they were told or share by EXIF") +
+      (any ? ", though the photos contradict them." : "."));
+}
+
 void Mapping::KeepCalibrated(MappingPass* pass) const {
   for (LensFinding& lens : pass->lenses.lenses) {
     const Camera& told = pass->plan.cameras().at(lens.camera_ids[0]);
@@ -346,6 +358,7 @@ MappingPass Mapping::Map(const LensPlan& plan, bool refine) {
   if (!pass.best.empty()) {
     context_.progress.Stage("check lenses");
     pass.lenses = CheckLenses(pass.model(), labels_, RefineIntrinsics::kAuto);
+    if (!as_planned) KeepCamerasOfRigs(&pass.lenses);
   }
   return pass;
 }

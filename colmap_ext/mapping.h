@@ -110,6 +110,8 @@ class Mapping {
   MappingPass MapGroup();
   // A lens that a group's photos have determined is a calibrated one for the next.
   void LearnLenses(const MappingPass& pass);
+  // Of a database whose rigs tie its cameras together.
+  void KeepCamerasOfRigs(LensCheck* check) const;
   void KeepCalibrated(MappingPass* pass) const;
   // And says so.
   bool IsContradicted(const MappingPass& pass) const;

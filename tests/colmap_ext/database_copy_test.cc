@@ -86,6 +86,64 @@ TEST(DatabaseCopy, TurnsTheTablesOf4xIntoThoseOf39) {
             0);
 }
 
+// Lenses that photos share or that were found reach COLMAP 4.x, too: its rigs and frames name the
+// cameras once more.
+TEST(DatabaseCopy, GivesPhotosOfA4xDatabaseOtherCameras) {
+  const TempFolder folder;
+  const SimulatedViews views = SmallSet();
+  {
+    DatabaseMaker maker(folder / "database.db", DatabaseMaker::Schema::k41);
+    maker.AddCamera(views.cameras.at(1));
+    maker.AddCamera(views.cameras.at(2));
+    for (const auto& [image_id, image] : views.images) {
+      maker.AddImage(image_id, image.name, image.camera_id);
+      maker.AddKeypoints(image_id, views.keypoints.at(image_id), 6);
+    }
+    maker.Run("INSERT INTO pose_priors VALUES (1, NULL, 2, 1, 0)");
+  }
+  const Database original(folder / "database.db");
+  original.CopyForMapper(folder / "copy.db", Database::Schema::kAsIs);
+  std::map<uint32_t, Camera> cameras = {{7, views.cameras.at(1)}};
+  cameras[7].camera_id = 7;
+  cameras[7].params[0] = 1234;
+  std::map<uint32_t, DatabaseImage> images = original.ReadImages();
+  for (auto& [id, image] : images) image.camera_id = 7;
+  ASSERT_TRUE(Database::SetCameras(folder / "copy.db", cameras, images));
+  {
+    const Database changed(folder / "copy.db");
+    ASSERT_EQ(changed.ReadCameras().size(), 1u);
+    EXPECT_EQ(changed.ReadCameras().at(7).params, cameras[7].params);
+    for (const auto& [id, image] : changed.ReadImages()) EXPECT_EQ(image.camera_id, 7u);
+  }
+  SQLite::Database copy(folder / "copy.db");
+  const auto count = [&](const std::string& of) {
+    return copy.execAndGet("SELECT COUNT(*) FROM " + of).getInt();
+  };
+  EXPECT_EQ(count("rigs"), 1);
+  EXPECT_EQ(count("rigs WHERE rig_id = 7 AND ref_sensor_id = 7 AND ref_sensor_type = 0"), 1);
+  EXPECT_EQ(count("frames WHERE rig_id = 7"), static_cast<int>(images.size()));
+  EXPECT_EQ(count("frame_data WHERE frame_id = data_id AND sensor_id = 7 AND sensor_type = 0"),
+            static_cast<int>(images.size()));
+  EXPECT_EQ(count("pose_priors WHERE corr_sensor_id = 7"), 1);
+}
+
+TEST(DatabaseCopy, LeavesTheCamerasOfRigsAlone) {
+  const TempFolder folder;
+  const SimulatedViews views = SmallSet();
+  {
+    DatabaseMaker maker(folder / "database.db", DatabaseMaker::Schema::k41);
+    maker.AddCamera(views.cameras.at(1));
+    maker.AddCamera(views.cameras.at(2));
+    for (const auto& [id, image] : views.images) maker.AddImage(id, image.name, image.camera_id);
+    maker.Run("INSERT INTO rig_sensors VALUES (1, 2, 0, NULL)");
+  }
+  const Database original(folder / "database.db");
+  original.CopyForMapper(folder / "copy.db", Database::Schema::kAsIs);
+  const std::string before = ReadBytes(folder / "copy.db");
+  EXPECT_FALSE(Database::SetCameras(folder / "copy.db", {}, original.ReadImages()));
+  EXPECT_EQ(ReadBytes(folder / "copy.db"), before);
+}
+
 // What a database may carry beside data. Every road by which we use it is gone: nothing of this is
 // run, the copies hold tables and rows alone, and the file itself stays as it was.
 class CraftedDatabase : public testing::TestWithParam<const char*> {};

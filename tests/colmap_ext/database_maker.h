@@ -38,7 +38,12 @@ class DatabaseMaker {
           "INTEGER NOT NULL, ref_sensor_type INTEGER NOT NULL)");
       Run("CREATE TABLE frames (frame_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, rig_id "
           "INTEGER NOT NULL)");
-      Run("CREATE TABLE pose_priors (pose_prior_id INTEGER PRIMARY KEY NOT NULL, position BLOB)");
+      Run("CREATE TABLE rig_sensors (rig_id INTEGER NOT NULL, sensor_id INTEGER NOT NULL, "
+          "sensor_type INTEGER NOT NULL, sensor_from_rig BLOB)");
+      Run("CREATE TABLE frame_data (frame_id INTEGER NOT NULL, data_id INTEGER NOT NULL, "
+          "sensor_id INTEGER NOT NULL, sensor_type INTEGER NOT NULL)");
+      Run("CREATE TABLE pose_priors (pose_prior_id INTEGER PRIMARY KEY NOT NULL, position BLOB, "
+          "corr_data_id INTEGER, corr_sensor_id INTEGER, corr_sensor_type INTEGER)");
       Run("PRAGMA user_version = 4010100");
     }
   }
@@ -55,6 +60,8 @@ class DatabaseMaker {
     BindBlob(&insert, 5, camera.params);
     insert.bind(6, camera.has_prior_focal_length ? 1 : 0);
     insert.exec();
+    const std::string id = std::to_string(camera.camera_id);
+    if (schema_ == Schema::k41) Run("INSERT INTO rigs VALUES (" + id + ", " + id + ", 0)");
   }
 
   void AddImage(uint32_t image_id, const std::string& name, uint32_t camera_id) {
@@ -64,6 +71,10 @@ class DatabaseMaker {
     insert.bind(2, name);
     insert.bind(3, static_cast<int64_t>(camera_id));
     insert.exec();
+    if (schema_ == Schema::k38) return;
+    const std::string id = std::to_string(image_id), camera = std::to_string(camera_id);
+    Run("INSERT INTO frames VALUES (" + id + ", " + camera + ")");
+    Run("INSERT INTO frame_data VALUES (" + id + ", " + id + ", " + camera + ", 0)");
   }
 
   // num_columns 2, 4 or 6; the columns behind x and y hold numbers that nobody may take for

@@ -204,15 +204,13 @@ double PhotoRegistrar::MeanScale() const {
 
 void PhotoRegistrar::Look(int level) {
   level_ = level;
-  std::vector<cv::Mat1b> pictures;
-  std::vector<double> scales;
+  std::vector<LevelPicture> pictures;
   std::vector<float> gains;
   for (const RegisteredPhoto& photo : registered_) {
-    pictures.push_back(photo.levels[level]);
-    scales.push_back(photo.scale / (1 << level));
+    pictures.push_back(photo.At(level));
     gains.push_back(photo.gain);
   }
-  samples_.Look(photos_, pictures, scales, gains, num_threads_);
+  samples_.Look(photos_, pictures, gains, num_threads_);
 }
 
 bool PhotoRegistrar::IsCompared(const Sighting& s) const {
@@ -237,6 +235,8 @@ void PhotoRegistrar::Load(int i, const Eigen::Vector3f& gain) {
   if (photo.scale < 1) {
     cv::resize(grey, grey, {}, photo.scale, photo.scale, cv::INTER_AREA);
   }
+  photo.scales = Eigen::Array2f(static_cast<float>(grey.cols), static_cast<float>(grey.rows)) /
+                 Eigen::Array2f(static_cast<float>(picture.cols), static_cast<float>(picture.rows));
   photo.levels.push_back(grey);
   for (int level = 1; level < kNumLevels; ++level) {
     cv::Mat1b next;
@@ -280,14 +280,14 @@ std::vector<ExpectedPixel> PhotoRegistrar::Expect(int i, const std::vector<int>&
                                                   Eigen::Vector2f* middle) const {
   const RegisteredPhoto& photo = registered_[i];
   const std::vector<Sighting>& sightings = samples_.Of(i);
-  const auto scale = static_cast<float>(photo.scale / (1 << level_));
+  const LevelPicture picture = photo.At(level_);
   const size_t skip = std::max<size_t>(1, members.size() / kMostPixels);
   std::vector<ExpectedPixel> expected;
   middle->setZero();
   for (size_t k = 0; k < members.size(); k += skip) {
     const Sighting& s = sightings[members[k]];
     const Eigen::Vector2f shown = s.place + photo.shown.At(s.place.x(), s.place.y());
-    expected.push_back({shown * scale, grey_of(s)});
+    expected.push_back({picture.Place(shown), grey_of(s)});
     *middle += s.place;
   }
   *middle /= static_cast<float>(expected.size());

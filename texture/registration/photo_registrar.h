@@ -95,8 +95,10 @@ class PhotoRegistrar {
  private:
   // A photo in grey, and how it has been moved.
   struct RegisteredPhoto {
-    std::vector<cv::Mat1b> levels;  // the next one has half the size
-    double scale = 1;               // pixels of the first level per pixel of the photo
+    std::vector<cv::Mat1b> levels;                   // the next one has half the size
+    Eigen::Array2f scales = Eigen::Array2f::Ones();  // `scale` along x and y, to whole pixels
+    LevelPicture At(int level) const { return {levels[level], level, scales}; }
+    double scale = 1;  // pixels of the first level per pixel of the photo
     float gain = 1;
     std::optional<CameraProjection> camera;
     Rigid first_pose;

@@ -70,8 +70,8 @@ void SharedSamples::ListBySample() {
   }
 }
 
-void SharedSamples::LookFrom(const PhotoView& photo, const cv::Mat1b& picture, double scale,
-                             float gain, std::vector<Sighting>* sightings) const {
+void SharedSamples::LookFrom(const PhotoView& photo, const LevelPicture& picture, float gain,
+                             std::vector<Sighting>* sightings) const {
   const PhotoProjector projector(photo);
   ProjectedBlock projected;
   size_t at = 0;
@@ -86,18 +86,17 @@ void SharedSamples::LookFrom(const PhotoView& photo, const cv::Mat1b& picture, d
       s.place = {projected.x[i], projected.y[i]};
       Eigen::Vector2f shown = s.place;
       if (photo.warp) shown += photo.warp->At(s.place.x(), s.place.y());
-      const float grey = GreyAt(picture, shown * static_cast<float>(scale));
+      const float grey = GreyAt(picture.grey, picture.Place(shown));
       if (grey >= 0) s.grey = grey * gain;
     }
   }
 }
 
 void SharedSamples::Look(const std::vector<PhotoView>& photos,
-                         const std::vector<cv::Mat1b>& pictures, const std::vector<double>& scales,
-                         const std::vector<float>& gains, int num_threads) {
-  ParallelFor(num_threads, 0, num_photos(), [&](int i) {
-    LookFrom(photos[i], pictures[i], scales[i], gains[i], &sightings_[i]);
-  });
+                         const std::vector<LevelPicture>& pictures, const std::vector<float>& gains,
+                         int num_threads) {
+  ParallelFor(num_threads, 0, num_photos(),
+              [&](int i) { LookFrom(photos[i], pictures[i], gains[i], &sightings_[i]); });
   weight_.assign(normals_.size(), 0.0f);
   sum_.assign(normals_.size(), 0.0f);
   for (const auto& sightings : sightings_) {

@@ -22,6 +22,20 @@ struct Sighting {
   Eigen::Vector2f place = Eigen::Vector2f::Zero();  // `img`, by the camera model
 };
 
+// One level of a photo's pyramid.
+struct LevelPicture {
+  cv::Mat1b grey;
+  int level = 0;                                  // each has half the pixels of the one before
+  Eigen::Array2f scale = Eigen::Array2f::Ones();  // pixels of level 0 per pixel of the photo
+
+  // Where it shows a place of the photo; both `img`. cv::pyrDown puts the middle of its pixel j
+  // onto the middle of pixel 2 j.
+  Eigen::Vector2f Place(const Eigen::Vector2f& in_photo) const {
+    const float share = 1.0f / static_cast<float>(1 << level);
+    return in_photo.array() * scale * share + 0.5f * (1 - share);
+  }
+};
+
 class SharedSamples {
  public:
   // An even selection of the samples that two photos or more see without doubt, by what is kept of
@@ -33,9 +47,9 @@ class SharedSamples {
 
   // Looks at all samples anew in the pictures of one level of detail, from where the photos stand
   // now, and adds up what they say.
-  // pictures: per photo, 8-bit; scales: pixels of it per pixel of the photo; gains: of its greys.
-  void Look(const std::vector<PhotoView>& photos, const std::vector<cv::Mat1b>& pictures,
-            const std::vector<double>& scales, const std::vector<float>& gains, int num_threads);
+  // pictures, gains of their greys: per photo.
+  void Look(const std::vector<PhotoView>& photos, const std::vector<LevelPicture>& pictures,
+            const std::vector<float>& gains, int num_threads);
 
   int num_photos() const { return static_cast<int>(sightings_.size()); }
   // Ordered by sample.
@@ -63,7 +77,7 @@ class SharedSamples {
 
  private:
   void ListBySample();
-  void LookFrom(const PhotoView& photo, const cv::Mat1b& picture, double scale, float gain,
+  void LookFrom(const PhotoView& photo, const LevelPicture& picture, float gain,
                 std::vector<Sighting>* sightings) const;
 
   std::vector<PointBlock> blocks_;

@@ -40,13 +40,16 @@ inline float UnpackWeight(uint16_t code) {
 }
 
 struct Observation {
-  Observation() : photo(0), in_doubt(0) {}
-  uint32_t color = 0;     // PackColor, as photographed
-  uint16_t weight = 0;    // PackWeight; 0 = empty
-  uint16_t photo : 15;    // number of the photo
+  Observation() : photo(0), at_boundary(0), in_doubt(0) {}
+  uint32_t color = 0;   // PackColor, as photographed
+  uint16_t weight = 0;  // PackWeight; 0 = empty
+  uint16_t photo : 14;  // number of the photo
+  // Near a depth boundary of what the photo sees, Sight::kBoundary or less: the colour may be that
+  // of another surface.
+  uint16_t at_boundary : 1;
   uint16_t in_doubt : 1;  // something unseen may stand in front: Sight::kShadow or kFringe
 };
-inline constexpr int kMaxPhotos = 1 << 15;
+inline constexpr int kMaxPhotos = 1 << 14;
 static_assert(sizeof(Observation) == 8, "memory per sample is counted on this");
 
 // The best observations of every sample: of more than `capacity` photos those with the largest

@@ -119,6 +119,7 @@ class PhotoObserver {
           PackColor(vignetting_ ? color.linear * vignetting_->At(x, y) : color.linear);
       observation.weight = PackWeight(std::max(weight, 1e-10f));
       observation.photo = static_cast<uint16_t>(photo) & (kMaxPhotos - 1);
+      observation.at_boundary = sight != Sight::kClear;
       observation.in_doubt =
           sight < Sight::kBoundary || (moving_ && moving_->At(shown.x(), shown.y()));
       seen->all.push_back({tile.first_slot + i, observation});

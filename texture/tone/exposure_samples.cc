@@ -9,8 +9,9 @@
 namespace roomtex {
 namespace {
 
-// Observations of less weight lie in a depth-boundary band.
-constexpr float kLeastWeight = 0.002f;
+// Of the weight of the sample's best view. Not a weight of its own: where samples lie closer than
+// pixels, all views of a sample weigh little.
+constexpr float kLeastShare = 0.002f;
 
 // 0 at `from`, 1 at `to`.
 float Ramp(float value, float from, float to) {
@@ -20,8 +21,12 @@ float Ramp(float value, float from, float to) {
 // Adds the usable views of one sample; none if fewer than two photos have one.
 void AddSample(const ObservationStore& store, size_t slot, ExposureSamples* samples) {
   const Observation* observations = store.Begin(slot);
+  float best = 0;
   for (int i = 0; i < store.Count(slot); ++i) {
-    if (UnpackWeight(observations[i].weight) < kLeastWeight) continue;
+    if (observations[i].at_boundary) continue;
+    const float weight = UnpackWeight(observations[i].weight);
+    best = std::max(best, weight);
+    if (weight < kLeastShare * best) continue;
     ExposureView view;
     view.light = UnpackColor(observations[i].color);
     view.trust = ExposureTrust(view.light);

@@ -3,6 +3,9 @@
 #include <cmath>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "texture/registration/shared_samples.h"
 
 namespace roomtex {
 namespace {
@@ -46,6 +49,26 @@ TEST(ShiftPatch, FindsAShiftBetweenThePixelsInAnyLight) {
   EXPECT_NEAR(found.shift.x(), truth.x(), 0.1);
   EXPECT_NEAR(found.shift.y(), truth.y(), 0.1);
   EXPECT_GT(found.likeness, 0.99);
+}
+
+// Light that grows evenly stays what it is on every level, so that a place tells its own number.
+TEST(ShiftPatch, APlaceIsTheSameOnEveryLevelOfThePyramid) {
+  LevelPicture picture;
+  picture.scale = {0.5f, 1};
+  picture.grey = cv::Mat1b(64, 64);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) picture.grey(y, x) = static_cast<uint8_t>(x + 2 * y);
+  }
+  const Eigen::Vector2f in_photo(61.4f, 30.3f);
+  const float here = GreyAt(picture.grey, picture.Place(in_photo));
+  EXPECT_NEAR(here, 30.7 - 0.5 + 2 * (30.3 - 0.5), 0.01);
+  for (picture.level = 1; picture.level <= 2; ++picture.level) {
+    cv::Mat1b half;
+    cv::pyrDown(picture.grey, half);
+    picture.grey = half;
+    // Greys are rounded to whole ones.
+    EXPECT_NEAR(GreyAt(picture.grey, picture.Place(in_photo)), here, 0.5) << picture.level;
+  }
 }
 
 TEST(ShiftPatch, KnowsNothingAlongStripes) {

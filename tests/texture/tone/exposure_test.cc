@@ -187,6 +187,27 @@ TEST(Exposure, TrustsNeitherClippedNorNearlyBlackLight) {
   EXPECT_NEAR(overlaps[0].log_ratio[3], -std::log(4), 0.01);
 }
 
+// Where samples lie much closer than pixels, every view weighs little (ResolutionWeight); the third
+// photo's lie at a depth boundary and show something else.
+TEST(Exposure, ComparesViewsOfLittleWeightButNoneAtABoundary) {
+  ObservationStore store(3000, 3);
+  for (int i = 0; i < 3000; ++i) {
+    const float truth = 0.05f + 0.0001f * static_cast<float>(i);
+    for (int p = 0; p < 3; ++p) {
+      Observation o;
+      o.color =
+          PackColor(Eigen::Vector3f::Constant(p == 2 ? 0.3f : truth * (p == 0 ? 1.0f : 2.0f)));
+      o.weight = PackWeight(p == 0 ? 0.003f : p == 1 ? 0.0004f : 0.000003f);
+      o.photo = static_cast<uint16_t>(p);
+      o.at_boundary = p == 2;
+      store.Add(i, o);
+    }
+  }
+  const std::vector<Overlap> overlaps = FindOverlaps(SelectSamples(store, 3));
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_NEAR(overlaps[0].log_ratio[3], -std::log(2), 0.01);
+}
+
 TEST(Exposure, ModeExifMatchesPhotosWithoutExif) {
   Capture capture(kExposures, 6000, 0.02, Chain);
   capture.exif[3] = ExposureData();
