@@ -1,6 +1,7 @@
 #include "align/automatic_alignment.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "align/start_appearance.h"
@@ -23,11 +24,13 @@ std::string ContradictingHint(const AlignmentInput& input, const Alignment& alig
     const Pick& pick = input.picks[i];
     const SparseImage& image = *input.model.FindImage(pick.image_name);
     const double limit = 2 * trust.PickRmsLimit(input.model.cameras.at(image.camera_id));
-    if (!(pick.weight > 0) || alignment.refined_pick_px[i] < limit) continue;
-    return "The pick on " + LineOf(pick) + " (" + pick.image_name + ") is " +
-           Number(alignment.refined_pick_px[i], 0) +
-           " pixels away from where the alignment puts it, that was found with it as a hint. "
-           "Correct or remove it, or add others.";
+    const double off_px = alignment.refined_pick_px[i];
+    if (!(pick.weight > 0) || off_px < limit) continue;
+    const std::string where = std::isfinite(off_px) ? Number(off_px, 0) + " pixels away from where"
+                                                    : "out of the photo's sight where";
+    return "The pick on " + LineOf(pick) + " (" + pick.image_name + ") is " + where +
+           " the alignment puts it, that was found with it as a hint. Correct or remove it, or add "
+           "others.";
   }
   return "";
 }

@@ -33,13 +33,13 @@ const char* SurfaceName(FaceKind kind) {
   }
 }
 
-// What GIS programs show of a building.
-Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid) {
+// What GIS programs show of a building. height: of the outline's origin in what is written.
+Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid, double height) {
   const auto [eaves, ridge] = solid.RoofHeights();
   Json json;
-  json["ground_height"] = building.ground;
-  json["eaves_height"] = eaves;
-  json["ridge_height"] = ridge;
+  json["ground_height"] = height + building.ground;
+  json["eaves_height"] = height + eaves;
+  json["ridge_height"] = height + ridge;
   json["measured_height"] = ridge - building.ground;
   json["roof"] = building.RoofShape();
   json["footprint_area"] = PolygonArea(building.footprint);
@@ -49,7 +49,8 @@ Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid) {
 
 // Where GIS programs want the vertices, and what that is called.
 struct MapFrame {
-  int epsg = 0;  // 0 = the outline's own coordinates
+  int epsg = 0;              // 0 = the outline's own coordinates
+  double origin_height = 0;  // of the outline's origin, metres above the ellipsoid
   std::function<Eigen::Vector3d(const Eigen::Vector3d&)> from_outline;
 };
 
@@ -59,6 +60,7 @@ MapFrame MapFrameOf(const Outline& outline) {
   if (!outline.geo || !outline.geo->GridFromEnu(Eigen::Vector3d::Zero())) return frame;
   const GeoFrame& geo = *outline.geo;
   frame.epsg = geo.GridOfOrigin().EpsgCode();
+  frame.origin_height = geo.origin().height;
   frame.from_outline = [geo](const Eigen::Vector3d& x) -> Eigen::Vector3d {
     const auto grid = geo.GridFromEnu(x);
     if (!grid) {
@@ -281,7 +283,7 @@ void WriteCityJson(const std::string& path, const Outline& outline) {
     geometry["semantics"] = {{"surfaces", surfaces}, {"values", Json::array({values})}};
     Json object;
     object["type"] = "Building";
-    object["attributes"] = AttributesOf(*building, ExtrudeBuilding(*building));
+    object["attributes"] = AttributesOf(*building, ExtrudeBuilding(*building), map.origin_height);
     object["geometry"] = Json::array({geometry});
     json["CityObjects"]["building_" + building->name] = object;
   }
@@ -341,7 +343,7 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
   int building_number = 0;
   for (const OutlineBuilding& building : outline.buildings) {
     BuildingSolid solid = ExtrudeBuilding(building);
-    const Json attributes = AttributesOf(building, solid);
+    const Json attributes = AttributesOf(building, solid, map.origin_height);
     for (Eigen::Vector3d& vertex : solid.vertices) {
       vertex = map.from_outline(vertex);
       box.extend(vertex);
@@ -426,16 +428,10 @@ void WriteGeoJson(const std::string& path, const Outline& outline) {
         ring.push_back({corner.x(), corner.y()});
       }
     }
-    Json properties = AttributesOf(building, ExtrudeBuilding(building));
     Json named;
     named["name"] = building.name;
-    named.update(properties);
-    if (outline.geo) {
-      // Heights of the file are those of the enu frame: above the ellipsoid by the origin's.
-      for (const char* name : {"ground_height", "eaves_height", "ridge_height"}) {
-        named[name] = named[name].get<double>() + outline.geo->origin().height;
-      }
-    }
+    named.update(AttributesOf(building, ExtrudeBuilding(building),
+                              outline.geo ? outline.geo->origin().height : 0));
     Json feature;
     feature["type"] = "Feature";
     feature["properties"] = named;

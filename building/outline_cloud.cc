@@ -263,6 +263,19 @@ void LimitPoints(OutlineCloud* cloud) {
   }
 }
 
+// What --geo_origin must not stand beside, must not stand beside a place on the Earth that the
+// input has by itself, either.
+void RequireNoOtherFrame(const OutlineInputOptions& options, bool is_on_earth) {
+  if (!is_on_earth) return;
+  const char* const has_place = " has its place on the Earth by itself, ";
+  if (!options.up.empty()) {
+    throw UsageError(options.input_path + has_place + "and with it what is up: leave --up out");
+  }
+  if (options.scale != 0 && options.scale != 1) {
+    throw UsageError(options.input_path + has_place + "in metres: leave --scale out");
+  }
+}
+
 }  // namespace
 
 void OutlineInputOptions::Declare(OptionFields* fields) {
@@ -375,6 +388,7 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
                          std::to_string(kFewestPoints) + ")",
                      "Give a model or cloud with more points");
   }
+  RequireNoOtherFrame(options, place.geo || LooksEarthCentred(cloud.points));
   // A model beside a cloud is that of its points; alone, a cloud is in metres as all scans are.
   cloud.frame.metric = place.aligned || options.scale > 0 || !options.geo_origin.empty() ||
                        (!is_model && model_folder.empty());

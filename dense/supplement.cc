@@ -1,6 +1,7 @@
 #include "dense/supplement.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <unordered_map>
 
@@ -222,10 +223,35 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
   return result;
 }
 
-// Cells that earlier photos have filled, and with which photo's vertices.
+// Cells that earlier photos have filled. A photo whose vertices lie further apart fills larger
+// ones: each level's are twice as large as those of the one before.
 struct SupplementBuilder::Taken {
-  std::unordered_map<uint64_t, int> photo_of_cell;
+  static constexpr int kNumLevels = 10;
+  std::array<std::unordered_map<uint64_t, int>, kNumLevels> photo_of_cell;
   int num_photos = 0;
+
+  static double CellSize(const SupplementOptions& options, int level) {
+    return 2 * options.spacing * (1 << level);
+  }
+  // Of a photo with a vertex every `pitch` metres.
+  static int LevelOf(const SupplementOptions& options, double pitch) {
+    constexpr double kVertexDistances = 1.3;  // so that no cell of a sheet stays empty
+    int level = 0;
+    while (level + 1 < kNumLevels && CellSize(options, level) < kVertexDistances * pitch) ++level;
+    return level;
+  }
+
+  // False where another photo has filled the place, whatever the size of its cells.
+  bool Take(const Eigen::Vector3d& x_in_scan, int photo, int level,
+            const SupplementOptions& options) {
+    for (int other = 0; other < kNumLevels; ++other) {
+      const auto& cells = photo_of_cell[other];
+      const auto found = cells.find(CellKey(x_in_scan, CellSize(options, other)));
+      if (found != cells.end() && found->second != photo) return false;
+    }
+    photo_of_cell[level].emplace(CellKey(x_in_scan, CellSize(options, level)), photo);
+    return true;
+  }
 };
 
 SupplementBuilder::SupplementBuilder(const SupplementOptions& options)
@@ -244,7 +270,7 @@ void SupplementBuilder::Add(const StereoView& view, const ConfirmedDepth& confir
   if (depths.empty()) return;
   const double pixel = Median(&depths) / view.camera.params[0];
   const int step = std::max(1, static_cast<int>(std::lround(options_.spacing / pixel)));
-  const double cell = 2 * std::max(options_.spacing, step * pixel);
+  const int level = Taken::LevelOf(options_, step * pixel);
   const CameraProjection projection(view.camera);
   const Rigid scan_from_cam = view.cam_from_scan.Inverse();
   const int columns = confirmed.depth.cols / step, rows = confirmed.depth.rows / step;
@@ -258,9 +284,7 @@ void SupplementBuilder::Add(const StereoView& view, const ConfirmedDepth& confir
       const float depth = confirmed.depth(y, x);
       SupplementVertex vertex;
       vertex.x_in_scan = scan_from_cam * (*projection.RayFromImg({x + 0.5, y + 0.5}) * depth);
-      const auto [found, is_first] =
-          taken_->photo_of_cell.try_emplace(CellKey(vertex.x_in_scan, cell), photo);
-      if (!is_first && found->second != photo) continue;
+      if (!taken_->Take(vertex.x_in_scan, photo, level, options_)) continue;
       const Eigen::Vector3d normal(confirmed.normals[0](y, x), confirmed.normals[1](y, x),
                                    confirmed.normals[2](y, x));
       vertex.normal = (scan_from_cam.rotation * normal).cast<float>();

@@ -92,6 +92,13 @@ class E57ScanReader {
     scan_.num_rows = grid_->num_rows();
     scan_.num_columns = grid_->num_columns();
     const size_t cells = static_cast<size_t>(scan_.num_rows) * scan_.num_columns;
+    // With many empty cells the grid takes more than its records, which were asked about before.
+    const double cell_bytes = sizeof(Eigen::Vector3d) + sizeof(float) * (1 + reader_.HasReturns()) +
+                              3.0 * static_cast<double>(HasColors());
+    RequireMemory(scan_.path,
+                  "a grid of " + std::to_string(scan_.num_columns) + " x " +
+                      std::to_string(scan_.num_rows) + " cells",
+                  static_cast<double>(cells) * cell_bytes, "Export the scan with a coarser grid");
     scan_.points.assign(cells, Scan::MissingPoint());
     scan_.intensity.assign(cells, 0.0f);
     if (HasColors()) scan_.colors.assign(cells, {0, 0, 0});

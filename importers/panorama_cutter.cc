@@ -85,6 +85,27 @@ void WriteCameraOptions(const Camera& camera, const std::string& path) {
   file.Commit();
 }
 
+// Faces that an earlier run cut and this one does not: features and matches would come to lie on
+// them.
+void RemoveOlderFaces(const std::string& folder, const std::vector<CutPanorama>& panoramas,
+                      OutputSet* outputs) {
+  std::set<std::string> names;
+  for (const CutPanorama& panorama : panoramas) {
+    for (const CutPanorama::Face& face : panorama.faces) names.insert(face.name);
+  }
+  const std::string set = folder + "/panoramas.json";
+  if (!fs::exists(set)) return;
+  try {
+    for (const CutPanorama& panorama : ReadPanoramaSet(set)) {
+      for (const CutPanorama::Face& face : panorama.faces) {
+        if (names.count(face.name) == 0) outputs->Remove(face.name);
+      }
+    }
+  } catch (const InputError&) {
+    // Of somebody else, or damaged: it is replaced, and says nothing of other files.
+  }
+}
+
 }  // namespace
 
 bool IsPanoramaInput(const std::string& input_path) {
@@ -115,7 +136,12 @@ std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
     return p.face_camera.width == camera.width && p.face_camera.params == camera.params;
   });
   const fs::path folder = outputs.aside();
-  if (is_one) WriteCameraOptions(camera, (folder / "camera_options.txt").string());
+  if (is_one) {
+    WriteCameraOptions(camera, (folder / "camera_options.txt").string());
+  } else {
+    outputs.Remove("camera_options.txt");
+  }
+  RemoveOlderFaces(output_folder, panoramas, &outputs);
   WritePanoramaSet(panoramas, (folder / "panoramas.json").string());
   outputs.Commit();
   return panoramas;

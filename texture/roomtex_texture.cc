@@ -388,7 +388,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
     result.exposure.tones[0]->response.Write(outputs->Path("response.txt"));
   }
 
-  WriteAll(scans, result.scans, list.photos, options, !by_station, context, outputs.get(),
+  WriteAll(scans, result.scans, result.photos, options, !by_station, context, outputs.get(),
            &context.report.keys());
   if (by_station) {
     // Of the thinned scans no more is needed than where they stand, and what they hide.

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sstream>
 
 #include "core/error.h"
@@ -39,6 +40,11 @@ std::optional<KnownCamera> CalibrationOf(const PhotoGroup& group, const PhotoGro
 
 constexpr size_t kEnoughForOpencv = 10;  // photos
 
+// Of a camera that nobody calibrated and few photos are of.
+std::string ModelOfFew(const AutoOptions& options) {
+  return options.camera_model.empty() ? "SIMPLE_RADIAL" : options.camera_model;
+}
+
 void AddCamera(const PhotoGroup& group, const PhotoGroup& largest, const AutoOptions& options,
                CommandLine* line, std::vector<std::string>* notes) {
   const std::optional<KnownCamera> known = CalibrationOf(group, largest, options);
@@ -48,9 +54,8 @@ void AddCamera(const PhotoGroup& group, const PhotoGroup& largest, const AutoOpt
     notes->push_back(group.Text() + ": one camera, calibrated");
     return;
   }
-  const std::string model = !options.camera_model.empty()            ? options.camera_model
-                            : group.names.size() >= kEnoughForOpencv ? "OPENCV"
-                                                                     : "SIMPLE_RADIAL";
+  const bool enough = options.camera_model.empty() && group.names.size() >= kEnoughForOpencv;
+  const std::string model = enough ? "OPENCV" : ModelOfFew(options);
   AddOption("--ImageReader.camera_model", model, line);
   notes->push_back(group.Text() + ": one camera, not calibrated (" + model + ")" +
                    (options.cameras_path.empty() ? "" : "; --cameras_path has none of their size"));
@@ -162,6 +167,19 @@ void AddLensOfPhotosAlone(Chain* chain, CommandLine* line) {
   }
 }
 
+// The photos of one camera, as the step's next command.
+void AddGroup(Chain* chain, const PhotoGroup& group, const PhotoGroup& largest,
+              const CommandLine& start, bool with_list, Step* step) {
+  CommandLine line = start;
+  if (with_list) {
+    const std::string number = std::to_string(step->commands.size() + 1);
+    AddList(group.names, chain->At("log/photos_of_camera_" + number + ".txt"), &line, step);
+  }
+  AddOption("--ImageReader.single_camera", "1", &line);
+  AddCamera(group, largest, chain->options(), &line, &step->notes);
+  step->commands.push_back(line);
+}
+
 Step MakeFeatures(Chain* chain) {
   const AutoOptions& options = chain->options();
   Step step;
@@ -182,23 +200,37 @@ Step MakeFeatures(Chain* chain) {
     line.insert(line.end(), words.begin(), words.end());
     step.commands = {line};
   } else if (groups.size() > std::max<size_t>(4, photos.size() / 3)) {
-    CommandLine line = start;
-    std::vector<std::string> names;
-    for (const PhotoFacts& photo : photos) names.push_back(photo.name);
-    if (has_scanner) AddList(names, chain->At("log/photos_of_the_user.txt"), &line, &step);
-    step.commands = {line};
-    step.notes.push_back(std::to_string(groups.size()) +
-                         " cameras or focal lengths: a camera for every photo");
-  } else {
-    for (size_t i = 0; i < groups.size(); ++i) {
-      CommandLine line = start;
-      if (groups.size() > 1 || has_scanner) {
-        AddList(groups[i].names,
-                chain->At("log/photos_of_camera_" + std::to_string(i + 1) + ".txt"), &line, &step);
+    std::map<std::string, PhotoGroup> calibrated;  // by their parameters
+    std::vector<std::string> others;
+    for (const PhotoGroup& group : groups) {
+      const auto known = CalibrationOf(group, groups[0], options);
+      if (known) {
+        PhotoGroup& alike = calibrated.emplace(known->params, group).first->second;
+        if (alike.names == group.names) continue;
+        alike.names.insert(alike.names.end(), group.names.begin(), group.names.end());
+      } else {
+        others.insert(others.end(), group.names.begin(), group.names.end());
       }
-      AddOption("--ImageReader.single_camera", "1", &line);
-      AddCamera(groups[i], groups[0], options, &line, &step.notes);
+    }
+    for (const auto& [params, group] : calibrated) {
+      AddGroup(chain, group, groups[0], start, true, &step);
+    }
+    if (!others.empty()) {
+      CommandLine line = start;
+      if (has_scanner || !step.commands.empty()) {
+        AddList(others, chain->At("log/photos_of_other_cameras.txt"), &line, &step);
+      }
+      const std::string model = ModelOfFew(options);
+      AddOption("--ImageReader.camera_model", model, &line);
       step.commands.push_back(line);
+      step.notes.push_back(std::to_string(groups.size()) +
+                           " cameras or focal lengths: a camera for every photo that is not "
+                           "calibrated (" +
+                           model + ")");
+    }
+  } else {
+    for (const PhotoGroup& group : groups) {
+      AddGroup(chain, group, groups[0], start, groups.size() > 1 || has_scanner, &step);
     }
   }
   for (CommandLine& line : step.commands) AddPassed(options.passed.features, &line);

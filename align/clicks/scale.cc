@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
@@ -54,11 +55,25 @@ double MaxRadius2(const CameraProjection& projection) {
   return radius2 * (1 + 4 * kMargin) * (1 + 4 * kMargin);
 }
 
+// The cone about the camera's axis that the photo lies in, against a sphere around the triangle:
+// false only where no part of it can be in view. Corners: camera frame.
+bool MayBeInView(double half_angle, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                 const Eigen::Vector3d& c) {
+  const Eigen::Vector3d middle = (a + b + c) / 3;
+  const double radius = std::max({(a - middle).norm(), (b - middle).norm(), (c - middle).norm()});
+  const double distance = middle.norm();
+  if (!(distance > radius)) return distance == distance;  // NaN = a corner is missing
+  const double from_axis = std::acos(std::clamp(middle.z() / distance, -1.0, 1.0));
+  return from_axis - std::asin(radius / distance) < half_angle;
+}
+
 VisiblePart FindVisiblePart(const CameraProjection& projection, const Rigid& cam_from_scan,
                             const std::vector<Scan>& scans,
                             const std::vector<std::vector<Triangle>>& meshes) {
   VisiblePart part;
   const double max_radius2 = MaxRadius2(projection);
+  const double half_angle =
+      projection.camera().IsPerspective() ? std::atan(std::sqrt(max_radius2)) : kPi;
   const Eigen::Matrix3d r = cam_from_scan.rotation.toRotationMatrix();
   for (size_t s = 0; s < scans.size(); ++s) {
     const std::vector<Eigen::Vector3d>& points = scans[s].points;
@@ -68,9 +83,22 @@ VisiblePart FindVisiblePart(const CameraProjection& projection, const Rigid& cam
       renumbered[i] = static_cast<int>(part.points.size());
       part.points.push_back(points[i]);
     }
+    const auto in_cam = [&](int i) -> Eigen::Vector3d {
+      return r * points[i] + cam_from_scan.translation;
+    };
     for (const Triangle& t : meshes[s]) {
-      const Triangle moved = {renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]};
-      if (moved[0] >= 0 && moved[1] >= 0 && moved[2] >= 0) part.triangles.push_back(moved);
+      const bool all = renumbered[t[0]] >= 0 && renumbered[t[1]] >= 0 && renumbered[t[2]] >= 0;
+      // A wall of a mesh can be two triangles, whose corners no photo shows.
+      if (!all && (scans[s].organised ||
+                   !MayBeInView(half_angle, in_cam(t[0]), in_cam(t[1]), in_cam(t[2])))) {
+        continue;
+      }
+      for (const int corner : t) {
+        if (renumbered[corner] >= 0) continue;
+        renumbered[corner] = static_cast<int>(part.points.size());
+        part.points.push_back(points[corner]);
+      }
+      part.triangles.push_back({renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]});
     }
   }
   return part;

@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 
+#include "align/automatic_alignment.h"
 #include "align/command/align_outputs.h"
 #include "align/command/one_model.h"
 #include "align/surface/scan_planes_report.h"
@@ -80,6 +81,15 @@ std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,
   if (!any_known) RequirePicksOrPhotos(a);
   GiveOut(a, &models);
   for (ModelToAlign& one : models) {
+    // Of one model alone this is an error; the others may have what they need.
+    if (models.size() > 1 && a.image_path.empty() && !one.picks.empty() && AreHints(one.picks)) {
+      context.Warn(fmt::format(
+          "{} of the picks are in photos of {}, which are too few to place it, and without "
+          "--image_path nothing confirms them: they are left out.",
+          one.picks.size(), one.options.input_path));
+      one.picks.clear();
+      one.options.picks_path.clear();
+    }
     one.near = ReadHints(one.options, one.picks, one.model, context);
   }
   std::vector<const SparseModel*> all;

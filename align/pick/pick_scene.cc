@@ -92,6 +92,7 @@ void PickScene::ReadScans() {
   const AlignmentRecord record = ReadAlignmentRecord(input_.AlignedPath());
   PlacedScans placed =
       ReadScansOfModel(record, {input_.scan_paths, input_.scan_poses, input_.scan_reader});
+  input_.remembers_scans = !record.scans.empty() && input_.scan_paths.empty();
   scans_ = std::move(placed.scans);
   ReplaceClouds(&scans_, input_.num_threads);
   notes_.insert(notes_.end(), placed.notes.begin(), placed.notes.end());

@@ -33,6 +33,7 @@ struct PickSceneInput {
   std::string panoramas_path;           // of MergeFaces(); may be empty
   PhotoCameraOptions camera;            // of those
   std::vector<std::string> scan_paths;  // empty: those that the one model remembers
+  bool remembers_scans = false;         // found: it does, and no other paths were given
   ScanReaderOptions scan_reader;
   int num_threads = -1;
 

@@ -41,6 +41,22 @@ bool IsHint(const PickSession::Snapshot& snapshot) {
          }) < kMinPicksPerPhoto;
 }
 
+void AddScans(const PickSceneInput& input, std::vector<std::string>* arguments) {
+  const auto add = [&](const std::string& name, const std::string& value) {
+    arguments->insert(arguments->end(), {name, value});
+  };
+  for (const std::string& path : input.scan_paths) add("--scan_path", path);
+  if (!input.scan_poses.empty()) add("--scan_poses", input.scan_poses);
+  const ScanReaderOptions &reader = input.scan_reader, defaults;
+  if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
+  if (reader.units != defaults.units) add("--units", reader.units);
+  if (reader.up_axis != defaults.up_axis) add("--up_axis", reader.up_axis);
+  if (reader.max_range != defaults.max_range) {
+    add("--max_range", Exact(reader.max_range));
+  }
+  if (!reader.e57_check) add("--E57.check", "0");
+}
+
 // What roomtex-align is given: what this command was given. Without picks it searches.
 std::vector<std::string> AlignArguments(const PickScene& scene, const PickSession& session,
                                         const PickServer::Setup& setup) {
@@ -51,7 +67,8 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
     arguments.push_back(value);
   };
   for (const std::string& path : input.input_paths) add("--input_path", path);
-  for (const std::string& path : input.scan_paths) add("--scan_path", path);
+  // Given once more they would be read as if nobody knew where they stand.
+  if (!input.remembers_scans) AddScans(input, &arguments);
   if (HasPairs(*session.Now())) add("--picks_path", session.picks_path());
   add("--output_path", setup.aligned_path);
   add("--image_path", input.image_path);
@@ -60,16 +77,7 @@ std::vector<std::string> AlignArguments(const PickScene& scene, const PickSessio
     add("--camera_model", input.camera.camera_model);
   }
   if (!input.camera.camera_params.empty()) add("--camera_params", input.camera.camera_params);
-  if (!input.scan_poses.empty()) add("--scan_poses", input.scan_poses);
   if (!input.panoramas_path.empty()) add("--panoramas_path", input.panoramas_path);
-  const ScanReaderOptions &reader = input.scan_reader, defaults;
-  if (reader.azimuth != defaults.azimuth) add("--azimuth", reader.azimuth);
-  if (reader.units != defaults.units) add("--units", reader.units);
-  if (reader.up_axis != defaults.up_axis) add("--up_axis", reader.up_axis);
-  if (reader.max_range != defaults.max_range) {
-    add("--max_range", Exact(reader.max_range));
-  }
-  if (!reader.e57_check) add("--E57.check", "0");
   if (input.num_threads > 0) add("--num_threads", std::to_string(input.num_threads));
   add("--overlays", std::to_string(kNumOverlays));
   return arguments;

@@ -207,6 +207,12 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
     EXPECT_EQ(city["metadata"]["referenceSystem"], "https://www.opengis.net/def/crs/EPSG/0/32632");
     EXPECT_NEAR(city["transform"]["translate"][0].get<double>(), 693400, 1000);
     EXPECT_NEAR(city["transform"]["translate"][1].get<double>(), 5330500, 1000);
+    // As high as the vertices are.
+    const std::string name = "building_" + house["properties"]["name"].get<std::string>();
+    const Json& attributes = city["CityObjects"][name]["attributes"];
+    EXPECT_NEAR(attributes["ridge_height"].get<double>(), 566, 0.05);
+    EXPECT_NEAR(attributes["measured_height"].get<double>(),
+                566 - attributes["ground_height"].get<double>(), 0.05);
     std::filesystem::remove(folder / "outline.json");
   };
   CommandResult result = RunCommandLine("roomtex-outline --input_path " + (folder / "model") +
@@ -230,6 +236,13 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
   result = RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + common);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   check();
+
+  for (const char* frame : {" --up 0,0,1", " --scale 2"}) {
+    result =
+        RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + frame + common);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_NE(result.err.find("place on the Earth by itself"), std::string::npos) << result.err;
+  }
 
   // As COLMAP's model_aligner makes it: about the middle of the Earth.
   SparseModel earth = street.model;

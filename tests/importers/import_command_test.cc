@@ -70,6 +70,16 @@ TEST_F(ImportCommand, CutsPanoramasIntoFaces) {
   const CommandResult refused = RunOn("photo.jpg", Output("other"));
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.err, HasSubstr("twice as wide as high"));
+  // What another run cut does not stay among the new faces; what is not ours does.
+  std::filesystem::remove(folder_ / "panoramas/a.jpg");
+  WriteBytes(folder_ / "faces/a/notes.txt", "mine");
+  ASSERT_EQ(
+      RunOn("panoramas", "--quiet --Faces.around 4 --Faces.poles 0" + Output("faces")).exit_code,
+      0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "faces/a/face_1.jpg"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "faces/a/notes.txt"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "faces/b/face_4.jpg"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "faces/b/face_5.jpg"));
   EXPECT_EQ(RunOn("panoramas", Output("panoramas")).exit_code, 2);
 }
 

@@ -129,6 +129,21 @@ TEST_F(StepTableTest, PhotosThatAllDifferGetACameraEach) {
   EXPECT_THAT(Line("features"), Not(HasSubstr("single_camera")));
 }
 
+TEST_F(StepTableTest, PhotosThatAllDifferHaveTheLensThatIsTold) {
+  for (int i = 0; i < 6; ++i) AddPhotos("a" + std::to_string(i), 1, 60 + 2 * i);
+  options_.camera_model = "RADIAL";
+  EXPECT_THAT(Line("features"), HasSubstr("--ImageReader.camera_model RADIAL"));
+  options_.camera_model.clear();
+  WriteBytes(folder_ / "cameras.txt", "1 PINHOLE 64 40 70 70 32 20\n");
+  options_.cameras_path = folder_ / "cameras.txt";
+  const Step step = Make("features");
+  ASSERT_EQ(step.commands.size(), 2u);
+  EXPECT_EQ(step.files[0].second, "a2100.jpg\n");
+  EXPECT_THAT(CommandText(step.commands[0]), HasSubstr("--ImageReader.camera_params 70,70,32,20"));
+  EXPECT_THAT(CommandText(step.commands[1]), Not(HasSubstr("camera_params")));
+  EXPECT_THAT(CommandText(step.commands[1]), HasSubstr("--ImageReader.camera_model SIMPLE_RADIAL"));
+}
+
 TEST_F(StepTableTest, ACalibrationGoesToThePhotosOfItsSize) {
   AddPhotos("a", 5, 60);
   AddPhotos("b", 3, 80);

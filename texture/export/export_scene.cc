@@ -1,7 +1,9 @@
 #include "texture/export/export_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <unordered_map>
 
 #include <opencv2/core.hpp>
@@ -76,7 +78,93 @@ std::vector<int> SpreadEvenly(const std::vector<Candidate>& candidates, int max_
   return chosen;
 }
 
+// Points in the cells of a lattice, to find the nearest one.
+class PointLattice {
+ public:
+  // edge: of a cell; a few points each are best.
+  PointLattice(const std::vector<Eigen::Vector3d>& points, double edge)
+      : points_(points), edge_(edge) {
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (points[i].allFinite()) of_cell_[Key(CellOf(points[i]))].push_back(static_cast<int>(i));
+    }
+  }
+
+  // -1 = none within `reach` cells.
+  int Nearest(const Eigen::Vector3d& place, int reach) const {
+    const Eigen::Vector3d middle = CellOf(place);
+    int nearest = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (int ring = 0; ring <= reach; ++ring) {
+      // Nothing of this ring or a later one is nearer than that.
+      if (nearest >= 0 && least <= (ring - 1) * edge_) break;
+      for (int x = -ring; x <= ring; ++x) {
+        for (int y = -ring; y <= ring; ++y) {
+          const bool is_side = std::max(std::abs(x), std::abs(y)) == ring;
+          for (int z = -ring; z <= ring; z += is_side || ring == 0 ? 1 : 2 * ring) {
+            const auto found = of_cell_.find(Key(middle + Eigen::Vector3d(x, y, z)));
+            if (found == of_cell_.end()) continue;
+            for (const int i : found->second) {
+              const double distance = (points_[i] - place).norm();
+              if (distance < least) {
+                least = distance;
+                nearest = i;
+              }
+            }
+          }
+        }
+      }
+    }
+    return nearest;
+  }
+
+ private:
+  Eigen::Vector3d CellOf(const Eigen::Vector3d& place) const {
+    return (place / edge_).array().floor();
+  }
+  // Cells 2^21 apart share a key, which costs time and changes nothing.
+  static uint64_t Key(const Eigen::Vector3d& cell) {
+    uint64_t key = 0;
+    for (int k = 0; k < 3; ++k) {
+      key = key << 21 | (static_cast<uint64_t>(static_cast<int64_t>(cell[k])) & 0x1fffff);
+    }
+    return key;
+  }
+
+  const std::vector<Eigen::Vector3d>& points_;
+  double edge_;
+  std::unordered_map<uint64_t, std::vector<int>> of_cell_;
+};
+
+double AreaOf(const Scan& mesh) {
+  double area = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Eigen::Vector3d& a = mesh.points[t[0]];
+    area += (mesh.points[t[1]] - a).cross(mesh.points[t[2]] - a).norm() / 2;
+  }
+  return area;
+}
+
 }  // namespace
+
+ColorGrid ColorsOfSurface(const Scan& cloud, const ColorGrid& colors, const Scan& surface) {
+  ColorGrid found;
+  found.num_columns = surface.num_columns;
+  found.num_rows = surface.num_rows;
+  found.rgb.assign(surface.points.size(), {0, 0, 0});
+  found.views.assign(surface.points.size(), 0);
+  const double spacing = std::sqrt(AreaOf(surface) / static_cast<double>(cloud.points.size()));
+  if (!(spacing > 0)) return found;
+  const PointLattice lattice(cloud.points, 2 * spacing);
+  constexpr int kReach = 8;  // a corner lies half way to the next points at most
+  for (size_t i = 0; i < surface.points.size(); ++i) {
+    if (surface.IsMissing(static_cast<int>(i))) continue;
+    const int nearest = lattice.Nearest(surface.points[i], kReach);
+    if (nearest < 0) continue;
+    found.rgb[i] = colors.rgb[nearest];
+    found.views[i] = colors.views[nearest];
+  }
+  return found;
+}
 
 ScanColors ReadScanColors(const std::vector<Scan>& scans, const std::string& model_ply) {
   PlyOptions options;

@@ -21,6 +21,10 @@ using ScanColors = std::vector<ColorGrid>;
 // others.
 ScanColors ReadScanColors(const std::vector<Scan>& scans, const std::string& model_ply);
 
+// Of the surface that took a cloud's place (ReplaceClouds): to each of its corners what the nearest
+// point of the cloud has.
+ColorGrid ColorsOfSurface(const Scan& cloud, const ColorGrid& colors, const Scan& surface);
+
 struct ExportScene {
   std::vector<OccluderTiles> occluders;
   double angular_spacing = 0;       // radians, of the finest scan; 0 = not known

@@ -71,12 +71,22 @@ void AddOptions(ExportCommandOptions* o, Command* command) {
   command->Add(FieldsOf(&o->blend).Only(kBlendOptions));
 }
 
-ScanColors ColorsOf(const std::vector<Scan>& scans, const ExportCommandOptions& options,
-                    PhotoList* list, const Command::Context& context) {
+// Puts surfaces in the place of the clouds, and finds the colours of all.
+ScanColors ColorsOf(std::vector<Scan>* clouds, const ExportCommandOptions& options, PhotoList* list,
+                    const Command::Context& context) {
+  std::vector<Scan>& scans = *clouds;
   if (!options.colors_path.empty()) {
     context.progress.Stage("read colours");
-    return ReadScanColors(scans, options.colors_path);
+    ScanColors colors = ReadScanColors(scans, options.colors_path);
+    for (size_t s = 0; s < scans.size(); ++s) {
+      if (scans[s].kind() != Scan::Kind::kCloud) continue;
+      Scan surface = FindCloudSurface(scans[s], context.options.num_threads).patches;
+      colors[s] = ColorsOfSurface(scans[s], colors[s], surface);
+      scans[s] = std::move(surface);
+    }
+    return colors;
   }
+  ReplaceClouds(&scans, context.options.num_threads);
   ColorizeOptions colorize;
   colorize.atlas.mode = "0";
   colorize.occlusion = options.exporting.occlusion;
@@ -165,7 +175,6 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   const SampleWork work("exporting", kExportBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
       alignment, {options.scan_paths, options.scan_poses, options.scan_reader}, context);
-  ReplaceClouds(&placed.scans, context.options.num_threads);
   for (const Scan& scan : placed.scans) {
     if (options.format == "e57" && !scan.organised) {
       throw InputError(scan.path, "", "has no grid, which an E57 needs here",
@@ -174,7 +183,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   }
 
   const std::string& folder = outputs->aside();
-  const ScanColors colors = ColorsOf(placed.scans, options, &list, context);
+  const ScanColors colors = ColorsOf(&placed.scans, options, &list, context);
   if (options.format == "e57") {
     WriteE57(placed.scans, colors, list, folder, context);
   } else {

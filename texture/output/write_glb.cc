@@ -23,7 +23,7 @@ class GlbBuilder {
     model_.extensionsUsed = {"KHR_materials_unlit"};
     model_.buffers.emplace_back();
     model_.nodes.emplace_back();
-    model_.nodes[0].name = "scan frame, turned to +Y up";
+    model_.nodes[0].name = kRootOfScanFrame;
     tinygltf::Scene scene;
     scene.nodes = {0};
     model_.scenes = {scene};

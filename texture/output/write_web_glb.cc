@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "core/report.h"
+#include "texture/output/write_glb.h"
 
 namespace roomtex {
 namespace {
@@ -52,7 +53,7 @@ class WebGlbBuilder {
     meshopt_encodeVertexVersion(0);  // what EXT_meshopt_compression knows
     meshopt_encodeIndexVersion(1);
     const auto turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitY());
-    root_ = {{"name", "scan frame, turned to +Y up"},
+    root_ = {{"name", kRootOfScanFrame},
              {"rotation", {turn.x(), turn.y(), turn.z(), turn.w()}},  // glTF: x y z w
              {"children", Json::array()}};
   }

@@ -64,6 +64,7 @@ ColoredMesh ReadColoredMesh(const std::string& path) {
   ColoredMesh mesh;
   mesh.points = std::move(scan.points);
   mesh.triangles = std::move(scan.triangles);
+  if (!scan.up_is_assumed) mesh.up = scan.up;
   for (const auto& [red, green, blue] : scan.colors) mesh.colors.emplace_back(red, green, blue);
   return mesh;
 }

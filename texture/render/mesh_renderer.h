@@ -25,6 +25,7 @@ struct ColoredMesh {
   std::vector<Eigen::Vector2f> uv;
   std::vector<int> texture_of_triangle;
   std::vector<cv::Mat> textures;
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();  // unit; zero = the file does not say
 };
 
 // A PLY mesh with colours at the vertices. Throws InputError.

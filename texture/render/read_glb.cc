@@ -1,5 +1,6 @@
 // A model.glb of roomtex-texture as a mesh with texture images, in the scan frame.
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -12,6 +13,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo.h"
+#include "texture/output/write_glb.h"
 #include "texture/render/mesh_renderer.h"
 #include "texture/render/unpack_glb.h"
 
@@ -160,6 +162,18 @@ void AddPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& primi
   }
 }
 
+// What the node above all others turns to glTF's +Y.
+Eigen::Vector3d UpOf(const tinygltf::Model& model) {
+  for (const tinygltf::Node& node : model.nodes) {
+    const std::vector<double>& q = node.rotation;  // x y z w
+    if (node.name != kRootOfScanFrame || q.size() != 4) continue;
+    const Eigen::Quaterniond turn(q[3], q[0], q[1], q[2]);
+    if (std::abs(turn.norm() - 1) > 0.01) break;
+    return turn.normalized().conjugate() * Eigen::Vector3d::UnitY();
+  }
+  return Eigen::Vector3d::Zero();
+}
+
 }  // namespace
 
 ColoredMesh ReadTexturedMesh(const std::string& path) {
@@ -191,6 +205,7 @@ ColoredMesh ReadTexturedMesh(const std::string& path) {
     throw NotOurs(path);
   }
   if (mesh.triangles.empty()) throw InputError(path, "", "has no faces", "");
+  mesh.up = UpOf(model);
   return mesh;
 }
 

@@ -17,9 +17,9 @@
 #include "core/frames.h"
 #include "core/output_set.h"
 #include "core/photo.h"
+#include "core/photo_fit.h"
 #include "core/picture_file.h"
 #include "core/statistics.h"
-#include "core/stays_inside.h"
 #include "texture/render/mesh_renderer.h"
 
 namespace roomtex {
@@ -35,11 +35,14 @@ struct RenderOptions {
 };
 
 // The photo to the left of the picture.
-cv::Mat Beside(const std::string& image_path, const std::string& name, const cv::Mat& picture) {
-  if (!StaysInside(name)) {
-    throw InputError(name, "", "leads out of --image_path", "Correct the model");
+cv::Mat Beside(const std::string& image_path, const std::string& name, const Camera& camera,
+               const cv::Mat& picture) {
+  const std::string path = image_path + "/" + name;
+  const PhotoFit fit = FitPhotoToCamera(path, name, camera.width, camera.height);
+  if (!fit.usable()) {
+    throw InputError(path, "", "cannot be shown. " + AsClause(fit.problem), "");
   }
-  cv::Mat photo = ReadPhoto(image_path + "/" + name), both;
+  cv::Mat photo = ReadPhoto(path, fit.pixels), both;
   cv::resize(photo, photo, picture.size(), 0, 0, cv::INTER_AREA);
   cv::hconcat(photo, picture, both);
   return both;
@@ -59,19 +62,22 @@ void RenderOne(const RenderOptions& options, const SparseModel& model, const Col
   settings.num_threads = context.options.num_threads;
   settings.empty = {255, 0, 255};
   context.progress.Stage("render");
-  cv::Mat picture = MeshRenderer(mesh).Render(model.cameras.at(image->camera_id),
-                                              new_from_cam * image->cam_from_model, settings);
+  const Camera& camera = model.cameras.at(image->camera_id);
+  cv::Mat picture =
+      MeshRenderer(mesh).Render(camera, new_from_cam * image->cam_from_model, settings);
   if (!options.image_path.empty()) {
-    picture = Beside(options.image_path, image->name, picture);
+    picture = Beside(options.image_path, image->name, camera, picture);
   }
   WritePictureFile(options.output_path, picture);
 }
 
-// The axis of the scan frame that is up, from the way photos are held.
-Eigen::Vector3d FindUp(const SparseModel& model) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const auto& [id, image] : model.images) {
-    sum += image.cam_from_model.rotation.conjugate() * -Eigen::Vector3d::UnitY();
+// The axis of the scan frame that is up: what the mesh says, else the way photos are held.
+Eigen::Vector3d FindUp(const SparseModel& model, const ColoredMesh& mesh) {
+  Eigen::Vector3d sum = mesh.up;
+  if (sum.isZero()) {
+    for (const auto& [id, image] : model.images) {
+      sum += image.cam_from_model.rotation.conjugate() * -Eigen::Vector3d::UnitY();
+    }
   }
   int axis = 0;
   sum.cwiseAbs().maxCoeff(&axis);
@@ -114,10 +120,10 @@ class PictureSet {
     const int count = std::min<int>(options_.num_photos, static_cast<int>(images.size()));
     for (int i = 0; i < count; ++i) {
       const SparseImage& image = *images[i * images.size() / count];
-      cv::Mat picture =
-          renderer.Render(model.cameras.at(image.camera_id), image.cam_from_model, settings_);
+      const Camera& camera = model.cameras.at(image.camera_id);
+      cv::Mat picture = renderer.Render(camera, image.cam_from_model, settings_);
       if (!options_.image_path.empty()) {
-        const cv::Mat both = Beside(options_.image_path, image.name, picture);
+        const cv::Mat both = Beside(options_.image_path, image.name, camera, picture);
         pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
         Write("photo_" + std::to_string(i + 1), image.name, both);
         pictures_.emplace_back("the scan from there", picture);
@@ -281,7 +287,7 @@ void RenderSet(const RenderOptions& options, const SparseModel& model, const Col
                const Command::Context& context) {
   context.progress.Stage("render", options.num_photos + options.num_ring + 3);
   const RoomBox box = FindRoomBox(mesh);
-  const Eigen::Vector3d up = FindUp(model);
+  const Eigen::Vector3d up = FindUp(model, mesh);
   DescribeRoom(model, box, up, &context.report);
   PictureSet set(options, context);
   {

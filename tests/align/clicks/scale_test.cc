@@ -55,6 +55,37 @@ TEST(Scale, FollowsTheScaleOfTheSparseModel) {
   EXPECT_EQ(after.num_features, before.num_features);
 }
 
+// A mesh that was simplified: a wall of two triangles, 20 m wide, of which a photo shows the
+// middle.
+TEST(Scale, IsFoundOnAWallOfTwoTriangles) {
+  Scan wall;
+  wall.organised = false;
+  wall.points = {{-10, -10, 3}, {10, -10, 3}, {10, 10, 3}, {-10, 10, 3}};
+  wall.triangles = {{0, 1, 2}, {0, 2, 3}};
+  SparseModel model;
+  Camera& camera = model.cameras[1];
+  camera.camera_id = 1;
+  camera.model = CameraModel::kPinhole;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {500, 500, 320, 240};
+  SparseImage& image = model.images[1];
+  image.image_id = image.camera_id = 1;
+  image.name = "a.jpg";
+  for (uint64_t id = 1; id <= 80; ++id) {
+    const Eigen::Vector2d x_in_img(10.0 + 7.5 * static_cast<double>(id),
+                                   20.0 + 37.0 * static_cast<double>(id % 12));
+    model.points[id].x_in_model =
+        1.5 * Eigen::Vector3d((x_in_img.x() - 320) / 500, (x_in_img.y() - 240) / 500, 1);
+    image.points2d.push_back(x_in_img);
+    image.point3d_ids.push_back(id);
+  }
+  const ScaleEstimate estimate =
+      EstimateScale(model, image, Rigid(), {wall}, {wall.triangles}, ScaleOptions());
+  EXPECT_EQ(estimate.num_features, 80);
+  EXPECT_NEAR(estimate.scale, 2, 1e-9);
+}
+
 TEST(Scale, HasNoFeaturesWhenTheCameraLooksAwayFromTheScan) {
   const SimulatedCase& one = MakeCase();
   const int photo = one.room->BestPhotoForPicks();

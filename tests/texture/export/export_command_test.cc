@@ -1,6 +1,8 @@
 // roomtex-export as a user calls it; what it writes is read by an independent reader
 // (reproject.py).
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 
@@ -12,7 +14,9 @@
 #include "capture/simulation/simulated_room.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/option_fields.h"
+#include "core/statistics.h"
 #include "importers/scan_reader.h"
+#include "importers/scan_writer.h"
 #include "tests/support/option_check.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -108,6 +112,47 @@ TEST_F(ExportCommand, TransformsOfNerfstudioReproject) {
   const Errors errors = Reproject("nerfstudio", "nerf");
   EXPECT_LT(errors.median_m, 0.003);
   EXPECT_GT(errors.num_m, 1000);
+}
+
+TEST_F(ExportCommand, TakesTheColoursOfACloud) {
+  Scan cloud = ReadScan(Capture() + "/scan.rtpi", {});
+  cloud.organised = false;
+  cloud.triangles.clear();
+  WriteScan(cloud, {}, Path("cloud.ply"));
+  const std::string input = " --quiet --input_path " + Path("model") + " --image_path " +
+                            Capture() + "/photos --scan_path " + Path("cloud.ply");
+  CommandResult result =
+      RunCommandLine("roomtex-texture" + input + " --output_path " + Path("textured"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto export_to = [&](const std::string& output, const std::string& more) {
+    return RunCommandLine("roomtex-export" + input + " --max_points 5000 --output_path " +
+                          Path(output) + more);
+  };
+  result = export_to("of_cloud", "");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  result = export_to("with_colors", " --colors_path " + Path("textured/model.ply"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Errors errors = Reproject("colmap", "with_colors");
+  EXPECT_LT(errors.max_px, 0.01);
+  EXPECT_GT(errors.num_px, 4000);
+  // As coloured here, but for detail that a piece of the surface is too coarse for.
+  const SparseModel here = ReadSparseModel(Path("of_cloud/sparse")),
+                    taken = ReadSparseModel(Path("with_colors/sparse"));
+  std::vector<double> differences;
+  for (const auto& [id, point] : taken.points) {
+    const auto other =
+        std::find_if(here.points.begin(), here.points.end(), [&, &point = point](const auto& p) {
+          return (p.second.x_in_model - point.x_in_model).norm() < 1e-4;
+        });
+    if (other == here.points.end()) continue;
+    double difference = 0;
+    for (int k = 0; k < 3; ++k) {
+      difference += std::abs(int{point.color[k]} - int{other->second.color[k]}) / 3.0;
+    }
+    differences.push_back(difference);
+  }
+  ASSERT_GT(differences.size(), 1000u);
+  EXPECT_LT(Median(&differences), 6);
 }
 
 TEST_F(ExportCommand, SomebodyWhoWalkedThroughAPhotoIsMasked) {
