@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "align/fit/bent_model.h"
 #include "core/frames.h"
 #include "tests/align/surface/surface_room.h"
 #include "tests/support/matchers.h"
@@ -115,6 +116,61 @@ std::optional<BendFit> Fit(const SurfaceRoom& room, const SparseModel& model, do
   const std::vector<bool> used(room.picks.size(), true);
   return FitScanBend(model, FindSurfacePoints(model, 3, 0.7), {room.scan}, *room.patches,
                      room.picks, used, 1.5, Similarity(), min_bend);
+}
+
+// Two cameras of one frame at the station, looking ahead and aside. first: which has the lower
+// number, 0 or 1.
+SparseModel RigModel(const Scan& scan, int first) {
+  SparseModel model;
+  Camera& camera = model.cameras[1];
+  camera.camera_id = 1;
+  camera.model = CameraModel::kPinhole;
+  camera.width = camera.height = 400;
+  camera.params = {220, 220, 200, 200};
+  for (int side = 0; side < 2; ++side) {
+    SparseImage image;
+    image.image_id = side == first ? 1 : 2;
+    image.camera_id = 1;
+    image.frame_id = 7;
+    image.name = side == 0 ? "ahead" : "aside";
+    image.cam_from_model.rotation =
+        Eigen::AngleAxisd(side == 0 ? 0 : RadFromDeg(70), Eigen::Vector3d::UnitY()) *
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(1, 0.3, 0), Eigen::Vector3d::UnitZ());
+    const Eigen::Vector3d centre = scan.Station() + Eigen::Vector3d(0.3, 0.2 * side, 0.1);
+    image.cam_from_model.translation = -(image.cam_from_model.rotation * centre);
+    const CameraProjection projection(camera);
+    for (size_t i = 0; i < scan.points.size(); i += 37) {
+      const auto x_in_img = projection.ImgFromCam(image.cam_from_model * scan.points[i]);
+      if (!x_in_img || !projection.InImage(*x_in_img)) continue;
+      model.points[i].x_in_model = scan.points[i];
+      image.points2d.push_back(*x_in_img);
+      image.point3d_ids.push_back(i);
+    }
+    model.images[image.image_id] = image;
+  }
+  return model;
+}
+
+TEST(BendModel, AFrameOfARigGoesWhereAllItsPhotosFit) {
+  const Scan scan = BallScan(Eigen::Vector3d::UnitZ(), true);
+  const ScanBend bend = SomeBend(scan);
+  const SparseModel straight = RigModel(scan, 0);
+  ASSERT_GT(straight.FindImage("ahead")->point3d_ids.size(), 20u);
+  ASSERT_GT(straight.FindImage("aside")->point3d_ids.size(), 20u);
+  const SparseModel bent = BendModel(straight, bend), other = BendModel(RigModel(scan, 1), bend);
+  const auto pose = [](const SparseModel& model, const std::string& name) {
+    return model.FindImage(name)->cam_from_model;
+  };
+  const auto beside = [&](const SparseModel& model) {
+    return (pose(model, "aside") * pose(model, "ahead").Inverse()).translation;
+  };
+  EXPECT_THAT(beside(bent), IsNearMatrix(Eigen::Vector3d(beside(straight)), 1e-9));
+  for (const char* name : {"ahead", "aside"}) {
+    const Eigen::Vector3d centre = pose(bent, name).TargetOriginInSource();
+    EXPECT_GT((centre - pose(straight, name).TargetOriginInSource()).norm(), 1e-3);
+    // Whichever of them has the lower number.
+    EXPECT_LT((centre - pose(other, name).TargetOriginInSource()).norm(), 1e-5);
+  }
 }
 
 TEST(FitScanBend, AStraightScanStaysStraight) {
