@@ -102,9 +102,9 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
                                       const std::vector<NearHint>& near,
                                       const AlignmentOptions& options, Progress* progress) {
   AutomaticAlignment found;
-  const bool hinted =
-      !near.empty() || std::any_of(input.picks.begin(), input.picks.end(),
-                                   [](const Pick& pick) { return pick.weight > 0; });
+  const bool has_picks = std::any_of(input.picks.begin(), input.picks.end(),
+                                     [](const Pick& pick) { return pick.weight > 0; });
+  const bool hinted = has_picks || !near.empty();
   StartSearchOptions search;
   search.num_threads = input.num_threads;
   const auto judge = [&] {
@@ -148,7 +148,8 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
     if (!reason.empty()) alignment.reasons.insert(alignment.reasons.begin(), reason);
   }
   if (!alignment.open.None() && !found.verdict.reason.empty()) {
-    alignment.reasons.push_back(alignment.open.Sentence());
+    alignment.reasons.push_back(alignment.open.Sentence(
+        has_picks ? OpenDirections::HeldBy::kPicks : OpenDirections::HeldBy::kNothing));
   }
   found.attempt.alignment = std::move(alignment);
   return found;

@@ -192,7 +192,8 @@ void FindAccuracy(const AlignmentInput& input, const AlignmentStart& start, cons
         ((judgement->open.num_facings < 2 && judgement->open.slide_sigma > kHeldWell) ||
          judgement->expected_error.at_cameras > kHeldAtAll);
     (is_too_much ? judgement->reasons : judgement->warnings)
-        .push_back(judgement->open.Sentence(by_photos));
+        .push_back(judgement->open.Sentence(by_photos ? OpenDirections::HeldBy::kPhotos
+                                                      : OpenDirections::HeldBy::kPicks));
   }
   if (!held && !(judgement->open.None() && is_finite)) {
     judgement->reasons.push_back(

@@ -246,6 +246,7 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   // Photos that could confirm it and do not: what a user says of the place changes nothing.
   const bool denied = alone && best.photos && best.photos->shifts.clear.num >= kEnoughPatches;
+  if (denied) verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
   if (!confirmed && verdict.ratio < options.min_ratio) {
     verdict.kind = Kind::kAmbiguous;
     // Of several places a hint leaves one; the mirror image is nowhere.
@@ -261,7 +262,6 @@ StartVerdict JudgeStarts(const AlignmentInput& input, const StartSearch& search,
   }
   if (denied) {
     verdict.kind = Kind::kByPhotos;
-    verdict.chance_wrong = std::max(verdict.chance_wrong, kEvenOdds);
     verdict.reason =
         best.photos->contradicts ? best.photos->reason : UnconfirmedReason(best.photos->shifts);
     verdict.reason += kPicksRemedy;

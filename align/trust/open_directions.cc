@@ -74,23 +74,31 @@ OpenDirections FindOpenDirections(const SimilarityFit& fit, const Eigen::Vector3
   return open;
 }
 
-std::string OpenDirections::Sentence(bool by_photos) const {
+std::string OpenDirections::Sentence(HeldBy held_by) const {
   if (None()) return "";
   std::string open;
   const auto add = [&](const std::string& what) { open += (open.empty() ? "" : ", ") + what; };
   if (!slides.empty()) add("where the model lies along " + Listed(slides));
   if (!turns.empty()) add("how it is turned about " + Listed(turns));
   if (scale) add("its scale");
-  return fmt::format(
-      "The surface of the scan that the sparse points lie on {} and leaves open {}: there {} "
-      "alone hold it{}. More picks, or a scan of more of the room, would make it safer.",
-      num_facings == 1   ? "faces one way only (one wall, or walls opposite each other)"
-      : num_facings == 2 ? "faces two ways only"
-                         : "is too small or too round",
-      open, by_photos ? "the photos, by what they show of the scan's intensity," : "the picks",
-      slides.empty()
-          ? ""
-          : ", to " + Number(1000 * slide_sigma, 1) + " mm at the photos (one standard deviation)");
+  const std::string left_open =
+      fmt::format("The surface of the scan that the sparse points lie on {} and leaves open {}: ",
+                  num_facings == 1   ? "faces one way only (one wall, or walls opposite each other)"
+                  : num_facings == 2 ? "faces two ways only"
+                                     : "is too small or too round",
+                  open);
+  if (held_by == HeldBy::kNothing) {
+    return left_open + "there nothing holds it. Six picks would, or a scan of more of the room.";
+  }
+  return left_open +
+         fmt::format(
+             "there {} alone hold it{}. More picks, or a scan of more of the room, would make it "
+             "safer.",
+             held_by == HeldBy::kPhotos ? "the photos, by what they show of the scan's intensity,"
+                                        : "the picks",
+             slides.empty() ? ""
+                            : ", to " + Number(1000 * slide_sigma, 1) +
+                                  " mm at the photos (one standard deviation)");
 }
 
 }  // namespace roomtex

@@ -27,9 +27,10 @@ struct OpenDirections {
   double slide_sigma = 0;
 
   bool None() const { return slides.empty() && turns.empty() && !scale; }
-  // What the surface leaves open and how well the picks hold it, or the photos if it is they, in a
-  // sentence; empty if None().
-  std::string Sentence(bool by_photos = false) const;
+  // What the surface leaves open, and what holds it there and how well, in a sentence; empty if
+  // None().
+  enum class HeldBy { kNothing, kPicks, kPhotos };
+  std::string Sentence(HeldBy held_by) const;
 };
 
 // Something is open when the surface alone leaves more than 2 cm, 0.5 degrees or 1 % of it, at

@@ -352,6 +352,11 @@ Calibration Calibrate(const std::vector<BoardPhoto>& photos, const Board& board,
   result.camera = RoundedCamera(fit.camera);
   result.lens = fit.lens;
   result.sigma_px = fit.sigma_px;
+  if (!fit.converged) {
+    result.reasons.emplace_back(
+        "the adjustment came to no rest: what the photos show leaves the camera open, or fits no "
+        "lens; give --camera_model a simpler one, or more photos at other tilts");
+  }
   DescribePhotos(photos, board, selection, fit, &result);
   DescribeUncertainty(fit, selection.views(), &result);
   DescribeCoverage(&result);

@@ -7,6 +7,7 @@
 #include <tiny_gltf.h>
 
 #include "core/error.h"
+#include "core/gltf_frame.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"

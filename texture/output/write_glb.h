@@ -9,9 +9,6 @@
 
 namespace roomtex {
 
-// Name of the node that turns a model.glb or model_web.glb from the scan frame to glTF's +Y up.
-inline constexpr char kRootOfScanFrame[] = "scan frame, turned to +Y up";
-
 class OptionFields;
 
 struct GlbOptions {

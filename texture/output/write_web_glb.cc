@@ -9,11 +9,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
+#include "core/gltf_frame.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 #include "core/report.h"
-#include "texture/output/write_glb.h"
 
 namespace roomtex {
 namespace {

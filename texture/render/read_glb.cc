@@ -11,9 +11,9 @@
 #include <tiny_gltf.h>
 
 #include "core/error.h"
+#include "core/gltf_frame.h"
 #include "core/output_file.h"
 #include "core/photo.h"
-#include "texture/output/write_glb.h"
 #include "texture/render/mesh_renderer.h"
 #include "texture/render/unpack_glb.h"
 

@@ -8,6 +8,7 @@
 namespace roomtex {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
@@ -50,7 +51,7 @@ TEST(OpenDirections, AFurnishedRoomLeavesNothingOpen) {
   const Alignment& alignment = AlignedCase();
   EXPECT_TRUE(alignment.open.None());
   EXPECT_EQ(alignment.open.num_facings, 3);
-  EXPECT_EQ(alignment.open.Sentence(), "");
+  EXPECT_EQ(alignment.open.Sentence(OpenDirections::HeldBy::kPicks), "");
 }
 
 TEST(OpenDirections, OneWallLeavesSlidingTurningAndScaleToThePicks) {
@@ -65,6 +66,10 @@ TEST(OpenDirections, OneWallLeavesSlidingTurningAndScaleToThePicks) {
   EXPECT_GT(LargestCosine(alignment.open.turns, axes.col(1)), 0.999);
   EXPECT_TRUE(alignment.open.scale);
   EXPECT_THAT(alignment.warnings, Contains(HasSubstr("one wall, or walls opposite each other")));
+  EXPECT_THAT(alignment.warnings, Contains(HasSubstr("there the picks alone hold it, to")));
+  // Without any, nobody says how well they hold it.
+  EXPECT_THAT(alignment.open.Sentence(OpenDirections::HeldBy::kNothing),
+              AllOf(HasSubstr("nothing holds it"), Not(HasSubstr("mm"))));
   // The truth lies within what is said of it.
   EXPECT_GT(alignment.open.slide_sigma, 0.001);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.scan_from_sparse).position,
