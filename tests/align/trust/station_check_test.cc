@@ -76,26 +76,6 @@ TEST(StationCheck, OfThreeTheWrongOneIsNamedAndRegisteredAnew) {
   EXPECT_EQ(scans[0].points[1000], right[0].points[1000]);
 }
 
-// As many as a project has: no fixed number of rounds.
-TEST(StationCheck, FourOfNineAreRegisteredAnew) {
-  SimulatedRoomOptions options = CaseOptions(3);
-  options.num_stations = 9;
-  options.scan_columns = 400;
-  options.scan_rows = 200;
-  const SimulatedRoom room(options);
-  std::vector<Scan> scans;
-  for (int station = 0; station < 9; ++station) scans.push_back(room.MakeScan(station));
-  const std::vector<Scan> right = scans;
-  const std::vector<int> displaced = {2, 4, 5, 7};
-  for (const int i : displaced) Displace({-0.03 + 0.01 * i, 0.03, 0.01}, 0.1 * i, &scans[i]);
-  const std::vector<int> moved = RegisterStations(&scans);
-  for (const int i : displaced) {
-    EXPECT_THAT(moved, Contains(i));
-    EXPECT_LT((scans[i].Station() - right[i].Station()).norm(), 0.005) << i;
-  }
-  EXPECT_THAT(CheckStations(scans).wrong, IsEmpty());
-}
-
 TEST(StationCheck, ScansOfDifferentRoomsSayNothing) {
   std::vector<Scan> scans = Stations(2);
   Displace({100, 0, 0}, 0, &scans[1]);
