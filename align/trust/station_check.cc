@@ -29,8 +29,7 @@ constexpr double kMinCommonShare = 0.1;
 // Metres: how far off a station is looked for, and the gate of the last steps.
 constexpr double kFirstGate = 0.2, kLastGate = 0.02;
 constexpr double kGateShrink = 0.8;
-constexpr int kMaxSteps = 40;
-constexpr size_t kRegisteringsPerScan = 2;
+constexpr int kMaxSteps = 40, kNumRegisterings = 3;
 constexpr double kSettled = 1e-5;  // metres and radians of a step at the last gate
 // What is known without any surface: keeps open directions where they are (metres, radians).
 constexpr double kPriorStationMove = 0.05, kPriorStationTurn = 0.02;
@@ -279,8 +278,7 @@ StationCheck CheckStations(const std::vector<Scan>& scans) {
 std::vector<int> RegisterStations(std::vector<Scan>* scans) {
   std::set<int> moved;
   std::vector<ScanPatches> patches = PatchesOf(*scans);
-  const size_t most = kRegisteringsPerScan * scans->size();
-  for (size_t round = 0; round < most; ++round) {
+  for (int round = 0; round < kNumRegisterings; ++round) {
     const StationCheck check = ComparePatches(patches);
     // The worst that is not the first: onto all that are not contradicted, together.
     const auto worst =
