@@ -391,12 +391,12 @@ SparseModel SinglePhotos(const SparseModel& model) {
 void HoldAsTold(const SparseModel& model, const LensFinding& finding, int index, LensSet* set) {
   std::map<uint32_t, int> lens_of_camera;
   for (const uint32_t id : finding.camera_ids) {
+    int lens = index;
     if (!lens_of_camera.empty() && !finding.told_alike) {
+      lens = static_cast<int>(set->lenses.size());
       const Lens copy = set->lenses[static_cast<size_t>(index)];
       set->lenses.push_back(copy);
     }
-    const bool keeps = lens_of_camera.empty() || finding.told_alike;
-    const int lens = keeps ? index : static_cast<int>(set->lenses.size()) - 1;
     lens_of_camera[id] = lens;
     set->lenses[static_cast<size_t>(lens)].free = false;
     set->lenses[static_cast<size_t>(lens)].camera = model.cameras.at(id);

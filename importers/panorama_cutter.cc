@@ -14,6 +14,8 @@
 #include "core/parallel.h"
 #include "core/photo.h"
 #include "core/photo_files.h"
+#include "core/stays_inside.h"
+#include "core/text.h"
 
 namespace fs = std::filesystem;
 namespace roomtex {
@@ -98,7 +100,10 @@ void RemoveOlderFaces(const std::string& folder, const std::vector<CutPanorama>&
   try {
     for (const CutPanorama& panorama : ReadPanoramaSet(set)) {
       for (const CutPanorama::Face& face : panorama.faces) {
-        if (names.count(face.name) == 0) outputs->Remove(face.name);
+        // The file is data: it may name files that no run of ours has made.
+        const bool is_face =
+            StaysInside(face.name) && BeginsWith(fs::path(face.name).filename().string(), "face_");
+        if (is_face && names.count(face.name) == 0) outputs->Remove(face.name);
       }
     }
   } catch (const InputError&) {

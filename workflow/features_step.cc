@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <sstream>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -200,19 +201,21 @@ Step MakeFeatures(Chain* chain) {
     line.insert(line.end(), words.begin(), words.end());
     step.commands = {line};
   } else if (groups.size() > std::max<size_t>(4, photos.size() / 3)) {
-    std::map<std::string, PhotoGroup> calibrated;  // by their parameters
+    std::map<std::pair<std::string, std::string>, PhotoGroup> calibrated;  // by model, parameters
     std::vector<std::string> others;
     for (const PhotoGroup& group : groups) {
       const auto known = CalibrationOf(group, groups[0], options);
       if (known) {
-        PhotoGroup& alike = calibrated.emplace(known->params, group).first->second;
-        if (alike.names == group.names) continue;
-        alike.names.insert(alike.names.end(), group.names.begin(), group.names.end());
+        const auto [alike, is_first] =
+            calibrated.emplace(std::make_pair(known->model, known->params), group);
+        if (is_first) continue;
+        auto& names = alike->second.names;
+        names.insert(names.end(), group.names.begin(), group.names.end());
       } else {
         others.insert(others.end(), group.names.begin(), group.names.end());
       }
     }
-    for (const auto& [params, group] : calibrated) {
+    for (const auto& [camera, group] : calibrated) {
       AddGroup(chain, group, groups[0], start, true, &step);
     }
     if (!others.empty()) {

@@ -80,6 +80,16 @@ TEST_F(ImportCommand, CutsPanoramasIntoFaces) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "faces/a/notes.txt"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "faces/b/face_4.jpg"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "faces/b/face_5.jpg"));
+  // Nor does what such a file names elsewhere.
+  auto hostile = nlohmann::json::parse(ReadBytes(folder_ / "faces/panoramas.json"));
+  hostile["panoramas"][0]["faces"][0]["name"] = "../photo.jpg";
+  hostile["panoramas"][0]["faces"][1]["name"] = "a/notes.txt";
+  WriteBytes(folder_ / "faces/panoramas.json", hostile.dump());
+  ASSERT_EQ(
+      RunOn("panoramas", "--quiet --Faces.around 4 --Faces.poles 0" + Output("faces")).exit_code,
+      0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "photo.jpg"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "faces/a/notes.txt"));
   EXPECT_EQ(RunOn("panoramas", Output("panoramas")).exit_code, 2);
 }
 
