@@ -303,6 +303,9 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
       record.expected_error = found.get<double>() / 1000;
       break;
     }
+    const Json disagreement =
+        expected.is_object() ? expected.value("disagreement_mm", Json()) : Json();
+    if (disagreement.is_number()) record.disagreement = disagreement.get<double>() / 1000;
     for (const Json& image : json.value("images", Json::array())) {
       const Json doubt = image.value("doubt", Json());
       if (!doubt.is_string()) continue;

@@ -49,6 +49,9 @@ struct AlignmentRecord {
   // Metres, at the far corner of the room, or at the photos where each was placed by itself; 0 =
   // not known.
   double expected_error = 0;
+  // Metres: how far the sparse model and the scan were apart in shape (ShapeDisagreement::rms)
+  // before the model was moved onto the scan.
+  double disagreement = 0;
   std::vector<ScanRecord> scans;  // empty: not remembered
   // Photos that agree with nobody (align/trust/photo_verdict.h), by name: why they are left out, in
   // sentences.

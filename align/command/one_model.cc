@@ -21,6 +21,7 @@
 #include "align/command/search_report.h"
 #include "align/mirrored_reading.h"
 #include "align/surface/scan_planes_report.h"
+#include "align/trust/disagreement.h"
 #include "align/trust/photo_verdict.h"
 #include "colmap_ext/database.h"
 #include "colmap_ext/duplicate_photos.h"
@@ -31,6 +32,7 @@
 #include "core/commit_together.h"
 #include "core/error.h"
 #include "importers/photo_picks.h"
+#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace {
@@ -300,6 +302,18 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
   return photos;
 }
 
+// A model that roomtex-align moved onto a scan of another shape fits that scan better than it knows
+// the room: what is left between them says nothing of the error any more.
+void DoubtAlignedBefore(const std::string& input_path, const Command::Context& context) {
+  const AlignmentRecord before = ReadAlignmentRecord(input_path);
+  if (before.disagreement < kSameShape) return;
+  context.report.SetUntrusted(fmt::format(
+      "{} was aligned before, where model and scan differed in shape by {:.0f} mm: it was moved "
+      "onto the scan there, so that nothing shows the difference now. Align the sparse model that "
+      "it was made of.",
+      input_path, 1000 * before.disagreement));
+}
+
 }  // namespace
 
 ModelToAlign ReadModelToAlign(const AlignCommandOptions& options, const Command::Context& context) {
@@ -391,6 +405,7 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   Alignment& alignment = *reading->attempt.alignment;
   for (const std::string& warning : alignment.warnings) context.Warn(warning);
   for (const std::string& reason : alignment.reasons) context.report.SetUntrusted(reason);
+  DoubtAlignedBefore(a.input_path, context);
 
   std::map<uint32_t, std::vector<Eigen::Vector2d>> keypoints;
   for (const auto& [id, image] : model.images) {

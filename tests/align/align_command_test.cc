@@ -95,6 +95,23 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
 }
 
 // Placed by the middle rows; what is written are the photos' own keypoints.
+// Moved onto a scan of another shape, a model fits it however far both are from the room.
+TEST(AlignCommand, WhatWasBentOntoTheScanIsNotJudgedByIt) {
+  CaseFolder files(MakeCase());
+  ASSERT_EQ(files.Align().exit_code, 0);
+  files.input_path = files.output_path;
+  files.output_path = files.folder / "again";
+  EXPECT_EQ(files.Align().exit_code, 0);
+  const std::string path = files.input_path + "/alignment.json";
+  Json report = Json::parse(ReadBytes(path));
+  ASSERT_LT(report["expected_error"]["disagreement_mm"].get<double>(), 10);
+  report["expected_error"]["disagreement_mm"] = 35.2;
+  WriteBytes(path, report.dump());
+  const CommandResult result = files.Align();
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("differed in shape by 35 mm"));
+}
+
 TEST(AlignCommand, ARollingShutterIsSaid) {
   RowMotions motions;
   const SimulatedCase one = WithRollingShutter(MakeCase(2, 6), 1, &motions);
