@@ -11,7 +11,7 @@ namespace {
 
 // Of the weight of the sample's best view. Not a weight of its own: where samples lie closer than
 // pixels, all views of a sample weigh little.
-constexpr float kLeastShare = 0.002f;
+constexpr float kLeastShareOfBest = 0.002f;
 
 // 0 at `from`, 1 at `to`.
 float Ramp(float value, float from, float to) {
@@ -26,7 +26,7 @@ void AddSample(const ObservationStore& store, size_t slot, ExposureSamples* samp
     if (observations[i].at_boundary) continue;
     const float weight = UnpackWeight(observations[i].weight);
     best = std::max(best, weight);
-    if (weight < kLeastShare * best) continue;
+    if (weight < kLeastShareOfBest * best) continue;
     ExposureView view;
     view.light = UnpackColor(observations[i].color);
     view.trust = ExposureTrust(view.light);
