@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "building/outline_proposal.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
@@ -122,9 +123,8 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
   finding.trusted = fixed || (finding.source != "planes" && LevelShare(*segments, up) >= kEnough);
 
   cloud->up = up;
-  MoveBoth({1, Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()),
-            Eigen::Vector3d::Zero()},
-           cloud, segments);
+  MoveBoth({1, RotationBetween(up, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()}, cloud,
+           segments);
   finding.up_in_input =
       cloud->frame.outline_from_input.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   return finding;

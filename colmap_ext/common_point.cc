@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/decompositions.h"
+
 namespace roomtex {
 namespace {
 
@@ -42,7 +44,7 @@ double GrowthByView(const CommonPoint& common, const Rigid& view_from_model) {
     fit.Add(view_from_model, common.ray, x);
     best = std::min(best, fit.sum2);
     if (!std::isfinite(fit.sum2)) break;
-    x -= fit.hessian.ldlt().solve(fit.gradient);
+    x -= SolveSymmetric(fit.hessian, fit.gradient);
     if (!x.allFinite()) break;
   }
   return std::max(0.0, best - without);

@@ -5,8 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
-
+#include "core/decompositions.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/statistics.h"
@@ -88,9 +87,9 @@ std::optional<Similarity> FitPoses(const std::vector<Both>& photos) {
     mean_in_scan += photo.centre_in_scan / static_cast<double>(photos.size());
   }
   // Markley et al. 2007, Averaging Quaternions: the eigenvector of the largest eigenvalue.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(turns);
   Similarity fit;
-  fit.rotation = Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
+  fit.rotation =
+      Eigen::Quaterniond(Eigen::Vector4d(SymmetricEigen(turns).vectors.col(3))).normalized();
   double along = 0, square = 0;
   for (const Both& photo : photos) {
     const Eigen::Vector3d turned = fit.rotation * (photo.centre_in_sparse - mean_in_sparse);

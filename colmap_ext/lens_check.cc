@@ -7,10 +7,9 @@
 #include <tuple>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "colmap_ext/calibration_check.h"
 #include "core/camera_formulas.h"
+#include "core/decompositions.h"
 #include "core/similarity.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -225,7 +224,7 @@ void LensFinding::SetCovariance(const Eigen::MatrixXd& covariance) {
   if (covariance.size() == 0) return;
   sigmas = covariance.diagonal().cwiseSqrt();
   const Eigen::VectorXd off = Difference(found, told);
-  deviations = std::sqrt(std::max(0.0, off.dot(covariance.ldlt().solve(off))));
+  deviations = std::sqrt(std::max(0.0, off.dot(SolveSymmetric(covariance, off))));
 }
 
 bool LensFinding::Contradicts() const { return deviations > kMaxDeviations; }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include "core/decompositions.h"
 
 namespace roomtex {
 
@@ -28,8 +28,7 @@ std::optional<InverseDepthPoint> Triangulate(const std::vector<Rigid>& views_fro
       normal += row * row.transpose();
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(normal);
-  const Eigen::Vector4d x = solver.eigenvectors().col(0);
+  const Eigen::Vector4d x = SymmetricEigen(normal).vectors.col(0);
   if (!x.allFinite() || !(std::abs(x.z()) > 1e-12)) return std::nullopt;
   return InverseDepthPoint(x.x() / x.z(), x.y() / x.z(), x.w() / x.z());
 }

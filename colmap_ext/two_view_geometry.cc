@@ -9,6 +9,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include "colmap_ext/triangulation.h"
+#include "core/decompositions.h"
 
 namespace roomtex {
 namespace {
@@ -34,9 +35,9 @@ Eigen::Matrix3d HartleyNormalisation(const std::vector<RayMatch>& matches,
 // Row-major matrix of the right singular vector of least singular value; `gap` is how much larger
 // the next singular value is (squared, relative to the largest).
 Eigen::Matrix3d NullMatrix(const Matrix9d& normal, double* gap) {
-  const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(normal);
-  const Vector9d f = solver.eigenvectors().col(0);
-  *gap = solver.eigenvalues()[1] / solver.eigenvalues()[8];
+  const SymmetricEigen of_normal(normal);
+  const Vector9d f = of_normal.vectors.col(0);
+  *gap = of_normal.values[1] / of_normal.values[8];
   Eigen::Matrix3d matrix;
   matrix << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];
   return matrix;

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/scan_mesh.h"
@@ -42,7 +43,7 @@ ScanSpace::ScanSpace(const std::vector<Scan>& scans, int num_threads)
     Station station;
     station.place = scan.Station();
     station.station_from_scan =
-        Eigen::Quaterniond::FromTwoVectors(scan.up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+        RotationBetween(scan.up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     const int columns = std::clamp(scan.num_columns, kMinColumns, kMaxColumns);
     cv::Mat1f range(columns / 2, columns, 0.0f);
     ParallelFor(num_threads, 0, range.rows, [&](int row) {

@@ -5,6 +5,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 
 namespace roomtex {
@@ -116,9 +117,8 @@ class GridFinder {
   GridFinder(const Scan& cloud, const Eigen::Vector3d& axis_in_station)
       : cloud_(cloud), upright_from_scan_(cloud.scan_from_station.Inverse()) {
     if (axis_in_station == Eigen::Vector3d::UnitZ()) return;
-    const Rigid upright_from_station{
-        Eigen::Quaterniond::FromTwoVectors(axis_in_station, Eigen::Vector3d::UnitZ()),
-        Eigen::Vector3d::Zero()};
+    const Rigid upright_from_station{RotationBetween(axis_in_station, Eigen::Vector3d::UnitZ()),
+                                     Eigen::Vector3d::Zero()};
     upright_from_scan_ = upright_from_station * upright_from_scan_;
   }
 

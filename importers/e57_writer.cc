@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/command_line.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "importers/content_hash.h"
 #include "importers/e57_pages.h"
@@ -341,7 +342,7 @@ uint64_t E57Writer::PhysicalOffset() const { return num_pages_ * kPageSize + pag
 
 void E57Writer::AddScan(const Scan& scan, const CellColors* colors) {
   if (stations_.empty()) {
-    file_from_scan_ = Eigen::Quaterniond::FromTwoVectors(scan.up, Eigen::Vector3d::UnitZ());
+    file_from_scan_ = RotationBetween(scan.up, Eigen::Vector3d::UnitZ());
   }
   // The station's frame is turned like the file's: there, too, z is up.
   const Rigid turned{file_from_scan_, Eigen::Vector3d::Zero()};

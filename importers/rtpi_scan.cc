@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/decompositions.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/statistics.h"
@@ -239,9 +240,8 @@ RtpiFile RtpiFromScan(const Scan& scan, bool counterclockwise) {
   if (!scan.organised) throw std::invalid_argument("RtpiFromScan needs an organised scan");
   const Rigid station_from_scan = scan.scan_from_station.Inverse();
   const Eigen::Vector3d up_in_station = station_from_scan.rotation * scan.up;
-  const Rigid rtpi_from_station{
-      Eigen::Quaterniond::FromTwoVectors(up_in_station, Eigen::Vector3d::UnitY()),
-      Eigen::Vector3d::Zero()};
+  const Rigid rtpi_from_station{RotationBetween(up_in_station, Eigen::Vector3d::UnitY()),
+                                Eigen::Vector3d::Zero()};
   const Rigid rtpi_from_scan = rtpi_from_station * station_from_scan;
   const bool stays = rtpi_from_scan.translation.isZero(0) &&
                      rtpi_from_scan.rotation.isApprox(Eigen::Quaterniond::Identity(), 1e-15);

@@ -211,8 +211,8 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   Matrix10d turned = Matrix10d::Identity();
   turned.topLeftCorner<3, 3>() =
       RotationWithJacobian(Eigen::Map<const Eigen::Vector3d>(pose)).left_jacobian;
-  if (const auto inverse = BalancedInverse<10>(normal, 1e-13)) {
-    const Matrix10d covariance = turned * *inverse * turned.transpose();
+  if (const auto inverse = BalancedInverse(normal, 1e-13)) {
+    const Matrix10d covariance = turned * Matrix10d(*inverse) * turned.transpose();
     result.covariance = covariance.topLeftCorner<6, 6>();
     result.focal_sigma = std::sqrt(covariance(6, 6));
     result.radial_sigma = HasRadial() ? std::sqrt(covariance(7, 7)) : 0;

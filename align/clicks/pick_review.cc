@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "core/decompositions.h"
 #include "core/option_fields.h"
 
 namespace roomtex {
@@ -28,8 +29,7 @@ struct LineFit {
 LineFit FitLine(const Eigen::Matrix3Xd& points) {
   const Eigen::Vector3d centre = points.rowwise().mean();
   const Eigen::Matrix3Xd centred = points.colwise() - centre;
-  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(centred, Eigen::ComputeThinU);
-  const Eigen::Vector3d axis = svd.matrixU().col(0);
+  const Eigen::Vector3d axis = RightSingularVectors(centred.transpose()).col(0);
   const Eigen::RowVectorXd along = axis.transpose() * centred;
   LineFit fit;
   fit.length = along.maxCoeff() - along.minCoeff();

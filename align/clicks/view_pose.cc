@@ -11,6 +11,7 @@
 
 #include "core/balanced_inverse.h"
 #include "core/camera_formulas.h"
+#include "core/decompositions.h"
 
 namespace roomtex {
 namespace {
@@ -116,8 +117,7 @@ std::optional<Rigid> PoseFromProjectionMatrix(const NormalisedPairs& pairs, cons
       a.block<1, 4>(2 * i + k / 3, 4 * (k % 3)) = across[k / 3][k % 3] * p.transpose();
     }
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
-  const Eigen::VectorXd p = svd.matrixV().col(11);
+  const Eigen::VectorXd p = RightSingularVectors(a).col(11);
   Eigen::Matrix3d m;
   m << p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10];
   if (m.determinant() < 0) m = -m;  // step 3: det R > 0
@@ -141,8 +141,7 @@ std::optional<Rigid> PoseFromPlane(const NormalisedPairs& pairs, const Frame& fr
       a.block<1, 3>(2 * i + k / 3, 3 * (k % 3)) = across[k / 3][k % 3] * p;
     }
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
-  const Eigen::VectorXd h = svd.matrixV().col(8);
+  const Eigen::VectorXd h = RightSingularVectors(a).col(8);
   double ahead = h[8];  // the centre of the points is in front
   if (!pairs.is_perspective) {
     ahead = 0;
@@ -265,7 +264,7 @@ class PoseProblem {
 
 // Infinite where the picks leave something open.
 Matrix6d InverseNormal(const Matrix6d& normal) {
-  return BalancedInverse<6>(normal, 1e-13).value_or(Matrix6d::Constant(kInfinity));
+  return BalancedInverse(normal, 1e-13).value_or(Matrix6d::Constant(kInfinity));
 }
 
 // Thesis steps 6 and 7, from one start. None if no point lies in front, or the solution leaves the

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/twist.h"
 
@@ -72,8 +72,8 @@ Form MakeForm(const RaysToScan& rays) {
     ba += b.transpose() * a;
     bb += b.transpose() * b;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(bb);
-  if (!(solver.eigenvalues()[0] > kLeastCondition * solver.eigenvalues()[3])) {
+  const SymmetricEigen of_origin(bb);
+  if (!(of_origin.values[0] > kLeastCondition * of_origin.values[3])) {
     form.size_of_origins = 0;  // the rays meet in one place
     return form;
   }
@@ -100,7 +100,7 @@ Eigen::Quaterniond Descend(const Matrix9d& form, Eigen::Quaterniond rotation, do
     const Eigen::Vector3d gradient = weighed.transpose() * VectorOf(matrix);
     Eigen::Matrix3d normal = jacobian.transpose() * weighed;
     normal.diagonal().array() += damping * (1e-12 + normal.trace());
-    const Eigen::Vector3d turn = -normal.ldlt().solve(gradient);
+    const Eigen::Vector3d turn = -SolveSymmetric(normal, gradient);
     if (!turn.allFinite()) break;
     const Eigen::Quaterniond next = (RotationFromVector(turn) * rotation).normalized();
     const Eigen::Matrix3d next_matrix = next.toRotationMatrix();

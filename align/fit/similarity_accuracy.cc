@@ -8,6 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/statistics.h"
 
@@ -75,10 +76,9 @@ Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
   const Eigen::SelfAdjointEigenSolver<Matrix7d> of_a(a);
   const Matrix7d root = of_a.operatorSqrt(), inverse_root = of_a.operatorInverseSqrt();
   if (!inverse_root.allFinite()) return a;
-  const Eigen::SelfAdjointEigenSolver<Matrix7d> relative(inverse_root * b * inverse_root);
-  const Vector7d larger = relative.eigenvalues().cwiseMax(1);
-  return root * relative.eigenvectors() * larger.asDiagonal() *
-         relative.eigenvectors().transpose() * root;
+  const SymmetricEigen relative(inverse_root * b * inverse_root);
+  const Vector7d larger = relative.values.cwiseMax(1);
+  return root * relative.vectors * larger.asDiagonal() * relative.vectors.transpose() * root;
 }
 
 // The distances at the solution of a fit, all together and part by part; facing: mean of n n^T.

@@ -105,7 +105,7 @@ void SimilarityNormal::AddDistance(double distance, const Eigen::Vector3d& x_in_
 }
 
 bool SimilarityNormal::SolveStep(Vector7d* step, Matrix7d* inverse) const {
-  const auto found = BalancedInverse<7>(matrix, 1e-12);
+  const auto found = BalancedInverse(matrix, 1e-12);
   if (!found) return false;
   *inverse = *found;
   *step = -*inverse * gradient;

@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/twist.h"
 #include "importers/content_hash.h"
@@ -251,7 +251,7 @@ Matrix6d Adjust(RoomLink* link) {
       right.head<3>() +=
           v * TurnBetween(link->first_from_second.rotation, view.first_from_second.rotation);
     }
-    link->first_from_second = Moved(link->first_from_second, Vector6d(normal.ldlt().solve(right)));
+    link->first_from_second = Moved(link->first_from_second, SolveSymmetric(normal, right));
   }
   return normal;
 }

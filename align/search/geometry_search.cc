@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "align/search/translation_search.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
@@ -48,7 +49,7 @@ Eigen::Vector3d MiddleOf(const SearchCloud& cloud) {
 
 LevelCloud MakeLevel(const SearchCloud& cloud, const Eigen::Vector3d& up) {
   LevelCloud level;
-  level.level_from_sparse = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  level.level_from_sparse = RotationBetween(up, Eigen::Vector3d::UnitZ());
   level.middle = MiddleOf(cloud);
   std::vector<double> radii, heights, squares;
   for (const SurfacePoint& point : cloud.points) {

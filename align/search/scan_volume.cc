@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "align/surface/scan_patches.h"
+#include "core/decompositions.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -29,8 +30,7 @@ std::vector<Eigen::Vector3d> SomeSamples(const Scan& scan, size_t count) {
 
 ScanVolume::ScanVolume(const std::vector<Scan>& scans, const Eigen::Vector3d& up,
                        const ScanVolumeOptions& options)
-    : options_(options),
-      level_from_scan_(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ())) {
+    : options_(options), level_from_scan_(RotationBetween(up, Eigen::Vector3d::UnitZ())) {
   FindSize(scans);
   if (size_.prod() == 0) return;
   state_.assign(size_.prod(), State::kUnknown);

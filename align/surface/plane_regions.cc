@@ -6,10 +6,10 @@
 #include <map>
 #include <numeric>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/statistics.h"
 
@@ -259,7 +259,7 @@ double FindEndSlope(const PlaneRegion& region) {
     normal_matrix += cell.area * row * row.transpose();
     right += cell.area * offset.dot(region.normal) * row;
   }
-  const Eigen::Matrix<double, 6, 1> quadric = normal_matrix.ldlt().solve(right);
+  const Eigen::Matrix<double, 6, 1> quadric = SolveSymmetric(normal_matrix, right);
   if (!quadric.allFinite()) return 0;
   const double end = std::sqrt(3.0);  // of an even spread, in standard deviations
   // Too little to be told from the noise.

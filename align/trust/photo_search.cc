@@ -10,10 +10,10 @@
 #include <set>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "align/trust/scan_cells.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
@@ -151,7 +151,7 @@ class PhotoRays {
     for (int step = 0; step < kFitSteps && damping < kMostDamping; ++step) {
       Eigen::Matrix<double, 6, 6> damped = normal.matrix;
       damped.diagonal() *= 1 + damping;
-      const Eigen::Matrix<double, 6, 1> change = -damped.ldlt().solve(normal.gradient);
+      const Eigen::Matrix<double, 6, 1> change = -SolveSymmetric(damped, normal.gradient);
       Rigid moved;
       moved.rotation = (RotationFromVector(change.head<3>()) * pose.rotation).normalized();
       moved.translation = pose.translation + change.tail<3>();

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <opencv2/imgproc.hpp>
 
 #include "capture/association/associated_views_light.h"
+#include "core/decompositions.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
 
@@ -166,7 +166,7 @@ class Level {
     Eigen::Vector3d right = sums.right;
     // A slope that is missing in one direction stays unknown.
     normal.diagonal().array() += 1e-6 * normal.trace() + 1e-12;
-    const Eigen::Vector3d free = normal.ldlt().solve(right);
+    const Eigen::Vector3d free = SolveSymmetric(normal, right);
     const double rest = std::max(sums.squares - right.dot(free), 1e-3 * sums.squares);
     const double variance = rest / std::max(sums.count, 1.0) * kDependent + 1e-9;
     if (free[0] * std::sqrt(normal(0, 0) / variance) < least_deviations) return false;
@@ -174,7 +174,7 @@ class Level {
     const double hold = variance / (kContrastSpread * kContrastSpread);
     normal(0, 0) += hold;
     right[0] += hold * kContrast;
-    const Eigen::Vector3d solution = normal.ldlt().solve(right);
+    const Eigen::Vector3d solution = SolveSymmetric(normal, right);
     const double contrast = solution[0];
     if (!(contrast > 0.1 && contrast < 3)) return false;
     result->shift = solution.tail<2>() / contrast;

@@ -12,6 +12,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/camera_formulas.h"
+#include "core/decompositions.h"
 #include "core/projection_jacobian.h"
 #include "core/robust_kernel.h"
 #include "core/twist.h"
@@ -174,14 +175,13 @@ CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double
   const Eigen::VectorXd scale = sum.S.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * sum.S * scale.asDiagonal();
   const Eigen::VectorXd step =
-      scale.asDiagonal() * scaled.ldlt().solve(Eigen::VectorXd(scale.asDiagonal() * sum.g));
+      scale.asDiagonal() * SolveSymmetric(scaled, scale.asDiagonal() * sum.g);
   CameraFit stepped = fit;
   if (!step.allFinite()) return stepped;
   stepped.camera = WithStep(fit.camera, step);
   for (size_t i = 0; i < blocks.size(); ++i) {
-    const Vector6 pose_step = Damped(blocks[i].C, damping)
-                                  .ldlt()
-                                  .solve(blocks[i].b - blocks[i].B.topRows(n).transpose() * step);
+    const Vector6 pose_step = SolveSymmetric(
+        Damped(blocks[i].C, damping), blocks[i].b - blocks[i].B.topRows(n).transpose() * step);
     if (pose_step.allFinite()) stepped.cam_from_board[i] = Moved(fit.cam_from_board[i], pose_step);
   }
   return stepped;
@@ -312,7 +312,7 @@ Rigid FitPose(const BoardView& view, const Camera& camera, const Rigid& start, d
   PoseBlock block = MakeEquations<0>(view, camera, pose, huber_px);
   double damping = 1e-4;
   for (int iteration = 0; iteration < 50 && std::isfinite(block.cost); ++iteration) {
-    const Vector6 step = Damped(block.C, damping).ldlt().solve(block.b);
+    const Vector6 step = SolveSymmetric(Damped(block.C, damping), block.b);
     if (!step.allFinite()) break;
     const Rigid moved = Moved(pose, step);
     const PoseBlock next = MakeEquations<0>(view, camera, moved, huber_px);

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "core/decompositions.h"
 #include "core/projection_jacobian.h"
 
 namespace roomtex {
@@ -106,7 +107,7 @@ Eigen::Matrix2Xd MappingDifference(const Camera& camera, const Camera& other,
       normal += by_turn.transpose() * by_turn;
       right += by_turn.transpose() * (x - *seen);
     }
-    const Eigen::Vector3d step = normal.ldlt().solve(right);
+    const Eigen::Vector3d step = SolveSymmetric(normal, right);
     if (!step.allFinite() || !(step.norm() > 1e-10)) break;
     // Not RotationFromVector(): products of matrices, in the order that the report's numbers have.
     turn = Eigen::AngleAxisd(step.norm(), step.normalized()).toRotationMatrix() * turn;

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "capture/simulation/scan_grid.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/twist.h"
 
@@ -54,7 +54,7 @@ DepthCamera::DepthCamera(const SimulatedRoomOptions& options, const RoomScene& s
     matrix += jacobian.transpose() * jacobian;
     right += jacobian.transpose() * (jacobian * DriftAt(theta, phi));
   }
-  mean_drift_ = matrix.ldlt().solve(right);
+  mean_drift_ = SolveSymmetric(matrix, right);
 }
 
 double DepthCamera::Field(int purpose, double theta, double phi, double waves) const {

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/decompositions.h"
 #include "core/error.h"
 #include "importers/rtpi.h"
 #include "tests/importers/rtpi_bytes.h"
@@ -25,8 +26,7 @@ Scan MakeScan(bool is_rtpi, const Eigen::Vector3d& up, const Rigid& scan_from_st
   scan.num_rows = 29;
   scan.scan_from_station = scan_from_station;
   scan.up = scan_from_station.rotation * up;
-  const Eigen::Quaterniond station_from_y_up =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), up);
+  const Eigen::Quaterniond station_from_y_up = RotationBetween(Eigen::Vector3d::UnitY(), up);
   for (int row = 0; row < scan.num_rows; ++row) {
     for (int column = 0; column < scan.num_columns; ++column) {
       const double phi = (40 - 2.5 * row) * kDegree, theta = (-170 + 9 * column) * kDegree;

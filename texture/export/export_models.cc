@@ -4,6 +4,7 @@
 
 #include "colmap_ext/dense_workspace.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/decompositions.h"
 #include "core/output_file.h"
 #include "core/report.h"
 #include "texture/export/export_photos.h"
@@ -118,8 +119,7 @@ size_t WriteColmapModel(const ExportScene& scene, const std::vector<ExportedPhot
 void WriteNerfstudioModel(const ExportScene& scene, const std::vector<ExportedPhoto>& photos,
                           const Eigen::Vector3d& up_in_scan, bool masks,
                           const std::string& folder) {
-  const auto world_from_scan =
-      Eigen::Quaterniond::FromTwoVectors(up_in_scan, Eigen::Vector3d::UnitZ());
+  const auto world_from_scan = RotationBetween(up_in_scan, Eigen::Vector3d::UnitZ());
   Json frames = Json::array();
   for (const ExportedPhoto& photo : photos) {
     const std::vector<double>& p = photo.camera.params;

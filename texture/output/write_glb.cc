@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <tiny_gltf.h>
 
+#include "core/decompositions.h"
 #include "core/error.h"
 #include "core/gltf_frame.h"
 #include "core/option_fields.h"
@@ -37,7 +38,7 @@ class GlbBuilder {
   }
 
   void TurnUp(const Eigen::Vector3d& up) {
-    const auto turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitY());
+    const auto turn = RotationBetween(up, Eigen::Vector3d::UnitY());
     model_.nodes[0].rotation = {turn.x(), turn.y(), turn.z(), turn.w()};  // glTF: x y z w
   }
 

@@ -8,6 +8,7 @@
 #include <meshoptimizer.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/decompositions.h"
 #include "core/error.h"
 #include "core/gltf_frame.h"
 #include "core/option_fields.h"
@@ -52,7 +53,7 @@ class WebGlbBuilder {
       : path_(path), compressed_(options.compression == "meshopt") {
     meshopt_encodeVertexVersion(0);  // what EXT_meshopt_compression knows
     meshopt_encodeIndexVersion(1);
-    const auto turn = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitY());
+    const auto turn = RotationBetween(up, Eigen::Vector3d::UnitY());
     root_ = {{"name", kRootOfScanFrame},
              {"rotation", {turn.x(), turn.y(), turn.z(), turn.w()}},  // glTF: x y z w
              {"children", Json::array()}};

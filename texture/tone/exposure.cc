@@ -6,9 +6,8 @@
 #include <limits>
 #include <map>
 
-#include <Eigen/Cholesky>
-
 #include "core/cpu_stages.h"
+#include "core/decompositions.h"
 #include "core/option_fields.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
@@ -59,7 +58,7 @@ Eigen::VectorXd SolveRobust(const std::vector<Equation>& equations, int num_unkn
       normal(e.plus, e.minus) -= weight;
       normal(e.minus, e.plus) -= weight;
     }
-    const Eigen::VectorXd next = normal.ldlt().solve(right);
+    const Eigen::VectorXd next = SolveSymmetric(normal, right);
     const double change = (next - x).cwiseAbs().maxCoeff();
     x = next;
     if (change < 1e-9) break;

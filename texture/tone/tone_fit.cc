@@ -4,8 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
@@ -140,7 +139,7 @@ class LightFit {
     normal *= information;
     right *= information;
     for (int i = 0; i < n; ++i) normal(i, i) += 1 / (priors[i] * priors[i]);
-    return normal.ldlt().solve(right);
+    return SolveSymmetric(normal, right);
   }
 
   Unknowns unknowns_;

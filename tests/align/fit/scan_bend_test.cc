@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "align/fit/bent_model.h"
+#include "core/decompositions.h"
 #include "core/frames.h"
 #include "tests/align/surface/surface_room.h"
 #include "tests/support/matchers.h"
@@ -135,7 +136,7 @@ SparseModel RigModel(const Scan& scan, int first) {
     image.name = side == 0 ? "ahead" : "aside";
     image.cam_from_model.rotation =
         Eigen::AngleAxisd(side == 0 ? 0 : RadFromDeg(70), Eigen::Vector3d::UnitY()) *
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(1, 0.3, 0), Eigen::Vector3d::UnitZ());
+        RotationBetween(Eigen::Vector3d(1, 0.3, 0), Eigen::Vector3d::UnitZ());
     const Eigen::Vector3d centre = scan.Station() + Eigen::Vector3d(0.3, 0.2 * side, 0.1);
     image.cam_from_model.translation = -(image.cam_from_model.rotation * centre);
     const CameraProjection projection(camera);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/decompositions.h"
 #include "core/frames.h"
 
 namespace roomtex {
@@ -82,8 +83,7 @@ MotionUncertainty PairUncertainty(const SeedGeometry& geometry,
   const Eigen::MatrixXd covariance =
       ldlt.solve(Eigen::MatrixXd::Identity(size - 1, size - 1).leftCols(5)) * noise_px * noise_px;
   const auto largest = [](const Eigen::MatrixXd& part) {
-    return DegFromRad(
-        std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(part).eigenvalues().maxCoeff()));
+    return DegFromRad(std::sqrt(SymmetricEigen(part).values.maxCoeff()));
   };
   result.rotation_deg = largest(covariance.topLeftCorner(3, 3));
   result.baseline_deg = largest(covariance.block(3, 3, 2, 2));

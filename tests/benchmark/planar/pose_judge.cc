@@ -5,9 +5,8 @@
 #include <filesystem>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-
 #include "colmap_ext/seed_bundle.h"
+#include "core/decompositions.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -74,9 +73,8 @@ Eigen::Quaterniond MeanRotation(const SparseModel& model, const SimulatedViews& 
         views.cam_from_scene.at(image_id).rotation.conjugate() * image.cam_from_model.rotation;
     sum += scene_from_model.coeffs() * scene_from_model.coeffs().transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
   Eigen::Quaterniond mean;
-  mean.coeffs() = solver.eigenvectors().col(3);
+  mean.coeffs() = SymmetricEigen(sum).vectors.col(3);
   return mean.normalized();
 }
 
