@@ -185,6 +185,37 @@ TEST(LensCheck, CamerasThatWereRefinedOneByOneAreOneLens) {
   }
 }
 
+// Cameras of one lens that stays, told a little apart, keep each what it was told while another
+// lens is mended.
+TEST(LensCheck, CamerasOfALensThatStaysKeepWhatTheyWereTold) {
+  const SparseModel& truth = TrueModel(1);
+  SparseModel model = truth;
+  LensLabels labels;
+  for (auto& [id, image] : model.images) {
+    const uint32_t camera_id = id <= 4 ? 1 : id <= 8 ? 2 : 3;
+    Camera camera = truth.cameras.at(1);
+    camera.camera_id = camera_id;
+    if (camera_id == 2) Scale(1.0002, &camera);
+    if (camera_id == 3) Scale(1.03, &camera);
+    image.camera_id = camera_id;
+    model.cameras[camera_id] = camera;
+    labels[id].text = camera_id == 3 ? "a phone" : "a camera";
+  }
+  const SparseModel told = model;
+  const LensCheck check = CheckLenses(Mapped(model), labels, RefineIntrinsics::kAuto);
+  ASSERT_EQ(check.lenses.size(), 2u);
+  ASSERT_TRUE(check.mended);
+  for (const LensFinding& lens : check.lenses) EXPECT_EQ(lens.used, lens.camera_ids.size() == 1);
+  for (const auto& [id, image] : check.mended->images) {
+    const Camera& kept = check.mended->cameras.at(image.camera_id);
+    if (id <= 8) {
+      EXPECT_EQ(kept.params, told.cameras.at(told.images.at(id).camera_id).params) << id;
+    } else {
+      EXPECT_NEAR(kept.MeanFocalLength() / truth.cameras.at(1).MeanFocalLength(), 1, 0.003);
+    }
+  }
+}
+
 TEST(LensCheck, AZoomedPhotoGetsACameraOfItsOwn) {
   const SparseModel& truth = TrueModel(1);
   SparseModel zoomed = truth;
