@@ -185,9 +185,7 @@ TEST(LensCheck, CamerasThatWereRefinedOneByOneAreOneLens) {
   }
 }
 
-// Cameras of one lens that stays, told a little apart, keep each what it was told while another
-// lens is mended.
-TEST(LensCheck, CamerasOfALensThatStaysKeepWhatTheyWereTold) {
+TEST(LensCheck, ALensThatStaysIsAsToldWhileAnotherIsMended) {
   const SparseModel& truth = TrueModel(1);
   SparseModel model = truth;
   LensLabels labels;
@@ -195,7 +193,6 @@ TEST(LensCheck, CamerasOfALensThatStaysKeepWhatTheyWereTold) {
     const uint32_t camera_id = id <= 4 ? 1 : id <= 8 ? 2 : 3;
     Camera camera = truth.cameras.at(1);
     camera.camera_id = camera_id;
-    if (camera_id == 2) Scale(1.0002, &camera);
     if (camera_id == 3) Scale(1.03, &camera);
     image.camera_id = camera_id;
     model.cameras[camera_id] = camera;
