@@ -57,6 +57,71 @@ TEST(SimilarityFit, PicksHoldWhatOneWallLeavesOpen) {
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 0.02);
 }
 
+// Shelves one above the other, and two walls: from picks that are off by most of the way to the
+// next shelf, the surface pulls the model to that one.
+struct Shelves {
+  static constexpr double kApart = 0.3;
+  explicit Shelves(const Eigen::Vector3d& middle, const Similarity& scan_from_sparse) {
+    scan.organised = false;
+    scan.scan_from_station.translation = middle + Eigen::Vector3d(1.9, 1.9, 3);
+    const Eigen::Vector3d corner = middle - Eigen::Vector3d(2, 2, 1);
+    for (int i = 0; i < 200; ++i) {
+      for (int j = 0; j < 200; ++j) {
+        const double u = 0.02 * i, v = 0.02 * j;
+        for (int shelf = 0; shelf < 8; ++shelf) {
+          Add(corner + Eigen::Vector3d(u, v, kApart * shelf), {0, 0, 1}, i * 200 + j);
+        }
+        Add(corner + Eigen::Vector3d(u, 0, v), {0, 1, 0}, i * 200 + j);
+        Add(corner + Eigen::Vector3d(0, u, v), {1, 0, 0}, i * 200 + j);
+      }
+    }
+    const Similarity sparse_from_scan = scan_from_sparse.Inverse();
+    for (SurfacePoint& point : points) {
+      point.x_in_sparse = sparse_from_scan * point.x_in_sparse;
+      point.to_cameras = sparse_from_scan.rotation * point.to_cameras;
+    }
+  }
+
+  Scan scan;
+  std::vector<SurfacePoint> points;
+
+ private:
+  void Add(const Eigen::Vector3d& x_in_scan, const Eigen::Vector3d& normal, int sample) {
+    scan.points.push_back(x_in_scan);
+    if (sample % 199 == 0) points.push_back({x_in_scan, Eigen::Matrix3d::Zero(), normal});
+  }
+};
+
+TEST(SimilarityFit, RoughPicksAreLookedAroundFor) {
+  const SimulatedCase& one = MakeCase();
+  const Similarity truth = one.room->ScanFromSparse();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Pick& pick : one.picks)
+    middle += pick.x_in_scan / static_cast<double>(one.picks.size());
+  const Shelves shelves(middle, truth);
+  const ScanPatches surface({shelves.scan}, ScanPatchOptions());
+  Similarity start = truth;
+  start.translation.z() += 0.2;
+  std::vector<Pick> picks = one.picks;
+  for (Pick& pick : picks) {
+    const SparseImage& image = *one.model.FindImage(pick.image_name);
+    const CameraProjection projection(one.model.cameras.at(image.camera_id));
+    pick.x_in_img =
+        projection.ImgFromCam(CamFromScan(image.cam_from_model, start) * pick.x_in_scan).value();
+  }
+  const std::vector<bool> used(picks.size(), true);
+  const auto off = [&truth](const SimilarityFit& fit, const Eigen::Vector3d& x_in_scan) {
+    return (fit.scan_from_sparse * (truth.Inverse() * x_in_scan) - x_in_scan).norm();
+  };
+  const SimilarityFit one_way = FitToSurface(one.model, shelves.points, surface, picks, used, 60,
+                                             0.5, start, SimilarityFitOptions());
+  EXPECT_NEAR(off(one_way, middle), Shelves::kApart, 0.02);
+  const SimilarityFit fit = FitToSurfaceFromAround(one.model, shelves.points, surface, picks, used,
+                                                   60, 0.5, start, SimilarityFitOptions());
+  EXPECT_TRUE(fit.converged);
+  EXPECT_LT(off(fit, middle), 0.002);
+}
+
 TEST(SimilarityFit, GivesUpWhereThereIsNoSurface) {
   const SimulatedCase& one = MakeCase();
   const ScanPatches surface(one.scans, ScanPatchOptions());
