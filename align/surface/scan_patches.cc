@@ -34,9 +34,6 @@ struct Cube {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d sum2 = Eigen::Matrix3d::Zero();
   int count = 0, num_in_patches = 0;
-  std::optional<ScanPatch> patch;
-  int larger = -1;            // the cube of twice the edge around it, of its grid
-  bool is_in_larger = false;  // that, or a larger one, makes a patch
 
   void Add(const Eigen::Vector3d& point) {
     const Eigen::Vector3d offset = point - origin;
@@ -127,12 +124,26 @@ std::optional<ScanPatch> FitPatch(const Cube& cube, double edge, const ScanPatch
   return patch;
 }
 
-void FitPatches(const ScanPatchOptions& options, CubeGrid* grid) {
-  for (Cube& cube : grid->cubes()) {
+// What is kept of a cube when its samples have been tried.
+struct TriedCube {
+  int patch = -1;             // of those found; -1 = none
+  int larger = -1;            // the cube of twice the edge around it; -1 = none was tried
+  bool is_in_larger = false;  // that, or a larger one, makes a patch
+};
+
+std::vector<TriedCube> FitPatches(const ScanPatchOptions& options, CubeGrid* grid,
+                                  std::vector<ScanPatch>* found) {
+  std::vector<TriedCube> tried(grid->cubes().size());
+  for (size_t i = 0; i < tried.size(); ++i) {
+    Cube& cube = grid->cubes()[i];
     if (cube.num_in_patches > kMostInSmaller * cube.count) continue;
-    cube.patch = FitPatch(cube, grid->edge(), options);
-    if (cube.patch) cube.num_in_patches = cube.count;
+    const auto patch = FitPatch(cube, grid->edge(), options);
+    if (!patch) continue;
+    cube.num_in_patches = cube.count;
+    tried[i].patch = static_cast<int>(found->size());
+    found->push_back(*patch);
   }
+  return tried;
 }
 
 }  // namespace
@@ -187,23 +198,24 @@ ScanPatches::ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions&
     VisitSurface(scan, options.cell_size / 4,
                  [&](const Eigen::Vector3d& x_in_scan) { grid.Add(x_in_scan, station); });
   }
-  std::vector<CubeGrid> sizes;
-  sizes.push_back(std::move(grid));
-  FitPatches(options, &sizes.back());
+  std::vector<ScanPatch> found;
+  std::vector<std::vector<TriedCube>> sizes = {FitPatches(options, &grid, &found)};
   // Sizes are doubled exactly, the largest is typed in decimals.
-  while (2 * sizes.back().edge() < 1.001 * options.max_cell_size) {
-    CubeGrid larger(2 * sizes.back().edge());
-    for (Cube& cube : sizes.back().cubes()) cube.larger = larger.Add(cube);
-    FitPatches(options, &larger);
-    sizes.push_back(std::move(larger));
+  while (2 * grid.edge() < 1.001 * options.max_cell_size) {
+    CubeGrid larger(2 * grid.edge());
+    for (size_t i = 0; i < sizes.back().size(); ++i) {
+      sizes.back()[i].larger = larger.Add(grid.cubes()[i]);
+    }
+    grid = std::move(larger);
+    sizes.push_back(FitPatches(options, &grid, &found));
   }
   for (size_t i = sizes.size(); i-- > 0;) {
-    for (Cube& cube : sizes[i].cubes()) {
+    for (TriedCube& cube : sizes[i]) {
       if (cube.larger >= 0) {
-        const Cube& larger = sizes[i + 1].cubes()[cube.larger];
-        cube.is_in_larger = larger.is_in_larger || larger.patch;
+        const TriedCube& larger = sizes[i + 1][cube.larger];
+        cube.is_in_larger = larger.is_in_larger || larger.patch >= 0;
       }
-      if (cube.patch && !cube.is_in_larger) patches_.push_back(*cube.patch);
+      if (cube.patch >= 0 && !cube.is_in_larger) patches_.push_back(found[cube.patch]);
     }
   }
   if (!patches_.empty()) BuildTree(0, static_cast<int>(patches_.size()));
