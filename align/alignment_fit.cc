@@ -8,10 +8,6 @@
 namespace roomtex {
 namespace {
 
-// Metres; of picks that leave the camera more open, the way to the surface may end in a minimum
-// beside the right one.
-constexpr double kRoughPicks = 0.05;
-
 // Pixels per photo with picks, the largest.
 double PickBend(const AlignmentInput& input, const ShapeDisagreement& disagreement) {
   double bend_px = 0;
@@ -40,10 +36,9 @@ AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& sta
   fit.scan_from_sparse = start.scan_from_sparse;
   fit.points = FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
   const double gate = std::clamp(5 * start.position_sigma, 0.1, options.fit.max_gate);
-  const bool is_rough = !input.picks.empty() && start.position_sigma > kRoughPicks;
-  fit.surface = (is_rough ? FitToSurfaceFromAround : FitToSurface)(
-      input.model, fit.points, input.surveyed.patches(), input.picks, start.UsedPicks(),
-      start.pick_sigma_px, gate, start.scan_from_sparse, options.fit);
+  fit.surface = FitToSurface(input.model, fit.points, input.surveyed.patches(), input.picks,
+                             start.UsedPicks(), start.pick_sigma_px, gate, start.scan_from_sparse,
+                             options.fit);
   fit.pick_px.assign(input.picks.size(), std::numeric_limits<double>::quiet_NaN());
   if (!fit.surface.converged) return fit;
   fit.pick_px = PickDistances(input.model, input.picks, fit.surface.scan_from_sparse);

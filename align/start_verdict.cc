@@ -121,7 +121,8 @@ std::vector<Eigen::Vector3d> OpenSlides(const AlignmentInput& input, const Start
   Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();
   int count = 0;
   for (const SurfacePoint& point : search.cloud.points) {
-    const auto nearest = surface.FindNearest(scan_from_sparse * point.x_in_sparse, 0);
+    const auto nearest =
+        surface.FindNearest(scan_from_sparse * point.x_in_sparse, surface.cell_size());
     if (!nearest) continue;
     const Eigen::Vector3d& normal = surface.patches()[nearest->patch].normal;
     facing += normal * normal.transpose();

@@ -70,13 +70,14 @@ class Association {
   }
 
   std::optional<Candidate> Patch(const SurfacePoint& point, double gate) const {
-    const auto nearest = patches_.FindNearest(point.x_in_sparse, options_.max_distance);
+    const double reach = std::hypot(options_.max_distance, patches_.cell_size());
+    const auto nearest = patches_.FindNearest(point.x_in_sparse, reach);
     if (!nearest) return std::nullopt;
     const ScanPatch& patch = patches_.patches()[nearest->patch];
     if (patch.thickness > kMaxThickness * typical_thickness_) return std::nullopt;
     const Eigen::Vector3d offset = point.x_in_sparse - patch.point;
     const double beside = (offset - nearest->distance * patch.normal).norm();
-    if (beside > patch.size) return std::nullopt;
+    if (beside > patches_.cell_size()) return std::nullopt;
     return Judge(point, {0, patch.point, patch.normal, PatchSigma(patch, beside), -1, true}, gate);
   }
 
@@ -93,7 +94,7 @@ class Association {
   double PatchSigma(const ScanPatch& patch, double beside) const {
     const double curved2 =
         patch.thickness * patch.thickness - typical_thickness_ * typical_thickness_;
-    const double extent2 = patch.size * patch.size / 12;
+    const double extent2 = patches_.cell_size() * patches_.cell_size() / 12;
     const double noise2 =
         patch.thickness * patch.thickness / patch.num_samples * (1 + beside * beside / extent2);
     return std::sqrt(options_.surface_noise * options_.surface_noise + noise2 +

@@ -200,7 +200,7 @@ class BendSolver {
     std::vector<double> deviations;
     for (size_t i = 0; i < points_.size(); ++i) {
       const Eigen::Vector3d x = state.bend.Bend(state.scan_from_sparse * points_[i].x_in_sparse);
-      const auto nearest = surface_.FindNearest(x, kReach);
+      const auto nearest = surface_.FindNearest(x, std::hypot(kReach, surface_.cell_size()));
       if (!nearest || std::abs(nearest->distance) > kReach) continue;
       const ScanPatch& patch = surface_.patches()[nearest->patch];
       const Eigen::Vector3d normal = linear.transpose() * patch.normal;
@@ -208,7 +208,7 @@ class BendSolver {
       // The noise of the samples turns the patch, too.
       const double beside2 =
           std::max(0.0, (x - patch.point).squaredNorm() - nearest->distance * nearest->distance);
-      const double extent2 = patch.size * patch.size / 12;
+      const double extent2 = surface_.cell_size() * surface_.cell_size() / 12;
       const double variance =
           normal.dot(points_[i].covariance * normal) +
           patch.thickness * patch.thickness / patch.num_samples * (1 + beside2 / extent2) +

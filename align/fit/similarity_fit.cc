@@ -10,7 +10,6 @@
 
 #include "align/fit/similarity_accuracy.h"
 #include "align/fit/similarity_normal.h"
-#include "core/decompositions.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/robust_kernel.h"
@@ -24,16 +23,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The gate shrinks by this factor per step.
 constexpr double kGateShrink = 0.8;
 constexpr int kNumCellSteps = 20;
-// Where else the way to the surface begins: this many standard deviations of the picks aside, along
-// this many directions; a turn and a change of scale count by what they do at this distance,
-// metres.
-constexpr double kAside = 1.5;
-constexpr int kNumOpen = 4;
-constexpr double kLever = 2.0;
-// Metres; points within it say which of the answers is right, one from elsewhere only with clearly
-// more of them.
-constexpr double kSupportReach = 0.05;
-constexpr double kClearlyMore = 1.02;
 
 bool IsTiny(const Vector7d& step) {
   return step.head<3>().norm() < 1e-7 && step.segment<3>(3).norm() < 1e-8 &&
@@ -208,16 +197,12 @@ SimilarityFit FitToPicks(const SparseModel& model, const std::vector<Pick>& pick
   return fit;
 }
 
-namespace {
-
-// FitToSurface() whose way begins at `from`; what is known before is `start` all the same.
-SimilarityFit FitFrom(const Similarity& from, const SparseModel& model,
-                      const std::vector<SurfacePoint>& points, const ScanPatches& surface,
-                      const std::vector<Pick>& picks, const std::vector<bool>& used,
-                      double sigma_px, double gate, const Similarity& start,
-                      const SimilarityFitOptions& options) {
+SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePoint>& points,
+                           const ScanPatches& surface, const std::vector<Pick>& picks,
+                           const std::vector<bool>& used, double sigma_px, double gate,
+                           const Similarity& start, const SimilarityFitOptions& options) {
   SimilarityFit fit;
-  fit.scan_from_sparse = from;
+  fit.scan_from_sparse = start;
   fit.pivot = picks.empty() ? Middle(points, start) : Pivot(picks);
   fit.covariance.setConstant(kInfinity);
   const PickTerms terms(model, picks);
@@ -270,65 +255,6 @@ SimilarityFit FitFrom(const Similarity& from, const SparseModel& model,
   fit.rms_before = fit.num_points > 0 ? std::sqrt(sum_before / fit.num_points) : 0;
   fit.rms_after = fit.num_points > 0 ? std::sqrt(sum_after / fit.num_points) : 0;
   return fit;
-}
-
-// How many points lie near the surface, each the less the farther it is.
-double Support(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
-               const Similarity& scan_from_sparse) {
-  double support = 0;
-  for (const SurfaceMatch& match :
-       FindMatches(points, surface, scan_from_sparse, kSupportReach, kSupportReach)) {
-    support += TukeyWeight(match.distance, kSupportReach);
-  }
-  return support;
-}
-
-// To either side along the directions that the picks leave most open.
-std::vector<Similarity> PlacesAround(const SimilarityFit& by_picks) {
-  Vector7d lever = Vector7d::Ones();
-  lever.tail<4>().setConstant(kLever);
-  const Matrix7d covariance = lever.asDiagonal() * by_picks.covariance * lever.asDiagonal();
-  const SymmetricEigen directions(covariance);
-  std::vector<Similarity> places;
-  for (int k = 6; k > 6 - kNumOpen; --k) {
-    const double sigma = std::sqrt(std::max(0.0, directions.values[k]));
-    const Vector7d step = kAside * sigma * directions.vectors.col(k).cwiseQuotient(lever);
-    for (const Vector7d& side : {step, Vector7d(-step)}) {
-      places.push_back(Moved(by_picks.scan_from_sparse, by_picks.pivot, side));
-    }
-  }
-  return places;
-}
-
-}  // namespace
-
-SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePoint>& points,
-                           const ScanPatches& surface, const std::vector<Pick>& picks,
-                           const std::vector<bool>& used, double sigma_px, double gate,
-                           const Similarity& start, const SimilarityFitOptions& options) {
-  return FitFrom(start, model, points, surface, picks, used, sigma_px, gate, start, options);
-}
-
-SimilarityFit FitToSurfaceFromAround(const SparseModel& model,
-                                     const std::vector<SurfacePoint>& points,
-                                     const ScanPatches& surface, const std::vector<Pick>& picks,
-                                     const std::vector<bool>& used, double sigma_px, double gate,
-                                     const Similarity& start, const SimilarityFitOptions& options) {
-  SimilarityFit best =
-      FitToSurface(model, points, surface, picks, used, sigma_px, gate, start, options);
-  const SimilarityFit by_picks = FitToPicks(model, picks, used, sigma_px, start, options);
-  if (!by_picks.covariance.allFinite()) return best;
-  double least =
-      best.converged ? kClearlyMore * Support(points, surface, best.scan_from_sparse) : 0;
-  for (const Similarity& place : PlacesAround(by_picks)) {
-    const SimilarityFit other =
-        FitFrom(place, model, points, surface, picks, used, sigma_px, gate, start, options);
-    const double support = Support(points, surface, other.scan_from_sparse);
-    if (!other.converged || !(support > least)) continue;
-    best = other;
-    least = support;
-  }
-  return best;
 }
 
 }  // namespace roomtex

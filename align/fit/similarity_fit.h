@@ -101,13 +101,4 @@ SimilarityFit FitToSurface(const SparseModel& model, const std::vector<SurfacePo
                            const std::vector<bool>& used, double sigma_px, double gate,
                            const Similarity& start, const SimilarityFitOptions& options);
 
-// The same where the picks are rough, so that the way to the surface may end in a minimum beside
-// the right one: also from places around `start` that the picks allow as well, and the answer that
-// most points lie near.
-SimilarityFit FitToSurfaceFromAround(const SparseModel& model,
-                                     const std::vector<SurfacePoint>& points,
-                                     const ScanPatches& surface, const std::vector<Pick>& picks,
-                                     const std::vector<bool>& used, double sigma_px, double gate,
-                                     const Similarity& start, const SimilarityFitOptions& options);
-
 }  // namespace roomtex

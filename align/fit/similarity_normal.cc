@@ -54,7 +54,8 @@ std::vector<SurfaceMatch> FindMatches(const std::vector<SurfacePoint>& points,
   const Eigen::Matrix3d linear = s.scale * s.rotation.toRotationMatrix();
   std::vector<SurfaceMatch> matches;
   for (size_t i = 0; i < points.size(); ++i) {
-    const auto nearest = surface.FindNearest(s * points[i].x_in_sparse, gate);
+    const double reach = std::hypot(gate, surface.cell_size());
+    const auto nearest = surface.FindNearest(s * points[i].x_in_sparse, reach);
     if (!nearest) continue;
     const ScanPatch& patch = surface.patches()[nearest->patch];
     const Eigen::Vector3d normal_in_sparse = linear.transpose() * patch.normal;

@@ -22,7 +22,6 @@ struct ScanPatch {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit length, towards the scanner
   double thickness = 0;  // RMS distance of its samples from its plane, metres
   int num_samples = 0;
-  double size = 0;  // metres; edge of the cube of its samples
 };
 
 // Calls `visit` with points of the scan's surface: every measured sample of a grid; of a mesh
@@ -32,11 +31,7 @@ void VisitSurface(const Scan& scan, double spacing,
 
 struct ScanPatchOptions {
   double cell_size = 0.06;  // metres; edge of the cubes whose samples make one patch
-  // Samples of cubes that make none are tried together in cubes of twice the edge, and so on up to
-  // this edge, metres: coarse scans have few samples, and noisy ones are flat only over more of the
-  // surface.
-  double max_cell_size = 0.48;
-  int min_samples = 6;  // a cube with fewer samples makes no patch
+  int min_samples = 6;      // a cube with fewer samples makes no patch
   // A cube makes a patch only if its samples are flat: thickness below this share of their second
   // extent.
   double max_thickness_share = 0.25;
@@ -51,6 +46,7 @@ class ScanPatches {
   ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options);
 
   const std::vector<ScanPatch>& patches() const { return patches_; }
+  double cell_size() const { return cell_size_; }
   // Median thickness of the patches: the noise of the scan, metres; 0 without patches.
   double TypicalThickness() const;
 
@@ -58,10 +54,8 @@ class ScanPatches {
     int patch = -1;
     double distance = 0;  // along the normal, metres, positive on the scanner's side
   };
-  // Of the patches whose centres are within hypot(gate, their size) of the point, the one that is
-  // nearest by its power (distance^2 - (size / 2)^2; Aurenhammer 1987, "Power Diagrams"); none if
-  // there is none.
-  std::optional<Nearest> FindNearest(const Eigen::Vector3d& x_in_scan, double gate) const;
+  // The patch whose centre is nearest, no farther than max_distance; none if there is none.
+  std::optional<Nearest> FindNearest(const Eigen::Vector3d& x_in_scan, double max_distance) const;
 
  private:
   struct Node {
@@ -69,14 +63,13 @@ class ScanPatches {
     int axis = -1;           // -1 = leaf
     double split = 0;
     int left = -1, right = -1;
-    double max_size2 = 0;  // square of the largest patch's size
   };
-  struct Best;
   int BuildTree(int begin, int end);
-  void Search(int node, const Eigen::Vector3d& x, double gate2, Best* best) const;
+  void Search(int node, const Eigen::Vector3d& x, double* best2, int* best) const;
 
   std::vector<ScanPatch> patches_;  // in the order of the tree's leaves
   std::vector<Node> nodes_;
+  double cell_size_;
 };
 
 }  // namespace roomtex

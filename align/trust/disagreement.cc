@@ -31,7 +31,7 @@ std::vector<OnSurface> PointsNear(const std::vector<SurfacePoint>& points,
   std::vector<OnSurface> near;
   for (size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d x = bend.Bend(scan_from_sparse * points[i].x_in_sparse);
-    const auto nearest = surface.FindNearest(x, reach);
+    const auto nearest = surface.FindNearest(x, std::hypot(reach, surface.cell_size()));
     if (!nearest || !(std::abs(nearest->distance) < reach)) continue;
     const ScanPatch& patch = surface.patches()[nearest->patch];
     const Eigen::Vector3d normal = linear.transpose() * patch.normal;

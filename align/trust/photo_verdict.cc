@@ -109,9 +109,10 @@ void CountSights(const std::vector<ExpectedSighting>& expected, const Camera& ca
 void CountOnSurface(const SparseModel& aligned, const ScanPatches& surface,
                     const FreeSpace& free_space, double tolerance, double sigma_px,
                     std::map<uint32_t, PhotoVerdict>* photos) {
+  const double reach = std::hypot(tolerance, surface.cell_size());
   std::map<uint32_t, double> judged, on_surface;  // sums of weights
   for (const SurfacePoint& point : FindSurfacePoints(aligned, 2, sigma_px)) {
-    const auto nearest = surface.FindNearest(point.x_in_sparse, tolerance);
+    const auto nearest = surface.FindNearest(point.x_in_sparse, reach);
     const bool is_on = nearest && std::abs(nearest->distance) < tolerance;
     if (!is_on) {
       // What stands before the surface is known to be off it; behind, and where nobody measured,

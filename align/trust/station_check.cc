@@ -116,8 +116,8 @@ class StationCells {
       for (const ScanPatch& patch : patches[station].patches()) {
         std::vector<int>& there = stations_[Key((patch.point / kCell).array().floor())];
         if (there.empty() || there.back() != station) there.push_back(station);
-        reach_ = std::max(reach_, std::hypot(kFirstGate, patch.size));
       }
+      reach_ = std::max(reach_, std::hypot(kFirstGate, patches[station].cell_size()));
     }
   }
 

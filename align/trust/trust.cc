@@ -87,7 +87,7 @@ Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoin
   for (const SurfacePoint& point : points) {
     ++placement.num_points;
     const Eigen::Vector3d x_in_scan = scan_from_sparse * point.x_in_sparse;
-    const auto nearest = surface.FindNearest(x_in_scan, tolerance);
+    const auto nearest = surface.FindNearest(x_in_scan, std::hypot(tolerance, surface.cell_size()));
     if (nearest && std::abs(nearest->distance) < tolerance) {
       ++placement.num_on_surface;
       continue;
