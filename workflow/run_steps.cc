@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr char kReportStep[] = "report";
+constexpr char kCopiedDatabase[] = "database.copy.db";
 constexpr char kResultChanged[] = "its result was changed or removed";
 
 // Without what a result does not depend on.
@@ -232,9 +233,8 @@ class StepRunner {
     if (why) return why;
     if (IsConsumed(step.name)) {
       if (MatchesAreDone()) return std::nullopt;
-      if (!IsThere(step.outputs[0])) return "its result is not there";
-      if (HoldsOtherMatches()) return "it holds matches by other options";
-      return std::nullopt;
+      if (IsThere(step.outputs[0]) || MatchesHoldTheseFeatures()) return std::nullopt;
+      return "its result is not there";
     }
     if (!OutputsAreAsLeft(*record)) return kResultChanged;
     return std::nullopt;
@@ -256,6 +256,16 @@ class StepRunner {
     return Differences(record->made_from, MadeFromOf(step)).empty() && OutputsAreAsLeft(*record);
   }
 
+  // Whichever way they were matched, the database has the features that are asked for now.
+  bool MatchesHoldTheseFeatures() {
+    const StepRecord* const record = state_.Find("matches");
+    if (record == nullptr || record->state != StepState::kDone) return false;
+    const MadeFrom now = MadeFromOf(MakeStep(*RowOf("matches")));
+    const auto features = record->made_from.find("features");
+    return features != record->made_from.end() && now.count("features") != 0 &&
+           features->second == now.at("features") && OutputsAreAsLeft(*record);
+  }
+
   static const StepRow* RowOf(const std::string& name) {
     for (const StepRow& row : StepTable()) {
       if (row.name == name) return &row;
@@ -270,6 +280,10 @@ class StepRunner {
     StepRecord record;
     record.made_from = made_from;
     record.notes = step.notes;
+    const std::vector<CommandLine> first = ClearMatches(step);
+    // Killed before they are cleared, they are those of other options still.
+    if (!first.empty()) record.made_from["matches"] = "not cleared";
+    for (const CommandLine& line : first) record.commands.push_back(CommandText(line));
     for (const CommandLine& line : step.commands) record.commands.push_back(CommandText(line));
     state_.Set(step.name, record);
     for (const std::string& note : step.notes) context_.progress.Note(note);
@@ -295,7 +309,12 @@ class StepRunner {
       });
       record.state = StepState::kDone;
     } else {
-      RunCommands(step, &record);
+      num_commands_ = first.size() + step.commands.size();
+      if (RunCommands(step, first, &record)) {
+        record.made_from = made_from;
+        if (!first.empty()) state_.Set(step.name, record);
+        if (RunCommands(step, step.commands, &record)) record.state = StepState::kDone;
+      }
     }
     record.seconds = Elapsed();
     if (!IsConsumed(step.name)) {
@@ -318,10 +337,32 @@ class StepRunner {
                         Differences(before->made_from, made_from).empty();
       if (!same) RemoveDatabase(partial);
     }
-    if (step.name == "matches" && !IsThere(partial)) {
+    if (step.name == "matches" && !IsThere(partial) && !IsThere(chain_.At(kDatabase))) {
       throw InputError(partial, "", "is not there: the step features has to run first",
                        "Start with --from features");
     }
+  }
+
+  // What gives the step matches a database of features alone. Photos that are matched once more
+  // have theirs in the database of the matches; that one stays until the new one is whole.
+  std::vector<CommandLine> ClearMatches(const Step& step) {
+    if (step.name != "matches") return {};
+    const std::string partial = chain_.At(kPartialDatabase);
+    const auto clear = [this](const std::string& path) {
+      return CommandLine{chain_.options().colmap,
+                         "database_cleaner",
+                         "--type",
+                         "matches",
+                         "--database_path",
+                         path};
+    };
+    if (IsThere(partial)) {
+      return HoldsOtherMatches() ? std::vector<CommandLine>{clear(partial)}
+                                 : std::vector<CommandLine>();
+    }
+    const std::string copy = chain_.At(kCopiedDatabase);
+    RemoveDatabase(copy);
+    return {{"cp", chain_.At(kDatabase), copy}, clear(copy), {"mv", copy, partial}};
   }
 
   static void RemoveDatabase(const std::string& path) {
@@ -329,10 +370,10 @@ class StepRunner {
     for (const char* more : {"", "-journal", "-wal", "-shm"}) fs::remove(path + more, ignored);
   }
 
-  void RunCommands(const Step& step, StepRecord* record) {
-    record->state = StepState::kDone;
-    for (const CommandLine& line : step.commands) {
-      if (line[0] != "mv") context_.progress.Note("$ " + CommandText(line));
+  // False: one failed, as the record says then.
+  bool RunCommands(const Step& step, const std::vector<CommandLine>& commands, StepRecord* record) {
+    for (const CommandLine& line : commands) {
+      if (line[0] != "mv" && line[0] != "cp") context_.progress.Note("$ " + CommandText(line));
       const ChildRun run = RunOne(step, line);
       ++command_;
       record->cpu_seconds += run.cpu_seconds;
@@ -345,12 +386,13 @@ class StepRunner {
           is_ours ? ReasonOf(step, run) : line[0] + " " + run.failure + ": " + run.LastLines();
       const bool untrusted = is_ours && (run.exit_code == kExitUntrusted || without_picks);
       record->state = untrusted ? StepState::kUntrusted : StepState::kFailed;
-      exit_code_ = untrusted                            ? kExitUntrusted
-                   : is_ours && run.exit_code < 128     ? run.exit_code
-                   : line[0] == chain_.options().colmap ? kExitInput
-                                                        : kExitInternalError;
-      return;
+      exit_code_ = untrusted             ? kExitUntrusted
+                   : !is_ours            ? kExitInput
+                   : run.exit_code < 128 ? run.exit_code
+                                         : kExitInternalError;
+      return false;
     }
+    return true;
   }
 
   ChildRun RunOne(const Step& step, const CommandLine& line) {
@@ -365,7 +407,7 @@ class StepRunner {
     settings.stop_signal = is_ours ? SIGTERM : SIGKILL;
     settings.on_line = [&](const std::string& text) {
       const double share = ShareOfLine(text);
-      if (share >= 0) share_ = (command_ + share) / static_cast<double>(step.commands.size());
+      if (share >= 0) share_ = (command_ + share) / static_cast<double>(num_commands_);
       const bool is_warning = BeginsWith(text, "warning: ");
       if (is_ours && is_warning) context_.Warn(step.name + ": " + text.substr(9));
     };
@@ -488,6 +530,7 @@ class StepRunner {
   std::string running_;
   double share_ = -1;
   int command_ = 0, exit_code_ = 0;
+  size_t num_commands_ = 1;
 };
 
 }  // namespace

@@ -106,5 +106,7 @@ void AddScanReading(const AutoOptions& options, CommandLine* line);
 
 // Where COLMAP's steps leave the database until it holds all matches.
 inline constexpr char kPartialDatabase[] = "database.partial.db";
+// What it is called then.
+inline constexpr char kDatabase[] = "database.db";
 
 }  // namespace roomtex

@@ -157,8 +157,8 @@ Step MakeMatches(Chain* chain) {
   }
   AddPassed(options.passed.matches, &line);
   step.commands.push_back(line);
-  step.commands.push_back({"mv", chain->At(kPartialDatabase), chain->At("database.db")});
-  step.outputs = {chain->At("database.db")};
+  step.commands.push_back({"mv", chain->At(kPartialDatabase), chain->At(kDatabase)});
+  step.outputs = {chain->At(kDatabase)};
   return step;
 }
 
@@ -167,7 +167,7 @@ Step MakeMatches(Chain* chain) {
 Step MakeMapper(Chain* chain) {
   const AutoOptions& options = chain->options();
   Step step;
-  CommandLine line = {"roomtex-mapper",    "--database_path",     chain->At("database.db"),
+  CommandLine line = {"roomtex-mapper",    "--database_path",     chain->At(kDatabase),
                       "--image_path",      chain->ColmapFolder(), "--output_path",
                       chain->At("sparse"), "--report_path",       chain->ReportOf("mapper")};
   const std::string known = chain->KnownPath();
@@ -179,7 +179,7 @@ Step MakeMapper(Chain* chain) {
   AddCommon(options, &line);
   AddPassed(options.passed.mapper, &line);
   step.commands = {line};
-  step.inputs = {chain->At("database.db"), chain->ColmapFolder()};
+  step.inputs = {chain->At(kDatabase), chain->ColmapFolder()};
   if (!known.empty()) {
     step.inputs.push_back(known);
     step.notes.emplace_back("the scanner's photos stand where the scan's file has them");
@@ -215,8 +215,8 @@ Step MakeAlign(Chain* chain) {
     }
     // Its matches tell which photos are right; those of panoramas are their faces'.
     if (!HasPanoramas(chain)) {
-      AddOption("--database_path", chain->At("database.db"), &line);
-      step.inputs.push_back(chain->At("database.db"));
+      AddOption("--database_path", chain->At(kDatabase), &line);
+      step.inputs.push_back(chain->At(kDatabase));
     }
   }
   step.inputs.push_back(chain->ColorFolder());

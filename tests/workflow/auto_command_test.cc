@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "colmap_ext/database.h"
 #include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
@@ -371,6 +372,52 @@ TEST_F(AutoCommand, ScansOfOneNameInOtherFoldersAreTwoInputs) {
   EXPECT_THAT(sentences(), HasSubstr("(changed: " + second + ")"));
   WriteBytes(first, ReadBytes(first) + " ");
   EXPECT_THAT(sentences(), HasSubstr("(changed: " + second + ", scan.rtpi)"));
+}
+
+// Photos that are matched in another way, or once more, keep the features that they have.
+TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
+  const auto features = TimeOf("log/features.log");
+  const auto keypoints = [] { return Database(Result("database.db")).CountKeypoints(); };
+  const auto matches = [] {
+    size_t sum = 0;
+    for (const auto& [pair, count] : Database(Result("database.db")).CountMatches()) sum += count;
+    return sum;
+  };
+  const auto features_before = keypoints();
+  const size_t matches_before = matches();
+  const std::string strict = Arguments() + " --SiftMatching.max_ratio 0.5";
+
+  const CommandResult fewer = RunCommandLine(strict + " --until matches");
+  EXPECT_EQ(fewer.exit_code, 0) << fewer.err;
+  EXPECT_THAT(fewer.err, HasSubstr("features: done before"));
+  EXPECT_EQ(TimeOf("log/features.log"), features);
+  EXPECT_EQ(keypoints(), features_before);
+  EXPECT_LT(matches(), 0.8 * matches_before);
+
+  const CommandResult again = RunCommandLine(Arguments() + " --only matches");
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(TimeOf("log/features.log"), features);
+  EXPECT_EQ(keypoints(), features_before);
+  EXPECT_NEAR(matches(), matches_before, 0.05 * matches_before);
+
+  const CommandResult nothing = RunCommandLine(Arguments() + " --until matches");
+  EXPECT_EQ(nothing.exit_code, 0) << nothing.err;
+  EXPECT_THAT(nothing.err, Not(HasSubstr("$ ")));
+
+  // What cannot be matched leaves what there was, whole, and its features for the next time.
+  const std::string database = ReadBytes(Result("database.db"));
+  const CommandResult failed =
+      RunCommandLine(Arguments() + " --SiftMatching.max_ratio nonsense --until matches");
+  EXPECT_EQ(failed.exit_code, 3) << failed.err;
+  EXPECT_EQ(ReadBytes(Result("database.db")), database);
+  EXPECT_TRUE(fs::exists(Result("database.partial.db")));
+  const CommandResult mended = RunCommandLine(strict + " --until matches");
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+  EXPECT_EQ(TimeOf("log/features.log"), features);
+  EXPECT_EQ(keypoints(), features_before);
+  EXPECT_LT(matches(), 0.8 * matches_before);
+  EXPECT_FALSE(fs::exists(Result("database.partial.db")));
+  EXPECT_FALSE(fs::exists(Result("database.copy.db")));
 }
 
 TEST_F(AutoCommand, OneRunAtATime) {
