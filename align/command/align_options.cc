@@ -15,7 +15,9 @@
 
 namespace roomtex {
 
-void AddOptions(AlignCommandOptions* a, Command* command) {
+namespace {
+
+void AddMainFiles(AlignCommandOptions* a, Command* command) {
   command->AddInputPaths("input_path", &a->input_paths,
                          "COLMAP's sparse model: a folder, .bin or .txt. Several (photos that "
                          "nothing connects: sparse/0 sparse/1) are put into the scan each by "
@@ -49,6 +51,9 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
       "scan_from_sparse_matrix.txt (the same as 4x4 matrix, for COLMAP up to 3.8). A trusted "
       "result "
       "that is there is not replaced by an untrusted one, which goes to OUTPUT.untrusted.");
+}
+
+void AddEvidenceAndReading(AlignCommandOptions* a, Command* command) {
   command->AddInputPath("image_path", &a->image_path,
                         "Folder of the photos (the plain ones where a pattern was projected); with "
                         "it the report says how well photos and scan intensity agree, and the "
@@ -74,6 +79,9 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
   command->Add(FieldsOf(&a->scan_reader));
   command->Add(FieldsOf(&a->bound));
   command->Add(FieldsOf(&a->camera));
+}
+
+void AddMethod(AlignCommandOptions* a, Command* command) {
   AlignmentOptions& o = a->alignment;
   command->AddBool("plane_constrained", &o.plane_constrained,
                    "Refine the similarity on the surface of the scan, and adjust poses and points "
@@ -95,6 +103,14 @@ void AddOptions(AlignCommandOptions* a, Command* command) {
   command->Add(FieldsOf(&o.surface));
   command->Add(FieldsOf(&o.fit));
   command->Add(FieldsOf(&o.mesh));
+}
+
+}  // namespace
+
+void AddOptions(AlignCommandOptions* a, Command* command) {
+  AddMainFiles(a, command);
+  AddEvidenceAndReading(a, command);
+  AddMethod(a, command);
 }
 
 void RequirePicksOrPhotos(const AlignCommandOptions& a) {

@@ -29,7 +29,7 @@ Rigid SimulatedRoomOptions::RoomFromSecondRoom() const {
           Eigen::Vector3d(2 * DoorX(), -kPartitionThickness, 0)};
 }
 
-void SimulatedRoomOptions::Declare(OptionFields* fields) {
+void SimulatedRoomOptions::DeclareRoom(OptionFields* fields) {
   fields->Number("room_width", &width, "size of the room along x, metres")
       .Within(4.6, 20, "m: the furniture has to fit in");
   fields->Number("room_depth", &depth, "size of the room along y, metres")
@@ -38,6 +38,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Bool("furnished", &furnished, "table, shelf, sofa, pictures and so on");
   fields->Bool("bare_walls", &bare_walls,
                "plain walls, floor and ceiling: nothing for features to hold on to");
+}
+
+void SimulatedRoomOptions::DeclareProjectors(OptionFields* fields) {
   fields
       ->Int("projectors", &projectors,
             "projectors that throw patterns; every place is then photographed twice, "
@@ -60,6 +63,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       .Within(0.3, 100, "m");
   fields->Bool("same_pattern", &same_pattern,
                "a mistake to study: all projectors throw the same pattern");
+}
+
+void SimulatedRoomOptions::DeclareSurfaces(OptionFields* fields) {
   fields
       ->Number("finest_detail", &finest_detail,
                "metres: no surface has finer detail; larger = smoother pictures and prints")
@@ -70,6 +76,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                "varnish on floor and wood: share of the light that it mirrors seen from straight "
                "above, in the photos and not in the true colours; 0.05 = polished")
       .Within(0, 1);
+}
+
+void SimulatedRoomOptions::DeclareCamera(OptionFields* fields) {
   fields->Int("num_photos", &num_photos, "number of photos; with projectors: of places")
       .Within(1, 1000);
   fields->Int("photo_width", &photo_width, "pixels").Within(64, 20000, "pixels");
@@ -91,6 +100,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                   "--camera_model EQUIRECTANGULAR needs a --photo_width of twice --photo_height, "
                   "e.g. 4096 and 2048");
   fields->Bool("distortion", &distortion, "lens distortion (0 = all its parameters zero)");
+}
+
+void SimulatedRoomOptions::DeclareLight(OptionFields* fields) {
   fields
       ->Number("exposure_range_ev", &exposure_range_ev,
                "exposures vary by up to plus or minus this, in thirds of an EV")
@@ -120,6 +132,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Choice("wrong_exif", &wrong_exif, {"none", "one", "all"},
                  "one: the middle photo notes a quarter of its exposure time; all: every photo "
                  "notes the same");
+}
+
+void SimulatedRoomOptions::DeclareMotion(OptionFields* fields) {
   fields
       ->Number("rolling_shutter_ms", &rolling_shutter_ms,
                "time from reading the first row of a photo to the last one, in which the hand "
@@ -139,6 +154,10 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
   fields->Require(projectors == 0 || rolling_shutter_ms == 0,
                   "--rolling_shutter_ms needs a hand that moves, --projectors a camera that stands "
                   "still; give one of them");
+}
+
+void SimulatedRoomOptions::DeclareOddPhotos(OptionFields* fields) {
+  const auto model = CameraModelFromName(camera_model);
   fields
       ->Number("strangers", &strangers,
                "share of the photos in which somebody stands who is not in the scan")
@@ -157,6 +176,9 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
                   "--zoomed needs a lens, which --camera_model EQUIRECTANGULAR has not");
   fields->Require(similar_room == 0 || projectors == 0,
                   "--similar_room and --projectors cannot be had together; give one of them");
+}
+
+void SimulatedRoomOptions::DeclareScans(OptionFields* fields) {
   fields->Bool("second_room", &second_room,
                "behind the open door, with --num_photos and --num_stations of its own; further "
                "photos are taken on the way through the door");
@@ -191,6 +213,17 @@ void SimulatedRoomOptions::Declare(OptionFields* fields) {
       .Within(0, 1, "m");
   fields->Bool("missing_samples", &missing_samples,
                "no echo from the window, the mirror and a few random samples");
+}
+
+void SimulatedRoomOptions::Declare(OptionFields* fields) {
+  DeclareRoom(fields);
+  DeclareProjectors(fields);
+  DeclareSurfaces(fields);
+  DeclareCamera(fields);
+  DeclareLight(fields);
+  DeclareMotion(fields);
+  DeclareOddPhotos(fields);
+  DeclareScans(fields);
   fields->Int("num_picks", &num_picks, "clicks in the photo that suits best").Within(0, 1000);
   fields
       ->Number("click_noise_px", &click_noise_px,

@@ -107,6 +107,16 @@ struct SimulatedRoomOptions {
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
+
+ private:
+  void DeclareRoom(OptionFields* fields);
+  void DeclareProjectors(OptionFields* fields);
+  void DeclareSurfaces(OptionFields* fields);
+  void DeclareCamera(OptionFields* fields);
+  void DeclareLight(OptionFields* fields);
+  void DeclareMotion(OptionFields* fields);
+  void DeclareOddPhotos(OptionFields* fields);
+  void DeclareScans(OptionFields* fields);
 };
 
 }  // namespace roomtex
