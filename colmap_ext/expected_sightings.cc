@@ -7,6 +7,7 @@
 
 #include "core/camera_model.h"
 #include "core/frames.h"
+#include "core/projections.h"
 
 namespace roomtex {
 namespace {
@@ -112,7 +113,7 @@ class SightingSearch {
   SightingSearch(const SparseModel& model, const HidesPoint& hides,
                  const std::set<uint32_t>& not_believed)
       : model_(model), hides_(hides), not_believed_(not_believed) {
-    for (const auto& [id, camera] : model.cameras) projections_.emplace(id, camera);
+    projections_ = ProjectionsOf(model.cameras);
     for (const auto& [id, image] : model.images) {
       centres_[id] = image.cam_from_model.TargetOriginInSource();
       densities_.emplace(id, KeypointDensity(image, model.cameras.at(image.camera_id)));

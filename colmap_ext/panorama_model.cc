@@ -15,6 +15,7 @@
 #include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/projections.h"
 #include "core/twist.h"
 
 namespace roomtex {
@@ -185,8 +186,7 @@ void Adjust(SparseModel* model) {
   ceres::Problem problem(problem_options);
   ceres::Solver::Options options;
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model->cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model->cameras);
   double* x_in_model = points.empty() ? nullptr : points[0].data();
   for (const auto& [id, point] : model->points) {
     for (const TrackElement& element : point.track) {

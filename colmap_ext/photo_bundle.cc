@@ -17,6 +17,7 @@
 #include "colmap_ext/lens_prior.h"
 #include "colmap_ext/reduced_normal.h"
 #include "colmap_ext/reprojection_cost.h"
+#include "core/projections.h"
 #include "core/robust_kernel.h"
 #include "core/similarity.h"
 #include "core/statistics.h"
@@ -416,8 +417,7 @@ class PhotoNormal {
 }  // namespace
 
 double KeypointNoise(const SparseModel& model) {
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model.cameras);
   std::vector<double> errors;
   double num_points = 0;
   for (const auto& [id, point] : model.points) {

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/output_file.h"
+#include "core/projections.h"
 #include "core/resource_limits.h"
 #include "core/statistics.h"
 
@@ -366,8 +367,7 @@ SparseModel WithoutPhotos(const SparseModel& model, const std::set<uint32_t>& im
 }
 
 ReprojectionErrors UpdateReprojectionErrors(SparseModel* model) {
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model->cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model->cameras);
   struct View {
     const SparseImage* image;
     const CameraProjection* projection;

@@ -12,6 +12,7 @@
 #include "colmap_ext/photo_bundle.h"
 #include "core/frames.h"
 #include "core/option_fields.h"
+#include "core/projections.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -48,8 +49,7 @@ constexpr double kMaxBendDeviations = 3;
 
 // By image_id.
 std::map<uint32_t, double> PhotoCosts(const SparseModel& model, double sigma_px) {
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model.cameras);
   std::map<uint32_t, double> costs;
   for (const auto& [id, point] : model.points) {
     for (const TrackElement& element : point.track) {
@@ -232,8 +232,7 @@ std::string StopRunaway(const PlaneBundleInput& input, const PlaneBundleOptions&
 
 // RMS error of the used picks, by their weights, over its limit.
 double PickExcess(const PlaneBundleInput& input, const SparseModel& model) {
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model.cameras);
   double sum = 0, sum_of_weights = 0, diagonal = 0;
   for (size_t i = 0; i < input.picks.size(); ++i) {
     const SparseImage* const image = model.FindImage(input.picks[i].image_name);
@@ -325,8 +324,7 @@ void FindIdleImages(const PlaneBundleInput& input, const PlaneBundleOptions& opt
 void StopRows(PlaneBundle* result) {
   SparseModel& model = result->model;
   for (const uint32_t id : result->idle_images) result->motions.erase(id);
-  std::map<uint32_t, CameraProjection> projections;
-  for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
+  const auto projections = ProjectionsOf(model.cameras);
   for (const auto& [id, motion] : result->motions) {
     SparseImage& image = model.images.at(id);
     const CameraProjection& projection = projections.at(image.camera_id);

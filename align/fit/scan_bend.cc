@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "core/frames.h"
+#include "core/projections.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
 #include "core/twist.h"
@@ -152,7 +153,7 @@ class BendSolver {
         used_(used),
         pick_sigma_px_(pick_sigma_px),
         start_(start) {
-    for (const auto& [id, camera] : model.cameras) projections_.emplace(id, camera);
+    projections_ = ProjectionsOf(model.cameras);
     for (const Pick& pick : picks) pivot_ += pick.x_in_scan / static_cast<double>(picks.size());
     for (size_t i = 0; picks.empty() && i < points.size(); ++i) {
       pivot_ += start * points[i].x_in_sparse / static_cast<double>(points.size());

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/photo_files.h"
+#include "core/projections.h"
 #include "core/resource_limits.h"
 #include "core/surfels.h"
 #include "importers/scan_record.h"
@@ -50,10 +51,7 @@ double ScoreOf(const SparseImage& image, const Camera& camera, const SparseModel
 PickScene::PickScene(const PickSceneInput& input, Progress* progress) : input_(input) {
   RequireFolder(input.image_path, "Check --image_path");
   ReadModels(progress);
-  for (const SparseModel& model : models_) {
-    std::map<uint32_t, CameraProjection>& projections = projections_.emplace_back();
-    for (const auto& [id, camera] : model.cameras) projections.emplace(id, camera);
-  }
+  for (const SparseModel& model : models_) projections_.push_back(ProjectionsOf(model.cameras));
   AddPhotos();
   progress->Stage("read scan");
   ReadScans();
