@@ -232,7 +232,6 @@ class StepRunner {
     const auto why = WhyStale(*record, Differences(record->made_from, made_from));
     if (why) return why;
     if (IsConsumed(step.name)) {
-      if (MatchesAreDone()) return std::nullopt;
       if (IsThere(step.outputs[0]) || MatchesHoldTheseFeatures()) return std::nullopt;
       return "its result is not there";
     }
@@ -246,14 +245,6 @@ class StepRunner {
     if (record == nullptr || record->state == StepState::kDone) return false;
     const Step step = MakeStep(*RowOf("matches"));
     return !Differences(record->made_from, MadeFromOf(step)).empty();
-  }
-
-  // With the features that are there now.
-  bool MatchesAreDone() {
-    const StepRecord* const record = state_.Find("matches");
-    if (record == nullptr || record->state != StepState::kDone) return false;
-    const Step step = MakeStep(*RowOf("matches"));
-    return Differences(record->made_from, MadeFromOf(step)).empty() && OutputsAreAsLeft(*record);
   }
 
   // Whichever way they were matched, the database has the features that are asked for now.
