@@ -43,6 +43,7 @@ class Viewer {
     this.measuring = false;
     this.sectioning = false;  // the line of a section is drawn
     this.scheduled = false;
+    this.handingOver = false;
     this.numPictures = 0;
     this.cost = 0;  // milliseconds that the graphics card took for the last picture
     this.fence = null;
@@ -51,7 +52,9 @@ class Viewer {
     const invalidate = () => this.invalidate();
     this.panel = new Panel(this);
     const fail = (sentence) => this.panel.fail(sentence);
-    this.room = new Room(scene, renderer, {invalidate, refine: () => this.refine(), fail});
+    this.room = new Room(
+        scene, renderer,
+        {invalidate, refine: () => this.refine(), handOver: () => this.#handOver(), fail});
     this.world.add(this.room.group);
     this.navigation = new Navigation(this.canvas, {
       cast: (ray) => this.room.cast(ray),
@@ -182,7 +185,20 @@ class Viewer {
     } else if (more) {
       this.refine();
     }
+    this.#handOver();
     this.panel.showProgress();
+  }
+
+  // What no picture shows yet is handed over without one: on slow graphics cards, that would be
+  // most of the time until the room is there.
+  #handOver() {
+    if (this.handingOver || !this.room.hasPendingTexture) return;
+    this.handingOver = true;
+    requestAnimationFrame(() => {
+      this.handingOver = false;
+      if (!this.scheduled && !this.#isDrawing()) this.room.handOverTexture();
+      this.#handOver();
+    });
   }
 
   // Whether the graphics card still works on the last picture; learns how long it takes.
@@ -208,7 +224,7 @@ class Viewer {
     return false;
   }
 
-  // Gives whether there is more to hand over to the graphics card.
+  // Gives whether there are more meshes to hand over to the graphics card.
   draw() {
     const {camera} = this.navigation;
     const started = performance.now();

@@ -146,10 +146,12 @@ class PageTexture {
 
 export class Room {
   // scene: of the server. invalidate: asks for a new picture. fail: takes a sentence.
-  // refine: the same, when the graphics card has time.
-  constructor(scene, renderer, {invalidate, refine, fail}) {
+  // refine: as invalidate, when the graphics card has time. handOver: calls handOverTexture(), as
+  // long as there is more.
+  constructor(scene, renderer, {invalidate, refine, handOver, fail}) {
     this.scene = scene;
     this.refine = refine;
+    this.handOver = handOver;
     this.renderer = renderer;
     this.invalidate = invalidate;
     this.fail = fail;
@@ -226,7 +228,7 @@ export class Room {
       // After the room as a whole: the first picture does not wait for it.
       while (!this.loaded) await new Promise((later) => setTimeout(later, 50));
       await page.loadWhole(gl.getParameter(gl.MAX_TEXTURE_SIZE));
-      this.refine();
+      this.handOver();
     } catch (error) {
       page.complete = true;
       this.fail(error.message);
@@ -300,8 +302,8 @@ export class Room {
   }
 
   // To be called before every picture: hands over what has arrived, as much as one picture may, and
-  // asks for what the camera wants. heightPx: of the picture. Gives whether there is more to hand
-  // over.
+  // asks for what the camera wants. heightPx: of the picture. Gives whether there are more meshes
+  // to hand over.
   update(camera, heightPx) {
     const started = performance.now();
     let bytes = 0;
@@ -311,18 +313,23 @@ export class Room {
       this.#accept(chunk, level, mesh);
       bytes += 20 * mesh.geometry.attributes.position.count + 2 * mesh.geometry.index.count;
     }
-    if (bytes < mayTake) {
-      const page = this.pages.find((candidate) => candidate.pending);
-      if (page?.step()) {
-        page.complete = true;
-        this.#showPage(page);
-      }
-    }
+    if (bytes < mayTake) this.handOverTexture();
     this.#choose(camera, heightPx);
     this.dirty = false;
-    this.handedOver = bytes > 0 || this.pages.some((page) => page.pending);
+    this.handedOver = bytes > 0 || this.hasPendingTexture;
     this.longestUpload = Math.max(this.longestUpload, performance.now() - started);
-    return this.arrived.length > 0 || this.pages.some((page) => page.pending);
+    return this.arrived.length > 0;
+  }
+
+  get hasPendingTexture() {
+    return this.pages.some((page) => page.pending);
+  }
+  // A strip of a texture, which no picture shows before it is whole: asks for one then.
+  handOverTexture() {
+    const page = this.pages.find((candidate) => candidate.pending);
+    if (!page?.step()) return;
+    page.complete = true;
+    this.#showPage(page);
   }
 
   #accept(chunk, level, mesh) {
