@@ -6,6 +6,8 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include <ceres/loss_function.h>
 #include <ceres/normal_prior.h>
@@ -25,8 +27,45 @@ constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
 // one finds.
 constexpr double kFunctionTolerance = 1e-5;
+// Or when a step moves no camera farther than this, a fifth of what counts as a change from round
+// to round: what would lower the cost further, for as many steps again, are a few points that hold
+// no camera.
+constexpr double kStillMetres = 1e-5, kStillRadians = 4e-6;
+constexpr double kStartRadius = 1e6;  // the start is near: almost a Gauss-Newton step
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
+
+// Ends a solution once the cameras stand still. The poses must be those of every iteration.
+class StopAtStillCameras : public ceres::IterationCallback {
+ public:
+  explicit StopAtStillCameras(const std::vector<PoseParameters>& poses) : poses_(poses) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    const std::vector<Rigid> before = std::exchange(last_, {});
+    for (const PoseParameters& pose : poses_) last_.push_back(pose.CamFromScan());
+    // A step that failed or was held back says nothing.
+    const bool is_free = summary.step_is_successful && summary.trust_region_radius >= kStartRadius;
+    return summary.iteration > 0 && is_free && IsStill(before)
+               ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+               : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  bool IsStill(const std::vector<Rigid>& before) const {
+    for (size_t i = 0; i < before.size(); ++i) {
+      const Eigen::Vector3d moved =
+          last_[i].TargetOriginInSource() - before[i].TargetOriginInSource();
+      if (moved.norm() > kStillMetres ||
+          RotationAngle(last_[i].rotation, before[i].rotation) > kStillRadians) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  const std::vector<PoseParameters>& poses_;
+  std::vector<Rigid> last_;
+};
 
 class RoundProblem {
  public:
@@ -58,7 +97,7 @@ class RoundProblem {
     o.function_tolerance = kFunctionTolerance;
     o.parameter_tolerance = 1e-9;
     o.gradient_tolerance = 1e-12;
-    o.initial_trust_region_radius = 1e6;  // the start is near: almost a Gauss-Newton step
+    o.initial_trust_region_radius = kStartRadius;
     o.num_threads = 1;
     o.logging_type = ceres::SILENT;
     o.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -72,6 +111,9 @@ class RoundProblem {
     for (auto& [id, motion] : motions_) order(motion.data(), 1);
     for (auto& params : params_) order(params.data(), 2);
     for (Eigen::Vector3d& point : pick_points_) order(point.data(), 3);
+    StopAtStillCameras stop(poses_);
+    o.callbacks.push_back(&stop);
+    o.update_state_every_iteration = true;
     ceres::Solver::Summary summary;
     ceres::Solve(o, problem_.get(), &summary);
     return summary.IsSolutionUsable();

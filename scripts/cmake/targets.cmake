@@ -61,12 +61,13 @@ function(roomtex_command name source)
           COMPONENT commands)
 endfunction()
 
-# roomtex_test(NAME [WHOLE] [LABEL l] SOURCES files... LIBRARIES ...): every suite of tests becomes a ctest of its own,
+# roomtex_test(NAME [WHOLE] [LABEL l] [SLOW tests...] SOURCES files... LIBRARIES ...): every suite of tests becomes a ctest of its own,
 # labelled `unit` or l: what a suite sets up is paid once, and so is starting a program, which takes 0.1 s of processor
 # for OpenCV and what comes with it. WHOLE: the program is one ctest, because its suites share a costly fixture or are
-# short.
+# short. SLOW, of a WHOLE one: tests (SUITE.NAME) that vary what others hold and take long; NAME_slow runs them, labelled
+# slow.
 function(roomtex_test name)
-  cmake_parse_arguments(ARG "WHOLE" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "WHOLE" "LABEL" "SLOW;SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -76,7 +77,17 @@ function(roomtex_test name)
                         GTest::gtest_main)
   target_precompile_headers(${name} REUSE_FROM roomtex_precompiled_tests)
   if(ARG_WHOLE)
-    add_test(NAME ${name} COMMAND ${name})
+    set(filter)
+    if(ARG_SLOW)
+      string(JOIN ":" slow ${ARG_SLOW})
+      set(filter --gtest_filter=-${slow})
+      add_test(NAME ${name}_slow COMMAND ${name} --gtest_filter=${slow})
+      # All of them: a name that is no test's must not pass for one.
+      list(LENGTH ARG_SLOW num_slow)
+      set_tests_properties(${name}_slow PROPERTIES LABELS slow TIMEOUT 1500 PASS_REGULAR_EXPRESSION
+                           "(PASSED |SKIPPED) ] ${num_slow} test")
+    endif()
+    add_test(NAME ${name} COMMAND ${name} ${filter})
     # Long ones first, also where ctest knows no times yet: none is then left for the end alone.
     set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} COST 40)
   else()
