@@ -10,6 +10,8 @@ constexpr double kMinDepth = 1e-3;  // metres in front of the camera
 // From the keypoint's row to the one that sees the point; each is nearer by the share of the photo
 // that the motion shifts what it shows, some thousandths.
 constexpr int kRowSteps = 2;
+// Derivatives cost by how many there may be; most camera models have no more parameters.
+constexpr int kFewParams = 8;
 
 using RowMatrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using RowMatrix26 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
@@ -109,10 +111,15 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   if (jacobians[1] != nullptr) Eigen::Map<RowMatrix23>{jacobians[1]} = by_q;
   if (refine_intrinsics_ && jacobians[2] != nullptr) {
     using ByParams = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto seen_by =
-        ErrorOfPoint<kMaxCameraParams>(camera_.model, intrinsics, num_params, p, x_in_img_);
-    Eigen::Map<ByParams>(jacobians[2], 2, num_params) =
-        weight * seen_by.by_params.leftCols(num_params);
+    Eigen::Map<ByParams> by_params(jacobians[2], 2, num_params);
+    const auto set = [&](const auto& seen_by) {
+      by_params = weight * seen_by.by_params.leftCols(num_params);
+    };
+    if (num_params <= kFewParams) {
+      set(ErrorOfPoint<kFewParams>(camera_.model, intrinsics, num_params, p, x_in_img_));
+    } else {
+      set(ErrorOfPoint<kMaxCameraParams>(camera_.model, intrinsics, num_params, p, x_in_img_));
+    }
   }
   if (rolls_ && jacobians[rolls_at] != nullptr) {
     Eigen::Map<RowMatrix26> by_motion(jacobians[rolls_at]);

@@ -13,7 +13,8 @@
 
 namespace roomtex {
 
-// kParams: 0 or kMaxCameraParams.
+// kParams: 0 (derivatives by the ray alone), or no less than the model has, kMaxCameraParams at
+// most.
 template <int kParams>
 struct ProjectedRay {
   Eigen::Vector2d x_in_img;

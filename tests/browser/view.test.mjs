@@ -160,6 +160,16 @@ test('a texture is on the screen as it is in the file', async () => {
   }
 });
 
+test('a texture in many strips comes without a picture for each of them', async () => {
+  const glb = folder.path('tall.glb');
+  writeFileSync(glb, writeSquareGlb(writePng(64, 8192, (x, y) => [y % 256, 128, y >> 8])));
+  const own = await serveView('--input_path', glb);
+  const {page, errors} = await openView(own.url);
+  assert.ok(await page.evaluate(() => roomtexView.numPictures) < 20);  // strips: 32 of 256 rows
+  assert.deepEqual(errors(), []);
+  await page.close();
+  assert.equal(await own.stop(), 0);
+});
 test('each way to colour the surface changes the picture and shows its legend', async () => {
   const {page, errors} = await openView();
   const colour = await picture(page);
