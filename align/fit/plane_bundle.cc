@@ -24,8 +24,6 @@ namespace {
 constexpr size_t kMinConstraints = 30;
 // Gates of the rounds, in standard deviations; the last one stays.
 constexpr double kGates[] = {6, 5, 4, 3.5};
-// A round that moves no camera farther is the last.
-constexpr double kSettledMetres = 5e-5, kSettledRadians = 2e-5;
 // Metres; a point nearer to a camera that sees it is none of the room.
 constexpr double kNearest = 0.01;
 // A photo with fewer observations takes no part: its pose follows the others.
@@ -63,15 +61,9 @@ std::map<uint32_t, double> PhotoCosts(const SparseModel& model, double sigma_px)
   return costs;
 }
 
-// How far a round moved the cameras.
 bool IsSettled(const SparseModel& before, const SparseModel& after) {
   for (const auto& [id, image] : after.images) {
-    const Rigid& old_pose = before.images.at(id).cam_from_model;
-    const Rigid& pose = image.cam_from_model;
-    if ((pose.TargetOriginInSource() - old_pose.TargetOriginInSource()).norm() > kSettledMetres ||
-        RotationAngle(pose.rotation, old_pose.rotation) > kSettledRadians) {
-      return false;
-    }
+    if (HasMoved(before.images.at(id).cam_from_model, image.cam_from_model, 1)) return false;
   }
   return true;
 }
@@ -420,7 +412,10 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
       ->Int("PlaneBA.num_rounds", &num_rounds,
             "Rounds in which points are given to surfaces anew; fewer if nothing changes.")
       .Within(1, 100);
-  fields->Int("PlaneBA.max_iterations", &max_iterations, "Steps of each round.").Positive();
+  fields
+      ->Int("PlaneBA.max_iterations", &max_iterations,
+            "Steps of each round, at most; larger = slower.")
+      .Positive();
 }
 
 std::vector<std::string> PlaneBundleOptions::Problems() const { return ProblemsOf(*this); }

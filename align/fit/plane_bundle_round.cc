@@ -27,10 +27,9 @@ constexpr double kCauchy = 3.0;
 // A round stops when a step lowers the cost by less than this share; what one round leaves the next
 // one finds.
 constexpr double kFunctionTolerance = 1e-5;
-// Or when a step moves no camera farther than this, a fifth of what counts as a change from round
-// to round: what would lower the cost further, for as many steps again, are a few points that hold
-// no camera.
-constexpr double kStillMetres = 1e-5, kStillRadians = 4e-6;
+// Or when a step moves no camera by more than this share of what counts from round to round: what
+// would lower the cost further, for as many steps again, are a few points that hold no camera.
+constexpr double kStillShare = 0.2;
 constexpr double kStartRadius = 1e6;  // the start is near: almost a Gauss-Newton step
 // More photos than this have a sparse reduced system.
 constexpr size_t kMaxDensePhotos = 80;
@@ -45,24 +44,14 @@ class StopAtStillCameras : public ceres::IterationCallback {
     for (const PoseParameters& pose : poses_) last_.push_back(pose.CamFromScan());
     // A step that failed or was held back says nothing.
     const bool is_free = summary.step_is_successful && summary.trust_region_radius >= kStartRadius;
-    return summary.iteration > 0 && is_free && IsStill(before)
-               ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-               : ceres::SOLVER_CONTINUE;
+    bool is_still = summary.iteration > 0 && is_free;
+    for (size_t i = 0; is_still && i < before.size(); ++i) {
+      is_still = !HasMoved(before[i], last_[i], kStillShare);
+    }
+    return is_still ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  bool IsStill(const std::vector<Rigid>& before) const {
-    for (size_t i = 0; i < before.size(); ++i) {
-      const Eigen::Vector3d moved =
-          last_[i].TargetOriginInSource() - before[i].TargetOriginInSource();
-      if (moved.norm() > kStillMetres ||
-          RotationAngle(last_[i].rotation, before[i].rotation) > kStillRadians) {
-        return false;
-      }
-    }
-    return true;
-  }
-
   const std::vector<PoseParameters>& poses_;
   std::vector<Rigid> last_;
 };
@@ -302,6 +291,12 @@ class RoundProblem {
 };
 
 }  // namespace
+
+bool HasMoved(const Rigid& before, const Rigid& after, double share) {
+  const Eigen::Vector3d step = after.TargetOriginInSource() - before.TargetOriginInSource();
+  return step.norm() > share * 5e-5 ||
+         RotationAngle(after.rotation, before.rotation) > share * 2e-5;
+}
 
 bool SolveRound(const BundleRound& round, SparseModel* model, RowMotions* motions) {
   RoundProblem problem(round, *model, *motions);

@@ -25,4 +25,8 @@ struct BundleRound {
 // parameters lie in arrays and it gets one thread.
 bool SolveRound(const BundleRound& round, SparseModel* model, RowMotions* motions);
 
+// Whether a camera has moved by more than `share` of what counts from round to round: 5e-5 metres,
+// 2e-5 radians.
+bool HasMoved(const Rigid& before, const Rigid& after, double share);
+
 }  // namespace roomtex

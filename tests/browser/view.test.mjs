@@ -106,8 +106,10 @@ function difference(a, b, dx = 0, dy = 0) {
 }
 const numMeasures = (page) => page.locator('#measures li').count();
 
-test('the room opens and says what it is', async () => {
+test('the room opens and says what it is', async (t) => {
   const {page, errors} = await openView();
+  const complete = await page.evaluate(() => performance.now());
+  t.diagnostic(`complete within ${(complete / 1000).toFixed(1)} s of the page`);
   assert.match(await page.title(), /roomtex-view/);
   assert.match(await page.textContent('#facts'), /points, .* triangles, 6 cameras/);
   assert.equal(await page.locator('#camera-list li').count(), 6);
