@@ -148,8 +148,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
     result.adjustment = AdjustAlignment(input, start, result.fit, lenses, options);
     if (rolling != nullptr && result.adjusted()) {
       progress->Stage("rolling shutter");
-      *rolling = FindRollingShutter(input, start, result.fit, lenses, result.adjustment.bundle,
-                                    result.adjustment.bend.has_value(), options);
+      *rolling = FindRollingShutter(input, start, result.fit, lenses, result.adjustment, options);
       if (*rolling) return result;
     }
     if (result.adjusted() && result.disagreement.rms > kSameShape) {

@@ -96,16 +96,22 @@ LensChoice ChooseLens(const AlignmentInput& input, const AlignmentFit& fit, cons
 
 ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
                                 const AlignmentFit& fit, const LensCheck& lenses,
-                                const AlignmentOptions& options) {
+                                const AlignmentOptions& options, const ModelAdjustment* like) {
   const SurveyedScans& surveyed = input.surveyed;
+  const ModelAdjustmentInput adjusted{
+      input.model,           fit.points,
+      surveyed.scans(),      surveyed.planes(),
+      surveyed.patches(),    input.picks,
+      start.UsedPicks(),     start.pick_sigma_px,
+      start.image_name,      ChooseLens(input, fit, lenses, options.refine_intrinsics),
+      lenses.lens_of_camera, lenses.ToldCameras(input.model),
+      fit.pick_bend_px,      input.row_motions,
+      input.freed_with_rows};
   // The clicked view keeps the pose of its clicks, so that the model starts there, too.
   const bool fixed = options.bundle.fix_clicked_view && !start.image_name.empty();
-  return AdjustModel(
-      {input.model, fit.points, surveyed.scans(), surveyed.planes(), surveyed.patches(),
-       input.picks, start.UsedPicks(), start.pick_sigma_px, start.image_name,
-       ChooseLens(input, fit, lenses, options.refine_intrinsics), lenses.lens_of_camera,
-       lenses.ToldCameras(input.model), fit.pick_bend_px, input.row_motions, input.freed_with_rows},
-      fixed ? start.scan_from_sparse : fit.scan_from_sparse, options.bundle);
+  const Similarity& similarity = fixed ? start.scan_from_sparse : fit.scan_from_sparse;
+  return like == nullptr ? AdjustModel(adjusted, similarity, options.bundle, input.num_threads)
+                         : AdjustModelLike(*like, adjusted, similarity, options.bundle);
 }
 
 }  // namespace roomtex

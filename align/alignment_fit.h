@@ -36,9 +36,11 @@ AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& sta
                           const AlignmentOptions& options);
 
 // Poses and points of a fit that is trusted, adjusted to the surface, and lenses that the check of
-// the photos (of input.model) found wrong, or that photos leave to the scan.
+// the photos (of input.model) found wrong, or that photos leave to the scan. like: an adjustment
+// whose bend, or that there is none, is taken over, as AdjustModelLike() has it.
 ModelAdjustment AdjustAlignment(const AlignmentInput& input, const AlignmentStart& start,
                                 const AlignmentFit& fit, const LensCheck& lenses,
-                                const AlignmentOptions& options);
+                                const AlignmentOptions& options,
+                                const ModelAdjustment* like = nullptr);
 
 }  // namespace roomtex

@@ -21,11 +21,12 @@ constexpr size_t kMostHolding = 10000;  // more say nothing new
 // colours get worse: by 0.4 and 1.3 dB in two sets; in four others they got better by 0.3 to 2 dB.
 constexpr double kHeldOutNearer = 0.9, kMostGrowth = 1.15;
 
-// The adjustment with these corners as picks that are as exact as they turn out to be.
+// The adjustment by the surface again, with these corners as picks that are as exact as they turn
+// out to be.
 ModelAdjustment AdjustByThese(const std::vector<Pick>& corners, double sigma_px,
                               const AlignmentInput& input, const AlignmentStart& start,
                               const AlignmentFit& fit, const LensCheck& lenses,
-                              const AlignmentOptions& options) {
+                              const AlignmentOptions& options, const ModelAdjustment& by_surface) {
   AlignmentStart held = start;
   std::vector<Pick> picks = input.picks;
   for (Pick corner : corners) {
@@ -39,7 +40,7 @@ ModelAdjustment AdjustByThese(const std::vector<Pick>& corners, double sigma_px,
   AlignmentFit unbent = fit;
   unbent.pick_bend_px = 0;
   return AdjustAlignment(input.With(input.model, input.surveyed, picks), held, unbent, lenses,
-                         options);
+                         options, &by_surface);
 }
 
 double MedianPickDistance(const std::vector<Pick>& corners, const SparseModel& aligned) {
@@ -64,7 +65,7 @@ CornerAdjustment AdjustByCorners(const AlignmentInput& input, const AlignmentSta
   if (corners.size() < kFewestHolding) return result;
   const double sigma_px = CornerSigma(corners, aligned, Similarity());
   const auto adjust_by = [&](const std::vector<Pick>& some) {
-    return AdjustByThese(some, sigma_px, input, start, fit, lenses, options);
+    return AdjustByThese(some, sigma_px, input, start, fit, lenses, options, *adjustment);
   };
   std::vector<Pick> holding, held_out;
   for (size_t i = 0; i < corners.size(); ++i) {

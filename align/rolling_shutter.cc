@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "colmap_ext/photo_bundle.h"
+#include "core/parallel.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -24,6 +26,8 @@ constexpr double kLookShare = 0.5;
 // scan is taken for bent it must also be so many times what the bend lowers the cost by: a shutter
 // bends the sparse model, too.
 constexpr double kMinGainOfOneShape = 0.05, kMuchMore = 2;
+// What is so many times as far from the shape of the scan no lens, found anew, brings to it.
+constexpr double kFarFromShape = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
   if (!still.usable || !moving.usable) return 0;
@@ -92,13 +96,34 @@ class StraightAdjustment {
   PlaneBundleInput input_;
 };
 
-bool HasShapeOfScan(const AlignmentInput& input, const AlignmentStart& start,
-                    const RollingShutter& rolling, const AlignmentOptions& options) {
+// What the photos would show if their cameras stood still.
+RollingShutter WithStillRows(const AlignmentInput& input, const AlignmentFit& fit,
+                             const PlaneBundle& moving) {
+  RollingShutter still;
+  still.picks = input.picks;
+  for (Pick& pick : still.picks) {
+    const SparseImage* const image = moving.model.FindImage(pick.image_name);
+    if (image == nullptr || moving.motions.count(image->image_id) == 0) continue;
+    const CameraProjection projection(moving.model.cameras.at(image->camera_id));
+    pick.x_in_img = KeypointOfStillRows(projection, moving.motions.at(image->image_id),
+                                        image->cam_from_model * pick.x_in_scan, pick.x_in_img);
+  }
+  still.motions = moving.motions;
+  still.model = moving.model;
+  TransformModel(fit.scan_from_sparse.Inverse(), &still.model);
+  // As the photos have it: on the surface nothing would show how far the two differ.
+  still.model = AdjustedByPhotos(still.model, KeypointNoise(still.model));
+  return still;
+}
+
+// How far model and scan then differ in shape, metres; infinite if the two do not meet.
+double ShapeDifference(const AlignmentInput& input, const AlignmentStart& start,
+                       const RollingShutter& rolling, const AlignmentOptions& options) {
   SparseModel still = rolling.model;
   const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&still).rms_px);
   const AlignmentFit fit =
       FitAlignment(input.With(still, input.surveyed, rolling.picks), start, sigma_px, options);
-  return fit.surface.converged && fit.disagreement.rms <= kSameShape;
+  return fit.surface.converged ? fit.disagreement.rms : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -118,7 +143,7 @@ double RollingShutter::MedianMove() const {
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
                                                  const AlignmentFit& fit, const LensCheck& lenses,
-                                                 const PlaneBundle& still, bool bent,
+                                                 const ModelAdjustment& still,
                                                  const AlignmentOptions& options) {
   if (HasRigs(input.model)) return std::nullopt;
   const StraightAdjustment straight(input, start, fit, lenses, options);
@@ -129,20 +154,30 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     bundle.max_iterations = kLookIterations;
     return straight.Adjust(bundle);
   };
-  const double look = Gain(glance(standing), glance(rolling));
+  PlaneBundle glances[2];
+  ParallelFor(input.num_threads, 0, 2,
+              [&](int k) { glances[k] = glance(k == 0 ? standing : rolling); });
+  const double look = Gain(glances[0], glances[1]);
   if (!(look > kLookShare * kMinGainOfOneShape)) return std::nullopt;
-  const PlaneBundle unbent = bent ? straight.Adjust(standing) : still;
+  const PlaneBundle& unbent = still.straight ? *still.straight : still.bundle;
   PlaneBundle moving = straight.Adjust(rolling);
   const double gain = Gain(unbent, moving);
   if (!(gain > kMinGainOfOneShape)) return std::nullopt;
-  if (bent && !(gain > kMuchMore * Gain(unbent, still))) return std::nullopt;
+  if (still.bend && !(gain > kMuchMore * Gain(unbent, still.bundle))) return std::nullopt;
 
-  RollingShutter found;
+  const bool ask_shape = !(gain > kMinGain);
+  const auto shape_with = [&](const RollingShutter& found) {
+    return ShapeDifference(input, start, found, options);
+  };
+  if (ask_shape && !(shape_with(WithStillRows(input, fit, moving)) <= kFarFromShape * kSameShape)) {
+    return std::nullopt;
+  }
+  bool is_freed = false;
   if (options.refine_intrinsics != RefineIntrinsics::kNever) {
     rolling.refine_intrinsics = true;
     PlaneBundle freed = straight.Adjust(rolling);
-    found.freed = IsLensBetter(moving, freed);
-    if (found.freed) moving = std::move(freed);
+    is_freed = IsLensBetter(moving, freed);
+    if (is_freed) moving = std::move(freed);
   }
   if (AllNodAlike(moving.model, moving.motions)) {
     PlaneBundleOptions lens_alone = standing;
@@ -150,22 +185,11 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     const double beyond_lens = Gain(straight.Adjust(lens_alone), moving);
     if (!(beyond_lens > kMinGain)) return std::nullopt;
   }
+  RollingShutter found = WithStillRows(input, fit, moving);
+  if (ask_shape && !(shape_with(found) <= kSameShape)) return std::nullopt;
+  found.freed = is_freed;
   found.cost_still = SharedImageCost(unbent, moving);
   found.cost_moving = SharedImageCost(moving, unbent);
-  found.picks = input.picks;
-  for (Pick& pick : found.picks) {
-    const SparseImage* const image = moving.model.FindImage(pick.image_name);
-    if (image == nullptr || moving.motions.count(image->image_id) == 0) continue;
-    const CameraProjection projection(moving.model.cameras.at(image->camera_id));
-    pick.x_in_img = KeypointOfStillRows(projection, moving.motions.at(image->image_id),
-                                        image->cam_from_model * pick.x_in_scan, pick.x_in_img);
-  }
-  found.motions = std::move(moving.motions);
-  found.model = std::move(moving.model);
-  TransformModel(fit.scan_from_sparse.Inverse(), &found.model);
-  // As the photos have it: on the surface nothing would show how far the two differ.
-  found.model = AdjustedByPhotos(found.model, KeypointNoise(found.model));
-  if (!(gain > kMinGain) && !HasShapeOfScan(input, start, found, options)) return std::nullopt;
   return found;
 }
 

@@ -32,12 +32,12 @@ struct RollingShutter {
 // and would only take up what is wrong elsewhere. Less is enough where the model then has the shape
 // of the scan. A lens that photos with moving rows found is not
 // that of the still ones: it is found anew where that explains the photos better, unless lenses are
-// never to be refined. still: the fit adjusted without motion; bent: to a scan that is taken for
-// bent, which motion must explain much better.
+// never to be refined. still: the fit adjusted without motion; where the scan is taken for bent,
+// motion must explain much more than that.
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
                                                  const AlignmentFit& fit, const LensCheck& lenses,
-                                                 const PlaneBundle& still, bool bent,
+                                                 const ModelAdjustment& still,
                                                  const AlignmentOptions& options);
 
 }  // namespace roomtex

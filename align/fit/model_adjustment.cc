@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/parallel.h"
+
 namespace roomtex {
 namespace {
 
@@ -84,39 +86,60 @@ class Adjuster {
            const PlaneBundleOptions& options)
       : input_(input), start_(start), options_(options) {}
 
-  TrialPointer Run() {
-    // More of the lens where that explains the photos better. The centre comes last: a scan that
-    // leaves a direction open takes a shift along it for one of the centre.
+  TrialPointer Run(int num_threads, std::optional<PlaneBundle>* of_straight) {
+    TrialPointer straight, bent;
+    ParallelFor(num_threads, 0, 2, [&](int task) {
+      task == 0 ? straight = AdjustStraight() : bent = AdjustBent(FindBend(), 1);
+    });
+    if (!bent || !IsScanBent(straight->bundle, bent->bundle) || IsStraightAfterAll(*bent)) {
+      return straight;
+    }
+    *of_straight = std::move(straight->bundle);
+    if (bent->bend->bend_rms <= kMaxScannerBend || bent->bend->Explained() >= kMinExplained) {
+      return bent;
+    }
+    TrialPointer followed = AdjustBent(bent->bend, kFollowedOfDrift);
+    return followed->bundle.usable ? std::move(followed) : std::move(bent);
+  }
+
+  TrialPointer RunLike(const ModelAdjustment& like) {
+    TrialPointer bent;
+    if (like.bend) bent = AdjustBent(FindBend(), like.bend->followed);
+    return bent && bent->bundle.usable ? std::move(bent) : AdjustStraight();
+  }
+
+ private:
+  // More of the lens where that explains the photos better. The centre comes last: a scan that
+  // leaves a direction open takes a shift along it for one of the centre.
+  TrialPointer AdjustStraight() const {
     const Freed first = input_.lens == LensChoice::kFree            ? Freed::kAll
                         : input_.lens == LensChoice::kFreeButCentre ? Freed::kNotCentre
                                                                     : Freed::kNothing;
     TrialPointer best = Try(start_, std::nullopt, first);
     if (input_.lens == LensChoice::kByScan || input_.lens == LensChoice::kFreeButCentre) {
       TrialPointer freed = Try(start_, std::nullopt, Freed::kAll);
-      if (IsLensBetter(best->bundle, freed->bundle)) {
-        best = std::move(freed);
-      }
+      if (IsLensBetter(best->bundle, freed->bundle)) best = std::move(freed);
     }
-    const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
-    if (!options_.bend || fixed) return best;
-    std::optional<BendFit> bend =
-        FitScanBend(input_.model, input_.points, input_.scans, input_.patches, input_.picks,
-                    input_.used, input_.pick_sigma_px, start_, options_.min_bend);
-    if (!bend) return best;
-    const Similarity start = bend->scan_from_sparse;
-    TrialPointer bent = Try(start, std::move(bend), Freed::kNothing);
-    if (!IsScanBent(best->bundle, bent->bundle) || IsStraightAfterAll(*bent)) return best;
-    if (bent->bend->bend_rms <= kMaxScannerBend || bent->bend->Explained() >= kMinExplained) {
-      return bent;
-    }
-    BendFit drift = *bent->bend;
-    drift.followed = kFollowedOfDrift;
-    drift.bend.coefficients *= kFollowedOfDrift;
-    TrialPointer followed = Try(start, std::move(drift), Freed::kNothing);
-    return followed->bundle.usable ? std::move(followed) : std::move(bent);
+    return best;
   }
 
- private:
+  // The scan's bend; none if it is not asked for or there is none.
+  std::optional<BendFit> FindBend() const {
+    const bool fixed = options_.fix_clicked_view && !input_.clicked_image.empty();
+    if (!options_.bend || fixed) return std::nullopt;
+    return FitScanBend(input_.model, input_.points, input_.scans, input_.patches, input_.picks,
+                       input_.used, input_.pick_sigma_px, start_, options_.min_bend);
+  }
+
+  // To a scan that is bent by this share of what was found; null without a bend.
+  TrialPointer AdjustBent(std::optional<BendFit> bend, double followed) const {
+    if (!bend) return nullptr;
+    const Similarity start = bend->scan_from_sparse;
+    bend->followed = followed;
+    bend->bend.coefficients *= followed;
+    return Try(start, std::move(bend), Freed::kNothing);
+  }
+
   TrialPointer Try(const Similarity& start, std::optional<BendFit> bend, Freed freed) const {
     return std::make_unique<Trial>(input_, start, std::move(bend), freed, options_);
   }
@@ -145,11 +168,12 @@ bool IsLensBetter(const PlaneBundle& held, const PlaneBundle& freed) {
   return IsBetter(held, freed, kMinLensShare, kMinLensGain);
 }
 
-ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
-                            const PlaneBundleOptions& options) {
+namespace {
+
+ModelAdjustment ResultOf(TrialPointer trial, const ModelAdjustmentInput& input,
+                         const Similarity& start) {
   ModelAdjustment result;
   result.scan_from_sparse = start;
-  const TrialPointer trial = Adjuster(input, start, options).Run();
   result.bundle = std::move(trial->bundle);
   if (!result.bundle.usable) return result;
   result.bend = trial->bend;
@@ -161,6 +185,22 @@ ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity&
   result.covariances = std::move(covariances.poses);
   result.camera_covariances = std::move(covariances.cameras);
   return result;
+}
+
+}  // namespace
+
+ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
+                            const PlaneBundleOptions& options, int num_threads) {
+  std::optional<PlaneBundle> straight;
+  TrialPointer trial = Adjuster(input, start, options).Run(num_threads, &straight);
+  ModelAdjustment result = ResultOf(std::move(trial), input, start);
+  result.straight = std::move(straight);
+  return result;
+}
+
+ModelAdjustment AdjustModelLike(const ModelAdjustment& like, const ModelAdjustmentInput& input,
+                                const Similarity& start, const PlaneBundleOptions& options) {
+  return ResultOf(Adjuster(input, start, options).RunLike(like), input, start);
 }
 
 }  // namespace roomtex

@@ -43,6 +43,8 @@ struct ModelAdjustmentInput {
 struct ModelAdjustment {
   PlaneBundle bundle;           // its model is the answer if it is usable
   std::optional<BendFit> bend;  // of a bent scan
+  // Of a bent scan: adjusted to it as it is, which the bend was judged against.
+  std::optional<PlaneBundle> straight;
   // From the input model to the adjusted one, the best there is (of a bent scan: to where the room
   // really is). If the bundle is not usable: the start's.
   Similarity scan_from_sparse;
@@ -60,6 +62,11 @@ bool IsLensBetter(const PlaneBundle& held, const PlaneBundle& freed);
 // of their observations, below that of a straight scan with its lenses freed, too; on a bent scan
 // lenses stay as they came.
 ModelAdjustment AdjustModel(const ModelAdjustmentInput& input, const Similarity& start,
-                            const PlaneBundleOptions& options);
+                            const PlaneBundleOptions& options, int num_threads);
+
+// The same where it is known whether the scan is bent and how much of that is followed: as `like`
+// has it. The bend itself is found anew.
+ModelAdjustment AdjustModelLike(const ModelAdjustment& like, const ModelAdjustmentInput& input,
+                                const Similarity& start, const PlaneBundleOptions& options);
 
 }  // namespace roomtex
