@@ -73,9 +73,14 @@ class Kitchen : public testing::Test {
     if (!std::filesystem::exists(kKitchen)) return;
     folder_ = new TempFolder;
     const std::string images = std::string(kKitchen) + "/images";
-    ExtractAndMatch(*folder_ / "database.db", images,
+    const std::string database = *folder_ / "database.db", pairs = *folder_ / "pairs.txt";
+    ExtractFeatures(database, images,
                     "--ImageReader.single_camera 1 --ImageReader.camera_model SIMPLE_RADIAL "
                     "--ImageReader.camera_params 525.9,320,240,-0.025");
+    pairs_ = RunCommandLine("roomtex-pairs --database_path " + database + " --output_path " +
+                            pairs + " --report_path " + (*folder_ / "pairs.json"));
+    Colmap("matches_importer", database,
+           "--match_list_path " + pairs + " --match_type pairs --SiftMatching.use_gpu 0");
     mapper_ = RunCommandLine("roomtex-mapper --database_path " + (*folder_ / "database.db") +
                              " --image_path " + images + " --output_path " + (*folder_ / "sparse") +
                              " --report_path " + (*folder_ / "mapper.json"));
@@ -101,11 +106,21 @@ class Kitchen : public testing::Test {
   }
 
   static TempFolder* folder_;
-  static CommandResult mapper_, align_, texture_;
+  static CommandResult pairs_, mapper_, align_, texture_;
 };
 
 TempFolder* Kitchen::folder_ = nullptr;
-CommandResult Kitchen::mapper_, Kitchen::align_, Kitchen::texture_;
+CommandResult Kitchen::pairs_, Kitchen::mapper_, Kitchen::align_, Kitchen::texture_;
+
+// Photos of one room see much of each other: a third of the pairs is all that need not be matched.
+TEST_F(Kitchen, PairsLeaveOutOnlyWhatSeesNothingOfEachOther) {
+  ASSERT_EQ(pairs_.exit_code, 0) << pairs_.err;
+  const json report = ReadJson(*folder_ / "pairs.json");
+  EXPECT_EQ(report["groups"].size(), 1u);
+  EXPECT_EQ(report["isolated"].size(), 0u);
+  EXPECT_GT(report["num_pairs"], 300);
+  EXPECT_LT(report["num_pairs"], 530);
+}
 
 TEST_F(Kitchen, RegistersEveryPhoto) {
   ASSERT_EQ(mapper_.exit_code, 0) << mapper_.err;

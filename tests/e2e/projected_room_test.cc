@@ -48,7 +48,7 @@ class ProjectedRoom : public testing::Test {
                        " --scan_columns 800 --scan_rows 400");
     ASSERT_EQ(simulate_.exit_code, 0) << simulate_.err;
     const std::string camera = ReadBytes(capture + "/camera_options.txt");
-    const std::string some = "--SiftExtraction.max_num_features 3000 " + camera;
+    const std::string some = "--SiftExtraction.max_num_features 2048 " + camera;
     associate_ =
         RunCommandLine("roomtex-associate --image_path " + photos + " --output_path " +
                        (*folder_ / "associations.csv") + " --links_path " + (*folder_ / "linked"));
