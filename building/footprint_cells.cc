@@ -355,8 +355,8 @@ class FootprintFinder {
     return fits(s, t) && fits(t, s);
   }
 
-  // The union of cells with label 0 becomes one label per roof that fits together.
-  std::vector<std::vector<int>> SplitByRoofs() {
+  // Roofs of the cells with label 0, the largest first: surfaces that fit together. Never empty.
+  std::vector<std::vector<int>> FindRoofs() const {
     std::map<int, double> squares;
     double total = 0;
     for (size_t c = 0; c < labels_.size(); ++c) {
@@ -366,78 +366,86 @@ class FootprintFinder {
     std::vector<std::pair<double, int>> order;
     for (const auto& [s, count] : squares) order.emplace_back(-count, s);
     std::sort(order.begin(), order.end());
-    std::vector<std::vector<int>> families;
+    std::vector<std::vector<int>> roofs;
     for (const auto& [minus_count, surface] : order) {
       const int s = surface;
       const double area = -minus_count * grid_->side() * grid_->side();
       if (-minus_count < 0.04 * total || area < 1.5 * cloud_.step * cloud_.step) continue;
-      auto family = std::find_if(families.begin(), families.end(), [&](const auto& members) {
+      auto roof = std::find_if(roofs.begin(), roofs.end(), [&](const auto& members) {
         return std::all_of(members.begin(), members.end(), [&](int t) { return Together(s, t); });
       });
-      if (family == families.end()) families.emplace_back(), family = families.end() - 1;
-      family->push_back(s);
+      if (roof == roofs.end()) roofs.emplace_back(), roof = roofs.end() - 1;
+      roof->push_back(s);
     }
-    if (families.size() < 2) {
-      if (families.empty()) families.emplace_back();
-      return families;
-    }
-    // Each cell to the roof with the most points there; those without follow their neighbours.
-    std::vector<int> parts(labels_.size(), -1);
+    if (roofs.empty()) roofs.emplace_back();
+    return roofs;
+  }
+
+  // Of each cell with label 0 the roof with the most points there; -1 without any.
+  std::vector<int> RoofOfCells(const std::vector<std::vector<int>>& roofs) const {
+    std::vector<int> roof_of(labels_.size(), -1);
     for (size_t c = 0; c < labels_.size(); ++c) {
       if (labels_[c] < 0) continue;
       int most = 0;
-      for (size_t f = 0; f < families.size(); ++f) {
+      for (size_t f = 0; f < roofs.size(); ++f) {
         int count = 0;
-        for (const int s : families[f]) {
+        for (const int s : roofs[f]) {
           const auto at = by_roof_[c].find(s);
           if (at != by_roof_[c].end()) count += at->second;
         }
-        if (count > most) most = count, parts[c] = static_cast<int>(f);
+        if (count > most) most = count, roof_of[c] = static_cast<int>(f);
       }
+    }
+    return roof_of;
+  }
+
+  // Cells without a roof take that of their neighbours, by the length of the edges between them.
+  void FollowNeighbors(std::vector<int>* roof_of) const {
+    std::map<std::pair<int, int>, size_t> owner;  // of a directed edge
+    for (size_t c = 0; c < labels_.size(); ++c) {
+      const auto& cell = cells_.cells[c];
+      for (size_t k = 0; k < cell.size(); ++k) owner[{cell[k], cell[(k + 1) % cell.size()]}] = c;
     }
     for (bool changed = true; changed;) {
       changed = false;
       std::vector<std::map<int, double>> votes(labels_.size());
-      std::map<std::pair<int, int>, int> owner;
-      for (size_t c = 0; c < labels_.size(); ++c) {
-        const auto& cell = cells_.cells[c];
-        for (size_t k = 0; k < cell.size(); ++k) {
-          owner[{cell[k], cell[(k + 1) % cell.size()]}] = static_cast<int>(c);
-        }
-      }
       for (const auto& [edge, c] : owner) {
         const auto twin = owner.find({edge.second, edge.first});
-        if (twin == owner.end() || labels_[static_cast<size_t>(c)] < 0 ||
-            parts[static_cast<size_t>(c)] >= 0 || parts[static_cast<size_t>(twin->second)] < 0) {
-          continue;
-        }
-        votes[static_cast<size_t>(c)][parts[static_cast<size_t>(twin->second)]] +=
-            (cells_.vertices[static_cast<size_t>(edge.first)] -
-             cells_.vertices[static_cast<size_t>(edge.second)])
-                .norm();
+        if (twin == owner.end() || labels_[c] < 0 || (*roof_of)[c] >= 0) continue;
+        const int roof = (*roof_of)[twin->second];
+        if (roof < 0) continue;
+        votes[c][roof] += (cells_.vertices[static_cast<size_t>(edge.first)] -
+                           cells_.vertices[static_cast<size_t>(edge.second)])
+                              .norm();
       }
       for (size_t c = 0; c < votes.size(); ++c) {
         if (votes[c].empty()) continue;
-        parts[c] =
-            std::max_element(votes[c].begin(), votes[c].end(), [](const auto& a, const auto& b) {
-              return a.second < b.second;
-            })->first;
+        const auto by_length = [](const auto& x, const auto& y) { return x.second < y.second; };
+        (*roof_of)[c] = std::max_element(votes[c].begin(), votes[c].end(), by_length)->first;
         changed = true;
       }
     }
+  }
+
+  // The union of cells with label 0 becomes one label per roof, which are returned.
+  std::vector<std::vector<int>> SplitByRoofs() {
+    std::vector<std::vector<int>> roofs = FindRoofs();
+    if (roofs.size() < 2) return roofs;
+    std::vector<int> roof_of = RoofOfCells(roofs);
+    FollowNeighbors(&roof_of);
     for (size_t c = 0; c < labels_.size(); ++c) {
-      if (labels_[c] >= 0) labels_[c] = std::max(0, parts[c]);
+      if (labels_[c] >= 0) labels_[c] = std::max(0, roof_of[c]);
     }
-    return families;
+    return roofs;
   }
 
   std::vector<FootprintRegion> Regions() {
-    const std::vector<std::vector<int>> families = SplitByRoofs();
+    const std::vector<std::vector<int>> roofs = SplitByRoofs();
     std::vector<FootprintRegion> regions;
-    for (size_t f = 0; f < families.size(); ++f) {
+    for (size_t f = 0; f < roofs.size(); ++f) {
       for (const std::vector<int>& loop : OutlinesOf(cells_, labels_, static_cast<int>(f))) {
         FootprintRegion region = RegionOf(loop);
-        region.roof = families[f];
+        region.roof = roofs[f];
         if (PolygonArea(region.polygon) > 0) regions.push_back(std::move(region));
       }
     }

@@ -18,6 +18,9 @@ const require =
     createRequire(path.join(fromEnvironment('ROOMTEX_BROWSER_PACKAGES'), 'package.json'));
 const {chromium} = require('playwright-core');
 
+// Whether tests run that have the label slow: {skip: !isSlowRun}.
+export const isSlowRun = process.env.ROOMTEX_SLOW === '1';
+
 export function makeFolder() {
   const folder = mkdtempSync(path.join(tmpdir(), 'roomtex-browser-'));
   return {

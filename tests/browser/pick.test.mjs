@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import {readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 
-import {launchBrowser, run, screenshot} from './browser.mjs';
+import {isSlowRun, launchBrowser, run, screenshot} from './browser.mjs';
 import {capture, colorsAt, distance, fileOf, kSampleSpacing, lowestContrast, onPage, PickPage, servePicks, until, usablePlaces} from './pick_page.mjs';
 
 let browser;
@@ -526,7 +526,8 @@ async function findIt(page) {
   await page.page.waitForSelector('#align .verdict', {timeout: 240000});
 }
 
-test('a few picks: the place is found by them', async () => {
+// This one and the undecided search below: run by the test pick_search.
+test('a few picks: the place is found by them', {skip: !isSlowRun}, async () => {
   await pageOn(async (page) => {
     await page.rowsAre(4);
     await findIt(page);
@@ -599,7 +600,7 @@ test('without a pick: found, and seen on the scan until picks place the photo', 
   });
 });
 
-test('an undecided search asks for one pair, and goes on with it', async () => {
+test('an undecided search asks for one pair, and goes on with it', {skip: !isSlowRun}, async () => {
   await pageOn(async (page, {folder}) => {
     await findIt(page);
     assert.match(await page.text('#align .verdict'), /Not trusted/);

@@ -6,7 +6,7 @@ import {createServer} from 'node:http';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
-import {launchBrowser, makeFolder, openPage, run, screenshot, serve} from './browser.mjs';
+import {isSlowRun, launchBrowser, makeFolder, openPage, run, screenshot, serve} from './browser.mjs';
 import {readPng, writePng, writeSquareGlb, writeSquarePly} from './pictures.mjs';
 
 const kSize = {
@@ -294,9 +294,7 @@ function psnr(all) {
   return 10 * Math.log10(255 ** 2 * all.reduce((total, one) => total + one.count, 0) / sum);
 }
 
-// Minutes where the processor draws: run by the tests view_prediction and view_large, label slow.
-const isSlowRun = process.env.ROOMTEX_SLOW === '1';
-
+// Minutes where the processor draws: run by the tests view_prediction and view_large.
 test('photos near the point of view predict those that were left out', {skip: !isSlowRun}, async (t) => {
   const kLeftOut = [5, 13, 21, 29, 37, 45].map((n) => `photo_0${String(n).padStart(2, '0')}.jpg`);
   // Per room and photo: the photo itself, the blended colours, the view-dependent ones.
