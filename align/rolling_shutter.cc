@@ -26,8 +26,9 @@ constexpr double kLookShare = 0.5;
 // scan is taken for bent it must also be so many times what the bend lowers the cost by: a shutter
 // bends the sparse model, too.
 constexpr double kMinGainOfOneShape = 0.05, kMuchMore = 2;
-// What is so many times as far from the shape of the scan no lens, found anew, brings to it
-// (kitchen: 24 mm with either lens).
+// What promises less than that at the first look and is then so many times as far from the shape of
+// the scan no better motion or lens brings to it: 26 mm, in the end 24 (kitchen); 7 and 7 (130), 6
+// and 6 (203).
 constexpr double kFarFromShape = 2;
 
 double Gain(const PlaneBundle& still, const PlaneBundle& moving) {
@@ -160,19 +161,19 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
               [&](int k) { glances[k] = glance(k == 0 ? standing : rolling); });
   const double look = Gain(glances[0], glances[1]);
   if (!(look > kLookShare * kMinGainOfOneShape)) return std::nullopt;
+  const auto shape_with = [&](const RollingShutter& found) {
+    return ShapeDifference(input, start, found, options);
+  };
+  if (look < kLookShare * kMinGain &&
+      !(shape_with(WithStillRows(input, fit, glances[1])) <= kFarFromShape * kSameShape)) {
+    return std::nullopt;
+  }
   const PlaneBundle& unbent = still.straight ? *still.straight : still.bundle;
   PlaneBundle moving = straight.Adjust(rolling);
   const double gain = Gain(unbent, moving);
   if (!(gain > kMinGainOfOneShape)) return std::nullopt;
   if (still.bend && !(gain > kMuchMore * Gain(unbent, still.bundle))) return std::nullopt;
 
-  const bool ask_shape = !(gain > kMinGain);
-  const auto shape_with = [&](const RollingShutter& found) {
-    return ShapeDifference(input, start, found, options);
-  };
-  if (ask_shape && !(shape_with(WithStillRows(input, fit, moving)) <= kFarFromShape * kSameShape)) {
-    return std::nullopt;
-  }
   bool is_freed = false;
   if (options.refine_intrinsics != RefineIntrinsics::kNever) {
     rolling.refine_intrinsics = true;
@@ -187,7 +188,7 @@ std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
     if (!(beyond_lens > kMinGain)) return std::nullopt;
   }
   RollingShutter found = WithStillRows(input, fit, moving);
-  if (ask_shape && !(shape_with(found) <= kSameShape)) return std::nullopt;
+  if (!(gain > kMinGain) && !(shape_with(found) <= kSameShape)) return std::nullopt;
   found.freed = is_freed;
   found.cost_still = SharedImageCost(unbent, moving);
   found.cost_moving = SharedImageCost(moving, unbent);
