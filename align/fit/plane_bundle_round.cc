@@ -65,8 +65,10 @@ class RoundProblem {
     options.disable_all_safety_checks = true;
     problem_ = std::make_unique<ceres::Problem>(options);
     MakeParameters();
+    motions_.reserve(motions.size());  // Ceres keeps pointers into it
     for (const auto& [id, motion] : motions) {
-      std::array<double, 6>& values = motions_[id];
+      motion_index_[id] = motions_.size();
+      std::array<double, 6>& values = motions_.emplace_back();
       Eigen::Map<Eigen::Vector3d>(values.data()) = motion.turn;
       Eigen::Map<Eigen::Vector3d>(values.data() + 3) = motion.move;
     }
@@ -97,9 +99,9 @@ class RoundProblem {
     };
     for (Eigen::Vector3d& point : points_) order(point.data(), 0);
     for (PoseParameters& pose : poses_) order(pose.values, 1);
-    for (auto& [id, motion] : motions_) order(motion.data(), 1);
-    for (auto& params : params_) order(params.data(), 2);
-    for (Eigen::Vector3d& point : pick_points_) order(point.data(), 3);
+    for (auto& motion : motions_) order(motion.data(), 2);
+    for (auto& params : params_) order(params.data(), 3);
+    for (Eigen::Vector3d& point : pick_points_) order(point.data(), 4);
     StopAtStillCameras stop(poses_);
     o.callbacks.push_back(&stop);
     o.update_state_every_iteration = true;
@@ -109,7 +111,8 @@ class RoundProblem {
   }
 
   void Write(SparseModel* model, RowMotions* motions) const {
-    for (const auto& [id, values] : motions_) {
+    for (const auto& [id, index] : motion_index_) {
+      const std::array<double, 6>& values = motions_[index];
       motions->at(id) = {Eigen::Map<const Eigen::Vector3d>(values.data()),
                          Eigen::Map<const Eigen::Vector3d>(values.data() + 3)};
     }
@@ -186,11 +189,11 @@ class RoundProblem {
     const Camera& camera = model_.cameras.at(model_.images.at(image_id).camera_id);
     PoseParameters& pose = poses_[pose_index_.at(image_id)];
     const bool refine = round_.options.refine_intrinsics;
-    const auto motion = motions_.find(image_id);
-    const bool rolls = motion != motions_.end();
+    const auto motion = motion_index_.find(image_id);
+    const bool rolls = motion != motion_index_.end();
     std::vector<double*> blocks{pose.values, point};
     if (refine) blocks.push_back(params_[camera_index_.at(camera.camera_id)].data());
-    if (rolls) blocks.push_back(motion->second.data());
+    if (rolls) blocks.push_back(motions_[motion->second].data());
     problem_->AddResidualBlock(new ReprojectionCost(pose, camera, x_in_img, weight, refine,
                                                     cam_from_rig_.at(image_id), rolls),
                                &reprojection_loss_, blocks);
@@ -244,7 +247,7 @@ class RoundProblem {
 
   void AddMotionPriors() {
     const Eigen::MatrixXd weights = round_.sigma_px * RowMotionPrior();
-    for (auto& [id, motion] : motions_) {
+    for (auto& motion : motions_) {
       if (!problem_->HasParameterBlock(motion.data())) continue;
       problem_->AddResidualBlock(new ceres::NormalPrior(weights, Eigen::VectorXd::Zero(6)), nullptr,
                                  motion.data());
@@ -281,7 +284,8 @@ class RoundProblem {
   std::map<uint32_t, size_t> camera_index_, pose_index_;
   std::map<uint32_t, Rigid> cam_from_rig_;  // by image; the rig is the first image of its frame
   std::map<uint64_t, size_t> point_index_;
-  std::map<uint32_t, std::array<double, 6>> motions_;  // RowMotion: turn, move
+  std::map<uint32_t, size_t> motion_index_;
+  std::vector<std::array<double, 6>> motions_;  // RowMotion: turn, move
   std::vector<std::array<double, kMaxCameraParams>> params_;
   std::vector<PoseParameters> poses_;
   std::vector<Eigen::Vector3d> points_, pick_points_;
