@@ -151,6 +151,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
       *rolling = FindRollingShutter(input, start, result.fit, lenses, result.adjustment, options);
       if (*rolling) return result;
     }
+    result.adjustment.straight.reset();  // as large as the model
     if (result.adjusted() && result.disagreement.rms > kSameShape) {
       progress->Stage("corners");
       result.corners =
@@ -232,7 +233,7 @@ double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& opti
     const AlignmentStart start = FindStart(input, options, progress, &ignored);
     const AlignmentFit fit =
         FitAlignment(input, start, KeypointSigma(ReprojectionRms(input.model)), options);
-    return fit.surface.converged ? fit.disagreement.rms : kNowhere;
+    return fit.ShapeDifference();
   } catch (const InputError&) {
     return kNowhere;
   }

@@ -1,6 +1,7 @@
 #pragma once
 // A start, fitted to the surface of the scan: one similarity for the whole model.
 
+#include <limits>
 #include <vector>
 
 #include "align/alignment_input.h"
@@ -26,6 +27,11 @@ struct AlignmentFit {
   // however well they are made: pixels, the largest over the photos with picks.
   ShapeDisagreement disagreement;
   double pick_bend_px = 0;
+
+  // How far model and scan differ in shape, metres rms; infinite if the two do not meet.
+  double ShapeDifference() const {
+    return surface.converged ? disagreement.rms : std::numeric_limits<double>::infinity();
+  }
 };
 
 // Standard deviation of an observation's coordinate, pixels.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "colmap_ext/photo_bundle.h"
@@ -118,14 +117,14 @@ RollingShutter WithStillRows(const AlignmentInput& input, const AlignmentFit& fi
   return still;
 }
 
-// How far model and scan then differ in shape, metres; infinite if the two do not meet.
+// AlignmentFit::ShapeDifference() of what the photos then show.
 double ShapeDifference(const AlignmentInput& input, const AlignmentStart& start,
                        const RollingShutter& rolling, const AlignmentOptions& options) {
   SparseModel still = rolling.model;
   const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&still).rms_px);
   const AlignmentFit fit =
       FitAlignment(input.With(still, input.surveyed, rolling.picks), start, sigma_px, options);
-  return fit.surface.converged ? fit.disagreement.rms : std::numeric_limits<double>::infinity();
+  return fit.ShapeDifference();
 }
 
 }  // namespace

@@ -30,10 +30,10 @@ struct RollingShutter {
 
 // Nothing where motion does not clearly explain the photos better: then it is no rolling shutter,
 // and would only take up what is wrong elsewhere. Less is enough where the model then has the shape
-// of the scan. A lens that photos with moving rows found is not
-// that of the still ones: it is found anew where that explains the photos better, unless lenses are
-// never to be refined. still: the fit adjusted without motion; where the scan is taken for bent,
-// motion must explain much more than that.
+// of the scan. A lens that photos with moving rows found is not that of the still ones: it is found
+// anew where that explains the photos better, unless lenses are never to be refined. still: the fit
+// adjusted without motion, by AdjustModel(); where the scan is taken for bent, motion must explain
+// much more than that.
 std::optional<RollingShutter> FindRollingShutter(const AlignmentInput& input,
                                                  const AlignmentStart& start,
                                                  const AlignmentFit& fit, const LensCheck& lenses,

@@ -43,7 +43,7 @@ struct ModelAdjustmentInput {
 struct ModelAdjustment {
   PlaneBundle bundle;           // its model is the answer if it is usable
   std::optional<BendFit> bend;  // of a bent scan
-  // Of a bent scan: adjusted to it as it is, which the bend was judged against.
+  // Of a bent scan, by AdjustModel(): adjusted to it as it is, which the bend was judged against.
   std::optional<PlaneBundle> straight;
   // From the input model to the adjusted one, the best there is (of a bent scan: to where the room
   // really is). If the bundle is not usable: the start's.

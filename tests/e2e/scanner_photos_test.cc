@@ -66,27 +66,15 @@ class ScannerPhotos : public testing::Test {
       if (entry.is_regular_file()) theirs += "scanner/" + entry.path().filename().string() + "\n";
     }
     WriteBytes(Path("theirs.txt"), theirs);
-    ASSERT_EQ(Shell(ExtractLine("mine.txt") + ReadLine(Path("capture/camera_options.txt"))), 0);
-    ASSERT_EQ(Shell(ExtractLine("theirs.txt") + "--ImageReader.single_camera 1"), 0);
-    ASSERT_EQ(
-        Shell("QT_QPA_PLATFORM=offscreen colmap exhaustive_matcher --database_path " +
-              Path("database.db") + " --SiftMatching.use_gpu 0 >" + Path("colmap.log") + " 2>&1"),
-        0);
+    const std::string some = "--SiftExtraction.max_num_features 2048 --image_list_path ";
+    ExtractFeatures(Path("database.db"), Path("photos"),
+                    some + Path("mine.txt") + " " + ReadBytes(Path("capture/camera_options.txt")));
+    ExtractAndMatch(Path("database.db"), Path("photos"),
+                    some + Path("theirs.txt") + " --ImageReader.single_camera 1");
   }
   static void TearDownTestSuite() {
     delete folder_;
     folder_ = nullptr;
-  }
-
-  static std::string ReadLine(const std::string& path) {
-    const std::string text = ReadBytes(path);
-    return text.substr(0, text.find('\n'));
-  }
-  static std::string ExtractLine(const std::string& list) {
-    return "QT_QPA_PLATFORM=offscreen colmap feature_extractor --SiftExtraction.use_gpu 0 "
-           "--SiftExtraction.max_num_features 2048 --database_path " +
-           Path("database.db") + " --image_path " + Path("photos") + " --image_list_path " +
-           Path(list) + " >" + Path("colmap.log") + " 2>&1 ";
   }
 
   // Median distance of the user's photos from where they were taken, metres. An E57 has z up.
