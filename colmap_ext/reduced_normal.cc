@@ -8,10 +8,11 @@
 namespace roomtex {
 namespace {
 
+using ByPoint = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, NormalTerms::kMaxSize, 3>;
+
 struct MixedBlock {
   int offset = 0;
-  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 12, 3>
-      product;  // derivatives' product with the point
+  ByPoint product;  // derivatives' product with the point
 };
 
 }  // namespace
@@ -48,7 +49,7 @@ void ReducedNormal::AddPoint(const std::vector<NormalTerms>& observations,
   if (!covariance.allFinite()) return;
   for (const NormalTerms& observation : observations) AddKnownPoint(observation);
   for (const MixedBlock& a : mixed) {
-    const Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 12, 3> weighted = a.product * covariance;
+    const ByPoint weighted = a.product * covariance;
     for (const MixedBlock& b : mixed) {
       matrix_.block(a.offset, b.offset, a.product.rows(), b.product.rows()).noalias() -=
           weighted * b.product.transpose();

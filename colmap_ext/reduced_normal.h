@@ -6,13 +6,17 @@
 
 #include <Eigen/Core>
 
+#include "core/camera_model.h"
+
 namespace roomtex {
 
 // Derivatives of one observation over its standard deviation.
 struct NormalTerms {
+  // The largest block of unknowns is that of a lens.
+  static constexpr int kMaxSize = kMaxCameraParams;
   struct Block {
     int offset = 0;  // of the block's unknowns
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, 12> by;
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, kMaxSize> by;
   };
   std::vector<Block> blocks;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;

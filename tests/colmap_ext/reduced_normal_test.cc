@@ -10,7 +10,7 @@
 namespace roomtex {
 namespace {
 
-constexpr int kNumPoses = 5, kNumLenses = 2, kPose = 6, kLens = 8, kNumPoints = 60;
+constexpr int kNumPoses = 5, kNumLenses = 2, kPose = 6, kLens = kMaxCameraParams, kNumPoints = 60;
 constexpr int kNumUnknowns = kNumPoses * kPose + kNumLenses * kLens;
 
 // The same equations in one matrix with the points still in it, and without them.
