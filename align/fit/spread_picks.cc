@@ -40,9 +40,9 @@ class SpreadProblem {
       const SparseImage& image = *model.FindImage(picks[i].image_name);
       const auto at =
           projections.try_emplace(image.camera_id, model.cameras.at(image.camera_id)).first;
-      const auto x = at->second.CamFromImg(picks[i].x_in_img);
-      has_ray_.push_back(x.has_value());
-      const Eigen::Vector3d ray = x ? x->homogeneous().eval() : Eigen::Vector3d::UnitZ();
+      const auto ray_in_cam = at->second.RayFromImg(picks[i].x_in_img);
+      has_ray_.push_back(ray_in_cam.has_value());
+      const Eigen::Vector3d ray = ray_in_cam.value_or(Eigen::Vector3d::UnitZ());
       rays_.origins.col(i) = image.cam_from_model.TargetOriginInSource();
       rays_.directions.col(i) = image.cam_from_model.rotation.conjugate() * ray.normalized();
       rays_.x_in_scan.col(i) = picks[i].x_in_scan;

@@ -1,5 +1,7 @@
 // Panoramas all around instead of photos.
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 
 #include "align/alignment.h"
@@ -49,6 +51,26 @@ TEST(PanoramaAlignment, OneWrongPickOfEightIsNamedAndLeftOut) {
   const Alignment alignment = AlignCase(one);
   EXPECT_FALSE(alignment.start.picks[2].used);
   EXPECT_THAT(alignment.reasons, IsEmpty());
+}
+
+// Behind the plane of the camera, where most of a panorama lies.
+TEST(PanoramaAlignment, PicksOfSeveralCountWhereverTheyAre) {
+  SimulatedCase one = MakeCase(PanoramaOptions(0), 6);
+  one.picks.clear();
+  for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+    int taken = 0;
+    for (Pick pick : PicksOfPhoto(*one.room, photo, 8)) {
+      const bool is_behind = std::abs(pick.x_in_img.x() - 2048) > 1024;
+      if (!is_behind || taken == 2) continue;
+      pick.line = 2 + static_cast<long>(one.picks.size());
+      one.picks.push_back(pick);
+      ++taken;
+    }
+  }
+  ASSERT_GE(one.picks.size(), 6u);
+  const Alignment alignment = AlignCase(one);
+  EXPECT_THAT(alignment.reasons, IsEmpty());
+  EXPECT_LT(WorstPoseErrors(*one.room, one.model, alignment.start.scan_from_sparse).position, 0.06);
 }
 
 }  // namespace

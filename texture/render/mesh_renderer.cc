@@ -135,13 +135,12 @@ cv::Mat MeshRenderer::Render(const Camera& camera, const Rigid& cam_from_scan,
       cv::Vec3f sum(0, 0, 0);
       for (int k = 0; k < side * side; ++k) {
         const double dx = (k % side + 0.5) / side, dy = (k / side + 0.5) / side;
-        const auto ray = projection.CamFromImg({(x + dx) / scale, (y + dy) / scale});
+        const auto ray = projection.RayFromImg({(x + dx) / scale, (y + dy) / scale});
         if (!ray) {
           sum += settings.empty;
           continue;
         }
-        const Eigen::Vector3d direction =
-            (scan_from_cam.rotation * Eigen::Vector3d(ray->x(), ray->y(), 1)).normalized();
+        const Eigen::Vector3d direction = (scan_from_cam.rotation * *ray).normalized();
         sum += ColorAlong(scan_from_cam.translation, direction, settings);
       }
       picture(y, x) = cv::Vec3b(sum / static_cast<float>(side * side));
@@ -157,11 +156,10 @@ double MeshRenderer::ShareInSight(const Camera& camera, const Rigid& cam_from_sc
   const Rigid scan_from_cam = cam_from_scan.Inverse();
   int count = 0;
   for (int k = 0; k < kColumns * kRows; ++k) {
-    const auto ray = projection.CamFromImg({(k % kColumns + 0.5) / kColumns * camera.width,
+    const auto ray = projection.RayFromImg({(k % kColumns + 0.5) / kColumns * camera.width,
                                             (k / kColumns + 0.5) / kRows * camera.height});
     if (!ray) continue;
-    const Eigen::Vector3d direction =
-        (scan_from_cam.rotation * Eigen::Vector3d(ray->x(), ray->y(), 1)).normalized();
+    const Eigen::Vector3d direction = (scan_from_cam.rotation * *ray).normalized();
     const auto hit = caster_.Cast(scan_from_cam.translation, direction, 0.01);
     if (!hit || hit->distance < kNearest) continue;
     const Triangle& t = mesh_.triangles[hit->triangle];

@@ -88,5 +88,36 @@ TEST(MeshRenderer, ShowsATriangleWhereItIs) {
   EXPECT_EQ(renderer.Render(camera, pose, settings).at<cv::Vec3b>(20, 20), cv::Vec3b(30, 200, 10));
 }
 
+// A box of other colours before, behind, beside: a panorama shows all of it.
+TEST(MeshRenderer, PanoramasLookAllAround) {
+  ColoredMesh mesh;
+  const auto add = [&](const Eigen::Vector3d& middle, const cv::Vec3b& rgb) {
+    const Eigen::Vector3d up(0, 1, 0), side = middle.cross(up);
+    const auto first = static_cast<int>(mesh.points.size());
+    for (const Eigen::Vector3d& x :
+         {Eigen::Vector3d(middle - side - up), Eigen::Vector3d(middle + side - up),
+          Eigen::Vector3d(middle + up)}) {
+      mesh.points.push_back(x);
+      mesh.colors.emplace_back(rgb[0], rgb[1], rgb[2]);
+    }
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  };
+  add({0, 0, -2}, {200, 0, 0});
+  add({0, 0, 2}, {0, 200, 0});
+  add({2, 0, 0}, {0, 0, 200});
+  Camera camera;
+  camera.model = CameraModel::kEquirectangular;
+  camera.width = 80;
+  camera.height = 40;
+  camera.params = {80, 40};
+  const Rigid pose = LookAt({0, 0, 0}, {0, 0, -1}, {0, 1, 0});
+  const MeshRenderer renderer(mesh);
+  const cv::Mat3b picture = renderer.Render(camera, pose, RenderSettings());
+  EXPECT_EQ(picture(20, 40), cv::Vec3b(0, 0, 200));
+  EXPECT_EQ(picture(20, 60), cv::Vec3b(200, 0, 0));
+  EXPECT_EQ(picture(20, 1), cv::Vec3b(0, 200, 0));
+  EXPECT_EQ(picture(20, 78), cv::Vec3b(0, 200, 0));
+}
+
 }  // namespace
 }  // namespace roomtex
