@@ -185,6 +185,26 @@ Value ValueOf(const Json& json, const char* key) {
   return json.at(key).get<Value>();
 }
 
+Json ToJson(const GeoPosition& position) {
+  return {{"latitude", position.latitude_deg},
+          {"longitude", position.longitude_deg},
+          {"height", position.height}};
+}
+
+GeoPosition PositionFromJson(const Json& json) {
+  const GeoPosition position{ValueOf<double>(json, "latitude"), ValueOf<double>(json, "longitude"),
+                             ValueOf<double>(json, "height")};
+  if (!position.Problems().empty()) throw std::domain_error("no place on Earth");
+  return position;
+}
+
+// Absent in what is not surveyed.
+std::optional<SurveyedStation> StationFromJson(const Json& pose) {
+  if (!pose.contains("station")) return std::nullopt;
+  const Json& station = pose.at("station");
+  return SurveyedStation{PositionFromJson(station), ValueOf<double>(station, "heading")};
+}
+
 ScanRecord RecordFromJson(const Json& json) {
   ScanRecord record;
   record.path = ValueOf<std::string>(json, "path");
@@ -208,8 +228,10 @@ ScanRecord RecordFromJson(const Json& json) {
       throw std::domain_error("no rotation");
     }
     record.poses.push_back({{QuaternionFromWxyz({q[0], q[1], q[2], q[3]}), {t[0], t[1], t[2]}},
-                            ValueOf<bool>(pose, "given")});
+                            ValueOf<bool>(pose, "given"),
+                            StationFromJson(pose)});
   }
+  if (json.contains("enu_origin")) record.enu_origin = PositionFromJson(json.at("enu_origin"));
   return record;
 }
 
@@ -226,8 +248,7 @@ ScanReaderOptions OptionsOf(const ScanRecord& record, const ScanReaderOptions& g
 
 }  // namespace
 
-std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderOptions& options,
-                                    const std::string& model_folder) {
+std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const std::string& model_folder) {
   std::vector<ScanRecord> records;
   size_t scan = 0;
   for (const PlacedScans::File& file : placed.files) {
@@ -244,12 +265,16 @@ std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderO
     record.num_bytes = SizeOf(path.file);
     record.content_hash = HashOfFile(path.file);
     record.azimuth = file.azimuth;
-    record.units = options.units;
+    record.units = file.options.units;
     record.meters_per_unit = file.meters_per_unit;
-    record.max_range = options.max_range;
+    record.max_range = file.options.max_range;
     record.up_axis = file.up_axis;
+    if (placed.enu) record.enu_origin = placed.enu->origin();
     for (const bool given : file.placed) {
-      record.poses.push_back({placed.scans[scan++].scan_from_station, given});
+      ScanRecord::Pose pose{placed.scans[scan].scan_from_station, given, std::nullopt};
+      if (scan < placed.stations.size()) pose.station = placed.stations[scan];
+      record.poses.push_back(pose);
+      ++scan;
     }
     records.push_back(std::move(record));
   }
@@ -271,12 +296,18 @@ Json ToJson(const std::vector<ScanRecord>& records) {
     one["meters_per_unit"] = record.meters_per_unit;
     one["max_range"] = record.max_range;
     one["up_axis"] = record.up_axis;
+    if (record.enu_origin) one["enu_origin"] = ToJson(*record.enu_origin);
     one["poses"] = Json::array();
     for (const ScanRecord::Pose& pose : record.poses) {
-      one["poses"].push_back(
-          {{"rotation_wxyz", ToJson(WxyzFromQuaternion(pose.scan_from_station.rotation))},
-           {"translation", ToJson(pose.scan_from_station.translation)},
-           {"given", pose.given}});
+      Json of_scan = {
+          {"rotation_wxyz", ToJson(WxyzFromQuaternion(pose.scan_from_station.rotation))},
+          {"translation", ToJson(pose.scan_from_station.translation)},
+          {"given", pose.given}};
+      if (pose.station) {
+        of_scan["station"] = ToJson(pose.station->position);
+        of_scan["station"]["heading"] = pose.station->heading_deg;
+      }
+      one["poses"].push_back(of_scan);
     }
     json.push_back(one);
   }
@@ -349,6 +380,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
     const ScanReaderOptions options = OptionsOf(*one.record, request.options);
     ScanFile file = ReadScanFile(one.path, options, thin);
     const std::vector<ScanRecord::Pose>& poses = one.record->poses;
+    if (one.record->enu_origin) placed.enu.emplace(*one.record->enu_origin);
     if (file.scans.size() != poses.size()) {
       throw InputError(alignment.path, "",
                        "gives " + std::to_string(poses.size()) + " poses for the " +
@@ -359,6 +391,7 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& alignment, const ScanRequest
     for (size_t k = 0; k < poses.size(); ++k) {
       if (poses[k].given) PlaceScan(poses[k].scan_from_station, &file.scans[k]);
       read.placed.push_back(poses[k].given);
+      if (poses[k].station) placed.stations.push_back(*poses[k].station);
       placed.scans.push_back(std::move(file.scans[k]));
     }
     placed.files.push_back(std::move(read));

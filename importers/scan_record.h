@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/command_line.h"
 #include "core/report.h"
 #include "core/similarity.h"
+#include "importers/geo_frame.h"
 #include "importers/scan_reader.h"
 
 namespace roomtex {
@@ -31,14 +33,16 @@ struct ScanRecord {
   struct Pose {
     Rigid scan_from_station;
     bool given = false;  // by --scan_poses, else the file's own
+    std::optional<SurveyedStation> station;
   };
   std::vector<Pose> poses;  // one per scan of the file
+  // With surveyed stations: `scan` is east-north-up about this place.
+  std::optional<GeoPosition> enu_origin;
 };
 
-// Of scans as ReadPlacedScans() gave them. Hashes the files. model_folder: where the model is
-// written. Throws InputError.
-std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const ScanReaderOptions& options,
-                                    const std::string& model_folder);
+// Of scans as ReadPlacedScans() or ReadScansOfModel() gave them. Hashes the files. model_folder:
+// where the model is written. Throws InputError.
+std::vector<ScanRecord> RecordScans(const PlacedScans& placed, const std::string& model_folder);
 Json ToJson(const std::vector<ScanRecord>& records);
 
 struct AlignmentRecord {

@@ -60,11 +60,13 @@ class ScanRecords : public testing::Test {
   // As roomtex-align leaves it.
   void Align(const std::vector<std::string>& paths, const ScanReaderOptions& options = {},
              const std::string& poses = "") const {
-    const PlacedScans placed = ReadPlacedScans(paths, poses, options);
+    Record(ReadPlacedScans(paths, poses, options));
+  }
+  void Record(const PlacedScans& placed) const {
     Json json;
     json["trusted"] = true;
     json["reason"] = "";
-    json["scans"] = ToJson(RecordScans(placed, options, folder_ / "aligned"));
+    json["scans"] = ToJson(RecordScans(placed, folder_ / "aligned"));
     WriteJson(folder_ / "aligned/alignment.json", json);
   }
   PlacedScans Read(const std::vector<std::string>& paths = {},
@@ -92,6 +94,42 @@ TEST_F(ScanRecords, TheScanIsReadAgainAsItWas) {
       EXPECT_EQ(now.scans[0].points[i], then.points[i]);
     }
   }
+}
+
+TEST_F(ScanRecords, AModelThatIsAlignedAgainRemembersTheSame) {
+  ScanReaderOptions options;
+  options.azimuth = "counterclockwise";
+  options.units = "feet";
+  options.max_range = 5;
+  options.up_axis = "z";
+  Align({WriteRtpi("scans/a.rtpi")}, options);
+  const std::string first = ReadBytes(folder_ / "aligned/alignment.json");
+  Record(Read());
+  EXPECT_EQ(ReadBytes(folder_ / "aligned/alignment.json"), first);
+}
+
+TEST_F(ScanRecords, SurveyedStationsAreRemembered) {
+  const std::string a = WriteRtpi("scans/a.rtpi"), b = WriteRtpi("scans/b.rtpi", 5);
+  const std::string poses = Write("poses.txt",
+                                  "a.rtpi geo -33.9 151.2 40.25 12.5\n"
+                                  "b.rtpi geo -33.8999 151.2001 41 180\n");
+  Align({b, a}, {}, poses);
+  fs::remove(poses);
+  const PlacedScans now = Read();
+  ASSERT_TRUE(now.enu);
+  EXPECT_EQ(now.enu->origin().latitude_deg, -33.9);
+  EXPECT_EQ(now.enu->origin().height, 40.25);
+  ASSERT_THAT(now.stations, SizeIs(2));
+  EXPECT_EQ(now.stations[0].position.longitude_deg, 151.2001);
+  EXPECT_EQ(now.stations[1].heading_deg, 12.5);
+  const std::string first = ReadBytes(folder_ / "aligned/alignment.json");
+  Record(now);
+  EXPECT_EQ(ReadBytes(folder_ / "aligned/alignment.json"), first);
+  const PlacedScans one = Read({a});
+  ASSERT_THAT(one.stations, SizeIs(1));
+  EXPECT_EQ(one.stations[0].heading_deg, 12.5);
+  Align({a});
+  EXPECT_FALSE(Read().enu);
 }
 
 TEST_F(ScanRecords, PosesAreRememberedToTheLastBit) {

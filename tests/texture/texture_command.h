@@ -97,7 +97,7 @@ class TextureCommand : public testing::Test {
     Json report;
     report["trusted"] = trusted;
     report["reason"] = trusted ? "" : "Too few points lie on the surface.";
-    report["scans"] = ToJson(RecordScans(placed, options, Path(name)));
+    report["scans"] = ToJson(RecordScans(placed, Path(name)));
     WriteJson(Path(name + "/alignment.json"), report);
     return Path(name);
   }
