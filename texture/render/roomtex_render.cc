@@ -34,17 +34,21 @@ struct RenderOptions {
   int num_photos = 4, num_ring = 4;
 };
 
-// The photo to the left of the picture.
-cv::Mat Beside(const std::string& image_path, const std::string& name, const Camera& camera,
-               const cv::Mat& picture) {
+// The photo as its camera has it. Throws InputError if it cannot be shown.
+cv::Mat ReadPhotoOf(const std::string& image_path, const std::string& name, const Camera& camera) {
   const std::string path = image_path + "/" + name;
   const PhotoFit fit = FitPhotoToCamera(path, name, camera.width, camera.height);
   if (!fit.usable()) {
     throw InputError(path, "", "cannot be shown. " + AsClause(fit.problem), "");
   }
-  cv::Mat photo = ReadPhoto(path, fit.pixels), both;
-  cv::resize(photo, photo, picture.size(), 0, 0, cv::INTER_AREA);
-  cv::hconcat(photo, picture, both);
+  return ReadPhoto(path, fit.pixels);
+}
+
+// The photo to the left of the picture.
+cv::Mat Beside(const cv::Mat& photo, const cv::Mat& picture) {
+  cv::Mat left, both;
+  cv::resize(photo, left, picture.size(), 0, 0, cv::INTER_AREA);
+  cv::hconcat(left, picture, both);
   return both;
 }
 
@@ -66,7 +70,7 @@ void RenderOne(const RenderOptions& options, const SparseModel& model, const Col
   cv::Mat picture =
       MeshRenderer(mesh).Render(camera, new_from_cam * image->cam_from_model, settings);
   if (!options.image_path.empty()) {
-    picture = Beside(options.image_path, image->name, camera, picture);
+    picture = Beside(ReadPhotoOf(options.image_path, image->name, camera), picture);
   }
   WritePictureFile(options.output_path, picture);
 }
@@ -117,20 +121,17 @@ class PictureSet {
     for (const auto& [id, image] : model.images) images.push_back(&image);
     std::sort(images.begin(), images.end(),
               [](const SparseImage* a, const SparseImage* b) { return a->name < b->name; });
-    const int count = std::min<int>(options_.num_photos, static_cast<int>(images.size()));
-    for (int i = 0; i < count; ++i) {
-      const SparseImage& image = *images[i * images.size() / count];
-      const Camera& camera = model.cameras.at(image.camera_id);
-      cv::Mat picture = renderer.Render(camera, image.cam_from_model, settings_);
-      if (!options_.image_path.empty()) {
-        const cv::Mat both = Beside(options_.image_path, image.name, camera, picture);
-        pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
-        Write("photo_" + std::to_string(i + 1), image.name, both);
-        pictures_.emplace_back("the scan from there", picture);
-      } else {
-        Add("photo_" + std::to_string(i + 1), "from " + image.name, picture);
+    const size_t count = std::min<size_t>(options_.num_photos, images.size());
+    size_t next = 0, number = 0;
+    for (size_t i = 0; i < count; ++i) {
+      next = std::max(next, i * images.size() / count);
+      bool is_shown = false;  // the next one where this one cannot be
+      while (!is_shown && next < images.size()) {
+        is_shown = FromPhoto(model, *images[next++], number + 1, renderer);
       }
+      number += is_shown;
     }
+    if (!options_.image_path.empty()) ReportPhotosLeftOut(left_out_, context_);
   }
 
   // Viewpoints on a ring in the room, as high as the photos, that look over the middle at the other
@@ -243,6 +244,32 @@ class PictureSet {
   }
 
  private:
+  // False: the photo cannot be shown.
+  bool FromPhoto(const SparseModel& model, const SparseImage& image, size_t number,
+                 const MeshRenderer& renderer) {
+    const Camera& camera = model.cameras.at(image.camera_id);
+    cv::Mat photo;
+    if (!options_.image_path.empty()) {
+      try {
+        photo = ReadPhotoOf(options_.image_path, image.name, camera);
+      } catch (const InputError& error) {
+        left_out_.push_back({image.name, error.what()});
+        return false;
+      }
+    }
+    const cv::Mat picture = renderer.Render(camera, image.cam_from_model, settings_);
+    const std::string file = "photo_" + std::to_string(number);
+    if (photo.empty()) {
+      Add(file, "from " + image.name, picture);
+      return true;
+    }
+    const cv::Mat both = Beside(photo, picture);
+    pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
+    Write(file, image.name, both);
+    pictures_.emplace_back("the scan from there", picture);
+    return true;
+  }
+
   void Add(const std::string& file, const std::string& caption, const cv::Mat& picture) {
     Write(file, caption, picture);
     pictures_.emplace_back(caption, picture);
@@ -258,6 +285,7 @@ class PictureSet {
   OutputSet outputs_;  // all pictures appear together
   RenderSettings settings_;
   std::vector<std::pair<std::string, cv::Mat>> pictures_;
+  std::vector<PhotoLeftOut> left_out_;
 };
 
 Json CameraToJson(const SparseImage& image, const Camera& camera) {
