@@ -75,6 +75,7 @@ std::vector<Scan> MirrorScans(std::vector<Scan> scans) {
       if (scan.IsMissing(static_cast<int>(i))) continue;
       scan.points[i] = MirroredAt(scan.scan_from_station, scan.points[i]);
     }
+    scan.viewpoint.x() *= -1;
     for (Triangle& triangle : scan.triangles) std::swap(triangle[1], triangle[2]);
   }
   return scans;

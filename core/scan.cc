@@ -22,6 +22,8 @@ Scan Thinned(const Scan& scan, int stride) {
   thin.name = scan.name;
   thin.organised = scan.organised;
   thin.scan_from_station = scan.scan_from_station;
+  thin.station_is_assumed = scan.station_is_assumed;
+  thin.viewpoint = scan.viewpoint;
   thin.up = scan.up;
   thin.up_is_assumed = scan.up_is_assumed;
   thin.is_rtpi = scan.is_rtpi;

@@ -53,6 +53,10 @@ struct Scan {
 
   // Where the scanner stood. The origin of `station` is the point that all ranges start from.
   Rigid scan_from_station;
+  bool station_is_assumed = false;  // the file does not say it: `station` is the frame of the file
+  // `station`: from where the surface shows its front. The scanner's place, unless that is assumed
+  // and cannot be it.
+  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
   // Unit vector of the scan frame that points up (RTPI: y; PTX: z).
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   bool up_is_assumed = false;  // the file does not say it
@@ -60,7 +64,7 @@ struct Scan {
 
   int Index(int column, int row) const { return row * num_columns + column; }
   bool IsMissing(int index) const { return !(points[index].x() == points[index].x()); }
-  Eigen::Vector3d Station() const { return scan_from_station.translation; }
+  Eigen::Vector3d Station() const { return scan_from_station * viewpoint; }
   int NumMissing() const;
 
   static Eigen::Vector3d MissingPoint() {

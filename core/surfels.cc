@@ -455,7 +455,8 @@ Scan MeshOfSurfels(const Scan& cloud, bool station_is_known, const Eigen::Vector
   mesh.up = cloud.up;
   mesh.organised = false;
   mesh.scan_from_station = cloud.scan_from_station;
-  if (!station_is_known) mesh.scan_from_station.translation = origin;
+  mesh.station_is_assumed = cloud.station_is_assumed;
+  if (!station_is_known) mesh.viewpoint = cloud.scan_from_station.Inverse() * origin;
   size_t count = 0;
   for (const std::vector<Surfel>& block : *blocks) count += block.size();
   mesh.points.reserve(4 * count);

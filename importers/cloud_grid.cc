@@ -7,6 +7,7 @@
 
 #include "core/decompositions.h"
 #include "core/frames.h"
+#include "core/resource_limits.h"
 
 namespace roomtex {
 namespace {
@@ -20,6 +21,8 @@ constexpr double kNearLine = 0.3;        // of a step
 constexpr double kLeastNearLines = 0.9;  // share of the points
 constexpr double kMostDoubled = 0.1;     // share of the points that may share a cell
 constexpr double kMostCellsPerPoint = 64;
+constexpr double kLeastBeside =
+    0.5;  // share of the points that have one to the right and one below
 constexpr double kFinestStep = 5e-6;  // radians; no scanner turns by less
 
 struct Angles {
@@ -123,7 +126,7 @@ class GridFinder {
   }
 
   std::optional<Scan> Find() {
-    if (!FindSteps() || !FindSize()) return std::nullopt;
+    if (!FindSteps() || !FindSize() || !IsDense()) return std::nullopt;
     return Fill();
   }
 
@@ -186,31 +189,56 @@ class GridFinder {
     return static_cast<double>(num_near) >= kLeastNearLines * static_cast<double>(num_asked);
   }
 
+  size_t NumCells() const {
+    return static_cast<size_t>(num_rows_) * static_cast<size_t>(num_columns_);
+  }
+  // Row by row, as Scan::Index().
+  size_t CellOf(size_t i) const {
+    const Angles a = AnglesAt(i);
+    const auto row = static_cast<size_t>(top_ - std::round(rows_.Place(a.elevation)));
+    const int column =
+        static_cast<int>(std::round(columns_.Place(Turn(a.azimuth))) - first_column_) %
+        num_columns_;
+    return row * static_cast<size_t>(num_columns_) + static_cast<size_t>(column);
+  }
+
+  // Points that were drawn from a scan at random stand on its lines, but a mesh of their grid would
+  // be nothing but holes.
+  bool IsDense() const {
+    std::vector<bool> is_measured(NumCells(), false);
+    for (size_t i = 0; i < cloud_.points.size(); ++i) is_measured[CellOf(i)] = true;
+    const auto width = static_cast<size_t>(num_columns_);
+    size_t count = 0, num_beside = 0;
+    for (size_t cell = 0; cell < is_measured.size(); ++cell) {
+      if (!is_measured[cell]) continue;
+      ++count;
+      const bool has_right = (cell + 1) % width != 0 && is_measured[cell + 1];
+      num_beside += has_right && cell + width < is_measured.size() && is_measured[cell + width];
+    }
+    return static_cast<double>(num_beside) >= kLeastBeside * static_cast<double>(count);
+  }
+
   std::optional<Scan> Fill() const {
+    const size_t cells = NumCells();
+    RequireMemoryForSamples(cloud_.path, static_cast<double>(cells));
     Scan scan = cloud_;
     scan.organised = true;
     scan.num_rows = num_rows_;
     scan.num_columns = num_columns_;
-    const size_t cells = static_cast<size_t>(num_rows_) * static_cast<size_t>(num_columns_);
     scan.points.assign(cells, Scan::MissingPoint());
     scan.intensity.assign(cells, 0.0f);
     scan.normals.clear();
     if (!cloud_.colors.empty()) scan.colors.assign(cells, {0, 0, 0});
     size_t num_doubled = 0;
     for (size_t i = 0; i < cloud_.points.size(); ++i) {
-      const Angles a = AnglesAt(i);
-      const int row = static_cast<int>(top_ - std::round(rows_.Place(a.elevation)));
-      const int column =
-          static_cast<int>(std::round(columns_.Place(Turn(a.azimuth))) - first_column_) %
-          num_columns_;
-      const int cell = scan.Index(column, row);
-      if (!scan.IsMissing(cell)) {
+      const size_t cell = CellOf(i);
+      if (!scan.IsMissing(static_cast<int>(cell))) {
         ++num_doubled;
         continue;
       }
-      scan.points[static_cast<size_t>(cell)] = cloud_.points[i];
-      scan.intensity[static_cast<size_t>(cell)] = cloud_.intensity[i];
-      if (!scan.colors.empty()) scan.colors[static_cast<size_t>(cell)] = cloud_.colors[i];
+      scan.points[cell] = cloud_.points[i];
+      scan.intensity[cell] = cloud_.intensity[i];
+      if (!scan.colors.empty()) scan.colors[cell] = cloud_.colors[i];
     }
     if (static_cast<double>(num_doubled) >
         kMostDoubled * static_cast<double>(cloud_.points.size())) {

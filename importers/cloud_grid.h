@@ -11,8 +11,8 @@ namespace roomtex {
 // equal azimuth and equal elevation about its axis. The steps are found as the strongest periods of
 // the angles; each point goes to the cell next to it, row 0 on top, columns by growing azimuth; of
 // two points in a cell the first stays. None if the angles show no such grid: points far from its
-// lines, or too many in one cell (merged stations, moving scanners, thinned to even distances, a
-// scanner that stood elsewhere or leant).
+// lines, too many in one cell, or too few beside each other (merged stations, moving scanners,
+// thinned to even distances or at random, a scanner that stood elsewhere or leant).
 std::optional<Scan> GridFromCloud(
     const Scan& cloud, const Eigen::Vector3d& axis_in_station = Eigen::Vector3d::UnitZ());
 

@@ -124,6 +124,7 @@ Scan ReadLas(const std::string& path, const LasOptions& options) {
   scan.organised = false;
   scan.up = Eigen::Vector3d::UnitZ();
   scan.up_is_assumed = true;
+  scan.station_is_assumed = true;
   scan.points.reserve(static_cast<size_t>(header.count));
   scan.intensity.reserve(static_cast<size_t>(header.count));
   std::vector<float> greys;

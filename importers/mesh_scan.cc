@@ -49,6 +49,16 @@ void FinishMesh(const std::string& path, double max_range, Scan* scan) {
                    max_range > 0 ? "Give a larger --max_range" : "Give another file");
 }
 
+void FindViewpoint(Scan* mesh) {
+  constexpr double kWithin = 0.4;  // of the extent, from the middle
+  const Bounds bounds = FindBounds(*mesh);
+  const Eigen::Vector3d middle = (bounds.min + bounds.max) / 2;
+  const Eigen::Vector3d from_middle = mesh->scan_from_station.translation - middle;
+  const Eigen::Vector3d extent = bounds.max - bounds.min;
+  if ((from_middle.array().abs() <= kWithin * extent.array()).all()) return;
+  mesh->viewpoint = mesh->scan_from_station.Inverse() * middle;
+}
+
 void FinishCloud(const std::string& path, double max_range, Scan* scan) {
   const Eigen::Vector3d station = scan->Station();
   size_t kept = 0;

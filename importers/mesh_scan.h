@@ -33,6 +33,10 @@ inline double GreyOf(const Eigen::Vector3d& rgb) {
 // InputError if no triangle is left.
 void FinishMesh(const std::string& path, double max_range, Scan* scan);
 
+// The viewpoint of a mesh whose file does not say where it was scanned from: the middle of it,
+// unless the file's origin lies well within, as where a scanning app was started.
+void FindViewpoint(Scan* mesh);
+
 // Makes the points that were read a cloud (Scan::Kind): those that are not finite or too far away
 // go, with their intensities, colours and normals. Throws InputError if none is left.
 void FinishCloud(const std::string& path, double max_range, Scan* scan);

@@ -48,6 +48,7 @@ class ObjParser {
   Scan Parse() {
     scan_.up = Eigen::Vector3d::UnitZ();
     scan_.up_is_assumed = true;
+    scan_.station_is_assumed = true;
     std::string_view line;
     while (NextLine(&line)) {
       const std::string_view whole = line;

@@ -257,7 +257,10 @@ class PlyParser {
         facts_.up = v.normalized();
         facts_.up_is_assumed = false;
       }
-      if (what == "station") facts_.station = options_.meters_per_unit * v;
+      if (what == "station") {
+        facts_.station = options_.meters_per_unit * v;
+        facts_.station_is_assumed = false;
+      }
     }
   }
 
@@ -434,6 +437,7 @@ class ScanMaker : public PlyVisitor {
     scan_.up = facts.up;
     scan_.up_is_assumed = facts.up_is_assumed;
     scan_.scan_from_station.translation = facts.station;
+    scan_.station_is_assumed = facts.station_is_assumed;
     color_scale_ = ColorScale(facts.color_scale);
     RequireMemoryForSamples(path_, static_cast<double>(facts.num_vertices));
     scan_.points.reserve(facts.num_vertices);
@@ -535,8 +539,10 @@ void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {
   if (!parts.empty()) {
     const Scan& scan = *parts.front().scan;
     stream << "comment roomtex up " << scan.up[0] << ' ' << scan.up[1] << ' ' << scan.up[2] << '\n';
-    stream << "comment roomtex station " << scan.Station()[0] << ' ' << scan.Station()[1] << ' '
-           << scan.Station()[2] << '\n';
+    if (!scan.station_is_assumed) {
+      stream << "comment roomtex station " << scan.Station()[0] << ' ' << scan.Station()[1] << ' '
+             << scan.Station()[2] << '\n';
+    }
   }
   const char* const type = as_double ? "double" : "float";
   stream << "element vertex " << num_vertices << '\n';

@@ -42,7 +42,7 @@ struct PlyFacts {
   bool has_intensity = false, has_color = false, has_normal = false;
   double color_scale = 255;  // of the colours' type: 1, 255 or 65535 (ColorScale)
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), station = Eigen::Vector3d::Zero();
-  bool up_is_assumed = true;
+  bool up_is_assumed = true, station_is_assumed = true;
 };
 struct PlyVertex {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  // metres, `scan` frame; as it is, also NaN

@@ -226,6 +226,7 @@ class ScanFinish {
       NoteInput(scan.path, "the scan");
       TakeUpAxis(options_, &scan);
       if (scan.kind() == Scan::Kind::kCloud) FindGridAgain(&scan, &file->notes);
+      if (scan.kind() == Scan::Kind::kMesh && scan.station_is_assumed) FindViewpoint(&scan);
       FindUpAxisAgain(&scan, &file->notes);
       if (file->up_axis.empty()) file->up_axis = NameOfUpAxis(scan.up);
       NoteDoubtfulUnit(options_, scan, file);

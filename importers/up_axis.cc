@@ -40,6 +40,7 @@ Scan ThinnedSurface(const Scan& scan) {
   Scan thin;
   thin.organised = false;
   thin.scan_from_station = scan.scan_from_station;
+  thin.viewpoint = scan.viewpoint;
   if (scan.kind() == Scan::Kind::kCloud) {
     const size_t every = scan.points.size() / kSurfacePoints + 1;
     for (size_t i = 0; i < scan.points.size(); i += every) thin.points.push_back(scan.points[i]);

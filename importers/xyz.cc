@@ -110,6 +110,7 @@ class XyzParser {
     scan_.organised = false;
     scan_.up = Eigen::Vector3d::UnitZ();
     scan_.up_is_assumed = true;
+    scan_.station_is_assumed = true;
     std::string_view line;
     while (lines_.Next(&line)) ParseLine(line);
     if (said_ >= 0 && num_points_ < said_) {

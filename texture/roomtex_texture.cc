@@ -26,6 +26,7 @@
 #include "texture/output/write_ply.h"
 #include "texture/output/write_texture.h"
 #include "texture/output/write_web_glb.h"
+#include "texture/sampling/mesh_front.h"
 #include "texture/sampling/photo_list.h"
 #include "texture/sampling/photo_pass.h"
 #include "texture/texels/grid_image.h"
@@ -283,6 +284,8 @@ void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& inde
   context.report["stations"] = Json::array();
   ForEachFullScan(placed, [&](size_t number, Scan scan) {
     context.progress.Note(StationFolder(number) + ": " + scan.path);
+    // A mesh is held in full, and turned to the photos, already.
+    if (scan.kind() == Scan::Kind::kMesh) scan.triangles = placed.scans[number].triangles;
     const std::vector<Scan> station = {std::move(scan)};
     const ColorizeResult result = ColorizeStation(station, index_of[number], colorize, num_threads,
                                                   &context.progress, coarse);
@@ -348,6 +351,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
         " columns and rows, then each station is coloured in full.");
   }
   if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
+  TurnMeshesToPhotos(list.photos, context, &placed.scans);
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
   ProtectInputs(options, placed.scans, by_station);

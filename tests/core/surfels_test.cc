@@ -144,7 +144,11 @@ TEST(Surfels, SaysWhetherTheCloudWasTakenFromItsStation) {
   // From outside one side hides the other, and from afar all lie in one direction.
   for (const Eigen::Vector3d& station : {Eigen::Vector3d(8, 1, 1), Eigen::Vector3d(5e5, 5e6, 0)}) {
     sides.cloud.scan_from_station.translation = station;
-    EXPECT_EQ(FindCloudSurface(sides.cloud, 1).angular_spacing, 0);
+    const CloudSurface outside = FindCloudSurface(sides.cloud, 1);
+    EXPECT_EQ(outside.angular_spacing, 0);
+    // Its frame stays where it is: an aligned model remembers that. It is seen from its middle.
+    EXPECT_EQ(outside.patches.scan_from_station.translation, station);
+    EXPECT_LT((outside.patches.Station() - kRoom / 2).norm(), 0.1);
   }
 }
 

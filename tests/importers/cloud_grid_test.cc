@@ -125,6 +125,11 @@ TEST(CloudGrid, IsNotSeenWhereThereIsNone) {
   two.points.insert(two.points.end(), more.points.begin(), more.points.end());
   two.intensity.insert(two.intensity.end(), more.intensity.begin(), more.intensity.end());
   EXPECT_FALSE(GridFromCloud(two).has_value());
+  // Thinned at random: on the lines, and next to nobody.
+  Scan thinned = scanner.Cloud();
+  thinned.points.resize(thinned.points.size() / 5);
+  thinned.intensity.resize(thinned.points.size());
+  EXPECT_FALSE(GridFromCloud(thinned).has_value());
   Scan few = scanner.Cloud();
   few.points.resize(20);
   few.intensity.resize(20);

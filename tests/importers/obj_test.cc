@@ -1,5 +1,7 @@
 #include "importers/obj.h"
 
+#include <sstream>
+
 #include <gmock/gmock.h>
 
 #include "core/error.h"
@@ -66,6 +68,26 @@ TEST_F(Obj, AppliesUnitsRangeAndTheUpAxisOfOurFiles) {
   EXPECT_EQ(scan.points[1], Eigen::Vector3d(1, 0, 0));
   EXPECT_TRUE(scan.IsMissing(3));
   EXPECT_EQ(scan.triangles.size(), 1u);
+}
+
+// The front of its walls is to the middle, not to an origin that lies elsewhere or at its border.
+TEST_F(Obj, IsSeenFromWithinWhereverItsOriginLies) {
+  const auto station = [&](const Eigen::Vector3d& low) {
+    std::ostringstream obj;
+    for (int i = 0; i < 8; ++i) {
+      obj << "v "
+          << (low + Eigen::Vector3d(4 * (i & 1), 3 * (i >> 1 & 1), 2 * (i >> 2))).transpose()
+          << "\n";
+    }
+    obj << "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+    WriteBytes(folder_ / "room.obj", obj.str());
+    return ReadScanFile(folder_ / "room.obj", {}).scans[0];
+  };
+  EXPECT_EQ(station({0, 0, 0}).Station(), Eigen::Vector3d(2, 1.5, 1));
+  EXPECT_EQ(station({500, 200, 0}).Station(), Eigen::Vector3d(502, 201.5, 1));
+  EXPECT_EQ(station({-1, -1, -1}).Station(), Eigen::Vector3d(0, 0, 0));  // where an app started
+  // A given pose is that of the file's frame.
+  EXPECT_EQ(station({500, 200, 0}).scan_from_station.translation, Eigen::Vector3d(0, 0, 0));
 }
 
 TEST_F(Obj, LeavesOutTrianglesWithOneCornerTwice) {

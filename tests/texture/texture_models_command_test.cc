@@ -136,7 +136,7 @@ TEST_F(TextureCommand, MeshWithoutAGridGetsVertexColoursOnly) {
   EXPECT_LT(num_triangles, 10000u);
 }
 
-// The bare walls of the room as a mesh of twelve triangles that look inwards.
+// The bare walls of the room as a mesh of twelve triangles that look outwards, as CAD models do.
 std::string BoxOfRoom(const SimulatedRoom& room) {
   const SimulatedRoomOptions& o = room.options();
   std::ostringstream obj;
@@ -145,7 +145,7 @@ std::string BoxOfRoom(const SimulatedRoom& room) {
     const Eigen::Vector3d corner(o.width * (i & 1), o.depth * (i >> 1 & 1), o.height * (i >> 2));
     obj << "v " << (room.ScanFromRoom() * corner).transpose() << "\n";
   }
-  obj << "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\nf 1 1 2\n";
+  obj << "f 3 4 2 1\nf 6 8 7 5\nf 2 6 5 1\nf 7 8 4 3\nf 5 7 3 1\nf 4 8 6 2\nf 1 1 2\n";
   return obj.str();
 }
 
@@ -164,6 +164,7 @@ TEST_F(TextureCommand, AMeshOfFewTrianglesGetsAnAtlasFromThePhotos) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json report = ReadJson(Path("box of the room/report.json"));
   ASSERT_EQ(report["atlas"].size(), 1u);
+  EXPECT_THAT(report["warnings"].dump(), testing::HasSubstr("12 of 12 triangles turn their back"));
   EXPECT_EQ(report["atlas"][0]["num_charts"], 6);
   EXPECT_NEAR(report["atlas"][0]["texel_mm"], 8, 1e-9);
   EXPECT_GT(report["atlas"][0]["coverage"], 0.5);

@@ -2,6 +2,8 @@
 #include <filesystem>
 #include <map>
 
+#include <Eigen/Geometry>
+
 #include "colmap_ext/dense_workspace.h"
 #include "colmap_ext/sparse_model.h"
 #include "core/decompositions.h"
@@ -64,12 +66,12 @@ SparseModel MakeModel(const ExportScene& scene, const std::vector<ExportedPhoto>
 }
 
 // OpenGL's camera looks along -z, y up.
-Eigen::Matrix4d WorldFromOpenGlCam(const Rigid& cam_from_scan,
-                                   const Eigen::Quaterniond& world_from_scan) {
+Eigen::Matrix4d WorldFromOpenGlCam(const Rigid& cam_from_scan, const Rigid& world_from_scan) {
   const Rigid scan_from_cam = cam_from_scan.Inverse();
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  matrix.topLeftCorner<3, 3>() = (world_from_scan * scan_from_cam.rotation).toRotationMatrix() *
-                                 Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
+  matrix.topLeftCorner<3, 3>() =
+      (world_from_scan.rotation * scan_from_cam.rotation).toRotationMatrix() *
+      Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
   matrix.topRightCorner<3, 1>() = world_from_scan * scan_from_cam.translation;
   return matrix;
 }
@@ -82,7 +84,17 @@ Json ToJsonRows(const Eigen::Matrix4d& matrix, int num_rows = 4) {
   return rows;
 }
 
-void WritePointsPly(const ExportScene& scene, const Eigen::Quaterniond& world_from_scan,
+// Of nerfstudio's world in `scan`, whole metres: points and poses become floats there, which far
+// from the origin are too coarse.
+Eigen::Vector3d WorldOrigin(const ExportScene& scene) {
+  constexpr double kFar = 1000;  // metres; floats are exact to 0.06 mm there
+  Eigen::AlignedBox3d box;
+  for (const ExportScene::Point& point : scene.points) box.extend(point.x_in_scan);
+  if (box.isEmpty() || box.center().norm() < kFar) return Eigen::Vector3d::Zero();
+  return box.center().array().round();
+}
+
+void WritePointsPly(const ExportScene& scene, const Rigid& world_from_scan,
                     const std::string& path) {
   OutputFile file(path);
   file.stream() << "ply\nformat binary_little_endian 1.0\ncomment roomtex-export: metres, z up\n"
@@ -103,7 +115,7 @@ size_t WriteColmapModel(const ExportScene& scene, const std::vector<ExportedPhot
                         const std::string& folder) {
   const SparseModel model = MakeModel(scene, photos);
   WriteSparseModel(model, folder + "/sparse/0");
-  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+  for (const char* name : kSparseModelFiles) {
     const fs::path from = fs::path(folder) / "sparse" / "0" / name;
     const fs::path to = fs::path(folder) / "sparse" / name;
     std::error_code error;
@@ -119,7 +131,9 @@ size_t WriteColmapModel(const ExportScene& scene, const std::vector<ExportedPhot
 void WriteNerfstudioModel(const ExportScene& scene, const std::vector<ExportedPhoto>& photos,
                           const Eigen::Vector3d& up_in_scan, bool masks,
                           const std::string& folder) {
-  const auto world_from_scan = RotationBetween(up_in_scan, Eigen::Vector3d::UnitZ());
+  Rigid world_from_scan;
+  world_from_scan.rotation = RotationBetween(up_in_scan, Eigen::Vector3d::UnitZ());
+  world_from_scan.translation = -(world_from_scan.rotation * WorldOrigin(scene));
   Json frames = Json::array();
   for (const ExportedPhoto& photo : photos) {
     const std::vector<double>& p = photo.camera.params;
@@ -140,8 +154,10 @@ void WriteNerfstudioModel(const ExportScene& scene, const std::vector<ExportedPh
         ToJsonRows(WorldFromOpenGlCam(photo.cam_from_scan, world_from_scan));
     frames.push_back(frame);
   }
+  const Rigid back = world_from_scan.Inverse();
   Eigen::Matrix4d scan_from_world = Eigen::Matrix4d::Identity();
-  scan_from_world.topLeftCorner<3, 3>() = world_from_scan.conjugate().toRotationMatrix();
+  scan_from_world.topLeftCorner<3, 3>() = back.rotation.toRotationMatrix();
+  scan_from_world.topRightCorner<3, 1>() = back.translation;
   Json transforms = {{"camera_model", "OPENCV"},
                      {"ply_file_path", "points3D.ply"},
                      {"depth_unit_scale_factor", 0.001}};

@@ -15,6 +15,7 @@
 #include "texture/export/export_photos.h"
 #include "texture/export/export_scene.h"
 #include "texture/output/write_e57.h"
+#include "texture/sampling/mesh_front.h"
 #include "texture/sampling/photo_list.h"
 
 namespace roomtex {
@@ -155,8 +156,23 @@ void WritePhotosAndModel(const std::vector<Scan>& scans, const ScanColors& color
   }
 }
 
+// An E57 holds photos in full, and nothing else of them.
+std::vector<std::string> ProblemsOfE57(const ExportOptions& options) {
+  std::vector<std::string> problems;
+  const ExportOptions usual;
+  for (const auto& [name, is_given] :
+       {std::pair("max_points", options.max_points != usual.max_points),
+        {"max_image_size", options.pinhole.max_image_size != usual.pinhole.max_image_size},
+        {"max_field_of_view", options.pinhole.max_field_deg != usual.pinhole.max_field_deg},
+        {"masks", options.masks != usual.masks}}) {
+    if (is_given) problems.push_back(std::string("--") + name + " is not for --format e57");
+  }
+  return problems;
+}
+
 void Export(const ExportCommandOptions& options, const Command::Context& context) {
   std::vector<std::string> problems = options.scan_reader.Problems();
+  if (options.format == "e57") AppendProblems(ProblemsOfE57(options.exporting), &problems);
   AppendProblems(options.exporting.Problems(), &problems);
   AppendProblems(options.blend.Problems(), &problems);
   ThrowIfProblems(problems);
@@ -182,6 +198,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
     }
   }
 
+  TurnMeshesToPhotos(list.photos, context, &placed.scans);
   const std::string& folder = outputs->aside();
   const ScanColors colors = ColorsOf(&placed.scans, options, &list, context);
   if (options.format == "e57") {

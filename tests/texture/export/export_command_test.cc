@@ -176,6 +176,7 @@ TEST_F(ExportCommand, FisheyesBecomePinholePictures) {
 }
 
 TEST_F(ExportCommand, ScansAndPhotosBecomeOneE57) {
+  EXPECT_EQ(Export("e57", "--format e57 --max_image_size 200").exit_code, 2);
   const CommandResult result = Export("e57", "--format e57");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const ScanFile file = ReadScanFile(Path("e57/scan.e57"), {});
@@ -210,6 +211,37 @@ TEST_F(ExportCommand, ChecksItsOptions) {
   ExpectChecksItsOptions("roomtex-export", "--input_path none --image_path none --output_path none",
                          {FieldsOf(&options), FieldsOf(&options.occlusion), FieldsOf(&reader),
                           FieldsOf(&blend).Only({"Blend.min_agreement"})});
+}
+
+// A trainer reads floats: 0.25 m apart in UTM.
+TEST(NerfstudioModel, LiesAboutANearOriginWhereTheScanIsFar) {
+  const TempFolder folder;
+  const Eigen::Vector3d far(500000.125, 5200000.25, 400);
+  ExportScene scene;
+  for (int k = 0; k < 3; ++k) {
+    scene.points.push_back({far + Eigen::Vector3d(0.001 * k, 2, 1), {1, 2, 3}});
+  }
+  ExportedPhoto photo;
+  photo.name = "a.jpg";
+  photo.camera.width = photo.camera.height = 10;
+  photo.camera.params = {10, 10, 5, 5};
+  photo.cam_from_scan.translation = -far;
+  WriteNerfstudioModel(scene, {photo}, {0, 0, 1}, false, folder.path());
+  const Json transforms = Json::parse(ReadBytes(folder / "transforms.json"));
+  const auto translation = [](const Json& rows) {
+    return Eigen::Vector3d(rows[0][3], rows[1][3], rows[2][3]);
+  };
+  const Eigen::Vector3d origin = translation(transforms["scan_from_world"]);
+  const Eigen::Vector3d camera = translation(transforms["frames"][0]["transform_matrix"]);
+  EXPECT_LT(camera.norm(), 10);
+  EXPECT_LT((origin + camera - far).norm(), 1e-8);
+  const std::string ply = ReadBytes(folder / "points3D.ply");
+  const char* const first = ply.data() + ply.size() - 3 * 15;
+  for (int k = 0; k < 3; ++k) {
+    Eigen::Vector3f x;
+    std::memcpy(x.data(), first + 15 * k, 12);
+    EXPECT_LT((origin + x.cast<double>() - scene.points[k].x_in_scan).norm(), 1e-6) << k;
+  }
 }
 
 }  // namespace
