@@ -60,7 +60,8 @@ struct SparseModel {
 // keypoints that do not answer each other, ids or names given twice ...
 SparseModel ReadSparseModel(const std::string& folder);
 
-// Writes cameras.bin, images.bin, points3D.bin (each aside and renamed); makes the folder.
+inline constexpr const char* kSparseModelFiles[] = {"cameras.bin", "images.bin", "points3D.bin"};
+// Writes kSparseModelFiles (each aside and renamed); makes the folder.
 // rigs.bin and frames.bin of an older 4.x model in the same folder would contradict: refuses with
 // an InputError when `folder` holds them.
 void WriteSparseModel(const SparseModel& model, const std::string& folder);

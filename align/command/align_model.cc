@@ -285,11 +285,7 @@ void AlignModel(const AlignCommandOptions& a, const Command::Context& context) {
       aligned->row_motions.clear();  // by the images' numbers before
     }
   }
-  CommitFilesAtEnd();
-  if (!a.planes_path.empty()) {
-    WriteScanPlanes(a.planes_path, reading.surveyed->scans(), PlanesOf(a, *reading.surveyed),
-                    context.options.num_threads, reading.origin.offset());
-  }
+  WritePlanes(a, reading, context);
   if (!aligned) return WriteRefusal(a, refusal, reading.origin, context);
   WriteAligned(a, std::move(aligned->model), aligned->row_motions, aligned->local_from_sparse,
                &reading, told, context);

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "align/command/align_outputs.h"
 #include "align/geo/geo_output.h"
 #include "colmap_ext/panorama_model.h"
 #include "core/command_line.h"
@@ -136,10 +137,22 @@ void CheckOptions(AlignCommandOptions* options) {
         "have "
         "six picks each");
   }
-  if (!a.input_path.empty() && !a.camera.camera_params.empty()) {
-    problems.push_back(
-        "--camera_params is for photos without a sparse model: that of --input_path "
-        "has cameras");
+  if (!a.input_path.empty()) {
+    for (const auto& [name, is_given] :
+         {std::pair("model", a.camera.camera_model != PhotoCameraOptions().camera_model),
+          {"params", !a.camera.camera_params.empty()}}) {
+      if (!is_given) continue;
+      problems.push_back(std::string("--camera_") + name +
+                         " is for photos without a sparse model: that of --input_path "
+                         "has cameras");
+    }
+  } else {
+    for (const auto& [name, path] :
+         {std::pair("database", a.database_path), {"panoramas", a.panoramas_path}}) {
+      if (path.empty()) continue;
+      problems.push_back(std::string("--") + name +
+                         "_path belongs to a sparse model: give --input_path, too");
+    }
   }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");
   if (a.overlays > 0 && a.image_path.empty()) {
@@ -155,8 +168,8 @@ void CheckOptions(AlignCommandOptions* options) {
         "--output_path is the same folder as --input_path: the input model is never "
         "overwritten");
   }
-  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "alignment.json",
-                           "scan_from_sparse.txt", "scan_from_sparse_matrix.txt"}) {
+  RequireReplaceable(a.output_path + "/" + kAlignReportName);
+  for (const std::string& name : FilesOfAlignedModel()) {
     RequireReplaceable(a.output_path + "/" + name);
   }
   if (!a.image_path.empty()) RequireFolder(a.image_path, "Check --image_path");

@@ -1,6 +1,7 @@
 #include "align/command/align_outputs.h"
 
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "align/trust/photo_comparison.h"
 #include "align/trust/scan_view.h"
 #include "colmap_ext/model_output.h"
+#include "core/commit_together.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/photo_fit.h"
@@ -20,17 +22,21 @@
 namespace roomtex {
 namespace {
 
+constexpr char kTransformName[] = "scan_from_sparse.txt",
+               kMatrixName[] = "scan_from_sparse_matrix.txt", kOverlayFolder[] = "overlays",
+               kGeoFolder[] = "geo";
+
 // The model on the Earth, with --geo_origin; the report's `geo`.
 void WriteGeo(const AlignCommandOptions& a, const SparseModel& aligned, const PlacedScans& placed,
               const std::optional<GeoReference>& geo, const OutputSet& outputs,
               const Command::Context& context) {
-  const std::string folder = outputs.folder() + "/geo";
+  const std::string folder = outputs.folder() + "/" + kGeoFolder;
   context.report["geo"] = nullptr;
   if (a.geo_origin.empty() && std::filesystem::exists(folder + "/geo.json")) {
     context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
   }
   if (!geo) return;
-  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, outputs.aside() + "/geo");
+  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, outputs.aside() + "/" + kGeoFolder);
   const GpsCheck gps = CheckGps(aligned, *geo, a.image_path);
   context.report["geo"] = GeoToJson(*geo, placed, gps);
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);
@@ -52,15 +58,16 @@ void WarnOfPhotos(const AlignCommandOptions& a, const std::vector<std::string>& 
 // The report's `overlays`.
 void WriteOverlayPictures(const AlignCommandOptions& a, const AlignedPhotos& aligned,
                           const SurveyedScans& surveyed, const std::set<std::string>& told,
-                          const OutputSet& outputs, const Command::Context& context) {
+                          OutputSet* outputs, const Command::Context& context) {
   context.report["overlays"] = Json::array();
+  outputs->ReplaceFolder(kOverlayFolder);  // those of another alignment show another one
   if (a.overlays == 0) return;
   context.progress.Stage("overlays");
   std::vector<std::string> warnings;
   for (const std::string& path :
-       WriteOverlays(aligned, outputs.aside() + "/overlays", surveyed.viewer(), a.overlays,
-                     OverlayOptions(), context.options.num_threads, &warnings)) {
-    context.report["overlays"].push_back(outputs.folder() + path.substr(outputs.aside().size()));
+       WriteOverlays(aligned, outputs->aside() + "/" + kOverlayFolder, surveyed.viewer(),
+                     a.overlays, OverlayOptions(), context.options.num_threads, &warnings)) {
+    context.report["overlays"].push_back(outputs->folder() + path.substr(outputs->aside().size()));
   }
   WarnOfPhotos(a, warnings, "Overlay: ", told, context);
 }
@@ -79,6 +86,12 @@ std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& c
 }
 
 }  // namespace
+
+std::vector<std::string> FilesOfAlignedModel() {
+  std::vector<std::string> names(std::begin(kSparseModelFiles), std::end(kSparseModelFiles));
+  names.insert(names.end(), {kTransformName, kMatrixName});
+  return names;
+}
 
 std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
                                     const std::vector<const SparseModel*>& models,
@@ -134,26 +147,41 @@ WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const AlignedPhoto
   return {agreement.gradient.supports && is_this_room && comparison.Agrees(), shown};
 }
 
+void WritePlanes(const AlignCommandOptions& a, const ScanReading& reading,
+                 const Command::Context& context) {
+  CommitFilesAtEnd();
+  if (a.planes_path.empty()) return;
+  WriteScanPlanes(a.planes_path, reading.surveyed->scans(), reading.surveyed->planes(),
+                  context.options.num_threads, reading.origin.offset());
+}
+
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
                   const LocalOrigin& origin, const Command::Context& context) {
   origin.MoveBack(&context.report.keys());
   context.report.SetUntrusted(refusal);
-  context.report["scan_from_sparse"] = nullptr;
+  for (const char* key :
+       {"scan_from_sparse", "picks", "scale", "planes", "plane_rms_m", "reprojection_rms_px",
+        "expected_error", "agreement", "images", "search"}) {
+    if (!context.report.keys().contains(key)) context.report[key] = nullptr;
+  }
   const std::string output_path = ChooseOutput(a, context);
-  MakeFolder(output_path);
-  context.report.AddCopy(output_path + "/alignment.json");
+  const auto outputs = std::make_shared<OutputSet>(output_path);
+  if (ReadAlignmentRecord(output_path).found) {
+    // An earlier result that is not trusted either: the report of this one must not speak of it.
+    for (const std::string& name : FilesOfAlignedModel()) outputs->Remove(name);
+    for (const char* name : {kOverlayFolder, kGeoFolder}) outputs->ReplaceFolder(name);
+  }
+  CommitWithReport(kAlignReportName, outputs);
 }
 
 void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,
                   const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
   const std::string output_path = ChooseOutput(a, context);
-  const char transform_name[] = "scan_from_sparse.txt",
-             matrix_name[] = "scan_from_sparse_matrix.txt";
   RequireNoRigs(output_path);
   const auto outputs = std::make_shared<OutputSet>(output_path);
-  WriteOverlayPictures(a, {model, a.image_path, row_motions}, *reading->surveyed, told, *outputs,
-                       context);
+  WriteOverlayPictures(a, {model, a.image_path, row_motions}, *reading->surveyed, told,
+                       outputs.get(), context);
   context.progress.Stage("write");
   reading->origin.MoveBack(&model);
   reading->origin.MoveBack(&reading->placed.scans);
@@ -162,16 +190,16 @@ void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMoti
   WriteSparseModel(model, outputs->aside());
   if (local_from_sparse) {
     const Similarity scan_from_sparse = reading->origin.MovedBack(*local_from_sparse);
-    WriteSimilarity(outputs->Path(transform_name), scan_from_sparse);
-    WriteSimilarityMatrix(outputs->Path(matrix_name), scan_from_sparse);
+    WriteSimilarity(outputs->Path(kTransformName), scan_from_sparse);
+    WriteSimilarityMatrix(outputs->Path(kMatrixName), scan_from_sparse);
   } else {
     // One of an earlier run would contradict.
-    outputs->Remove(transform_name);
-    outputs->Remove(matrix_name);
+    outputs->Remove(kTransformName);
+    outputs->Remove(kMatrixName);
   }
   WriteGeo(a, model, reading->placed, reading->geo, *outputs, context);
-  context.report["scans"] = ToJson(RecordScans(reading->placed, a.scan_reader, output_path));
-  CommitWithReport("alignment.json", outputs);
+  context.report["scans"] = ToJson(RecordScans(reading->placed, output_path));
+  CommitWithReport(kAlignReportName, outputs);
 }
 
 }  // namespace roomtex

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "align/command/align_options.h"
 #include "align/command/scan_reading.h"
@@ -13,6 +14,10 @@
 #include "core/similarity.h"
 
 namespace roomtex {
+
+inline constexpr char kAlignReportName[] = "alignment.json";
+// Those that are written into --output_path where there is a model.
+std::vector<std::string> FilesOfAlignedModel();
 
 // The photos of the models that can be compared with the scan; what there is to say about the
 // others (the report's `photos_left_out`). Returns the reasons that were told. Throws InputError
@@ -29,7 +34,10 @@ struct WhatPhotosSay {
 WhatPhotosSay CompareWithPhotos(const AlignCommandOptions& a, const AlignedPhotos& aligned,
                                 const SurveyedScans& surveyed, const std::set<std::string>& told,
                                 const Command::Context& context);
-// Nothing but the report, which says why.
+// --Plane.output_path; appears with what is written next.
+void WritePlanes(const AlignCommandOptions& a, const ScanReading& reading,
+                 const Command::Context& context);
+// Nothing but the report, which says why; an earlier result that was not trusted either goes.
 void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
                   const LocalOrigin& origin, const Command::Context& context);
 // The aligned model and what belongs to it: overlays, similarity, `geo`. Without local_from_sparse

@@ -100,6 +100,7 @@ void AlignFoundPhotosOnly(const AlignCommandOptions& a, const PhotoModel& photos
   context.report["search"] = FoundPhotosToJson(found);
   const AlignmentInput input{photos.model, *reading.surveyed, found.picks, "", reading.azimuth()};
   PhotoAlignment placed = AlignFoundPhotos(input, photos, found, a.alignment.trust);
+  WritePlanes(a, reading, context);
   if (found.views.empty()) {
     for (const std::string& warning : placed.alignment.warnings) context.Warn(warning);
     return WriteRefusal(a, placed.alignment.reasons[0], reading.origin, context);
@@ -137,6 +138,7 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
                        reading.azimuth()};
   input.scan_origin = reading.origin.offset();
   FoundPhotos found;
+  context.report["search"] = nullptr;
   if (!few.model.images.empty()) {
     found = SearchPhotos(a, few, hints, false, &reading, context);
     context.report["search"] = FoundPhotosToJson(found);
@@ -144,6 +146,7 @@ void AlignPickedPhotos(const AlignCommandOptions& a, const Command::Context& con
   std::string refusal;
   std::optional<PhotoAlignment> placed =
       FindPhotoAlignment(a, input, photos, found, context, &refusal);
+  WritePlanes(a, reading, context);
   if (!placed) return WriteRefusal(a, refusal, reading.origin, context);
   WritePlacedPhotos(a, &*placed, &reading, told, context);
 }

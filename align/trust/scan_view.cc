@@ -241,7 +241,7 @@ ScanView ScanViewer::Look(const RayLattice& lattice, const Camera& camera,
   view.depth = cv::Mat1f(rows, columns, 0.0f);
   view.column = cv::Mat1f(rows, columns, kNaN);
   view.row = cv::Mat1f(rows, columns, kNaN);
-  view.scan = cv::Mat1b(rows, columns, static_cast<uchar>(0));
+  view.scan = cv::Mat1w(rows, columns, static_cast<ushort>(0));
   const std::vector<Node> nodes = CastRays(lattice, cam_from_scan);
   long num_valid = 0;
   for (int node_row = 0; node_row + 1 < lattice.rows(); ++node_row) {
@@ -288,7 +288,7 @@ ScanView ScanViewer::Look(const RayLattice& lattice, const Camera& camera,
           view.depth(y, x) = 1 / between(&Node::inverse_depth);
           view.column(y, x) = column;
           view.row(y, x) = row;
-          view.scan(y, x) = static_cast<uchar>(std::min(n[0].scan, 255));
+          view.scan(y, x) = static_cast<ushort>(std::min(n[0].scan, 65535));
           ++num_valid;
         }
       }

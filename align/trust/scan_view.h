@@ -49,7 +49,7 @@ struct ScanView {
   cv::Mat1b valid;        // 255 where one smooth surface with samples all around is seen, else 0
   cv::Mat1f depth;        // metres along the optical axis; 0 where invalid
   cv::Mat1f column, row;  // in the scan's grid; NaN where invalid, or for a mesh without a grid
-  cv::Mat1b scan;         // index into the scans, up to 255
+  cv::Mat1w scan;         // index into the scans
   double valid_share = 0;
 };
 

@@ -425,6 +425,14 @@ TEST(AlignCommand, NamesPhotosThatItLeavesOutAndStopsIfStrict) {
   EXPECT_EQ(report["photos_left_out"][0]["name"], "photo_000.jpg");
 }
 
+std::vector<std::string> NamesIn(const std::string& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    names.push_back(entry.path().filename().string());
+  }
+  return names;
+}
+
 TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   SimulatedCase one = MakeCase();
   const CaseFolder files(one);
@@ -443,6 +451,12 @@ TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   WritePicks(files.picks_path, one.picks);
   EXPECT_EQ(files.Align("--plane_constrained 0").exit_code, 4);
   EXPECT_TRUE(std::filesystem::exists(files.folder / "aligned.untrusted/images.bin"));
+  // Refused once more: what was not trusted either does not stay beside the report of another.
+  one.picks = MakeCase().picks;
+  one.picks[2].x_in_img.swap(one.picks[5].x_in_img);
+  WritePicks(files.picks_path, one.picks);
+  EXPECT_EQ(files.Align().exit_code, 4);
+  EXPECT_THAT(NamesIn(files.folder / "aligned.untrusted"), testing::ElementsAre("alignment.json"));
   EXPECT_EQ(ReadBytes(files.folder / "aligned/alignment.json"), trusted);
   EXPECT_EQ(ReadBytes(files.folder / "aligned/images.bin"), images);
 }
