@@ -489,7 +489,8 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
     if (!one.report_name.empty()) WriteJson(one.set->Path(one.report_name), json);
     folders.push_back(one.set);
   }
-  std::vector<std::string> paths = ran ? report.copies() : std::vector<std::string>();
+  std::vector<std::string> paths = report.copies_of_any_end();
+  if (ran) paths.insert(paths.end(), report.copies().begin(), report.copies().end());
   if (!common.report_path.empty()) paths.push_back(common.report_path);
   for (const std::string& path : paths) {
     if (!HoldsReport(path, sets)) WriteJson(PlaceToWrite(path, folders), json);

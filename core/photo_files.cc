@@ -40,4 +40,18 @@ std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::st
   return names;
 }
 
+bool HasHiddenPhotos(const std::string& folder) {
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    if (!IsPhotoName(it->path().filename().string())) continue;
+    const fs::path name = it->path().lexically_relative(folder);
+    if (std::any_of(name.begin(), name.end(),
+                    [](const fs::path& part) { return BeginsWith(part.string(), "."); })) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace roomtex

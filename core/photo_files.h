@@ -16,4 +16,8 @@ bool IsPhotoName(const std::string& path);
 std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::string& remedy,
                                         bool below = true);
 
+// Photos that ListPhotoFiles() leaves out since they or a folder that they lie in are hidden, as
+// copies that other programs keep. COLMAP takes them all the same, unless it gets a list.
+bool HasHiddenPhotos(const std::string& folder);
+
 }  // namespace roomtex

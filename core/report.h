@@ -27,15 +27,18 @@ class Report {
 
   // Writes the same JSON to `path` as well, once the command has run to its end (exit 0 or 4).
   void AddCopy(const std::string& path) { copies_.push_back(path); }
+  // The same whatever the exit code is.
+  void AddCopyOfAnyEnd(const std::string& path) { copies_of_any_end_.push_back(path); }
 
   bool trusted() const { return reason_.empty(); }
   const std::string& reason() const { return reason_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
   const std::vector<std::string>& copies() const { return copies_; }
+  const std::vector<std::string>& copies_of_any_end() const { return copies_of_any_end_; }
 
  private:
   Json keys_ = Json::object();
-  std::vector<std::string> warnings_, copies_;
+  std::vector<std::string> warnings_, copies_, copies_of_any_end_;
   std::string reason_;
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/photo_files.h"
 #include "core/text.h"
 #include "workflow/step_lines.h"
 
@@ -190,6 +191,7 @@ Step MakeFeatures(Chain* chain) {
   const std::vector<PhotoFacts>& photos =
       chain->Photos(has_scanner ? chain->PhotoFolder() : folder);
   const std::vector<PhotoGroup> groups = GroupByCamera(photos);
+  const bool has_others = has_scanner || HasHiddenPhotos(folder);  // that these lines are not for
   step.inputs = {folder};
   step.outputs = {chain->At(kPartialDatabase)};
   if (!options.cameras_path.empty()) step.inputs.push_back(options.cameras_path);
@@ -220,7 +222,7 @@ Step MakeFeatures(Chain* chain) {
     }
     if (!others.empty()) {
       CommandLine line = start;
-      if (has_scanner || !step.commands.empty()) {
+      if (has_others || !step.commands.empty()) {
         AddList(others, chain->At("log/photos_of_other_cameras.txt"), &line, &step);
       }
       const std::string model = ModelOfFew(options);
@@ -233,7 +235,7 @@ Step MakeFeatures(Chain* chain) {
     }
   } else {
     for (const PhotoGroup& group : groups) {
-      AddGroup(chain, group, groups[0], start, groups.size() > 1 || has_scanner, &step);
+      AddGroup(chain, group, groups[0], start, groups.size() > 1 || has_others, &step);
     }
   }
   for (CommandLine& line : step.commands) AddPassed(options.passed.features, &line);

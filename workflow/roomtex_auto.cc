@@ -20,6 +20,8 @@
 #include "core/partial_path.h"
 #include "core/photo_fit.h"
 #include "workflow/auto_options.h"
+#include "workflow/output_folder.h"
+#include "workflow/passed_options.h"
 #include "workflow/report_data.h"
 #include "workflow/report_page.h"
 #include "workflow/run_steps.h"
@@ -123,30 +125,6 @@ void TidyUp(const std::string& output_path) {
   }
 }
 
-bool LiesIn(const std::string& folder, const std::string& outer) {
-  std::error_code error;
-  const fs::path inside = fs::weakly_canonical(folder, error);
-  const fs::path outside = fs::weakly_canonical(outer, error);
-  // Links in a circle lead nowhere; the first step that writes there says so.
-  if (inside.empty() || outside.empty()) return false;
-  return std::mismatch(outside.begin(), outside.end(), inside.begin(), inside.end()).first ==
-         outside.end();
-}
-
-// Pictures that are made are not to be taken for photos the next time, and photos not to be removed
-// with a folder that is made anew.
-void RequireApart(const std::string& output_path, const std::string& photos) {
-  if (LiesIn(output_path, photos)) {
-    throw UsageError("--output_path " + output_path + " lies in the folder of the photos, " +
-                     photos + ": give one outside of it");
-  }
-  const std::string made = output_path + "/with_scanner";
-  if (LiesIn(photos, made)) {
-    throw UsageError("the folder of the photos, " + photos + ", lies in " + made +
-                     ", which is made anew here: put your photos elsewhere");
-  }
-}
-
 // What is not there cannot be in the sparse model, either. Photos of a video have no names yet, and
 // those of which every place was taken twice get common ones.
 void CheckNear(const AutoOptions& o) {
@@ -167,9 +145,6 @@ void CheckInputs(const AutoOptions& o) {
   if (!o.near.empty()) CheckNear(o);
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
   if (!o.scan_poses.empty()) RequireFile(o.scan_poses, "Give the file with the stations' poses");
-  for (const std::string& photos : {o.image_path, o.panoramas_path}) {
-    if (!photos.empty()) RequireApart(o.output_path, photos);
-  }
   for (const std::string& path : o.scan_paths) {
     RequireFile(ScanFileOf(path), "Give the file of the range scan");
   }
@@ -196,7 +171,7 @@ void WriteReport(Chain* chain, const RunResult& result, const Command::Context& 
   Json keys = MakeReportKeys(chain, result);
   WriteReportPage(chain, &keys);
   for (const auto& [key, value] : keys.items()) context.report[key] = value;
-  context.report.AddCopy(chain->At("report.json"));
+  context.report.AddCopyOfAnyEnd(chain->At("report.json"));
   std::printf("%s\n%s\n", keys["verdict"]["headline"].get<std::string>().c_str(),
               chain->At("report.html").c_str());
 }
@@ -211,6 +186,8 @@ void RunAll(AutoOptions options, const Command::Context& context) {
   CheckInputs(options);
   const SignalGuard signals;
   Chain chain(options);
+  RequireInputsApart(&chain);
+  CheckPassedOptions(&chain);
   if (options.dry_run) {
     PrintSteps(&chain);
     return;

@@ -123,13 +123,18 @@ bool OutputsAreAsLeft(const StepRecord& record) {
 
 RunState::RunState(const std::string& path) : path_(path) {
   const Json json = ReadJsonIfAny(path);
-  if (!json.is_object()) return;
+  if (!json.is_object()) {
+    std::error_code error;
+    is_lost_ = fs::exists(path, error);
+    return;
+  }
   try {
     for (const auto& [name, record] : json.at("steps").items()) {
       records_[name] = RecordFromJson(record);
     }
   } catch (const Json::exception&) {
     records_.clear();
+    is_lost_ = true;
   }
 }
 

@@ -40,12 +40,16 @@ class RunState {
   // An unreadable file counts as none: everything is made again then.
   explicit RunState(const std::string& path);
 
+  // The file is there and cannot be read.
+  bool is_lost() const { return is_lost_; }
+
   const StepRecord* Find(const std::string& step) const;
   void Set(const std::string& step, const StepRecord& record);  // and writes; throws InputError
 
  private:
   std::string path_;
   std::map<std::string, StepRecord> records_;
+  bool is_lost_ = false;
 };
 
 // With all but its made_from and outputs, for reports.

@@ -12,6 +12,7 @@
 #include "core/output_file.h"
 #include "core/text.h"
 #include "workflow/align_remedies.h"
+#include "workflow/output_folder.h"
 #include "workflow/remaining_time.h"
 
 namespace roomtex {
@@ -53,39 +54,39 @@ std::string FileName(const std::string& path) {
 class StepRunner {
  public:
   StepRunner(Chain* chain, const Command::Context& context)
-      : chain_(*chain), context_(context), state_(chain->At("steps.json")) {}
+      : chain_(*chain),
+        context_(context),
+        asked_(StepsAskedFor(chain->options())),
+        state_(chain->At("steps.json")) {}
 
   RunResult Run() {
-    std::vector<const StepRow*> rows;
-    for (const StepRow& row : StepTable()) rows.push_back(&row);
+    RequireOwnResults(&chain_, state_);
     PlanTime();
-    for (const StepRow* row : rows) {
+    for (const StepRow& row : StepTable()) {
       ThrowIfInterrupted();
-      if (row->name == std::string(kReportStep)) break;
-      if (!row->applies(&chain_)) continue;
-      if (!RunRow(*row)) break;
+      if (row.name == std::string(kReportStep) || !GoesOn(row)) break;
     }
     result_.whole = !result_.stop.stopped && WholeUntil("pictures");
     return std::move(result_);
   }
 
  private:
+  // False: the run ends with this step. An input that is not as it should be, or gone, ends it like
+  // a command that fails, so that the report does not stay the one of the run before.
+  bool GoesOn(const StepRow& row) {
+    try {
+      return !row.applies(&chain_) || RunRow(row);
+    } catch (const InputError& error) {
+      result_.stop.stopped = true;
+      result_.stop.step = row.name;
+      result_.stop.reason = error.what();
+      result_.stop.exit_code = kExitInput;
+      return false;
+    }
+  }
+
   // ---- which steps
 
-  static int IndexOf(const std::string& name) {
-    const std::vector<std::string> names = StepNames();
-    return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
-  }
-  int First() const {
-    const AutoOptions& o = chain_.options();
-    const std::string& name = o.only.empty() ? o.from : o.only;
-    return name.empty() ? 0 : IndexOf(name);
-  }
-  int Last() const {
-    const AutoOptions& o = chain_.options();
-    const std::string& name = o.only.empty() ? o.until : o.only;
-    return name.empty() ? static_cast<int>(StepNames().size()) : IndexOf(name);
-  }
   bool IsForced() const { return !chain_.options().only.empty() || !chain_.options().from.empty(); }
   bool WholeUntil(const std::string& last) const {
     return std::any_of(result_.steps.begin(), result_.steps.end(), [&](const StepOutcome& step) {
@@ -97,13 +98,13 @@ class StepRunner {
 
   // False: the run ends here.
   bool RunRow(const StepRow& row) {
-    const int index = IndexOf(row.name);
+    const int index = IndexOfStep(row.name);
     StepOutcome outcome;
     outcome.name = row.name;
     outcome.does = row.does;
-    if (index < First() || index > Last()) {
-      if (index < First() || IsUpToDate(row)) Remember(&outcome);
-      if (index < First()) {
+    if (!asked_.Holds(index)) {
+      if (index < asked_.first || IsUpToDate(row)) Remember(&outcome);
+      if (index < asked_.first) {
         RequireMade(row);
         outcome.outdated = WhyOutdated(row);
       }
@@ -250,11 +251,12 @@ class StepRunner {
   // Whichever way they were matched, the database has the features that are asked for now.
   bool MatchesHoldTheseFeatures() {
     const StepRecord* const record = state_.Find("matches");
-    if (record == nullptr || record->state != StepState::kDone) return false;
+    if (record == nullptr || !IsThere(chain_.At(kDatabase))) return false;
     const MadeFrom now = MadeFromOf(MakeStep(*RowOf("matches")));
     const auto features = record->made_from.find("features");
     return features != record->made_from.end() && now.count("features") != 0 &&
-           features->second == now.at("features") && OutputsAreAsLeft(*record);
+           features->second == now.at("features") &&
+           (record->state != StepState::kDone || OutputsAreAsLeft(*record));
   }
 
   static const StepRow* RowOf(const std::string& name) {
@@ -371,11 +373,9 @@ class StepRunner {
       record->peak_memory_bytes = std::max(record->peak_memory_bytes, run.peak_memory_bytes);
       if (run.success) continue;
       const bool is_ours = BeginsWith(line[0], "roomtex-");
-      const bool without_picks = step.name == "align" && chain_.PicksPath().empty() &&
-                                 chain_.options().near.empty() && run.exit_code == kExitUsage;
       record->reason =
           is_ours ? ReasonOf(step, run) : line[0] + " " + run.failure + ": " + run.LastLines();
-      const bool untrusted = is_ours && (run.exit_code == kExitUntrusted || without_picks);
+      const bool untrusted = is_ours && run.exit_code == kExitUntrusted;
       record->state = untrusted ? StepState::kUntrusted : StepState::kFailed;
       exit_code_ = untrusted             ? kExitUntrusted
                    : !is_ours            ? kExitInput
@@ -429,8 +429,8 @@ class StepRunner {
     std::vector<std::string> steps;
     std::map<std::string, double> last_time;
     for (const StepRow& row : StepTable()) {
-      const int index = IndexOf(row.name);
-      if (index < First() || index > Last() || !row.applies(&chain_)) continue;
+      const int index = IndexOfStep(row.name);
+      if (!asked_.Holds(index) || !row.applies(&chain_)) continue;
       steps.emplace_back(row.name);
       const StepRecord* const record = state_.Find(row.name);
       if (record != nullptr && record->seconds > 0) last_time[row.name] = record->seconds;
@@ -462,7 +462,7 @@ class StepRunner {
       context_.progress.Note("no pairs of patterned and plain photos: all are ordinary photos");
       return true;
     }
-    if (untrusted && IsLeftToAlign(outcome) && IndexOf("align") <= Last()) {
+    if (untrusted && IsLeftToAlign(outcome) && IndexOfStep("align") <= asked_.last) {
       context_.progress.Note("roomtex-align, which knows the scan, has the last word on that");
       return true;
     }
@@ -481,8 +481,9 @@ class StepRunner {
     return false;
   }
 
+  // A refusal of roomtex-align is nothing but a report, and names no scans.
   bool HasModel(const std::string& step) const {
-    return step != "align" || IsThere(chain_.AlignedPath() + "/images.bin");
+    return step != "align" || ReadJsonFile(chain_.ReportOf(step)).contains("scans");
   }
 
   std::vector<std::string> Remedies(const std::string& step, bool untrusted) const {
@@ -514,6 +515,7 @@ class StepRunner {
 
   Chain& chain_;
   const Command::Context& context_;
+  const StepRange asked_;
   RunState state_;
   RemainingTime time_;
   RunResult result_;
@@ -544,6 +546,7 @@ RunResult RunSteps(Chain* chain, const Command::Context& context) {
 void PrintSteps(Chain* chain) {
   for (const StepRow& row : StepTable()) {
     if (row.name == std::string(kReportStep) || !row.applies(chain)) continue;
+    if (!IsAskedFor(row.name, chain->options())) continue;
     Step step;
     try {
       step = row.make(chain);

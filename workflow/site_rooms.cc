@@ -50,7 +50,8 @@ class RoomMaker {
     json_["remedies"] = remedies;
   }
 
-  // A run that fails leaves the report of the one before: what the steps say comes first.
+  // A run that is refused before its first step leaves the report of the one before: what the steps
+  // say comes first.
   void Verdict() {
     for (const std::string& step : StepNames()) {
       const StepRecord* const record = state_.Find(step);

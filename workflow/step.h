@@ -91,6 +91,14 @@ struct StepRow {
 };
 const std::vector<StepRow>& StepTable();
 std::vector<std::string> StepNames();
+// The steps that --from, --until and --only ask for, by their places in the table.
+struct StepRange {
+  int first = 0, last = 0;
+  bool Holds(int index) const { return index >= first && index <= last; }
+};
+int IndexOfStep(const std::string& name);
+StepRange StepsAskedFor(const AutoOptions& options);
+bool IsAskedFor(const std::string& step, const AutoOptions& options);
 
 // Small things that all of it uses.
 bool IsThere(const std::string& path);

@@ -196,11 +196,6 @@ Step MakeAlign(Chain* chain) {
   Step step;
   CommandLine line = {"roomtex-align"};
   if (PhotosStandAlone(chain)) {
-    if (!options.near.empty()) {
-      throw UsageError(
-          "--near is a hint for where a sparse model belongs, and so few photos make none: give "
-          "six picks");
-    }
     AddLensOfPhotosAlone(chain, &line);
     step.notes.emplace_back("so few photos make no sparse model: each is placed by itself");
   } else {
@@ -328,6 +323,22 @@ std::vector<std::string> StepNames() {
   std::vector<std::string> names;
   for (const StepRow& row : StepTable()) names.emplace_back(row.name);
   return names;
+}
+
+int IndexOfStep(const std::string& name) {
+  const std::vector<std::string> names = StepNames();
+  return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+StepRange StepsAskedFor(const AutoOptions& options) {
+  const std::string& first = options.only.empty() ? options.from : options.only;
+  const std::string& last = options.only.empty() ? options.until : options.only;
+  return {first.empty() ? 0 : IndexOfStep(first),
+          static_cast<int>(last.empty() ? StepTable().size() : IndexOfStep(last))};
+}
+
+bool IsAskedFor(const std::string& step, const AutoOptions& options) {
+  return StepsAskedFor(options).Holds(IndexOfStep(step));
 }
 
 }  // namespace roomtex

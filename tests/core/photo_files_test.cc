@@ -22,6 +22,8 @@ TEST(ListPhotoFiles, TakesWhatColmapTakesAndNothingHidden) {
   std::filesystem::create_symlink("loop.jpg", folder / "loop.jpg");
   EXPECT_THAT(ListPhotoFiles(folder.path(), ""), testing::ElementsAre("a/c.png", "b.JPG"));
   EXPECT_THAT(ListPhotoFiles(folder.path(), "", false), testing::ElementsAre("b.JPG"));
+  EXPECT_TRUE(HasHiddenPhotos(folder.path()));
+  EXPECT_FALSE(HasHiddenPhotos(folder / "a"));
   EXPECT_INPUT_ERROR(ListPhotoFiles(folder / "f.txt", "Give a folder"), "Give a folder");
 }
 

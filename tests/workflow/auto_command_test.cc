@@ -132,6 +132,46 @@ TEST_F(AutoCommand, RefusesBadOptionsAndMissingFiles) {
   EXPECT_FALSE(fs::exists(Result("")));
 }
 
+TEST_F(AutoCommand, ASlipInAnOptionForAStepIsSaidBeforeTheFirst) {
+  for (const auto& [option, reason] :
+       {std::pair("--PlaneBA.betta 2", "--PlaneBA.betta is no option of roomtex-align"),
+        {"--Mapper.ba_glbal 1", "--Mapper.ba_glbal is no option of colmap mapper"},
+        {"--SiftMatching.max_ration 0.8", "is no option of COLMAP's matchers"}}) {
+    const CommandResult result = RunCommandLine(Arguments() + " " + option);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(reason));
+  }
+  EXPECT_FALSE(fs::exists(Result("")));
+}
+
+TEST_F(AutoCommand, WhatIsNotItsOwnStaysAsItIs) {
+  const std::string line = "roomtex-auto --quality low --picks_path " +
+                           (*folder_ / "other/picks.csv") + " --output_path " +
+                           (*folder_ / "other_result");
+  const std::string scan = " --scan_path " + (*folder_ / "other/scan.rtpi");
+  const std::string photos = " --image_path " + (*folder_ / "other/photos");
+  // Results of somebody else's.
+  for (const char* name : {"database.db", "sparse/0/images.bin", "aligned/images.bin"}) {
+    const std::string path = *folder_ / ("other_result/" + std::string(name));
+    fs::create_directories(fs::path(path).parent_path());
+    WriteBytes(path, "mine");
+    const CommandResult result = RunCommandLine(line + scan + photos);
+    EXPECT_EQ(result.exit_code, 3) << name;
+    EXPECT_THAT(result.err, HasSubstr("roomtex-auto has not made it"));
+    EXPECT_EQ(ReadBytes(path), "mine");
+    fs::remove_all(*folder_ / "other_result");
+  }
+  // Photos where results go.
+  const std::string path = *folder_ / "other_result/pictures";
+  fs::create_directories(fs::path(path).parent_path());
+  fs::copy(*folder_ / "other/photos", path);
+  const CommandResult result = RunCommandLine(line + scan + " --image_path " + path);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("which is made anew here"));
+  EXPECT_TRUE(fs::exists(path + "/photo_000.jpg"));
+  fs::remove_all(*folder_ / "other_result");
+}
+
 // As Ctrl-C, which whoever runs tests in the background has switched off.
 TEST_F(AutoCommand, ASignalEndsColmapToo) {
   const CommandResult result = StopWhenThereIs("log/features.log", "TERM");
@@ -394,6 +434,7 @@ TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
   EXPECT_THAT(failed.err, HasSubstr("features: done before"));
   EXPECT_EQ(ReadBytes(Result("database.db")), database);
   EXPECT_TRUE(fs::exists(Result("database.partial.db")));
+  EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "failed");
 
   const CommandResult stricter = RunCommandLine(with_ratio + "0.5");
   EXPECT_EQ(stricter.exit_code, 0) << stricter.err;
@@ -406,6 +447,15 @@ TEST_F(AutoCommand, FeaturesOutliveTheirMatches) {
   EXPECT_EQ(TimeOf("log/features.log"), features);
   EXPECT_EQ(keypoints(), features_before);
   EXPECT_NEAR(matches(), matches_before, 0.05 * matches_before);
+
+  // As after a kill between the last match and the record of the step.
+  json steps = ReadJson(Result("steps.json"));
+  steps["steps"]["matches"]["state"] = "started";
+  WriteBytes(Result("steps.json"), steps.dump());
+  const CommandResult killed = RunCommandLine(Arguments() + " --until matches");
+  EXPECT_EQ(killed.exit_code, 0) << killed.err;
+  EXPECT_THAT(killed.err, HasSubstr("features: done before"));
+  EXPECT_EQ(keypoints(), features_before);
 
   const CommandResult nothing = RunCommandLine(Arguments() + " --until matches");
   EXPECT_EQ(nothing.exit_code, 0) << nothing.err;

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/photo.h"
 #include "tests/support/temp_folder.h"
+#include "workflow/output_folder.h"
 #include "workflow/scanner_photos.h"
 #include "workflow/step.h"
 
@@ -107,6 +108,16 @@ TEST_F(StepTableTest, OneCameraIsToldToColmapAsOne) {
   EXPECT_THAT(line, HasSubstr("--ImageReader.camera_model OPENCV"));
   EXPECT_THAT(line, HasSubstr("--SiftExtraction.use_gpu 0"));
   EXPECT_THAT(line, Not(HasSubstr("image_list_path")));
+}
+
+TEST_F(StepTableTest, CopiesThatAnotherProgramHidesAreNotForColmap) {
+  AddPhotos("a", 3, 64);
+  fs::create_directories(folder_ / "photos/.originals");
+  fs::copy(folder_ / "photos/a100.jpg", folder_ / "photos/.originals/a100.jpg");
+  const Step step = Make("features");
+  EXPECT_THAT(CommandText(step.commands.at(0)), HasSubstr("--image_list_path"));
+  ASSERT_EQ(step.files.size(), 1u);
+  EXPECT_EQ(step.files[0].second, "a100.jpg\na101.jpg\na102.jpg\n");
 }
 
 TEST_F(StepTableTest, AFewPhotosGetALensOfFewParameters) {
@@ -300,7 +311,7 @@ TEST_F(StepTableTest, OnePhotoIsPlacedByItselfWithoutAModel) {
   EXPECT_THAT(Line("align"), Not(HasSubstr("--input_path")));
   EXPECT_THAT(Line("align"), HasSubstr("--camera_model OPENCV --camera_params 70,70,32,20"));
   options_.near = "a100.jpg,1,-2.5,0";
-  EXPECT_THROW(Make("align"), UsageError);
+  EXPECT_THAT(Line("align"), HasSubstr("--near a100.jpg,1,-2.5,0"));
   options_.near.clear();
   // Two, and picks in one of them: by a model, which picks in one photo place.
   AddPhotos("b", 1, 64);
@@ -471,6 +482,18 @@ TEST_F(ScannerStepTest, WithoutPhotosOfTheUserTheirsColourTheScan) {
   EXPECT_THAT(line, HasSubstr("--input_path " + (folder_ / "result/scanner/sparse ")));
   EXPECT_THAT(line, HasSubstr("--image_path " + (folder_ / "result/scanner ")));
   EXPECT_THAT(line, HasSubstr("--scan_path other.ptx --scan_path"));
+}
+
+TEST_F(ScannerStepTest, AScanIsNotWhereItsPhotosGo) {
+  options_.image_path.clear();
+  fs::create_directories(folder_ / "result/scanner");
+  fs::rename(folder_ / "site.e57", folder_ / "result/scanner/site.e57");
+  options_.scan_paths = {folder_ / "result/scanner/site.e57"};
+  Chain chain(options_);
+  EXPECT_THROW(RequireInputsApart(&chain), UsageError);
+  options_.output_path = folder_ / "another";
+  Chain apart(options_);
+  RequireInputsApart(&apart);
 }
 
 TEST_F(ScannerStepTest, AskedForInVainTheyAreAProblem) {
