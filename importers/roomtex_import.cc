@@ -234,6 +234,10 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   if (options.output_paths.size() != 1) {
     throw UsageError("Of panoramas one --output_path is made: the folder for their faces.");
   }
+  if (!options.images_path.empty()) {
+    throw UsageError("--images_path is for the photos of an E57, and " + options.input_path +
+                     " are panoramas: their faces go to --output_path.");
+  }
   const std::string& folder = options.output_paths[0];
   const fs::path input = options.input_path;
   std::error_code none_yet;

@@ -223,12 +223,19 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   }
 #ifdef ROOMTEX_PAGES
   if (a.window) {
+    if (!a.outline_path.empty() && fs::exists(a.output_path)) {
+      context.Warn("--outline_path is not used: " + a.output_path +
+                   " is there already, and the window goes on with it");
+    }
     const OutlineWindowInput window{a.proposal,     a.server,      kOutlinePage,
                                     a.outline_path, a.output_path, a.model_paths};
     const OutlineProposal drawn =
         RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
     WriteModels(a, drawn.outline);
     ReportOutline(drawn, true, context);
+    UpFinding seen = up;
+    seen.trusted = true;  // who drew saw what is up, and could change it
+    SayDoubts(drawn, seen, context);
     return;
   }
 #endif
