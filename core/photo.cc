@@ -143,11 +143,41 @@ void Turn(int orientation, cv::Mat* photo) {
   if (then > 0) cv::flip(*photo, *photo, kFlips[then]);
 }
 
+// OpenCV turns a TIFF as its orientation says, whatever it is told: the first directory then says
+// that nothing is to be done. Other files, also broken ones, stay as they are.
+void ForgetTiffOrientation(std::vector<unsigned char>* bytes) {
+  constexpr size_t kHeader = 8, kEntry = 12;
+  constexpr unsigned kOrientationTag = 274;
+  if (bytes->size() < kHeader) return;
+  unsigned char* const b = bytes->data();
+  const bool is_little = b[0] == 'I' && b[1] == 'I' && b[2] == 42 && b[3] == 0;
+  const bool is_big = b[0] == 'M' && b[1] == 'M' && b[2] == 0 && b[3] == 42;
+  if (!is_little && !is_big) return;
+  const auto number = [&](size_t at, int num_bytes) {
+    size_t value = 0;
+    for (int k = 0; k < num_bytes; ++k) {
+      value = value << 8 | b[at + static_cast<size_t>(is_little ? num_bytes - 1 - k : k)];
+    }
+    return value;
+  };
+  const size_t directory = number(4, 4);
+  if (directory > bytes->size() - 2) return;
+  const size_t count = number(directory, 2);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at = directory + 2 + kEntry * i;
+    if (at + kEntry > bytes->size()) return;
+    if (number(at, 2) != kOrientationTag) continue;
+    b[at + 8] = is_little ? 1 : 0;
+    b[at + 9] = is_little ? 0 : 1;
+  }
+}
+
 // flags: cv::IMREAD_*.
 cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
   NoteInput(path);
-  const std::vector<unsigned char> bytes = ReadBytes(path);
+  std::vector<unsigned char> bytes = ReadBytes(path);
+  ForgetTiffOrientation(&bytes);
   const bool is_jpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
   if (is_jpeg && !IsWholeJpeg(bytes)) {
     throw InputError(path, BytePosition(static_cast<long long>(bytes.size())),
@@ -231,6 +261,7 @@ LensData ReadLensData(const std::string& path) {
     data.focal_length_mm = PositiveNumber(exif, "Exif.Photo.FocalLength");
     const auto zoom = PositiveNumber(exif, "Exif.Photo.DigitalZoomRatio");
     if (data.focal_length_mm && zoom) *data.focal_length_mm *= *zoom;
+    data.focal_length_on_film_mm = PositiveNumber(exif, "Exif.Photo.FocalLengthIn35mmFilm");
   } catch (const std::exception&) {
   }
   return data;

@@ -57,6 +57,7 @@ struct LensData {
   std::string camera;  // as ExposureData::camera
   // Millimetres; of a digital zoom, times its ratio.
   std::optional<double> focal_length_mm;
+  std::optional<double> focal_length_on_film_mm;  // equivalent on 35 mm film, rounded
 };
 // Missing or broken EXIF is no error: fields stay empty.
 LensData ReadLensData(const std::string& path);

@@ -18,23 +18,58 @@ bool IsPhotoName(const std::string& path) {
   return kExtensions.count(extension) > 0;
 }
 
+namespace {
+
+// Calls visit(name below the folder) for every file that is not hidden, in no order.
+template <typename Visit>
+void VisitFiles(const std::string& folder, bool below, std::error_code* error, const Visit& visit) {
+  std::error_code unknown;
+  for (fs::recursive_directory_iterator it(folder, *error), end; !*error && it != end;
+       it.increment(*error)) {
+    const bool is_hidden = BeginsWith(it->path().filename().string(), ".");
+    if (is_hidden || !below) it.disable_recursion_pending();
+    if (is_hidden || !it->is_regular_file(unknown)) continue;
+    visit(it->path().lexically_relative(folder));
+  }
+}
+
+}  // namespace
+
+std::string NoteOnOtherPhotos(const std::string& folder) {
+  static const std::set<std::string> kNotRead = {".heic", ".heif", ".hif", ".avif", ".dng", ".cr2",
+                                                 ".cr3",  ".nef",  ".arw", ".raf",  ".orf", ".rw2"};
+  std::set<std::string> read;  // without their endings: a camera writes the same as JPEG, too
+  std::vector<fs::path> others;
+  std::error_code error;
+  VisitFiles(folder, true, &error, [&](const fs::path& name) {
+    if (IsPhotoName(name.string())) read.insert(fs::path(name).replace_extension().string());
+    if (kNotRead.count(LowerCase(name.extension().string())) > 0) others.push_back(name);
+  });
+  others.erase(std::remove_if(others.begin(), others.end(),
+                              [&](const fs::path& name) {
+                                return read.count(fs::path(name).replace_extension().string()) > 0;
+                              }),
+               others.end());
+  if (others.empty()) return "";
+  std::sort(others.begin(), others.end());
+  return "photos in " + folder + " are not read (" + std::to_string(others.size()) + ", as " +
+         others[0].string() + "): export them as JPEG";
+}
+
 std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::string& remedy,
                                         bool below) {
   RequireFolder(folder, remedy);
   std::vector<std::string> names;
-  std::error_code error, unknown;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    const std::string file = it->path().filename().string();
-    const bool is_hidden = BeginsWith(file, ".");
-    if (is_hidden || !below) it.disable_recursion_pending();
-    if (is_hidden || !IsPhotoName(file) || !it->is_regular_file(unknown)) continue;
-    names.push_back(it->path().lexically_relative(folder).generic_string());
-  }
+  std::error_code error;
+  VisitFiles(folder, below, &error, [&](const fs::path& name) {
+    if (IsPhotoName(name.string())) names.push_back(name.generic_string());
+  });
   if (error)
     throw InputError(folder, "", "cannot be listed: " + error.message(), "Check its rights");
   if (names.empty()) {
-    throw InputError(folder, "", "holds no photos (.jpg, .png, .tif, .bmp)", remedy);
+    const std::string note = NoteOnOtherPhotos(folder);
+    throw InputError(folder, "", "holds no photos (.jpg, .png, .tif, .bmp)",
+                     note.empty() ? remedy : note);
   }
   std::sort(names.begin(), names.end());
   return names;

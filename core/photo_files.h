@@ -16,6 +16,11 @@ bool IsPhotoName(const std::string& path);
 std::vector<std::string> ListPhotoFiles(const std::string& folder, const std::string& remedy,
                                         bool below = true);
 
+// A sentence without its full stop on photos of kinds that nothing here reads, as those of
+// telephones (HEIC) and raw ones, unless the same lies beside them as a photo that is read; "" =
+// there are none.
+std::string NoteOnOtherPhotos(const std::string& folder);
+
 // Photos that ListPhotoFiles() leaves out since they or a folder that they lie in are hidden, as
 // copies that other programs keep. COLMAP takes them all the same, unless it gets a list.
 bool HasHiddenPhotos(const std::string& folder);

@@ -18,6 +18,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/partial_path.h"
+#include "core/photo_files.h"
 #include "core/photo_fit.h"
 #include "workflow/auto_options.h"
 #include "workflow/output_folder.h"
@@ -196,6 +197,9 @@ void RunAll(AutoOptions options, const Command::Context& context) {
   MakeFolder(options.output_path + "/log");
   const FolderLock lock(options.output_path);
   TidyUp(options.output_path);
+  if (const std::string note = NoteOnOtherPhotos(options.image_path); !note.empty()) {
+    context.Warn(note);
+  }
   const RunResult result = RunSteps(&chain, context);
   WriteReport(&chain, result, context);
   if (result.stop.stopped) TellStop(result.stop, context);

@@ -12,6 +12,7 @@
 #include "core/commit_together.h"
 #include "core/error.h"
 #include "core/option_fields.h"
+#include "core/photo_files.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -78,6 +79,9 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   CheckLinksPath(arguments);
   cv::setNumThreads(1);  // photos are handled side by side
   const Associations found = FindAssociations(options, &context.progress);
+  if (const std::string note = NoteOnOtherPhotos(options.image_path); !note.empty()) {
+    context.Warn(note);
+  }
   context.progress.Stage("write");
   FillReport(found, context);
   for (const std::string& warning : found.warnings) context.Warn(warning);

@@ -125,6 +125,7 @@ void Run(Arguments* a, const Command::Context& context) {
   }
   const std::vector<std::string> names =
       ListPhotoFiles(a->image_path, "Give the folder with photos of the board");
+  if (const std::string note = NoteOnOtherPhotos(a->image_path); !note.empty()) context.Warn(note);
   context.progress.Stage("find boards", static_cast<int>(names.size()));
   const std::vector<BoardPhoto> photos =
       FindBoards(a->image_path, names, board, context.options.num_threads, &context.progress);

@@ -63,6 +63,22 @@ TEST_F(PhotoFile, OrientationIsNotApplied) {
   EXPECT_EQ(ReadPhotoSize(path_), (std::array<int, 2>{64, 48}));
 }
 
+// OpenCV turns a TIFF by itself.
+TEST_F(PhotoFile, OrientationOfATiffIsNotApplied) {
+  const std::string tiff = folder_ / "photo.tif";
+  for (const int orientation : {1, 2, 3, 4, 5, 6, 7, 8}) {
+    cv::imwrite(tiff, TestImage(64, 48));
+    auto exif_image = Exiv2::ImageFactory::open(tiff);
+    exif_image->readMetadata();
+    exif_image->exifData()["Exif.Image.Orientation"] = static_cast<uint16_t>(orientation);
+    exif_image->writeMetadata();
+    const cv::Mat image = ReadPhoto(tiff);
+    ASSERT_EQ(image.size(), cv::Size(64, 48)) << orientation;
+    EXPECT_EQ(cv::norm(image, TestImage(64, 48), cv::NORM_INF), 0) << orientation;
+    EXPECT_EQ(ExifExchangesSides(tiff), orientation >= 5);
+  }
+}
+
 TEST(ReadPhoto, TakesGreyAlphaAndSixteenBits) {
   const TempFolder folder;
   cv::imwrite(folder / "grey.png", cv::Mat(10, 20, CV_8UC1, cv::Scalar(77)));
