@@ -8,8 +8,13 @@
 namespace roomtex {
 
 struct LensLabel {
-  std::string text;            // the same for photos of one camera and focal length
-  double focal_length_mm = 0;  // 0 = not said
+  std::string text;                    // the same for photos of one camera and focal length
+  double focal_length_mm = 0;          // 0 = not said
+  double focal_length_on_film_mm = 0;  // on 35 mm film, rounded; 0 = not said
+
+  // How many times longer this lens is than the other, in pixels of photos of one size. The lenses
+  // of a telephone have sensors of several sizes, which millimetres do not tell.
+  double TimesLongerThan(const LensLabel& other) const;
 };
 using LensLabels = std::map<uint32_t, LensLabel>;  // by image_id
 

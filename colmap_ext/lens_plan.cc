@@ -71,8 +71,7 @@ LensPlan::LensPlan(const std::map<uint32_t, Camera>& cameras,
     for (size_t i = 0; i < groups.size(); ++i) {
       Camera camera = own;
       if (i > 0) {
-        const double ratio = groups[i].label.focal_length_mm / groups[0].label.focal_length_mm;
-        ScaleFocalLength(ratio, &camera);
+        ScaleFocalLength(groups[i].label.TimesLongerThan(groups[0].label), &camera);
         camera.has_prior_focal_length = false;
         notes_.push_back("Camera " + std::to_string(camera_id) + " is several: EXIF says " +
                          groups[i].label.text + " of " + std::to_string(groups[i].images.size()) +

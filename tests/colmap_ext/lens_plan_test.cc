@@ -59,6 +59,15 @@ TEST(LensPlan, CamerasToldTheSameAreOneAndComeBackAsTheyWere) {
   }
 }
 
+TEST(LensLabel, LensesOfATelephoneDifferByWhatTheyAreOnFilm) {
+  const LensLabel wide{"phone at 6.86 mm", 6.86, 24}, ultra{"phone at 2.22 mm", 2.22, 14};
+  EXPECT_NEAR(ultra.TimesLongerThan(wide), 14.0 / 24, 1e-9);
+  // One sensor: equivalents are rounded, millimetres are not.
+  const LensLabel zoomed{"phone at 7.50 mm", 7.5, 26};
+  EXPECT_NEAR(zoomed.TimesLongerThan(wide), 7.5 / 6.86, 1e-9);
+  EXPECT_NEAR((LensLabel{"", 9, 0}.TimesLongerThan(wide)), 9 / 6.86, 1e-9);
+}
+
 TEST(LensPlan, PhotosOfOneCameraThatWereZoomedAreDivided) {
   const std::map<uint32_t, Camera> cameras = {{1, PlannedCamera(1, 500)}};
   std::map<uint32_t, DatabaseImage> images;
