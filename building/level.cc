@@ -123,8 +123,13 @@ UpFinding Level(OutlineCloud* cloud, std::vector<PlaneSegment>* segments) {
   finding.trusted = fixed || (finding.source != "planes" && LevelShare(*segments, up) >= kEnough);
 
   cloud->up = up;
-  MoveBoth({1, RotationBetween(up, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()}, cloud,
-           segments);
+  // Upright as it was said; then what walls and ground know better, about the middle of the points:
+  // about an origin as far as that of a map grid it would lift them by hundreds of metres.
+  const Eigen::Quaterniond upright = RotationBetween(start, Eigen::Vector3d::UnitZ());
+  MoveBoth({1, upright, Eigen::Vector3d::Zero()}, cloud, segments);
+  const Eigen::Quaterniond finer = RotationBetween(upright * up, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d middle = MiddleOf(cloud->points);
+  MoveBoth({1, finer, middle - finer * middle}, cloud, segments);
   finding.up_in_input =
       cloud->frame.outline_from_input.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   return finding;

@@ -294,6 +294,10 @@ void WriteOutline(const std::string& path, const Outline& outline, bool proposed
   WriteJson(path, json);
 }
 
+bool HoldsSameOutline(const std::string& path, const std::string& other) {
+  return OutlineToJson(ReadOutline(path)) == OutlineToJson(ReadOutline(other));
+}
+
 bool WasEdited(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return false;

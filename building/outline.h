@@ -65,5 +65,7 @@ void WriteOutline(const std::string& path, const Outline& outline, bool proposed
 // The file is there and not as WriteOutline(proposed) wrote it: somebody's work. A file that is no
 // outline at all is somebody's work, too.
 bool WasEdited(const std::string& path);
+// Throws InputError as ReadOutline() does.
+bool HoldsSameOutline(const std::string& path, const std::string& other);
 
 }  // namespace roomtex

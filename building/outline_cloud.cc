@@ -162,14 +162,19 @@ ModelPlace PlaceOfModel(const std::string& folder) {
   return place;
 }
 
-// The frame of COLMAP's model_aligner, ecef: everything as far from the origin as
-// the ground is from the middle of the Earth.
+// The frame of COLMAP's model_aligner, ecef: everything as far from the origin as the ground is
+// from the middle of the Earth. Northings of a map grid are, too, about 57 degrees north; their z
+// is a height, which in ecef only a strip of 20 km along the equator has so small.
 bool LooksEarthCentred(const std::vector<Eigen::Vector3d>& points) {
-  std::vector<double> norms;
+  constexpr double kHighest = 1e4;  // metres
+  std::vector<double> norms, heights;
   const size_t every = std::max<size_t>(1, points.size() / 1000);
-  for (size_t i = 0; i < points.size(); i += every) norms.push_back(points[i].norm());
+  for (size_t i = 0; i < points.size(); i += every) {
+    norms.push_back(points[i].norm());
+    heights.push_back(std::abs(points[i].z()));
+  }
   const double low = Quantile(norms, 0.05), high = Quantile(norms, 0.95);
-  return low > 6.34e6 && high < 6.40e6;
+  return low > 6.34e6 && high < 6.40e6 && Median(&heights) > kHighest;
 }
 
 void AddModelPoints(const SparseModel& model, OutlineCloud* cloud) {
@@ -318,6 +323,16 @@ std::vector<std::string> OutlineInputOptions::Problems() const {
   return problems;
 }
 
+Eigen::Vector3d MiddleOf(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& point : points) values.push_back(point[axis]);
+    middle[axis] = Median(&values);
+  }
+  return middle;
+}
+
 void OutlineCloud::MoveTo(const Similarity& target_from_here) {
   for (Eigen::Vector3d& point : points) point = target_from_here * point;
   for (Eigen::Vector3d& eye : eyes) eye = target_from_here * eye;
@@ -401,13 +416,8 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
     cloud.MoveTo({1, place.enu_from_model.rotation, place.enu_from_model.translation});
   } else if (LooksEarthCentred(cloud.points)) {
     const GeoFrame earth({0, 0, 0});
-    Eigen::Vector3d middle;
-    for (int axis = 0; axis < 3; ++axis) {
-      std::vector<double> values;
-      for (const Eigen::Vector3d& point : cloud.points) values.push_back(point[axis]);
-      middle[axis] = Median(&values);
-    }
-    const GeoPosition position = earth.GeoFromEnu(earth.EcefFromEnu().Inverse() * middle);
+    const GeoPosition position =
+        earth.GeoFromEnu(earth.EcefFromEnu().Inverse() * MiddleOf(cloud.points));
     cloud.frame.geo.emplace(position);
     const Rigid enu_from_ecef = cloud.frame.geo->EcefFromEnu().Inverse();
     cloud.MoveTo({1, enu_from_ecef.rotation, enu_from_ecef.translation});

@@ -54,6 +54,9 @@ struct OutlineCloud {
 inline constexpr size_t kMaxOutlinePoints = 150000;
 OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_threads);
 
+// The medians of the coordinates. points must not be empty.
+Eigen::Vector3d MiddleOf(const std::vector<Eigen::Vector3d>& points);
+
 // step, spacing and noise from the points; for clouds that were made, not read.
 void MeasureCloud(bool metric, int num_threads, OutlineCloud* cloud);
 

@@ -88,7 +88,11 @@ void CheckOutlineArguments(const OutlineArguments& a) {
   if (fs::is_directory(a.output_path)) {
     throw InputError(a.output_path, "", "is a folder", "Name a file for the outline: outline.json");
   }
-  if (!window && WasEdited(a.output_path)) {
+  // What is extruded or judged is written as it was read: the same line a second time.
+  const auto is_copy = [&] {
+    return !a.outline_path.empty() && HoldsSameOutline(a.output_path, a.outline_path);
+  };
+  if (!window && WasEdited(a.output_path) && !is_copy()) {
     throw InputError(a.output_path, "",
                      "is there already and was edited, or is another file: it is not replaced",
                      "Write to another --output_path, and give it as --outline_path to extrude it");
@@ -233,9 +237,6 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
         RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
     WriteModels(a, drawn.outline);
     ReportOutline(drawn, true, context);
-    UpFinding seen = up;
-    seen.trusted = true;  // who drew saw what is up, and could change it
-    SayDoubts(drawn, seen, context);
     return;
   }
 #endif

@@ -166,10 +166,12 @@ TEST(OutlineCommand, WritesTheStreetInEveryFormat) {
   EXPECT_EQ(ReadBytes(folder / "outline.json"), edited.dump(1)) << judged.err;
   const Json again = ReadJson(folder / "report.json");
   EXPECT_EQ(again["buildings"][0]["corners"][0]["x"], -1.5);
-  const CommandResult alone = RunCommandLine(
-      "roomtex-outline --outline_path " + (folder / "outline.json") + " --output_path " +
-      (folder / "copy.json") + " --model_path " + (folder / "alone.city.json"));
-  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  for (int time = 0; time < 2; ++time) {
+    const CommandResult alone = RunCommandLine(
+        "roomtex-outline --outline_path " + (folder / "outline.json") + " --output_path " +
+        (folder / "copy.json") + " --model_path " + (folder / "alone.city.json"));
+    EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  }
   EXPECT_EQ(OutlineToJson(ReadOutline(folder / "copy.json")),
             OutlineToJson(ReadOutline(folder / "outline.json")));
   EXPECT_TRUE(std::filesystem::exists(folder / "alone.city.json"));

@@ -1,7 +1,10 @@
 #include "building/outline_proposal.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
+#include "core/frames.h"
 #include "tests/building/simulated_street.h"
 #include "tests/support/temp_folder.h"
 
@@ -146,6 +149,23 @@ TEST(OutlineProposal, FindsTheStreetInADenseCloud) {
                                 cloud.frame.outline_from_input);
   EXPECT_EQ(result.proposal.outline.buildings.size(), 4u);
   ExpectExact(result, 0.05, 0.05);
+}
+
+// In a map grid, millions of metres from its origin, walls that correct what is up lift nothing.
+TEST(OutlineProposal, LevellingLeavesACloudWhereItLies) {
+  const TempFolder folder;
+  WriteCloud(MakeDenseStreet({}, 100000), folder / "dense.ply");
+  OutlineInputOptions input;
+  input.input_path = folder / "dense.ply";
+  OutlineCloud cloud = ReadOutlineCloud(input, -1);
+  const Eigen::Quaterniond tilt(
+      Eigen::AngleAxisd(RadFromDeg(0.1), Eigen::Vector3d(1, 2, 0).normalized()));
+  for (Eigen::Vector3d& x : cloud.points) x = tilt * x + Eigen::Vector3d(691000, 5334000, 520);
+  std::vector<PlaneSegment> segments = FindPlaneSegments(cloud, 0, -1);
+  const Eigen::Vector3d middle = MiddleOf(cloud.points);
+  const UpFinding up = Level(&cloud, &segments);
+  EXPECT_NEAR(DegFromRad(std::acos(up.up_in_input.z())), 0.1, 0.03);
+  EXPECT_LT((cloud.frame.outline_from_input * middle - middle).norm(), 0.01);
 }
 
 }  // namespace

@@ -58,13 +58,19 @@ function showSaved(error) {
   byId('save').title = path;
 }
 
-// One change after the other; `before`: what undo brings back.
-function change(buildings, before = copyOf(app.buildings)) {
+// One change after the other: `edit` makes of a copy of the buildings, as they are then, what they
+// become; nothing to drop it. `before`: what undo brings back. Resolves to whether it was taken.
+function change(edit, before = null) {
   app.busy = app.busy.then(async () => {
+    before ??= copyOf(app.buildings);
+    const buildings = edit(copyOf(app.buildings));
+    if (!buildings) return false;
+    let isTaken = false;
     try {
       take(await api.put(app.state.revision, buildings.map(plain)));
       app.done.push(before);
       app.undone.length = 0;
+      isTaken = true;
     } catch (error) {
       // Not taken: as it was.
       const kept = app.buildings;
@@ -74,6 +80,7 @@ function change(buildings, before = copyOf(app.buildings)) {
       say(error.message);
     }
     showAll();
+    return isTaken;
   });
   return app.busy;
 }
@@ -285,6 +292,7 @@ function closeContour() {
     say('A contour needs at least three corners.');
     return;
   }
+  const drawn = app.contour;
   app.contour = [];
   const footprint = areaOf(corners) < 0 ? corners.reverse() : corners;
   const ground = Math.min(...footprint.map(groundAt));
@@ -300,9 +308,13 @@ function closeContour() {
     } catch {
       say('The points tell no roof here: type its height in.');
     }
-    await change([...app.buildings, building]);
-    choose(app.buildings.length - 1);
-    setTool('select');
+    if (await change((all) => [...all, building])) {
+      choose(app.buildings.length - 1);
+      setTool('select');
+    } else if (app.tool === 'draw' && app.contour.length === 0) {
+      app.contour = drawn;  // to be mended
+      refresh();
+    }
   });
 }
 
@@ -321,23 +333,23 @@ function propose(area) {
       say('Nothing new was found in the points.');
       return;
     }
-    const all = copyOf(app.buildings);
-    for (const building of fresh) {
-      const used = new Set(all.map((known) => known.name));
-      let number = 1;
-      while (used.has(String(number))) ++number;
-      all.push({...building, name: String(number)});
-    }
-    await change(all);
-    say(`${fresh.length} proposed.`);
+    const isTaken = await change((all) => {
+      for (const building of fresh) {
+        const used = new Set(all.map((known) => known.name));
+        let number = 1;
+        while (used.has(String(number))) ++number;
+        all.push({...building, name: String(number)});
+      }
+      return all;
+    });
+    if (isTaken) say(`${fresh.length} proposed.`);
   });
 }
 
 function editSelected(edit) {
-  const all = copyOf(app.buildings);
-  const building = all[app.selected];
-  if (!building) return;
-  if (edit(building) !== false) change(all);
+  const at = app.selected;
+  if (!app.buildings[at]) return;
+  change((all) => all[at] && edit(all[at]) !== false ? all : null);
 }
 
 function heights() {
@@ -364,19 +376,21 @@ function remove() {
     });
     return;
   }
-  const all = copyOf(app.buildings);
-  all.splice(app.selected, 1);
+  const at = app.selected;
   app.selected = -1;
-  change(all);
+  change((all) => {
+    all.splice(at, 1);
+    return all;
+  });
 }
 
 function roofFrom(turn = 0) {
+  const shape = byId('shape').value;
+  const eaves = Number(byId('eaves').value);
+  let ridge = Number(byId('ridge').value);
   editSelected((building) => {
-    const shape = byId('shape').value;
     if (shape === 'planes') return false;
     const wall = (wallOf(building.footprint, building.roof) + turn) % building.footprint.length;
-    const eaves = Number(byId('eaves').value);
-    let ridge = Number(byId('ridge').value);
     if (shape !== 'flat' && ridge <= eaves) ridge = eaves + app.state.step;
     building.roof = makeRoof(building.footprint, {shape, eaves, ridge, wall});
     return true;
@@ -396,8 +410,9 @@ function nudge(dx, dy) {
     }
     const step = (event.shiftKey ? 10 : 1) / view.scale;
     const {right, up} = view.axes();
+    const at = app.corner;
     editSelected((building) => {
-      const corner = building.footprint[app.corner];
+      const corner = building.footprint[at];
       for (const axis of [0, 1]) corner[axis] += step * (dx * right[axis] + dy * up[axis]);
     });
   };
@@ -512,7 +527,12 @@ function released(event) {
   const place = placeOf(event);
   if (ended.kind === 'corner' && ended.moved) {
     app.snap = null;
-    change(app.buildings, ended.before);
+    const [of, at] = [app.selected, app.corner];
+    const corner = [...app.buildings[of].footprint[at]];
+    change((all) => {
+      all[of].footprint[at] = corner;
+      return all;
+    }, ended.before);
   } else if (ended.kind === 'area' && ended.moved) {
     const [a, b] = [view.toPlan(ended.start), view.toPlan(place)];
     app.box = null;
@@ -607,7 +627,11 @@ const kKeys = [
   {keys: ['-'], does: 'zoom out', run: () => zoomBy(1 / 1.3)},
   {keys: ['Enter'], does: 'close the contour', run: () => app.tool === 'draw' && closeContour()},
   {keys: ['Escape'], does: 'drop the contour, the selection', run: escape},
-  {keys: ['Delete', 'Backspace'], does: 'remove the corner, or the building', run: remove},
+  {
+    keys: ['Delete', 'Backspace'],
+    does: 'remove the corner, or the building',
+    run: (event) => event.repeat || remove(),
+  },
   {keys: ['Ctrl+z', 'Ctrl+Z'], does: 'undo', run: undo},
   {keys: ['Ctrl+y', 'Ctrl+Y', 'Ctrl+Shift+Z'], does: 'redo', run: redo},
   {keys: ['m', 'M'], does: 'write the solids', run: models},
@@ -683,12 +707,18 @@ function listen() {
     'help-close': () => byId('help').close(),
   };
   for (const [id, run] of Object.entries(clicks)) byId(id).addEventListener('click', run);
-  byId('name').addEventListener('change', () => editSelected((one) => {
-    one.name = byId('name').value.trim();
-  }));
-  byId('ground').addEventListener('change', () => editSelected((one) => {
-    one.ground = Number(byId('ground').value);
-  }));
+  byId('name').addEventListener('change', () => {
+    const name = byId('name').value.trim();
+    editSelected((one) => {
+      one.name = name;
+    });
+  });
+  byId('ground').addEventListener('change', () => {
+    const ground = Number(byId('ground').value);
+    editSelected((one) => {
+      one.ground = ground;
+    });
+  });
   for (const id of ['shape', 'eaves', 'ridge']) {
     byId(id).addEventListener('change', () => roofFrom());
   }
