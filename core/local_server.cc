@@ -99,6 +99,7 @@ struct LocalServer::Impl {
 
   const LocalServerOptions options;
   const std::string token = options.token.empty() ? MakeToken() : options.token;
+  const std::string run = MakeToken();  // tells this server from an earlier one of the same address
   int listen_fd = -1, stop_fd = -1, port = 0;
   LocalAddress address;
   std::vector<std::string> hosts;                       // "name:port", lower case
@@ -459,12 +460,20 @@ void LocalServer::AddJson(const std::string& path, std::function<Json(const Quer
 
 void LocalServer::AddContent(const std::string& path,
                              std::function<std::optional<Content>(const Query&)> handler) {
-  impl_->AddRoute("GET", path,
-                  [handler](const httplib::Request& request, httplib::Response& response) {
-                    const std::optional<Content> content = handler(QueryOf(request));
-                    if (content) return SetContent(request, *content, response);
-                    SetError(response, 404, "There is nothing at this address.");
-                  });
+  impl_->AddRoute(
+      "GET", path,
+      [handler, impl = impl_.get()](const httplib::Request& request, httplib::Response& response) {
+        std::optional<Content> content = handler(QueryOf(request));
+        if (!content) {
+          return SetError(response, 404, "There is nothing at this address.");
+        }
+        if (content->immutable && !impl->options.token.empty()) {
+          // The browser may have what an earlier server had there.
+          content->immutable = false;
+          content->etag = impl->run;
+        }
+        SetContent(request, *content, response);
+      });
 }
 
 void LocalServer::AddPost(const std::string& path, std::function<Json(const Json&)> handler) {

@@ -59,7 +59,9 @@ class LocalServer {
     std::shared_ptr<const std::string> bytes;
     std::string type;        // e.g. "image/jpeg"
     std::string etag;        // of these bytes, without quotes; "" = none
-    bool immutable = false;  // the same for this URL as long as the server runs: no asking again
+    // The same for this URL as long as the server runs: no asking again, unless the address
+    // outlives the server.
+    bool immutable = false;
   };
 
   // Throws UsageError with all problems of the options.

@@ -131,6 +131,13 @@ void OutputSet::ReplaceAllOf(const std::string& command) {
     throw InputError(folder_, "", "holds files that " + command + " did not write",
                      "Move it away or give another --output_path");
   }
+  const Json written = report.is_object() ? report.value("entries", Json()) : Json();
+  for (const fs::directory_entry& entry : old) {
+    const std::string name = entry.path().filename().string();
+    if (!written.is_array() || std::count(written.begin(), written.end(), Json(name)) > 0) continue;
+    throw InputError(folder_, "", "holds " + name + ", which " + command + " did not write",
+                     "Move it away or give another --output_path");
+  }
   for (const fs::directory_entry& entry : old) {
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
     (is_folder ? replaced_ : removed_).insert(entry.path().filename().string());
@@ -166,6 +173,18 @@ OutputSet::OutputSet(const std::string& folder) : folder_(folder), record_(Parti
 }
 
 OutputSet::~OutputSet() = default;
+
+std::vector<std::string> OutputSet::Entries() const {
+  std::vector<std::string> names = {"report.json"};
+  std::error_code error;
+  for (fs::directory_iterator entry(aside(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name != names[0]) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
 
 // A file of the user's does not make room for a folder.
 void OutputSet::RequireFoldersTo(const std::string& name) const {

@@ -35,8 +35,10 @@ class OutputSet {
   void Remove(const std::string& name) { removed_.insert(name); }
   // Nothing of the old folder is kept, but what other runs are making there. Throws InputError
   // unless it is missing, empty, or what this command left there (its report.json names the
-  // command): what is not ours stays.
+  // command, and as `entries` what Entries() gave): what is not ours stays.
   void ReplaceAllOf(const std::string& command);
+  // The files and folders of the set, without what lies in the folders, and report.json.
+  std::vector<std::string> Entries() const;
 
   // How the path is called in the folder; "" = it lies elsewhere.
   std::string NameOf(const std::string& path) const;

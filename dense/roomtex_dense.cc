@@ -179,6 +179,7 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   if (options.strict) ThrowIfAnyLeftOut(left_out, options.image_path);
   ReportPhotosLeftOut(left_out, context);
   FillReport(result, context);
+  context.report["entries"] = outputs->Entries();
   CommitWithReport("report.json", outputs);
   std::printf("%s\n", (options.output_path + "/supplement.ply").c_str());
 }

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/set_journal.h"
 #include "tests/core/failing_calls.h"
+#include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {
@@ -192,6 +193,23 @@ TEST_F(OutputSetHereTest, ReplacesAllOfItsOwnAgainAndAgain) {
             "secondsecondsecond");
   EXPECT_TRUE(fs::exists("report.json"));
   for (const char* name : {"tiles/1", "old.js", "old/tile"}) EXPECT_FALSE(fs::exists(name)) << name;
+}
+
+TEST_F(OutputSetHereTest, WhatAnotherPutBesideItsFilesIsNotReplaced) {
+  const auto write = [] {
+    OutputSet set(".");
+    set.ReplaceAllOf("roomtex-test");
+    WriteBytes(set.Path("index.html"), "page");
+    WriteBytes(set.Path("tiles/0"), "tile");
+    const Json report = {{"command", "roomtex-test"}, {"entries", set.Entries()}};
+    WriteBytes(set.Path("report.json"), report.dump());
+    set.Commit();
+  };
+  write();
+  write();
+  WriteBytes("notes.txt", "mine");
+  EXPECT_INPUT_ERROR(write(), "holds notes.txt, which roomtex-test did not write");
+  EXPECT_EQ(ReadBytes("notes.txt") + ReadBytes("tiles/0"), "minetile");
 }
 
 TEST_F(OutputSetHereTest, OfAReplacedLinkToAFolderOnlyTheLinkGoes) {

@@ -207,6 +207,7 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
     WritePhotosAndModel(placed.scans, colors, options, folder, &list, context);
   }
   ReportPhotosLeftOut(list.left_out, context);
+  context.report["entries"] = outputs->Entries();
   CommitWithReport("report.json", outputs);
   std::printf("%s\n", options.output_path.c_str());
 }

@@ -209,6 +209,9 @@ void ExposureOptions::Declare(OptionFields* fields) {
                "How bytes become light: srgb; estimate (from photos that overlap, needs EXIF "
                "exposures that differ by an EV); or a file with a line per level 0-255: its "
                "linear light, one number or three (red green blue).");
+  fields->Require(mode != "none" || (!vignetting && response != "estimate"),
+                  "--Exposure.mode none leaves photos as they are: --Exposure.vignetting and "
+                  "--Exposure.response estimate go with exif or match");
   fields->Require(!response.empty(), "--Exposure.response must be srgb, estimate or a file");
   fields->InputPath("Exposure.bracket_path", &bracket_path,
                     "Folder with photos of one still scene, exposed differently (EXIF): the "

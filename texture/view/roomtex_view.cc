@@ -54,11 +54,11 @@ std::string FindPhotos(const ViewOptions& options, const Command::Context& conte
     for (const char* section : {"inputs", "options"}) {
       std::string folder = FromReport(report, {section, "image_path"});
       if (folder.empty()) continue;
-      std::error_code error;
-      if (fs::is_directory(folder, error)) return folder;
-      // The command may have run elsewhere: beside its output folder, mostly.
-      for (const fs::path& base : {report.parent_path(), report.parent_path() / ".."}) {
+      // The command ran beside its output folder, mostly. Where this one runs may be another room
+      // whose photos have the same names: that comes last.
+      for (const fs::path& base : {report.parent_path() / "..", report.parent_path(), fs::path()}) {
         const fs::path moved = (base / folder).lexically_normal();
+        std::error_code error;
         if (fs::is_directory(moved, error)) return moved.string();
       }
       said = folder;

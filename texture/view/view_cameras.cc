@@ -34,6 +34,15 @@ std::shared_ptr<const std::string> EncodeJpeg(const cv::Mat& picture) {
   return std::make_shared<const std::string>(bytes.begin(), bytes.end());
 }
 
+// The photo, no smaller than `size`; what is a small part of it is decoded from a part of the data.
+cv::Mat ReadAtLeast(const std::string& path, PhotoPixels pixels, int size) {
+  if (pixels != PhotoPixels::kAsStored) return ReadPhoto(path, pixels);
+  const auto [width, height] = ReadPhotoSize(path);
+  int shrink = 1;
+  while (shrink < 8 && std::max(width, height) / (2 * shrink) >= size) shrink *= 2;
+  return shrink > 1 ? ReadShrunkPhoto(path, shrink) : ReadPhoto(path, pixels);
+}
+
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
@@ -44,6 +53,7 @@ struct ViewCameras::Cache {
     std::pair<int, int> key;  // camera, size
     std::shared_ptr<const std::string> bytes;
   };
+  std::mutex decoding;  // one photo at a time: a page asks for all of a list at once
   std::mutex mutex;
   std::list<Entry> entries;
   size_t bytes = 0;
@@ -168,7 +178,9 @@ std::shared_ptr<const std::string> ViewCameras::Photo(int id, int max_size) cons
   if (paths_[id].empty()) return nullptr;
   const int size = std::clamp(max_size, 16, 8192);
   if (auto found = cache_->Find({id, size})) return found;
-  cv::Mat photo = ReadPhoto(paths_[id], fits_[id].pixels);
+  const std::lock_guard<std::mutex> one_at_a_time(cache_->decoding);
+  if (auto found = cache_->Find({id, size})) return found;
+  cv::Mat photo = ReadAtLeast(paths_[id], fits_[id].pixels, size);
   const Camera& camera = model_.cameras.at(image.camera_id);
   const double shape = static_cast<double>(photo.cols) / photo.rows;
   if (std::abs(shape * camera.height / camera.width - 1) > 0.02) {

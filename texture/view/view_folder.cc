@@ -47,7 +47,8 @@ std::string ScriptOf(const ViewAnswers& answers, const Question& question) {
   if (json != answers.json().end()) {
     Json answer = json->second(query);
     if (question.word == "scene") answer["path"] = answer["name"];  // nobody else's business
-    return begin + answer.dump() + ");\n";
+    // A name may be in whatever encoding the disk has.
+    return begin + answer.dump(-1, ' ', false, Json::error_handler_t::replace) + ");\n";
   }
   const auto content = answers.content().at(question.word)(query);
   if (!content) return "";
@@ -137,13 +138,16 @@ ViewFolderSize WriteViewFolder(ViewContent content, const ViewFolderOptions& opt
                               ", waiting: new Map()};\n"
                               "function roomtexGive(name, value, type) {\n"
                               "  roomtexFolder.waiting.get(name)?.(value, type);\n}\n");
+  std::set<std::string> entries = {"README.txt", "data", "report.json"};
   for (const PageFile& file : kViewPage) {
     const std::string name(file.name);
+    entries.insert(name.substr(0, name.find('/')));
     write(name, name == "index.html" ? FolderPage(std::string(file.bytes)) : file.bytes);
   }
   write("README.txt", kReadme);
-  // By this the folder is known as ours when it is written again.
-  write("report.json", Json{{"command", "roomtex-view"}, {"version", Version()}}.dump(2) + "\n");
+  // By this the folder is known as ours when it is written again (OutputSet::ReplaceAllOf).
+  const Json report = {{"command", "roomtex-view"}, {"version", Version()}, {"entries", entries}};
+  write("report.json", report.dump(2) + "\n");
   return {num_files, num_bytes};
 }
 

@@ -56,7 +56,7 @@ async function ask(path) {
   try {
     response = await fetch(path);
   } catch {
-    throw new Error('roomtex-view no longer answers. Start it again and open the new address.');
+    throw new Error('roomtex-view no longer answers. If it has ended, start it again.');
   }
   if (response.ok) return response;
   let sentence = `The server answers with error ${response.status}.`;

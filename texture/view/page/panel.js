@@ -421,6 +421,7 @@ export class Panel {
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || $('help').open) return;
     const {viewer} = this, on = event.target;
+    if (on.matches?.('select') && event.key !== 'Escape') return;  // its own keys
     const inSlider = on.matches?.('input[type="range"], input[type="radio"]');
     const onButton = on.matches?.('button, input, a, summary, [role="listbox"]');
     const toggle = (id) => $(id).click();

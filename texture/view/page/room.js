@@ -216,7 +216,7 @@ export class Room {
     for (const page of this.pages) this.#loadPage(page);
     await Promise.all(this.chunks.map((chunk) => new Promise((done) => {
                                         this.queue.add(
-                                            chunk.id, () => this.#load(chunk, 0).finally(done));
+                                            chunk.id, () => this.#loadCoarse(chunk).finally(done));
                                       })));
   }
 
@@ -241,6 +241,15 @@ export class Room {
     this.refine();
   }
 
+  // Without one of its coarse pieces the room is never whole, and nothing finer comes.
+  async #loadCoarse(chunk) {
+    for (let pause = 500; pause < 60000; pause *= 2) {
+      if (await this.#load(chunk, 0)) return;
+      await new Promise((later) => setTimeout(later, pause));
+    }
+  }
+
+  // Resolves to whether it came.
   async #load(chunk, level) {
     try {
       const geometry = parseChunk(await getBytes(`chunk?id=${chunk.id}&level=${level}`), chunk);
@@ -250,9 +259,11 @@ export class Room {
       this.arrived.push({chunk, level, mesh});
       this.dirty = true;
       this.refine();
+      return true;
     } catch (error) {
       if (level > 0) chunk.asked[level] = false;
       this.fail(error.message);
+      return false;
     }
   }
 
