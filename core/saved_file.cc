@@ -40,8 +40,8 @@ void SavedFile::Save(const std::function<void()>& write) {
     KeepAs(path_ + ".other");
     ours_ = now;
     is_first_ = false;
-    throw InputError(path_, "", "was changed by somebody else, perhaps another window",
-                     "That is kept as " + path_ + ".other; the next change here replaces it");
+    throw ChangedElsewhere(path_, "", "was changed by somebody else, perhaps another window",
+                           "That is kept as " + path_ + ".other; the next change here replaces it");
   }
   if (is_first_ && now.is_there) KeepAs(path_ + ".bak");
   is_first_ = false;

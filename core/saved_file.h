@@ -5,7 +5,15 @@
 #include <functional>
 #include <string>
 
+#include "core/error.h"
+
 namespace roomtex {
+
+// Of a file that somebody else wrote since.
+class ChangedElsewhere : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 class SavedFile {
  public:
@@ -15,8 +23,9 @@ class SavedFile {
   const std::string& path() const { return path_; }
 
   // write() replaces the file. Before the first time, the file that was there at the beginning is
-  // kept as path.bak. One that somebody else wrote since is kept as path.other, and InputError says
-  // so once, instead of write(): whoever works here then knows, and the next save replaces it.
+  // kept as path.bak. One that somebody else wrote since is kept as path.other, and
+  // ChangedElsewhere says so once, instead of write(): whoever works here then knows, and the next
+  // save replaces it.
   void Save(const std::function<void()>& write);
 
  private:

@@ -141,7 +141,7 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
   server_.AddPost("/mirror", [this](const Json&) {
     const std::string problem = MirrorProblem(scene_);
     if (!problem.empty()) throw UsageError(problem);
-    if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
+    if (!session_->SaveAgain(true)) throw UsageError(session_->Now()->save_error);
     mirror_asked_ = true;
     server_.RequestStop();
     return Json{{"path", "/" + setup_.next_token + "/"}};
@@ -152,7 +152,7 @@ PickServer::PickServer(const PickScene& scene, PickSession* session, const Page&
 
 void PickServer::AddAlign() {
   server_.AddPost("/align", [this](const Json&) {
-    if (!session_->SaveAgain()) throw UsageError(session_->Now()->save_error);
+    if (!session_->SaveAgain(true)) throw UsageError(session_->Now()->save_error);
     const auto now = session_->Now();
     if (!scene_.has_model() && !HasPairs(*now)) {
       throw UsageError("There are no pairs yet: set six of them first.");
@@ -256,7 +256,7 @@ Json PickServer::Photos(const PickSession::Snapshot& snapshot) {
 }
 
 Json PickServer::State() {
-  session_->SaveAgain();  // a disk that was full may have space again
+  session_->SaveAgain(false);  // a disk that was full may have space again
   const auto snapshot = session_->Refresh();
   Json json;
   json["version"] = Version();

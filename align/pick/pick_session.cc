@@ -138,10 +138,11 @@ void PickSession::TakeFound(std::shared_ptr<const FoundPlaces> found) {
   Publish(std::move(next));
 }
 
-bool PickSession::SaveAgain() {
+bool PickSession::SaveAgain(bool over_others) {
   const std::lock_guard<std::mutex> lock(changing_);
   const auto now = Now();
   if (now->saved) return true;
+  if (changed_elsewhere_ && !over_others) return false;
   Snapshot next = *now;
   next.save_error = Save(next.picks);
   next.saved = next.save_error.empty();
@@ -156,8 +157,12 @@ std::string PickSession::Save(const std::vector<SessionPick>& picks) {
     complete.push_back(
         {pick.image_name, *pick.x_in_img, *pick.x_in_scan, 0, pick.weight, pick.label});
   }
+  changed_elsewhere_ = false;
   try {
     file_.Save([&] { WritePicks(picks_path(), complete); });
+  } catch (const ChangedElsewhere& error) {
+    changed_elsewhere_ = true;
+    return std::string("The picks could not be saved: ") + error.what();
   } catch (const std::exception& error) {
     return std::string("The picks could not be saved: ") + error.what();
   }

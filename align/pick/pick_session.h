@@ -40,8 +40,9 @@ class PickSession {
   // What the search of roomtex-align has found, in place of what it found before; null = nothing.
   // The revision stays.
   void TakeFound(std::shared_ptr<const FoundPlaces> found);
-  // Tries to write picks that could not be saved before. False: still not.
-  bool SaveAgain();
+  // Tries to write picks that could not be saved before. False: still not. Over a file that was
+  // changed elsewhere only with over_others: where a person goes on from these picks.
+  bool SaveAgain(bool over_others);
 
  private:
   void Read();
@@ -51,7 +52,8 @@ class PickSession {
 
   const PickScene& scene_;
   SavedFile file_;
-  std::mutex changing_;  // one change at a time; held while solving
+  std::mutex changing_;             // one change at a time; held while solving
+  bool changed_elsewhere_ = false;  // the file, when the picks were to be saved; under changing_
   PickSolver solver_;
   mutable std::mutex mutex_;  // of now_, held briefly
   std::shared_ptr<const Snapshot> now_;

@@ -127,7 +127,7 @@ std::optional<std::vector<SessionPick>> ServeScans(
   server.Start(true);
   if (is_first) *browser = AnnouncePage(a->server, server.server(), context);
   server.Wait();
-  if (!session.SaveAgain()) throw InputError(a->output_path, "", session.Now()->save_error, "");
+  if (!session.SaveAgain(true)) throw InputError(a->output_path, "", session.Now()->save_error, "");
   context.report["num_picks"] = session.Now()->picks.size();
   if (!server.mirror_asked()) return std::nullopt;
   a->scene.scan_reader.azimuth = OtherAzimuth(scene.azimuth());

@@ -54,6 +54,7 @@ export class AlignDialog {
   #parts = {};
   #timer = 0;
   #confirming = false;  // a pair was asked for: with it the search goes on
+  #pairsBefore = 0;     // it is one more than these
 
   // picks: Picks; facts: {min_picks, models, photos, aligned_path}
   // on: {look() at the photos on the scan, pickIn(name) shows that photo}
@@ -275,6 +276,7 @@ export class AlignDialog {
   #askForPair(name) {
     const begin = () => {
       this.#confirming = true;
+      this.#pairsBefore = this.#countPairs();
       this.dialog.close();
       this.on.pickIn(name);
     };
@@ -284,11 +286,15 @@ export class AlignDialog {
         'Set the pair', begin);
   }
 
+  #countPairs() {
+    return this.picks.session.picks.filter(({complete, weight}) => complete && weight > 0).length;
+  }
+
   // The pair that was asked for is there.
   #confirm() {
     const {picks} = this;
     if (!this.#confirming || picks.state !== 'saved') return;
-    if (!picks.session.picks.some(({complete, weight}) => complete && weight > 0)) return;
+    if (this.#countPairs() <= this.#pairsBefore) return;
     if (!this.dialog.open) this.dialog.showModal();
     this.#start({hint: true});
   }

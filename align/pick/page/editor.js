@@ -127,7 +127,8 @@ export class Editor {
     this.cross = {photo: null, scan: null};
     const half = this.half;
     if (side === 'scan') {
-      this.#tryPlace(half?.uid ?? null, img);
+      // A target that waits for its click in the photo keeps its place: this is another pick.
+      this.#tryPlace(half && !half.fixed ? half.uid : null, img);
       return;
     }
     this.forgetTried();
@@ -158,7 +159,7 @@ export class Editor {
     }
     this.selected = this.picks.addAll(
         `${fresh.length} targets added`,
-        fresh.map(({label, point}) => ({image_name: name, label, point})));
+        fresh.map(({label, point}) => ({image_name: name, label, point, fixed: true})));
     const first = this.picks.find(this.selected);
     say(`${fresh.length} targets: click ${first.label} in the photo, or choose another below`,
         {seconds: 6});

@@ -21,14 +21,13 @@ const kEmptyPick =
 // A target beside every scan has a point and no place in a picture.
 export const inScan = (pick) => Boolean(pick.scan || pick.point);
 
-function samePicks(a, b) {
-  const text = (picks) => JSON.stringify(
-      picks.map(({image_name,
-                  img,
-                  scan,
-                  weight,
-                  label}) => [image_name, img, scan && [scan.id, scan.x, scan.y], weight, label]));
-  return text(a) === text(b);
+// Of a target the server says where it is drawn in the scan: its point counts then.
+function samePicks(theirs, ours) {
+  const place = ({scan, point}, byPoint) => byPoint ? point : scan && [scan.id, scan.x, scan.y];
+  const text = (picks) => JSON.stringify(picks.map(
+      (pick, k) => [pick.image_name, pick.img, place(pick, !ours[k]?.scan), pick.weight,
+                    pick.label]));
+  return theirs.length === ours.length && text(theirs) === text(ours);
 }
 
 // Events: "change" (list or numbers), "sync" (state), "refused" (detail: the server's sentence).
@@ -47,6 +46,7 @@ export class Picks extends EventTarget {
   #version = 0;   // of the list
   #accepted = 0;  // version that the server has
   #acceptedList = [];
+  #sent = [];  // {version, list} whose answers have not come, the newest last
   #busy = false;
   #lastSent = 0;
   #timer = 0;
@@ -70,7 +70,7 @@ export class Picks extends EventTarget {
     this.#kept = `picks of ${name}`;
     try {
       const {list, undo, redo} = JSON.parse(sessionStorage.getItem(this.#kept) ?? '{}');
-      if (!list || !samePicks(list, this.list)) return;
+      if (!list || !samePicks(this.list, list)) return;
       // The pieces of the history share picks with the list by number, no longer as objects.
       this.#nextUid = 1 + Math.max(
           0, ...[list, ...[...undo, ...redo].flatMap(({before, after}) => [before, after])]
@@ -249,6 +249,7 @@ export class Picks extends EventTarget {
     this.#lastSent = Date.now();
     const version = this.#version;
     const list = this.list;
+    this.#sent.push({version, list});
     try {
       const session = await api.putPicks(this.session.revision, list.map(sentFields));
       this.#accepted = version;
@@ -259,7 +260,7 @@ export class Picks extends EventTarget {
       this.#busy = false;
       if (!(error instanceof ServerError)) throw error;
       if (error.kind === 'refused') {
-        await this.#refused(error, list);
+        await this.#refused(error);
       } else {
         this.#gone(error);
       }
@@ -270,6 +271,7 @@ export class Picks extends EventTarget {
   #take(session, list) {
     this.session = session;
     this.#acceptedList = list;
+    this.#sent = [];
     this.rows = new Map(list.map((pick, index) => [pick.uid, session.picks[index]]));
     // The point of a place comes from the server.
     this.list = this.list.map((pick) => {
@@ -293,7 +295,7 @@ export class Picks extends EventTarget {
 
   // The server said no: either another tab changed the picks since, or there is something wrong
   // with what was sent; then the last list that it took is back.
-  async #refused(error, list) {
+  async #refused(error) {
     let now;
     try {
       now = (await api.state()).session;
@@ -302,12 +304,13 @@ export class Picks extends EventTarget {
       return;
     }
     if (now.revision !== this.session.revision) {
-      this.#differs(now, list);
+      this.#differs(now);
       return;
     }
     while (this.#undo.length > 0 && this.#undo.at(-1).after === this.list) {
       if (this.#undo.pop().before === this.#acceptedList) break;
     }
+    this.#sent = [];
     this.list = this.#acceptedList;
     this.#draft = null;
     this.#accepted = this.#version;
@@ -316,12 +319,14 @@ export class Picks extends EventTarget {
     this.dispatchEvent(new CustomEvent('refused', {detail: error.message}));
   }
 
-  // The server has another revision than this page. If it is what was sent, only the answer was
-  // lost.
-  #differs(now, list) {
-    if (list && samePicks(now.picks, list)) {
-      this.#accepted = list === this.list ? this.#version : this.#accepted;
-      this.#take(now, list);
+  // The server has another revision than this page. If it is something that was sent, only the
+  // answer was lost, and what was changed since is sent now.
+  #differs(now) {
+    const newest = {version: this.#version, list: this.list};
+    const taken = [newest, ...[...this.#sent].reverse()].find(({list}) => samePicks(now.picks, list));
+    if (taken) {
+      this.#accepted = taken.version;
+      this.#take(now, taken.list);
       this.#schedule();
       return;
     }
@@ -357,7 +362,7 @@ export class Picks extends EventTarget {
     }
     this.#busy = false;
     if (now.revision !== this.session.revision) {
-      this.#differs(now, this.list);
+      this.#differs(now);
       return;
     }
     const solved = now.solution_number !== this.session.solution_number;  // by another tab's search

@@ -383,6 +383,23 @@ TEST_F(PickPage, PicksThatCannotBeSavedAreSaidAndNotLost) {
   EXPECT_EQ(ReadPicks(picks_path_).size(), 5u);
 }
 
+// It is kept beside the file; to be asked how things stand is no reason to replace it.
+TEST_F(PickPage, AFileThatWasEditedMeanwhileIsReplacedByTheNextChangeOnly) {
+  const Json picks = ToJson(TruePicks(6));
+  ASSERT_EQ(Put(1, picks).json()["saved"], true);
+  WriteBytes(picks_path_, "by hand");
+  EXPECT_EQ(Put(2, picks).json()["saved"], false);
+  for (int k = 0; k < 2; ++k) {
+    const Json session = Get("state").json()["session"];
+    EXPECT_EQ(session["saved"], false);
+    EXPECT_THAT(session["save_error"].get<std::string>(), HasSubstr("changed by somebody else"));
+    EXPECT_EQ(ReadBytes(picks_path_), "by hand");
+  }
+  EXPECT_EQ(Put(3, picks).json()["saved"], true);
+  EXPECT_EQ(ReadPicks(picks_path_).size(), 6u);
+  EXPECT_EQ(ReadBytes(picks_path_ + ".other"), "by hand");
+}
+
 TEST(PickSession, RefusesAPicksFileOfAnotherModel) {
   const TempFolder folder;
   WriteBytes(folder / "picks.csv", "image_name,x,y,scan_x,scan_y,scan_z\nphoto_02.jpg,1,2,3,4,5\n");
