@@ -12,7 +12,8 @@
 
 namespace roomtex {
 
-// Metres from the nearest sample of the scan up to which a pick counts as being on the scan.
+// Metres from the surface of the scan (SurveyedScans::DistancesOf) up to which a pick counts as
+// being on it.
 inline constexpr double kPickReach = 0.06;
 
 // The files are fine, but what they say contradicts each other so plainly that there is no

@@ -9,6 +9,24 @@ namespace {
 
 constexpr double kSpacing = 0.02;  // metres; between the points of a mesh without a grid
 
+// Metres from a place between the samples of a grid to the nearest of them, at most, around this
+// one. Of the neighbours to either side the nearer one counts: the other may lie beyond an edge.
+double HalfDiagonal(const Scan& scan, int sample) {
+  const int row = sample / scan.num_columns, column = sample % scan.num_columns;
+  const auto spacing = [&](int dx, int dy) {
+    double nearer = std::numeric_limits<double>::infinity();
+    for (const int sign : {-1, 1}) {
+      const int x = column + sign * dx, y = row + sign * dy;
+      if (x < 0 || y < 0 || x >= scan.num_columns || y >= scan.num_rows) continue;
+      const int other = scan.Index(x, y);
+      if (scan.IsMissing(other)) continue;
+      nearer = std::min(nearer, (scan.points[other] - scan.points[sample]).norm());
+    }
+    return std::isfinite(nearer) ? nearer : 0.0;
+  };
+  return 0.5 * std::hypot(spacing(1, 0), spacing(0, 1));
+}
+
 }  // namespace
 
 SurveyedScans::SurveyedScans(const std::vector<Scan>& scans, const SurveyOptions& options)
@@ -39,16 +57,34 @@ const ScanViewer& SurveyedScans::viewer() const {
 }
 
 std::vector<double> SurveyedScans::DistancesOf(const std::vector<Eigen::Vector3d>& points) const {
-  std::vector<double> distance2(points.size(), std::numeric_limits<double>::infinity());
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::vector<double> distances(points.size(), kNone);
   for (const Scan& scan : scans_) {
-    VisitSurface(scan, kSpacing, [&](const Eigen::Vector3d& x_in_scan) {
+    std::vector<double> distance2(points.size(), kNone);
+    std::vector<int> nearest(points.size(), -1);
+    int sample = 0;  // of a grid
+    const auto compare = [&](const Eigen::Vector3d& x_in_scan) {
       for (size_t i = 0; i < points.size(); ++i) {
-        distance2[i] = std::min(distance2[i], (points[i] - x_in_scan).squaredNorm());
+        const double value = (points[i] - x_in_scan).squaredNorm();
+        if (!(value < distance2[i])) continue;
+        distance2[i] = value;
+        nearest[i] = sample;
       }
-    });
+    };
+    if (scan.organised) {
+      for (; sample < static_cast<int>(scan.points.size()); ++sample) {
+        if (!scan.IsMissing(sample)) compare(scan.points[sample]);
+      }
+    } else {
+      VisitSurface(scan, kSpacing, compare);
+    }
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (nearest[i] < 0) continue;
+      const double between = scan.organised ? HalfDiagonal(scan, nearest[i]) : 0;
+      distances[i] = std::min(distances[i], std::max(0.0, std::sqrt(distance2[i]) - between));
+    }
   }
-  for (double& value : distance2) value = std::sqrt(value);
-  return distance2;
+  return distances;
 }
 
 }  // namespace roomtex

@@ -49,7 +49,8 @@ class SurveyedScans {
   const ScanViewer& viewer() const;
 
   // Distance of each point from the nearest sample (of a mesh without a grid: point of its
-  // surface), metres; infinite without samples. Looks at every sample for every point.
+  // surface), metres, less what a place between the samples around it may lie from them; infinite
+  // without samples. Looks at every sample for every point.
   std::vector<double> DistancesOf(const std::vector<Eigen::Vector3d>& points) const;
 
  private:

@@ -226,10 +226,13 @@ UpDirections FindScanUps(const std::vector<Scan>& scans, const ScanPatches& surf
     return found;
   }
   // Scanners are set up nearly level.
-  for (const Eigen::Vector3d& up : Directions(found.ups)) {
-    if (AngleBetween(up, told) < kMaxTilt) found.ups = {up};
-    if (found.ups.size() == 1) break;
+  for (const Eigen::Vector3d& up : found.ups) {
+    if (!(AngleBetween(up, told) < kMaxTilt)) continue;
+    found.ups = {Eigen::Vector3d(up)};
+    return found;
   }
+  // A facade or a shaft shows hardly anything that is level: what the scanner says may be true.
+  if (!scans[0].up_is_assumed) found.ups.push_back(told);
   return found;
 }
 

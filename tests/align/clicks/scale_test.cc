@@ -83,7 +83,8 @@ TEST(Scale, IsFoundOnAWallOfTwoTriangles) {
   const ScaleEstimate estimate =
       EstimateScale(model, image, Rigid(), {wall}, {wall.triangles}, ScaleOptions());
   EXPECT_EQ(estimate.num_features, 80);
-  EXPECT_NEAR(estimate.scale, 2, 1e-9);
+  EXPECT_NEAR(estimate.scale, 2,
+              1e-7);  // rays are cast in floats; processors differ in their last bit
 }
 
 TEST(Scale, HasNoFeaturesWhenTheCameraLooksAwayFromTheScan) {

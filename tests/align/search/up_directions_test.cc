@@ -73,5 +73,18 @@ TEST(ScanUps, ATiltedScanHasItsFloorsUp) {
   EXPECT_LT(NearestDeg(found, up), 1.5);
 }
 
+// Nothing in it is level; what the scanner says stays possible.
+TEST(ScanUps, OfAFacadeThatOfTheScannerIsAmongThem) {
+  const SimulatedCase& one = MakeCase();
+  std::vector<Scan> scans = {one.scans[0]};
+  const auto room_from_scan = one.room->ScanFromRoom().Inverse();
+  for (Eigen::Vector3d& x : scans[0].points) {
+    if (!((room_from_scan * x).y() < 0.05)) x = Scan::MissingPoint();
+  }
+  const UpDirections found = FindScanUps(scans, Survey(scans).patches());
+  EXPECT_FALSE(found.known);
+  EXPECT_LT(NearestDeg(found, scans[0].up), 0.1);
+}
+
 }  // namespace
 }  // namespace roomtex
