@@ -3,9 +3,10 @@
 # beside a furnished room of the same size. Every step as a user would type it, a table at the end (docs/capturing.md).
 # Usage: scripts/capture_demo.sh [FOLDER] [OPTIONS of roomtex-simulate]   (default: capture_demo/)
 set -euo pipefail
-cd "$(dirname "$0")/.."
-out=capture_demo
-if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then out=$1; shift; fi
+repository=$(cd "$(dirname "$0")/.." && pwd)
+out=$repository/capture_demo
+if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then out=$(realpath -m "$1"); shift; fi
+cd "$repository"
 size=("$@")
 [ $# -gt 0 ] || size=(--num_photos 16 --photo_width 1200 --photo_height 800 --scan_columns 1600 --scan_rows 800)
 

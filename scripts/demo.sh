@@ -3,8 +3,9 @@
 # a user would, and prints where the result lies and how far it is from the truth.
 # Usage: scripts/demo.sh [FOLDER]   (default: demo/)
 set -euo pipefail
-cd "$(dirname "$0")/.."
-out=${1:-demo}
+repository=$(cd "$(dirname "$0")/.." && pwd)
+out=$(realpath -m "${1:-$repository/demo}")
+cd "$repository"
 
 scripts/setup.sh
 cmake --preset release >/dev/null
@@ -40,9 +41,9 @@ Done. Look at
   $out/result/aligned/              the sparse model in the scan: colmap gui --import_path $out/result/aligned \\
                              --database_path $out/result/database.db --image_path $out/capture/photos
 or walk through it, and see where the picks lie, in a browser:
-  cmake --build --preset release --target roomtex-view roomtex-pick
-  build/bin/roomtex-view --input_path $out/result/textured --aligned $out/result/aligned --image_path $out/capture/photos
-  build/bin/roomtex-pick --input_path $out/result/sparse/0 --image_path $out/capture/photos \
-      --scan_path $out/capture/scan.rtpi --output_path $out/capture/picks.csv
+  (cd $repository && cmake --build --preset release --target roomtex-view roomtex-pick)
+  $repository/build/bin/roomtex-view --input_path $out/result/textured --aligned $out/result/aligned --image_path $out/capture/photos
+  $repository/build/bin/roomtex-pick --input_path $out/result/sparse/0 --image_path $out/capture/photos \
+      --scan_path $out/capture/scan.rtpi --output_path $out/picks.csv
 The numbers above compare poses and colours with the truth of the simulation.
 EOF
