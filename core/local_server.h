@@ -57,8 +57,8 @@ class LocalServer {
   // Something that is not JSON: a tile, a GLB.
   struct Content {
     std::shared_ptr<const std::string> bytes;
-    std::string type;        // e.g. "image/jpeg"
-    std::string etag;        // of these bytes, without quotes; "" = none
+    std::string type;  // e.g. "image/jpeg"
+    std::string etag;  // of these bytes, without quotes; "" = none
     // The same for this URL as long as the server runs: no asking again, unless the address
     // outlives the server.
     bool immutable = false;

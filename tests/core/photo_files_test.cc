@@ -26,9 +26,9 @@ TEST(ListPhotoFiles, TakesWhatColmapTakesAndNothingHidden) {
   WriteBytes(folder / "b.CR2", "x");  // beside b.JPG
   EXPECT_EQ(NoteOnOtherPhotos(folder.path()), "");
   WriteBytes(folder / "a/IMG_1.HEIC", "x");
-  EXPECT_EQ(NoteOnOtherPhotos(folder.path()),
-            "photos in " + folder.path() +
-                " are not read (1, as a/IMG_1.HEIC): export them as JPEG");
+  EXPECT_EQ(
+      NoteOnOtherPhotos(folder.path()),
+      "photos in " + folder.path() + " are not read (1, as a/IMG_1.HEIC): export them as JPEG");
   EXPECT_TRUE(HasHiddenPhotos(folder.path()));
   EXPECT_FALSE(HasHiddenPhotos(folder / "a"));
   EXPECT_INPUT_ERROR(ListPhotoFiles(folder / "f.txt", "Give a folder"), "Give a folder");
