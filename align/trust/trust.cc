@@ -79,6 +79,39 @@ double Placement::ChangedShare() const {
   return known > 0 ? static_cast<double>(std::min(num_floating, num_hidden)) / known : 0;
 }
 
+namespace {
+
+// Around a corner of the room the scanner sees nothing either, and photos are taken there. A camera
+// that stands right has the surface that it shows before it, the front turned to it; one behind a
+// wall has the wall between, or looks at its back.
+bool SeesItsPoints(const SparseModel& model, const SparseImage& image,
+                   const Similarity& scan_from_sparse, const ScanPatches& surface,
+                   const FreeSpace& free_space, double tolerance) {
+  constexpr size_t kMostPoints = 60;
+  constexpr int kFewestPoints = 10;
+  const Eigen::Vector3d centre = scan_from_sparse * image.cam_from_model.TargetOriginInSource();
+  std::vector<Eigen::Vector3d> points;
+  for (const uint64_t id : image.point3d_ids) {
+    const auto point = model.points.find(id);
+    if (point != model.points.end()) points.push_back(scan_from_sparse * point->second.x_in_model);
+  }
+  const size_t every = points.size() / kMostPoints + 1;
+  int num_on_surface = 0, num_seen = 0;
+  for (size_t i = 0; i < points.size(); i += every) {
+    const auto nearest = surface.FindNearest(points[i], std::hypot(tolerance, surface.cell_size()));
+    if (!nearest || !(std::abs(nearest->distance) < tolerance)) continue;
+    ++num_on_surface;
+    const Eigen::Vector3d to_camera = centre - points[i];
+    if (!(surface.patches()[nearest->patch].normal.dot(to_camera) > 0)) continue;
+    const double distance = to_camera.norm();
+    const auto sight = free_space.Look(centre, -to_camera / distance);
+    num_seen += !sight || (sight->x_in_scan - centre).norm() > distance - 2 * tolerance;
+  }
+  return num_on_surface >= kFewestPoints && 2 * num_seen > num_on_surface;
+}
+
+}  // namespace
+
 Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoint>& points,
                          const Similarity& scan_from_sparse, const ScanPatches& surface,
                          const FreeSpace& free_space, const TrustOptions& options) {
@@ -106,7 +139,9 @@ Placement CheckPlacement(const SparseModel& model, const std::vector<SurfacePoin
     ++placement.num_cameras;
     const Eigen::Vector3d centre = scan_from_sparse * image.cam_from_model.TargetOriginInSource();
     const FreeSpace::Place place = free_space.Locate(centre, tolerance);
-    placement.num_cameras_free += place != FreeSpace::Place::kHidden;
+    placement.num_cameras_free +=
+        place != FreeSpace::Place::kHidden ||
+        SeesItsPoints(model, image, scan_from_sparse, surface, free_space, tolerance);
   }
   return placement;
 }

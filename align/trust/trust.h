@@ -54,7 +54,9 @@ struct Placement {
   int num_floating = 0;  // in space that the scanner saw to be empty
   int num_hidden = 0;    // behind the surface that the scanner saw
   int num_cameras = 0;
-  int num_cameras_free = 0;  // in space that the scanner saw to be empty, or did not see at all
+  // In space that the scanner saw to be empty or did not see at all, or with the surface that they
+  // show before them.
+  int num_cameras_free = 0;
 
   // num_on_surface / (num_on_surface + num_floating); 0 without any.
   double SurfaceShare() const;
