@@ -118,11 +118,13 @@ SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches, const S
   const double common = CommonVariance(matches, cells);
   common_sigma_ = std::sqrt(common);
   std::map<std::array<long, 3>, int> parts;
+  size_t num_counted = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
     const int count = cells.NumPoints(cells.Cell(i));
     const double share = cells.NumPointsAlike(i) / static_cast<double>(matches.size());
     num_in_cells_ += count >= kMinPointsOfCell;
     counts_.push_back(count >= kMinPointsOfCell && share >= kMinFacingShare);
+    num_counted += counts_.back();
     const double own = std::pow(matches[i].sigma, 2) - std::pow(kSurfaceNoise, 2);
     variances_.push_back(own + count * common);
     normals_.push_back(cells.SharedNormal(i));
@@ -131,6 +133,11 @@ SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches, const S
     parts_.push_back(parts.emplace(key, static_cast<int>(parts.size())).first->second);
   }
   num_parts_ = static_cast<int>(parts.size());
+  // What is round faces all ways: no one way has many points, and all of them together hold it.
+  if (2 * num_counted >= num_in_cells_) return;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    counts_[i] = cells.NumPoints(cells.Cell(i)) >= kMinPointsOfCell;
+  }
 }
 
 void JudgeAccuracy(const std::vector<SurfaceMatch>& matches,

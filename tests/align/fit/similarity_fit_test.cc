@@ -1,7 +1,11 @@
 #include "align/fit/similarity_fit.h"
 
+#include <random>
+
 #include <gtest/gtest.h>
 
+#include "align/fit/similarity_accuracy.h"
+#include "align/fit/similarity_normal.h"
 #include "align/trust/expected_error.h"
 #include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
@@ -55,6 +59,33 @@ TEST(SimilarityFit, PicksHoldWhatOneWallLeavesOpen) {
                                          SimilarityFitOptions());
   EXPECT_TRUE(fit.converged);
   EXPECT_LT(WorstPoseErrors(*one.room, one.model, fit.scan_from_sparse).position, 0.02);
+}
+
+// A vault, a cave: hardly two patches face the same way.
+TEST(SurfaceWeights, AllOfARoundSurfaceCounts) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  const auto on_vault = [&] {
+    const Eigen::Vector3d x(normal(random), normal(random), normal(random));
+    return Eigen::Vector3d(x.normalized().cwiseProduct(Eigen::Vector3d(3, 2.5, 2)));
+  };
+  Scan scan;
+  scan.organised = false;
+  for (int i = 0; i < 300000; ++i) scan.points.push_back(on_vault());
+  scan.intensity.assign(scan.points.size(), 0.0f);
+  const ScanPatches surface({scan}, ScanPatchOptions());
+  std::vector<SurfacePoint> points(6000);
+  for (SurfacePoint& point : points) {
+    point.x_in_sparse = on_vault();
+    point.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+    point.to_cameras = -point.x_in_sparse.normalized();
+  }
+  const auto matches = FindMatches(points, surface, Similarity(), 0.05, 0.05);
+  ASSERT_GT(matches.size(), 5000u);
+  const SurfaceWeights weights(matches, surface);
+  size_t num_counted = 0;
+  for (size_t i = 0; i < matches.size(); ++i) num_counted += weights.Counts(i);
+  EXPECT_GT(num_counted, 0.8 * static_cast<double>(matches.size()));
 }
 
 TEST(SimilarityFit, GivesUpWhereThereIsNoSurface) {
