@@ -125,7 +125,11 @@ std::optional<std::vector<SessionPick>> ServeScans(
       scene, &session, kPickPage,
       {a->server, a->image_name, a->aligned_path, next_token, BesideThisProgram("roomtex-align")});
   server.Start(true);
-  if (is_first) *browser = AnnouncePage(a->server, server.server(), context);
+  if (is_first) {
+    *browser = AnnouncePage(a->server, server.server(), context);
+  } else {
+    std::cout << server.server().Url() << std::endl;  // the page goes there by itself, others ask
+  }
   server.Wait();
   if (!session.SaveAgain(true)) throw InputError(a->output_path, "", session.Now()->save_error, "");
   context.report["num_picks"] = session.Now()->picks.size();

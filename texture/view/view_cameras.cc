@@ -184,8 +184,9 @@ std::shared_ptr<const std::string> ViewCameras::Photo(int id, int max_size) cons
   const Camera& camera = model_.cameras.at(image.camera_id);
   const double shape = static_cast<double>(photo.cols) / photo.rows;
   if (std::abs(shape * camera.height / camera.width - 1) > 0.02) {
+    const auto [width, height] = ReadPhotoSize(paths_[id]);  // it changed since it was looked at
     throw InputError(paths_[id], "",
-                     "is " + std::to_string(photo.cols) + " x " + std::to_string(photo.rows) +
+                     "is " + std::to_string(width) + " x " + std::to_string(height) +
                          " pixels, its camera " + std::to_string(camera.width) + " x " +
                          std::to_string(camera.height),
                      "Give the photos that the model was made from");
