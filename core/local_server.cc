@@ -470,7 +470,7 @@ void LocalServer::AddContent(const std::string& path,
         if (content->immutable && !impl->options.token.empty()) {
           // The browser may have what an earlier server had there.
           content->immutable = false;
-          content->etag = impl->run;
+          if (content->etag.empty()) content->etag = impl->run;
         }
         SetContent(request, *content, response);
       });

@@ -47,7 +47,7 @@ void CheckNames(const std::vector<std::string>& passed, const std::set<std::stri
   std::vector<std::string> problems;
   for (size_t i = 0; i + 1 < passed.size(); i += 2) {
     if (names.count(passed[i]) > 0) continue;
-    problems.push_back(passed[i] + " is no option of " + command);
+    problems.push_back(passed[i] + " is no option of " + command + " (see its --help)");
   }
   ThrowIfProblems(problems);
 }

@@ -138,20 +138,20 @@ void CheckOptions(AlignCommandOptions* options) {
         "six picks each");
   }
   if (!a.input_path.empty()) {
-    for (const auto& [name, is_given] :
-         {std::pair("model", a.camera.camera_model != PhotoCameraOptions().camera_model),
-          {"params", !a.camera.camera_params.empty()}}) {
+    for (const auto& [option, is_given] :
+         {std::pair("--camera_model", a.camera.camera_model != PhotoCameraOptions().camera_model),
+          {"--camera_params", !a.camera.camera_params.empty()}}) {
       if (!is_given) continue;
-      problems.push_back(std::string("--camera_") + name +
+      problems.push_back(std::string(option) +
                          " is for photos without a sparse model: that of --input_path "
                          "has cameras");
     }
   } else {
-    for (const auto& [name, path] :
-         {std::pair("database", a.database_path), {"panoramas", a.panoramas_path}}) {
+    for (const auto& [option, path] :
+         {std::pair("--database_path", a.database_path), {"--panoramas_path", a.panoramas_path}}) {
       if (path.empty()) continue;
-      problems.push_back(std::string("--") + name +
-                         "_path belongs to a sparse model: give --input_path, too");
+      problems.push_back(std::string(option) +
+                         " belongs to a sparse model: give --input_path, too");
     }
   }
   if (a.overlays < 0) problems.push_back("--overlays must not be negative");

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "core/command_line.h"
+#include "core/local_server_key.h"
 #include "tests/core/served_page.h"
 
 namespace roomtex {
@@ -217,6 +218,24 @@ TEST_F(ServedPage, LargeContentArrivesWholeAndIsNotSentTwice) {
   const auto head = Client().Head(base_ + "/tile?x=1");
   ASSERT_TRUE(head);
   EXPECT_EQ(head->get_header_value("Content-Length"), std::to_string(large_->size()));
+}
+
+// The next server at the same address may have something else there.
+TEST_F(ServedPage, WhatOutlivesTheServerIsAskedForAgain) {
+  LocalServerOptions options = AnyPort();
+  options.token = MakeToken();
+  std::string etag;
+  for (int run = 0; run < 2; ++run) {
+    Start(options);
+    const auto piece = Client().Get(base_ + "/piece", httplib::Headers{{"If-None-Match", etag}});
+    ASSERT_TRUE(piece);
+    EXPECT_EQ(piece->status, 200);
+    EXPECT_TRUE(piece->body == *large_);
+    EXPECT_EQ(piece->get_header_value("Cache-Control"), "private, no-cache");
+    EXPECT_NE(piece->get_header_value("ETag"), etag);
+    etag = piece->get_header_value("ETag");
+    EXPECT_EQ(GetStatus(base_ + "/piece", {{"If-None-Match", etag}}), 304);
+  }
 }
 
 TEST_F(ServedPage, EveryAnswerKeepsTheBrowserCareful) {

@@ -81,6 +81,9 @@ class ServedPage : public testing::Test {
           if (!query.count("x") || query.at("x") != "1") return std::nullopt;
           return LocalServer::Content{large_, "image/jpeg", "tile-1", true};
         });
+    server_->AddContent("/piece", [this](const LocalServer::Query&) {
+      return LocalServer::Content{large_, "application/octet-stream", "", true};
+    });
     server_->Start(false);
     port_ = server_->port();
     const std::string url = server_->Url();

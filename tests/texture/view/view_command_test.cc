@@ -76,6 +76,10 @@ TEST_F(ViewCommand, WritesAFolderToGiveAway) {
   EXPECT_EQ(RunCommandLine(line).exit_code, 0);
   EXPECT_FALSE(std::filesystem::exists(out + "/data/chunk.id-7.level-2.js"));
   EXPECT_EQ(ReadBytes(out + "/data/scene.js"), scene);
+  std::ofstream(out + "/notes.txt") << "mine";
+  EXPECT_EQ(RunCommandLine(line).exit_code, 3);
+  EXPECT_EQ(ReadBytes(out + "/notes.txt"), "mine");
+  std::filesystem::remove(out + "/notes.txt");
   const CommandResult refused = RunCommandLine("roomtex-view --input_path '" + folder_.path() +
                                                "' --output_path '" + folder_.path() + "'");
   EXPECT_NE(refused.exit_code, 0);
