@@ -27,6 +27,7 @@ Scan Thinned(const Scan& scan, int stride) {
   thin.up = scan.up;
   thin.up_is_assumed = scan.up_is_assumed;
   thin.is_rtpi = scan.is_rtpi;
+  thin.number_in_file = scan.number_in_file;
   const int column_stride = scan.organised ? stride : stride * stride;
   thin.num_columns = (scan.num_columns + column_stride - 1) / column_stride;
   thin.num_rows = (scan.num_rows + stride - 1) / stride;

@@ -61,6 +61,8 @@ struct Scan {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   bool up_is_assumed = false;  // the file does not say it
   bool is_rtpi = false;
+  // Among the scans of its file, from 1; those that are left out because they are empty count.
+  int number_in_file = 1;
 
   int Index(int column, int row) const { return row * num_columns + column; }
   bool IsMissing(int index) const { return !(points[index].x() == points[index].x()); }

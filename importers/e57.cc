@@ -196,6 +196,7 @@ std::vector<Scan> ReadE57(const std::string& path, const std::string& part,
     if (source.points.num_records > 0) {
       scan = E57ScanReader(pages, source, options, notes).Read();
     }
+    scan.number_in_file = static_cast<int>(i) + 1;
     if (scan.NumMissing() < static_cast<int>(scan.points.size())) {
       scans.push_back(std::move(scan));
       if (visit) visit(&scans);

@@ -166,7 +166,7 @@ class ImageExtractor {
     if (image.kind == E57Image::Kind::kPinhole) {
       return AddPinhole(image, file, camera_from_scan, width, height);
     }
-    if (!(std::abs(0.5 * width / height - 1) <= kMaxPanoramaError)) {
+    if (!(std::abs(0.5 * width / height - 1) <= kMaxPanoramaError) || IsPartOfSphere(image)) {
       return "it is no panorama all around, twice as wide as high";
     }
     const Rigid cam_from_scan = Rigid{CamFromSphere(), Eigen::Vector3d::Zero()} * camera_from_scan;
@@ -178,6 +178,15 @@ class ImageExtractor {
     if (options_.cut_panoramas) return AddFaces({file, camera, cam_from_scan});
     result_.posed.push_back({file, camera, cam_from_scan});
     return "";
+  }
+
+  // Both angles say so: there are programs that write one of them wrong.
+  static bool IsPartOfSphere(const E57Image& image) {
+    constexpr double kWhole = 0.9;
+    const double azimuths = image.pixel_width * static_cast<double>(image.width);
+    const double elevations = image.pixel_height * static_cast<double>(image.height);
+    return azimuths > 0 && azimuths < kWhole * 2 * kPi && elevations > 0 &&
+           elevations < kWhole * kPi;
   }
 
   std::string AddPinhole(const E57Image& image, const std::string& file,

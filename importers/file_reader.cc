@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
+#include <cstdlib>
 #include <cstring>
 
 #include <fcntl.h>
@@ -66,7 +68,9 @@ std::string FileReader::ReadSome(int64_t offset, int64_t max_bytes) const {
 LineReader::LineReader(const FileReader& file, int64_t offset)
     : file_(file),
       block_(static_cast<size_t>(std::clamp<int64_t>(file.size() - offset, 1, kBlockSize))),
-      block_offset_(offset) {}
+      block_offset_(offset) {
+  if (offset == 0) block_offset_ = static_cast<int64_t>(SizeOfByteOrderMark(file.ReadSome(0, 3)));
+}
 
 bool LineReader::Refill() {
   std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
@@ -109,6 +113,10 @@ bool LineReader::Next(std::string_view* line) {
   return true;
 }
 
+size_t SizeOfByteOrderMark(std::string_view start) {
+  return start.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0;
+}
+
 std::vector<std::string> WordsOf(std::string_view line) {
   std::vector<std::string> words;
   size_t at = 0;
@@ -118,6 +126,17 @@ std::vector<std::string> WordsOf(std::string_view line) {
     at = end;
   }
   return words;
+}
+
+bool ParseReal(std::string_view word, double* number) {
+  if (word.substr(0, 1) == "+" && word.substr(1, 1) != "-") word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
+  if (error == std::errc::result_out_of_range) {
+    *number = std::strtod(std::string(word).c_str(), nullptr);
+  } else if (error != std::errc()) {
+    return false;
+  }
+  return end == word.data() + word.size();
 }
 
 }  // namespace roomtex

@@ -36,10 +36,14 @@ class FileReader {
   int64_t size_ = 0;
 };
 
+// Bytes of the mark that some programs put before UTF-8; 0 without one.
+size_t SizeOfByteOrderMark(std::string_view start);
+
 // The lines of a text file one after the other, without their line ends (LF, CR LF or CR CR LF).
 class LineReader {
  public:
-  // The file must outlive this. `offset` is where line 1 starts.
+  // The file must outlive this. `offset` is where line 1 starts;
+  // a byte order mark at the start of the file is passed over.
   explicit LineReader(const FileReader& file, int64_t offset = 0);
 
   // Gives the next line, valid until the next call; false at the end of the file.
@@ -63,6 +67,10 @@ class LineReader {
 
 // What stands between blanks and tabs.
 std::vector<std::string> WordsOf(std::string_view line);
+
+// A word that is a number, with a sign or without. What no double holds is 0 or infinite, as it is
+// too small or too large.
+bool ParseReal(std::string_view word, double* number);
 
 // As core/text.h has it.
 inline std::string Quoted(std::string_view text) { return Quoted(std::string(text)); }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <limits>
 #include <string_view>
 
@@ -40,28 +41,31 @@ std::string NameOfEpsgUnit(int number) {
 // GeoKeyDirectoryTag (OGC GeoTIFF 1.1, 7.1): after four numbers, of which the last counts them,
 // keys of four numbers: id, where the value stands (0 = here), how many, value.
 void TakeGeoKeys(std::string_view record, LasUnits* units) {
-  constexpr int kModelType = 1024, kGeographic = 2, kHorizontalUnit = 3076, kVerticalUnit = 4099;
+  constexpr int kModelType = 1024, kProjected = 1, kGeographic = 2, kHorizontalUnit = 3076,
+                kVerticalUnit = 4099;
   const size_t count = std::min<size_t>(ValueAt<uint16_t>(record, 6), record.size() / 8);
   for (size_t i = 1; i <= count; ++i) {
     if (ValueAt<uint16_t>(record, 8 * i + 2) != 0) continue;
     const int key = ValueAt<uint16_t>(record, 8 * i), value = ValueAt<uint16_t>(record, 8 * i + 6);
     if (key == kModelType && value == kGeographic) units->degrees = true;
+    if (key == kModelType && value == kProjected) units->projected = true;
     if (key == kHorizontalUnit) units->horizontal = NameOfEpsgUnit(value);
     if (key == kVerticalUnit) units->vertical = NameOfEpsgUnit(value);
   }
 }
 
-// The unit of the coordinate system (OGC 01-009: NAME[... UNIT["name",metres] ...]) that begins at
-// `at`: the UNIT directly in its brackets, not in those of a part of it.
+// The unit of the coordinate system that begins at `at`: NAME[... UNIT["name",metres] ...] (WKT 1,
+// OGC 01-009), LENGTHUNIT there or in its first AXIS[...] (WKT 2, OGC 18-010); not those of other
+// parts of it.
 std::string UnitOfSystem(std::string_view wkt, size_t at) {
   int depth = 0;
-  bool quoted = false;
+  bool quoted = false, in_axis = false;
   for (size_t i = at; i < wkt.size(); ++i) {
     if (wkt[i] == '"') quoted = !quoted;
     if (quoted) continue;
-    if (wkt[i] == '[') ++depth;
+    if (wkt[i] == '[' && ++depth == 2) in_axis = i >= 4 && wkt.substr(i - 4, 4) == "AXIS";
     if (wkt[i] == ']' && --depth == 0) return "";
-    if (depth != 1 || wkt.substr(i, 6) != "UNIT[\"") continue;
+    if (!(depth == 1 || (depth == 2 && in_axis)) || wkt.substr(i, 6) != "UNIT[\"") continue;
     const size_t comma = wkt.find("\",", i + 6);
     if (comma == std::string_view::npos) return "";
     const double meters = std::strtod(std::string(wkt.substr(comma + 2, 32)).c_str(), nullptr);
@@ -73,12 +77,21 @@ std::string UnitOfSystem(std::string_view wkt, size_t at) {
   return "";
 }
 
+size_t FirstOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  size_t first = std::string_view::npos;
+  for (const std::string_view word : words) first = std::min(first, text.find(word));
+  return first;
+}
+
 void TakeWkt(std::string_view wkt, LasUnits* units) {
-  const size_t projected = wkt.find("PROJCS["), vertical = wkt.find("VERT_CS[");
+  // WKT 1 (OGC 01-009) and WKT 2 (OGC 18-010).
+  const size_t projected = FirstOf(wkt, {"PROJCS[", "PROJCRS["});
+  const size_t vertical = FirstOf(wkt, {"VERT_CS[", "VERTCRS["});
   constexpr size_t kNone = std::string_view::npos;
   if (projected != kNone) units->horizontal = UnitOfSystem(wkt, projected);
   if (vertical != kNone) units->vertical = UnitOfSystem(wkt, vertical);
-  units->degrees = projected == kNone && wkt.find("GEOGCS[") != kNone;
+  units->projected = projected != kNone;
+  units->degrees = projected == kNone && FirstOf(wkt, {"GEOGCS[", "GEOGCRS["}) != kNone;
   units->wkt = wkt.substr(0, wkt.find('\0'));
 }
 

@@ -9,8 +9,9 @@ namespace roomtex {
 struct LasUnits {
   // Names of length_unit.h; "" = not said. Heights may have one of their own.
   std::string horizontal, vertical;
-  bool degrees = false;  // longitude and latitude
-  std::string wkt;       // the system itself, "" where GeoTIFF keys say it or nothing does
+  bool degrees = false;    // longitude and latitude
+  bool projected = false;  // a system of lengths is named, whether its unit is known or not
+  std::string wkt;         // the system itself, "" where GeoTIFF keys say it or nothing does
 };
 
 // By the GeoTIFF keys or the WKT among the records of variable length, before the points or behind

@@ -42,11 +42,32 @@ LasLayout LayoutOf(const std::string& version) {
 struct LasContent {
   uint64_t count = 0;
   Bounds bounds;
-  float largest = 0;  // intensity
+  // Intensities of measured points become factor * (intensity - offset).
+  float offset = 0, factor = 1;
   bool has_colors = false;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   double scale = kFinestScale;
 };
+
+// Whole numbers that 16 bits hold stay as they are, 0 to 1 becomes 0 to 65535, and so does the
+// range of all others: reflectances below 0, or what is hardly above 1.
+void SetIntensityRule(const std::vector<const Scan*>& scans, LasContent* content) {
+  constexpr float kMost = 65535;
+  float low = 0, high = 0;
+  bool are_whole = true;
+  for (const Scan* scan : scans) {
+    for (size_t i = 0; i < scan->intensity.size(); ++i) {
+      const float value = scan->intensity[i];
+      if (!std::isfinite(value) || scan->IsMissing(static_cast<int>(i))) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+      are_whole = are_whole && value == std::round(value);
+    }
+  }
+  if (low == high || (are_whole && low >= 0 && high > 1 && high <= kMost)) return;
+  content->offset = low;
+  content->factor = low >= 0 && high <= 1 ? kMost : kMost / (high - low);
+}
 
 LasContent ContentOf(const std::vector<const Scan*>& scans) {
   LasContent content;
@@ -57,20 +78,18 @@ LasContent ContentOf(const std::vector<const Scan*>& scans) {
     const Bounds bounds = FindBounds(*scan);
     all.min = all.min.cwiseMin(bounds.min);
     all.max = all.max.cwiseMax(bounds.max);
-    for (const float value : scan->intensity) {
-      if (std::isfinite(value)) content.largest = std::max(content.largest, value);
-    }
   }
+  SetIntensityRule(scans, &content);
   if (content.count == 0) all.min = all.max = Eigen::Vector3d::Zero();
   content.shift = (0.5 * (all.min + all.max)).array().round();
   while ((all.max - all.min).maxCoeff() / content.scale > 4e9) content.scale *= 10;
   return content;
 }
 
-uint16_t LasIntensity(float value, float largest) {
-  const float factor = largest <= 1 ? 65535.0f : largest > 65535 ? 65535 / largest : 1.0f;
-  if (!(value > 0)) return 0;  // also NaN
-  return static_cast<uint16_t>(std::lround(std::min(65535.0f, factor * value)));
+uint16_t LasIntensity(float value, const LasContent& content) {
+  const float scaled = content.factor * (value - content.offset);
+  if (!(scaled > 0)) return 0;  // also NaN
+  return static_cast<uint16_t>(std::lround(std::min(65535.0f, scaled)));
 }
 
 template <typename T>
@@ -142,7 +161,7 @@ std::string RecordOf(const Scan& scan, size_t i, const LasContent& content,
     const double steps = (scan.points[i][axis] - content.shift[axis]) / content.scale;
     PutAt(4 * k, static_cast<int32_t>(std::lround(steps)), &record);
   }
-  PutAt(12, LasIntensity(scan.intensity[i], content.largest), &record);
+  PutAt(12, LasIntensity(scan.intensity[i], content), &record);
   record[14] = layout.returns;
   for (size_t k = 0; k < 3 && !scan.colors.empty(); ++k) {
     PutAt(layout.record_size + 2 * k, static_cast<uint16_t>(257 * scan.colors[i][k]), &record);

@@ -104,12 +104,8 @@ class ObjParser {
     Eigen::Vector3d point;
     for (int k = 0; k < 3; ++k) {
       const std::string_view word = TakeWord(&line);
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), point[k]);
-      if (word.empty() || end != word.data() + word.size() ||
-          (error != std::errc() && error != std::errc::result_out_of_range)) {
+      if (!ParseReal(word, &point[k]))
         Fail("is " + Quoted(whole) + ", expected v and three numbers");
-      }
-      if (error == std::errc::result_out_of_range) point[k] = 0;  // smaller than any length
     }
     if (scan_.points.size() >= static_cast<size_t>(std::numeric_limits<int>::max())) {
       throw InputError(file_.path(), LinePosition(lines_.line_number()),
@@ -126,8 +122,7 @@ class ObjParser {
     for (int k = 0; k < 3; ++k) {
       const std::string_view word = TakeWord(&line);
       if (word.empty()) return;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), color[k]);
-      if (error != std::errc() || end != word.data() + word.size()) return;
+      if (!ParseReal(word, &color[k])) return;
     }
     scan_.colors.resize(scan_.points.size() - 1, {0, 0, 0});
     scan_.colors.push_back(color_scale_.Bytes(color, &scan_.colors));

@@ -62,12 +62,6 @@ bool ParseWhole(const std::string& word, int64_t low, int64_t high, int64_t* num
   return error == std::errc() && next == end && *number >= low && *number <= high;
 }
 
-bool ParseReal(std::string_view word, double* number) {
-  const char* const end = word.data() + word.size();
-  const auto [next, error] = std::from_chars(word.data(), end, *number);
-  return error == std::errc() && next == end;
-}
-
 class PcdHeaderParser {
  public:
   PcdHeaderParser(const FileReader& file, bool allow_clouds)
@@ -178,6 +172,14 @@ class PcdHeaderParser {
     CheckDataSize(static_cast<int64_t>(cells));
   }
 
+  // Nothing but zeros follows, as many as old versions of PCL put there: the rest of a page.
+  bool IsPadding(int64_t offset) const {
+    constexpr int64_t kLargestPage = 1 << 16;
+    if (file_.size() - offset > kLargestPage) return false;
+    const std::string rest = file_.ReadSome(offset, kLargestPage);
+    return rest.find_first_not_of('\0') == std::string::npos;
+  }
+
   void CheckDataSize(int64_t num_points) {
     const int64_t left = file_.size() - header_.data_offset;
     const int64_t data_size = num_points * header_.point_size;
@@ -191,12 +193,16 @@ class PcdHeaderParser {
       const int64_t shortest = 2 * header_.values_per_point * num_points - 1;
       if (left < shortest) fail("at least " + std::to_string(shortest));
     } else if (header_.data == "binary") {
-      if (left != data_size) fail(std::to_string(data_size));
+      if (left < data_size || !IsPadding(header_.data_offset + data_size)) {
+        fail(std::to_string(data_size));
+      }
     } else {
       uint32_t sizes[2] = {0, 0};
       if (left < 8) fail("at least 8");
       file_.Read(header_.data_offset, sizes, 8);
-      if (sizes[0] != left - 8) fail(std::to_string(8 + static_cast<int64_t>(sizes[0])));
+      if (sizes[0] > left - 8 || !IsPadding(header_.data_offset + 8 + sizes[0])) {
+        fail(std::to_string(8 + static_cast<int64_t>(sizes[0])));
+      }
       // A reference of LZF, 3 bytes, stands for at most 264.
       if (sizes[1] != data_size || sizes[1] > 100 * static_cast<int64_t>(sizes[0])) {
         throw InputError(file_.path(), BytePosition(header_.data_offset + 4),

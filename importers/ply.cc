@@ -57,17 +57,15 @@ class AsciiSource : public ValueSource {
   }
   double Next(PlyType) override {
     SkipBlanks();
-    const char* const end = rest_.data() + rest_.size();
+    const size_t size = std::min(rest_.find_first_of(" \t"), rest_.size());
     double value = 0;
-    const auto [next, error] = std::from_chars(rest_.data(), end, value);
-    const bool underflow = error == std::errc::result_out_of_range;
-    if ((error != std::errc() && !underflow) || (next < end && *next != ' ' && *next != '\t')) {
+    if (!ParseReal(rest_.substr(0, size), &value)) {
       throw InputError(path_, Position(),
                        "is " + Quoted(line_) + ", which lacks a number or holds something else",
                        kDamaged);
     }
-    rest_.remove_prefix(static_cast<size_t>(next - rest_.data()));
-    return underflow ? 0 : value;
+    rest_.remove_prefix(size);
+    return value;
   }
   void EndEntry() override {
     SkipBlanks();
@@ -226,6 +224,14 @@ class PlyParser {
         throw InputError(file_.path(), LinePosition(vertex_->line),
                          "the vertices have no property " + name, kDamaged);
       }
+    }
+    const bool has_strips =
+        std::any_of(header_.elements.begin(), header_.elements.end(),
+                    [](const PlyElement& e) { return e.name == "tristrips" && e.count > 0; });
+    if (!HasFaces() && has_strips) {
+      throw InputError(file_.path(), "",
+                       "has its triangles as strips (tristrips), which are not read",
+                       "Write it again with faces, by MeshLab or CloudCompare for example");
     }
     if (!HasFaces() && !options_.clouds) {
       throw InputError(

@@ -66,18 +66,26 @@ class PtxParser {
   PtxParser(const FileReader& file, const PtxOptions& options)
       : file_(file), options_(options), lines_(file) {}
 
-  // empty: number (from 0) of the first scan without a measured sample, if there is one.
-  std::vector<Scan> Parse(const ScanVisitor& visit, std::optional<size_t>* empty) {
+  std::vector<Scan> Parse(std::vector<std::string>* notes, const ScanVisitor& visit) {
     std::vector<Scan> scans;
     std::string_view line;
+    int number = 0;
     while (NextUnblankLine(&line)) {
-      scans.push_back(ParseScan(line));
-      if (!*empty && scans.back().NumMissing() == static_cast<int>(scans.back().points.size())) {
-        *empty = scans.size() - 1;
+      Scan scan = ParseScan(line);
+      scan.number_in_file = ++number;
+      if (scan.NumMissing() == static_cast<int>(scan.points.size())) {
+        notes->push_back("scan " + std::to_string(number) +
+                         " holds no measured point and is left out");
+        continue;
       }
-      if (visit && !*empty) visit(&scans);
+      scans.push_back(std::move(scan));
+      if (visit) visit(&scans);
     }
-    if (scans.empty()) throw InputError(file_.path(), "", "is empty", "Give a PTX file");
+    if (number == 0) throw InputError(file_.path(), "", "is empty", "Give a PTX file");
+    if (scans.empty()) {
+      throw InputError(file_.path(), "", "no scan in it holds a measured point",
+                       options_.max_range > 0 ? "Give a larger --max_range" : "Give another file");
+    }
     return scans;
   }
 
@@ -291,15 +299,10 @@ double IntensityDivisor(const Scan& scan, double* offset) {
 }
 
 std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options,
-                          const ScanVisitor& visit) {
+                          std::vector<std::string>* notes, const ScanVisitor& visit) {
+  std::vector<std::string> ignored;
   const FileReader file(path);
-  std::optional<size_t> empty;
-  std::vector<Scan> scans = PtxParser(file, options).Parse(visit, &empty);
-  if (!empty) return scans;
-  throw InputError(path, "",
-                   "scan " + std::to_string(*empty + 1) + " of " + std::to_string(scans.size()) +
-                       " holds no measured sample",
-                   options.max_range > 0 ? "Give a larger --max_range" : "Give another file");
+  return PtxParser(file, options).Parse(notes == nullptr ? &ignored : notes, visit);
 }
 
 void WritePtx(const std::vector<Scan>& scans, const std::string& path) {

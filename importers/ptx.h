@@ -20,8 +20,10 @@ struct PtxOptions {
 // All scans of the file, in the file's order, in one frame: each scan's own 4x4 pose is applied to
 // its points (translation in the last row as Cyclone writes it, or in the last column). Row 0 of
 // the grid is the top one. `up` is z, unless the order of the samples shows that the elevation
-// grows along y (see up_axis.h). Throws InputError with the line.
+// grows along y (see up_axis.h). Scans without a measured sample are left out, with a note. Throws
+// InputError with the line, and where no scan is left.
 std::vector<Scan> ReadPtx(const std::string& path, const PtxOptions& options,
+                          std::vector<std::string>* notes = nullptr,
                           const ScanVisitor& visit = nullptr);
 
 // Coordinates to the micrometre in the station frame with the pose as the scan's 4x4 matrix;

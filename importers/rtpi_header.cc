@@ -278,6 +278,17 @@ bool LooksLikeRtpi(const std::string& first_bytes) {
 
 RtpiLayout ReadRtpiHeader(const FileReader& file) { return HeaderParser(file).Parse(); }
 
+std::string AzimuthOfFile(const RtpiHeader& header) {
+  const auto says = [](const std::vector<std::string>& lines, const std::string& line) {
+    return std::find(lines.begin(), lines.end(), line) != lines.end();
+  };
+  if (!says(header.device, kModelRoomtex)) return "";
+  for (const char* azimuth : {"clockwise", "counterclockwise"}) {
+    if (says(header.comments, AzimuthComment(azimuth))) return azimuth;
+  }
+  return "";
+}
+
 std::string AzimuthOfScanner(const RtpiHeader& header) {
   const auto has = [&](const std::string& start) {
     return std::any_of(header.device.begin(), header.device.end(), [&](const std::string& line) {
@@ -290,6 +301,8 @@ std::string AzimuthOfScanner(const RtpiHeader& header) {
                            has("# laser:") && has("# scan_start_time:");
   return is_scanners ? "counterclockwise" : "";
 }
+
+std::string AzimuthComment(const std::string& azimuth) { return "# azimuth: " + azimuth; }
 
 std::string OtherAzimuth(const std::string& azimuth) {
   return azimuth == "clockwise" ? "counterclockwise" : "clockwise";

@@ -43,6 +43,11 @@ bool LooksLikeRtpi(const std::string& first_bytes);
 // the scan: manual 15.2, which counts so), else "".
 std::string AzimuthOfScanner(const RtpiHeader& header);
 
+// What our own writer says of it: "# azimuth: ..." among the comments of a kModelRoomtex; else "".
+std::string AzimuthOfFile(const RtpiHeader& header);
+inline constexpr char kModelRoomtex[] = "# model: roomtex";
+std::string AzimuthComment(const std::string& azimuth);
+
 // "clockwise" for "counterclockwise", and the other way round: a scan that is read the other way
 // is its own mirror image.
 std::string OtherAzimuth(const std::string& azimuth);

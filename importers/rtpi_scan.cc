@@ -196,6 +196,8 @@ Scan ScanFromRtpi(const RtpiFile& file, const RtpiScanOptions& options,
   scan.is_rtpi = true;
   scan.num_columns = grid.num_columns;
   scan.num_rows = grid.num_rows;
+  // Columns of few samples, far apart, make a grid much larger than the file.
+  RequireMemoryForSamples(file.path, static_cast<double>(grid.num_columns) * grid.num_rows);
   scan.points.resize(static_cast<size_t>(grid.num_columns) * grid.num_rows);
   scan.intensity.resize(scan.points.size());
   const double azimuth_sign = options.counterclockwise ? -1 : 1;
@@ -249,9 +251,9 @@ RtpiFile RtpiFromScan(const Scan& scan, bool counterclockwise) {
 
   RtpiFile file;
   file.header.units = "meters";
-  file.header.device = {"# model: roomtex"};
-  file.header.comments.push_back(std::string("# azimuth: ") +
-                                 (counterclockwise ? "counterclockwise" : "clockwise"));
+  file.header.device = {kModelRoomtex};
+  file.header.comments.push_back(
+      AzimuthComment(counterclockwise ? "counterclockwise" : "clockwise"));
   if (!rule.comment.empty()) file.header.comments.push_back(rule.comment);
   if (!stays) file.header.comments.push_back("# frame: the scanner's own, y up");
   std::vector<double> theta_of_cell(scan.points.size(), std::numeric_limits<double>::quiet_NaN());

@@ -157,10 +157,10 @@ void ScanPoses::AddEntry(Entry entry) {
 }
 
 // The path as it was given wins over the file name.
-ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int index, int count) {
-  const std::string number = "#" + std::to_string(index + 1);
+ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int number, int count) {
+  const std::string mark = "#" + std::to_string(number);
   for (const std::string& name : {scan_path, FileName(scan_path)}) {
-    const auto numbered = entry_of_name_.find(name + number);
+    const auto numbered = entry_of_name_.find(name + mark);
     if (numbered != entry_of_name_.end()) return &entries_[numbered->second];
     const auto bare = entry_of_name_.find(name);
     if (bare == entry_of_name_.end()) continue;
@@ -175,11 +175,11 @@ ScanPoses::Entry* ScanPoses::Find(const std::string& scan_path, int index, int c
   return nullptr;
 }
 
-std::optional<ScanPoses::Placement> ScanPoses::Take(const std::string& scan_path, int index,
+std::optional<ScanPoses::Placement> ScanPoses::Take(const std::string& scan_path, int number,
                                                     int count,
                                                     const Eigen::Vector3d& up_in_station) {
   asked_for_.push_back(FileName(scan_path));
-  Entry* const entry = Find(scan_path, index, count);
+  Entry* const entry = Find(scan_path, number, count);
   if (entry == nullptr) return std::nullopt;
   if (!entry->taken_by.empty()) {
     throw InputError(
@@ -201,9 +201,9 @@ void ScanPoses::RequireAllTaken() const {
   }
 }
 
-void ScanPoses::ThrowMissing(const std::string& scan_path, int index, int count,
+void ScanPoses::ThrowMissing(const std::string& scan_path, int number, int count,
                              size_t num_scans) const {
-  const std::string name = FileName(scan_path) + (count > 1 ? "#" + std::to_string(index + 1) : "");
+  const std::string name = FileName(scan_path) + (count > 1 ? "#" + std::to_string(number) : "");
   if (path_.empty()) {
     throw InputError(scan_path, "",
                      "has no pose, but there are " + std::to_string(num_scans) + " scans",

@@ -30,15 +30,15 @@ class ScanPoses {
     Rigid scan_from_station;
     std::optional<SurveyedStation> station;  // set when surveyed()
   };
-  // Placement of scan `index` (from 0) of the `count` scans in the file at scan_path; none if not
-  // named. up_in_station: the scanner's vertical axis. Throws InputError for a bare name where the
-  // file holds several scans, and for a file name that two of the scans have.
-  std::optional<Placement> Take(const std::string& scan_path, int index, int count,
+  // Placement of scan `number` (Scan::number_in_file), one of `count` in the file at scan_path;
+  // none if not named. up_in_station: the scanner's vertical axis. Throws InputError for a bare
+  // name where the file holds several scans, and for a file name that two of the scans have.
+  std::optional<Placement> Take(const std::string& scan_path, int number, int count,
                                 const Eigen::Vector3d& up_in_station);
   // Throws InputError if a pose was for none of the scans: the name is mistyped.
   void RequireAllTaken() const;
   // What is wrong when Take() gave nothing for one of several scans.
-  [[noreturn]] void ThrowMissing(const std::string& scan_path, int index, int count,
+  [[noreturn]] void ThrowMissing(const std::string& scan_path, int number, int count,
                                  size_t num_scans) const;
 
  private:
@@ -51,7 +51,7 @@ class ScanPoses {
   };
   Entry ParseEntry(const std::string& line_text, long line) const;
   void AddEntry(Entry entry);
-  Entry* Find(const std::string& scan_path, int index, int count);
+  Entry* Find(const std::string& scan_path, int number, int count);
 
   std::string path_;
   std::vector<Entry> entries_;

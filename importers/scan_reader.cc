@@ -104,8 +104,11 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
   ScanFile file;
   file.format = "RTPI";
   file.byte_order = rtpi.byte_order == ByteOrder::kBig ? "big" : "little";
+  const std::string of_file = AzimuthOfFile(rtpi.header);
   const std::string of_scanner = AzimuthOfScanner(rtpi.header);
-  const std::string by_default = of_scanner.empty() ? "clockwise" : of_scanner;
+  const std::string by_default = !of_file.empty()      ? of_file
+                                 : !of_scanner.empty() ? of_scanner
+                                                       : "clockwise";
   file.azimuth = options.azimuth == "auto" ? by_default : options.azimuth;
   if (!of_scanner.empty()) {
     const std::string whose =
@@ -115,6 +118,9 @@ ScanFile ReadAsRtpi(const std::string& path, const ScanReaderOptions& options) {
     } else if (options.azimuth != of_scanner) {
       file.azimuth_note = whose + "read " + options.azimuth + " the room is a mirror image.";
     }
+  } else if (!of_file.empty() && file.azimuth != of_file) {
+    file.azimuth_note = path + " says that its azimuths are " + of_file + ": read " + file.azimuth +
+                        " the room is a mirror image.";
   }
   if (!file.azimuth_note.empty()) file.notes.push_back(file.azimuth_note);
   RtpiScanOptions scan_options;
@@ -138,6 +144,19 @@ void TakeUpAxis(const ScanReaderOptions& options, Scan* scan) {
   scan->up_is_assumed = false;
 }
 
+// A cell of a grid holds one point, though a cloud can have several there (further returns).
+std::string WhatTheGridLacks(const Scan& cloud, const Scan& grid) {
+  const auto measured = [](const Scan& scan) {
+    return static_cast<long>(scan.points.size()) - scan.NumMissing();
+  };
+  const long num_lost = measured(cloud) - measured(grid);
+  if (num_lost == 0) return "";
+  return "; " + std::to_string(num_lost) +
+         (num_lost == 1 ? " point shares its place there with another one and is"
+                        : " points share their places there with others and are") +
+         " left out";
+}
+
 void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
   const Eigen::Quaterniond station_from_scan = scan->scan_from_station.rotation.conjugate();
   std::vector<Eigen::Vector3d> axes = {Eigen::Vector3d::UnitZ()};  // of the station
@@ -150,9 +169,10 @@ void FindGridAgain(Scan* scan, std::vector<std::string>* notes) {
     if (grid && scan->up_is_assumed) grid->up = scan->scan_from_station.rotation * axes[i];
   }
   if (!grid) return;
-  notes->push_back(
-      NameOrFile(*scan) + " is a cloud without a grid; its angles from the station show one of " +
-      std::to_string(grid->num_columns) + " columns x " + std::to_string(grid->num_rows) + " rows");
+  notes->push_back(NameOrFile(*scan) +
+                   " is a cloud without a grid; its angles from the station show one of " +
+                   std::to_string(grid->num_columns) + " columns x " +
+                   std::to_string(grid->num_rows) + " rows" + WhatTheGridLacks(*scan, *grid));
   *scan = std::move(*grid);
 }
 
@@ -171,7 +191,8 @@ void FindUpAxisAgain(Scan* scan, std::vector<std::string>* notes) {
 // Formats that do not say their unit, and scans that are hardly in metres.
 void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFile* file) {
   const bool is_silent = file->format == "PLY" || file->format == "OBJ" || file->format == "PCD" ||
-                         file->format == "PTX" || file->format == "XYZ";
+                         file->format == "PTX" || file->format == "XYZ" ||
+                         (file->format == "LAS" && !file->unit_is_said);
   if (!is_silent || !options.units.empty()) return;
   const std::string unit = LikelierUnit(scan);
   if (unit.empty()) return;
@@ -247,6 +268,7 @@ void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, Sc
     return;
   }
   const LasUnits units = ReadLasUnits(path);
+  file->unit_is_said = units.projected || !units.horizontal.empty();
   if (units.degrees) {
     throw InputError(path, "", "has coordinates of longitude and latitude",
                      "Project it (UTM, for example), by pdal translate with filters.reprojection; "
@@ -256,6 +278,12 @@ void TakeUnitOfLas(const std::string& path, const ScanReaderOptions& options, Sc
     file->notes.push_back("its heights are in " + units.vertical + ", the rest in " +
                           units.horizontal + ": they are read as " + units.horizontal +
                           " like the rest (export it anew)");
+  }
+  if (units.projected && units.horizontal.empty()) {
+    file->notes.push_back(
+        "its coordinate system does not say its unit in a way that is known" +
+        (units.vertical.empty() ? std::string() : " (of its heights: " + units.vertical + ")") +
+        ": its coordinates are taken for metres (--units says another)");
   }
   if (units.horizontal.empty() || units.horizontal == "meters") {
     file->coordinate_system = units.wkt;
@@ -288,6 +316,7 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
     const FileReader reader(path);
     if (reader.size() == 0) throw InputError(path, "", "is empty", kKnownFormats);
     start = reader.ReadSome(0, kLookAt);
+    start.erase(0, SizeOfByteOrderMark(start));
   }
   if (LooksLikeE57(start)) return ReadAsE57(parts, options, finish);
   if (!parts.part.empty()) {
@@ -315,7 +344,8 @@ ScanFile ReadWith(const std::string& given_path, const ScanReaderOptions& option
   } else if (LooksLikePtx(start)) {
     file.format = "PTX";
     file.byte_order = "text";
-    file.scans = ReadPtx(path, {meters_per_unit, options.max_range, options.colors}, visit);
+    file.scans =
+        ReadPtx(path, {meters_per_unit, options.max_range, options.colors}, &file.notes, visit);
   } else if (LooksLikeLas(start)) {
     file.format = "LAS";
     file.byte_order = "little";
@@ -440,7 +470,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   placed.enu = poses.enu();
   struct Missing {
     std::string path;
-    int index, count;
+    int number, count;
   };
   std::vector<Missing> missing;
   ScanThinner thinner(max_samples, &placed.scans);
@@ -456,13 +486,14 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
     for (int k = 0; k < count; ++k) {
       Scan& scan = file.scans[k];
       const Eigen::Vector3d up_in_station = scan.scan_from_station.rotation.conjugate() * scan.up;
-      const std::optional<ScanPoses::Placement> pose = poses.Take(path, k, count, up_in_station);
+      const std::optional<ScanPoses::Placement> pose =
+          poses.Take(path, scan.number_in_file, count, up_in_station);
       read.placed.push_back(pose.has_value());
       if (pose) {
         PlaceScan(pose->scan_from_station, &scan);
         if (pose->station) placed.stations.push_back(*pose->station);
       } else if (!file.CarriesPoses() || poses.surveyed()) {
-        missing.push_back({path, k, count});
+        missing.push_back({path, scan.number_in_file, count});
       }
       placed.scans.push_back(std::move(scan));
     }
@@ -471,7 +502,7 @@ PlacedScans ReadPlacedScans(const std::vector<std::string>& paths, const std::st
   placed.stride = thinner.stride();
   poses.RequireAllTaken();
   if (!missing.empty() && (placed.scans.size() > 1 || poses.surveyed())) {
-    poses.ThrowMissing(missing[0].path, missing[0].index, missing[0].count, placed.scans.size());
+    poses.ThrowMissing(missing[0].path, missing[0].number, missing[0].count, placed.scans.size());
   }
   return placed;
 }

@@ -18,7 +18,8 @@ class OptionFields;
 struct ScanReaderOptions {
   // RTPI: sense of the azimuth seen from above. "clockwise" is the thesis' formula (5.1.1), files
   // of real scanners are "counterclockwise"; the wrong one mirrors the room. "auto": by the header
-  // where it is one of the scanner's own (AzimuthOfScanner), else clockwise.
+  // where it is one of the scanner's own or of ours (AzimuthOfScanner, AzimuthOfFile), else
+  // clockwise.
   std::string azimuth = "auto";
   // Unit of the coordinates in the file; "" = what the file says, metres if it does not. "" or one
   // of LengthUnitNames() (length_unit.h).
@@ -51,6 +52,7 @@ struct ScanFile {
   // sentence or "". Other formats: "".
   std::string azimuth, azimuth_note;
   double meters_per_unit = 1;
+  bool unit_is_said = false;  // LAS: by its coordinate system
   // LAS: OGC WKT of the system that the coordinates are in as they were read; "" = not known, or
   // they became metres.
   std::string coordinate_system;

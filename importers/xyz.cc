@@ -16,94 +16,24 @@
 #include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
+#include "importers/xyz_columns.h"
 
 namespace roomtex {
 namespace {
 
-constexpr size_t kMostColumns = 64;
+constexpr int64_t kLookAt = 1 << 18;        // bytes, to tell the columns
 constexpr int64_t kPointsToGuessBy = 1000;  // how many there are in all
 constexpr int64_t kShortestPoint = 6;       // bytes: "0 0 0\n"
 const char kNotXyz[] = "The file is damaged, or no list of points";
 
-// The words of a line.
-void SplitWords(std::string_view line, std::vector<std::string_view>* words) {
-  constexpr char kBetween[] = " \t,;\r";
-  words->clear();
-  size_t at = line.find_first_not_of(kBetween);
-  while (at != std::string_view::npos && words->size() <= kMostColumns) {
-    const size_t end = std::min(line.find_first_of(kBetween, at), line.size());
-    words->push_back(line.substr(at, end - at));
-    at = line.find_first_not_of(kBetween, end);
-  }
-}
-
-bool IsComment(std::string_view line) {
-  return line.substr(0, 1) == "#" || line.substr(0, 2) == "//";
-}
-
-// "nan", "inf" and what no double holds are numbers, too: of no point.
-bool ParseWord(std::string_view word, double* number) {
-  if (!word.empty() && word[0] == '+') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
-  if (error == std::errc::result_out_of_range) {
-    *number = std::strtod(std::string(word).c_str(), nullptr);  // 1e-400 is zero
-  }
-  return (error == std::errc() || error == std::errc::result_out_of_range) &&
-         end == word.data() + word.size();
-}
-
-bool AreNumbers(const std::vector<std::string_view>& words) {
-  double number = 0;
-  return std::all_of(words.begin(), words.end(),
-                     [&](std::string_view word) { return ParseWord(word, &number); });
-}
-
-// Which column is what; -1 = there is none.
-struct XyzColumns {
-  int place[3] = {0, 1, 2};
-  int intensity = -1;
-  int color[3] = {-1, -1, -1};
-  size_t count = 0;
-
-  static XyzColumns ByNumber(size_t count) {
-    XyzColumns columns;
-    columns.count = count;
-    if (count == 4 || count >= 7) columns.intensity = 3;
-    if (count == 6) std::iota(columns.color, columns.color + 3, 3);
-    if (count >= 7) std::iota(columns.color, columns.color + 3, 4);
-    return columns;
-  }
-  // None if the words do not name x, y and z.
-  static std::optional<XyzColumns> ByName(const std::vector<std::string_view>& words) {
-    const auto find = [&](const std::vector<std::string>& names) {
-      for (size_t i = 0; i < words.size(); ++i) {
-        std::string word(words[i]);
-        for (const char quote : {'"', '\'', '/', '#'}) {
-          word.erase(std::remove(word.begin(), word.end(), quote), word.end());
-        }
-        if (std::find(names.begin(), names.end(), LowerCase(word)) != names.end())
-          return static_cast<int>(i);
-      }
-      return -1;
-    };
-    XyzColumns columns;
-    columns.count = words.size();
-    const char* const kAxes[] = {"x", "y", "z"};
-    for (int i = 0; i < 3; ++i) columns.place[i] = find({kAxes[i]});
-    if (*std::min_element(columns.place, columns.place + 3) < 0) return std::nullopt;
-    columns.intensity = find({"intensity", "i", "scalar_intensity", "reflectance"});
-    columns.color[0] = find({"r", "red"});
-    columns.color[1] = find({"g", "green"});
-    columns.color[2] = find({"b", "blue"});
-    if (std::min(columns.color[0], columns.color[1]) < 0) columns.color[2] = -1;
-    return columns;
-  }
-};
-
 class XyzParser {
  public:
   XyzParser(const FileReader& file, const XyzOptions& options)
-      : file_(file), options_(options), lines_(file) {}
+      : file_(file), options_(options), lines_(file) {
+    std::string start = file.ReadSome(0, kLookAt);
+    if (file.size() > kLookAt) start.resize(start.rfind('\n') + 1);  // nothing, of one line
+    layout_ = FindXyzLayout(start);
+  }
 
   Scan Parse() {
     scan_.path = file_.path();
@@ -135,44 +65,45 @@ class XyzParser {
   }
 
   void ParseLine(std::string_view line) {
-    SplitWords(line, &words_);
-    if (words_.empty()) return;
-    if (!columns_ && !AreNumbers(words_)) {
-      columns_ = XyzColumns::ByName(words_);
-      if (!columns_ && !IsComment(line)) throw Error(line, "numbers, or the names of columns");
+    SplitWords(line, layout_.decimal_commas, &words_);
+    if (words_.empty() || IsXyzComment(line)) return;
+    double number = 0;
+    const bool begins_with_number = ParseXyzNumber(words_[0], layout_.decimal_commas, &number);
+    if (num_points_ == 0 && !begins_with_number) {
+      if (!XyzColumns::ByName(words_)) throw Error(line, "numbers, or the names of columns");
       return;
     }
-    if (IsComment(line)) return;
-    if (!columns_ && said_ < 0 && words_.size() == 1) {
-      ParseCount(line);
+    if (words_.size() == 1 && num_points_ == std::max<int64_t>(said_, 0)) {
+      ParseCount(line, number);
       return;
     }
-    if (!columns_) {
+    if (!layout_.columns) {
       if (words_.size() < 3) throw Error(line, "x, y and z");
-      columns_ = XyzColumns::ByNumber(words_.size());
+      layout_.columns = XyzColumns::ByNumber(words_.size(), {});
     }
-    ParsePoint(line);
+    ParsePoint(line, *layout_.columns);
   }
 
-  // PTS.
-  void ParseCount(std::string_view line) {
-    double count = 0;
-    if (!ParseWord(words_[0], &count) || !(count >= 0) || count != std::floor(count) ||
+  // PTS, which can hold several lists, each behind its number.
+  void ParseCount(std::string_view line, double count) {
+    if (!(count >= 0) || count != std::floor(count) ||
         count * kShortestPoint > static_cast<double>(lines_.BytesLeft()) + 1) {
       throw Error(line, "the number of points, of which " + std::to_string(lines_.BytesLeft()) +
                             " bytes can hold at most " +
                             std::to_string((lines_.BytesLeft() + 1) / kShortestPoint));
     }
-    said_ = static_cast<int64_t>(count);
+    said_ = num_points_ + static_cast<int64_t>(count);
   }
 
-  void ParsePoint(std::string_view line) {
-    if (words_.size() != columns_->count) {
-      throw Error(line, std::to_string(columns_->count) + " columns as in the lines before");
+  void ParsePoint(std::string_view line, const XyzColumns& columns) {
+    if (words_.size() != columns.count) {
+      throw Error(line, std::to_string(columns.count) + " columns as in the lines before");
     }
     const auto number = [&](int column) {
       double value = 0;
-      if (!ParseWord(words_[static_cast<size_t>(column)], &value)) throw Error(line, "numbers");
+      if (!ParseXyzNumber(words_[static_cast<size_t>(column)], layout_.decimal_commas, &value)) {
+        throw Error(line, "numbers");
+      }
       return value;
     };
     if (++num_points_ > std::numeric_limits<int>::max()) {
@@ -183,33 +114,47 @@ class XyzParser {
       RequireMemoryForSamples(file_.path(),
                               kPointsToGuessBy * all / static_cast<double>(lines_.offset()));
     }
-    Eigen::Vector3d point;
-    for (int i = 0; i < 3; ++i) point[i] = options_.meters_per_unit * number(columns_->place[i]);
-    double intensity = columns_->intensity >= 0 ? number(columns_->intensity) : 0;
+    const auto three = [&](const int(&of)[3]) {
+      return Eigen::Vector3d(number(of[0]), number(of[1]), number(of[2]));
+    };
+    const Eigen::Vector3d point = options_.meters_per_unit * three(columns.place);
+    double intensity = columns.intensity >= 0 ? number(columns.intensity) : 0;
     Eigen::Vector3d color = Eigen::Vector3d::Zero();
-    const bool has_color = columns_->color[2] >= 0;
-    if (has_color && (options_.colors || columns_->intensity < 0)) {
-      for (int k = 0; k < 3; ++k) color[k] = number(columns_->color[k]);
-      if (columns_->intensity < 0) intensity = GreyOf(color);
-    }
-    if (options_.colors && color.minCoeff() < 0) {  // these columns are none
-      options_.colors = false;
-      FreeVectors(&scan_.colors);
+    if (has_colors_ && columns.color[0] >= 0) {
+      color = three(columns.color);
+      if (color.minCoeff() < 0) ForgetColors();
+      if (has_colors_ && columns.intensity < 0) intensity = GreyOf(color);
     }
     const double range = point.norm();
     if (!std::isfinite(range) || (options_.max_range > 0 && range > options_.max_range)) return;
     scan_.points.push_back(point);
-    if (options_.colors && has_color) {
+    if (options_.colors && has_colors_ && columns.color[0] >= 0) {
       scan_.colors.push_back(color_scale_.Bytes(color, &scan_.colors));
     }
+    if (columns.normal[0] >= 0) {
+      const Eigen::Vector3d normal = three(columns.normal);
+      const bool is_one = normal.allFinite() && normal.norm() > 0.5;
+      scan_.normals.push_back(is_one ? normal.normalized().cast<float>().eval()
+                                     : Eigen::Vector3f::Zero().eval());
+    }
     scan_.intensity.push_back(std::isfinite(intensity) ? static_cast<float>(intensity) : 0.0f);
+  }
+
+  // The columns hold something else, and the grey made of them is none either.
+  void ForgetColors() {
+    has_colors_ = false;
+    FreeVectors(&scan_.colors);
+    if (layout_.columns->intensity < 0) {
+      std::fill(scan_.intensity.begin(), scan_.intensity.end(), 0.0f);
+    }
   }
 
   const FileReader& file_;
   XyzOptions options_;
   LineReader lines_;
   std::vector<std::string_view> words_;
-  std::optional<XyzColumns> columns_;
+  XyzLayout layout_;
+  bool has_colors_ = true;
   int64_t said_ = -1, num_points_ = 0;
   Scan scan_;
   ColorScale color_scale_{1};
@@ -222,24 +167,7 @@ Scan ReadXyz(const std::string& path, const XyzOptions& options) {
   return XyzParser(file, options).Parse();
 }
 
-bool LooksLikeXyz(std::string_view start) {
-  std::vector<std::string_view> words;
-  bool had_count = false;
-  while (!start.empty()) {
-    const size_t end = std::min(start.find('\n'), start.size());
-    const std::string_view line = start.substr(0, end);
-    start.remove_prefix(std::min(end + 1, start.size()));
-    SplitWords(line, &words);
-    if (words.empty()) continue;
-    if (XyzColumns::ByName(words)) return true;
-    if (IsComment(line)) continue;
-    if (!AreNumbers(words)) return false;
-    if (words.size() >= 3) return true;
-    if (had_count || words.size() != 1) return false;
-    had_count = true;
-  }
-  return false;
-}
+bool LooksLikeXyz(std::string_view start) { return FindXyzLayout(start).columns.has_value(); }
 
 std::optional<XyzKind> XyzKindOf(const std::string& extension) {
   if (extension == ".xyz") return XyzKind::kXyz;

@@ -148,8 +148,12 @@ TEST_F(E57Images, ACameraSaidForAnotherSizeIsScaled) {
 TEST_F(E57Images, PanoramasSeeWhatTheStandardSays) {
   Add("all around", "spherical", 128, 64, PoseXml(kUnturned, {1, 2, 3}));
   Add("strip", "spherical", 128, 32, PoseXml(kUnturned, {1, 2, 3}));
+  // Twice as wide as high, and half of the sphere all the same.
+  Add("half", "spherical", 128, 64, PoseXml(kUnturned, {1, 2, 3}),
+      Float("pixelWidth", kPi / 128) + Float("pixelHeight", kPi / 128));
   const E57Photos photos = Extract();
-  EXPECT_THAT(photos.notes, ElementsAre(HasSubstr("strip.png is not in the model: it is no pan")));
+  EXPECT_THAT(photos.notes, ElementsAre(HasSubstr("strip.png is not in the model: it is no pan"),
+                                        HasSubstr("half.png is not in the model: it is no pan")));
   const SparseModel model = Model();
   EXPECT_EQ(model.cameras.at(1).model, CameraModel::kEquirectangular);
   const std::string name = "all_around.png";

@@ -10,6 +10,7 @@
 
 namespace roomtex {
 namespace {
+using testing::HasSubstr;
 
 constexpr int kSizes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
 
@@ -123,10 +124,25 @@ const char kStatePlane[] =
     "PROJECTION[\"Lambert\"],PARAMETER[\"false_easting\",2296583.333],"
     "UNIT[\"US survey foot [ftUS]\",0.3048006096012192],AXIS[\"X\",EAST]]";
 
+// WKT 2: lengths of other parts are no unit of the coordinates.
+const char kStatePlane2[] =
+    "PROJCRS[\"NAD83 / Texas Central (ftUS)\",BASEGEOGCRS[\"NAD83\",DATUM[\"D\",ELLIPSOID["
+    "\"GRS 1980\",6378137,298.257,LENGTHUNIT[\"metre\",1]]]],CONVERSION[\"c\",METHOD[\"Lambert\"],"
+    "PARAMETER[\"False "
+    "easting\",700000,LENGTHUNIT[\"metre\",1]]],CS[Cartesian,2],AXIS[\"(X)\",east,"
+    "ORDER[1],LENGTHUNIT[\"US survey foot\",0.304800609601219]]]";
+const char kUtm2[] =
+    "PROJCRS[\"UTM\",BASEGEOGCRS[\"WGS 84\"],CS[Cartesian,2],AXIS[\"e\",east],AXIS[\"n\",north],"
+    "LENGTHUNIT[\"metre\",1]]";
+
 TEST_F(Las, UnitsOfTheCoordinateSystemCount) {
-  const auto metres = [this](const std::string& bytes) {
+  const auto metres = [this](const std::string& bytes, const std::string& note = "") {
     const ScanFile file = ReadScanFile(Write(bytes), {});
-    EXPECT_EQ(file.notes.size(), file.meters_per_unit == 1 ? 0u : 1u);
+    const bool is_said = file.meters_per_unit != 1 || !note.empty();
+    EXPECT_EQ(file.notes.size(), is_said ? 1u : 0u);
+    if (is_said && file.notes.size() == 1) {
+      EXPECT_THAT(file.notes[0], HasSubstr(note));
+    }
     EXPECT_NEAR(file.scans[0].points[0].x(), 412001 * file.meters_per_unit, 1e-6);
     return file.meters_per_unit;
   };
@@ -139,7 +155,15 @@ TEST_F(Las, UnitsOfTheCoordinateSystemCount) {
   EXPECT_EQ(metres(WithSystem(2112, std::string("COMPD_CS[\"both\",") + kStatePlane + "]")),
             1200.0 / 3937);
   const std::string whole = kStatePlane;
-  EXPECT_EQ(metres(WithSystem(2112, whole.substr(0, whole.find("US survey") + 5))), 1);  // cut
+  EXPECT_EQ(metres(WithSystem(2112, whole.substr(0, whole.find("US survey") + 5)),  // cut
+                   "does not say its unit in a way that is known"),
+            1);
+  // The unit follows from the number of the system alone.
+  EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{1024, 1}, {3072, 2263}, {4099, 9003}})),
+                   "(of its heights: us_survey_feet)"),
+            1);
+  EXPECT_EQ(metres(WithSystem(2112, kStatePlane2)), 1200.0 / 3937);
+  EXPECT_EQ(metres(WithSystem(2112, kUtm2)), 1);
   EXPECT_EQ(metres(WithSystem(34735, GeoKeys({{3076, 9003}}).substr(0, 15))), 1);
   // The option counts more.
   ScanReaderOptions options;

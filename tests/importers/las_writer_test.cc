@@ -10,6 +10,7 @@
 
 namespace roomtex {
 namespace {
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -43,6 +44,21 @@ class LasWriter : public testing::Test {
   Scan scan_;
   TempFolder folder_;
 };
+
+TEST_F(LasWriter, IntensitiesOfEveryRangeKeepTheirOrder) {
+  const auto intensities = [this](std::vector<float> given) {
+    scan_.points.assign(given.size(), {1, 2, 3});
+    scan_.intensity = std::move(given);
+    WriteLas({&scan_}, folder_ / "i.las", {"1.2"}, "");
+    return ReadLas(folder_ / "i.las", {}).intensity;
+  };
+  EXPECT_THAT(intensities({0, 7, 65535}), ElementsAre(0, 7, 65535));
+  EXPECT_THAT(intensities({0, 0.5f, 1}), ElementsAre(0, 32768, 65535));
+  EXPECT_THAT(intensities({-2048, -1024, 2048}), ElementsAre(0, 16384, 65535));  // of a PTS
+  EXPECT_THAT(intensities({-20, -5, 0}), ElementsAre(0, 49151, 65535));          // dB
+  EXPECT_THAT(intensities({0.25f, 0.5f, 1.25f}), ElementsAre(13107, 26214, 65535));
+  EXPECT_THAT(intensities({0, 131070}), ElementsAre(0, 65535));
+}
 
 TEST_F(LasWriter, EveryVersionIsReadAsItWasWrittenByUsAndByAnother) {
   for (const std::string version : {"1.2", "1.3", "1.4"}) {

@@ -90,6 +90,13 @@ TEST_F(Obj, IsSeenFromWithinWhereverItsOriginLies) {
   EXPECT_EQ(station({500, 200, 0}).scan_from_station.translation, Eigen::Vector3d(0, 0, 0));
 }
 
+TEST_F(Obj, AcceptsAByteOrderMarkAndSigns) {
+  WriteBytes(folder_ / "bom.obj", "\xEF\xBB\xBFv +0 0 0\nv +1.5 0 0\nv 0 1 0\nf 1 2 3\n");
+  const ScanFile file = ReadScanFile(folder_ / "bom.obj", {});
+  EXPECT_EQ(file.format, "OBJ");
+  EXPECT_EQ(file.scans[0].points[1].x(), 1.5);
+}
+
 TEST_F(Obj, LeavesOutTrianglesWithOneCornerTwice) {
   EXPECT_EQ(Read(std::string(kVertices) + "f 1 1 2\nf 1 2 2 3\nf 1 2 3\n").triangles.size(), 2u);
 }

@@ -111,6 +111,21 @@ TEST_F(Pcd, ReadsAllThreeKindsThatPclWrites) {
   EXPECT_EQ(kind, "binary_compressed");
 }
 
+// Versions of PCL before 1.9 leave the rest of a page behind the data.
+TEST_F(Pcd, ZerosMayFollowBinaryData) {
+  const Scan scan = MakeScan();
+  const auto cloud = PclCloud(scan);
+  pcl::PCDWriter writer;
+  ASSERT_EQ(writer.writeBinary(folder_ / "b.pcd", cloud), 0);
+  ASSERT_EQ(writer.writeBinaryCompressed(folder_ / "c.pcd", cloud), 0);
+  for (const char* name : {"b.pcd", "c.pcd"}) {
+    const std::string bytes = ReadBytes(folder_ / name);
+    ExpectSameScan(Read(bytes + std::string(3900, '\0')), scan, 1e-6);
+    ExpectError(bytes + std::string(3900, '\0') + "x", "bytes of data follow the header");
+    ExpectError(bytes + std::string(1 << 17, '\0'), "bytes of data follow the header");
+  }
+}
+
 TEST_F(Pcd, SkipsPaddingAndTakesTheGreyOfColours) {
   pcl::PointCloud<pcl::PointXYZRGBNormal> cloud(3, 2);
   for (int i = 0; i < 6; ++i) {

@@ -105,6 +105,23 @@ TEST_F(Ply, AcceptsFacesBeforeVerticesAndCarriageReturns) {
   EXPECT_EQ(scan.intensity[2], 3);
 }
 
+TEST_F(Ply, AcceptsAByteOrderMarkAndSigns) {
+  const Scan scan = Read(
+      "\xEF\xBB\xBFply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
+      "+0.0 0 0\n+1.5 0 -0\n0 +1 0\n3 0 1 2\n");
+  EXPECT_THAT(scan.triangles, ElementsAre(Triangle{0, 1, 2}));
+  EXPECT_EQ(scan.points[1].x(), 1.5);
+}
+
+TEST_F(Ply, StripsOfTrianglesAreNoCloud) {
+  ExpectError(
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+      "has its triangles as strips (tristrips), which are not read. Write it again with faces");
+}
+
 TEST_F(Ply, LeavesOutTrianglesAtMissingAndFarVertices) {
   std::string bytes = HeaderOf("ascii") + kAsciiBody;
   bytes.replace(bytes.find("0 0 1 9"), 7, "nan 0 1 9");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
+#include "importers/scan_reader.h"
 #include "tests/support/matchers.h"
 #include "tests/support/temp_folder.h"
 
@@ -167,6 +168,24 @@ TEST_F(Ptx, IsRefusedWhereverItIsCutOff) {
   }
 }
 
+TEST_F(Ptx, AnEmptyStationIsLeftOutAndStillCounts) {
+  const std::string pose = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  const std::string measured = "1\n1\n" + pose + "1 2 3 0.5\n";
+  WriteBytes(folder_ / "three.ptx", measured + "1\n1\n" + pose + "0 0 0 0.5\n" + measured);
+  std::vector<std::string> notes;
+  const std::vector<Scan> scans = ReadPtx(folder_ / "three.ptx", {}, &notes);
+  ASSERT_EQ(scans.size(), 2u);
+  EXPECT_EQ(scans[0].number_in_file, 1);
+  EXPECT_EQ(scans[1].number_in_file, 3);
+  EXPECT_EQ(notes, (std::vector<std::string>{"scan 2 holds no measured point and is left out"}));
+  // A pose for the third reaches the third.
+  WriteBytes(folder_ / "poses.txt", "three.ptx#3 1 0 0 0 0 0 10\n");
+  const PlacedScans placed =
+      ReadPlacedScans({folder_ / "three.ptx"}, folder_ / "poses.txt", ScanReaderOptions());
+  EXPECT_EQ(placed.scans[0].points[0].z(), 3);
+  EXPECT_EQ(placed.scans[1].points[0].z(), 13);
+}
+
 TEST_F(Ptx, TellsTheLineOfWhatIsWrong) {
   const std::string pose = kIdentity;
   const std::string samples = "1 2 3 0.1\n1 2 4 0.2\n1 3 3 0.3\n1 3 4 0.4\n";
@@ -194,7 +213,7 @@ TEST_F(Ptx, TellsTheLineOfWhatIsWrong) {
               "line 10");
   ExpectError("", "is empty");
   ExpectError("1\n2\n" + pose + "0 0 0 0.5\nnan nan nan 0.5\n",
-              "scan 1 of 1 holds no measured sample");
+              "no scan in it holds a measured point");
   EXPECT_INPUT_ERROR(ReadPtx(folder_ / "none.ptx", {}), "does not exist");
   EXPECT_INPUT_ERROR(ReadPtx(folder_.path(), {}), "is a folder");
 }

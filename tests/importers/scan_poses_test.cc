@@ -46,19 +46,19 @@ TEST_F(ScanPosesFile, MatricesAndQuaternionsMayStandTogether) {
             "c.ptx#2 1 0 0 0 0 0 -1"));
   EXPECT_FALSE(poses.surveyed());
   EXPECT_FALSE(poses.empty());
-  const auto take = [&](const std::string& path, int index, int count) {
-    const auto placement = poses.Take(path, index, count, kYUp);
+  const auto take = [&](const std::string& path, int number, int count) {
+    const auto placement = poses.Take(path, number, count, kYUp);
     EXPECT_TRUE(placement) << path;
     EXPECT_FALSE(placement && placement->station);
     return placement ? placement->scan_from_station : Rigid();
   };
-  EXPECT_THAT(take("scans/a.rtpi", 0, 1), IsNearRigid(Rigid{{1, 0, 0, 0}, {10, 20, 30}}, 0, 0));
+  EXPECT_THAT(take("scans/a.rtpi", 1, 1), IsNearRigid(Rigid{{1, 0, 0, 0}, {10, 20, 30}}, 0, 0));
   const double half = std::sqrt(0.5);
-  EXPECT_THAT(take("b.rtpi", 0, 1), IsNearRigid(Rigid{{half, 0, 0, half}, {10, 20, 30}}, 1e-7, 0));
-  EXPECT_THAT(take("/x/room 2.rtpi", 0, 1) * Eigen::Vector3d(1, 2, 3),
+  EXPECT_THAT(take("b.rtpi", 1, 1), IsNearRigid(Rigid{{half, 0, 0, half}, {10, 20, 30}}, 1e-7, 0));
+  EXPECT_THAT(take("/x/room 2.rtpi", 1, 1) * Eigen::Vector3d(1, 2, 3),
               IsNearMatrix(Eigen::Vector3d(3, 1, 9), 1e-12));
-  EXPECT_FALSE(poses.Take("c.ptx", 0, 2, kYUp));
-  EXPECT_EQ(take("c.ptx", 1, 2).translation.z(), -1);
+  EXPECT_FALSE(poses.Take("c.ptx", 1, 2, kYUp));
+  EXPECT_EQ(take("c.ptx", 2, 2).translation.z(), -1);
   poses.RequireAllTaken();
 }
 
@@ -71,8 +71,8 @@ TEST_F(ScanPosesFile, SurveyedStationsMakeTheScanFrameEastNorthUpAboutTheFirst) 
   EXPECT_EQ(poses.enu()->origin().latitude_deg, 47);
   EXPECT_EQ(poses.enu()->origin().height, 500);
   // Asked for in another order than they stand in the file: the frame stays the same.
-  const auto b = poses.Take("b.ptx", 0, 1, Eigen::Vector3d::UnitZ());
-  const auto a = poses.Take("a.rtpi", 0, 1, kYUp);
+  const auto b = poses.Take("b.ptx", 1, 1, Eigen::Vector3d::UnitZ());
+  const auto a = poses.Take("a.rtpi", 1, 1, kYUp);
   ASSERT_TRUE(a && b);
   EXPECT_THAT(a->scan_from_station.translation, IsNearMatrix(Eigen::Vector3d(0, 0, 0), 1e-8));
   EXPECT_THAT(a->scan_from_station * Eigen::Vector3d(0, 0, -2),

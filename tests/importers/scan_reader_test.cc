@@ -83,6 +83,23 @@ TEST_F(ScanReader, TheContentDecidesNotTheName) {
   EXPECT_EQ(ReadScanFile(folder_ / "y", {}).format, "PLY");
 }
 
+TEST_F(ScanReader, OurOwnFilesSayTheSenseOfTheirAzimuths) {
+  const Scan scan = ReadScan(WriteGoodRtpi("a.rtpi"), {});
+  for (const bool counterclockwise : {false, true}) {
+    ScanWriterOptions writer;
+    writer.counterclockwise = counterclockwise;
+    WriteScan(scan, {}, folder_ / "again.rtpi", writer);
+    const ScanFile again = ReadScanFile(folder_ / "again.rtpi", {});
+    EXPECT_EQ(again.azimuth, counterclockwise ? "counterclockwise" : "clockwise");
+    EXPECT_EQ(again.azimuth_note, "");
+    EXPECT_THAT(again.scans[0].points[2], IsNearMatrix(scan.points[2], 1e-5));
+    ScanReaderOptions other;
+    other.azimuth = counterclockwise ? "clockwise" : "counterclockwise";
+    EXPECT_THAT(ReadScanFile(folder_ / "again.rtpi", other).azimuth_note,
+                HasSubstr("the room is a mirror image"));
+  }
+}
+
 TEST_F(ScanReader, OptionsReachTheFormats) {
   const std::string path = WriteGoodRtpi("a.rtpi");
   const Scan plain = ReadScan(path, {});

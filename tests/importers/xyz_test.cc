@@ -62,8 +62,59 @@ TEST_F(Xyz, NamesSayWhatTheColumnsAre) {
   EXPECT_THAT(scan.intensity, ElementsAre(7, 8));
 }
 
+TEST_F(Xyz, WhatMarksACommentIsNoColumn) {
+  for (const char* mark : {"# ", "#", "// ", "//"}) {
+    const Scan scan = Read(mark + std::string("x y z intensity\n1 2 3 0.5\n"));
+    EXPECT_THAT(scan.points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0)) << mark;
+    EXPECT_THAT(scan.intensity, ElementsAre(0.5f)) << mark;
+  }
+  // Prose with the same letters in it names no columns.
+  const Scan prose = Read("# room scan, columns are z y x i\n1 2 3\n");
+  EXPECT_THAT(prose.points[0], IsNearMatrix(Eigen::Vector3d(1, 2, 3), 0));
+  EXPECT_THAT(Read("\xEF\xBB\xBFx,y,z\n1,2,3\n").points, SizeIs(1));  // as Excel writes it
+}
+
+TEST_F(Xyz, CommasMayStandForPoints) {
+  for (const char* text : {"-2,5;1,25;3\n", "-2,5 1,25 3\n", "-2,5\t1,25\t3,0\n",
+                           "x;y;z\n-2,5;1,25;3\n", "1;2;3\n-2,5;1,25;3\n"}) {
+    EXPECT_THAT(Read(text).points.back(), IsNearMatrix(Eigen::Vector3d(-2.5, 1.25, 3), 0)) << text;
+  }
+  for (const char* text : {"-2.5, 1.25, 3\n", "-2.5,1.25,3\n", "-2.5 ,1.25 ,3\n"}) {
+    EXPECT_THAT(Read(text).points.back(), IsNearMatrix(Eigen::Vector3d(-2.5, 1.25, 3), 0)) << text;
+  }
+}
+
+TEST_F(Xyz, NormalsAreNoColours) {
+  XyzOptions options;
+  options.colors = true;
+  const Scan six = Read("1 2 3 0 0.6 -0.8\n4 5 6 1 0 0\n", options);
+  EXPECT_THAT(six.intensity, ElementsAre(0, 0));
+  EXPECT_THAT(six.colors, SizeIs(0));
+  EXPECT_THAT(six.normals, ElementsAre(Eigen::Vector3f(0, 0.6f, -0.8f), Eigen::Vector3f(1, 0, 0)));
+  const Scan nine = Read("1 2 3 200 100 50 0 0 1\n1 2 3 20 10 5 0 1 0\n", options);
+  EXPECT_THAT(nine.colors,
+              ElementsAre(std::array<uint8_t, 3>{200, 100, 50}, std::array<uint8_t, 3>{20, 10, 5}));
+  EXPECT_THAT(nine.normals, SizeIs(2));
+  // Neither: numbers below 0, which no colour has.
+  const Scan none = Read("1 2 3 4 5 -6\n1 2 3 4 5 6\n", options);
+  EXPECT_THAT(none.intensity, ElementsAre(0, 0));
+  EXPECT_THAT(none.colors, SizeIs(0));
+}
+
+TEST_F(Xyz, AScalarMayStandBehindTheColours) {
+  XyzOptions options;
+  options.colors = true;
+  const Scan scan = Read("1 2 3 200 100 50 1999.5\n1 2 3 20 10 5 7\n", options);
+  EXPECT_THAT(scan.intensity, ElementsAre(1999.5f, 7));
+  EXPECT_THAT(scan.colors,
+              ElementsAre(std::array<uint8_t, 3>{200, 100, 50}, std::array<uint8_t, 3>{20, 10, 5}));
+}
+
 TEST_F(Xyz, APtsSaysItsNumberOfPoints) {
   EXPECT_THAT(Read("2\n1 2 3 -5 0 0 0\n4 5 6 -6 0 0 0\n").points, SizeIs(2));
+  EXPECT_THAT(Read("1\n1 2 3 -5 0 0 0\n1\n4 5 6 -6 0 0 0\n").points, SizeIs(2));
+  EXPECT_THAT(Read("//X Y Z R G B Intensity\n1\n1 2 3 0 0 0 5\n").intensity, ElementsAre(5));
+  ExpectError("2\n1 2 3 4\n1\n4 5 6 4\n", "line 3: is \"1\", expected 4 columns");
   ExpectError("3\n1 2 3 -5 0 0 0\n4 5 6 -6 0 0 0\n", "line 4: the file ends after 2 of 3 points");
   ExpectError("1000000000000\n1 2 3\n", "line 1: is \"1000000000000\", expected the number");
 }
@@ -80,7 +131,7 @@ TEST_F(Xyz, PointsThatAreNoneAreLeftOut) {
 TEST_F(Xyz, TellsTheLineOfWhatIsWrong) {
   ExpectError("1 2 3\n1 2\n", "line 2: is \"1 2\", expected 3 columns");
   ExpectError("1 2 3\n1 2 x\n", "line 2: is \"1 2 x\", expected numbers");
-  ExpectError("1 2 3\n# fine\n1,5 2,5 3,5\n", "line 3");
+  ExpectError("1 2 3\n# fine\n1,5 2,5 3.5\n", "line 3: is \"1,5 2,5 3.5\", expected 3 columns");
   ExpectError("5 6\n", "line 1: is \"5 6\", expected x, y and z");
   ExpectError("hello\n", "line 1: is \"hello\", expected numbers, or the names of columns");
   ExpectError("# nothing\n", "holds no point");

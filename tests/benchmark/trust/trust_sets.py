@@ -2,7 +2,7 @@
 """Makes the sets of trust_table.py: simulated captures, and the real ones of a folder `data` (kitchen, desk,
 iphone_floor), with COLMAP's database and the sparse model for several cameras and picks. What exists is kept.
 
-  tests/benchmark/trust/trust_sets.py --bin build/bin SETS [--data DATA] [NAME...]
+  tests/benchmark/trust/trust_sets.py --bin build/bin [--data DATA] SETS [NAME...]
 """
 
 import argparse
