@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -172,6 +173,29 @@ void ForgetTiffOrientation(std::vector<unsigned char>* bytes) {
   }
 }
 
+// By the file's header: what is asked for every photo decodes none that cannot be transparent.
+bool MayHaveAlpha(const std::string& path) {
+  unsigned char start[26] = {};
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(reinterpret_cast<char*>(start), sizeof start);
+  const std::string_view bytes(reinterpret_cast<const char*>(start), sizeof start);
+  if (bytes.substr(1, 3) == "PNG") {
+    constexpr size_t kColourType = 25;  // ISO 15948, 11.2.2: 4 and 6 have alpha
+    return (start[kColourType] & 4) != 0;
+  }
+  if (bytes.substr(8, 4) == "WEBP") return true;
+  if (bytes.substr(0, 2) != "II" && bytes.substr(0, 2) != "MM") return false;
+  SilenceExiv2();
+  try {
+    auto image = OpenExif(path);
+    image->readMetadata();
+    const auto samples = PositiveNumber(image->exifData(), "Exif.Image.SamplesPerPixel");
+    return samples && (*samples == 2 || *samples == 4);
+  } catch (const std::exception&) {
+    return true;
+  }
+}
+
 // flags: cv::IMREAD_*.
 cv::Mat DecodePhoto(const std::string& path, int flags) {
   RequireFile(path, "Check --image_path: it is the folder that COLMAP was given");
@@ -208,6 +232,20 @@ cv::Mat ReadPhoto(const std::string& path, PhotoPixels pixels) {
   cv::Mat photo = DecodePhoto(path, cv::IMREAD_COLOR);
   if (pixels == PhotoPixels::kTurnedByExif) Turn(ReadOrientation(path), &photo);
   return photo;
+}
+
+cv::Mat1b ReadTransparency(const std::string& path, PhotoPixels pixels) {
+  constexpr double kOpaqueShare = 0.98;
+  if (!MayHaveAlpha(path)) return {};
+  const cv::Mat photo = DecodePhoto(path, cv::IMREAD_UNCHANGED);
+  if (photo.channels() != 4 && photo.channels() != 2) return {};
+  cv::Mat alpha;
+  cv::extractChannel(photo, alpha, photo.channels() - 1);
+  const double opaque = alpha.depth() == CV_8U ? 255 : alpha.depth() == CV_16U ? 65535 : 1;
+  cv::Mat1b transparent = alpha < kOpaqueShare * opaque;
+  if (cv::countNonZero(transparent) == 0) return {};
+  if (pixels == PhotoPixels::kTurnedByExif) Turn(ReadOrientation(path), &transparent);
+  return transparent;
 }
 
 bool ExifExchangesSides(const std::string& path) { return ReadOrientation(path) >= 5; }

@@ -30,6 +30,10 @@ enum class PhotoPixels { kAsStored, kTurnedByExif };
 // are not turned either. Throws InputError if the file is missing, not an image or broken.
 cv::Mat ReadPhoto(const std::string& path, PhotoPixels pixels = PhotoPixels::kAsStored);
 
+// Where the picture of ReadPhoto() is not opaque, as masks and programs that cut things out write
+// it: other than 0. Empty where the file has no alpha, or all of it is opaque. Throws likewise.
+cv::Mat1b ReadTransparency(const std::string& path, PhotoPixels pixels);
+
 // The file's EXIF orientation exchanges width and height.
 bool ExifExchangesSides(const std::string& path);
 

@@ -47,6 +47,17 @@ Rigid Moved(const Rigid& target_from_source, const Eigen::Matrix<double, 6, 1>& 
   return moved;
 }
 
+Rigid MovedInPlace(const Rigid& target_from_source,
+                   const Eigen::Matrix<double, 6, 1>& turn_and_shift) {
+  Rigid moved = Moved(target_from_source, turn_and_shift);
+  const Eigen::Vector3d w = turn_and_shift.head<3>();
+  if (w.norm() > 0) {
+    moved.translation =
+        RotationFromVector(w) * target_from_source.translation + turn_and_shift.tail<3>();
+  }
+  return moved;
+}
+
 Similarity Moved(const Similarity& target_from_source, const Eigen::Vector3d& pivot,
                  const Eigen::Matrix<double, 7, 1>& shift_turn_growth) {
   const Eigen::Quaterniond turn = RotationFromVector(shift_turn_growth.segment<3>(3));

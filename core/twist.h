@@ -32,6 +32,11 @@ RotationAndJacobian RotationWithJacobian(const Eigen::Vector3d& w);
 // turned in the target frame, the translation shifted. Exact for any w.
 Rigid Moved(const Rigid& target_from_source, const Eigen::Matrix<double, 6, 1>& turn_and_shift);
 
+// x' = x + w x x + dt: as Moved(), but turned about the target's origin. Of a camera that is where
+// it stands, wherever the origin of the scan lies.
+Rigid MovedInPlace(const Rigid& target_from_source,
+                   const Eigen::Matrix<double, 6, 1>& turn_and_shift);
+
 // x' = x + dt + w x (x - pivot) + ds (x - pivot) for small steps (dt, w, ds); exact rotation, and
 // the scale grows by exp(ds).
 Similarity Moved(const Similarity& target_from_source, const Eigen::Vector3d& pivot,

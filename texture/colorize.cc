@@ -91,6 +91,7 @@ SmoothedScan SurfaceOfCloud(const Scan& scan, const std::vector<PhotoView>& phot
                                                             cloud.angular_spacing}}
                                : FindStations(scan, num_threads);
   surface.front_is_known = cloud.front_is_known || TurnToStations(stations, &cloud);
+  surface.has_shadows = !stations.empty();
   for (const CloudStation& station : stations) {
     AddShadows(scan, station, options, num_threads, occluder);
   }
@@ -221,6 +222,13 @@ std::vector<float> Disagreements(const GridOfSamples& grid, const PhotoPassInput
 std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) {
   std::vector<Rgb> colors;
   if (options.unseen != "intensity") return colors;
+  const auto [low, high] = std::minmax_element(scan.intensity.begin(), scan.intensity.end());
+  // A mesh or cloud that has none: neither black nor white.
+  constexpr uint8_t kMiddle = 128;
+  if (low == scan.intensity.end() || *low == *high) {
+    colors.assign(scan.points.size(), {kMiddle, kMiddle, kMiddle});
+    return colors;
+  }
   for (const uint8_t grey : IntensityAsGrey(scan)) colors.push_back({grey, grey, grey});
   return colors;
 }
@@ -229,8 +237,19 @@ std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) 
 // surface that no photo sees.
 constexpr double kMaxTexelsPerPixel = 4;
 
-// Atlases of the meshes without a grid. Probes on their surfaces are added to what the photos are
-// asked about: few vertices would say little about exposures.
+double AreaOf(const std::vector<Eigen::Vector3d>& points, const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d& a = points[t[0]];
+    const double doubled = (points[t[1]] - a).cross(points[t[2]] - a).norm();
+    if (std::isfinite(doubled)) area += doubled / 2;
+  }
+  return area;
+}
+
+// Atlases of the meshes without a grid, which share the texels by their areas. Probes on their
+// surfaces are added to what the photos are asked about: few vertices would say little about
+// exposures.
 std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
                                    const std::vector<PhotoView>& photos,
                                    const std::vector<SmoothedScan>& surfaces,
@@ -244,13 +263,21 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
   const double max_texels =
       std::min({kMaxAutoTexels, kMaxTexelsPerPixel * pixels,
                 kMaxAutoBands * 1e6 * options.texture_memory_mb / BytesPerTexel(options.blend)});
+  const auto has_atlas = [&](size_t s) {
+    return scans[s].kind() == Scan::Kind::kMesh && options.atlas.mode != "0";
+  };
+  std::vector<double> areas(scans.size(), 0);
+  for (size_t s = 0; s < scans.size(); ++s) {
+    if (has_atlas(s)) areas[s] = AreaOf(scans[s].points, surfaces[s].triangles);
+  }
+  const double all_area = std::accumulate(areas.begin(), areas.end(), 0.0);
   std::vector<MeshAtlas> atlases(scans.size());
   for (size_t s = 0; s < scans.size(); ++s) {
-    if (scans[s].kind() != Scan::Kind::kMesh || options.atlas.mode == "0") continue;
+    if (!has_atlas(s)) continue;
     const std::vector<Triangle>& triangles = surfaces[s].triangles;
     const SurfaceProbes probes = SpreadProbes(scans[s].points, triangles, kNumProbes);
-    atlases[s] = LayOutAtlas(scans[s].points, triangles, PixelOnSurface(probes, photos), max_texels,
-                             options.atlas);
+    atlases[s] = LayOutAtlas(scans[s].points, triangles, PixelOnSurface(probes, photos),
+                             max_texels * areas[s] / std::max(all_area, 1e-12), options.atlas);
     if (atlases[s].empty()) continue;
     AddGrid(static_cast<int>(probes.points.size()), 1, probes.points, probes.normals,
             Scan::MissingPoint(), input);
@@ -303,12 +330,21 @@ void ColorizeTextures(const std::vector<Scan>& scans, const std::vector<PhotoVie
 // moves, and none of them is to be believed more than another.
 constexpr size_t kForeignOf = 5;
 
-// Throws UnusablePhotos.
+// Throws UnusablePhotos. Not where a photo may look through what the scanner left open: the backs
+// of things in a cloud whose scanners nobody knows.
 void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
-                           const std::vector<PhotoAgreement>& agreement, double min_correlation) {
+                           const std::vector<PhotoAgreement>& agreement,
+                           const std::vector<SmoothedScan>& surfaces,
+                           const ColorizeOptions& options) {
+  const double min_correlation = options.blend.min_agreement;
   if (min_correlation == 0) return;  // below it are photos that contradict more than chance does
+  if (!std::all_of(surfaces.begin(), surfaces.end(),
+                   [](const SmoothedScan& surface) { return surface.has_shadows; })) {
+    return;
+  }
   const std::vector<int> foreign = FindForeignPhotos(agreement, min_correlation);
-  if (foreign.empty() || kForeignOf * foreign.size() > photos.size()) return;
+  const size_t before = options.num_left_out_as_foreign, all = before + foreign.size();
+  if (foreign.empty() || kForeignOf * all > before + photos.size()) return;
   std::vector<PhotoLeftOut> left_out;
   for (const int i : foreign) {
     left_out.push_back(
@@ -318,7 +354,7 @@ void LeaveOutForeignPhotos(const std::vector<PhotoView>& photos,
                      "moved. Remove it, or keep it by --Blend.min_agreement 0.",
                      agreement[i].correlation)});
   }
-  throw UnusablePhotos(std::move(left_out));
+  throw ForeignPhotos(std::move(left_out));
 }
 
 // Whether any photo has another weight now.
@@ -449,11 +485,15 @@ ColorizeResult ColorizeScans(const std::vector<Scan>& scans,
   }
 
   progress->Stage("exposure");
+  // Vignetting is taken out of the store, too, where it is found.
+  const std::vector<Eigen::Vector3f> no_gains(photos.size(), Eigen::Vector3f::Ones());
+  const double before = MeasureDisagreement(store, no_gains).before;
   result.exposure = UnifyExposure(input.samples, options.exposure, num_threads, &photos, &store);
   result.comparison = ComparePhotos(store, result.exposure.gains);
   result.agreement = result.comparison.Agreement();
-  LeaveOutForeignPhotos(photos, result.agreement, options.blend.min_agreement);
+  LeaveOutForeignPhotos(photos, result.agreement, scene.surfaces, options);
   result.disagreement = MeasureDisagreement(store, result.exposure.gains);
+  result.disagreement.before = before;
 
   const bool masked =
       MaskMovingThings(input, store, result.exposure.gains, options.blend, num_threads, &photos);
@@ -510,8 +550,8 @@ ColorizeResult ColorizeStation(const std::vector<Scan>& station, size_t index,
   return result;
 }
 
-ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOptions& options,
-                              bool strict, int num_threads, Progress* progress, PhotoList* list) {
+ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, ColorizeOptions options, bool strict,
+                              int num_threads, Progress* progress, PhotoList* list) {
   while (true) {
     try {
       return ColorizeScans(scans, list->photos, options, num_threads, progress);
@@ -523,6 +563,9 @@ ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOpti
       std::vector<PhotoView>& photos = list->photos;
       photos.erase(std::remove_if(photos.begin(), photos.end(), is_unusable), photos.end());
       if (photos.empty()) throw;
+      if (dynamic_cast<const ForeignPhotos*>(&unusable) != nullptr) {
+        options.num_left_out_as_foreign += unusable.photos().size();
+      }
       list->left_out.insert(list->left_out.end(), unusable.photos().begin(),
                             unusable.photos().end());
     }

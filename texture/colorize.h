@@ -45,7 +45,8 @@ struct ColorizeOptions {
   AtlasOptions atlas;  // of meshes without a grid
   // ColorizeStation() follows: the result keeps what hides.
   bool keep_occluders = false;
-  std::string debug_path;  // folder for debug_images.h; "" = none
+  size_t num_left_out_as_foreign = 0;  // photos, before: of the fifth that may be
+  std::string debug_path;              // folder for debug_images.h; "" = none
 
   void Declare(OptionFields* fields);  // its own, not those of the structs in it
   std::vector<std::string> Problems() const;
@@ -89,7 +90,7 @@ inline constexpr double kCoarseTolerance = 0.02;
 // ColorizeScans with photos that cannot be used: a file that looked like a photo and is broken
 // further down, a photo that contradicts the others. They go from list->photos to list->left_out,
 // and all is done again without them. strict, or none left: throws.
-ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, const ColorizeOptions& options,
-                              bool strict, int num_threads, Progress* progress, PhotoList* list);
+ColorizeResult ColorizeUsable(const std::vector<Scan>& scans, ColorizeOptions options, bool strict,
+                              int num_threads, Progress* progress, PhotoList* list);
 
 }  // namespace roomtex

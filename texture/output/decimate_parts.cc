@@ -212,12 +212,21 @@ void DecimateParts(const std::vector<Scan>& scans, size_t max_triangles, int num
                    std::vector<std::vector<TexturedPart>>* parts) {
   const size_t total = CountTriangles(*parts);
   if (max_triangles == 0 || total <= max_triangles) return;
-  const double share = static_cast<double>(max_triangles) / static_cast<double>(total);
+  // The few large triangles of a small mesh hold more than as many small ones of a scan.
+  const size_t kept = max_triangles / (2 * scans.size());
+  size_t all_kept = 0;
+  for (const std::vector<TexturedPart>& of_scan : *parts) {
+    all_kept += std::min(kept, TrianglesOf(of_scan));
+  }
+  const double share_of_rest =
+      static_cast<double>(max_triangles - all_kept) / static_cast<double>(total - all_kept);
   for (size_t s = 0; s < scans.size(); ++s) {
     std::vector<TexturedPart>& of_scan = (*parts)[s];
     const size_t num_triangles = TrianglesOf(of_scan);
-    const auto wanted = static_cast<size_t>(share * static_cast<double>(num_triangles));
-    if (num_triangles == 0) continue;
+    if (num_triangles <= kept) continue;
+    const size_t wanted =
+        kept + static_cast<size_t>(share_of_rest * static_cast<double>(num_triangles - kept));
+    const double share = static_cast<double>(wanted) / static_cast<double>(num_triangles);
     int square_samples = 0;  // of an atlas: its texture runs straight in each chart
     if (scans[s].organised) {
       const double samples = std::sqrt(kTrianglesPerSquare / (2 * share));  // two triangles each

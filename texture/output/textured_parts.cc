@@ -31,11 +31,11 @@ struct Cuts {
       quads = num_samples;
       return;
     }
-    const int most = std::max(2, max_size / scale);
+    const int most = std::max(3, max_size / scale);
     const int aligned = most / kAlignment * kAlignment - 2 * kOverlap;
     overlap = aligned >= 4 * kOverlap ? kOverlap : 0;
     if (overlap == 0) {
-      quads = most - 1;
+      quads = most - 2;
       return;
     }
     const int parts = (num_samples + aligned - 1) / aligned;
@@ -43,10 +43,10 @@ struct Cuts {
     quads = (even + kAlignment - 1) / kAlignment * kAlignment;
   }
   int First(int part) const { return part == 0 && overlap == 0 ? 0 : part * quads - overlap; }
-  // Samples of a part's image.
+  // Samples of a part's image: the triangles over a missing sample are two quads long.
   int Length(int part) const {
     if (overlap > 0) return quads + 2 * overlap;
-    return std::min(quads + 1, samples - part * quads);
+    return std::min(quads + 2, samples - part * quads);
   }
 };
 

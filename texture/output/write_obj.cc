@@ -54,6 +54,15 @@ std::vector<size_t> NumberVertices(size_t num_points, const std::vector<Textured
   return numbers;
 }
 
+// The same of a cloud, which has no parts: every measured point.
+std::vector<size_t> NumberPoints(const Scan& cloud, size_t* next) {
+  std::vector<size_t> numbers(cloud.points.size(), 0);
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (!cloud.IsMissing(static_cast<int>(i))) numbers[i] = (*next)++;
+  }
+  return numbers;
+}
+
 void WriteVertices(const Scan& scan, const ColoredScan& colored, const std::vector<size_t>& numbers,
                    bool with_colors, TextSink* sink) {
   constexpr int kMicrometres = 6;
@@ -93,6 +102,7 @@ void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredSc
   OutputFile obj(file_path("model.obj")), mtl(file_path("model.mtl"));
   mtl.stream() << "# roomtex-texture: photos on the scan; they hold the light already\n";
   int num_images = 0;
+  bool has_plain = false;
   {
     TextSink sink(&obj.stream());
     const Eigen::Vector3d& up = scans.at(0).up;
@@ -104,7 +114,9 @@ void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredSc
       const bool textured = scans[s].organised || !colored[s].atlas.empty();
       (sink << "o scan_").Number(s) << "\n";
       const std::vector<size_t> numbers =
-          NumberVertices(scans[s].points.size(), parts[s], &next_vertex);
+          scans[s].kind() == Scan::Kind::kCloud
+              ? NumberPoints(scans[s], &next_vertex)
+              : NumberVertices(scans[s].points.size(), parts[s], &next_vertex);
       WriteVertices(scans[s], colored[s], numbers, !textured, &sink);
       for (const TexturedPart& part : parts[s]) {
         if (textured) {
@@ -114,6 +126,12 @@ void WriteColoredObj(const std::vector<Scan>& scans, const std::vector<ColoredSc
           mtl.stream() << "newmtl " << name << "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd "
                        << image << "\n";
           sink << "usemtl " << name << "\n";
+        } else {
+          // A material holds on over the next object, textures and all.
+          if (!has_plain)
+            mtl.stream() << "newmtl vertex_colors\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\n";
+          has_plain = true;
+          sink << "usemtl vertex_colors\n";
         }
         for (const Eigen::Vector2f& uv : part.uv) {  // OBJ counts rows from below
           (sink << "vt ").Number(uv.x(), 7) << " ";

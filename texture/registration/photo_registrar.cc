@@ -386,8 +386,8 @@ std::optional<PhotoRegistrar::Seen> PhotoRegistrar::See(int i, const Sighting& s
   Seen seen;
   seen.by_point = by_point * view.cam_from_scan.rotation.toRotationMatrix();
   seen.place.photo = i;
-  Eigen::Matrix<double, 3, 6> by_step;  // of Moved()
-  by_step << -CrossMatrix(view.cam_from_scan.rotation * x_in_scan), Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 3, 6> by_step;  // of MovedInPlace()
+  by_step << -CrossMatrix(x_in_cam), Eigen::Matrix3d::Identity();
   seen.place.by_pose.leftCols<6>() = (by_point * by_step).cast<float>();
   if (options_.row_turn_deg > 0) {
     seen.place.by_pose.rightCols<3>() =
@@ -432,8 +432,9 @@ PhotoPrior PhotoRegistrar::PriorOf(int i, bool with_warp) const {
   PhotoPrior prior;
   prior.is_free = IsFree(i);
   const Rigid& pose = photos_[i].cam_from_scan;
-  prior.pose << VectorFromRotation(pose.rotation * photo.first_pose.rotation.conjugate()),
-      pose.translation - photo.first_pose.translation, photo.row_turn;
+  const Eigen::Quaterniond turn = pose.rotation * photo.first_pose.rotation.conjugate();
+  prior.pose << VectorFromRotation(turn), pose.translation - turn * photo.first_pose.translation,
+      photo.row_turn;
   // What moves nothing is held at 0 by any sigma.
   const double row_turn_deg = options_.row_turn_deg > 0 ? options_.row_turn_deg : 1;
   prior.pose_sigma << Eigen::Vector3d::Constant(RadFromDeg(options_.turn_deg)),
@@ -447,7 +448,7 @@ PhotoPrior PhotoRegistrar::PriorOf(int i, bool with_warp) const {
 void PhotoRegistrar::Move(int i, const PhotoStep& step) {
   if (!IsFree(i)) return;
   RegisteredPhoto& photo = registered_[i];
-  photos_[i].cam_from_scan = Moved(photos_[i].cam_from_scan, step.pose.head<6>());
+  photos_[i].cam_from_scan = MovedInPlace(photos_[i].cam_from_scan, step.pose.head<6>());
   photo.row_turn += step.pose.tail<3>();
   for (size_t n = 0; n < step.warp.size(); ++n) {
     photo.warp.Shift(static_cast<int>(n)) += step.warp[n];

@@ -152,6 +152,15 @@ class CameraSource {
   std::map<std::string, uint32_t> camera_of_;
 };
 
+// What cannot be read is said where the colours are.
+cv::Mat1b TransparencyOf(const PhotoView& view) {
+  try {
+    return ReadTransparency(view.path, view.pixels);
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 std::vector<AssociatedPhotos> ReadAssociations(const std::string& path) {
@@ -202,7 +211,7 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
   PhotoList list;
   const auto file_of = ChooseFiles(model_in_scan, sources, &list.warnings);
   CameraSource cameras(model_in_scan, sources);
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, transparent;
   for (const auto& [id, image] : model_in_scan.images) {
     const auto file = file_of.find(image.name);
     if (file == file_of.end()) continue;
@@ -224,8 +233,14 @@ PhotoList ListPhotos(const SparseModel& model_in_scan, const PhotoSources& sourc
     view.pixels = fit.pixels;
     view.camera = fit.scaled ? ScaleCamera(camera, fit.width, fit.height) : camera;
     view.cam_from_scan = image.cam_from_model;
+    view.transparent = MaskOfTransparency(TransparencyOf(view));
+    if (view.transparent) transparent.push_back(view.name);
     list.photos.push_back(std::move(view));
     if (!fit.note.empty()) notes.push_back(fit.note);
+  }
+  if (!transparent.empty()) {
+    list.warnings.push_back(fmt::format("{} are transparent in part, and give no colour there.",
+                                        Enumerate(transparent)));
   }
   for (const std::string& note : FirstNotes(notes)) list.warnings.push_back(note);
   if (!cameras.Warning().empty()) list.warnings.push_back(cameras.Warning());

@@ -1,10 +1,13 @@
 #pragma once
-// Parts of a photo that show something else than the surface behind: somebody who stood there.
+// Parts of a photo that do not show the surface: somebody stood before it, or it was cut out.
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
+
+#include <opencv2/core/mat.hpp>
 
 namespace roomtex {
 
@@ -31,5 +34,8 @@ class PhotoMask {
   int cell_px_, columns_, rows_;
   std::vector<uint8_t> is_masked_;  // row by row
 };
+
+// Of ReadTransparency(), and as far around as a look at a photo reaches; none if that is empty.
+std::shared_ptr<const PhotoMask> MaskOfTransparency(const cv::Mat1b& transparent);
 
 }  // namespace roomtex

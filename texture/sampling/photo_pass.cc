@@ -47,6 +47,7 @@ class PhotoObserver {
         projector_(view),
         warp_(view.warp),
         moving_(view.moving),
+        transparent_(view.transparent),
         visibility_(projector_, input.occluders, input.angular_spacing, occlusion),
         image_(std::move(picture)) {
     if (view.camera.IsPanorama()) {
@@ -95,6 +96,7 @@ class PhotoObserver {
       Eigen::Vector2f shown(x, y);
       if (warp_) shown += warp_->At(x, y);
       if (!(shown.minCoeff() >= 0 && shown.x() <= width && shown.y() <= height)) continue;
+      if (transparent_ && transparent_->At(shown.x(), shown.y())) continue;
       const Eigen::Vector3f camera_direction = to_camera.normalized();
       if (probe_stride_ > 0 && (tile.first_slot + i) % probe_stride_ == 0 && sight == Sight::kClear)
         Probe(tile.first_slot + i, shown, to_camera.norm() / focal_length,
@@ -140,7 +142,7 @@ class PhotoObserver {
   size_t probe_stride_;  // 0 = no probes
   PhotoProjector projector_;
   std::shared_ptr<const PhotoWarp> warp_;
-  std::shared_ptr<const PhotoMask> moving_;
+  std::shared_ptr<const PhotoMask> moving_, transparent_;
   PhotoVisibility visibility_;
   cv::Mat image_;    // sRGB
   int seam_px_ = 0;  // columns that a panorama's image goes on for beyond both borders

@@ -36,6 +36,12 @@ class UnusablePhotos : public InputError {
   std::vector<PhotoLeftOut> photos_;
 };
 
+// They show something else than the others.
+class ForeignPhotos : public UnusablePhotos {
+ public:
+  using UnusablePhotos::UnusablePhotos;
+};
+
 // Adds every photo's observations to the store. Returns how many samples each photo sees of each
 // grid. probes: null, or what CompareSharpness() asks for, per photo. Throws UnusablePhotos; the
 // store is then of no use.

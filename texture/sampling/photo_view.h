@@ -28,7 +28,8 @@ struct PhotoView {
   float weight = 1;  // share of its weight in the blend that it keeps, e.g. a blurred one
   std::shared_ptr<const PhotoWarp> warp;  // what camera and pose do not say; none = nothing
 
-  std::shared_ptr<const PhotoMask> moving;  // parts that count for nothing; none = nothing
+  std::shared_ptr<const PhotoMask> moving;       // parts that count for nothing; none = nothing
+  std::shared_ptr<const PhotoMask> transparent;  // parts that show nothing at all
 
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }
 };

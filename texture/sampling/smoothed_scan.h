@@ -38,6 +38,7 @@ struct SmoothedScan {
   double range_noise = 0;         // metres, robust estimate of one sample's standard deviation
   double angular_spacing = 0;     // radians between neighbouring samples, median; 0 = not known
   bool station_is_known = false;  // the scanner stood at Scan::Station()
+  bool has_shadows = true;        // clouds: known is from where some of it was measured
   bool front_is_known = false;    // clouds: the normals point to where it can be seen from
 };
 

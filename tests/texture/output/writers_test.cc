@@ -159,6 +159,32 @@ TEST(WriteColoredGlb, SplitsLargeGridsIntoTexturesThatShareTheirBorders) {
   ExpectColorsAtVertices(model, scan, colored.triangles.size());
 }
 
+// The triangles over a missing sample are two rows high, and one of them lies over each cut.
+TEST(TexturedParts, TrianglesOverHolesFitWhereverACutIs) {
+  TwoWalls scene;
+  scene.board_half = 0;
+  const Scan scan = scene.MakeScan(60, 40);
+  ColoredScan colored = ColorByCell(scan);
+  colored.triangles.clear();
+  for (int row = 1; row + 1 < scan.num_rows; ++row) {
+    const int column = 5 + row % 3;
+    colored.triangles.push_back(
+        {scan.Index(column, row - 1), scan.Index(column - 1, row), scan.Index(column, row + 1)});
+  }
+  for (const int max_size : {2, 3, 5, 8, 25}) {
+    size_t num_corners = 0;
+    for (const TexturedPart& part : MakeTexturedParts(scan, colored, max_size)) {
+      num_corners += part.corners.size();
+      for (size_t v = 0; v < part.vertices.size(); ++v) {
+        EXPECT_NEAR(part.uv[v].y() * part.height,
+                    part.vertices[v] / scan.num_columns - part.first_row + 0.5, 1e-4);
+        EXPECT_LT(part.uv[v].y(), 1) << max_size;
+      }
+    }
+    EXPECT_EQ(num_corners, 3 * colored.triangles.size());
+  }
+}
+
 // A wall of 400 x 150 samples whose colours tell their cell; every cell as 2 x 2 texels.
 struct LargeWall {
   Scan scan;
@@ -265,6 +291,24 @@ TEST(DecimateParts, LeavesAsManyAsWantedWithoutGapsAndColoursInPlace) {
       ASSERT_EQ(image(y, x), cv::Vec3b(want[2], want[1], want[0]));
     }
   }
+}
+
+TEST(DecimateParts, ASmallMeshBesideALargeScanStaysAsItIs) {
+  const LargeWall wall;
+  Scan mesh;
+  mesh.organised = false;
+  mesh.num_columns = 3;
+  mesh.num_rows = 1;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  ColoredScan colored;
+  colored.triangles = {{0, 1, 2}};
+  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  std::vector<std::vector<TexturedPart>> parts =
+      MakeMeshParts({wall.scan, mesh}, {wall.colored, colored}, 256);
+  DecimateParts({wall.scan, mesh}, 5000, 2, &parts);
+  EXPECT_LE(CountTriangles(parts), 5000u);
+  EXPECT_GT(CountTriangles(parts), 3000u);
+  EXPECT_EQ(CountTriangles({parts[1]}), 1u);
 }
 
 TEST(WriteWebGlb, ThePictureIsThatOfTheWholeMesh) {
@@ -421,7 +465,36 @@ TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
   EXPECT_NE(obj.find("v 0.000000 0.000000 0.000000 1.0000 0.0000 0.2000\n"), std::string::npos);
   EXPECT_NE(obj.find("f 1 2 3\n"), std::string::npos);
   EXPECT_NE(obj.find("f 4 5 6\n"), std::string::npos);  // the second scan
-  EXPECT_EQ(obj.find("usemtl"), std::string::npos);
+  EXPECT_EQ(obj.find("usemtl model"), std::string::npos);
+}
+
+TEST(WriteColoredObj, AMeshBehindATexturedScanDoesNotTakeItsMaterial) {
+  const TempFolder folder;
+  const LargeWall wall;
+  Scan mesh;
+  mesh.organised = false;
+  mesh.num_columns = 3;
+  mesh.num_rows = 1;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  ColoredScan colored;
+  colored.triangles = {{0, 1, 2}};
+  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  Scan cloud = mesh;
+  ColoredScan points = colored;
+  points.triangles.clear();
+  const std::vector<Scan> scans = {wall.scan, mesh, cloud};
+  const std::vector<ColoredScan> all = {wall.colored, colored, points};
+  WriteColoredObj(scans, all, MakeMeshParts(scans, all, 512), false,
+                  [&](const std::string& name) { return folder / name; });
+  const std::string obj = ReadBytes(folder / "model.obj");
+  const size_t second = obj.find("o scan_1\n"), third = obj.find("o scan_2\n");
+  ASSERT_TRUE(second != std::string::npos && third != std::string::npos);
+  const std::string of_mesh = obj.substr(second, third - second);
+  EXPECT_NE(of_mesh.find("usemtl vertex_colors\nf "), std::string::npos) << of_mesh;
+  EXPECT_NE(ReadBytes(folder / "model.mtl").find("newmtl vertex_colors\n"), std::string::npos);
+  // A cloud has its points.
+  EXPECT_NE(obj.find("v 1.000000 0.000000 0.000000 0.0000 0.0000 0.0000\n", third),
+            std::string::npos);
 }
 
 TEST(PaintGutters, TakesTheNearestKnownColor) {

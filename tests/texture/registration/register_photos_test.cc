@@ -68,6 +68,37 @@ TEST_F(RegisterPhotosTest, OnePhotoAmongManyIsPutRight) {
             3 * with.registration.photos[4].shift_after_px);
 }
 
+// Site and map grids have their origin far away.
+TEST_F(RegisterPhotosTest, CamerasAreTurnedWhereTheyStand) {
+  const auto registered = [](const Eigen::Vector3d& origin) {
+    std::vector<PhotoView> photos = Photos(0, 0);
+    for (size_t i = 0; i < photos.size(); ++i) {
+      Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
+      step[i % 3] = RadFromDeg(i % 2 == 0 ? 0.2 : -0.2);
+      photos[i].cam_from_scan = MovedInPlace(photos[i].cam_from_scan, step);
+      photos[i].cam_from_scan.translation -= photos[i].cam_from_scan.rotation * origin;
+    }
+    Scan scan = room_->MakeScan();
+    for (Eigen::Vector3d& x : scan.points) x += origin;
+    scan.scan_from_station.translation += origin;
+    Progress quiet(true);
+    ColorizeOptions options;
+    options.registration.mode = "pose";
+    return ColorizeScans({scan}, photos, options, 2, &quiet).registration.photos;
+  };
+  const auto here = registered(Eigen::Vector3d::Zero());
+  const auto there = registered({3000, -2000, 500});
+  double turned = 0, moved = 0;
+  for (size_t i = 0; i < here.size(); ++i) {
+    EXPECT_NEAR(there[i].turned_deg, here[i].turned_deg, 0.02);
+    EXPECT_NEAR(there[i].moved, here[i].moved, 1e-3);
+    turned += here[i].turned_deg / static_cast<double>(here.size());
+    moved += here[i].moved / static_cast<double>(here.size());
+  }
+  EXPECT_NEAR(turned, 0.2, 0.06);
+  EXPECT_LT(moved, 5e-3);
+}
+
 TEST_F(RegisterPhotosTest, AWarpSaysWhatTheCameraDoesNot) {
   const double best = Psnr(Colorize(Photos(0, 0), "none"));
   std::vector<PhotoView> photos = Photos(0, 0);
