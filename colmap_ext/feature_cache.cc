@@ -24,10 +24,16 @@ std::vector<int> EvenChoice(size_t size, int count) {
   return chosen;
 }
 
-// Visual words of an even choice of the photos and of their descriptors.
-Eigen::MatrixXf LearnWordsOf(FeatureCache* features, uint64_t seed, Progress* progress) {
-  const std::vector<int> photos =
-      EvenChoice(static_cast<size_t>(features->num_photos()), kMaxWordPhotos);
+std::vector<int> EvenChoiceOf(const std::vector<int>& photos, int count) {
+  std::vector<int> chosen = EvenChoice(photos.size(), count);
+  for (int& photo : chosen) photo = photos[static_cast<size_t>(photo)];
+  return chosen;
+}
+
+// Visual words of an even choice of these photos and of their descriptors.
+Eigen::MatrixXf LearnWordsOf(const std::vector<int>& with_features, FeatureCache* features,
+                             uint64_t seed, Progress* progress) {
+  const std::vector<int> photos = EvenChoiceOf(with_features, kMaxWordPhotos);
   progress->Stage("read features", static_cast<int>(photos.size()));
   std::vector<uint8_t> sample;
   for (const int photo : photos) {
@@ -70,6 +76,16 @@ size_t FeatureCache::max_photos() const {
   return static_cast<size_t>(kMaxFeaturesInMemory / num_features_);
 }
 
+std::vector<int> FeatureCache::PhotosWithFeatures() const {
+  const std::map<uint32_t, size_t> counts = database_->CountKeypoints();
+  std::vector<int> photos;
+  for (int photo = 0; photo < num_photos(); ++photo) {
+    const auto count = counts.find(images_[static_cast<size_t>(photo)].image_id);
+    if (count != counts.end() && count->second > 0) photos.push_back(photo);
+  }
+  return photos;
+}
+
 void FeatureCache::Load(const std::set<int>& photos) {
   if (features_.size() + photos.size() > max_photos()) {
     for (auto it = features_.begin(); it != features_.end();) {
@@ -87,9 +103,11 @@ void FeatureCache::Load(const std::set<int>& photos) {
 
 Eigen::MatrixXf SignPhotos(FeatureCache* features, int num_threads, uint64_t random_seed,
                            Progress* progress) {
-  const Eigen::MatrixXf words = LearnWordsOf(features, random_seed, progress);
-  const std::vector<int> for_axes =
-      EvenChoice(static_cast<size_t>(features->num_photos()), kMaxAxesPhotos);
+  // Every other photo may be of a bare wall: an even choice of all could be of those alone.
+  const std::vector<int> with_features = features->PhotosWithFeatures();
+  if (with_features.empty()) return Eigen::MatrixXf::Zero(1, features->num_photos());
+  const Eigen::MatrixXf words = LearnWordsOf(with_features, features, random_seed, progress);
+  const std::vector<int> for_axes = EvenChoiceOf(with_features, kMaxAxesPhotos);
   progress->Stage("signatures", static_cast<int>(for_axes.size()) + features->num_photos());
   Eigen::MatrixXf vlads(words.size(), static_cast<Eigen::Index>(for_axes.size()));
   ForEachVlad(for_axes, words, num_threads, features, progress,

@@ -22,6 +22,7 @@ class FeatureCache {
   FeatureCache(const Database& database, int num_features);
 
   int num_photos() const { return static_cast<int>(images_.size()); }
+  std::vector<int> PhotosWithFeatures() const;
   size_t max_photos() const;  // that Load() may be asked for at once
 
   // These photos' features into memory; others make room. Throws InputError as Database does.
@@ -38,7 +39,7 @@ class FeatureCache {
 };
 
 // A column per photo, see photo_signature.h: words and axes are learned from an even choice of the
-// photos, which are read three times in the whole. Same seed, same signatures.
+// photos that have features, which are read three times in the whole. Same seed, same signatures.
 Eigen::MatrixXf SignPhotos(FeatureCache* features, int num_threads, uint64_t random_seed,
                            Progress* progress);
 

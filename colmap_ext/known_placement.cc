@@ -189,6 +189,7 @@ Json KnownToJson(const KnownPlacement& placement, const KnownPhotos& known,
   std::set<uint32_t> held;
   std::set_difference(fit.agreeing.begin(), fit.agreeing.end(), placement.rough.begin(),
                       placement.rough.end(), std::inserter(held, held.end()));
+  held.insert(placement.added.begin(), placement.added.end());
   json["photos_held"] = names(placement.held ? held : std::set<uint32_t>());
   // What one standpoint leaves open, the scan tells (roomtex-align), which needs the poses as told.
   json["told"] = Json::array();

@@ -202,12 +202,9 @@ LensFinding FindingOf(const SparseModel& model, const PhotoBundle& bundle, int i
       told.push_back(model.cameras.at(image.camera_id));
   }
   finding.camera_ids.assign(camera_ids.begin(), camera_ids.end());
-  finding.told = RicherCamera(MedianCamera(told));
-  finding.told_alike = std::all_of(told.begin(), told.end(), [&](const Camera& camera) {
-    return camera.params == told[0].params;
-  });
   finding.found = lens.camera;
-  finding.SetCovariance(noise * bundle.covariances[static_cast<size_t>(index)]);
+  finding.covariance = noise * bundle.covariances[static_cast<size_t>(index)];
+  finding.Tell(told);
   if (finding.sigmas.size() == 0) finding.found = finding.told;
   return finding;
 }
@@ -219,7 +216,20 @@ RefineIntrinsics RefineIntrinsicsFromWord(const std::string& word) {
   return word == "0" ? RefineIntrinsics::kNever : RefineIntrinsics::kAlways;
 }
 
-void LensFinding::SetCovariance(const Eigen::MatrixXd& covariance) {
+void LensFinding::Tell(const std::vector<Camera>& cameras) {
+  std::vector<Camera> rich;
+  for (const Camera& camera : cameras) rich.push_back(RicherCamera(camera));
+  const bool is_one_kind = std::all_of(
+      rich.begin(), rich.end(), [&](const Camera& camera) { return camera.model == found.model; });
+  if (rich.empty() || !is_one_kind) return;
+  told = MedianCamera(rich);
+  told_alike = std::all_of(rich.begin(), rich.end(),
+                           [&](const Camera& camera) { return camera.params == rich[0].params; });
+  SetCovariance(covariance);
+}
+
+void LensFinding::SetCovariance(const Eigen::MatrixXd& of_found) {
+  covariance = of_found;
   focal_sigma = MeanFocalSigma(found, covariance);
   if (covariance.size() == 0) return;
   sigmas = covariance.diagonal().cwiseSqrt();

@@ -33,9 +33,10 @@ struct LensFinding {
   // What was told (RicherCamera): of cameras with different intrinsics the parameters' medians.
   Camera told;
   bool told_alike = true;
-  Camera found;            // as told where the photos say nothing
-  Eigen::VectorXd sigmas;  // of found's parameters, one standard deviation; empty = not determined
-  double focal_sigma = 0;  // of the mean focal length, pixels; infinite = not determined
+  Camera found;                // as told where the photos say nothing
+  Eigen::MatrixXd covariance;  // of found's parameters; 0 x 0 = not determined
+  Eigen::VectorXd sigmas;      // their standard deviations; empty = not determined
+  double focal_sigma = 0;      // of the mean focal length, pixels; infinite = not determined
   // How far found is from told, all parameters together: the root of the squared distance in their
   // covariance (Mahalanobis 1936).
   double deviations = 0;
@@ -43,9 +44,11 @@ struct LensFinding {
   // Told and found differ by more than keypoints do, photo by photo.
   bool Contradicts() const;
 
-  // Sets sigmas, focal_sigma and deviations by the covariance of found's parameters; 0 x 0 = not
-  // determined.
-  void SetCovariance(const Eigen::MatrixXd& covariance);
+  // Sets sigmas, focal_sigma and deviations, too.
+  void SetCovariance(const Eigen::MatrixXd& of_found);
+  // Sets told, told_alike and deviations by the cameras that were told. Nothing is done if `found`
+  // is of another camera model than RicherCamera makes of them.
+  void Tell(const std::vector<Camera>& cameras);
   double FocalDeviations() const;
   std::string Sentence() const;  // what is said of a lens that is used
 };

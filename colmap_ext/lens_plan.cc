@@ -106,12 +106,14 @@ bool LensPlan::IsAsInDatabase() const {
   });
 }
 
-void LensPlan::Take(const LensCheck& found, const SparseModel& model) {
+std::vector<LensFinding> LensPlan::Take(const LensCheck& found, const SparseModel& model) {
+  std::vector<LensFinding> taken;
   const bool any_main =
       std::any_of(found.lenses.begin(), found.lenses.end(),
                   [](const LensFinding& lens) { return lens.used && !lens.apart; });
   for (const LensFinding& lens : found.lenses) {
     if (!lens.used || (lens.apart && any_main)) continue;
+    taken.push_back(lens);
     uint32_t camera_id = lens.camera_ids.front();
     if (lens.apart) {
       camera_id = NextId(cameras_, database_cameras_);
@@ -130,6 +132,7 @@ void LensPlan::Take(const LensCheck& found, const SparseModel& model) {
       cameras_[id] = std::move(camera);
     }
   }
+  return taken;
 }
 
 void LensPlan::Calibrate(const SparseModel& model) {

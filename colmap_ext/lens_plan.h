@@ -38,7 +38,8 @@ class LensPlan {
 
   // With lenses as they were found (of a model of this plan); those not used stay. Photos are set
   // apart only where all else stays: beside a wrong lens single photos look wrong that are right.
-  void Take(const LensCheck& found, const SparseModel& model);
+  // Gives those that were taken.
+  std::vector<LensFinding> Take(const LensCheck& found, const SparseModel& model);
 
   // The cameras of a model of this plan as they are there, calibrated ones from now on.
   void Calibrate(const SparseModel& model);

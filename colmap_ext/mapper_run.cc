@@ -22,11 +22,15 @@ void Set(const std::string& name, const std::string& value, ColmapOptions* optio
   options->emplace_back(name, value);
 }
 
-// The line in which COLMAP refuses an option; "" if it does not.
+// What COLMAP says when it refuses an option; "" if it does not.
 std::string OptionRefusal(const ColmapRun& run) {
+  std::string reason;  // the first: others only follow from it
   for (const std::string& line : run.last) {
+    const size_t check = line.find("Check failed: ");
+    if (reason.empty() && check != std::string::npos) reason = line.substr(check);
+    // Which one it is stands in a line before.
+    if (line.find("nvalid option") != std::string::npos) return reason.empty() ? line : reason;
     if (line.find("Failed to parse options") != std::string::npos ||
-        line.find("nvalid option") != std::string::npos ||
         line.find("unrecognised option") != std::string::npos ||
         line.find("Check failed: options") != std::string::npos ||
         line.find("Check failed: mapper") != std::string::npos) {
@@ -36,9 +40,16 @@ std::string OptionRefusal(const ColmapRun& run) {
   return "";
 }
 
-// Adjusts the model with these cameras as they are given, the others refined. False, and nothing
-// done, where there is none of them, or where that fails.
-bool HoldCameras(const std::map<uint32_t, Camera>& held, SparseModel* model) {
+bool HasRigs(const SparseModel& model) {
+  return std::any_of(model.images.begin(), model.images.end(),
+                     [](const auto& image) { return image.second.frame_id != kNoFrame; });
+}
+
+enum class Holding { kNotNeeded, kDone, kFailed };
+
+// Adjusts the model with these cameras as they are given, the others refined. Only kDone changes
+// it; kNotNeeded: it has none of them.
+Holding HoldCameras(const std::map<uint32_t, Camera>& held, SparseModel* model) {
   LensSet lenses = LensesOf(*model);
   bool any = false;
   for (Lens& lens : lenses.lenses) {
@@ -48,11 +59,12 @@ bool HoldCameras(const std::map<uint32_t, Camera>& held, SparseModel* model) {
     lens.camera = lens.told = one->second;
     any = true;
   }
-  if (!any) return false;
+  if (!any) return Holding::kNotNeeded;
+  if (HasRigs(*model)) return Holding::kFailed;  // single photos would take them apart
   PhotoBundle bundle = AdjustPhotos(*model, lenses, KeypointNoise(*model));
-  if (!bundle.usable) return false;
+  if (!bundle.usable) return Holding::kFailed;
   *model = PutBack(WithLenses(bundle.model, bundle.lenses), *model);
-  return true;
+  return Holding::kDone;
 }
 
 }  // namespace
@@ -254,8 +266,14 @@ MapperResult MapperRun::Close(const std::string& folder, bool two_view_tracks) {
 
   result.folder = adjusted;
   result.model = ReadSparseModel(adjusted);
-  if (options_.refine_intrinsics && HoldCameras(options_.held_cameras, &result.model)) {
-    WriteSparseModel(result.model, adjusted);
+  if (options_.refine_intrinsics) {
+    const Holding holding = HoldCameras(options_.held_cameras, &result.model);
+    result.could_not_hold = holding == Holding::kFailed;
+    if (holding == Holding::kDone) {
+      // Not over COLMAP's: 4.x has put rigs and frames there that would be another model's.
+      result.folder = Folder("held");
+      WriteSparseModel(result.model, result.folder);
+    }
   }
   result.mean_reprojection_error_px = MeanPointError(&result.model);
   return result;

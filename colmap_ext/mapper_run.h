@@ -26,10 +26,11 @@ struct MapperOptions {
 };
 
 struct MapperResult {
-  std::string folder;  // the finished model as COLMAP wrote it; "" if there is none
+  std::string folder;  // the finished model; "" if there is none
   SparseModel model;
   double mean_reprojection_error_px = 0;  // mean over points, as model_analyzer
   bool grew = false;                      // images beyond the seed's were registered
+  bool could_not_hold = false;            // MapperOptions::held_cameras are as COLMAP refined them
   std::string problem;                    // what went wrong; "" if nothing
 };
 

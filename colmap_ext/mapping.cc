@@ -12,6 +12,7 @@
 #include "colmap_ext/mapping_report.h"
 #include "colmap_ext/model_check.h"
 #include "colmap_ext/photo_groups.h"
+#include "core/error.h"
 #include "core/output_file.h"
 #include "core/text.h"
 
@@ -60,6 +61,12 @@ void ChainLeftOut(const Database& database, const MatchedImages& images, MapperR
   outcome->reasons = std::move(chain.reasons);
 }
 
+std::string OutcomeSentence(const MapperResult& result) {
+  if (!result.problem.empty()) return result.problem;
+  return std::to_string(result.model.images.size()) + " photos registered" +
+         (result.grew ? "" : ", all of them of the seed");
+}
+
 // Seeds one after the other until COLMAP makes something of one.
 std::vector<MappingOutcome> TrySeeds(const Database& database, MatchedImages* images,
                                      MapperRun* mapper, const MappingOptions& options,
@@ -85,15 +92,7 @@ std::vector<MappingOutcome> TrySeeds(const Database& database, MatchedImages* im
     if (options.chain.enabled && !outcome.result.folder.empty() && num_mapped < num_images) {
       ChainLeftOut(database, *images, mapper, options, context, &outcome);
     }
-    const bool all_in_seed = static_cast<int>(outcome.seed.poses.images.size()) == num_images;
-    if (outcome.result.problem.empty() && !outcome.result.grew && !all_in_seed) {
-      outcome.result.problem = "no further photo could be registered";
-    }
-    trials->push_back(
-        TrialJson(outcome.seed.trial, *images,
-                  outcome.result.problem.empty()
-                      ? std::to_string(outcome.result.model.images.size()) + " photos registered"
-                      : outcome.result.problem));
+    trials->push_back(TrialJson(outcome.seed.trial, *images, OutcomeSentence(outcome.result)));
     if (!outcome.result.problem.empty()) {
       context.Warn("starting from " + images->images().at(outcome.seed.trial.image_id1).name +
                    " and " + images->images().at(outcome.seed.trial.image_id2).name + ": " +
@@ -171,11 +170,32 @@ SparseModel PosesOf(const SparseModel& model, const std::set<uint32_t>& photos) 
   return poses;
 }
 
-// The later one, if it lost no photos.
-MappingPass BetterOf(MappingPass first, MappingPass second) {
-  if (second.best.empty()) return first;
-  if (second.model().images.size() < first.model().images.size()) return first;
-  return second;
+size_t NumPhotos(const MappingPass& pass) {
+  return pass.best.empty() ? 0 : pass.model().images.size();
+}
+
+// From which version on COLMAP knows a camera model (major * 100 + minor).
+int FirstVersionWith(CameraModel model) {
+  if (model <= CameraModel::kThinPrismFisheye) return 0;
+  return model == CameraModel::kRadTanThinPrismFisheye ? 311 : 400;
+}
+
+// COLMAP aborts where it meets the number of a camera model that it does not know.
+void RequireKnownCameraModels(const ColmapProgram& colmap, const LensPlan& plan,
+                              const std::string& database_path) {
+  const int version = colmap.VersionNumber();
+  for (const auto& [id, image] : plan.images()) {
+    const CameraModel model = plan.cameras().at(image.camera_id).model;
+    const int first = FirstVersionWith(model);
+    if (version == 0 || version >= first) continue;
+    throw InputError(
+        database_path, "camera " + std::to_string(image.camera_id),
+        fmt::format("is {}, which COLMAP {}.{} does not know", CameraModelName(model),
+                    version / 100, version % 100),
+        fmt::format("Name COLMAP {}.{} or newer by --colmap, or extract the features with another "
+                    "--ImageReader.camera_model",
+                    first / 100, first % 100));
+  }
 }
 
 }  // namespace
@@ -251,7 +271,9 @@ std::map<uint32_t, Camera> Mapping::CalibratedAsTold(const LensPlan& plan) const
 MappingPass Mapping::MapAsLensesAre() {
   if (!plan_) {
     plan_ = PlanLenses();
+    told_ = plan_;
     for (const std::string& note : plan_->notes()) context_.Warn(note);
+    RequireKnownCameraModels(colmap_, *plan_, options_.database_path);
   }
   LensPlan plan = *plan_;
   const bool calibrated = IsCalibrated(plan);
@@ -259,16 +281,65 @@ MappingPass Mapping::MapAsLensesAre() {
   MappingPass best = Map(plan, refine_ == RefineIntrinsics::kAlways || (automatic && !calibrated));
   if (best.best.empty() || refine_ == RefineIntrinsics::kNever) return best;
   if (automatic && best.refine && !IsDetermined(best.lenses)) {
-    context_.Warn("the photos do not determine the focal length: it stays as the database has it");
-    return BetterOf(std::move(best), Map(plan, false));
+    MappingPass as_told = Map(plan, false);
+    const bool loses = NumPhotos(as_told) < NumPhotos(best);
+    context_.Warn(std::string("the photos do not determine the focal length") +
+                  (loses ? ", but with that of the database fewer of them can be mapped: it is "
+                           "what they made of it"
+                         : ": it stays as the database has it"));
+    return loses ? std::move(best) : std::move(as_told);
   }
   KeepCalibrated(&best);
-  for (int i = 0; automatic && i < kMaxMoreMappings && IsContradicted(best); ++i) {
-    plan.Take(best.lenses, best.model());
-    best = BetterOf(std::move(best), Map(plan, true));
+  return automatic ? MapWithLensesFound(std::move(plan), std::move(best)) : std::move(best);
+}
+
+MappingPass Mapping::MapWithLensesFound(LensPlan plan, MappingPass best) {
+  for (int i = 0; i < kMaxMoreMappings && IsContradicted(best); ++i) {
+    const std::vector<LensFinding> taken = plan.Take(best.lenses, best.model());
+    MappingPass again = Map(plan, true);
+    const size_t num_before = NumPhotos(best), num_after = NumPhotos(again);
+    // Of a bent room photos may have found a place that a straight one has not.
+    const bool is_better =
+        static_cast<double>(num_after) >= (1 - kMaxLeftOut) * static_cast<double>(num_before);
+    for (LensFinding lens : taken) {
+      lens.used = is_better;
+      context_.Warn(
+          lens.Sentence() +
+          (num_after < num_before
+               ? fmt::format(" With the lens found {} photos can be mapped, {} with that told.",
+                             num_after, num_before)
+               : "") +
+          (best.refine || !is_better ? "" : " --refine_intrinsics 0 keeps what was told."));
+    }
+    if (!is_better) break;
+    best = std::move(again);
     KeepCalibrated(&best);
   }
   return best;
+}
+
+void Mapping::TellLenses(MappingPass* pass) const {
+  const LensPlan told =
+      pass->can_set_lenses ? *told_ : LensPlan(images_.cameras(), images_.images());
+  const SparseModel& model = pass->model();
+  for (LensFinding& lens : pass->lenses.lenses) {
+    // By whether they are calibrated: what COLMAP guessed counts where nothing else was told.
+    std::map<bool, std::map<uint32_t, Camera>> told_cameras;
+    std::map<bool, bool> is_another;
+    for (const std::string& name : lens.photos) {
+      const SparseImage& image = *model.FindImage(name);
+      const Camera& camera = told.cameras().at(told.images().at(image.image_id).camera_id);
+      const Camera& now = model.cameras.at(image.camera_id);
+      const bool is_calibrated = camera.has_prior_focal_length;
+      is_another[is_calibrated] |= now.model != camera.model || now.params != camera.params;
+      told_cameras[is_calibrated].emplace(camera.camera_id, camera);
+    }
+    const bool any_calibrated = told_cameras.count(true) > 0;
+    std::vector<Camera> cameras;
+    for (const auto& [id, camera] : told_cameras[any_calibrated]) cameras.push_back(camera);
+    lens.used = is_another[any_calibrated];
+    lens.Tell(cameras);
+  }
 }
 
 void Mapping::KeepCamerasOfRigs(LensCheck* check) const {
@@ -304,16 +375,20 @@ void Mapping::KeepCalibrated(MappingPass* pass) const {
 
 bool Mapping::IsContradicted(const MappingPass& pass) const {
   bool contradicted = false;
-  for (const LensFinding& lens : pass.lenses.lenses) {
+  const bool determined = IsDetermined(pass.lenses);
+  for (LensFinding lens : pass.lenses.lenses) {
     if (pass.lenses.only_looked_at && lens.Contradicts()) {
       context_.Warn(lens.Sentence() + " It is for roomtex-align, which has the scan, to mend it.");
     }
     if (!lens.used) continue;
     contradicted = true;
+    if (determined) continue;
+    lens.used = false;
     context_.Warn(lens.Sentence() +
-                  (pass.refine ? "" : " --refine_intrinsics 0 keeps what was told."));
+                  fmt::format(" The photos leave focal lengths open by more than {:.0f} %.",
+                              100 * kMaxFocalSigma));
   }
-  return contradicted && IsDetermined(pass.lenses);
+  return contradicted && determined;
 }
 
 InitOptions Mapping::InitOfGroup(const MatchedImages& images) const {
@@ -413,6 +488,7 @@ void Mapping::LearnLenses(const MappingPass& pass) {
 MappingPass Mapping::MapGroup() {
   MappingPass pass = MapAsLensesAre();
   if (pass.best.empty()) return pass;
+  TellLenses(&pass);
   context_.progress.Stage("check model");
   pass.check = Check(pass, pass.model());
   for (int i = 0; i < kMaxLeavings && LeaveOutDoubtful(&pass); ++i) {
@@ -432,7 +508,25 @@ MappingPass Mapping::MapGroup() {
                                        scratch_ / ("known_" + std::to_string(num_passes_)),
                                        pass.mapper.get(), &outcome.result);
   }
+  SayWhatWasNotHeld(pass);
   return pass;
+}
+
+void Mapping::SayWhatWasNotHeld(const MappingPass& pass) const {
+  const std::vector<const MapperResult*> models = pass.best[0].Models();
+  if (std::none_of(models.begin(), models.end(),
+                   [](const auto* one) { return one->could_not_hold; })) {
+    return;
+  }
+  std::string list;
+  for (const auto& [id, camera] : CalibratedAsTold(pass.plan)) {
+    if (pass.model().cameras.count(id) == 0) continue;
+    list += (list.empty() ? "" : ", ") + std::to_string(id);
+  }
+  context_.Warn("Calibrated cameras (" + list +
+                ") could not be held beside those that are refined: the model has them as COLMAP "
+                "refined them. Map the photos of calibrated cameras by themselves, or give "
+                "--refine_intrinsics 0, which keeps all as told.");
 }
 
 ModelCheck Mapping::Check(const MappingPass& pass, const SparseModel& model) const {

@@ -63,7 +63,7 @@ struct MappingPass {
   std::unique_ptr<MatchedImages> images;  // of the group, and the pairs between them
   std::unique_ptr<MapperRun> mapper;
   std::vector<MappingOutcome> best;  // at most one
-  LensCheck lenses;
+  LensCheck lenses;                  // told and used: Mapping::TellLenses
   // Of the best model, and of its other rooms', once Mapping::Run() is done.
   ModelCheck check;
   std::vector<ModelCheck> room_checks;
@@ -113,8 +113,14 @@ class Mapping {
   // Of a database whose rigs tie its cameras together.
   void KeepCamerasOfRigs(LensCheck* check) const;
   void KeepCalibrated(MappingPass* pass) const;
-  // And says so.
+  // By photos that know it better. Says what they say of lenses that stay all the same.
   bool IsContradicted(const MappingPass& pass) const;
+  // Once more with the lenses that contradict the plan's, if they are, and says which are used.
+  MappingPass MapWithLensesFound(LensPlan plan, MappingPass best);
+  // Makes of the findings what the report says: of the lenses that the database tells, not of those
+  // that this pass was told.
+  void TellLenses(MappingPass* pass) const;
+  void SayWhatWasNotHeld(const MappingPass& pass) const;
   MappingPass Map(const LensPlan& plan, bool refine);
   MappingPass MapAsLensesAre();
   LensPlan PlanLenses() const;
@@ -141,6 +147,7 @@ class Mapping {
   std::map<uint32_t, std::string> names_;
   LensLabels labels_;
   std::optional<LensPlan> plan_;  // as far as it is known
+  std::optional<LensPlan> told_;  // what plan_ was at first
   std::set<uint32_t> photos_;     // of the group that is mapped
   int num_passes_ = 0;
   Json trials_ = Json::array();

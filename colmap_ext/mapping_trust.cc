@@ -132,7 +132,6 @@ void JudgeByOwnPhotos(const ModelCheck& check, const MatchedImages& images, Mode
   }
 }
 
-// Whether the errors shrink when the lens may change.
 // A camera of a model that COLMAP's OPENCV would describe better.
 bool HasPlainLens(const SparseModel& model) {
   return std::any_of(model.cameras.begin(), model.cameras.end(), [](const auto& one) {
@@ -142,29 +141,41 @@ bool HasPlainLens(const SparseModel& model) {
   });
 }
 
-Json JudgeLens(const MappingPass& pass, const Command::Context& context, Json* reasons) {
+// What to do about a lens that does not fit. refine: what the user asked for.
+std::string LensRemedy(const MappingPass& pass, RefineIntrinsics refine) {
+  if (!pass.refine && refine == RefineIntrinsics::kNever) {
+    return "Calibrate the camera, or give --refine_intrinsics auto.";
+  }
+  if (!pass.refine) {
+    return "Calibrate the camera (roomtex-calibrate), or add photos from more places; "
+           "--refine_intrinsics 1 takes the lens that these photos ask for.";
+  }
+  return HasPlainLens(pass.model())
+             ? "Extract the features with a camera model that can describe the lens "
+               "(--ImageReader.camera_model OPENCV)."
+             : "Calibrate the camera (roomtex-calibrate), or add photos from more places.";
+}
+
+// Whether the errors shrink when the lens may change.
+Json JudgeLens(const MappingPass& pass, RefineIntrinsics refine, const Command::Context& context,
+               Json* reasons) {
   context.progress.Stage("check calibration");
   const CalibrationCheck check =
-      CheckCalibration(pass.model(), [&](const SparseModel& model, bool refine) {
+      CheckCalibration(pass.model(), [&](const SparseModel& model, bool is_free) {
         ThrowIfInterrupted();
-        return pass.mapper->BundleAdjust(model, refine);
+        return pass.mapper->BundleAdjust(model, is_free);
       });
   Json json;
   json["rms_fixed_px"] = check.rms_fixed_px;
   json["rms_free_px"] = check.rms_free_px;
   if (check.Fits()) return json;
-  Refuse("calibration",
-         fmt::format(
-             "the camera's calibration does not fit the photos: their error falls from {:.2f} "
-             "to {:.2f} px "
-             "when focal length and distortion may change, so the model is bent. {}",
-             check.rms_fixed_px, check.rms_free_px,
-             !pass.refine ? "Calibrate the camera, or give --refine_intrinsics auto."
-             : HasPlainLens(pass.model())
-                 ? "Extract the features with a camera model that can describe the lens "
-                   "(--ImageReader.camera_model OPENCV)."
-                 : "Calibrate the camera (roomtex-calibrate), or add photos from more places."),
-         reasons);
+  Refuse(
+      "calibration",
+      fmt::format("the camera's calibration does not fit the photos: their error falls from {:.2f} "
+                  "to {:.2f} px "
+                  "when focal length and distortion may change, so the model is bent. {}",
+                  check.rms_fixed_px, check.rms_free_px, LensRemedy(pass, refine)),
+      reasons);
   return json;
 }
 
@@ -172,7 +183,7 @@ Json JudgeLens(const MappingPass& pass, const Command::Context& context, Json* r
 
 std::vector<ModelTrust> JudgeModels(const std::vector<MappingPass>& passes,
                                     const MatchedImages& images, const KnownPhotos& known,
-                                    const Command::Context& context) {
+                                    RefineIntrinsics refine, const Command::Context& context) {
   const std::vector<MappedModel> models = ListModels(passes);
   std::vector<ModelTrust> trusts;
   Json of_all = Json::array(), of_pass, calibration;
@@ -184,7 +195,7 @@ std::vector<ModelTrust> JudgeModels(const std::vector<MappingPass>& passes,
       if (outcome.seed.ambiguous) {
         Refuse("motion", AmbiguousSentence(outcome.seed.trial, images), &of_pass);
       }
-      calibration = JudgeLens(*model.pass, context, &of_pass);
+      calibration = JudgeLens(*model.pass, refine, context, &of_pass);
     }
     ModelTrust trust;
     trust.reasons = of_pass;

@@ -17,11 +17,11 @@ struct ModelTrust {
   Json reasons = Json::array();
 };
 
-// Of every model, in the order of ListModels(). images: all of the database. Says on the way what
-// is worth a warning. Adjusts every model twice, by COLMAP, to see whether its lens fits; the other
-// rooms of a model have that of the first.
+// Of every model, in the order of ListModels(). images: all of the database. refine: as asked for.
+// Says on the way what is worth a warning. Adjusts every model twice, by COLMAP, to see whether its
+// lens fits; the other rooms of a model have that of the first.
 std::vector<ModelTrust> JudgeModels(const std::vector<MappingPass>& passes,
                                     const MatchedImages& images, const KnownPhotos& known,
-                                    const Command::Context& context);
+                                    RefineIntrinsics refine, const Command::Context& context);
 
 }  // namespace roomtex

@@ -71,6 +71,41 @@ void AddOptions(MappingOptions* options, Command* command) {
       "the pair is chosen here, by --Init.*.");
 }
 
+std::string GroupText(const std::set<uint32_t>& group, const MatchedImages& images) {
+  return fmt::format("a group of {} photos, e.g. {}", group.size(),
+                     images.images().at(*group.begin()).name);
+}
+
+// Throws InputError for photos to start from that no group holds (together), which would be passed
+// over.
+void CheckStartPhotos(const MatchedImages& images, const MappingOptions& options) {
+  const std::vector<std::set<uint32_t>> groups = PhotoGroups(images, options);
+  const std::set<uint32_t>* first = nullptr;
+  for (const std::string* name : {&options.init.image_name1, &options.init.image_name2}) {
+    if (name->empty()) continue;
+    const uint32_t id = images.FindImage(*name)->image_id;
+    const auto group = std::find_if(groups.begin(), groups.end(),
+                                    [id](const auto& one) { return one.count(id) > 0; });
+    if (group == groups.end()) {
+      throw InputError(options.database_path, *name,
+                       fmt::format("is connected by verified matches with fewer than {} photos, "
+                                   "which get no model beside the larger groups",
+                                   kFewestOfModel),
+                       "Name a photo of a larger group by --Init.image_name1 and 2, or match this "
+                       "one with more photos");
+    }
+    if (first != nullptr && first != &*group) {
+      throw InputError(options.database_path, "",
+                       "holds no verified matches that connect " + options.init.image_name1 +
+                           " (of " + GroupText(*first, images) + ") with " + *name + " (of " +
+                           GroupText(*group, images) + ")",
+                       "Give two photos of one group by --Init.image_name1 and 2, or match photos "
+                       "between the two");
+    }
+    first = &*group;
+  }
+}
+
 // Everything in the database that would make mapping senseless.
 void CheckDatabase(const MatchedImages& images, const MappingOptions& options,
                    const Command::Context& context) {
@@ -88,6 +123,7 @@ void CheckDatabase(const MatchedImages& images, const MappingOptions& options,
                      "Give --Init.image_name1 and 2 as the database names them, e.g. " +
                          images.images().begin()->second.name);
   }
+  CheckStartPhotos(images, options);
   std::string missing;
   int num_missing = 0;
   for (const auto& [image_id, image] : images.images()) {
@@ -135,10 +171,11 @@ KnownPhotos ReadKnownPhotos(const MappingOptions& options, const MatchedImages& 
 [[noreturn]] void ThrowNothingWorked(const std::string& database_path, const Json& trials) {
   std::string reasons;
   std::set<std::string> told;
-  bool colmap_fails = !trials.empty();  // no photo helps then
+  bool colmap_fails = !trials.empty(), says_why = false;  // no photo helps then
   for (const Json& trial : trials) {
-    colmap_fails &=
-        trial["outcome"].get<std::string>().find("was killed by signal") != std::string::npos;
+    const std::string outcome = trial["outcome"].get<std::string>();
+    colmap_fails &= outcome.find("was killed by signal") != std::string::npos;
+    says_why |= outcome.find("Check failed") != std::string::npos;
   }
   constexpr size_t kNumShown = 3;
   for (size_t i = 0; i < trials.size() && i < kNumShown; ++i) {
@@ -153,14 +190,23 @@ KnownPhotos ReadKnownPhotos(const MappingOptions& options, const MatchedImages& 
     reasons += "; and " + std::to_string(trials.size() - kNumShown) + " more pairs";
   }
   throw InputError(database_path, "", "gives no pair to start from" + reasons,
-                   colmap_fails ? "This is COLMAP's own failure: give it more memory or threads "
-                                  "(ulimit -v, ulimit -u), or name another one with --colmap"
-                                : "Add photos from other places that overlap well, or relax "
-                                  "--Init.*");
+                   colmap_fails && says_why
+                       ? "This is COLMAP's own failure, for the reason that it gives: name another "
+                         "version of it with --colmap"
+                   : colmap_fails ? "This is COLMAP's own failure: give it more memory or threads "
+                                    "(ulimit -v, ulimit -u), or name another one with --colmap"
+                                  : "Add photos from other places that overlap well, or relax "
+                                    "--Init.*");
 }
 
 std::string ModelPath(const MappingOptions& options, size_t number) {
   return options.output_path + "/" + std::to_string(number);
+}
+
+// Of photos that may fall apart into more groups, and rooms, than pairs tell.
+size_t MostModels(const MatchedImages& images, const MappingOptions& options) {
+  if (!options.map_all_groups && !options.take_rooms_apart) return 1;
+  return std::max<size_t>(1, images.images().size() / kFewestOfModel);
 }
 
 bool IsOfEarlierRun(const MappingOptions& options, size_t number) {
@@ -274,8 +320,8 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   const KnownPhotos known = ReadKnownPhotos(options, images, context);
 
   MakeFolder(options.output_path);
-  const size_t num_groups = PhotoGroups(images, options).size();
-  for (size_t i = 0; i < num_groups; ++i) RequireReplaceableModel(ModelPath(options, i));
+  const size_t most_models = MostModels(images, options);
+  for (size_t i = 0; i < most_models; ++i) RequireReplaceableModel(ModelPath(options, i));
   RequireReplaceableModel(options.output_path + "/init");
   const SignalGuard signals;
   const ScratchFolder scratch(options.output_path);
@@ -294,7 +340,8 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   if (passes.empty()) ThrowNothingWorked(options.database_path, mapping.trials());
   FillMappingReport(passes, images, &context.report);
   const std::vector<MappedModel> models = ListModels(passes);
-  const std::vector<ModelTrust> trusts = JudgeModels(passes, images, known, context);
+  const std::vector<ModelTrust> trusts = JudgeModels(
+      passes, images, known, RefineIntrinsicsFromWord(options.refine_intrinsics), context);
   context.report["check"] = trusts[0].check;
   if (!trusts[0].known.is_null()) context.report["known"] = trusts[0].known;
   context.report["reasons"] = trusts[0].reasons;

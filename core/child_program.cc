@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/text.h"
 
 extern char** environ;
 
@@ -157,6 +158,11 @@ void ReadLines(int input, const std::function<void(const std::string&)>& on_line
   if (!line.empty()) on_line(line);
 }
 
+// Of a stack trace as glog prints it, behind the line that says what failed.
+bool IsOfStackTrace(const std::string& line) {
+  return BeginsWith(line, "    @ ") || BeginsWith(line, "*** ") || BeginsWith(line, "PC: @ ");
+}
+
 double Seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
 }
@@ -252,7 +258,7 @@ ChildRun RunChild(std::vector<std::string> arguments, const ChildSettings& setti
   const auto take_line = [&](const std::string& line) {
     log << line << '\n';
     if (settings.on_line) settings.on_line(line);
-    if (line.find_first_not_of(" \t=-") == std::string::npos) return;
+    if (line.find_first_not_of(" \t=-") == std::string::npos || IsOfStackTrace(line)) return;
     last.push_back(line);
     if (last.size() > kNumLastLines) last.pop_front();
   };

@@ -12,7 +12,7 @@ struct ChildRun {
   bool success = false;
   int exit_code = 0;    // 128 + signal when killed
   std::string failure;  // "ended with exit code 1", "was killed by signal 6"; "" on success
-  std::vector<std::string> last;    // last lines it printed
+  std::vector<std::string> last;    // last lines it printed, stack traces left out
   double cpu_seconds = 0;           // user and system, with all that it waited for
   long long peak_memory_bytes = 0;  // of the largest process among them
   std::string LastLines() const;    // joined by " | "

@@ -18,6 +18,7 @@
 namespace roomtex {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -174,6 +175,7 @@ TEST_F(KnownPhotosCommand, AKnownPhotoWithFewMatchesIsTakenAsItStands) {
   ASSERT_EQ(model.images.size(), 8u);
   ExpectNearTruth(model, 0.005);
   EXPECT_EQ(Report()["images"][7]["by"], "known");
+  EXPECT_THAT(Report()["known"]["photos_held"], Contains("view_007.jpg"));
 }
 
 TEST_F(KnownPhotosCommand, OneOfThemDoesNotTellTheScale) {

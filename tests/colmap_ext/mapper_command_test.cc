@@ -210,6 +210,9 @@ TEST_F(MapperCommand, SaysWhenFewerThanHalfOfThePhotosRegister) {
   const CommandResult result = Run("--Init.max_pairs 1");
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_NE(result.err.find("only 4 of 9 photos"), std::string::npos) << result.err;
+  // All that can be mapped are in the seed: it has not failed.
+  EXPECT_EQ(result.err.find("starting from"), std::string::npos) << result.err;
+  EXPECT_EQ(Report()["pair_trials"][0]["outcome"], "4 photos registered, all of them of the seed");
   EXPECT_EQ(ReadSparseModel(folder_ / "sparse/0").images.size(), 4u);
 }
 
@@ -247,6 +250,37 @@ TEST_F(MapperCommand, LeavesTheOldModelWhenEveryPairFails) {
   EXPECT_NE(ReadBytes(folder_ / "sparse/roomtex-mapper.log").find("out of luck"),
             std::string::npos);
   ExpectNoScratch();
+}
+
+TEST_F(MapperCommand, SaysWhyColmapAborts) {
+  Simulate(RoomOptions(3));
+  WriteScript("colmap-aborts",
+              "if [ \"$1\" = point_triangulator ] && [ \"$2\" != -h ]; then\n"
+              "  echo 'Check failed: sense > nonsense'; echo '*** Check failure stack trace: ***'\n"
+              "  for i in 1 2 3 4 5 6 7 8 9 10 11 12; do echo '    @ 0x7fe6 Fail()'; done\n"
+              "  kill -6 $$\nfi\nexec colmap \"$@\"\n");
+  const CommandResult result = Run("--colmap " + (folder_ / "colmap-aborts"));
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("its last lines: Check failed: sense > nonsense (all"),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(result.err.find("ulimit"), std::string::npos) << result.err;
+}
+
+TEST_F(MapperCommand, ACameraModelThatColmapDoesNotKnowIsSaidBeforeAnythingIsTried) {
+  views_ = SimulateViews(RoomOptions(3));
+  Camera& camera = views_.cameras.at(1);
+  camera.model = CameraModel::kEucm;
+  camera.params = {camera.params[0], camera.params[1], camera.params[2], camera.params[3], 0.6, 1};
+  WriteSimulatedDatabase(views_, folder_.path());
+  WriteScript("colmap-3.8", "colmap \"$@\" | sed 's/^COLMAP [0-9.]*/COLMAP 3.8/'\n");
+  const CommandResult result = Run("--colmap " + (folder_ / "colmap-3.8"));
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("camera 1: is EUCM, which COLMAP 3.8 does not know"), std::string::npos)
+      << result.err;
+  EXPECT_NE(result.err.find("Name COLMAP 4.0 or newer by --colmap"), std::string::npos)
+      << result.err;
+  EXPECT_EQ(result.err.find("signal"), std::string::npos) << result.err;
 }
 
 TEST_F(MapperCommand, ReplacesAnOldModelAsAWhole) {
@@ -373,6 +407,11 @@ TEST_F(MapperCommand, RefusesOptionsThatColmapDoesNotKnow) {
   result = Run("--Mapper.min_num_matches many");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("min_num_matches"), std::string::npos) << result.err;
+  result = Run("--Mapper.abs_pose_min_num_inliers -5");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("refuses: Check failed: abs_pose_min_num_inliers > 0"),
+            std::string::npos)
+      << result.err;
   EXPECT_FALSE(fs::exists(folder_ / "sparse/0"));
   ExpectNoScratch();
 }

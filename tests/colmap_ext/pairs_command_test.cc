@@ -129,6 +129,30 @@ TEST_F(PairsCommand, NamesWhatStandsAlone) {
   EXPECT_THAT(result.err, HasSubstr("stand alone, nothing agrees with them: a2.jpg"));
 }
 
+// Plain photos of bare walls between those with a pattern: an even choice of all 1024 photos, by
+// which words and axes are learned, may hit none with features.
+TEST_F(PairsCommand, FewPhotosWithFeaturesAmongManyWithoutAreFound) {
+  for (const int first : {2, 44}) {  // the words' choice passes over the one, the axes' over both
+    std::filesystem::remove(database_);
+    WriteRooms("a");
+    for (const std::string table : {"images", "keypoints", "descriptors"}) {
+      Change("UPDATE " + table + " SET image_id = image_id + 10000");
+      Change("UPDATE " + table + " SET image_id = 2 * (image_id - 10001) + " +
+             std::to_string(first));
+    }
+    Change(
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 1024) INSERT "
+        "OR IGNORE INTO images (image_id, name, camera_id) SELECT i, 'plain' || i || '.jpg', "
+        "(SELECT camera_id FROM cameras) FROM n");
+    const CommandResult result = Run("--graph_path " + (folder_ / "graph.json"));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(Report()["num_images"], 1024);
+    EXPECT_THAT(Pairs(), SizeIs(kViewsPerRoom * (kViewsPerRoom - 1) / 2));
+    const Json graph = Json::parse(std::ifstream(folder_ / "graph.json"));
+    EXPECT_EQ(graph["edges"][0]["found_by"], "signature");
+  }
+}
+
 TEST_F(PairsCommand, WhatCannotBeUsedGetsASentence) {
   const std::map<std::string, std::string> sentence_of_change = {
       {"UPDATE images SET name = 'a b.jpg' WHERE image_id = 2", "blank in its name"},

@@ -27,6 +27,13 @@ TEST(RunChild, TellsEveryLineOfBothStreamsAndKeepsTheLastOnes) {
   EXPECT_GT(run.peak_memory_bytes, 0);
 }
 
+TEST(RunChild, KeepsTheReasonBeforeAStackTrace) {
+  const ChildRun run = RunShell(
+      "echo 'Check failed: a > b'; echo '*** Check failure stack trace: ***'; "
+      "for i in 1 2 3 4 5 6 7 8 9 10 11 12; do echo '    @  0x7fe6  main'; done; exit 1");
+  EXPECT_EQ(run.LastLines(), "Check failed: a > b");
+}
+
 TEST(RunChild, TellsHowItEnded) {
   const ChildRun failed = RunShell("exit 4");
   EXPECT_FALSE(failed.success);
