@@ -21,6 +21,7 @@
 #include "core/commit_together.h"
 #include "core/error.h"
 #include "core/input_guard.h"
+#include "core/json_text.h"
 #include "core/option_fields.h"
 #include "core/option_list.h"
 #include "core/output_file.h"
@@ -30,6 +31,7 @@
 #include "core/resource_limits.h"
 #include "core/signal_tidy.h"
 #include "core/standard_files.h"
+#include "core/text.h"
 #include "core/version.h"
 
 namespace roomtex {
@@ -232,6 +234,15 @@ struct Command::Impl {
   [[noreturn]] void RefuseReportPath() const;
   void RequireReplaceableReport() const;
   void CheckReportPath(const std::vector<SetWithReport>& sets, const CommitTogether& files) const;
+  // Whether a file may become the report of a command that could not read its options, and so does
+  // not know what is an input: none, or an earlier report of this command that lies in no folder
+  // which the arguments name. There it belongs to results, which a slip does not change.
+  bool MayReportTo(const std::string& path, const std::vector<std::string>& arguments) const;
+  bool IsOwnReport(const std::string& path) const;
+  // Ends a command that cannot begin: says why, also in --report_path, so that nobody takes the
+  // report of the run before for this one's.
+  int EndEarly(int exit_code, const std::string& failure,
+               const std::vector<std::string>& arguments) const;
   // Puts the sets and copies of a command that ran to its end in their places, and --report_path.
   void WriteReports(int exit_code, const Report& report, const Progress& progress) const;
 };
@@ -498,6 +509,58 @@ void Command::Impl::WriteReports(int exit_code, const Report& report,
   files->Finish(folders);
 }
 
+bool Command::Impl::MayReportTo(const std::string& path,
+                                const std::vector<std::string>& arguments) const {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const auto place_of = [&error](const std::string& file) {
+    fs::path place = fs::weakly_canonical(fs::absolute(file, error), error);
+    return place.has_filename() ? place : place.parent_path();
+  };
+  const fs::path place = place_of(path);
+  size_t num_times = 0;
+  for (const std::string& argument : arguments) {
+    const size_t equals = BeginsWith(argument, "--") ? argument.find('=') : std::string::npos;
+    const std::string value =
+        FileOf(equals == std::string::npos ? argument : argument.substr(equals + 1));
+    const fs::path other = place_of(value);
+    if (value.empty() || other == other.root_path()) continue;
+    if (other == place) ++num_times;
+    const bool is_inside =
+        std::mismatch(other.begin(), other.end(), place.begin(), place.end()).first == other.end();
+    if (is_inside && other != place) return false;
+  }
+  if (num_times > 1) return false;
+  return !fs::exists(fs::symlink_status(path, error)) || IsOwnReport(path);
+}
+
+bool Command::Impl::IsOwnReport(const std::string& path) const {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
+  const Json report = ReadJsonIfAny(path);
+  return report.is_object() && report.value("command", Json()) == name;
+}
+
+int Command::Impl::EndEarly(int exit_code, const std::string& failure,
+                            const std::vector<std::string>& arguments) const {
+  std::cerr << name << ": " << failure << "\n";
+  if (exit_code == kExitUsage) std::cerr << "See " << name << " --help\n";
+  const std::string path = options.GivenAs("report_path", arguments);
+  if (path.empty()) return exit_code;
+  if (!MayReportTo(path, arguments)) {
+    if (IsOwnReport(path)) {
+      std::cerr << name << ": " << path << " stays as it was, the report of an earlier run\n";
+    }
+    return exit_code;
+  }
+  Report report;
+  report.SetUntrusted(failure);
+  const Outcome written =
+      RunBody([&] { WriteJson(path, MakeReport(report, Progress(/*quiet=*/true))); });
+  if (written.exit_code != kExitDone) std::cerr << name << ": " << written.failure << "\n";
+  return exit_code;
+}
+
 int Command::Run(int argc, char** argv, const std::function<void(const Context&)>& body) {
   OpenStandardFiles();
   CommonOptions& common = impl_->common;
@@ -520,11 +583,9 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
     guard.emplace(paths);
     impl_->RequireReplaceableReport();
   } catch (const UsageError& error) {
-    std::cerr << impl_->name << ": " << error.what() << "\nSee " << impl_->name << " --help\n";
-    return kExitUsage;
+    return impl_->EndEarly(kExitUsage, error.what(), arguments);
   } catch (const InputError& error) {
-    std::cerr << impl_->name << ": " << error.what() << "\n";
-    return kExitInput;
+    return impl_->EndEarly(kExitInput, error.what(), arguments);
   }
 
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not the end
@@ -539,7 +600,7 @@ int Command::Run(int argc, char** argv, const std::function<void(const Context&)
   int exit_code = outcome.exit_code;
   std::string failure = outcome.failure;
   if (outcome.signal != 0) StopBySignal(impl_->name, outcome.signal);
-  if (exit_code == kExitDone && !report.trusted()) {
+  if (exit_code == kExitDone && report.ends_untrusted()) {
     exit_code = kExitUntrusted;
     failure = "the result is not to be trusted: " + report.reason();
   }

@@ -114,9 +114,7 @@ std::string OptionList::Unknown(const std::string& argument) const {
   std::string needed;
   for (const Option& option : options_) {
     if (BeginsWith(option.name, name + "_")) return text + ". Did you mean --" + option.name + "?";
-    const bool is_file =
-        option.name.size() > 5 && option.name.rfind("_path") == option.name.size() - 5;
-    if (is_file && option.name != "report_path" && option.name != "project_path") {
+    if (option.type == "PATH" && option.name != "report_path" && option.name != "project_path") {
       needed += (needed.empty() ? "" : ", ") + ("--" + option.name);
     }
   }
@@ -281,6 +279,36 @@ void OptionList::Parse(const std::vector<std::string>& arguments) const {
   ThrowIfProblems(problems);
 }
 
+std::string OptionList::GivenAs(const std::string& name,
+                                const std::vector<std::string>& arguments) const {
+  const std::string option = "--" + name, with_equals = option + "=";
+  std::vector<std::string> values;
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    if (BeginsWith(arguments[i], with_equals)) {
+      values.push_back(arguments[i].substr(with_equals.size()));
+    } else if (arguments[i] == option && i + 1 < arguments.size() &&
+               !BeginsWith(arguments[i + 1], "--")) {
+      values.push_back(arguments[++i]);
+    }
+  }
+  if (!values.empty()) return values.size() == 1 ? values[0] : "";
+  const std::string project = name == "project_path" ? "" : GivenAs("project_path", arguments);
+  std::error_code error;
+  if (project.empty() || !std::filesystem::is_regular_file(project, error) ||
+      std::filesystem::file_size(project, error) > kMaxProjectBytes) {
+    return "";
+  }
+  std::ifstream stream(project);
+  for (std::string line; std::getline(stream, line);) {
+    const size_t equals = line.find('=');
+    if (BeginsWith(Trimmed(line), "[")) break;
+    if (equals != std::string::npos && Trimmed(line.substr(0, equals)) == name) {
+      return Trimmed(line.substr(equals + 1));
+    }
+  }
+  return "";
+}
+
 std::string OptionList::Help() const {
   std::string text;
   for (const Option& option : options_) {
@@ -300,7 +328,12 @@ std::string OptionList::Help() const {
 Json OptionList::Effective() const {
   Json json = Json::object();
   for (const Option& option : options_) json[option.name] = option.value();
-  for (const PassedThrough& p : passed_) json[p.prefix.substr(2) + "*"] = *p.arguments;
+  for (const PassedThrough& p : passed_) {
+    const std::vector<std::string>& words = *p.arguments;
+    for (size_t i = 0; i + 1 < words.size(); i += 2) {
+      if (BeginsWith(words[i], p.prefix)) json[words[i].substr(2)] = words[i + 1];
+    }
+  }
   return json;
 }
 

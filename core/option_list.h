@@ -41,6 +41,10 @@ class OptionList {
   // for what is wrong with an option, InputError for a file that is no ini file.
   void Parse(const std::vector<std::string>& arguments) const;
 
+  // The value that `arguments`, or else the ini file they name, give to an option, where Parse()
+  // has thrown; "" if there is none or they give several.
+  std::string GivenAs(const std::string& name, const std::vector<std::string>& arguments) const;
+
   // One paragraph per option: name, type, default, help.
   std::string Help() const;
   // Name to value in effect.

@@ -8,6 +8,11 @@
 namespace roomtex {
 
 void Report::SetUntrusted(const std::string& reason) {
+  SetUnfinished(reason);
+  ends_untrusted_ = true;
+}
+
+void Report::SetUnfinished(const std::string& reason) {
   reason_ += (reason_.empty() ? "" : " ") + reason;
 }
 

@@ -24,6 +24,9 @@ class Report {
   void AddWarning(const std::string& warning) { warnings_.push_back(warning); }
   // The answer is not to be trusted (exit 4); several reasons are joined.
   void SetUntrusted(const std::string& reason);
+  // The report says the same, but the command ends with 0: what was asked for is done, and yet what
+  // is there is no whole answer, or one that the user has accepted.
+  void SetUnfinished(const std::string& reason);
 
   // Writes the same JSON to `path` as well, once the command has run to its end (exit 0 or 4).
   void AddCopy(const std::string& path) { copies_.push_back(path); }
@@ -31,6 +34,7 @@ class Report {
   void AddCopyOfAnyEnd(const std::string& path) { copies_of_any_end_.push_back(path); }
 
   bool trusted() const { return reason_.empty(); }
+  bool ends_untrusted() const { return ends_untrusted_; }  // with exit 4
   const std::string& reason() const { return reason_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
   const std::vector<std::string>& copies() const { return copies_; }
@@ -40,6 +44,7 @@ class Report {
   Json keys_ = Json::object();
   std::vector<std::string> warnings_, copies_, copies_of_any_end_;
   std::string reason_;
+  bool ends_untrusted_ = false;
 };
 
 Json NumberOrNull(double value);  // null: not finite

@@ -23,6 +23,15 @@ std::vector<std::string> MirroredRemedies(AutoOptions options) {
   return {"Start again without --azimuth, so that it is found: " + CommandWith(options)};
 }
 
+// Picks that were made on it are as wrong.
+std::vector<std::string> MirroredPicksRemedies(AutoOptions options) {
+  options.azimuth = "auto";
+  std::vector<std::string> remedies = MirroredRemedies(options);
+  remedies.insert(remedies.begin(), "Pick anew, in the scan as it is read then: " +
+                                        CommandText(Chain(options).PickCommand()));
+  return remedies;
+}
+
 // Where a pick or --near decides: between several places, or that photos and scan are of one room.
 std::vector<std::string> HintRemedies(const Chain& chain, bool several) {
   AutoOptions options = chain.options();
@@ -48,7 +57,9 @@ std::vector<std::string> AlignRemedies(const Chain& chain, const Json& report) {
   const Json found = report.is_object() ? report.value("search", Json()) : Json();
   const Json search = found.is_object() ? found : Json::object();
   const std::string verdict = search.value("verdict", "");
-  if (verdict == "mirrored") return MirroredRemedies(chain.options());
+  const Json mirrored = report.is_object() ? report.value("mirrored", Json()) : Json();
+  if (mirrored == "scan and picks") return MirroredPicksRemedies(chain.options());
+  if (verdict == "mirrored" || mirrored == "scan") return MirroredRemedies(chain.options());
   if (search.value("hint_decides", false)) return HintRemedies(chain, verdict == "ambiguous");
   std::vector<std::string> remedies;
   if (verdict == "none" || verdict == "weak" || verdict == "photos contradict") {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "workflow/step.h"
+#include "workflow/chain.h"
 
 namespace roomtex {
 

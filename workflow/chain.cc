@@ -1,4 +1,4 @@
-// What is known of one run (step.h).
+#include "workflow/chain.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,6 @@
 #include "core/report.h"
 #include "core/text.h"
 #include "workflow/scanner_photos.h"
-#include "workflow/step.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -16,10 +15,6 @@ namespace fs = std::filesystem;
 bool IsThere(const std::string& path) {
   std::error_code ignored;
   return fs::exists(path, ignored);
-}
-
-std::string ScanFileOf(const std::string& path) {
-  return IsThere(path) ? path : path.substr(0, path.find('#'));
 }
 
 Json ReadJsonFile(const std::string& path) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/photo_files.h"
 #include "core/text.h"
 #include "workflow/step_lines.h"
@@ -251,7 +252,7 @@ Step MakeScanner(Chain* chain) {
                       chain->ReportOf("scanner")};
   AddOption("--units", options.units, &line);
   if (!options.e57_check) AddOption("--E57.check", "0", &line);
-  step.inputs = {ScanFileOf(chain->ScannerScan())};
+  step.inputs = {FileOf(chain->ScannerScan())};
   if (chain->OnlyScanner()) {
     step.outputs = {chain->ScannerFolder()};
     step.commands = {{"rm", "-rf", step.outputs[0]}, line};
@@ -266,7 +267,7 @@ Step MakeScanner(Chain* chain) {
   step.commands = {{"rm", "-rf", chain->LinkFolder()},
                    {"cp", "-r", "--symbolic-link", photos + "/.", chain->LinkFolder()},
                    line};
-  step.notes = {ScanFileOf(chain->ScannerScan()) +
+  step.notes = {FileOf(chain->ScannerScan()) +
                 " has photos of its own, with poses: they go beside yours (--scanner_photos 0: "
                 "without them)"};
   return step;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/input_guard.h"
 
 namespace roomtex {
 namespace {
@@ -66,7 +67,7 @@ std::vector<Input> InputsOf(const AutoOptions& o) {
       {"--image_path", o.image_path}, {"--panoramas_path", o.panoramas_path},
       {"--video_path", o.video_path}, {"--scan_poses", o.scan_poses},
       {"--picks_path", o.picks_path}, {"--cameras_path", o.cameras_path}};
-  for (const std::string& path : o.scan_paths) inputs.push_back({"--scan_path", ScanFileOf(path)});
+  for (const std::string& path : o.scan_paths) inputs.push_back({"--scan_path", FileOf(path)});
   inputs.erase(std::remove_if(inputs.begin(), inputs.end(),
                               [](const Input& input) { return input.path.empty(); }),
                inputs.end());

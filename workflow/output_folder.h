@@ -2,8 +2,8 @@
 // The folder that roomtex-auto makes everything in: what of it is made anew, so that nothing of the
 // user's may lie there.
 
+#include "workflow/chain.h"
 #include "workflow/run_state.h"
-#include "workflow/step.h"
 
 namespace roomtex {
 

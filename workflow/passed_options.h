@@ -1,7 +1,7 @@
 #pragma once
 // Options that roomtex-auto hands on to the commands of its steps.
 
-#include "workflow/step.h"
+#include "workflow/chain.h"
 
 namespace roomtex {
 

@@ -96,8 +96,10 @@ class ReportMaker {
     if (stop.stopped) {
       const bool untrusted = stop.exit_code == kExitUntrusted;
       verdict["state"] = untrusted ? "untrusted" : "failed";
-      verdict["headline"] = untrusted ? "Not finished: " + Doubt(stop.step)
-                                      : "Not finished: the step " + stop.step + " failed";
+      verdict["headline"] =
+          "Not finished: " + (untrusted ? Doubt(stop.step)
+                                        : "the step " + stop.step +
+                                              (stop.cannot_begin ? " cannot run yet" : " failed"));
       sentences.push_back(stop.reason);
     } else if (const std::vector<std::string> outdated = Outdated(); !outdated.empty()) {
       verdict["state"] = "unfinished";

@@ -1,6 +1,7 @@
 #include "workflow/report_page.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "core/command_line.h"
 #include "core/error.h"
@@ -123,8 +124,12 @@ class Page {
         "lines lie anywhere between two samples.</p>\n";
     for (const Json& path : paths) {
       if (!path.is_string()) continue;
-      const std::string text = path;
-      Figure(text, kWide, "The scan's edges on a photo", text.substr(text.rfind('/') + 1));
+      const std::filesystem::path file = path.get<std::string>();
+      const std::string name = file.filename(), folder = file.parent_path().filename(),
+                        aligned = file.parent_path().parent_path().filename();
+      // Where the output folder is now, and from here.
+      Figure(chain_.At(aligned + "/" + folder + "/" + name), kWide, "The scan's edges on a photo",
+             name);
     }
   }
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/report.h"
-#include "workflow/step.h"
+#include "workflow/chain.h"
 
 namespace roomtex {
 

@@ -14,6 +14,7 @@
 #include "core/child_program.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/near_hint.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -21,12 +22,12 @@
 #include "core/photo_files.h"
 #include "core/photo_fit.h"
 #include "workflow/auto_options.h"
+#include "workflow/chain.h"
 #include "workflow/output_folder.h"
 #include "workflow/passed_options.h"
 #include "workflow/report_data.h"
 #include "workflow/report_page.h"
 #include "workflow/run_steps.h"
-#include "workflow/step.h"
 
 namespace roomtex {
 namespace {
@@ -147,7 +148,7 @@ void CheckInputs(const AutoOptions& o) {
   if (!o.cameras_path.empty()) ReadKnownCameras(o.cameras_path);
   if (!o.scan_poses.empty()) RequireFile(o.scan_poses, "Give the file with the stations' poses");
   for (const std::string& path : o.scan_paths) {
-    RequireFile(ScanFileOf(path), "Give the file of the range scan");
+    RequireFile(FileOf(path), "Give the file of the range scan");
   }
 }
 
@@ -172,8 +173,12 @@ void WriteReport(Chain* chain, const RunResult& result, const Command::Context& 
   Json keys = MakeReportKeys(chain, result);
   WriteReportPage(chain, &keys);
   for (const auto& [key, value] : keys.items()) context.report[key] = value;
+  const Json& verdict = keys["verdict"];
+  if (!result.stop.stopped && verdict["state"] != "trusted") {
+    context.report.SetUnfinished(verdict["headline"].get<std::string>() + ".");
+  }
   context.report.AddCopyOfAnyEnd(chain->At("report.json"));
-  std::printf("%s\n%s\n", keys["verdict"]["headline"].get<std::string>().c_str(),
+  std::printf("%s\n%s\n", verdict["headline"].get<std::string>().c_str(),
               chain->At("report.html").c_str());
 }
 

@@ -25,14 +25,15 @@ enum class StepState { kStarted, kDone, kUntrusted, kFailed };
 struct StepRecord {
   StepState state = StepState::kStarted;
   MadeFrom made_from;
-  std::map<std::string, std::string> outputs;  // path and signature, when it had ended
+  // Path, as PathNames (made_from.h) has it, and signature, when it had ended.
+  std::map<std::string, std::string> outputs;
   std::vector<std::string> commands, notes;
   std::string reason;  // why it is not to be trusted or has failed
   double seconds = 0, cpu_seconds = 0;
   long long peak_memory_bytes = 0;
 };
 
-// A record's outputs are there as it left them.
+// A record's outputs, whose paths lead to them from here, are there as it left them.
 bool OutputsAreAsLeft(const StepRecord& record);
 
 class RunState {

@@ -12,8 +12,10 @@
 #include "core/output_file.h"
 #include "core/text.h"
 #include "workflow/align_remedies.h"
+#include "workflow/made_from.h"
 #include "workflow/output_folder.h"
 #include "workflow/remaining_time.h"
+#include "workflow/step.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -23,32 +25,10 @@ constexpr char kReportStep[] = "report";
 constexpr char kCopiedDatabase[] = "database.copy.db";
 constexpr char kResultChanged[] = "its result was changed or removed";
 
-// Without what a result does not depend on.
-std::string EssentialText(const CommandLine& line) {
-  CommandLine essential;
-  for (size_t i = 0; i < line.size(); ++i) {
-    const std::string& word = line[i];
-    const bool is_threads =
-        word == "--num_threads" ||
-        (word.size() > 12 && word.compare(word.size() - 12, 12, ".num_threads") == 0);
-    if (is_threads) {
-      ++i;
-    } else {
-      essential.push_back(word);
-    }
-  }
-  return CommandText(essential);
-}
-
 std::string Joined(const std::vector<std::string>& texts, const char* between) {
   std::string joined;
   for (const std::string& text : texts) joined += (joined.empty() ? "" : between) + text;
   return joined;
-}
-
-std::string FileName(const std::string& path) {
-  const fs::path trimmed = path.back() == '/' ? fs::path(path).parent_path() : fs::path(path);
-  return trimmed.filename().string();
 }
 
 class StepRunner {
@@ -57,6 +37,7 @@ class StepRunner {
       : chain_(*chain),
         context_(context),
         asked_(StepsAskedFor(chain->options())),
+        names_(chain->options().output_path),
         state_(chain->At("steps.json")) {}
 
   RunResult Run() {
@@ -78,7 +59,8 @@ class StepRunner {
       return !row.applies(&chain_) || RunRow(row);
     } catch (const InputError& error) {
       result_.stop.stopped = true;
-      result_.stop.step = row.name;
+      result_.stop.cannot_begin = IndexOfStep(row.name) < asked_.first;
+      result_.stop.step = result_.stop.cannot_begin ? StepTable()[asked_.first].name : row.name;
       result_.stop.reason = error.what();
       result_.stop.exit_code = kExitInput;
       return false;
@@ -115,6 +97,9 @@ class StepRunner {
     const MadeFrom made_from = MadeFromOf(step);
     const std::optional<std::string> why = WhyRun(step, made_from);
     if (why) {
+      if (state_.Find(step.name) != nullptr) {
+        context_.progress.Note(step.name + ": once more, " + *why);
+      }
       RunStep(step, made_from, *why);
       outcome.ran = true;
     } else {
@@ -149,9 +134,12 @@ class StepRunner {
     if (IsConsumed(row.name)) return;
     for (const std::string& path : MakeStep(row).outputs) {
       if (IsThere(path)) continue;
-      throw InputError(path, "",
-                       std::string("is not there: the step ") + row.name + " has to run first",
-                       "Start without --from or --only, or with --from " + std::string(row.name));
+      // The matches take up the features: without these they cannot run either.
+      const bool lacks_features =
+          row.name == std::string("matches") && !IsThere(chain_.At(kPartialDatabase));
+      const std::string first = lacks_features ? "features" : row.name;
+      throw InputError(path, "", "is not there: the step " + first + " has to run first",
+                       "Start without --from or --only, or with --from " + first);
     }
   }
 
@@ -166,7 +154,7 @@ class StepRunner {
     bool uses_colmap = step.name == "mapper";
     for (size_t i = 0; i < step.commands.size(); ++i) {
       from["options" + (i == 0 ? "" : " " + std::to_string(i + 1))] =
-          EssentialText(step.commands[i]);
+          names_.Essential(step.commands[i]);
       uses_colmap |= step.commands[i][0] == chain_.options().colmap;
     }
     if (uses_colmap) from["COLMAP"] = chain_.Colmap().version();
@@ -177,7 +165,7 @@ class StepRunner {
                          "Check the path");
       }
       // Two of one name, as scans in folders of their own: by their paths.
-      from[from.count(FileName(path)) == 0 ? FileName(path) : path] = signature;
+      from[from.count(FileName(path)) == 0 ? FileName(path) : names_.Of(path)] = signature;
     }
     for (const auto& [path, content] : step.files) from[FileName(path)] = HashText(content);
     if (step.name == "matches") {
@@ -194,7 +182,14 @@ class StepRunner {
     if (record == nullptr) return false;
     const Step step = MakeStep(row);
     return std::all_of(step.inputs.begin(), step.inputs.end(), IsThere) &&
-           Differences(record->made_from, MadeFromOf(step)).empty();
+           names_.Changes(record->made_from, MadeFromOf(step)).empty();
+  }
+
+  bool OutputsAreThere(StepRecord record) const {
+    std::map<std::string, std::string> placed;
+    for (const auto& [name, signature] : record.outputs) placed[names_.PlaceOf(name)] = signature;
+    record.outputs = std::move(placed);
+    return OutputsAreAsLeft(record);
   }
 
   // Why what a record left is not what its step would give now; none if it is.
@@ -215,14 +210,14 @@ class StepRunner {
     for (const std::string& path : step.inputs) {
       if (!IsThere(path)) return FileName(path) + " is not there any more";
     }
-    std::vector<std::string> changed = Differences(record->made_from, MadeFromOf(step));
+    std::vector<std::string> changed = names_.Changes(record->made_from, MadeFromOf(step));
     changed.erase(std::remove_if(changed.begin(), changed.end(),
                                  [](const std::string& name) {
                                    return name == "roomtex" || name == "COLMAP";
                                  }),
                   changed.end());
     if (const auto why = WhyStale(*record, changed)) return *why;
-    return IsConsumed(row.name) || OutputsAreAsLeft(*record) ? "" : kResultChanged;
+    return IsConsumed(row.name) || OutputsAreThere(*record) ? "" : kResultChanged;
   }
 
   // Why a step has to run; none if it has not.
@@ -230,13 +225,13 @@ class StepRunner {
     if (IsForced()) return "asked for";
     const StepRecord* const record = state_.Find(step.name);
     if (record == nullptr) return "for the first time";
-    const auto why = WhyStale(*record, Differences(record->made_from, made_from));
+    const auto why = WhyStale(*record, names_.Changes(record->made_from, made_from));
     if (why) return why;
     if (IsConsumed(step.name)) {
       if (IsThere(step.outputs[0]) || MatchesHoldTheseFeatures()) return std::nullopt;
       return "its result is not there";
     }
-    if (!OutputsAreAsLeft(*record)) return kResultChanged;
+    if (!OutputsAreThere(*record)) return kResultChanged;
     return std::nullopt;
   }
 
@@ -245,7 +240,7 @@ class StepRunner {
     const StepRecord* const record = state_.Find("matches");
     if (record == nullptr || record->state == StepState::kDone) return false;
     const Step step = MakeStep(*RowOf("matches"));
-    return !Differences(record->made_from, MadeFromOf(step)).empty();
+    return !names_.Changes(record->made_from, MadeFromOf(step)).empty();
   }
 
   // Whichever way they were matched, the database has the features that are asked for now.
@@ -256,7 +251,7 @@ class StepRunner {
     const auto features = record->made_from.find("features");
     return features != record->made_from.end() && now.count("features") != 0 &&
            features->second == now.at("features") &&
-           (record->state != StepState::kDone || OutputsAreAsLeft(*record));
+           (record->state != StepState::kDone || OutputsAreThere(*record));
   }
 
   static const StepRow* RowOf(const std::string& name) {
@@ -313,7 +308,7 @@ class StepRunner {
     if (!IsConsumed(step.name)) {
       // Asked again: how many models the mapper makes is known now.
       for (const std::string& path : RowOf(step.name)->make(&chain_).outputs) {
-        record.outputs[path] = Signature(path);
+        record.outputs[names_.Of(path)] = Signature(path);
       }
     }
     state_.Set(step.name, record);
@@ -327,7 +322,7 @@ class StepRunner {
     if (step.name == "features") {
       const StepRecord* const before = state_.Find(step.name);
       const bool same = before != nullptr && before->state == StepState::kStarted &&
-                        Differences(before->made_from, made_from).empty();
+                        names_.Changes(before->made_from, made_from).empty();
       if (!same) RemoveDatabase(partial);
     }
     if (step.name == "matches" && !IsThere(partial) && !IsThere(chain_.At(kDatabase))) {
@@ -516,6 +511,7 @@ class StepRunner {
   Chain& chain_;
   const Command::Context& context_;
   const StepRange asked_;
+  const PathNames names_;
   RunState state_;
   RemainingTime time_;
   RunResult result_;

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/command_line.h"
+#include "workflow/chain.h"
 #include "workflow/run_state.h"
-#include "workflow/step.h"
 
 namespace roomtex {
 
@@ -30,6 +30,8 @@ bool IsLeftToAlign(const StepOutcome& outcome);
 // Why a run ended before its last step.
 struct Stop {
   bool stopped = false;
+  // --from or --only passed over what `step`, the first one asked for, needs: it has not run.
+  bool cannot_begin = false;
   std::string step, reason;
   int exit_code = 0;                  // kExitUntrusted, kExitInput or kExitInternalError
   std::vector<std::string> remedies;  // what a person can do, sentences and command lines

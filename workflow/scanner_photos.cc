@@ -5,7 +5,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "workflow/step.h"
+#include "core/input_guard.h"
 
 namespace roomtex {
 namespace {
@@ -76,7 +76,7 @@ std::string FindScannerScan(const AutoOptions& options) {
   if (!WhyNoScannerPhotos(options).empty()) return "";
   const auto found =
       std::find_if(options.scan_paths.begin(), options.scan_paths.end(),
-                   [](const std::string& path) { return HoldsPosedPhotos(ScanFileOf(path)); });
+                   [](const std::string& path) { return HoldsPosedPhotos(FileOf(path)); });
   return found == options.scan_paths.end() ? "" : *found;
 }
 

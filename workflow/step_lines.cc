@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/input_guard.h"
 
 namespace roomtex {
 namespace {
@@ -65,7 +66,7 @@ bool UsesGpu(Chain* chain, std::vector<std::string>* notes) {
 void AddScans(const AutoOptions& options, CommandLine* line, std::vector<std::string>* inputs) {
   for (const std::string& path : options.scan_paths) {
     AddOption("--scan_path", path, line);
-    inputs->push_back(ScanFileOf(path));
+    inputs->push_back(FileOf(path));
   }
   AddScanReading(options, line);
   if (!options.scan_poses.empty()) inputs->push_back(options.scan_poses);

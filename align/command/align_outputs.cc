@@ -72,14 +72,25 @@ void WriteOverlayPictures(const AlignCommandOptions& a, const AlignedPhotos& ali
   WarnOfPhotos(a, warnings, "Overlay: ", told, context);
 }
 
+std::string UntrustedPath(std::string output_path) {
+  while (output_path.size() > 1 && output_path.back() == '/') output_path.pop_back();
+  return output_path + ".untrusted";
+}
+
+// An untrusted result of an earlier run stays beside this one, and nobody shall take it for newer.
+void WarnOfUntrusted(const AlignCommandOptions& a, const Command::Context& context) {
+  const std::string aside = UntrustedPath(a.output_path);
+  if (!ReadAlignmentRecord(aside).found) return;
+  context.Warn(aside + " is of an earlier run, which was not to be trusted: this one is in " +
+               a.output_path + ". Remove " + aside + " if nothing needs it");
+}
+
 // Where the result goes: a trusted one that is there is kept.
 std::string ChooseOutput(const AlignCommandOptions& a, const Command::Context& context) {
   if (context.report.trusted()) return a.output_path;
   const AlignmentRecord there = ReadAlignmentRecord(a.output_path);
   if (!there.found || !there.trusted) return a.output_path;
-  std::string output_path = a.output_path;
-  while (output_path.size() > 1 && output_path.back() == '/') output_path.pop_back();
-  output_path += ".untrusted";
+  const std::string output_path = UntrustedPath(a.output_path);
   context.Warn("The trusted result in " + a.output_path + " is kept; this one is in " +
                output_path + ".");
   return output_path;
@@ -97,8 +108,11 @@ std::set<std::string> LookForPhotos(const AlignCommandOptions& a,
                                     const std::vector<const SparseModel*>& models,
                                     const Command::Context& context) {
   std::set<std::string> told;
-  if (a.image_path.empty()) return told;
   std::vector<PhotoLeftOut> left_out;
+  if (a.image_path.empty()) {
+    ReportPhotosLeftOut(left_out, context);
+    return told;
+  }
   std::vector<std::string> notes;
   std::set<std::string> names;
   for (const SparseModel* model : models) {
@@ -161,7 +175,7 @@ void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
   context.report.SetUntrusted(refusal);
   for (const char* key :
        {"scan_from_sparse", "picks", "scale", "planes", "plane_rms_m", "reprojection_rms_px",
-        "expected_error", "agreement", "images", "search"}) {
+        "expected_error", "agreement", "images", "search", "mirrored"}) {
     if (!context.report.keys().contains(key)) context.report[key] = nullptr;
   }
   const std::string output_path = ChooseOutput(a, context);
@@ -178,6 +192,7 @@ void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMoti
                   const std::optional<Similarity>& local_from_sparse, ScanReading* reading,
                   const std::set<std::string>& told, const Command::Context& context) {
   const std::string output_path = ChooseOutput(a, context);
+  if (context.report.trusted()) WarnOfUntrusted(a, context);
   RequireNoRigs(output_path);
   const auto outputs = std::make_shared<OutputSet>(output_path);
   WriteOverlayPictures(a, {model, a.image_path, row_motions}, *reading->surveyed, told,

@@ -29,6 +29,10 @@ std::optional<PhotoAlignment> FindPhotoAlignment(const AlignCommandOptions& a,
                                                  std::string* refusal) {
   try {
     return AlignPhotos(input, photos, found, a.alignment, &context.progress);
+  } catch (const MirroredScan& mirrored) {
+    context.report["mirrored"] = "scan";
+    *refusal = mirrored.what();
+    return std::nullopt;
   } catch (const Contradiction& contradiction) {
     *refusal = contradiction.what();
     return std::nullopt;

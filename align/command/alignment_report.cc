@@ -1,6 +1,8 @@
 #include "align/command/alignment_report.h"
 
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "align/command/plane_bundle_report.h"
 #include "core/frames.h"
@@ -12,6 +14,41 @@ Json RmsOrNull(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value * value;
   return NumberOrNull(std::sqrt(sum / static_cast<double>(values.size())));
+}
+
+// How far picks miss their places, those of the start from `first` to `last`; NaN for none.
+struct Misses {
+  double rms_px, max_px, refined_rms_px;
+};
+Misses MissesOf(const Alignment& alignment, size_t first, size_t last) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Misses misses = {kNone, kNone, kNone};
+  const AlignmentStart& start = alignment.start;
+  const std::vector<PickOutcome> some(start.picks.begin() + static_cast<long>(first),
+                                      start.picks.begin() + static_cast<long>(last));
+  if (some.empty() || alignment.refined_pick_px.size() < last) return misses;
+  std::vector<double> at_start;
+  for (const PickOutcome& outcome : some) {
+    at_start.push_back(outcome.residual_px);
+    if (outcome.pick.weight > 0) misses.max_px = std::fmax(misses.max_px, outcome.residual_px);
+  }
+  const std::vector<double>& all_refined = alignment.refined_pick_px;
+  misses.rms_px = PickRms(some, at_start);
+  misses.refined_rms_px = PickRms(some, {all_refined.begin() + static_cast<long>(first),
+                                         all_refined.begin() + static_cast<long>(last)});
+  return misses;
+}
+
+// Corners of the photos that the scan has at the same place: they hold a model without picks, or
+// with few.
+Json CornersToJson(const Alignment& alignment) {
+  const size_t num_picks = alignment.start.picks.size(), num_corners = alignment.start.num_corners;
+  if (num_corners == 0) return nullptr;
+  const Misses misses = MissesOf(alignment, num_picks - num_corners, num_picks);
+  return {{"count", num_corners},
+          {"rms_px", NumberOrNull(misses.rms_px)},
+          {"max_px", NumberOrNull(misses.max_px)},
+          {"refined_rms_px", NumberOrNull(misses.refined_rms_px)}};
 }
 
 Json PicksToJson(const Alignment& alignment) {
@@ -43,15 +80,19 @@ Json PicksToJson(const Alignment& alignment) {
   json["count"] = num_picks;
   json["num_used"] = num_used;
   json["image_name"] = start.image_name.empty() ? Json(nullptr) : Json(start.image_name);
-  json["rms_px"] = NumberOrNull(start.pick_rms_px);
-  json["max_px"] = NumberOrNull(start.pick_max_px);
-  json["refined_rms_px"] = NumberOrNull(alignment.refined_pick_rms_px);
-  json["position_sigma_m"] = NumberOrNull(start.position_sigma);
+  const Misses misses = start.num_corners > 0 ? MissesOf(alignment, 0, num_picks)
+                                              : Misses{start.pick_rms_px, start.pick_max_px,
+                                                       alignment.refined_pick_rms_px};
+  json["rms_px"] = NumberOrNull(misses.rms_px);
+  json["max_px"] = NumberOrNull(misses.max_px);
+  json["refined_rms_px"] = NumberOrNull(misses.refined_rms_px);
+  json["position_sigma_m"] = num_picks > 0 ? NumberOrNull(start.position_sigma) : Json(nullptr);
   if (!check_px.empty()) {
     json["check_points"] = {{"count", check_px.size()},
                             {"rms_px", RmsOrNull(check_px)},
                             {"refined_rms_px", RmsOrNull(refined_check_px)}};
   }
+  json["corners"] = CornersToJson(alignment);
   json["per_pick"] = per_pick;
   return json;
 }
@@ -115,7 +156,8 @@ void FillReport(const Alignment& alignment, double reprojection_rms_after, Repor
   r["picks"] = PicksToJson(alignment);
   const ScaleEstimate& scale = alignment.start.scale;
   const bool has_scale = scale.num_features > 0;
-  r["scale"]["value"] = has_scale ? Json(scale.scale) : Json(nullptr);
+  // Without picks in a photo of which the features could tell it, that of the answer.
+  r["scale"]["value"] = has_scale ? scale.scale : alignment.scan_from_sparse.scale;
   r["scale"]["num_features"] = scale.num_features;
   r["scale"]["relative_mad"] = has_scale ? Json(scale.relative_mad) : Json(nullptr);
   r["planes"] = Json::array();
@@ -215,6 +257,8 @@ void NullWithoutModel(Report* report) {
   for (const char* key : {"scan_from_sparse", "scan_from_sparse_from_picks", "plane_bundle"}) {
     r[key] = nullptr;
   }
+  r["scale"]["value"] = nullptr;
+  r["mirrored"] = nullptr;
   r["reprojection_rms_px"]["before"] = nullptr;
   r["expected_error"]["at_far_corner_mm"] = nullptr;
   r["expected_error"]["far_corner"] = nullptr;

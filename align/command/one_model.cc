@@ -164,6 +164,8 @@ void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
     TakeMirroredReading(std::move(found), reading, context);
   } else if (!attempt.says_mirrored) {
     const bool both = found.kind == MirroredReading::Kind::kScanAndPicks;
+    attempt.says_mirrored = true;
+    reading->picks_are_mirrored = both;
     attempt.alignment.reset();
     attempt.refusal = MirroredScan(files[0].path,
                                    std::string("the scan is a mirror image of the room") +
@@ -171,6 +173,12 @@ void AlignScans(const AlignCommandOptions& a, const AlignmentInput& input,
                                    MirrorRemedy(input), !both)
                           .what();
   }
+}
+
+// The report's `mirrored`: what the refusal says is to be read the other way; null = nothing.
+Json MirroredToJson(const ScanReading& reading) {
+  if (!reading.attempt.says_mirrored) return nullptr;
+  return reading.picks_are_mirrored ? "scan and picks" : "scan";
 }
 
 // What roomtex-mapper held against the model. A lens that was adjusted here is no longer the one
@@ -391,11 +399,13 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   input.num_threads = context.options.num_threads;
   input.scan_origin = reading->origin.offset();
   reading->search = Json();
+  reading->picks_are_mirrored = false;
   AlignScans(a, input, one.near, verdict.known_rms, one_place, may_turn, reading, context);
   if (verdict.known_rms && reading->search.is_null() && a.picks_path.empty()) {
     reading->search = {{"method", "known_poses"}, {"position_rms_m", *verdict.known_rms}};
   }
   context.report["search"] = reading->search;
+  context.report["mirrored"] = MirroredToJson(*reading);
   AlignedModel aligned;
   const std::vector<ScanPlane> planes = PlanesOf(a, *reading->surveyed);
   if (!reading->attempt.alignment) {

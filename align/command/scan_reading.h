@@ -27,6 +27,7 @@ struct ScanReading {
   PlacedScans placed;            // about the origin and sorted by path, until WriteAligned()
   std::vector<size_t> as_named;  // the order of its files on the command line
   LocalOrigin origin{{}};
+  bool picks_are_mirrored = false;  // where attempt.says_mirrored: made on the mirrored scan
   std::unique_ptr<const std::vector<Scan>> mirrored;  // in place of placed.scans
   std::unique_ptr<const SurveyedScans> surveyed;
   std::optional<GeoReference> geo;

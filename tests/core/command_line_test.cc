@@ -210,6 +210,8 @@ TEST(CommandLine, WrongOptionsAreUsageErrors) {
   ExpectUsageError({"--unknown", "1"}, "--unknown is not an option of roomtex-test");
   ExpectUsageError({"--unknown=1"}, "--unknown is not an option of roomtex-test");
   ExpectUsageError({"--conut", "1"}, "Did you mean --count?");
+  ExpectUsageError({"--photograph", "1"},
+                   "Its files are --input_path, --output_path, --scan_path.");
   ExpectUsageError({"-x"}, "-x is not an option of roomtex-test");
   ExpectUsageError({"stray"}, "\"stray\" does not belong to an option");
   ExpectUsageError({"--count"}, "--count needs a value");
@@ -452,6 +454,65 @@ TEST_F(CommandReport, ReplacesAReportAndNothingElse) {
     EXPECT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitDone);
     EXPECT_THAT(ReadBytes(path_), HasSubstr("roomtex-test"));
   }
+}
+
+// What is wrong with the options is found before anything runs; the report of the run before must
+// not stand for this one.
+TEST_F(CommandReport, IsWrittenForOptionsThatCannotBeRead) {
+  WriteBytes(folder_ / "options.ini", "report_path=" + path_ + "\ntypo=1\n");
+  const std::vector<std::vector<std::string>> wrong = {
+      {"--typo", "1", "--report_path", path_},
+      {"--report_path=" + path_, "--mode", "off"},
+      {"--report_path", path_, "stray"},
+      {"--report_path", path_, "--project_path", folder_ / "options.ini"},
+      {"--project_path", folder_ / "options.ini"}};
+  for (const std::vector<std::string>& arguments : wrong) {
+    ASSERT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitDone);
+    EXPECT_EQ(test_.Run(arguments), kExitUsage) << testing::PrintToString(arguments);
+    const Json report = Json::parse(ReadBytes(path_));
+    EXPECT_EQ(report["trusted"], false) << testing::PrintToString(arguments);
+    EXPECT_THAT(test_.err, HasSubstr(report["reason"].get<std::string>()));
+  }
+  ASSERT_TRUE(std::filesystem::remove(path_));
+  EXPECT_EQ(test_.Run({"--typo", "1", "--report_path", path_}), kExitUsage);
+  EXPECT_EQ(Json::parse(ReadBytes(path_))["command"], "roomtex-test");
+}
+
+// It is not known what is an input, and what lies in a folder of results belongs to them.
+TEST_F(CommandReport, OfOptionsThatCannotBeReadReplacesNothingElse) {
+  for (const char* other : {"{}", "a thesis", R"({"command": "roomtex-align"})"}) {
+    WriteBytes(path_, other);
+    EXPECT_EQ(test_.Run({"--typo", "1", "--report_path", path_}), kExitUsage);
+    EXPECT_EQ(ReadBytes(path_), other);
+  }
+  std::filesystem::remove(path_);
+  ASSERT_EQ(test_.Run({"--input_path", "in", "--report_path", path_}), kExitDone);
+  const std::string before = ReadBytes(path_);
+  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+           {"--output_path", folder_.path()}, {"--scan_path=" + path_}, {"--input_path", path_}}) {
+    std::vector<std::string> arguments = {"--typo", "1", "--report_path", path_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(test_.Run(arguments), kExitUsage);
+    EXPECT_EQ(ReadBytes(path_), before) << more[0];
+    EXPECT_THAT(test_.err, HasSubstr("stays as it was, the report of an earlier run")) << more[0];
+  }
+}
+
+TEST_F(CommandReport, UnfinishedIsNotTrustedButDone) {
+  EXPECT_EQ(Run([](const Command::Context& context) {
+              context.report.SetUnfinished("Only some of the steps were asked for.");
+            }),
+            kExitDone);
+  EXPECT_EQ(report_["trusted"], false);
+  EXPECT_EQ(report_["reason"], "Only some of the steps were asked for.");
+}
+
+TEST_F(CommandReport, HoldsOptionsOfAnotherProgramByTheirNames) {
+  ASSERT_EQ(test_.Run({"--input_path", "in", "--report_path", path_, "--Mapper.x", "1"}),
+            kExitDone);
+  const Json options = Json::parse(ReadBytes(path_))["options"];
+  EXPECT_EQ(options["Mapper.x"], "1");
+  EXPECT_FALSE(options.contains("Mapper.*"));
 }
 
 TEST_F(CommandReport, UnwritableReportIsSaid) {

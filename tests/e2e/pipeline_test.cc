@@ -68,7 +68,7 @@ TEST_F(Pipeline, MapperRegistersEveryPhoto) {
   const json report = ReadJson(*folder_ / "mapper.json");
   EXPECT_EQ(report["num_images"], 14);
   EXPECT_EQ(report["num_reg_images"], 14);
-  EXPECT_LT(report["mean_reprojection_error_px"], 1.0);
+  EXPECT_LT(report["mean_reprojection_error_px"], 0.4);  // measured: 0.25
   EXPECT_EQ(ReadSparseModel(*folder_ / "sparse/0").images.size(), 14u);
   EXPECT_EQ(ReadSparseModel(*folder_ / "sparse/init").images.size(), 2u);
 }
@@ -82,8 +82,8 @@ TEST_F(Pipeline, AlignedPosesAreNearTheTruth) {
   ASSERT_EQ(evaluate_.exit_code, 0) << evaluate_.err;
   const json truth = json::parse(evaluate_.out);
   // Six clicks of 1.5 px in one photo of 960 x 640.
-  EXPECT_LT(truth["poses"]["position_median_mm"], 10.0);
-  EXPECT_LT(truth["poses"]["rotation_median_deg"], 0.15);
+  EXPECT_LT(truth["poses"]["position_median_mm"], 4.0);    // measured: 1.0 to 1.7
+  EXPECT_LT(truth["poses"]["rotation_median_deg"], 0.08);  // measured: 0.02 to 0.04
   EXPECT_EQ(truth["poses"]["num_registered"], 14);
 }
 
@@ -91,8 +91,8 @@ TEST_F(Pipeline, ColoursAreNearTheTruth) {
   ASSERT_EQ(texture_.exit_code, 0) << texture_.err;
   ASSERT_EQ(evaluate_.exit_code, 0) << evaluate_.err;
   const json truth = json::parse(evaluate_.out);
-  EXPECT_GT(truth["color"]["psnr_db"], 24.0);
-  EXPECT_GT(ReadJson(*folder_ / "textured/report.json")["coverage"], 0.5);
+  EXPECT_GT(truth["color"]["psnr_db"], 27.0);  // measured: 28.7 to 29.2
+  EXPECT_GT(ReadJson(*folder_ / "textured/report.json")["coverage"], 0.7);  // measured: 0.746
 }
 
 TEST_F(Pipeline, WritesEveryFileOfTheContract) {

@@ -75,6 +75,18 @@ TEST_F(AlignRemediesTest, AMirroredScanIsToBeReadTheOtherWay) {
   EXPECT_THAT(remedies[0].substr(remedies[0].find(": roomtex-auto")), Not(HasSubstr("--azimuth")));
 }
 
+// By six picks nothing was searched for, and the picks are right.
+TEST_F(AlignRemediesTest, AScanThatPicksShowToBeMirroredIsNoFaultOfThePicks) {
+  WriteBytes(folder_ / "result/picks.csv", "");
+  options_.azimuth = "counterclockwise";
+  EXPECT_THAT(OfReport({{"search", nullptr}, {"mirrored", "scan"}}),
+              ElementsAre(HasSubstr("without --azimuth")));
+  // Those that were made on it are not.
+  EXPECT_THAT(OfReport({{"search", nullptr}, {"mirrored", "scan and picks"}}),
+              ElementsAre(AllOf(HasSubstr("Pick anew"), Not(HasSubstr("--azimuth"))),
+                          HasSubstr("Then start again")));
+}
+
 TEST_F(AlignRemediesTest, AHintThatDidNotHelpIsToBeChecked) {
   options_.near = "a.jpg,1,2,3";
   EXPECT_THAT(Of("none")[1], HasSubstr("--near a.jpg,1,2,3"));

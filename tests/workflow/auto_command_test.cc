@@ -15,6 +15,7 @@
 #include "tests/support/folders.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
+#include "workflow/run_state.h"
 
 namespace roomtex {
 namespace {
@@ -144,6 +145,21 @@ TEST_F(AutoCommand, ASlipInAnOptionForAStepIsSaidBeforeTheFirst) {
   EXPECT_FALSE(fs::exists(Result("")));
 }
 
+// Whichever step is asked for, the first that has to run is named.
+TEST_F(AutoCommand, AStepThatCannotRunYetSaysWhichHasToRunFirst) {
+  const CommandResult result =
+      RunCommandLine("roomtex-auto --quality low --image_path " + (*folder_ / "other/photos") +
+                     " --scan_path " + (*folder_ / "other/scan.rtpi") + " --output_path " +
+                     (*folder_ / "nothing") + " --only texture");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("texture: "));
+  EXPECT_THAT(result.err, HasSubstr("the step features has to run first. Start without --from or "
+                                    "--only, or with --from features."));
+  const json report = ReadJson(*folder_ / "nothing/report.json");
+  EXPECT_EQ(report["verdict"]["headline"], "Not finished: the step texture cannot run yet");
+  EXPECT_EQ(report["trusted"], false);
+}
+
 TEST_F(AutoCommand, WhatIsNotItsOwnStaysAsItIs) {
   const std::string line = "roomtex-auto --quality low --picks_path " +
                            (*folder_ / "other/picks.csv") + " --output_path " +
@@ -195,6 +211,11 @@ TEST_F(AutoCommand, GoesOnWhereItWasKilled) {
   EXPECT_TRUE(fs::exists(Result("database.db")));
   EXPECT_TRUE(fs::exists(Result("sparse/0/images.bin")));
   EXPECT_FALSE(fs::exists(Result("aligned")));
+  // Done as asked for, but no coloured room that anybody may trust.
+  const json report = ReadJson(Result("report.json"));
+  EXPECT_EQ(report["verdict"]["state"], "unfinished");
+  EXPECT_EQ(report["trusted"], false);
+  EXPECT_THAT(report["reason"].get<std::string>(), HasSubstr("only some of the steps"));
 }
 
 // The scan of a room of the same plan, and nobody has clicked.
@@ -225,6 +246,16 @@ TEST_F(AutoCommand, SaysWhatAPersonCanDoWhereAStepIsNotToBeTrusted) {
   EXPECT_THAT(page, HasSubstr("that is a guess"));
 }
 
+// The picks are right, and so they are not to be looked at.
+TEST_F(AutoCommand, AMirroredScanIsReadTheOtherWayAndKeepsItsPicks) {
+  const CommandResult result =
+      RunCommandLine(Arguments() + Picks() + " --until align --azimuth counterclockwise");
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("Start again without --azimuth"));
+  EXPECT_THAT(result.err, Not(HasSubstr("roomtex-pick --")));
+  EXPECT_EQ(ReadJson(Result("log/align.json"))["mirrored"], "scan");
+}
+
 TEST_F(AutoCommand, AlignsAgainWhereAPhotoIsSaidToBelongElsewhere) {
   const auto run = [](const std::string& near) {
     const CommandResult result = RunCommandLine(Arguments() + " --until align --near " + near);
@@ -237,7 +268,7 @@ TEST_F(AutoCommand, AlignsAgainWhereAPhotoIsSaidToBelongElsewhere) {
   EXPECT_EQ(ReadJson(Result("log/align.json"))["options"]["near"], near);
   EXPECT_THAT(run(near), HasSubstr("align: done before"));
   EXPECT_THAT(run("photo_001.jpg,-1.2431,-0.6965,1.1159"), HasSubstr("$ roomtex-align "));
-  EXPECT_THAT(ReadBytes(Result("log/align.log")), HasSubstr("align, changed: options"));
+  EXPECT_THAT(ReadBytes(Result("log/align.log")), HasSubstr("align, changed: options (--near)"));
 }
 
 TEST_F(AutoCommand, GoesOnFromThereWithPicks) {
@@ -318,6 +349,37 @@ TEST_F(AutoCommand, DoesNothingTwice) {
   EXPECT_EQ(TimeOf("database.db"), database);
 }
 
+TEST_F(AutoCommand, GoesOnWhateverItsPathsAreCalled) {
+  const auto run_in = [](const std::string& folder, const std::string& arguments) {
+    WriteBytes(*folder_ / "elsewhere.sh",
+               "cd " + folder + " && " + BinFolder() + "/roomtex-auto --quality low " + arguments);
+    const CommandResult result = RunProgram("bash " + (*folder_ / "elsewhere.sh"));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("pictures: done before"));
+    EXPECT_THAT(result.err, Not(HasSubstr("$ ")));
+  };
+  const std::string arguments =
+      "--image_path photos/ --scan_path ./scan.rtpi --cameras_path ../capture/cameras.txt ";
+  run_in(*folder_ / "capture", arguments + "--output_path ../result");
+  // Moved; the page still finds its pictures.
+  fs::rename(Result(""), *folder_ / "moved");
+  run_in(*folder_ / "capture", arguments + "--output_path ../moved/");
+  EXPECT_EQ(NumTimes(ReadBytes(*folder_ / "moved/report.html"), "<img "), 10u);
+  fs::rename(*folder_ / "moved", Result(""));
+
+  // As versions before wrote it, paths as they were typed.
+  const std::string steps = ReadBytes(Result("steps.json"));
+  json typed = json::parse(
+      std::regex_replace(steps, std::regex("'?\\{result\\}([^ '\"]*)'?"), "../result$1"));
+  json& records = typed["steps"];
+  ASSERT_THAT(records["mapper"]["made_from"]["options"].get<std::string>(),
+              HasSubstr("--database_path ../result/database.db"));
+  records["matches"]["made_from"]["features"] = HashText(records["features"]["made_from"].dump());
+  WriteBytes(Result("steps.json"), typed.dump());
+  run_in(*folder_ / "capture", arguments + "--output_path " + Result(""));
+  WriteBytes(Result("steps.json"), steps);
+}
+
 // How cameras moved and their lens roomtex-align judges anew; that photos are missing it does not.
 TEST_F(AutoCommand, GoesOnBehindAModelOfWhichAlignmentHasTheLastWord) {
   const std::string steps = ReadBytes(Result("steps.json")),
@@ -366,7 +428,9 @@ TEST_F(AutoCommand, AChangedOptionIsRunAgainFromItsStepOn) {
   EXPECT_EQ(TimeOf("aligned/images.bin"), aligned);
   EXPECT_NE(TimeOf("textured/model.ply"), model);
   // The pictures are there, but of the texture before.
-  EXPECT_EQ(ReadJson(Result("report.json"))["verdict"]["state"], "unfinished");
+  const json report = ReadJson(Result("report.json"));
+  EXPECT_EQ(report["verdict"]["state"], "unfinished");
+  EXPECT_EQ(report["trusted"], false);
 }
 
 TEST_F(AutoCommand, AReportAloneSaysWhichStepsItPassedOverAreOutOfDate) {

@@ -420,6 +420,15 @@ class ScannerStepTest : public StepTableTest {
   }
 };
 
+// A scan of a file whose name has a # of its own.
+TEST_F(ScannerStepTest, AreFoundInAFileWithAHashInItsName) {
+  const std::string file = folder_ / "b#1.e57";
+  fs::copy(folder_ / "site.e57", file);
+  options_.scan_paths = {file + "#2"};
+  EXPECT_EQ(Applying().front(), "scanner");
+  EXPECT_THAT(Make("scanner").inputs, ElementsAre(file, folder_ / "photos"));
+}
+
 TEST_F(ScannerStepTest, TheirPosesGoToTheMapper) {
   AddPhotos("a", 4, 60);
   EXPECT_EQ(Applying().front(), "scanner");
