@@ -134,7 +134,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
 
   progress->Stage("trust");
   Judgement judgement = JudgeFit(input, start, result.fit, options);
-  AskPhotos(input, result.fit, options.trust, &judgement);
+  OverruleByPhotos(input, result.fit, options.trust, &judgement);
   result.expected_error = judgement.expected_error;
   result.photo_sigmas = std::move(judgement.photo_sigmas);
   result.disagreement = std::move(judgement.disagreement);

@@ -108,7 +108,7 @@ AutomaticAlignment AlignAutomatically(const AlignmentInput& input,
   StartSearchOptions search;
   search.num_threads = input.num_threads;
   const auto judge = [&] {
-    AskPhotos(input, options, StartPhotosOptions(), &found.search);
+    AskPhotosOfStarts(input, options, StartPhotosOptions(), &found.search);
     found.verdict = JudgeStarts(input, found.search, hinted, StartVerdictOptions());
   };
   const auto look = [&] {

@@ -268,8 +268,8 @@ bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions
   return photos.supports && shifts.at_pose.Share() - shifts.elsewhere.Share() >= kClearlyInPlace;
 }
 
-void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,
-               Judgement* judgement) {
+void OverruleByPhotos(const AlignmentInput& input, const AlignmentFit& fit,
+                      const TrustOptions& trust, Judgement* judgement) {
   if (judgement->doubt.reason.empty()) return;
   const auto [reason, differs] = std::exchange(judgement->doubt, {});
   if (!input.image_path.empty() && judgement->reasons.empty()) {

@@ -26,9 +26,9 @@ struct Judgement {
   std::vector<std::string> warnings;
   // Why the answer is not to be trusted; empty = trusted.
   std::vector<std::string> reasons;
-  // One more reason, or "", that photos can overrule (AskPhotos): too few points on the surface for
-  // a laser scan; or too few for a coarse one, or too many before it and behind, so that scan and
-  // photos differ.
+  // One more reason, or "", that photos can overrule (OverruleByPhotos): too few points on the
+  // surface for a laser scan; or too few for a coarse one, or too many before it and behind, so
+  // that scan and photos differ.
   struct Doubt {
     std::string reason;
     bool differs = false;  // the latter
@@ -53,8 +53,8 @@ bool Overrules(const GradientAgreement& photos, bool differs, const TrustOptions
 
 // Decides on Judgement::doubt: by photos and intensity (agreement.h), where there are both; else it
 // is a reason like the others.
-void AskPhotos(const AlignmentInput& input, const AlignmentFit& fit, const TrustOptions& trust,
-               Judgement* judgement);
+void OverruleByPhotos(const AlignmentInput& input, const AlignmentFit& fit,
+                      const TrustOptions& trust, Judgement* judgement);
 
 // What speaks against an adjustment, or should be known of it. All of it warnings: the similarity
 // remains.

@@ -124,12 +124,11 @@ std::vector<std::string> CheckSpread(const AlignmentInput& input, const SpreadPi
                      "Pick points that are spread over the photos, in depth, and not on one line");
   }
   if (spread.mirrored) {
-    throw Contradiction(
-        input.surveyed.scans()[0].path, "",
-        "the scan is a mirror image of the room: the picks of all photos together " +
-            Miss(spread.rms_px[0]) + ", but " + Miss(spread.mirrored_rms_px) +
-            " when the scan is reflected",
-        MirrorRemedy(input));
+    throw MirroredScan(input.surveyed.scans()[0].path,
+                       "the scan is a mirror image of the room: the picks of all photos together " +
+                           Miss(spread.rms_px[0]) + ", but " + Miss(spread.mirrored_rms_px) +
+                           " when the scan is reflected",
+                       MirrorRemedy(input), false);
   }
   if (!spread.HasFit()) {
     throw Contradiction(input.picks_path, "",

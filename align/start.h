@@ -10,6 +10,7 @@
 
 #include "align/alignment_input.h"
 #include "align/clicks/pick_view.h"
+#include "align/clicks/view_pose.h"
 #include "align/fit/joint_picks.h"
 #include "align/fit/spread_picks.h"
 
@@ -36,7 +37,7 @@ struct AlignmentStart {
   // So many of `picks`, the last ones, are no clicks but places of the scan's intensity that the
   // photos show where they should (automatic_alignment.cc).
   int num_corners = 0;
-  double pick_sigma_px = 1.5;  // click noise, per coordinate
+  double pick_sigma_px = kUsualClickSigma;  // click noise, per coordinate
   // NaN without picks.
   double pick_rms_px = std::numeric_limits<double>::quiet_NaN();  // of those used
   double pick_max_px = std::numeric_limits<double>::quiet_NaN();  // of all that count

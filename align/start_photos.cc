@@ -70,8 +70,8 @@ void AskPhotosOf(const AlignmentInput& input, const AlignmentOptions& options,
 
 }  // namespace
 
-void AskPhotos(const AlignmentInput& input, const AlignmentOptions& options,
-               const StartPhotosOptions& photos, StartSearch* search) {
+void AskPhotosOfStarts(const AlignmentInput& input, const AlignmentOptions& options,
+                       const StartPhotosOptions& photos, StartSearch* search) {
   if (input.image_path.empty() || search->starts.empty()) return;
   const double most = search->starts[0].sights.Score();
   for (int i = 0; i < static_cast<int>(search->starts.size()); ++i) {

@@ -20,12 +20,12 @@ struct StartPhotosOptions {
 };
 
 // Fills FittedStart::photos of the best starts, and of one that looks alike, where it is not known
-// yet. Where sparse points and surface differ by
-// centimetres (kExactRms), a start that is fitted to the surface can be a few degrees off, too far
-// for photos to confirm: where each of them shows the scan's corners shifted alike, the start is
-// first drawn to there, by a fit to these corners and the surface.
-void AskPhotos(const AlignmentInput& input, const AlignmentOptions& options,
-               const StartPhotosOptions& photos, StartSearch* search);
+// yet. Where sparse points and surface differ by centimetres (kExactRms), a start that is fitted to
+// the surface can be a few degrees off, too far for photos to confirm: where each of them shows the
+// scan's corners shifted alike, the start is first drawn to there, by a fit to these corners and
+// the surface.
+void AskPhotosOfStarts(const AlignmentInput& input, const AlignmentOptions& options,
+                       const StartPhotosOptions& photos, StartSearch* search);
 
 // Corners that photos show, as picks of weight 1: at most `most`, evenly taken. scan_from_sparse:
 // what they were looked for with.

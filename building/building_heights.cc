@@ -362,34 +362,35 @@ double ExplainedShare(const OutlineCloud& cloud, const GroundPlane& ground,
   return all > 0 ? on / all : 0;
 }
 
-void FindDoubts(const OutlineCloud& cloud, BuildingEvidence* evidence) {
+std::vector<std::string> FindDoubts(const OutlineCloud& cloud, const BuildingEvidence& evidence) {
   double length = 0, covered = 0;
   int bare = 0;
-  for (const BuildingEvidence::Wall& wall : evidence->walls) {
+  for (const BuildingEvidence::Wall& wall : evidence.walls) {
     length += wall.length;
     covered += wall.length * wall.covered;
     bare += wall.covered < 0.3 && wall.length > 0.5 * cloud.step;
   }
-  std::vector<std::string>& doubts = evidence->doubts;
+  std::vector<std::string> doubts;
   if (bare > 0) {
-    doubts.push_back(std::to_string(bare) + " of " + std::to_string(evidence->walls.size()) +
+    doubts.push_back(std::to_string(bare) + " of " + std::to_string(evidence.walls.size()) +
                      " walls have no points: they are where others end");
   } else if (covered < 0.6 * length) {
     doubts.push_back("points lie on only " + Percent(covered / length) + " of its walls' length");
   }
-  if (evidence->num_roof_points == 0) {
+  if (evidence.num_roof_points == 0) {
     doubts.push_back("no points on its roof: taken as flat, as high as the walls' points");
-  } else if (evidence->roof_covered < 0.35) {
-    doubts.push_back("points of the roof lie above only " + Percent(evidence->roof_covered) +
+  } else if (evidence.roof_covered < 0.35) {
+    doubts.push_back("points of the roof lie above only " + Percent(evidence.roof_covered) +
                      " of it");
   }
-  if (evidence->num_ground_points < 20) {
+  if (evidence.num_ground_points < 20) {
     doubts.push_back("no points on the ground around it: its floor is the scene's lowest");
   }
-  if (evidence->explained < 0.6) {
-    doubts.push_back("only " + Percent(evidence->explained) +
+  if (evidence.explained < 0.6) {
+    doubts.push_back("only " + Percent(evidence.explained) +
                      " of the points inside and on it lie on its walls and roof");
   }
+  return doubts;
 }
 
 }  // namespace roomtex

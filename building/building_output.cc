@@ -72,6 +72,30 @@ MapFrame MapFrameOf(const Outline& outline) {
   return frame;
 }
 
+// A building as it is written in the frame of a map; its attributes are those of the outline.
+struct MappedBuilding {
+  const OutlineBuilding* building;
+  Json attributes;
+  BuildingSolid solid;
+};
+std::vector<MappedBuilding> OnTheMap(const Outline& outline, const MapFrame& map) {
+  std::vector<MappedBuilding> buildings;
+  for (const OutlineBuilding& building : outline.buildings) {
+    BuildingSolid solid = ExtrudeBuilding(building);
+    const Json attributes = AttributesOf(building, solid, map.origin_height);
+    for (Eigen::Vector3d& vertex : solid.vertices) vertex = map.from_outline(vertex);
+    buildings.push_back({&building, attributes, std::move(solid)});
+  }
+  return buildings;
+}
+Eigen::AlignedBox3d BoxOf(const std::vector<MappedBuilding>& buildings) {
+  Eigen::AlignedBox3d box;
+  for (const MappedBuilding& one : buildings) {
+    for (const Eigen::Vector3d& vertex : one.solid.vertices) box.extend(vertex);
+  }
+  return box;
+}
+
 // --- OBJ
 
 void WriteBuildingsObj(const std::string& path, const Outline& outline) {
@@ -239,15 +263,8 @@ void WriteCityJson(const std::string& path, const Outline& outline) {
         "https://www.opengis.net/def/crs/EPSG/0/" + std::to_string(map.epsg);
   }
   json["CityObjects"] = Json::object();
-  std::vector<std::pair<const OutlineBuilding*, BuildingSolid>> solids;
-  Eigen::AlignedBox3d box;
-  for (const OutlineBuilding& building : outline.buildings) {
-    solids.emplace_back(&building, ExtrudeBuilding(building));
-    for (Eigen::Vector3d& vertex : solids.back().second.vertices) {
-      vertex = map.from_outline(vertex);
-      box.extend(vertex);
-    }
-  }
+  const std::vector<MappedBuilding> buildings = OnTheMap(outline, map);
+  const Eigen::AlignedBox3d box = BoxOf(buildings);
   const Eigen::Vector3d origin =
       box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.min().array().floor());
   // Small things in units of their own keep their digits.
@@ -265,7 +282,7 @@ void WriteCityJson(const std::string& path, const Outline& outline) {
     if (is_new) vertices.push_back({std::get<0>(key), std::get<1>(key), std::get<2>(key)});
     return found->second;
   };
-  for (const auto& [building, solid] : solids) {
+  for (const auto& [building, attributes, solid] : buildings) {
     Json shell = Json::array(), values = Json::array(), surfaces = Json::array();
     for (const FaceKind kind : {FaceKind::kGround, FaceKind::kRoof, FaceKind::kWall}) {
       surfaces.push_back({{"type", SurfaceName(kind)}});
@@ -283,7 +300,7 @@ void WriteCityJson(const std::string& path, const Outline& outline) {
     geometry["semantics"] = {{"surfaces", surfaces}, {"values", Json::array({values})}};
     Json object;
     object["type"] = "Building";
-    object["attributes"] = AttributesOf(*building, ExtrudeBuilding(*building), map.origin_height);
+    object["attributes"] = attributes;
     object["geometry"] = Json::array({geometry});
     json["CityObjects"]["building_" + building->name] = object;
   }
@@ -315,14 +332,12 @@ void AddMeasure(pugi::xml_node* building, const char* name, double value) {
   attribute.append_child("gen:value").text() = Number(value, 3).c_str();
 }
 
-void WriteCityGml(const std::string& path, const Outline& outline) {
-  const MapFrame map = MapFrameOf(outline);
-  const int digits = outline.metric ? 4 : 7;
-  pugi::xml_document document;
-  pugi::xml_node declaration = document.append_child(pugi::node_declaration);
+// The model's root element.
+pugi::xml_node AppendCity(pugi::xml_document* document) {
+  pugi::xml_node declaration = document->append_child(pugi::node_declaration);
   declaration.append_attribute("version") = "1.0";
   declaration.append_attribute("encoding") = "UTF-8";
-  pugi::xml_node city = document.append_child("core:CityModel");
+  pugi::xml_node city = document->append_child("core:CityModel");
   const std::pair<const char*, const char*> namespaces[] = {
       {"xmlns:core", "http://www.opengis.net/citygml/2.0"},
       {"xmlns:bldg", "http://www.opengis.net/citygml/building/2.0"},
@@ -337,21 +352,65 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
        "http://schemas.opengis.net/citygml/generics/2.0/generics.xsd"},
   };
   for (const auto& [name, value] : namespaces) city.append_attribute(name) = value;
-  // The envelope comes first and is known last.
-  pugi::xml_node bounded = city.append_child("gml:boundedBy").append_child("gml:Envelope");
-  Eigen::AlignedBox3d box;
+  return city;
+}
+
+void AppendEnvelope(const Eigen::AlignedBox3d& box, int epsg, int digits, pugi::xml_node* city) {
+  if (box.isEmpty()) return;
+  pugi::xml_node envelope = city->append_child("gml:boundedBy").append_child("gml:Envelope");
+  if (epsg != 0) {
+    envelope.append_attribute("srsName") =
+        ("urn:ogc:def:crs:EPSG::" + std::to_string(epsg)).c_str();
+  }
+  envelope.append_attribute("srsDimension") = 3;
+  const auto corner = [digits](const Eigen::Vector3d& x) {
+    return Number(x.x(), digits) + ' ' + Number(x.y(), digits) + ' ' + Number(x.z(), digits);
+  };
+  envelope.append_child("gml:lowerCorner").text() = corner(box.min()).c_str();
+  envelope.append_child("gml:upperCorner").text() = corner(box.max()).c_str();
+}
+
+// The solid names its surfaces, which follow with what they are.
+void AppendSurfaces(const BuildingSolid& solid, const std::string& id, int digits,
+                    pugi::xml_node* building) {
+  pugi::xml_node composite = building->append_child("bldg:lod2Solid")
+                                 .append_child("gml:Solid")
+                                 .append_child("gml:exterior")
+                                 .append_child("gml:CompositeSurface");
+  int face_number = 0;
+  for (const SolidFace& face : solid.faces) {
+    const std::string face_id = id + "_" + std::to_string(++face_number);
+    composite.append_child("gml:surfaceMember").append_attribute("xlink:href") =
+        ("#" + face_id).c_str();
+    pugi::xml_node polygon =
+        building->append_child("bldg:boundedBy")
+            .append_child((std::string("bldg:") + SurfaceName(face.kind)).c_str())
+            .append_child("bldg:lod2MultiSurface")
+            .append_child("gml:MultiSurface")
+            .append_child("gml:surfaceMember")
+            .append_child("gml:Polygon");
+    polygon.append_attribute("gml:id") = face_id.c_str();
+    pugi::xml_node positions = polygon.append_child("gml:exterior")
+                                   .append_child("gml:LinearRing")
+                                   .append_child("gml:posList");
+    positions.append_attribute("srsDimension") = 3;
+    positions.text() = PositionsOf(solid.CornersOf(face), digits).c_str();
+  }
+}
+
+void WriteCityGml(const std::string& path, const Outline& outline) {
+  const MapFrame map = MapFrameOf(outline);
+  const int digits = outline.metric ? 4 : 7;
+  const std::vector<MappedBuilding> buildings = OnTheMap(outline, map);
+  pugi::xml_document document;
+  pugi::xml_node city = AppendCity(&document);
+  AppendEnvelope(BoxOf(buildings), map.epsg, digits, &city);
   int building_number = 0;
-  for (const OutlineBuilding& building : outline.buildings) {
-    BuildingSolid solid = ExtrudeBuilding(building);
-    const Json attributes = AttributesOf(building, solid, map.origin_height);
-    for (Eigen::Vector3d& vertex : solid.vertices) {
-      vertex = map.from_outline(vertex);
-      box.extend(vertex);
-    }
+  for (const auto& [building, attributes, solid] : buildings) {
     const std::string id = "b" + std::to_string(++building_number);
     pugi::xml_node node = city.append_child("core:cityObjectMember").append_child("bldg:Building");
     node.append_attribute("gml:id") = id.c_str();
-    node.append_child("gml:name").text() = building.name.c_str();
+    node.append_child("gml:name").text() = building->name.c_str();
     for (const char* name :
          {"ground_height", "eaves_height", "ridge_height", "footprint_area", "volume"}) {
       AddMeasure(&node, name, attributes[name].get<double>());
@@ -359,43 +418,7 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
     pugi::xml_node measured = node.append_child("bldg:measuredHeight");
     measured.append_attribute("uom") = outline.metric ? "m" : "1";
     measured.text() = Number(attributes["measured_height"].get<double>(), 3).c_str();
-    pugi::xml_node composite = node.append_child("bldg:lod2Solid")
-                                   .append_child("gml:Solid")
-                                   .append_child("gml:exterior")
-                                   .append_child("gml:CompositeSurface");
-    int face_number = 0;
-    for (const SolidFace& face : solid.faces) {
-      const std::string face_id = id + "_" + std::to_string(++face_number);
-      composite.append_child("gml:surfaceMember").append_attribute("xlink:href") =
-          ("#" + face_id).c_str();
-      pugi::xml_node polygon =
-          node.append_child("bldg:boundedBy")
-              .append_child((std::string("bldg:") + SurfaceName(face.kind)).c_str())
-              .append_child("bldg:lod2MultiSurface")
-              .append_child("gml:MultiSurface")
-              .append_child("gml:surfaceMember")
-              .append_child("gml:Polygon");
-      polygon.append_attribute("gml:id") = face_id.c_str();
-      pugi::xml_node positions = polygon.append_child("gml:exterior")
-                                     .append_child("gml:LinearRing")
-                                     .append_child("gml:posList");
-      positions.append_attribute("srsDimension") = 3;
-      positions.text() = PositionsOf(solid.CornersOf(face), digits).c_str();
-    }
-  }
-  if (map.epsg != 0) {
-    bounded.append_attribute("srsName") =
-        ("urn:ogc:def:crs:EPSG::" + std::to_string(map.epsg)).c_str();
-  }
-  bounded.append_attribute("srsDimension") = 3;
-  const auto corner = [digits](const Eigen::Vector3d& x) {
-    return Number(x.x(), digits) + ' ' + Number(x.y(), digits) + ' ' + Number(x.z(), digits);
-  };
-  if (box.isEmpty()) {
-    city.remove_child("gml:boundedBy");
-  } else {
-    bounded.append_child("gml:lowerCorner").text() = corner(box.min()).c_str();
-    bounded.append_child("gml:upperCorner").text() = corner(box.max()).c_str();
+    AppendSurfaces(solid, id, digits, &node);
   }
   OutputFile file(path);
   document.save(file.stream(), "  ");

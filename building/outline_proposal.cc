@@ -169,7 +169,7 @@ OutlineProposal ProposeOutline(const OutlineCloud& cloud, const std::vector<Plan
     building.name = std::to_string(proposal.outline.buildings.size() + 1);
     AddWallEvidence(cloud, ground, region.walls, building, &evidence);
     AddExplained(cloud, ground, building, &evidence);
-    FindDoubts(cloud, &evidence);
+    evidence.doubts = FindDoubts(cloud, evidence);
     if (!building.Problems().empty()) continue;
     proposal.outline.buildings.push_back(building);
     proposal.evidence.push_back(evidence);
@@ -191,7 +191,7 @@ OutlineProposal JudgeOutline(const OutlineCloud& cloud, const std::vector<PlaneS
     FindHeights(cloud, ground, segments, roof, &measured, &evidence);
     AddWallEvidence(cloud, ground, {}, building, &evidence);
     AddExplained(cloud, ground, building, &evidence);
-    FindDoubts(cloud, &evidence);
+    evidence.doubts = FindDoubts(cloud, evidence);
     judged.evidence.push_back(evidence);
   }
   judged.explained = ExplainedShare(cloud, ground, outline.buildings);

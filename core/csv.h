@@ -27,8 +27,8 @@ class CsvReader {
   CsvReader(const std::string& path, const std::string& remedy, const std::string& expected);
 
   // Goes to the next record that is no comment: a line, or several where a quoted field goes over
-  // their ends; false behind the last one. Throws InputError for what
-  // is not a line of text, and when the file cannot be read on.
+  // their ends; false behind the last one. Throws InputError for what is not a line of text, and
+  // when the file cannot be read on.
   bool Next();
 
   long line_number() const { return line_number_; }        // its first line, from 1

@@ -15,9 +15,9 @@ enum ExitCode {
   kExitUntrusted = 4,  // it ran, but the answer is not to be trusted
 };
 
-// Input that cannot be used. Thrown where it is found; only Command::Run (command_line.h)
-// catches. The message reads "PATH: POSITION: FINDING. REMEDY", each part a plain phrase without a
-// full stop at its end.
+// Input that cannot be used. Thrown where it is found. Caught by Command::Run (command_line.h), by
+// servers (an answer 422), and where one photo or one trial of several may fail. The message reads
+// "PATH: POSITION: FINDING. REMEDY", each part a plain phrase without a full stop at its end.
 class InputError : public std::runtime_error {
  public:
   // path: file or folder as the user named it. position: "line 12", "byte 4711", or "" for all of

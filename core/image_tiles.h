@@ -44,7 +44,7 @@ struct TilePyramid {
 // Everything may be called from several threads.
 class ImageTiles {
  public:
-  enum class Format { kJpeg, kPng };  // kPng: exact, for drawings and masks
+  enum class Format { kJpeg, kPng };  // kPng: exact, for tests
   // Gives 8-bit grey or BGR of the size that was said. May be called again when the picture has
   // left the cache, and for several pictures side by side.
   using Loader = std::function<cv::Mat()>;

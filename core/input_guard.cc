@@ -17,8 +17,12 @@ namespace fs = std::filesystem;
 
 std::string FileOf(const std::string& path) {
   std::error_code error;
-  const size_t hash = path.rfind('#');
-  return hash == std::string::npos || fs::exists(path, error) ? path : path.substr(0, hash);
+  if (fs::exists(path, error)) return path;
+  for (size_t at = path.find('#'); at != std::string::npos; at = path.find('#', at + 1)) {
+    const std::string file = path.substr(0, at);
+    if (at + 1 < path.size() && fs::is_regular_file(file, error)) return file;
+  }
+  return path;
 }
 
 namespace {

@@ -15,7 +15,9 @@ struct GuardedPaths {
   std::vector<OptionPath> inputs, outputs;
 };
 
-// The file of a path: "file.e57#name" is a scan of file.e57.
+// The file of a path: "file.e57#name" is a scan of file.e57. Names of files and of scans may have a
+// # of their own: the first one before which there is a file parts the two. The path itself where
+// it is a file, or nothing is there. (The rule of SplitScanPath, importers/scan_path.h.)
 std::string FileOf(const std::string& path);
 
 class InputGuard {

@@ -217,19 +217,15 @@ void LocalServer::Impl::Bind() {
 }
 
 void LocalServer::Impl::AllowHosts() {
-  std::vector<std::string> names = options.allowed_hosts;
-  names.insert(names.end(), {"127.0.0.1", "localhost", "[::1]", address.Text()});
+  std::vector<std::string> names = {"127.0.0.1", "localhost", "[::1]", address.Text()};
   if (LowerCase(options.host).find_first_not_of("0123456789abcdef:.") != std::string::npos) {
     names.push_back(options.host);
   }
   if (!address.IsLoopback()) names.push_back(HostName());
   const std::string suffix = ":" + std::to_string(port);
   for (const std::string& name : names) {
-    const bool has_port =
-        name.find(':', name.rfind(']') == std::string::npos ? 0 : name.rfind(']')) !=
-        std::string::npos;
-    hosts.push_back(LowerCase(has_port ? name : name + suffix));
-    if (!has_port && port == 80) hosts.push_back(LowerCase(name));  // browsers leave out 80
+    hosts.push_back(LowerCase(name + suffix));
+    if (port == 80) hosts.push_back(LowerCase(name));  // browsers leave out 80
   }
 }
 

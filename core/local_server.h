@@ -32,8 +32,6 @@ struct LocalServerOptions {
   bool allow_remote = false;       // a host that other computers reach needs this
   bool open = false;               // the command opens the URL in the browser
   std::string token;  // KeptToken(), for addresses that outlive the server; "" = a new one
-  // Names, "name" or "name:port", that a Host header may have beside the bound address.
-  std::vector<std::string> allowed_hosts;
 
   int max_body_bytes = 1 << 20;     // larger requests: 413
   int max_header_bytes = 16 << 10;  // request line and header together; larger: 431

@@ -1,10 +1,10 @@
 #include "core/near_hint.h"
 
-#include <cmath>
-#include <cstdlib>
+#include <optional>
 #include <vector>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace roomtex {
 
@@ -24,10 +24,9 @@ NearHint ParseNearHint(const std::string& text) {
   for (int k = 0; k < 3; ++k) {
     const size_t begin = commas[2 - k] + 1;
     const size_t end = k < 2 ? commas[1 - k] : text.size();
-    const std::string number = text.substr(begin, end - begin);
-    char* rest = nullptr;
-    hint.x_in_scan[k] = std::strtod(number.c_str(), &rest);
-    if (number.empty() || *rest != '\0' || !std::isfinite(hint.x_in_scan[k])) throw fail();
+    const std::optional<double> number = ParseNumber(Trimmed(text.substr(begin, end - begin)));
+    if (!number) throw fail();
+    hint.x_in_scan[k] = *number;
   }
   return hint;
 }

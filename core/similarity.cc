@@ -1,8 +1,8 @@
 #include "core/similarity.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <vector>
 
 #include "core/error.h"
@@ -126,12 +126,12 @@ Similarity ReadSimilarity(const std::string& path) {
   std::ifstream stream(path);
   std::vector<double> v;
   for (std::string word; v.size() <= 16 && stream >> word;) {
-    char* end = nullptr;
-    v.push_back(std::strtod(word.c_str(), &end));
-    if (*end != 0 || !std::isfinite(v.back())) {
-      throw InputError(path, "value " + std::to_string(v.size()),
-                       "\"" + word.substr(0, 40) + "\" is not a finite number", kExpected);
+    const std::optional<double> number = ParseNumber(word);
+    if (!number) {
+      throw InputError(path, "value " + std::to_string(v.size() + 1),
+                       Quoted(word) + " is not a finite number", kExpected);
     }
+    v.push_back(*number);
   }
   if (v.size() == 16) return SimilarityFromMatrix(path, Eigen::Map<const RowMajor4d>(v.data()));
   if (v.size() != 8) {

@@ -9,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/cell_key.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
@@ -26,15 +27,6 @@ constexpr int kTrimPx = 4;              // half a window of the matching
 constexpr int kThroughPx = 2;           // around a position that a photo sees through
 constexpr float kBehind = 0.02f;        // share of the depth: another thing
 constexpr float kSameSurface = 0.02f;   // share of the depth per vertex step
-
-uint64_t CellKey(const Eigen::Vector3d& x_in_scan, double cell) {
-  uint64_t key = 0;
-  for (int k = 0; k < 3; ++k) {
-    key = key << 21 |
-          (static_cast<uint64_t>(static_cast<int64_t>(std::floor(x_in_scan[k] / cell))) & 0x1fffff);
-  }
-  return key;
-}
 
 // Islands of few pixels, by depth: 0.
 void RemoveSpeckles(cv::Mat1b* is_new, const cv::Mat1f& depth) {

@@ -1,19 +1,12 @@
 #include "importers/scan_path.h"
 
-#include <filesystem>
+#include "core/input_guard.h"
 
 namespace roomtex {
 
 ScanPath SplitScanPath(const std::string& path) {
-  std::error_code error;
-  if (std::filesystem::exists(path, error)) return {path, ""};
-  for (size_t at = path.find('#'); at != std::string::npos; at = path.find('#', at + 1)) {
-    const std::string file = path.substr(0, at);
-    if (at + 1 < path.size() && std::filesystem::is_regular_file(file, error)) {
-      return {file, path.substr(at + 1)};
-    }
-  }
-  return {path, ""};
+  const std::string file = FileOf(path);
+  return {file, file.size() < path.size() ? path.substr(file.size() + 1) : ""};
 }
 
 }  // namespace roomtex

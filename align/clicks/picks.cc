@@ -92,8 +92,10 @@ Pick ParsePick(const CsvReader& table, const Columns& columns) {
     if (!(pick.weight >= 0 && pick.weight <= kMaxPickWeight)) {
       throw table.Error(
           fmt::format("{} is {}", kWeight, Quoted(field)),
-          "A weight is 1 for an ordinary pick, more for a more exact one (up to 1000), 0 for a "
-          "check point, on which nothing rests");
+          fmt::format(
+              "A weight is 1 for an ordinary pick, more for a more exact one (up to {:g}), 0 "
+              "for a check point, on which nothing rests",
+              kMaxPickWeight));
     }
   }
   if (columns.label >= 0) pick.label = (*fields)[columns.label];
@@ -259,7 +261,8 @@ void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& pi
                    fmt::format("holds {} picks{}; at least {} are needed, in one photo or spread "
                                "over several",
                                picks.size(), off, kMinPicksPerPhoto),
-                   "Add picks, well spread over the photo and in depth");
+                   "Add picks, well spread over the photo and in depth, or give --image_path: the "
+                   "place is searched for then, and these are a hint");
 }
 
 }  // namespace roomtex

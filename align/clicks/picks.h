@@ -35,8 +35,9 @@ inline constexpr int kMinPicksPerPhoto = 6;
 // The largest weight that a file or the window may give: a typing error is larger.
 inline constexpr double kMaxPickWeight = 1000;
 
-// Throws InputError with the line: no header, wrong number of fields, not a finite number, a
-// negative weight, the same pixel or the same scan point picked twice in one photo.
+// Throws InputError with the line: no header, a quote that is not closed, wrong number of fields,
+// no name of a photo, not a finite number, a weight that is negative or above kMaxPickWeight, the
+// same pixel or the same scan point picked twice in one photo.
 std::vector<Pick> ReadPicks(const std::string& path);
 // Written aside and renamed; reading it back gives the same numbers to the last bit.
 void WritePicks(const std::string& path, const std::vector<Pick>& picks);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "align/clicks/view_pose.h"
 #include "align/fit/plane_bundle.h"
 #include "align/fit/pose_covariance.h"
 #include "align/fit/scan_bend.h"
@@ -29,7 +30,7 @@ struct ModelAdjustmentInput {
   const ScanPatches& patches;
   const std::vector<Pick>& picks;  // may be empty
   std::vector<bool> used;          // one per pick
-  double pick_sigma_px = 1.5;
+  double pick_sigma_px = kUsualClickSigma;
   std::string clicked_image;  // for PlaneBundleOptions::fix_clicked_view; may be empty
   LensChoice lens = LensChoice::kHeld;
   // As in PlaneBundleInput.

@@ -35,8 +35,8 @@ struct PlaneAssociationOptions {
   double gate = 3.5;
   bool surface = true;  // points on no plane may belong to a patch
   // Metres; what stays unknown of every surface however many samples show it: waviness, and what is
-  // too thin for the scanner.
-  double surface_noise = 0.001;
+  // too thin for the scanner. Larger = farther from the scan.
+  double surface_noise = kSurfaceNoise;
 };
 
 // In the order of `points`, at most one each. `points` are those of a model in the scan frame

@@ -333,10 +333,7 @@ void StopRows(PlaneBundle* result) {
 // Runs the rounds; a sentence if one of them fails.
 std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& options,
                       PlaneBundle* result) {
-  PlaneAssociationOptions association;
-  association.max_distance = options.max_distance;
-  association.surface = options.surface;
-  association.surface_noise = options.surface_noise;
+  PlaneAssociationOptions association = options.association;
   FindIdleImages(input, options, result);
   for (const auto& [id, image] : input.model.images) {
     const bool alone = image.frame_id == kNoFrame && result->idle_images.count(id) == 0;
@@ -348,7 +345,8 @@ std::string RunRounds(const PlaneBundleInput& input, const PlaneBundleOptions& o
     if (result->constraints.size() < kMinConstraints) {
       return "Only " + std::to_string(result->constraints.size()) +
              " sparse points lie on the scan's planes" +
-             (options.surface ? " or flat patches" : "") + ", too few to adjust the poses to them.";
+             (options.association.surface ? " or flat patches" : "") +
+             ", too few to adjust the poses to them.";
     }
     const SparseModel before = result->model;
     const auto straight = Straightened(result->constraints, result->model, input.bend);
@@ -378,14 +376,14 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
       .NotNegative()
       .Finite();
   fields
-      ->Number("PlaneBA.max_distance", &max_distance,
+      ->Number("PlaneBA.max_distance", &association.max_distance,
                "Metres; a sparse point farther from a surface never belongs to it; larger = "
                "more tolerant.")
       .Positive();
-  fields->Bool("PlaneBA.surface", &surface,
+  fields->Bool("PlaneBA.surface", &association.surface,
                "Points on no plane are held by flat patches of the scan; 0 = planes alone.");
   fields
-      ->Number("PlaneBA.surface_noise", &surface_noise,
+      ->Number("PlaneBA.surface_noise", &association.surface_noise,
                "Metres; what stays unknown of a surface however many samples show it; larger "
                "= farther from the scan.")
       .Positive();
@@ -440,7 +438,6 @@ PlaneBundle AdjustToSurface(const PlaneBundleInput& input, const PlaneBundleOpti
     StopRows(&result);
     result.plane_rms_before = SurfaceRms(input.model, result.constraints);
     result.photo_costs = PhotoCosts(result.model, result.sigma_px);
-    for (const auto& [id, cost] : result.photo_costs) result.image_cost += cost;
     result.model = BendModel(result.model, input.bend);
     result.plane_rms_after = SurfaceRms(result.model, result.constraints);
     result.reprojection_rms_after = UpdateReprojectionErrors(&result.model).rms_px;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "align/clicks/picks.h"
+#include "align/clicks/view_pose.h"
 #include "align/fit/plane_association.h"
 #include "align/fit/scan_bend.h"
 #include "align/surface/scan_patches.h"
@@ -25,11 +26,9 @@ struct PlaneBundleOptions {
   // errors, the thesis' beta. Larger = nearer to the scan. 0 = per point from the ratio of image
   // noise and scan noise.
   double beta = 0;
-  double max_distance = 0.10;  // metres; a point farther from a surface never belongs to it
-  bool surface = true;  // points on no plane may be held by flat patches (thesis, chapter 10)
-  // Metres; what stays unknown of a surface however many samples show it. Larger = farther from the
-  // scan.
-  double surface_noise = 0.001;
+  // Which points are held on which surface: by flat patches, too (thesis, chapter 10). Each round
+  // has a gate of its own.
+  PlaneAssociationOptions association;
   int min_track = 3;  // observations that a point needs to be held on a surface
   // The photo of the picks keeps its pose, as in the thesis; else its picks hold it no more than
   // their noise allows.
@@ -59,11 +58,11 @@ struct PlaneBundleInput {
   const SparseModel& model;
   const std::vector<ScanPlane>& planes;
   const ScanPatches& patches;
-  const std::vector<Pick>& picks;  // of all photos
-  std::vector<bool> used;          // one per pick
-  double pick_sigma_px = 1.5;      // click noise, per coordinate
-  std::string clicked_image;       // for fix_clicked_view
-  ScanBend bend = ScanBend();      // where the scan has what the photos see
+  const std::vector<Pick>& picks;           // of all photos
+  std::vector<bool> used;                   // one per pick
+  double pick_sigma_px = kUsualClickSigma;  // click noise, per coordinate
+  std::string clicked_image;                // for fix_clicked_view
+  ScanBend bend = ScanBend();               // where the scan has what the photos see
   // Cameras with the same number are one lens; one that lacks here is a lens of its own.
   std::map<uint32_t, int> lens_of_camera = {};
   std::map<uint32_t, Camera> told = {};  // as told, where the model's cameras are no longer that
@@ -102,11 +101,11 @@ struct PlaneBundle {
   double plane_rms_before = 0, plane_rms_after = 0;
   // RMS over all observations, pixels.
   double reprojection_rms_before = 0, reprojection_rms_after = 0;
-  double sigma_px = 0;  // image noise per coordinate, from the input's residuals
-  // Sum over all observations of Huber's cost of the reprojection error in units of sigma_px, of
-  // the adjusted model before it is put onto a bent scan: twice the negative log likelihood.
-  double image_cost = 0;
-  std::map<uint32_t, double> photo_costs;  // what of it is of each photo, by image_id
+  double sigma_px = 0;  // image noise per coordinate: the input's, or that of its residuals
+  // By image_id: sum over the photo's observations of Huber's cost of the reprojection error in
+  // units of sigma_px, of the adjusted model before it is put onto a bent scan: twice the negative
+  // log likelihood. All of them together are the bundle's image cost.
+  std::map<uint32_t, double> photo_costs;
   int num_rounds = 0;
 };
 

@@ -230,11 +230,6 @@ class ReducedSystem {
 
 }  // namespace
 
-PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
-                                    const PlaneBundleOptions& options) {
-  return FindCovariances(input, bundle, options).poses;
-}
-
 BundleCovariances FindCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
                                   const PlaneBundleOptions& options) {
   if (!bundle.usable) return {};

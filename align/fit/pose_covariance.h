@@ -18,16 +18,13 @@ using PoseCovariances = std::map<uint32_t, Eigen::Matrix<double, 6, 6>>;
 // More photos than this would need a dense matrix of more than 2400 x 2400.
 inline constexpr size_t kMaxPosesWithCovariance = 400;
 
-// By image_id, for the photos that took part. Image noise is that of the bundle; what stays unknown
-// of a surface is taken to be the same for all points within half a metre of it, so that thousands
-// of points on a wall do not make it exact. Empty for more than kMaxPosesWithCovariance photos, for
-// a bundle that is not usable, and where something stays open. What the rows' motions leave open is
-// in them for half as many photos.
-PoseCovariances FindPoseCovariances(const PlaneBundleInput& input, const PlaneBundle& bundle,
-                                    const PlaneBundleOptions& options);
-
-// The same, and that of the cameras' parameters where lenses are adjusted (of cameras that are one
-// lens the same), by camera_id; what a lens leaves open is in the poses', too.
+// By image_id, for the photos that took part, and of the cameras' parameters where lenses are
+// adjusted (of cameras that are one lens the same), by camera_id; what a lens leaves open is in the
+// poses', too. Image noise is that of the bundle; what stays unknown of a surface is taken to be
+// the same for all points within half a metre of it, so that thousands of points on a wall do not
+// make it exact. Empty for more than kMaxPosesWithCovariance photos, for a bundle that is not
+// usable, and where something stays open. What the rows' motions leave open is in them for half as
+// many photos.
 struct BundleCovariances {
   PoseCovariances poses;
   std::map<uint32_t, Eigen::MatrixXd> cameras;

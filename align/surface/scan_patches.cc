@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "align/surface/visit_triangle.h"
+#include "core/cell_key.h"
 #include "core/option_fields.h"
 #include "core/statistics.h"
 
@@ -31,7 +32,7 @@ class CellGrid {
   explicit CellGrid(double cell_size) : cell_size_(cell_size) {}
 
   void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& station) {
-    const uint64_t key = Key(point);
+    const uint64_t key = CellKey(point, cell_size_);
     if (key != last_key_ || cells_.empty()) {
       const auto [at, is_new] = index_.try_emplace(key, static_cast<int>(cells_.size()));
       if (is_new) {
@@ -52,17 +53,8 @@ class CellGrid {
   const std::vector<Cell>& cells() const { return cells_; }
 
  private:
-  // 21 bits per axis; cubes two million cells apart share a key only in scans of more than 100 km.
-  uint64_t Key(const Eigen::Vector3d& point) const {
-    uint64_t key = 0;
-    for (int k = 0; k < 3; ++k) {
-      const auto cell = static_cast<int64_t>(std::floor(point[k] / cell_size_));
-      key = (key << 21) | (static_cast<uint64_t>(cell) & 0x1fffff);
-    }
-    return key;
-  }
-
   double cell_size_;
+  // By CellKey: cells share one only in scans of more than 100 km.
   std::unordered_map<uint64_t, int> index_;
   std::vector<Cell> cells_;
   uint64_t last_key_ = 0;

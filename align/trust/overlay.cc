@@ -202,6 +202,14 @@ void DrawCaptions(const std::string& name, int panel_width, cv::Mat* sheet) {
         2 * panel_width + 6);
 }
 
+std::vector<ScanEdge> EdgesOfGrids(const std::vector<Scan>& scans, const ScanEdgeOptions& options) {
+  std::vector<ScanEdge> edges;
+  for (const Scan& scan : scans) {
+    for (ScanEdge& edge : FindScanEdges(scan, options)) edges.push_back(std::move(edge));
+  }
+  return edges;
+}
+
 }  // namespace
 
 Scan ScanFromPhoto(const FreeSpace& free_space, const RayLattice& lattice, const Camera& camera,
@@ -218,8 +226,9 @@ Scan ScanFromPhoto(const FreeSpace& free_space, const RayLattice& lattice, const
       const auto sight = ray.allFinite()
                              ? free_space.Look(centre, scan.scan_from_station.rotation * ray)
                              : std::nullopt;
-      scan.points.push_back(sight ? sight->x_in_scan : Scan::MissingPoint());
-      scan.intensity.push_back(sight ? sight->grey : 0.0f);
+      const bool on_mesh = sight && std::isnan(sight->column);
+      scan.points.push_back(on_mesh ? sight->x_in_scan : Scan::MissingPoint());
+      scan.intensity.push_back(on_mesh ? sight->grey : 0.0f);
     }
   }
   return scan;
@@ -316,11 +325,7 @@ std::vector<std::string> WriteOverlays(const AlignedPhotos& aligned, const std::
                                        const ScanViewer& viewer, int count,
                                        const OverlayOptions& options, int num_threads,
                                        std::vector<std::string>* warnings) {
-  std::vector<ScanEdge> edges;
-  for (const Scan& scan : viewer.scans()) {
-    if (!scan.organised) continue;
-    for (ScanEdge& edge : FindScanEdges(scan, options.edges)) edges.push_back(std::move(edge));
-  }
+  const std::vector<ScanEdge> grid_edges = EdgesOfGrids(viewer.scans(), options.edges);
   const PerspectiveViews views(aligned);
   const std::vector<const SparseImage*> images = SpreadImages(views.model(), count);
   struct Setup {
@@ -365,6 +370,12 @@ std::vector<std::string> WriteOverlays(const AlignedPhotos& aligned, const std::
     const cv::Mat photo = views.Still(image, corner_view, setup.corners, *read);
     const GradientShifts shifts = MeasureGradientShifts(corner_view, photo, setup.projection,
                                                         viewer.sample_angle(), options.gradient);
+    std::vector<ScanEdge> edges = grid_edges;
+    if (viewer.has_mesh()) {
+      const Scan seen =
+          ScanFromPhoto(viewer.free_space(), setup.lattice, camera, image.cam_from_model);
+      for (ScanEdge& edge : FindScanEdges(seen, options.edges)) edges.push_back(std::move(edge));
+    }
     const cv::Mat sheet = DrawOverlay(
         photo, view, SeeEdges(edges, viewer.free_space(), setup.projection, image.cam_from_model),
         shifts, image.name, options);

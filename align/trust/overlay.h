@@ -33,8 +33,9 @@ struct ImgEdge {
   std::vector<Eigen::Vector2d> points;
 };
 
-// What a scanner in the photo's place would measure, a sample per cell of the lattice: gives a mesh
-// without a grid the grid that FindScanEdges asks for.
+// What a scanner in the photo's place would measure of the meshes, a sample per cell of the
+// lattice: gives them the grid that FindScanEdges asks for. Missing where a scan with a grid of its
+// own is seen.
 Scan ScanFromPhoto(const FreeSpace& free_space, const RayLattice& lattice, const Camera& camera,
                    const Rigid& cam_from_scan);
 

@@ -13,6 +13,7 @@
 #include "align/fit/similarity_accuracy.h"
 #include "align/fit/similarity_normal.h"
 #include "align/surface/scan_patches.h"
+#include "core/cell_key.h"
 #include "core/frames.h"
 #include "core/robust_kernel.h"
 #include "core/statistics.h"
@@ -114,7 +115,7 @@ class StationCells {
   explicit StationCells(const std::vector<ScanPatches>& patches) : counts_(patches.size(), 0) {
     for (int station = 0; station < static_cast<int>(patches.size()); ++station) {
       for (const ScanPatch& patch : patches[station].patches()) {
-        std::vector<int>& there = stations_[Key((patch.point / kCell).array().floor())];
+        std::vector<int>& there = stations_[CellKey(patch.point, kCell)];
         if (there.empty() || there.back() != station) there.push_back(station);
       }
       reach_ = std::max(reach_, std::hypot(kFirstGate, patches[station].cell_size()));
@@ -134,7 +135,7 @@ class StationCells {
       for (cell.x() = low.x(); cell.x() <= high.x(); ++cell.x()) {
         for (cell.y() = low.y(); cell.y() <= high.y(); ++cell.y()) {
           for (cell.z() = low.z(); cell.z() <= high.z(); ++cell.z()) {
-            const auto at = stations_.find(Key(cell));
+            const auto at = stations_.find(CellKey(cell));
             if (at == stations_.end()) continue;
             for (const int other : at->second) {
               if (other >= station) break;  // in order
@@ -159,16 +160,7 @@ class StationCells {
 
  private:
   static constexpr double kCell = 0.5;  // metres
-  // 21 bits a coordinate: cells a thousand kilometres apart fall together, and then a pair is
-  // compared for nothing.
-  static uint64_t Key(const Eigen::Array3d& cell) {
-    uint64_t key = 0;
-    for (int k = 0; k < 3; ++k) {
-      key = key << 21 | (static_cast<uint64_t>(static_cast<int64_t>(cell[k])) & 0x1fffff);
-    }
-    return key;
-  }
-
+  // By CellKey: of cells a thousand kilometres apart a pair is compared for nothing.
   std::unordered_map<uint64_t, std::vector<int>> stations_;
   std::vector<int> counts_;
   double reach_ = 0;

@@ -86,12 +86,6 @@ int NumLinks(const std::vector<AssociatedPair>& pairs) {
                                         [](const AssociatedPair& pair) { return !pair.is_spare; }));
 }
 
-int WriteLinks(const std::string& folder, const std::string& image_path,
-               const std::vector<AssociatedPair>& pairs) {
-  MakeLinks(folder, image_path, pairs)->Commit();
-  return NumLinks(pairs);
-}
-
 std::shared_ptr<OutputSet> MakeLinks(const std::string& folder, const std::string& image_path,
                                      const std::vector<AssociatedPair>& pairs) {
   MakeFolder(folder);

@@ -19,10 +19,10 @@ void WriteCamerasText(const std::string& path, const Camera& camera);
 // "--ImageReader.single_camera 1 --ImageReader.camera_model OPENCV --ImageReader.camera_params ..."
 std::string FeatureExtractorOptions(const Camera& camera);
 
-// The command's own keys of docs/commands.md.
 // For people: "focal length 2412.3 +- 0.8 px (0.03 %), reprojection 0.07 px rms over 24 photos".
 std::string FocalLengthLine(const Calibration& calibration);
 
+// The command's own keys of docs/commands.md.
 void FillReport(const Calibration& calibration, const Board& board, Report* report);
 
 }  // namespace roomtex

@@ -32,10 +32,9 @@ cv::Mat1b FromDetail(const cv::Mat1w& detail, const PatternOptions& options) {
   // Thesis 5.1.2: the intensity is inverted, the blocks are re-arranged.
   const cv::Mat1w inverted = 65535 - detail;
   const cv::Mat1b spread = SpreadGrey(inverted, options.brightness);
-  const BlockShuffle shuffle =
+  const std::vector<int> order =
       ShuffleBlocks(spread, options.blocks, {options.width, options.height}, SeedOf(options));
-  return ApplyShuffle(spread, options.blocks, shuffle)({0, 0, options.width, options.height})
-      .clone();
+  return ApplyShuffle(spread, options.blocks, order)({0, 0, options.width, options.height}).clone();
 }
 
 cv::Mat1w Wide(const cv::Mat1b& grey) {

@@ -150,7 +150,8 @@ std::vector<int> InOrder(int blocks) {
 
 }  // namespace
 
-BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible, uint64_t seed) {
+std::vector<int> ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible,
+                               uint64_t seed) {
   std::vector<int> order = InOrder(blocks);
   RandomStream random(MixBits(seed, 0xb10c5));
   for (int i = static_cast<int>(order.size()) - 1; i > 0; --i) {
@@ -158,13 +159,13 @@ BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible,
   }
   Board board(image, blocks, visible, std::move(order));
   board.Improve(&random);
-  return {board.order(), board.Count()};
+  return board.order();
 }
 
-cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const BlockShuffle& shuffle) {
+cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const std::vector<int>& order) {
   cv::Mat1b result(image.rows, image.cols);
   for (int place = 0; place < blocks * blocks; ++place) {
-    image(BlockAt(image.size(), blocks, shuffle.order[place]))
+    image(BlockAt(image.size(), blocks, order[place]))
         .copyTo(result(BlockAt(image.size(), blocks, place)));
   }
   return result;

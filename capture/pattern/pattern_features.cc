@@ -102,22 +102,4 @@ std::vector<FeatureMatch> MatchFeatures(const PatternFeatures& query, const Patt
   return matches;
 }
 
-std::vector<std::array<int, 2>> MatchMutually(const PatternFeatures& a, const PatternFeatures& b,
-                                              double max_ratio, int num_threads) {
-  // OpenCV's descriptors have a length of 512.
-  constexpr float kMostDistance = 0.7f * 512;
-  const auto good = [&](const FeatureMatch& match) {
-    return match.nearest >= 0 && match.distance < kMostDistance && match.Ratio() < max_ratio;
-  };
-  const auto b_of_a = MatchFeatures(a, b, 0, num_threads);
-  const auto a_of_b = MatchFeatures(b, a, 0, num_threads);
-  std::vector<std::array<int, 2>> pairs;
-  for (int i = 0; i < static_cast<int>(b_of_a.size()); ++i) {
-    if (!good(b_of_a[i])) continue;
-    const FeatureMatch& back = a_of_b[b_of_a[i].nearest];
-    if (good(back) && back.nearest == i) pairs.push_back({i, b_of_a[i].nearest});
-  }
-  return pairs;
-}
-
 }  // namespace roomtex

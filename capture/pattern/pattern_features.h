@@ -35,9 +35,4 @@ struct FeatureMatch {
 std::vector<FeatureMatch> MatchFeatures(const PatternFeatures& query, const PatternFeatures& train,
                                         float apart, int num_threads);
 
-// Pairs (feature of a, feature of b) that are each other's nearest, with a ratio below max_ratio
-// both ways and a distance below 0.7 of a descriptor's length: as COLMAP matches by default.
-std::vector<std::array<int, 2>> MatchMutually(const PatternFeatures& a, const PatternFeatures& b,
-                                              double max_ratio, int num_threads);
-
 }  // namespace roomtex

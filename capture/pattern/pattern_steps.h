@@ -18,22 +18,17 @@ cv::Mat1b DrawDetail(int width, int height, double finest, uint64_t seed);
 // ordered by a smoothed copy of the image.
 cv::Mat1b SpreadGrey(const cv::Mat1w& image, double brightness);
 
-// A shuffle of blocks x blocks tiles: the block at place i (row by row) of the result is block
-// order[i] of the image.
-struct BlockShuffle {
-  std::vector<int> order;
-  // Neighbouring blocks that still look alike, because too few of the blocks differ.
-  int num_similar = 0;
-};
 // Two blocks beside or above each other are alike when the lines of pixels that meet, or the blocks
 // as a whole, differ by less than kLeastStep grey values on average, or follow each other with a
-// correlation above kMostCorrelation. Blocks are exchanged until no neighbours are alike.
+// correlation above kMostCorrelation. Blocks are exchanged until no neighbours are alike, or too
+// few of them differ.
 inline constexpr double kLeastStep = 16;
 inline constexpr double kMostCorrelation = 0.6;
-// width and height of the image are multiples of `blocks`; visible: what will be seen of it, from
-// the upper left corner.
-BlockShuffle ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible, uint64_t seed);
-cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const BlockShuffle& shuffle);
+// A shuffle of blocks x blocks tiles: the block at place i (row by row) of the result is block
+// order[i] of the image. Width and height of the image are multiples of `blocks`; visible: what
+// will be seen of it, from the upper left corner.
+std::vector<int> ShuffleBlocks(const cv::Mat1b& image, int blocks, cv::Size visible, uint64_t seed);
+cv::Mat1b ApplyShuffle(const cv::Mat1b& image, int blocks, const std::vector<int>& order);
 // Neighbours in a pattern that are alike. Its blocks have width / blocks pixels, rounded up, and so
 // on; the last column and row may be cut off.
 int CountSimilarNeighbours(const cv::Mat1b& pattern, int blocks);

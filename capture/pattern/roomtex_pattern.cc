@@ -126,13 +126,59 @@ void ReportPhoto(const PatternPhotoCheck& check, const std::string& path,
   }
 }
 
+// The options of the pattern, as far as they say which one it is.
+std::string Described(const PatternOptions& options) {
+  return "--random_seed " + std::to_string(options.random_seed) + ", --width " +
+         std::to_string(options.width) + ", --height " + std::to_string(options.height) +
+         ", --blocks " + std::to_string(options.blocks) + ", --brightness " +
+         Significant(options.brightness, 3);
+}
+
+// A photo of the wall is asked for the pattern that is projected: one that is there already is that
+// one, and stays. Throws UsageError where the options make another.
+void RequireThisPattern(const std::string& path, const cv::Mat1b& pattern,
+                        const PatternOptions& options) {
+  constexpr double kMostRounding = 2;  // grey levels, mean: other programs and machines round
+  const cv::Mat1b there = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  if (there.size() == pattern.size() && cv::norm(there, pattern, cv::NORM_L1) <=
+                                            kMostRounding * static_cast<double>(pattern.total())) {
+    return;
+  }
+  throw UsageError("--output_path " + path +
+                   " is there, and is not the pattern of these options (" + Described(options) +
+                   "): nothing was written. Give the options that it was made with, --input_path "
+                   "too, or leave --output_path out");
+}
+
+void WriteOrKeep(const Arguments& arguments, const PatternOptions& options,
+                 const cv::Mat1b& pattern) {
+  if (arguments.output_path.empty()) return;
+  std::error_code error;
+  if (!arguments.evaluate_path.empty() && std::filesystem::exists(arguments.output_path, error)) {
+    RequireThisPattern(arguments.output_path, pattern, options);
+  } else {
+    WritePattern(arguments.output_path, pattern);
+  }
+}
+
+// What is wrong with the paths.
+std::vector<std::string> PathProblems(const Arguments& arguments) {
+  if (arguments.output_path.empty()) {
+    if (!arguments.evaluate_path.empty()) return {};
+    return {"--output_path is required"};
+  }
+  if (LowerCase(std::filesystem::path(arguments.output_path).extension().string()) == ".png") {
+    return {};
+  }
+  return {"--output_path must end in .png: that is what is written"};
+}
+
 void Run(const Arguments& arguments, const Command::Context& context) {
   const int num_threads = context.options.num_threads;
   PatternOptions options = arguments.pattern;
   options.random_seed = context.options.random_seed;
   std::vector<std::string> problems = options.Problems();
-  if (LowerCase(std::filesystem::path(arguments.output_path).extension().string()) != ".png")
-    problems.push_back("--output_path must end in .png: that is what is written");
+  for (const std::string& problem : PathProblems(arguments)) problems.push_back(problem);
   ThrowIfProblems(problems);
   if (ThreadsNotStarted() == 0) cv::setNumThreads(EffectiveThreads(num_threads));
 
@@ -143,7 +189,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   const cv::Mat wall =
       arguments.evaluate_path.empty() ? cv::Mat() : ReadPhoto(arguments.evaluate_path);
   const cv::Mat1b pattern = Make(photo, options);
-  WritePattern(arguments.output_path, pattern);
+  WriteOrKeep(arguments, options, pattern);
 
   context.progress.Stage("measure");
   const PatternFeatures features = FindFeatures(pattern);
@@ -164,7 +210,7 @@ void Run(const Arguments& arguments, const Command::Context& context) {
                 context);
   }
   context.progress.Finish();
-  std::printf("%s\n", arguments.output_path.c_str());
+  if (!arguments.output_path.empty()) std::printf("%s\n", arguments.output_path.c_str());
 }
 
 }  // namespace
@@ -178,7 +224,9 @@ int main(int argc, char** argv) {
                   "them hold features.",
                   "roomtex-pattern --output_path pattern.png --width 1920 --height 1080");
   command.AddOutputPath("output_path", &arguments.output_path,
-                        "the pattern, PNG; show it full screen, pixel by pixel");
+                        "the pattern, PNG; show it full screen, pixel by pixel; with "
+                        "--evaluate_path one that is there stays, and may be left out",
+                        Command::Kind::kOptional);
   const OptionFields pattern = FieldsOf(&arguments.pattern);
   command.Add(pattern.Only({"width", "height"}));
   command.AddInputPath("input_path", &arguments.input_path,

@@ -296,7 +296,10 @@ TEST(AlignCommand, RefusesMissingInputs) {
 TEST(AlignCommand, RefusesFewerThanSixPicks) {
   SimulatedCase one = MakeCase();
   one.picks.resize(5);
-  ExpectFailure(CaseFolder(one).Align(), 3, "holds 5 picks");
+  const CommandResult result = CaseFolder(one).Align();
+  ExpectFailure(result, 3, "holds 5 picks");
+  // What is enough for them.
+  EXPECT_THAT(result.err, HasSubstr("or give --image_path"));
 }
 
 TEST(AlignCommand, RefusesAnImageNameThatIsNotInTheModel) {
@@ -311,6 +314,7 @@ TEST(AlignCommand, RefusesAMirroredScanAndNamesTheOption) {
   // The picks were made on the scan read clockwise. (Picks on the mirrored scan:
   // alignment_test.cc.)
   ExpectContradiction(files, files.Align("--azimuth counterclockwise"), "--azimuth clockwise");
+  EXPECT_EQ(Json::parse(ReadBytes(files.folder / "aligned/alignment.json"))["mirrored"], "scan");
 }
 
 TEST(AlignCommand, FindsTheReadingOfAScanByThePicks) {
@@ -318,6 +322,12 @@ TEST(AlignCommand, FindsTheReadingOfAScanByThePicks) {
   ScanWriterOptions options;
   options.counterclockwise = true;
   WriteScan(MakeCase().scans[0], {}, files.scan_path, options);
+  // As files are that do not say it.
+  std::string bytes = ReadBytes(files.scan_path);
+  const std::string told = "# azimuth: counterclockwise";
+  ASSERT_NE(bytes.find(told), std::string::npos);
+  WriteBytes(files.scan_path,
+             bytes.replace(bytes.find(told), told.size(), "# azimuth: nobody has told."));
   const CommandResult result = files.Align();
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
@@ -459,6 +469,11 @@ TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   EXPECT_THAT(NamesIn(files.folder / "aligned.untrusted"), testing::ElementsAre("alignment.json"));
   EXPECT_EQ(ReadBytes(files.folder / "aligned/alignment.json"), trusted);
   EXPECT_EQ(ReadBytes(files.folder / "aligned/images.bin"), images);
+  // Trusted again: nobody shall take what lies beside it for newer.
+  WritePicks(files.picks_path, MakeCase().picks);
+  EXPECT_EQ(files.Align().exit_code, 0);
+  EXPECT_THAT(ReadBytes(files.folder / "aligned/alignment.json"),
+              HasSubstr("aligned.untrusted is of an earlier run, which was not to be trusted"));
 }
 
 TEST(AlignCommand, RefusesExchangedPicks) {

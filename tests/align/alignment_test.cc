@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "align/pick_findings.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "tests/align/simulated_alignment.h"
@@ -196,7 +197,7 @@ TEST(Alignment, NeverTrustsPicksOfAnotherPhoto) {
     for (Pick& pick : wrong.picks) pick.image_name = one.room->PhotoName(photo);
     try {
       EXPECT_NE(Reasons(AlignCase(wrong)), "") << photo;
-    } catch (const InputError&) {
+    } catch (const Contradiction&) {
       // Refused: fine as well.
     }
   }
@@ -227,7 +228,7 @@ TEST(Alignment, NeverTrustsTheScanOfAnotherRoom) {
   one.scans = {SimulatedRoom(options).MakeScan(0)};
   try {
     EXPECT_NE(Reasons(AlignCase(one)), "");
-  } catch (const InputError&) {
+  } catch (const Contradiction&) {
   }
 }
 
@@ -249,7 +250,7 @@ TEST(Alignment, NeverTrustsTheScanOfARoomOfTheSameShape) {
     try {
       EXPECT_NE(Reasons(AlignCase(one)), "") << seed;
       ++num_tried;
-    } catch (const InputError&) {
+    } catch (const Contradiction&) {
     }
   }
   EXPECT_GE(num_tried, 1);

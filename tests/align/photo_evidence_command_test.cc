@@ -146,7 +146,7 @@ TEST(PhotoEvidence, OverrulesThatHardlyAnyPointLiesOnTheSurface) {
     Judgement judgement = JudgeFit(input, alignment.start, fit, options);
     EXPECT_LT(judgement.placement.SurfaceShare(), 0.3);
     EXPECT_THAT(judgement.doubt.reason, HasSubstr("float in empty space"));
-    AskPhotos(input, fit, options.trust, &judgement);
+    OverruleByPhotos(input, fit, options.trust, &judgement);
     return judgement;
   };
   EXPECT_THAT(judge().reasons, testing::ElementsAre(HasSubstr("Give --image_path")));

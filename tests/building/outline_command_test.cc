@@ -43,6 +43,44 @@ double SixVolumes(const std::vector<Eigen::Vector3d>& ring, const Eigen::Vector3
   return sum;
 }
 
+// The numbers of a gml:posList.
+std::vector<Eigen::Vector3d> PositionsOf(const pugi::xml_node& polygon) {
+  const pugi::xml_node ring = polygon.child("gml:exterior").child("gml:LinearRing");
+  std::istringstream numbers(ring.child("gml:posList").text().get());
+  std::vector<Eigen::Vector3d> positions;
+  for (Eigen::Vector3d x; numbers >> x.x() >> x.y() >> x.z();) positions.push_back(x);
+  return positions;
+}
+
+// Easting, northing and height of the corners of a building's floor.
+std::vector<Eigen::Vector3d> FloorOf(const Json& city, const std::string& building) {
+  const Json& solid = city["CityObjects"]["building_" + building]["geometry"][0];
+  const Json& kinds = solid["semantics"]["values"][0];
+  std::vector<Eigen::Vector3d> floor;
+  for (size_t face = 0; face < kinds.size(); ++face) {
+    const Json& surface = solid["semantics"]["surfaces"][kinds[face].get<size_t>()];
+    if (surface["type"] != "GroundSurface") continue;
+    for (const Json& index : solid["boundaries"][0][face][0]) {
+      Eigen::Vector3d x;
+      for (size_t i = 0; i < 3; ++i) {
+        x[static_cast<int>(i)] = city["vertices"][index.get<size_t>()][i].get<double>() *
+                                     city["transform"]["scale"][i].get<double>() +
+                                 city["transform"]["translate"][i].get<double>();
+      }
+      floor.push_back(x);
+    }
+  }
+  return floor;
+}
+std::vector<Eigen::Vector3d> FloorOf(const pugi::xml_document& gml, const std::string& building) {
+  const pugi::xml_node floor =
+      gml.select_node(("//bldg:Building[gml:name='" + building + "']//bldg:GroundSurface").c_str())
+          .node();
+  std::vector<Eigen::Vector3d> positions = PositionsOf(floor.select_node(".//gml:Polygon").node());
+  if (!positions.empty()) positions.pop_back();  // a ring ends where it began
+  return positions;
+}
+
 TEST(OutlineCommand, WritesTheStreetInEveryFormat) {
   const TempFolder folder;
   const SimulatedStreet street = MakeStreet({});
@@ -107,14 +145,7 @@ TEST(OutlineCommand, WritesTheStreetInEveryFormat) {
   double gml_volume = 0;
   for (const auto& found : gml.select_nodes("//gml:Polygon")) {
     ids.insert(found.node().attribute("gml:id").value());
-    std::istringstream numbers(found.node()
-                                   .child("gml:exterior")
-                                   .child("gml:LinearRing")
-                                   .child("gml:posList")
-                                   .text()
-                                   .get());
-    std::vector<Eigen::Vector3d> ring;
-    for (Eigen::Vector3d x; numbers >> x.x() >> x.y() >> x.z();) ring.push_back(x);
+    const std::vector<Eigen::Vector3d> ring = PositionsOf(found.node());
     ASSERT_GE(ring.size(), 4u);
     EXPECT_EQ(ring.front(), ring.back());
     gml_volume += SixVolumes(ring, {20, 0, 0}) / 6;
@@ -182,7 +213,8 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
   const SimulatedStreet street = MakeStreet({});
   WriteSparseModel(street.model, folder / "model");
   const std::string common = " --output_path " + (folder / "outline.json") + " --model_path " +
-                             (folder / "b.geojson") + " --model_path " + (folder / "b.city.json");
+                             (folder / "b.geojson") + " --model_path " + (folder / "b.city.json") +
+                             " --model_path " + (folder / "b.gml");
   const auto check = [&] {
     const GeoFrame frame({48.1, 11.6, 560});
     const Json features = ReadJson(folder / "b.geojson");
@@ -207,11 +239,29 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
     EXPECT_GT(PolygonArea(polygon), 0);  // RFC 7946: counter-clockwise
     const Json city = ReadJson(folder / "b.city.json");
     EXPECT_EQ(city["metadata"]["referenceSystem"], "https://www.opengis.net/def/crs/EPSG/0/32632");
-    EXPECT_NEAR(city["transform"]["translate"][0].get<double>(), 693400, 1000);
-    EXPECT_NEAR(city["transform"]["translate"][1].get<double>(), 5330500, 1000);
+    pugi::xml_document gml;
+    ASSERT_TRUE(gml.load_file((folder / "b.gml").c_str()));
+    EXPECT_STREQ(gml.select_node("//gml:Envelope").node().attribute("srsName").value(),
+                 "urn:ogc:def:crs:EPSG::32632");
+    // Turned back from the map, the floor lies where the footprint of GeoJSON does, which is at the
+    // house: a millimetre is the unit of CityJSON.
+    const std::string name = house["properties"]["name"].get<std::string>();
+    const double ground = house["properties"]["ground_height"].get<double>();
+    EXPECT_NEAR(ground, 560 + street.truth.buildings[0].ground, 0.1);
+    for (const auto& floor : {FloorOf(city, name), FloorOf(gml, name)}) {
+      ASSERT_EQ(floor.size(), 4u);
+      for (const Eigen::Vector2d& corner : polygon) {
+        double nearest = 100;
+        for (const Eigen::Vector3d& x : floor) {
+          const Eigen::Vector3d x_in_enu = frame.EnuFromGrid(x.x(), x.y(), x.z());
+          nearest = std::min(nearest, (x_in_enu.head<2>() - corner).norm());
+          EXPECT_NEAR(x.z(), ground, 0.002);
+        }
+        EXPECT_LT(nearest, 0.001);  // measured: 0.6 mm
+      }
+    }
     // As high as the vertices are.
-    const std::string name = "building_" + house["properties"]["name"].get<std::string>();
-    const Json& attributes = city["CityObjects"][name]["attributes"];
+    const Json& attributes = city["CityObjects"]["building_" + name]["attributes"];
     EXPECT_NEAR(attributes["ridge_height"].get<double>(), 566, 0.05);
     EXPECT_NEAR(attributes["measured_height"].get<double>(),
                 566 - attributes["ground_height"].get<double>(), 0.05);

@@ -51,6 +51,20 @@ TEST_F(InputGuardTest, KnowsAnInputByAnyName) {
   EXPECT_THAT(Refusal(scan, scan + "#2"), HasSubstr("is the input"));
 }
 
+TEST_F(InputGuardTest, KnowsTheFileOfAScanWhateverHasAHash) {
+  const std::string hash = folder / "a#b.e57";
+  WriteBytes(hash, "scan");
+  EXPECT_EQ(FileOf(scan + "#2"), scan);
+  EXPECT_EQ(FileOf(scan + "#s#an#1"), scan) << "the scan's name has one";
+  EXPECT_EQ(FileOf(hash), hash) << "the file's name has one";
+  EXPECT_EQ(FileOf(hash + "#1"), hash);
+  EXPECT_EQ(FileOf(scan + "#"), scan + "#") << "no scan is named";
+  EXPECT_EQ(FileOf(folder / "none.e57#1"), folder / "none.e57#1");
+  EXPECT_EQ(FileOf(photos + "#1"), photos + "#1") << "a folder has no scans";
+  EXPECT_THAT(Refusal(scan, scan + "#s#an#1"), HasSubstr("is the input"));
+  EXPECT_THAT(Refusal(hash, hash + "#1"), HasSubstr("is the input"));
+}
+
 TEST_F(InputGuardTest, KnowsPhotosInAFolderAndLeavesTheRest) {
   EXPECT_THAT(Refusal(photos + "/sub/a.JPG", photos), HasSubstr("is a file of the input --input"));
   EXPECT_EQ(Refusal(photos + "/notes.json", photos), "");

@@ -14,7 +14,9 @@ TEST(NearHint, IsReadWithCommasInTheName) {
   const NearHint hint = ParseNearHint("a, b.jpg,1.5,-2,0.25");
   EXPECT_EQ(hint.image_name, "a, b.jpg");
   EXPECT_EQ(hint.x_in_scan, Eigen::Vector3d(1.5, -2, 0.25));
-  for (const char* text : {"", "a.jpg", "a.jpg,1,2", "a.jpg,1,2,x", ",1,2,3", "a.jpg,1,2,nan"}) {
+  EXPECT_EQ(ParseNearHint("a.jpg, 1, +2, -3").x_in_scan, Eigen::Vector3d(1, 2, -3));
+  for (const char* text : {"", "a.jpg", "a.jpg,1,2", "a.jpg,1,2,x", ",1,2,3", "a.jpg,1,2,nan",
+                           "a.jpg,0x10,2,3", "a.jpg,1,2,", "a.jpg,1,2 3,4"}) {
     try {
       ParseNearHint(text);
       ADD_FAILURE() << text;

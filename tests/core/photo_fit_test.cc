@@ -73,8 +73,8 @@ TEST_F(PhotoFits, CellsAreMeansOfThePixelsWhateverTheFilesSize) {
     ASSERT_EQ(cells.size(), cv::Size(17, 11));
     // The quarter ends at 60 = 8 4/7 cells and at 40 = 5 5/7.
     EXPECT_GT(cells.at<cv::Vec3b>(4, 7)[0], 215);
-    EXPECT_NEAR(cells.at<cv::Vec3b>(2, 8)[0], 20 + 200 * 4 / 7, 50);  // a quarter of a cell
-    EXPECT_NEAR(cells.at<cv::Vec3b>(5, 3)[0], 20 + 200 * 5 / 7, 50);
+    EXPECT_NEAR(cells.at<cv::Vec3b>(2, 8)[0], 20 + 200 * 4 / 7, 16);  // half a pixel of seven
+    EXPECT_NEAR(cells.at<cv::Vec3b>(5, 3)[0], 20 + 200 * 5 / 7, 16);
     EXPECT_LT(cells.at<cv::Vec3b>(2, 9)[0], 25);
     EXPECT_LT(cells.at<cv::Vec3b>(6, 3)[0], 25);
   }

@@ -152,6 +152,7 @@ TEST(SimilarityFile, MistakesAreRefused) {
       {"1 0 0 0 0 0 0 0", "zero or negative"},
       {"1 1 0 0 0 0 0 nan", "\"nan\" is not a finite number"},
       {"1 1 0 0 0 0 0 1e999", "\"1e999\" is not a finite number"},
+      {"1 1 0 0 0 0 0 0x10", "\"0x10\" is not a finite number"},
       {"1 1 0 0 0 0 0 x", "\"x\" is not a finite number"},
       {"1 0 0 0 0 1 0 0 0 0 -1 0 0 0 0 1", "not a similarity"},
       {"1 0 0 0 0 1 0 0 0 0 2 0 0 0 0 1", "not a similarity"},

@@ -183,12 +183,6 @@ export class Picks extends EventTarget {
     return true;
   }
 
-  get canUndo() {
-    return this.#undo.length > 0;
-  }
-  get canRedo() {
-    return this.#redo.length > 0;
-  }
   get undoLabel() {
     return this.#undo.at(-1)?.label ?? '';
   }

@@ -56,12 +56,6 @@ export class TileStore {
     return tile.toned;
   }
 
-  // A picture under the same URL has changed or come back.
-  forgetFailures() {
-    this.#failed.clear();
-    this.#next();
-  }
-
   #tone(tile, tone) {
     const {width, height} = tile.bitmap;
     if (!tile.toned) {

@@ -108,7 +108,7 @@ TEST(PlaneBundle, PatchesHelpWhereThereAreFewPlanes) {
                            one.room.picks[0].image_name};
     PlaneBundleOptions options;
     const PlaneBundle any_surface = AdjustToSurface(input, options);
-    options.surface = false;
+    options.association.surface = false;
     const PlaneBundle planes_only = AdjustToSurface(input, options);
     ASSERT_TRUE(any_surface.usable) << any_surface.reason;
     with += PoseErrorsOf(one.room.room, any_surface.model).position.median / 4;
@@ -144,7 +144,7 @@ TEST(PlaneBundle, ARoomWithoutAnyPlaneIsHeldByPatches) {
   EXPECT_LT(PositionErrors(room, bundle.model).worst, 0.7 * PositionErrors(room, best).worst);
   EXPECT_LT(PositionErrors(room, bundle.model).median, 0.002);
   EXPECT_GT(bundle.constraints.size(), 3500u);
-  options.surface = false;
+  options.association.surface = false;
   const PlaneBundle nothing = AdjustToSurface(input, options);
   EXPECT_FALSE(nothing.usable);
   EXPECT_THAT(nothing.reason, HasSubstr("Only 0 sparse points lie on the scan's planes"));
@@ -212,7 +212,7 @@ TEST(PlaneBundle, DoesNotDependOnTheFrameOfTheScan) {
   for (Pick& pick : picks) pick.x_in_scan = other * pick.x_in_scan;
   // Patches depend on where their cubes lie: without them.
   PlaneBundleOptions options;
-  options.surface = false;
+  options.association.surface = false;
   const ScanPatches no_patches({}, ScanPatchOptions());
   const std::vector<bool> used(picks.size(), true);
   const std::string clicked = picks[0].image_name;
@@ -391,10 +391,12 @@ TEST(PlaneBundle, APhotoThatStandsElsewhereThanItsPointsWantItIsPutBackAndItsCos
       AdjustToSurface(one.room.Input(OnSurface(one.room, one.model)), PlaneBundleOptions());
   ASSERT_TRUE(right.usable) << right.reason;
   EXPECT_TRUE(right.ran_away.empty());
-  EXPECT_NEAR(SharedImageCost(right, bundle), right.image_cost - right.photo_costs.at(5),
-              1e-9 * right.image_cost);
-  EXPECT_NEAR(SharedImageCost(bundle, right), bundle.image_cost - bundle.photo_costs.at(5),
-              1e-9 * bundle.image_cost);
+  for (const auto& [one_of_two, other] : {std::pair(&right, &bundle), {&bundle, &right}}) {
+    double cost = 0;
+    for (const auto& [id, of_photo] : one_of_two->photo_costs) cost += of_photo;
+    EXPECT_NEAR(SharedImageCost(*one_of_two, *other), cost - one_of_two->photo_costs.at(5),
+                1e-9 * cost);
+  }
 }
 
 TEST(PlaneBundle, APhotoThatNothingHoldsFollowsTheOthers) {
@@ -454,9 +456,9 @@ TEST(PlaneBundle, ABentScanGetsTheColoursToTheirPlace) {
     const Spread truth = ColourErrors(one.room, one.model);  // the best similarity to the truth
     const Spread fitted = ColourErrors(one.room, similarity);
     PlaneBundleOptions bundle_options;
-    bundle_options.surface = false;
+    bundle_options.association.surface = false;
     const PlaneBundle planes = AdjustToSurface(one.room.Input(similarity), bundle_options);
-    bundle_options.surface = true;
+    bundle_options.association.surface = true;
     const PlaneBundle any = AdjustToSurface(one.room.Input(similarity), bundle_options);
     // Straightened.
     const std::vector<bool> used(one.room.picks.size(), true);
@@ -494,8 +496,8 @@ TEST(PlaneBundleOptions, NamesEveryProblem) {
   PlaneBundleOptions options;
   EXPECT_THAT(options.Problems(), testing::IsEmpty());
   options.beta = -1;
-  options.max_distance = 0;
-  options.surface_noise = 0;
+  options.association.max_distance = 0;
+  options.association.surface_noise = 0;
   options.min_track = 1;
   options.min_bend = -1;
   options.num_rounds = 0;

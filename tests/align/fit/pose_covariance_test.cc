@@ -19,7 +19,7 @@ Adjusted Adjust(const SurfaceRoom& room, const SparseModel& model,
   const PlaneBundleInput input = room.Input(model);
   Adjusted adjusted{AdjustToSurface(input, options), {}};
   EXPECT_TRUE(adjusted.bundle.usable) << adjusted.bundle.reason;
-  adjusted.covariances = FindPoseCovariances(input, adjusted.bundle, options);
+  adjusted.covariances = FindCovariances(input, adjusted.bundle, options).poses;
   return adjusted;
 }
 
@@ -114,7 +114,7 @@ TEST(PoseCovariance, GrowsWithTheSquareOfTheNoise) {
   adjusted.bundle.sigma_px *= 2;
   for (SurfaceConstraint& c : adjusted.bundle.constraints) c.sigma *= 2;
   // Residuals are smaller against the doubled noise, so that none counts less as an outlier.
-  const PoseCovariances doubled = FindPoseCovariances(input, adjusted.bundle, {});
+  const PoseCovariances doubled = FindCovariances(input, adjusted.bundle, {}).poses;
   ASSERT_EQ(adjusted.covariances.size(), one.model.images.size());
   for (const auto& [id, covariance] : adjusted.covariances) {
     EXPECT_NEAR(doubled.at(id).trace() / covariance.trace(), 4, 0.4) << id;
@@ -123,7 +123,7 @@ TEST(PoseCovariance, GrowsWithTheSquareOfTheNoise) {
 
 TEST(PoseCovariance, IsEmptyForABundleThatIsNotUsed) {
   const Reconstruction& one = StraightRoom();
-  EXPECT_TRUE(FindPoseCovariances(one.room.Input(one.model), PlaneBundle(), {}).empty());
+  EXPECT_TRUE(FindCovariances(one.room.Input(one.model), PlaneBundle(), {}).poses.empty());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/frames.h"
 #include "core/report.h"
@@ -98,9 +99,8 @@ TEST(ScanEdges, OfAPlainNoisyWallAreNone) {
   EXPECT_EQ(FindScanEdges(scan, ScanEdgeOptions()).size(), 0u);
 }
 
-// A mesh has no grid of its own: a camera in front of a unit box sees three faces and their
-// creases.
-TEST(ScanEdges, OfABoxMeshAreFoundFromThePhoto) {
+// A unit box as a mesh, and a camera at (3, 2.5, 3.5) that sees three of its faces.
+Scan BoxMesh() {
   Scan box;
   box.organised = false;
   for (int i = 0; i < 8; ++i) box.points.emplace_back(i & 1, i >> 1 & 1, i >> 2 & 1);
@@ -109,20 +109,27 @@ TEST(ScanEdges, OfABoxMeshAreFoundFromThePhoto) {
   box.num_columns = 8;
   box.num_rows = 1;
   box.intensity.assign(8, 0);
-  EXPECT_EQ(FindScanEdges(box, ScanEdgeOptions()).size(), 0u);
-
-  const Camera camera{1, CameraModel::kPinhole, 400, 300, {400, 400, 200, 150}};
-  Rigid cam_from_scan;  // at (3, 2.5, 3.5), looking at the box's middle
+  return box;
+}
+Camera BoxCamera() { return {1, CameraModel::kPinhole, 400, 300, {400, 400, 200, 150}}; }
+Rigid CamFromBox() {
   const Eigen::Vector3d centre(3, 2.5, 3.5);
   const Eigen::Vector3d z = (Eigen::Vector3d::Constant(0.5) - centre).normalized();
   const Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitY()).normalized();
   Eigen::Matrix3d rotation;
   rotation << x.transpose(), z.cross(x).transpose(), z.transpose();
-  cam_from_scan.rotation = rotation;
-  cam_from_scan.translation = -(rotation * centre);
+  return {Eigen::Quaterniond(rotation), -(rotation * centre)};
+}
+
+// A mesh has no grid of its own: a camera in front of it sees the creases between its faces.
+TEST(ScanEdges, OfABoxMeshAreFoundFromThePhoto) {
+  const Scan box = BoxMesh();
+  EXPECT_EQ(FindScanEdges(box, ScanEdgeOptions()).size(), 0u);
+
+  const Camera camera = BoxCamera();
   const FreeSpace free_space({box}, 1000);
   const Scan scan =
-      ScanFromPhoto(free_space, RayLattice(CameraProjection(camera), 1), camera, cam_from_scan);
+      ScanFromPhoto(free_space, RayLattice(CameraProjection(camera), 1), camera, CamFromBox());
   EXPECT_EQ(scan.num_columns, 400);
   EXPECT_EQ(scan.num_rows, 300);
   double length = 0;
@@ -139,6 +146,17 @@ TEST(ScanEdges, OfABoxMeshAreFoundFromThePhoto) {
   }
   // All of the three edges but their ends; one that runs obliquely is met by rows and by columns.
   EXPECT_GT(length, 2.5);
+}
+
+// A scan with a grid has edges of its own.
+TEST(ScanEdges, OfAGridAreNotFoundOnceMoreFromThePhoto) {
+  const FreeSpace free_space({TwoWalls(0)}, 100000);
+  const Camera camera = BoxCamera();
+  Rigid cam_from_scan;  // in the scanner's place, looking along -z
+  cam_from_scan.rotation = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX());
+  const Scan scan =
+      ScanFromPhoto(free_space, RayLattice(CameraProjection(camera), 1), camera, cam_from_scan);
+  for (int i = 0; i < static_cast<int>(scan.points.size()); ++i) ASSERT_TRUE(scan.IsMissing(i));
 }
 
 // The crease of the two walls as a distorted camera sees it, and not what is behind a surface.
@@ -180,6 +198,62 @@ TEST(DrawOverlay, DrawsTheEdgesWhereTheyAre) {
   EXPECT_GT(sheet.at<cv::Vec3b>(top + 280, left + 350)[2], 200);
   // The left panel is the photo alone.
   EXPECT_LT(sheet.at<cv::Vec3b>(top + 240, 300)[2], 30);
+}
+
+// Where lines are drawn on the photo: there is colour in what was grey.
+cv::Mat1b Coloured(const cv::Mat& bgr) {
+  cv::Mat planes[3], coloured;
+  cv::split(bgr, planes);
+  cv::Mat most = cv::max(cv::max(planes[0], planes[1]), planes[2]);
+  cv::Mat least = cv::min(cv::min(planes[0], planes[1]), planes[2]);
+  cv::compare(most - least, 60, coloured, cv::CMP_GT);
+  return coloured;
+}
+
+TEST(WriteOverlays, DrawsTheEdgesOfAMesh) {
+  const TempFolder folder;
+  const std::vector<Scan> scans = {BoxMesh()};
+  const FreeSpace free_space(scans, 1000);
+  const ScanViewer viewer(scans, free_space);
+  cv::imwrite(folder / "box.png", cv::Mat(300, 400, CV_8UC3, cv::Scalar(90, 90, 90)));
+  SparseModel model;
+  model.cameras[1] = BoxCamera();
+  SparseImage& image = model.images[1];
+  image.image_id = image.camera_id = 1;
+  image.name = "box.png";
+  image.cam_from_model = CamFromBox();
+  OverlayOptions options;
+  options.panel_width = 400;
+  options.num_crops = 0;
+  std::vector<std::string> warnings;
+  const std::vector<std::string> paths =
+      WriteOverlays({model, folder.path()}, folder / "overlays", viewer, 1, options, 2, &warnings);
+  ASSERT_EQ(paths.size(), 1u) << (warnings.empty() ? "" : warnings[0]);
+  const cv::Mat sheet = cv::imread(paths[0]);
+  constexpr int kTop = 26;
+  ASSERT_EQ(sheet.cols, 1200);
+  EXPECT_EQ(cv::countNonZero(Coloured(sheet(cv::Rect(0, kTop, 400, 300)))), 0) << "the photo";
+  const cv::Mat1b drawn = Coloured(sheet(cv::Rect(800, kTop, 400, 300)));
+
+  // The three edges at the corner (1, 1, 1), two pixels to either side: the lines, and no others.
+  const CameraProjection projection(BoxCamera());
+  cv::Mat1b wanted(300, 400, uchar{0}), thin = wanted.clone();
+  const auto at = [&](const Eigen::Vector3d& x) {
+    const Eigen::Vector2d x_in_cv = OpenCvFromImg(*projection.ImgFromCam(CamFromBox() * x));
+    return cv::Point(static_cast<int>(std::lround(x_in_cv.x())),
+                     static_cast<int>(std::lround(x_in_cv.y())));
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d corner = Eigen::Vector3d::Ones(),
+                          end = corner - Eigen::Vector3d::Unit(axis);
+    cv::line(wanted, at(corner), at(end), 255, 5);
+    cv::line(thin, at(corner), at(end), 255, 1);
+  }
+  cv::Mat1b reached;
+  cv::dilate(drawn, reached, cv::Mat1b::ones(5, 5));
+  const double length = cv::countNonZero(thin);
+  EXPECT_GT(cv::countNonZero(reached & thin), 0.8 * length);  // measured: 206 of 227 pixels
+  EXPECT_EQ(cv::countNonZero(drawn & ~wanted), 0);
 }
 
 // On photo and intensity alike, in place and not told apart; the panel with the edges has none.

@@ -1,5 +1,7 @@
 #include "align/trust/photo_search.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "core/frames.h"
@@ -58,7 +60,10 @@ TEST(PhotoSearch, FindsThePoseAmongFiveTimesAsManyWrongMatches) {
     if (places.size() > 1) {
       EXPECT_LT(places[1].num_cells, places[0].num_cells / 2);  // some of the same matches, askew
     }
-    for (const int i : places[0].agreeing) EXPECT_LT(i, 40);  // hardly a wrong one
+    const std::vector<int>& agreeing = places[0].agreeing;
+    const auto num_wrong =
+        std::count_if(agreeing.begin(), agreeing.end(), [](int i) { return i >= 30; });
+    EXPECT_LE(num_wrong, 1);  // measured: 0 of 29 or 30
   }
 }
 

@@ -46,8 +46,10 @@ std::map<uint32_t, PhotoVerdict> Judge(const SparseModel& aligned,
                                        const std::map<uint32_t, double>& support = {},
                                        const std::set<uint32_t>& picked = {}) {
   const SurveyedScans& surveyed = Survey(MakeCase().scans);
-  return JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(), 0.05, kSigmaPx, support,
-                     picked);
+  const auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(), 0.05,
+                                  kSigmaPx, support, picked);
+  EXPECT_EQ(photos.size(), aligned.images.size());
+  return photos;
 }
 
 TEST(PhotoVerdict, DoubtsNoRightPhoto) {

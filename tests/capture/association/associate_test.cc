@@ -34,6 +34,13 @@ Take Patterned(double shift_x = 0, double shift_y = 0, double ev = 0) {
   return take;
 }
 
+// As the command does it. Gives the number of pairs.
+int WriteLinks(const std::string& folder, const std::string& image_path,
+               const std::vector<AssociatedPair>& pairs) {
+  MakeLinks(folder, image_path, pairs)->Commit();
+  return NumLinks(pairs);
+}
+
 class Associate : public ::testing::Test {
  protected:
   Associate() { fs::create_directories(Images()); }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "capture/simulation/room_pictures.h"
 #include "tests/capture/pattern/pattern_camera.h"
@@ -49,10 +50,32 @@ TEST_F(PatternCommand, GivesTheSameBytesForEveryNumberOfThreads) {
   EXPECT_EQ(Report()["cross_seed"], report["cross_seed"]);
 }
 
+// Of two pictures of one size: -1..1.
+double Correlation(const cv::Mat1b& a, const cv::Mat1b& b) {
+  cv::Mat1f score;
+  cv::matchTemplate(a, b, score, cv::TM_CCOEFF_NORMED);
+  return score(0, 0);
+}
+
 TEST_F(PatternCommand, TakesAPhotoOfDetail) {
-  cv::imwrite(folder_ / "map.png", DrawMap(1400, 900, "PLAN", 2));
-  EXPECT_EQ(Run("--input_path " + (folder_ / "map.png")).exit_code, 0);
-  EXPECT_TRUE(Report()["warnings"].empty()) << Report()["warnings"];
+  const cv::Mat map = DrawMap(1400, 900, "PLAN", 2);
+  cv::imwrite(folder_ / "map.png", map);
+  const auto pattern = [&](const std::string& options) {
+    EXPECT_EQ(Run(options).exit_code, 0);
+    EXPECT_TRUE(Report()["warnings"].empty()) << Report()["warnings"];
+    return cv::Mat1b(cv::imread(folder_ / "pattern.png", cv::IMREAD_GRAYSCALE));
+  };
+  const std::string photo = "--input_path " + (folder_ / "map.png");
+  const cv::Mat1b shuffled = pattern(photo);
+  // Not shuffled, half of it is the map, inverted: the middle of it that has the projector's shape.
+  const cv::Mat1b whole = pattern(photo + " --blocks 1");
+  cv::Mat1b grey;
+  cv::cvtColor(map, grey, cv::COLOR_BGR2GRAY);
+  const int height = 1400 * 540 / 960;
+  cv::resize(grey(cv::Rect(0, (900 - height) / 2, 1400, height)), grey, {960, 540}, 0, 0,
+             cv::INTER_AREA);
+  EXPECT_LT(Correlation(whole, grey), -0.45);  // measured: -0.53, and 0.00
+  EXPECT_LT(std::abs(Correlation(shuffled, grey)), 0.1);
 }
 
 TEST_F(PatternCommand, SaysWhenAPhotoIsSmallPlainOrNone) {
@@ -86,10 +109,33 @@ TEST_F(PatternCommand, EvaluatesAPhotoOfTheWall) {
   const Json photo = Report()["photo"];
   EXPECT_TRUE(photo["usable"].get<bool>());
   EXPECT_GT(photo["on_planes"].get<int>(), 500);
-  // Another projector's photo is not taken for this one's.
-  const CommandResult result = Run("--random_seed 9 --evaluate_path " + (folder_ / "wall.jpg"));
-  EXPECT_EQ(result.exit_code, 4);
+}
+
+// The pattern is being projected: a look at a photo of it must not replace it by another.
+TEST_F(PatternCommand, EvaluatingAPhotoReplacesNoPattern) {
+  ASSERT_EQ(Run("--random_seed 1").exit_code, 0);
+  const std::string pattern = ReadBytes(folder_ / "pattern.png");
+  cv::imwrite(folder_ / "wall.jpg",
+              TakePhoto(cv::imread(folder_ / "pattern.png", cv::IMREAD_GRAYSCALE), WallView(), 1));
+  const std::string evaluate = " --evaluate_path " + (folder_ / "wall.jpg");
+  CommandResult result = Run(evaluate);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("is not the pattern of these options (--random_seed 0, --width 960"),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(ReadBytes(folder_ / "pattern.png"), pattern);
+  EXPECT_EQ(Run("--random_seed 1" + evaluate).exit_code, 0);
+  EXPECT_EQ(ReadBytes(folder_ / "pattern.png"), pattern);
+  // Without a pattern nothing is written; another projector's photo is not taken for this one's.
+  const std::string line =
+      "roomtex-pattern --quiet --width 960 --height 540 --report_path " + (folder_ / "report.json");
+  result = RunCommandLine(line + " --random_seed 9" + evaluate);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_NE(Report()["reason"].get<std::string>().find("cannot be used"), std::string::npos);
+  EXPECT_EQ(result.out, "");
+  result = RunCommandLine(line);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("--output_path is required"), std::string::npos) << result.err;
 }
 
 }  // namespace

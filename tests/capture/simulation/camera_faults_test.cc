@@ -57,6 +57,7 @@ TEST(CameraFaults, ShowInThePhotosAsTheTruthSays) {
   const cv::Mat faulty = room.RenderPhoto(1);
   const Eigen::Vector3d tint = room.WhiteBalance(1).cast<double>();
   EXPECT_GT((tint - Eigen::Vector3d::Ones()).norm(), 0.01);
+  int num_compared = 0, num_corners = 0;
   for (const int x : {0, plain.cols / 2, plain.cols - 12}) {
     for (const int y : {0, plain.rows / 2, plain.rows - 12}) {
       const double dx = x + 6 - room.camera().params[2], dy = y + 6 - room.camera().params[3];
@@ -64,10 +65,14 @@ TEST(CameraFaults, ShowInThePhotosAsTheTruthSays) {
           4 * (dx * dx + dy * dy) / (plain.cols * plain.cols + plain.rows * plain.rows);
       const Eigen::Vector3d light = MeanLight(plain, x, y);
       if (light.maxCoeff() > 0.6) continue;  // may be clipped
+      ++num_compared;
+      num_corners += x != plain.cols / 2 && y != plain.rows / 2;
       const Eigen::Vector3d wanted = VignettingAt(radius2, 0.5) * tint.cwiseProduct(light);
       EXPECT_LT((MeanLight(faulty, x, y) - wanted).cwiseAbs().maxCoeff(), 0.02) << x << " " << y;
     }
   }
+  EXPECT_GE(num_compared, 5);  // measured: 6
+  EXPECT_GE(num_corners, 2) << "where vignetting is strongest";
 }
 
 TEST(CameraFaults, WrongExifIsWrongWhereItSaysSo) {
