@@ -36,9 +36,16 @@ async function onStreet(body, {scheme = 'light', size = {width: 1280, height: 80
     return [box.x + box.width / 2 + (x - cx) * scale, box.y + box.height / 2 - (y - cy) * scale];
   };
   const press = (key) => page.keyboard.press(key);
+  const drag = async (from, to, onTheWay = async () => {}) => {
+    await page.mouse.move(...await toScreen(from));
+    await page.mouse.down();
+    await page.mouse.move(...await toScreen(to), {steps: 5});
+    await onTheWay();
+    await page.mouse.up();
+  };
   const count = (n) => until(() => file().buildings.length === n, `${n} buildings in the file`);
   try {
-    await body({page, file, toScreen, press, count, model, output});
+    await body({page, file, toScreen, press, drag, count, model, output});
     // What the server refuses, Chromium notes.
     assert.deepEqual(errors().filter((error) => !/status of 422/.test(error)), []);
   } catch (error) {
@@ -108,6 +115,99 @@ test('a house is removed, drawn again with snapping, and stands where it stood',
     await until(async () => /roof does not lie above/.test(await page.innerText('#toast')), 'said');
     assert.equal(readFileSync(output, 'utf8'), kept);
     assert.equal(await page.inputValue('#ground'), '-1.25');
+  });
+});
+
+test('arrows after an undo move nothing that was not chosen, and all goes on being saved', async () => {
+  await onStreet(async ({page, file, toScreen, press, drag, count}) => {
+    await count(4);
+    await page.click('#list li:first-child button');
+    const corners = () => file().buildings[0].footprint;
+    const earlier = corners();
+    const n = earlier.length;
+    // Its last wall, four pixels outside: the footprint runs to the left.
+    const [a, b] = [earlier[n - 1], earlier[0]];
+    const middle = await toScreen([0, 1].map((i) => (a[i] + b[i]) / 2));
+    const outside = await toScreen([(a[0] + b[0]) / 2 + b[1] - a[1], (a[1] + b[1]) / 2 + a[0] - b[0]]);
+    const away = 4 / Math.hypot(outside[0] - middle[0], outside[1] - middle[1]);
+    await page.mouse.dblclick(...[0, 1].map((i) => middle[i] + away * (outside[i] - middle[i])));
+    await until(() => corners().length === n + 1, 'a corner in the last wall');
+    await press('Control+z');
+    await until(() => corners().length === n, 'undone');
+    await press('ArrowRight');
+    const to = [earlier[0][0] - 1, earlier[0][1] - 1];
+    await drag(earlier[0], to);
+    await until(() => !near(corners()[0], earlier[0], 0.5), 'a corner that is dragged is saved');
+    assert.deepEqual(corners().slice(1), earlier.slice(1));
+    await press('Control+z');
+    await until(() => near(corners()[0], earlier[0], 1e-9), 'back');
+
+    // Arrow keys one after the other are one step.
+    const scale = Number((await page.getAttribute('#pane', 'data-view')).split(' ')[0]);
+    for (let i = 0; i < 5; ++i) await press('ArrowLeft');
+    const moved = [earlier[0][0] - 5 / scale, earlier[0][1]];
+    await until(() => near(corners()[0], moved, 1e-6), 'moved by five pixels');
+    await press('Control+z');
+    await until(() => near(corners()[0], earlier[0], 1e-9), 'back by one step');
+  });
+});
+
+test('heights that come late are those of the house that was asked for', async () => {
+  await onStreet(async ({page, file, press, count}) => {
+    await count(4);
+    await page.click('#list li:first-child button');
+    await page.fill('#ground', '-1.25');
+    await press('Tab');
+    await until(() => file().buildings[0].ground === -1.25, 'the ground is typed');
+    const earlier = file().buildings;
+    let answer;
+    const isTime = new Promise((done) => {
+      answer = done;
+    });
+    await page.route('**/heights', async (route) => {
+      await isTime;
+      await route.continue();
+    });
+    await page.click('#heights');
+    await page.click('#list li:nth-child(2) button');
+    answer();
+    await until(() => file().buildings[0].ground > -1, 'the ground comes from the points');
+    const {footprint, name} = file().buildings[0];
+    assert.deepEqual([name, footprint], [earlier[0].name, earlier[0].footprint]);
+    assert.deepEqual(file().buildings.slice(1), earlier.slice(1));
+  });
+});
+
+test('a drag that is given up, and a field that is emptied, change nothing', async () => {
+  await onStreet(async ({page, file, press, drag, count}) => {
+    await count(4);
+    await page.click('#list li:first-child button');
+    const house = () => file().buildings[0];
+    const earlier = house();
+    const [x, y] = earlier.footprint[0];
+    await drag([x, y], [x - 2, y - 3], () => press('Escape'));
+    await page.fill('#ground', '');
+    await press('Tab');
+    await until(async () => /Type a number/.test(await page.innerText('#toast')), 'said');
+    assert.notEqual(await page.inputValue('#ground'), '');
+    assert.deepEqual(house(), earlier);
+    await page.fill('#ground', '-1.25');
+    await press('Tab');
+    await until(() => house().ground === -1.25, 'the ground is typed');
+    assert.deepEqual(house(), {...earlier, ground: -1.25});
+
+    // A height that was typed stays to the last digit when something else of the roof changes.
+    await page.fill('#eaves', '6.1234');
+    await press('Tab');
+    const eaves = () => house().roof[0].point[2];
+    await until(() => eaves() === 6.1234, 'the eaves are typed');
+    await page.selectOption('#shape', 'gable');
+    await until(() => house().roof.length === 2, 'a gable');
+    assert.ok(Math.abs(eaves() - 6.1234) < 1e-9, `${eaves()}`);
+    const direction = house().roof[0].downhill_deg;
+    await page.click('#turn');
+    await until(() => house().roof[0].downhill_deg !== direction, 'turned');
+    assert.ok(Math.abs(eaves() - 6.1234) < 1e-9, `${eaves()}`);
   });
 });
 

@@ -237,6 +237,34 @@ test('the missing half is predicted near the truth, and taken by Enter', async (
   }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
+test('Enter takes no prediction of a place that was moved since', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    await page.click('photo', places[6].img);
+    await page.rowIs(6, (row) => row.status === 'half', 'half finished');
+    await page.saved();
+    await until(async () => (await page.session()).picks[6].predicted_scan, 'a prediction');
+    let answer;
+    const isTime = new Promise((done) => {
+      answer = done;
+    });
+    await page.page.route('**/picks', async (route) => {
+      await isTime;
+      await route.continue();
+    });
+    await page.page.click('#scan-whole');
+    await page.page.focus('#photo-pane');
+    for (let i = 0; i < 5; ++i) await page.page.keyboard.press('ArrowRight');
+    await page.page.keyboard.press('Enter');
+    await until(
+        async () => /Nothing is predicted here yet/.test(await page.text('#toast')), 'it says so');
+    answer();
+    await page.saved();
+    assert.equal((await page.rows())[6].status, 'half');
+    assert.equal(page.file().length, 6);
+  }, {picksFile: fileOf(places.slice(0, 6))});
+});
+
 test('reloading the page goes on with the picks, and so does a new server', async () => {
   await pageOn(async (page, {picksPath}) => {
     await page.rowsAre(6);
@@ -291,6 +319,30 @@ test('picks in a second photo', async () => {
     assert.equal(row.photo, name);
     assert.ok(row.px < 8, `${row.px}`);
     assert.equal(page.file().filter((pick) => pick.image_name === name).length, 2);
+  }, {picksFile: fileOf(places.slice(0, 6))});
+});
+
+test('to look at another photo is no step of the history', async () => {
+  await pageOn(async (page) => {
+    await page.rowsAre(6);
+    await page.click('scan', places[6].scan);
+    const {photo} = await page.rowIs(6, (row) => row.status === 'half', 'half finished');
+    await page.saved();
+    assert.match(await page.text('#save'), /saved, but for 1 unfinished/);
+    const step = await page.page.getAttribute('#undo', 'title');
+    await page.page.keyboard.press('PageDown');
+    await page.rowIs(6, (row) => row.photo !== photo, 'goes along');
+    assert.equal(await page.page.getAttribute('#undo', 'title'), step);
+    await page.page.keyboard.press('Control+z');
+    await page.rowsAre(6);
+    await page.page.keyboard.press('PageUp');
+    await page.page.keyboard.press('Control+y');
+    await page.rowIs(6, (row) => row.photo === photo, 'again, in the photo that is shown');
+    await page.saved();
+    await page.page.keyboard.press('Control+z');
+    await page.rowsAre(6);
+    await page.saved();
+    assert.match(await page.text('#save'), /saved$/);
   }, {picksFile: fileOf(places.slice(0, 6))});
 });
 
@@ -713,6 +765,28 @@ test('targets with coordinates need a click in the photo only', async () => {
     const file = page.file();
     assert.deepEqual(file.map(({label}) => label), ['T1', 'T2', 'T3', 'T4', 'T5', 'T6']);
     file.forEach(({point}, i) => assert.ok(distance(point, six[i].point) < 1e-9));
+
+    // Neither arrows nor the mouse move what the file has said.
+    const saysWhy = async () => {
+      await until(async () => /that of its file/.test(await page.text('#toast')), 'it says why');
+      await page.saved();
+      assert.deepEqual(page.file(), file);
+    };
+    await page.page.keyboard.press('w');
+    await page.page.keyboard.press('ArrowRight');
+    await saysWhy();
+    await page.page.reload();
+    await page.page.waitForSelector('body[data-ready]');
+    await page.rowsAre(6);
+    const [x, y] = six[2].scan;
+    await page.zoomTo('scan', [x, y]);
+    await page.drag('scan', [x, y], [x + 6, y]);
+    await saysWhy();
+    // In the photo they can be moved.
+    await page.page.focus('#photo-pane');
+    await page.page.keyboard.press('ArrowRight');
+    await until(
+        () => distance(page.file()[2].img, [file[2].img[0] + 1, file[2].img[1]]) < 1e-9, 'moved');
   });
 });
 

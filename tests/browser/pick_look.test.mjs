@@ -172,6 +172,47 @@ test('a press that moves pans, one that does not sets a point', async () => {
   });
 });
 
+test('a second finger, or a second button, moves nothing', async () => {
+  const eight = places.slice(0, 8);
+  await pageOn(async (page) => {
+    await page.rowsAre(8);
+    const earlier = page.file();
+    const [x, y] = await page.toScreen('photo', eight[2].img);
+    const fingers = await page.page.context().newCDPSession(page.page);
+    const touch = (type, ...points) => fingers.send('Input.dispatchTouchEvent', {
+      type: `touch${type}`,
+      touchPoints: points.map(([px, py], id) => ({x: px, y: py, id})),
+    });
+    await touch('Start', [x, y]);
+    await touch('Move', [x + 30, y]);
+    await touch('Start', [x + 30, y], [x + 90, y + 40]);
+    await touch('Move', [x + 30, y], [x + 120, y + 60]);
+    await touch('Move', [x + 40, y], [x + 120, y + 60]);
+    await touch('End');
+    await page.saved();
+    assert.deepEqual(page.file(), earlier);
+    await page.rowsAre(8);
+    // One finger moves a point.
+    await touch('Start', [x, y]);
+    await touch('Move', [x + 30, y]);
+    await touch('End');
+    await until(() => distance(page.file()[2].img, earlier[2].img) > 10, 'moved');
+    await page.page.keyboard.press('Control+z');
+    await until(() => distance(page.file()[2].img, earlier[2].img) < 1e-9, 'back');
+
+    const {mouse} = page.page;
+    await mouse.move(x, y);
+    await mouse.down();
+    await mouse.move(x + 30, y, {steps: 4});
+    await mouse.down({button: 'right'});
+    await mouse.up();
+    await mouse.up({button: 'right'});
+    await mouse.move(x + 60, y + 30, {steps: 4});
+    await page.saved();
+    assert.deepEqual(page.file(), earlier);
+  }, {picksFile: fileOf(eight)});
+});
+
 // A place that the server refuses for this reason, and that has one near it that can be picked.
 async function refusedPlace(page, reason) {
   for (let y = 20; y < 400; y += 7) {
@@ -256,6 +297,21 @@ test(
         await page.page.locator('#back-range').fill('70');
         await until(async () => await saturation() > 20, 'over it again');
         await screenshot(page.page, 'pick-back');
+        // The edges are those of the photo that is shown, or there are none.
+        let answer;
+        const isTime = new Promise((done) => {
+          answer = done;
+        });
+        await page.page.route('**/edges?*', async (route) => {
+          await isTime;
+          await route.continue();
+        });
+        await page.page.focus('#photo-pane');
+        await page.page.keyboard.press('PageDown');
+        const legend = () => page.page.locator('#photo-legend').innerText();
+        await until(async () => !/crease/.test(await legend()), 'the edges are gone');
+        answer();
+        await until(async () => /crease/.test(await legend()), 'those of this photo');
       }, {picksFile: fileOf(places.slice(0, 8))});
     });
 

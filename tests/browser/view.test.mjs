@@ -634,6 +634,60 @@ test('flights are smooth unless the user wants none', async () => {
   }
 });
 
+test('a view from above is one, also when it was asked for during a flight', async () => {
+  const {page, errors} = await openView(server.url, {...kSize, reducedMotion: 'no-preference'});
+  await page.keyboard.press('g');
+  await page.waitForFunction(() => roomtexView.navigation.flight !== null);
+  await page.keyboard.press('t');
+  await settle(page);
+  const {mode, flies, down} = await page.evaluate(() => {
+    const {navigation} = roomtexView;
+    return {
+      mode: navigation.mode,
+      flies: navigation.flight !== null,
+      down: navigation.rayAt(10, 10).direction.y,
+    };
+  });
+  assert.deepEqual([mode, flies], ['top', false]);
+  assert.ok(Math.abs(down + 1) < 1e-9, `${down}`);
+  assert.deepEqual(errors(), []);
+  await page.close();
+});
+
+test('nothing that is done meanwhile changes a plan', async () => {
+  const {page, errors} = await openView();
+  const plan = async (begin) => {
+    const [download] = await Promise.all([
+      page.waitForEvent('download', (one) => /plan\.png$/.test(one.suggestedFilename())),
+      page.evaluate(begin),
+    ]);
+    const png = readPng(readFileSync(await download.path()));
+    await page.waitForFunction(() => roomtexView.drawing === null);
+    return png;
+  };
+  await page.selectOption('#plan-step', '10');
+  const quiet = await plan(() => {
+    roomtexView.panel.savePlan();
+  });
+  // All of it before the first piece is in the plan.
+  const busy = await plan(() => {
+    roomtexView.panel.savePlan();
+    roomtexView.setBackground('light');
+    roomtexView.setMode('views');
+    roomtexView.panel.savePicture();
+    roomtexView.panel.saveSection();
+    roomtexView.resize();
+  });
+  assert.deepEqual([busy.width, busy.height], [quiet.width, quiet.height]);
+  assert.deepEqual(busy.at(1, 1), [255, 255, 255]);
+  assert.ok(difference(busy, quiet) < 0.5, `${difference(busy, quiet)}`);
+  await page.waitForFunction(
+      () => roomtexView.mode === 'views' && roomtexView.background === 'light');
+  await settle(page);
+  assert.deepEqual(errors(), []);
+  await page.close();
+});
+
 test('text stands out from its background, light and dark', async () => {
   const {page, errors} = await openView();
   await page.keyboard.press('4');
@@ -758,7 +812,7 @@ test('a folder to give away shows the same from a disk and from any web server',
     await settle(page);
     await page.locator('#camera-list li').first().click();
     await page.waitForFunction(() => roomtexView.cameras.photoShown);
-    assert.match(await page.getAttribute('#camera-list img', 'src'), /^blob:/);
+    await page.waitForSelector('#camera-list img[src^="blob:"]');
     assert.match(await page.evaluate(() => location.hash), /at=/);
     await screenshot(page, 'view-given');
     assert.deepEqual(errors(), []);

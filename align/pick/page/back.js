@@ -195,11 +195,18 @@ export class EdgeLayer {
     context.drawImage(this.#canvas, 0, 0, width / ratio, height / ratio);
   }
 
+  // Another photo is shown: those of the last one are not its edges.
+  leave() {
+    this.#asking?.abort();
+    this.#key = '';
+    this.edges = [];
+  }
+
   // solution null: no solution.
   async show(photo, solution) {
     const key = solution === null || !this.on ? '' : `${photo.id} ${solution}`;
     if (key === this.#key) return;
-    if (!key.startsWith(`${photo.id} `)) this.edges = [];
+    if (!key || !this.#key.startsWith(`${photo.id} `)) this.edges = [];
     this.#key = key;
     this.#asking?.abort();
     this.pane.redraw();
@@ -213,7 +220,11 @@ export class EdgeLayer {
       this.pane.redraw();
     } catch (error) {
       if (error.name !== 'AbortError' && !(error instanceof ServerError)) throw error;
-      if (this.#key === key) this.#key = '';  // the next change asks again
+      if (this.#key !== key) return;
+      // None rather than old ones; the next change asks again.
+      this.#key = '';
+      this.edges = [];
+      this.pane.redraw();
     }
   }
 }

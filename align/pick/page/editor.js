@@ -10,6 +10,7 @@ import {inScan} from './picks.js';
 
 const kCornerReach = 8;    // CSS pixels: how far from a corner somebody clicks
 const kLiveInterval = 80;  // milliseconds between two places tried while a marker is dragged
+const kFixed = 'The place of a target is that of its file: only its point in the photo can be moved';
 
 export class Editor {
   photo = null;  // of the server's state
@@ -31,12 +32,15 @@ export class Editor {
   showPhoto(photo) {
     this.photo = photo;
     this.cross.photo = null;
-    // Scan points without a partner go along to the new photo.
-    const loose = this.picks.list.find((pick) => !pick.img);
-    if (!loose || loose.image_name === photo.name) return;
-    const label = `pick ${this.picks.numberOf(loose.uid)} to ${photo.name}`;
-    const move = (pick) => pick.img ? pick : {...pick, image_name: photo.name};
-    this.picks.change(label, loose.uid, (list) => list.map(move), `photo of ${loose.uid}`);
+    this.#bringAlong();
+  }
+
+  // Scan points without a partner go along to the photo that is shown.
+  #bringAlong() {
+    const name = this.photo?.name;
+    const isBehind = (pick) => !pick.img && pick.image_name !== name;
+    if (!this.picks.list.some(isBehind)) return;
+    this.picks.follow((pick) => isBehind(pick) ? {...pick, image_name: name} : pick);
   }
 
   showScan(scan) {
@@ -62,9 +66,17 @@ export class Editor {
     return pick.scan && pick.scan.id === this.scan?.id ? [pick.scan.x, pick.scan.y] : null;
   }
 
+  // What the server says of a pick, if that is of the pick as it is now; else null.
+  #rowOf(pick) {
+    const row = pick && this.picks.rows.get(pick.uid);
+    const place = ({image_name, img, scan, point}) =>
+        JSON.stringify([image_name, img, scan ? [scan.id, scan.x, scan.y] : point]);
+    return row && place(row) === place(pick) ? row : null;
+  }
+
   // Where the solution expects the missing half, on the picture that is shown.
   ghostOf(pick, side) {
-    const row = pick && this.picks.rows.get(pick.uid);
+    const row = this.#rowOf(pick);
     if (!row) return null;
     if (side === 'photo') {
       return !pick.img && pick.scan && pick.image_name === this.photo?.name ? row.predicted_img :
@@ -232,7 +244,7 @@ export class Editor {
   // The prediction becomes the missing half.
   acceptGhost() {
     const half = this.half;
-    const row = half && this.picks.rows.get(half.uid);
+    const row = this.#rowOf(half);
     if (!row) return false;
     if (!half.img && row.predicted_img) {
       this.set('photo', row.predicted_img);
@@ -249,7 +261,7 @@ export class Editor {
 
   showGhost() {
     const half = this.half;
-    const row = half && this.picks.rows.get(half.uid);
+    const row = this.#rowOf(half);
     if (row?.predicted_scan && row.predicted_scan.id !== this.scan?.id) {
       this.on.chooseScan(row.predicted_scan.id);
     }
@@ -306,6 +318,7 @@ export class Editor {
     say(`${redo ? 'Again' : 'Undone'}: ${step.label}`, {seconds: 2.5});
     const pick = this.picks.find(step.uid);
     if (pick?.img && pick.image_name !== this.photo?.name) this.on.choosePhoto(pick.image_name);
+    this.#bringAlong();
     this.selected = pick ? step.uid : null;
     this.on.changed();
   }
@@ -325,7 +338,9 @@ export class Editor {
       return;
     }
     const to = [clamp(place[0] + dx, 0, width), clamp(place[1] + dy, 0, height)];
-    if (side === 'scan') {
+    if (side === 'scan' && pick.fixed) {
+      say(kFixed);
+    } else if (side === 'scan') {
       this.#tryPlace(pick.uid, to, `nudge scan ${pick.uid}`);
     } else {
       this.picks.set(
@@ -373,6 +388,10 @@ export class Editor {
   dragStart(side, uid) {
     this.forgetTried();
     this.selected = uid;
+    if (side === 'scan' && this.picks.find(uid)?.fixed) {
+      say(kFixed);
+      return;
+    }
     this.#drag = {side, uid, last: 0, busy: false, next: null};
     this.picks.begin(`pick ${this.picks.numberOf(uid)} moved`, uid);
   }

@@ -23,6 +23,7 @@ import {gammaTable} from './tiles.js';
 const kHeartbeat = 5000;   // milliseconds
 const kReadyPoll = 500;    // milliseconds
 const kStartAgain = 1500;  // milliseconds
+const kPatience = 120000;  // milliseconds until a scan should be read again
 const kMinPickScale = 2;   // CSS pixels per pixel when a pick is looked at
 
 const views = new Map();  // photo id -> how it was looked at last
@@ -69,6 +70,7 @@ function choosePhoto(id) {
   const {view} = panes.photo;
   if (editor.photo) views.set(editor.photo.id, [view.scale, view.centre, view.fitted]);
   editor.showPhoto(photo);
+  app.edges.leave();
   panes.photo.setPicture(photo.missing ? null : {
     key: `photo ${id}`,
     width: photo.width,
@@ -234,6 +236,10 @@ async function mirrorScan() {
   }
   let path;
   try {
+    if ((await api.align()).state === 'running') {
+      say('roomtex-align is running, and Mirror would end it: wait for it, or cancel it in Align…', {seconds: 6});
+      return;
+    }
     ({path} = await api.mirror());
   } catch (error) {
     say(error.message, {seconds: 9, urgent: true});
@@ -242,12 +248,19 @@ async function mirrorScan() {
   app.picks.leave();
   setText(byId('next'), 'Reading the scan the other way round…');
   document.body.inert = true;
+  const late = Date.now() + kPatience;
   while (true) {
     await new Promise((done) => setTimeout(done, kStartAgain));
     try {
-      if ((await fetch(`${path}align`)).ok) break;
+      if ((await fetch(`${path}align`)).ok && !app.picks.pending) break;
     } catch {
       // It is still reading.
+    }
+    // Or it has ended: the picks are still here, and it may come yet.
+    if (app.picks.left && Date.now() > late) {
+      document.body.inert = false;
+      app.picks.stay();
+      refresh();
     }
   }
   location.replace(path);

@@ -142,7 +142,11 @@ export class Pane {
     element.addEventListener('pointerdown', (event) => this.#down(event));
     element.addEventListener('pointermove', (event) => this.#move(event));
     element.addEventListener('pointerup', (event) => this.#up(event));
-    element.addEventListener('pointercancel', () => this.cancel());
+    for (const type of ['pointercancel', 'lostpointercapture']) {
+      element.addEventListener(type, (event) => {
+        if (event.pointerId === this.press?.id) this.cancel();
+      });
+    }
     element.addEventListener('pointerleave', () => {
       this.cursor = null;
       this.on.hover(null);
@@ -159,7 +163,12 @@ export class Pane {
   }
 
   #down(event) {
-    if (this.press || !this.picture || event.button > 1) return;
+    if (this.press) {
+      // A second finger, or the palm: nothing that was meant by the first.
+      if (event.pointerId !== this.press.id) this.cancel();
+      return;
+    }
+    if (!event.isPrimary || !this.picture || event.button > 1) return;
     if (event.button === 1) event.preventDefault();
     const at = this.#place(event);
     const grip = event.button === 0 ? this.on.grips?.find((one) => one.hit(at)) : null;
@@ -171,7 +180,8 @@ export class Pane {
       const grabbed = this.view.toImg(at);
       offset = [place[0] - grabbed[0], place[1] - grabbed[1]];
     }
-    this.press = {at, last: at, marker, grip, offset, button: event.button, moved: false};
+    const {pointerId: id, button} = event;
+    this.press = {id, at, last: at, marker, grip, offset, button, moved: false};
     try {
       this.element.setPointerCapture(event.pointerId);
     } catch {
@@ -180,9 +190,10 @@ export class Pane {
   }
 
   #move(event) {
+    const press = this.press;
+    if (press && event.pointerId !== press.id) return;
     const at = this.#place(event);
     this.cursor = at;
-    const press = this.press;
     if (press) {
       if (!press.moved && Math.hypot(at[0] - press.at[0], at[1] - press.at[1]) > kClickSlack) {
         press.moved = true;
@@ -205,7 +216,12 @@ export class Pane {
 
   #up(event) {
     const press = this.press;
-    if (!press || event.button !== press.button) return;
+    if (!press || event.pointerId !== press.id) return;
+    if (event.button !== press.button) {
+      // The last of several buttons is let go; that of the press was before.
+      this.cancel();
+      return;
+    }
     this.press = null;
     const at = this.#place(event);
     if (press.grip) return;

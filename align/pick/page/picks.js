@@ -115,6 +115,10 @@ export class Picks extends EventTarget {
   get pending() {
     return this.#version !== this.#accepted;
   }
+  // Those that no file has: half finished, or targets that wait.
+  get numUnfinished() {
+    return this.list.filter((pick) => !pick.img || !inScan(pick)).length;
+  }
 
   // Changes the list by fn(list) -> list. Changes with the same `merge` within a second are one
   // step of the history (a key held down).
@@ -151,6 +155,25 @@ export class Picks extends EventTarget {
     this.change(
         label, uid, (list) => list.map((pick) => pick.uid === uid ? {...pick, ...fields} : pick),
         merge);
+  }
+
+  // Changes picks by fn(pick) -> pick, also as the history has them: that is no step of it.
+  follow(fn) {
+    // Lists and picks that were the same stay the same.
+    const mapped = new Map();
+    const once = (key, map) => {
+      if (!mapped.has(key)) mapped.set(key, map(key));
+      return mapped.get(key);
+    };
+    const follow = (list) => once(list, () => list.map((pick) => once(pick, fn)));
+    for (const step of [...this.#undo, ...this.#redo]) {
+      step.before = follow(step.before);
+      step.after = follow(step.after);
+    }
+    if (this.#draft) this.#draft.before = follow(this.#draft.before);
+    this.#acceptedList = follow(this.#acceptedList);
+    this.list = follow(this.list);
+    this.#changed();
   }
 
   remove(label, uid) {
@@ -339,6 +362,11 @@ export class Picks extends EventTarget {
   leave() {
     this.left = true;
     clearTimeout(this.#retry);
+  }
+  // It did not come.
+  stay() {
+    this.left = false;
+    this.check();
   }
 
   // Asks how the picks stand at the server: after it was gone, and when this page comes back to the

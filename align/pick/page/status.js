@@ -5,7 +5,8 @@ import {app} from './app.js';
 import {byId, el, setText} from './dom.js';
 
 const kSaveTexts = {
-  saved: () => 'saved',
+  saved: (why, unfinished) =>
+      unfinished > 0 ? `saved, but for ${unfinished} unfinished` : 'saved',
   saving: () => 'saving…',
   unsaved: () => 'not saved',
   gone: (why) => `not saved: ${why}; trying again`,
@@ -17,10 +18,12 @@ export function showSync() {
   const {picks, server} = app;
   const box = byId('save');
   box.dataset.state = picks.state;
+  const unfinished = picks.numUnfinished;
   box.title = server ? server.picks_path : '';
+  if (unfinished > 0) box.title += `\n${unfinished} unfinished, kept only while roomtex-pick runs`;
   // Nothing is unsaved when the server is gone and nothing was changed since.
   const nothingLost = !picks.pending && ['gone', 'restarted'].includes(picks.state);
-  setText(byId('save-text'), nothingLost ? picks.why : kSaveTexts[picks.state](picks.why));
+  setText(byId('save-text'), nothingLost ? picks.why : kSaveTexts[picks.state](picks.why, unfinished));
   const banner = byId('banner');
   // The line at the top has no room for a reason.
   const shown = picks.state === 'unsaved' ? `unsaved ${picks.why}` : picks.state;

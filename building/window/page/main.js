@@ -7,7 +7,9 @@ import {snap} from './snap.js';
 import {View} from './view.js';
 
 const byId = (id) => document.getElementById(id);
-const kReach = 11;  // pixels that a corner may snap over
+const kReach = 11;       // pixels that a corner may snap over
+const kWallReach = 8;    // pixels; a click this near to a wall means it
+const kNudgeRest = 300;  // milliseconds after the last arrow key until a corner is saved
 
 const view = new View();
 const app = {
@@ -44,9 +46,18 @@ const plain = ({name, ground, footprint, roof}) => ({name, ground, footprint, ro
 const copyOf = (buildings) => structuredClone(buildings.map(plain));
 
 function take(answer) {
+  const before = app.buildings[app.selected];
   app.state.revision = answer.revision;
   app.buildings = answer.buildings;
   app.selected = Math.min(app.selected, app.buildings.length - 1);
+  // The corner of that number is another one now, or none.
+  const now = app.buildings[app.selected];
+  if (now?.name !== before?.name || now?.footprint.length !== before?.footprint.length) {
+    app.corner = -1;
+    clearTimeout(nudged?.timer);
+    nudged = null;
+    if (drag?.kind === 'corner') dropDrag();
+  }
   showSaved(answer.save_error);
   showAll();
 }
@@ -58,15 +69,24 @@ function showSaved(error) {
   byId('save').title = path;
 }
 
-// One change after the other: `edit` makes of a copy of the buildings, as they are then, what they
-// become; nothing to drop it. `before`: what undo brings back. Resolves to whether it was taken.
-function change(edit, before = null) {
-  app.busy = app.busy.then(async () => {
-    before ??= copyOf(app.buildings);
-    const buildings = edit(copyOf(app.buildings));
-    if (!buildings) return false;
+// One after the other, whatever became of those before.
+function queue(task) {
+  keepNudge();
+  app.busy = app.busy.catch(() => {}).then(task);
+  return app.busy;
+}
+
+// `edit` makes of a copy of the buildings, as they are then, what they become; nothing to drop it.
+// `shift`: the corner that it moves, where the page shows it moved already. Resolves to whether it
+// was taken.
+function change(edit, shift = null) {
+  return queue(async () => {
+    const before = copyOf(app.buildings);
+    if (shift) putBack(before, shift);
     let isTaken = false;
     try {
+      const buildings = edit(structuredClone(before));
+      if (!buildings) return false;
       take(await api.put(app.state.revision, buildings.map(plain)));
       app.done.push(before);
       app.undone.length = 0;
@@ -82,11 +102,31 @@ function change(edit, before = null) {
     showAll();
     return isTaken;
   });
-  return app.busy;
+}
+
+// Corner `at` of building `of`, to be moved on the page before that is saved: of which buildings, and
+// from where.
+function shiftOf(of, at) {
+  return {of, at, on: app.buildings, from: [...app.buildings[of].footprint[at]]};
+}
+
+// With an answer of the server meanwhile it is back.
+function putBack(buildings, {of, at, on, from}) {
+  if (on === app.buildings) buildings[of].footprint[at] = [...from];
+}
+
+// move: (corner) => corner.
+function moveCorner(shift, move) {
+  const {of, at} = shift;
+  change((all) => {
+    if (!all[of]?.footprint[at]) return null;
+    all[of].footprint[at] = move(all[of].footprint[at]);
+    return all;
+  }, shift);
 }
 
 function travel(from, to) {
-  app.busy = app.busy.then(async () => {
+  return queue(async () => {
     const goal = from.pop();
     if (!goal) return;
     try {
@@ -99,7 +139,6 @@ function travel(from, to) {
     }
     showAll();
   });
-  return app.busy;
 }
 
 async function trying(body) {
@@ -168,8 +207,7 @@ function showAll() {
     const button = document.createElement('button');
     button.type = 'button';
     button.setAttribute('aria-pressed', String(i === app.selected));
-    const height = Math.abs(ridge - eaves) < 0.005 ? ridge.toFixed(2) :
-                                                     `${eaves.toFixed(2)} to ${ridge.toFixed(2)}`;
+    const height = shown(eaves) === shown(ridge) ? shown(ridge) : `${shown(eaves)} to ${shown(ridge)}`;
     button.textContent =
         `${building.name}: ${building.footprint.length} corners, ${building.shape}, ${height}`;
     if (building.doubts?.length) {
@@ -196,6 +234,10 @@ function showAll() {
   refresh();
 }
 
+// Heights: to a hundredth of a metre, finer of small things.
+const numDigits = () => Math.min(9, Math.max(2, Math.ceil(1 - Math.log10(app.state.step))));
+const shown = (height) => height.toFixed(numDigits());
+
 function showDetails() {
   const building = app.buildings[app.selected];
   byId('details').hidden = !building;
@@ -205,16 +247,16 @@ function showDetails() {
     if (document.activeElement !== byId(id)) byId(id).value = value;
   };
   set('name', building.name);
-  set('ground', building.ground.toFixed(2));
+  set('ground', shown(building.ground));
   set('shape', building.shape);
-  set('eaves', eaves.toFixed(2));
-  set('ridge', ridge.toFixed(2));
+  set('eaves', shown(eaves));
+  set('ridge', shown(ridge));
   byId('eaves').disabled = building.shape === 'planes';
   byId('ridge').disabled = building.shape === 'planes' || building.shape === 'flat';
   byId('turn').disabled = building.shape === 'planes' || building.shape === 'flat';
   const sigma = Math.max(...(building.corner_sigma ?? [0]));
   byId('facts').textContent = `Volume ${building.volume.toFixed(1)} ${app.state.unit}³; corners ` +
-      `within about ${sigma.toFixed(3)} ${app.state.unit}; ` +
+      `within about ${sigma.toFixed(numDigits() + 1)} ${app.state.unit}; ` +
       `${Math.round(100 * building.explained)} % of its points lie on it.`;
   byId('doubts').replaceChildren(...building.doubts.map((doubt) => {
     const item = document.createElement('li');
@@ -346,18 +388,25 @@ function propose(area) {
   });
 }
 
+// edit: of the building that is selected now, and of what is known of it when its turn comes.
 function editSelected(edit) {
   const at = app.selected;
-  if (!app.buildings[at]) return;
-  change((all) => all[at] && edit(all[at]) !== false ? all : null);
+  if (!app.buildings[at]) return Promise.resolve(false);
+  return change((all) => all[at] && edit(all[at], app.buildings[at]) !== false ? all : null);
 }
 
 function heights() {
   const building = app.buildings[app.selected];
   if (!building) return;
   trying(async () => {
-    const answer = await api.heights(plain(building));
-    editSelected((one) => Object.assign(one, answer.building));
+    const {ground, roof} = (await api.heights(plain(building))).building;
+    // Another one may be selected by now, or corners of this one moved.
+    change((all) => {
+      const same = all.find(({name}) => name === building.name);
+      if (!same) return null;
+      Object.assign(same, {ground, roof});
+      return all;
+    });
   });
 }
 
@@ -384,22 +433,36 @@ function remove() {
   });
 }
 
-function roofFrom(turn = 0) {
+// What was typed into a field; where that is no number, it shows again what holds: null.
+function typedNumber(id) {
+  const value = byId(id).valueAsNumber;
+  if (Number.isFinite(value)) return value;
+  say('Type a number.');
+  const building = app.buildings[app.selected];
+  if (building) byId(id).value = shown({ground: building.ground, ...roofRange(building)}[id]);
+  return null;
+}
+
+// typed: the height that was typed, {eaves} or {ridge}. The fields are rounded: the others stay.
+function roofFrom({turn = 0, typed = {}} = {}) {
   const shape = byId('shape').value;
-  const eaves = Number(byId('eaves').value);
-  let ridge = Number(byId('ridge').value);
-  editSelected((building) => {
+  editSelected((building, known) => {
     if (shape === 'planes') return false;
+    const {eaves, ridge: top} = {...roofRange(known), ...typed};
     const wall = (wallOf(building.footprint, building.roof) + turn) % building.footprint.length;
-    if (shape !== 'flat' && ridge <= eaves) ridge = eaves + app.state.step;
+    const rises = top > eaves && shown(top) !== shown(eaves);
+    const ridge = shape === 'flat' || rises ? top : eaves + app.state.step;
     building.roof = makeRoof(building.footprint, {shape, eaves, ridge, wall});
     return true;
   });
 }
 
 function models() {
-  trying(async () => say(`Written: ${(await api.models()).written.join(', ')}`));
+  trying(() => queue(async () => say(`Written: ${(await api.models()).written.join(', ')}`)));
 }
+
+// A corner that the arrows move: shiftOf() and `by`. It is saved once they rest.
+let nudged = null;
 
 function nudge(dx, dy) {
   return (event) => {
@@ -408,14 +471,28 @@ function nudge(dx, dy) {
       refresh(true);
       return;
     }
+    const [of, at] = [app.selected, app.corner];
+    const footprint = app.buildings[of]?.footprint;
+    if (!footprint?.[at] || drag) return;
+    if (nudged && (nudged.of !== of || nudged.at !== at)) keepNudge();
+    nudged ??= {...shiftOf(of, at), by: [0, 0]};
+    if (nudged.on !== app.buildings) Object.assign(nudged, shiftOf(of, at));
     const step = (event.shiftKey ? 10 : 1) / view.scale;
     const {right, up} = view.axes();
-    const at = app.corner;
-    editSelected((building) => {
-      const corner = building.footprint[at];
-      for (const axis of [0, 1]) corner[axis] += step * (dx * right[axis] + dy * up[axis]);
-    });
+    nudged.by = nudged.by.map((value, axis) => value + step * (dx * right[axis] + dy * up[axis]));
+    footprint[at] = nudged.from.map((value, axis) => value + nudged.by[axis]);
+    clearTimeout(nudged.timer);
+    nudged.timer = setTimeout(keepNudge, kNudgeRest);
+    refresh();
   };
+}
+
+function keepNudge() {
+  if (!nudged) return;
+  const {by, timer, ...shift} = nudged;
+  clearTimeout(timer);
+  nudged = null;
+  moveCorner(shift, (corner) => corner.map((value, axis) => value + by[axis]));
 }
 
 // --- the mouse
@@ -466,8 +543,20 @@ function meant(event, before, after, skip = -1) {
 
 let drag = null;
 
+// Ends a drag without its effect; false if there is none.
+function dropDrag() {
+  if (!drag) return false;
+  if (drag.kind === 'corner') putBack(app.buildings, drag);
+  drag = app.box = app.stroke = app.snap = null;
+  refresh();
+  return true;
+}
+
 function pressed(event) {
   byId('pane').focus();
+  dropDrag();
+  if (!event.isPrimary) return;  // a second finger
+  keepNudge();
   const place = placeOf(event);
   byId('pane').setPointerCapture(event.pointerId);
   drag = {start: place, last: place, moved: false, turn: event.button === 2, kind: 'pan'};
@@ -477,8 +566,7 @@ function pressed(event) {
   if (app.tool === 'select') {
     const corner = cornerAt(place);
     if (corner >= 0) {
-      drag.kind = 'corner';
-      drag.before = copyOf(app.buildings);
+      Object.assign(drag, shiftOf(app.selected, corner), {kind: 'corner'});
       app.corner = corner;
       refresh();
     }
@@ -512,10 +600,16 @@ function moved(event) {
     app.stroke = [drag.start, place];
     refresh();
   } else if (drag.kind === 'corner') {
-    const {footprint} = app.buildings[app.selected];
+    const footprint = app.buildings[drag.of]?.footprint;
+    if (!footprint?.[drag.at]) {
+      dropDrag();
+      return;
+    }
+    if (drag.on !== app.buildings) Object.assign(drag, shiftOf(drag.of, drag.at));
     const n = footprint.length;
-    const at = (i) => footprint[(app.corner + i + n) % n];
-    footprint[app.corner] = meant(event, [at(-2), at(-1)], at(1), app.corner);
+    const at = (i) => footprint[(drag.at + i + n) % n];
+    drag.to = meant(event, [at(-2), at(-1)], at(1), drag.at);
+    footprint[drag.at] = [...drag.to];
     refresh();
   }
 }
@@ -527,12 +621,8 @@ function released(event) {
   const place = placeOf(event);
   if (ended.kind === 'corner' && ended.moved) {
     app.snap = null;
-    const [of, at] = [app.selected, app.corner];
-    const corner = [...app.buildings[of].footprint[at]];
-    change((all) => {
-      all[of].footprint[at] = corner;
-      return all;
-    }, ended.before);
+    const {of, at, on, from, to} = ended;
+    moveCorner({of, at, on, from}, () => to);
   } else if (ended.kind === 'area' && ended.moved) {
     const [a, b] = [view.toPlan(ended.start), view.toPlan(place)];
     app.box = null;
@@ -557,29 +647,42 @@ function clicked(event, place) {
       app.contour.push(at);
     }
   } else if (app.tool === 'select' && cornerAt(place) < 0) {
-    choose(buildingAt(place));
+    // Walls are clicked from both sides.
+    choose(wallAt(place) ? app.selected : buildingAt(place));
   }
 }
 
-// A corner in the wall that was clicked twice.
-function addCorner(event) {
+// Of the selected building: {wall, share (along it)}, or null.
+function wallAt(place) {
   const building = app.buildings[app.selected];
-  if (app.tool !== 'select' || !building || !view.isTop) return;
-  const place = placeOf(event);
+  if (!building || !view.isTop) return null;
   const n = building.footprint.length;
   for (let i = 0; i < n; ++i) {
     const [a, b] = [i, (i + 1) % n].map((k) => view.toScreen([...building.footprint[k], 0]));
     const d = [b[0] - a[0], b[1] - a[1]];
     const share = ((place[0] - a[0]) * d[0] + (place[1] - a[1]) * d[1]) / (d[0] ** 2 + d[1] ** 2);
     if (share < 0.02 || share > 0.98) continue;
-    if (Math.hypot(a[0] + share * d[0] - place[0], a[1] + share * d[1] - place[1]) > 8) continue;
-    const [p, q] = [building.footprint[i], building.footprint[(i + 1) % n]];
-    app.corner = i + 1;
-    editSelected((one) => {
-      one.footprint.splice(i + 1, 0, [0, 1].map((k) => p[k] + share * (q[k] - p[k])));
-    });
-    return;
+    const away = Math.hypot(a[0] + share * d[0] - place[0], a[1] + share * d[1] - place[1]);
+    if (away <= kWallReach) return {wall: i, share};
   }
+  return null;
+}
+
+// A corner in the wall that was clicked twice.
+async function addCorner(event) {
+  const found = app.tool === 'select' && wallAt(placeOf(event));
+  if (!found) return;
+  const {wall, share} = found;
+  const of = app.selected;
+  const isTaken = await editSelected(({footprint}) => {
+    const [p, q] = [footprint[wall], footprint[(wall + 1) % footprint.length]];
+    if (!p || !q) return false;
+    footprint.splice(wall + 1, 0, [0, 1].map((k) => p[k] + share * (q[k] - p[k])));
+    return true;
+  });
+  if (!isTaken || app.selected !== of) return;
+  app.corner = wall + 1;
+  refresh();
 }
 
 // The line that was drawn is upright, or level if it is nearer to that.
@@ -593,13 +696,13 @@ function turnUpright(from, to) {
   if (dy < 0) [dx, dy] = [-dx, -dy];
   const {right, up} = view.axes();
   const direction = right.map((value, i) => (dx * value + dy * up[i]) / Math.hypot(dx, dy));
-  trying(async () => {
+  trying(() => queue(async () => {
     await api.up(app.state.revision, direction);
     app.done.length = 0;  // what was done lies in another frame
     app.undone.length = 0;
     await load();
     say('Turned.');
-  });
+  }));
 }
 
 // --- the keyboard
@@ -616,7 +719,7 @@ const kKeys = [
   {keys: ['u', 'U'], does: 'say what is upright', run: () => setTool('level')},
   {keys: ['p', 'P'], does: 'propose everywhere', run: () => propose()},
   {keys: ['h', 'H'], does: 'floor and roof by the points', run: heights},
-  {keys: ['t', 'T'], does: 'turn the roof', run: () => roofFrom(1)},
+  {keys: ['t', 'T'], does: 'turn the roof', run: () => roofFrom({turn: 1})},
   {keys: ['n', 'N'], does: 'next building', run: () => choose((app.selected + 1) % Math.max(1, app.buildings.length))},
   {keys: ['c', 'C'], does: 'next corner', run: nextCorner},
   {keys: ['ArrowLeft'], does: 'move the corner by a pixel (Shift: 10); without one, the view', run: nudge(-1, 0)},
@@ -626,7 +729,7 @@ const kKeys = [
   {keys: ['+', '='], does: 'zoom in', run: () => zoomBy(1.3)},
   {keys: ['-'], does: 'zoom out', run: () => zoomBy(1 / 1.3)},
   {keys: ['Enter'], does: 'close the contour', run: () => app.tool === 'draw' && closeContour()},
-  {keys: ['Escape'], does: 'drop the contour, the selection', run: escape},
+  {keys: ['Escape'], does: 'drop a drag, the contour, the selection', run: escape},
   {
     keys: ['Delete', 'Backspace'],
     does: 'remove the corner, or the building',
@@ -650,6 +753,7 @@ function zoomBy(factor) {
 }
 
 function escape() {
+  if (dropDrag()) return;
   if (app.contour.length > 0) {
     app.contour = [];
     refresh();
@@ -702,7 +806,7 @@ function listen() {
       app.corner = -1;
       remove();
     },
-    turn: () => roofFrom(1),
+    turn: () => roofFrom({turn: 1}),
     'help-open': () => byId('help').showModal(),
     'help-close': () => byId('help').close(),
   };
@@ -714,13 +818,18 @@ function listen() {
     });
   });
   byId('ground').addEventListener('change', () => {
-    const ground = Number(byId('ground').value);
+    const ground = typedNumber('ground');
+    if (ground === null) return;
     editSelected((one) => {
       one.ground = ground;
     });
   });
-  for (const id of ['shape', 'eaves', 'ridge']) {
-    byId(id).addEventListener('change', () => roofFrom());
+  byId('shape').addEventListener('change', () => roofFrom());
+  for (const id of ['eaves', 'ridge']) {
+    byId(id).addEventListener('change', () => {
+      const height = typedNumber(id);
+      if (height !== null) roofFrom({typed: {[id]: height}});
+    });
   }
   for (const id of ['show-lines', 'show-ground', 'show-colors']) {
     byId(id).addEventListener('change', () => refresh(true));
@@ -729,9 +838,7 @@ function listen() {
   pane.addEventListener('pointerdown', pressed);
   pane.addEventListener('pointermove', moved);
   pane.addEventListener('pointerup', released);
-  pane.addEventListener('pointercancel', () => {
-    drag = null;
-  });
+  pane.addEventListener('pointercancel', dropDrag);
   pane.addEventListener('dblclick', addCorner);
   pane.addEventListener('contextmenu', (event) => event.preventDefault());
   pane.addEventListener('wheel', (event) => {
@@ -763,6 +870,7 @@ async function load() {
   }
   app.cloud = {positions, colors: bytes, heights: heightsAbove};
   app.top = Math.max(app.state.bounds[1][2] - base, app.state.step);
+  for (const id of ['ground', 'eaves', 'ridge']) byId(id).step = 10 ** -numDigits();
   take(app.state);
   refresh(true);
 }

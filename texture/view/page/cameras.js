@@ -15,6 +15,7 @@ const kColors = {
 };
 const kThumbnail = 256;  // pixels
 const kMaxNear = 24;     // cameras that show their photo small
+const kMaxKept = 64;     // small photos that are kept
 
 function bitmapTexture(bitmap) {
   const texture = new THREE.Texture(bitmap);
@@ -179,6 +180,7 @@ export class Cameras {
           geometry,
           new THREE.MeshBasicMaterial({map: texture, side: THREE.DoubleSide, toneMapped: false}));
       this.#placeThumbnail(mesh, camera);
+      mesh.userData.seen = performance.now();
       this.thumbnails.set(camera.id, mesh);
       this.group.add(mesh);
       this.invalidate();
@@ -206,9 +208,25 @@ export class Cameras {
       const camera = this.list[id];
       mesh.visible = !this.standing && !this.near.has(camera) &&
           (camera === this.hovered || (this.pictures && near.includes(camera)));
+      if (mesh.visible) mesh.userData.seen = performance.now();
     }
+    this.#forget();
     if (!this.pictures) return;
     for (const camera of near) this.#showThumbnail(camera);
+  }
+  // Those that were not seen for the longest time.
+  #forget() {
+    if (this.thumbnails.size <= kMaxKept) return;
+    const byAge = [...this.thumbnails].sort(([, a], [, b]) => a.userData.seen - b.userData.seen);
+    for (const [id, mesh] of byAge.slice(0, -kMaxKept)) {
+      const {geometry, material} = mesh;
+      this.group.remove(mesh);
+      this.thumbnails.delete(id);
+      geometry.dispose();
+      material.map.image.close();
+      material.map.dispose();
+      material.dispose();
+    }
   }
   setPictures(on) {
     this.pictures = on;

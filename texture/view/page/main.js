@@ -42,6 +42,7 @@ class Viewer {
     this.evidence = null;
     this.measuring = false;
     this.sectioning = false;  // the line of a section is drawn
+    this.drawing = null;      // while a plan or section is made: what is to be done after it
     this.scheduled = false;
     this.handingOver = false;
     this.numPictures = 0;
@@ -173,6 +174,7 @@ class Viewer {
 
   #frame(now) {
     this.scheduled = false;
+    if (this.drawing) return;  // the canvas is that of the plan
     if (this.#isDrawing()) return this.invalidate();  // the last picture is not finished
     const pause = now - (this.lastFrame ?? now);
     this.lastFrame = now;
@@ -265,6 +267,7 @@ class Viewer {
   }
 
   resize() {
+    if (this.drawing) return;
     const {clientWidth: width, clientHeight: height} = this.canvas.parentElement;
     if (width === 0 || height === 0) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
@@ -384,7 +387,20 @@ class Viewer {
 
   // --- what the panel sets --------------------------------------------------------------------
 
+  // Whether a plan or section is being made: what would change it waits until it is done.
+  postpone(act) {
+    this.drawing?.push(act);
+    return this.drawing !== null;
+  }
+  endDrawing() {
+    const acts = this.drawing;
+    this.drawing = null;
+    this.resize();
+    for (const act of acts) act();
+  }
+
   async setMode(mode) {
+    if (this.postpone(() => this.setMode(mode))) return;
     if (needsEvidence(mode) && !this.evidence?.available) return;
     if (mode === 'view-dependent' && !this.lumigraph) return;
     this.mode = mode;
@@ -397,6 +413,7 @@ class Viewer {
     this.remember();
   }
   setBackground(name) {
+    if (this.postpone(() => this.setBackground(name))) return;
     this.background = name;
     this.renderer.setClearColor(kBackgrounds[name]);
     this.invalidate();
@@ -529,9 +546,14 @@ class Viewer {
       this.panel.showSectioning();
     }
   }
-  async measureAt(x, y) {
+  // One after the other: what is far away takes longer.
+  measureAt(x, y) {
+    const ray = this.navigation.rayAt(x, y);
+    this.picking = (this.picking ?? Promise.resolve()).then(() => this.#measure(ray));
+  }
+  async #measure(ray) {
     try {
-      const point = await this.measures.pick(this.navigation.rayAt(x, y), this.room);
+      const point = await this.measures.pick(ray, this.room);
       if (!this.measuring) return;
       if (point) this.measures.add(point);
       this.panel.hint(

@@ -190,6 +190,7 @@ export class Navigation extends EventTarget {
   }
 
   #switchMode(mode) {
+    this.#endFlight();  // it would move the other camera from now on
     this.mode = mode;
     this.camera = mode === 'top' ? this.orthographic : this.perspective;
     this.dispatchEvent(new Event('mode'));

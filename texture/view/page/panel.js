@@ -96,9 +96,14 @@ export class Panel {
         'copy-link',
         () => this.#copy(location.href, 'The address of this view is in the clipboard.'));
     const onInput = (id, set) => $(id).addEventListener('input', (event) => set(event.target));
-    onInput('both-sides', ({checked}) => viewer.room.setBothSides(checked));
-    const setSupplement = () => viewer.room.setSupplement(
-        $('show-supplement').checked, $('mark-supplement').checked);
+    const setBothSides = () => {
+      if (!viewer.postpone(setBothSides)) viewer.room.setBothSides($('both-sides').checked);
+    };
+    const setSupplement = () => {
+      if (viewer.postpone(setSupplement)) return;
+      viewer.room.setSupplement($('show-supplement').checked, $('mark-supplement').checked);
+    };
+    onInput('both-sides', setBothSides);
     onInput('show-supplement', setSupplement);
     onInput('mark-supplement', setSupplement);
     onInput('opacity', ({value}) => viewer.cameras.setOpacity(Number(value)));
@@ -150,6 +155,7 @@ export class Panel {
   // The sliders run from floor to ceiling and from wall to wall.
   #setCut() {
     const {viewer} = this;
+    if (viewer.postpone(() => this.#setCut())) return;
     const {min, max} = viewer.navigation.bounds;
     const floor = viewer.floorHeight();
     const read = (id, off, from, to, zero) => {
@@ -201,6 +207,8 @@ export class Panel {
   // what: plan or section. draw: with metres per pixel, and what takes the share that is done.
   async #saveDrawing(what, draw) {
     const {viewer} = this, button = $(`save-${what}`);
+    if (this.#isDrawing()) return;
+    viewer.drawing = [];
     button.disabled = true;
     try {
       // From everywhere at once nothing is near: the blended colours.
@@ -216,8 +224,14 @@ export class Panel {
     } catch (error) {
       this.fail(error.message);
     }
-    await viewer.room.setMode(viewer.mode, viewer.evidence);
+    await viewer.room.setMode(viewer.mode, viewer.evidence)
+        .catch((error) => this.fail(error.message));
     button.disabled = false;
+    viewer.endDrawing();
+  }
+  #isDrawing() {
+    if (this.viewer.drawing) this.hint('One moment: a plan or section is being drawn.');
+    return this.viewer.drawing !== null;
   }
   #download(blob, ending) {
     const link = make('a', {
@@ -229,6 +243,7 @@ export class Panel {
   }
   async savePicture() {
     const {viewer} = this;
+    if (this.#isDrawing()) return;
     const scale = Number(radios('scale').find((radio) => radio.checked).value);
     const blob = await viewer.picture(scale);
     if (!blob) return this.fail('The picture is too large for this browser.');
@@ -336,9 +351,17 @@ export class Panel {
     $('camera-size').max = Math.max(1, 2 * size);
     this.#setCameraSize(size);
     this.shifts = new Shifts(list);
+    // Small photos come once they are in view.
+    const seen = new IntersectionObserver((entries) => {
+      for (const {isIntersecting, target} of entries) {
+        if (!isIntersecting) continue;
+        seen.unobserve(target);
+        this.#showSmall(target, target.parentElement.camera);
+      }
+    });
     this.options = list.map((camera) => {
-      const image = make('img', {alt: '', loading: 'lazy', width: 54, height: 36});
-      if (camera.photo) this.#showSmall(image, camera);
+      const image = make('img', {alt: '', width: 54, height: 36});
+      if (camera.photo) seen.observe(image);
       const option = make(
           'li', {id: `camera-${camera.id}`, camera}, image,
           make('span', {text: camera.name, title: camera.name}), ...this.shifts.label(camera));
@@ -353,6 +376,7 @@ export class Panel {
     $('camera-list').addEventListener('keydown', (event) => this.#listKey(event));
   }
   async #showSmall(image, camera) {
+    image.addEventListener('load', () => URL.revokeObjectURL(image.src), {once: true});
     try {
       image.src = await getImageUrl(`photo?id=${camera.id}&max=128`);
     } catch (error) {

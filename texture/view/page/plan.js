@@ -39,12 +39,16 @@ export function planRotation(heading) {
   return rotationOf(heading - quarter * Math.round(heading / quarter), -quarter);
 }
 
+// Gives whether all details are there.
 async function drawn(viewer, camera, height) {
   const until = performance.now() + kLongest;
   for (;;) {
+    viewer.room.coarseOnly = false;
+    viewer.room.tolerance = 1;
     const more = viewer.room.update(camera, height);
     viewer.renderer.render(viewer.world, camera);
-    if ((!more && viewer.room.settled) || performance.now() > until) return;
+    if (!more && viewer.room.settled) return true;
+    if (performance.now() > until) return false;
     await new Promise((later) => setTimeout(later, 20));
   }
 }
@@ -69,15 +73,13 @@ export async function drawTrueToScale(
   camera.near = near;
   camera.far = far;
   camera.quaternion.copy(rotation);
-  const {renderer, cameras, measures, section, room} = viewer;
+  const {renderer, world, cameras, measures, section, room} = viewer;
   const ratio = renderer.getPixelRatio();
   const background = renderer.getClearColor(new THREE.Color()), alpha = renderer.getClearAlpha();
-  const hidden = [cameras.group, cameras.overlay, measures.group, section.group].filter(
-      (group) => group?.visible);
-  for (const group of hidden) group.visible = false;
+  const beside = [cameras.group, cameras.overlay, measures.group, section.group].filter(
+      (group) => group?.parent === world);
+  world.remove(...beside);
   const tolerance = room.tolerance;
-  room.coarseOnly = false;
-  room.tolerance = 1;
   renderer.setPixelRatio(1);
   renderer.setClearColor(0xffffff, 1);
   try {
@@ -98,13 +100,15 @@ export async function drawTrueToScale(
         camera.updateProjectionMatrix();
         camera.updateMatrixWorld();
         renderer.setSize(columns, rows, false);
-        await drawn(viewer, camera, rows);
+        if (!await drawn(viewer, camera, rows)) {
+          viewer.panel.fail('Details of the room did not come in time: parts of the picture are coarse.');
+        }
         context.drawImage(renderer.domElement, x, y);
         progress(++done / numTiles);
       }
     }
   } finally {
-    for (const group of hidden) group.visible = true;
+    world.add(...beside);
     room.tolerance = tolerance;
     renderer.setClearColor(background, alpha);
     renderer.setPixelRatio(ratio);

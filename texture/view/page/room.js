@@ -411,17 +411,18 @@ export class Room {
         this.shownTriangles += chunk.levels[shown].geometry.index.count / 3;
       }
     }
-    this.#forget();
+    this.#forget(now);
   }
 
-  // The finer levels that were not looked at for the longest time, beyond what may be kept.
-  #forget() {
+  // The finer levels that were not looked at for the longest time, beyond what may be kept; now: when
+  // what is in view was last wanted.
+  #forget(now) {
     if (this.numTriangles <= kMaxTriangles) return;
     const byAge = [...this.chunks].sort((a, b) => a.lastWanted - b.lastWanted);
     for (const chunk of byAge) {
       for (const level of [1, 2]) {
         const mesh = chunk.levels[level];
-        if (!mesh || mesh.visible) continue;
+        if (!mesh || (mesh.visible && chunk.lastWanted === now)) continue;
         if (this.numTriangles <= kMaxTriangles) return;
         this.numTriangles -= mesh.geometry.index.count / 3;
         this.group.remove(mesh);
