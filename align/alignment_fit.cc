@@ -13,7 +13,7 @@ double PickBend(const AlignmentInput& input, const ShapeDisagreement& disagreeme
   double bend_px = 0;
   for (const Pick& pick : input.picks) {
     const SparseImage* const image = input.model.FindImage(pick.image_name);
-    if (image == nullptr) continue;
+    if (image == nullptr || !(pick.weight > 0)) continue;
     const auto seen = disagreement.photos.find(image->image_id);
     if (seen == disagreement.photos.end()) continue;
     const Camera& camera = input.model.cameras.at(image->camera_id);

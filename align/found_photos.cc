@@ -17,16 +17,10 @@ namespace {
 // The pose with all that it may be off by: FoundPhotoOptions.
 ViewPose WithScanError(ViewPose pose, const FoundPhotoOptions& options) {
   pose.covariance *= options.formal_times * options.formal_times;
-  // Turns about the camera's centre move it not: the translation takes them up.
-  const Eigen::Vector3d& t = pose.cam_from_scan.translation;
-  Eigen::Matrix3d across;
-  across << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
   const double turn2 = std::pow(RadFromDeg(options.scan_sigma_deg), 2) / 3;
   const double move2 = options.scan_sigma * options.scan_sigma / 3;
-  Matrix6d more;
-  more << turn2 * Eigen::Matrix3d::Identity(), turn2 * across, -turn2 * across,
-      move2 * Eigen::Matrix3d::Identity() - turn2 * across * across;
-  pose.covariance += more;
+  pose.covariance.diagonal().head<3>().array() += turn2;
+  pose.covariance.diagonal().tail<3>().array() += move2;
   return pose;
 }
 

@@ -21,17 +21,17 @@
 namespace roomtex {
 namespace {
 
-constexpr int64_t kLookAt = 1 << 18;        // bytes, to tell the columns
-constexpr int64_t kPointsToGuessBy = 1000;  // how many there are in all
-constexpr int64_t kShortestPoint = 6;       // bytes: "0 0 0\n"
+constexpr int64_t kTellColumnsBy = 1 << 18;  // bytes, to tell the columns
+constexpr int64_t kPointsToGuessBy = 1000;   // how many there are in all
+constexpr int64_t kShortestPoint = 6;        // bytes: "0 0 0\n"
 const char kNotXyz[] = "The file is damaged, or no list of points";
 
 class XyzParser {
  public:
   XyzParser(const FileReader& file, const XyzOptions& options)
       : file_(file), options_(options), lines_(file) {
-    std::string start = file.ReadSome(0, kLookAt);
-    if (file.size() > kLookAt) start.resize(start.rfind('\n') + 1);  // nothing, of one line
+    std::string start = file.ReadSome(0, kTellColumnsBy);
+    if (file.size() > kTellColumnsBy) start.resize(start.rfind('\n') + 1);  // nothing, of one line
     layout_ = FindXyzLayout(start);
   }
 

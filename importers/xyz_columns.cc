@@ -42,7 +42,8 @@ Commas CommasOf(std::string_view line, std::vector<std::string_view>* words) {
   const auto is_number = [](std::string_view word) {
     double number = 0;
     const size_t comma = word.find(',');
-    const bool is_within = comma == std::string_view::npos || (comma > 0 && comma + 1 < word.size());
+    const bool is_within =
+        comma == std::string_view::npos || (comma > 0 && comma + 1 < word.size());
     return is_within && word.find('.') == std::string_view::npos &&
            ParseXyzNumber(word, true, &number);
   };

@@ -28,13 +28,13 @@ constexpr int kNumLens = 4;
 
 using Matrix10d = Eigen::Matrix<double, 10, 10>;
 
-// Reprojection error, pixels times weight; pose (w, t) as in view_pose.cc.
+// Reprojection error, pixels times weight; pose (w, dt) as in view_pose.cc.
 struct LensPickCost {
   template <typename T>
   bool operator()(const T* const pose, const T* const lens, T* residual) const {
-    const T rotated[3] = {T(rotated_point.x()), T(rotated_point.y()), T(rotated_point.z())};
+    const T at_start[3] = {T(start_point.x()), T(start_point.y()), T(start_point.z())};
     T p[3];
-    ceres::AngleAxisRotatePoint(pose, rotated, p);
+    ceres::AngleAxisRotatePoint(pose, at_start, p);
     for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
     if (p[2] < T(kMinDepth)) return false;
     const T params[4] = {T(focal) * exp(lens[0]), T(principal.x()) + lens[2],
@@ -49,7 +49,7 @@ struct LensPickCost {
   double focal;
   Eigen::Vector2d principal;
   Eigen::Vector2d x_in_img;
-  Eigen::Vector3d rotated_point;
+  Eigen::Vector3d start_point;  // `cam`, as the start has it
   double weight;
 };
 
@@ -143,9 +143,7 @@ std::vector<ViewPose> LensPoseSolver::Starts(const PointPairs& pairs,
 std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
                                                const ViewPose& start) const {
   const double focal = start.lens->params[0];
-  const Eigen::Quaterniond rotation = start.cam_from_scan.rotation;
   double pose[6] = {0, 0, 0, 0, 0, 0};
-  Eigen::Map<Eigen::Vector3d>(pose + 3) = start.cam_from_scan.translation;
   const Eigen::Vector2d principal = Principal(*start.lens);
   double lens[kNumLens] = {0, HasRadial() ? start.lens->params[3] : 0, 0, 0};
   ceres::Problem problem;
@@ -153,7 +151,7 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<LensPickCost, 2, 6, kNumLens>(
             new LensPickCost{focal, principal, pairs.x_in_img.col(i),
-                             rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
+                             start.cam_from_scan * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
         nullptr, pose, lens);
   }
   const bool by_exif = source_ == FocalSource::kExif;
@@ -180,9 +178,8 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   if (!summary.IsSolutionUsable()) return std::nullopt;
 
   ViewPose result;
-  result.cam_from_scan = {
-      (RotationFromVector(Eigen::Map<const Eigen::Vector3d>(pose)) * rotation).normalized(),
-      Eigen::Map<const Eigen::Vector3d>(pose + 3)};
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> step(pose);
+  result.cam_from_scan = MovedInPlace(start.cam_from_scan, step);
   result.lens = WithLens(camera_, focal * std::exp(lens[0]),
                          principal + Eigen::Vector2d(lens[2], lens[3]), lens[1]);
   if (!result.lens->Problems().empty()) return std::nullopt;
@@ -209,8 +206,8 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
     normal += j * j.transpose() / (is_prior ? SquareOf(kUsualClickSigma) : noise2);
   }
   Matrix10d turned = Matrix10d::Identity();
-  turned.topLeftCorner<3, 3>() =
-      RotationWithJacobian(Eigen::Map<const Eigen::Vector3d>(pose)).left_jacobian;
+  turned.topLeftCorner<3, 3>() = RotationWithJacobian(step.head<3>()).left_jacobian;
+  turned.block<3, 3>(3, 0) = CrossMatrix(step.tail<3>()) * turned.topLeftCorner<3, 3>();
   if (const auto inverse = BalancedInverse(normal, 1e-13)) {
     const Matrix10d covariance = turned * Matrix10d(*inverse) * turned.transpose();
     result.covariance = covariance.topLeftCorner<6, 6>();

@@ -178,13 +178,14 @@ Rigid ReflectedAlongSight(const NormalisedPairs& pairs, const Frame& frame, cons
   return {rotation.normalized(), BestTranslation(pairs, rotation.normalized())};
 }
 
-// Reprojection error in pixels; parameters (w, t) with x_in_cam = exp(w) R x_in_scan + t.
+// Reprojection error in pixels; parameters (w, dt) with x_in_cam = exp(w) (R x_in_scan + t) + dt, R
+// and t those of the start: turned about the camera, wherever the origin of the scan lies.
 struct PickCost {
   template <typename T>
   bool operator()(const T* const pose, T* residual) const {
-    const T rotated[3] = {T(rotated_point.x()), T(rotated_point.y()), T(rotated_point.z())};
+    const T at_start[3] = {T(start_point.x()), T(start_point.y()), T(start_point.z())};
     T p[3];
-    ceres::AngleAxisRotatePoint(pose, rotated, p);
+    ceres::AngleAxisRotatePoint(pose, at_start, p);
     for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
     T params[kMaxCameraParams], x, y;
     for (size_t i = 0; i < camera->params.size(); ++i) params[i] = T(camera->params[i]);
@@ -200,7 +201,7 @@ struct PickCost {
   }
   const Camera* camera;
   Eigen::Vector2d x_in_img;
-  Eigen::Vector3d rotated_point;
+  Eigen::Vector3d start_point;  // `cam`, as the start has it
   double weight;
 };
 
@@ -208,11 +209,10 @@ class PoseProblem {
  public:
   PoseProblem(const CameraProjection& projection, const PointPairs& pairs, const Rigid& start)
       : start_(start) {
-    Eigen::Map<Eigen::Vector3d>(parameters_ + 3) = start.translation;
     for (int i = 0; i < pairs.size(); ++i) {
       problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PickCost, 2, 6>(new PickCost{
                                     &projection.camera(), pairs.x_in_img.col(i),
-                                    start.rotation * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
+                                    start * pairs.x_in_scan.col(i), pairs.WeightOf(i)}),
                                 nullptr, parameters_);
     }
   }
@@ -238,7 +238,7 @@ class PoseProblem {
     ceres::AngleAxisToQuaternion(parameters_, wxyz);
     turn = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     return {(turn * start_.rotation).normalized(),
-            Eigen::Map<const Eigen::Vector3d>(parameters_ + 3)};
+            turn * start_.translation + Eigen::Map<const Eigen::Vector3d>(parameters_ + 3)};
   }
 
   // Normal matrix; valid when the problem was made at the pose itself (w = 0).
@@ -331,15 +331,9 @@ Eigen::Vector3d PrincipalExtents(const Eigen::Matrix3Xd& points) {
 }
 
 double ViewPose::PositionSigma() const {
-  // C = -R^T t with R = exp(w) R0: dC = -R0^T (dt + t x w), so its covariance is that of dt + [t]x
-  // w.
-  Eigen::Matrix3d cross;
-  const Eigen::Vector3d& t = cam_from_scan.translation;
-  cross << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;
-  Eigen::Matrix<double, 3, 6> jacobian;
-  jacobian << cross, Eigen::Matrix3d::Identity();
+  // w turns the camera where it stands: its place moves by -R^T dt.
   if (!covariance.allFinite()) return kInfinity;
-  return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
+  return std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
 }
 
 std::vector<ViewPose> SolveViewPoses(const CameraProjection& projection, const PointPairs& pairs,

@@ -55,9 +55,9 @@ struct ViewPose {
   // Standard deviation of a click with weight 1 per coordinate, from the residuals:
   // sqrt(sum_px2 / (2 n - 6)).
   double sigma_px = 0;
-  // Covariance of (w, dt) with x_in_cam = exp(w) R x_in_scan + t + dt: inverse normal matrix of the
-  // last step times sigma_px^2. rad^2, rad m, m^2. Infinite where the picks do not determine the
-  // pose.
+  // Covariance of (w, dt) with x_in_cam = exp(w) (R x_in_scan + t) + dt: inverse normal matrix of
+  // the last step times sigma_px^2. rad^2, rad m, m^2. Infinite where the picks do not determine
+  // the pose.
   Matrix6d covariance = Matrix6d::Zero();
   // Of a lens that was found with the pose (lens_pose.h): the camera, one standard deviation of its
   // focal length, as a share, and of its radial term. None and 0 where the lens was known.

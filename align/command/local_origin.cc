@@ -5,7 +5,8 @@
 namespace roomtex {
 namespace {
 
-constexpr double kFar = 5000;  // metres
+// Metres. Farther away, steps and limits of many fits are those of the distance, not of the room.
+constexpr double kFar = 50;
 
 }  // namespace
 

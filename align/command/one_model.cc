@@ -283,7 +283,7 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
   std::set<uint32_t> picked;
   for (const Pick& pick : picks) {
     const SparseImage* const image = aligned.FindImage(pick.image_name);
-    if (image != nullptr) picked.insert(image->image_id);
+    if (image != nullptr && pick.weight > 0) picked.insert(image->image_id);
   }
   auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),

@@ -154,8 +154,11 @@ class BendSolver {
         pick_sigma_px_(pick_sigma_px),
         start_(start) {
     projections_ = ProjectionsOf(model.cameras);
-    for (const Pick& pick : picks) pivot_ += pick.x_in_scan / static_cast<double>(picks.size());
-    for (size_t i = 0; picks.empty() && i < points.size(); ++i) {
+    const auto num_used = std::count(used.begin(), used.end(), true);
+    for (size_t i = 0; i < picks.size(); ++i) {
+      if (used[i]) pivot_ += picks[i].x_in_scan / static_cast<double>(num_used);
+    }
+    for (size_t i = 0; num_used == 0 && i < points.size(); ++i) {
       pivot_ += start * points[i].x_in_sparse / static_cast<double>(points.size());
     }
   }

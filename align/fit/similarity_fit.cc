@@ -29,10 +29,16 @@ bool IsTiny(const Vector7d& step) {
          std::abs(step[6]) < 1e-8;
 }
 
+// Of what the fit rests on: check points may lie anywhere.
 Eigen::Vector3d Pivot(const std::vector<Pick>& picks) {
-  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
-  for (const Pick& pick : picks) pivot += pick.x_in_scan / static_cast<double>(picks.size());
-  return pivot;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const Pick& pick : picks) {
+    if (!(pick.weight > 0)) continue;
+    sum += pick.x_in_scan;
+    ++count;
+  }
+  return count > 0 ? Eigen::Vector3d(sum / count) : picks[0].x_in_scan;
 }
 
 // The pivot where there are no picks.

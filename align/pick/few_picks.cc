@@ -62,12 +62,12 @@ void Polish(const CameraProjection& projection, const PointPairs& pairs, Rigid* 
     Matrix6d jacobian;
     for (int k = 0; k < 6; ++k) {
       const Vector6d step = kStep * Vector6d::Unit(k);
-      jacobian.col(k) = (Errors(projection, pairs, Moved(*pose, step)) -
-                         Errors(projection, pairs, Moved(*pose, -step))) /
+      jacobian.col(k) = (Errors(projection, pairs, MovedInPlace(*pose, step)) -
+                         Errors(projection, pairs, MovedInPlace(*pose, -step))) /
                         (2 * kStep);
     }
     if (!jacobian.allFinite()) return;
-    const Rigid next = Moved(*pose, -jacobian.fullPivLu().solve(errors));
+    const Rigid next = MovedInPlace(*pose, -jacobian.fullPivLu().solve(errors));
     const Vector6d next_errors = Errors(projection, pairs, next);
     if (!(next_errors.norm() < errors.norm())) return;
     *pose = next;

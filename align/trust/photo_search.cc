@@ -152,9 +152,7 @@ class PhotoRays {
       Eigen::Matrix<double, 6, 6> damped = normal.matrix;
       damped.diagonal() *= 1 + damping;
       const Eigen::Matrix<double, 6, 1> change = -SolveSymmetric(damped, normal.gradient);
-      Rigid moved;
-      moved.rotation = (RotationFromVector(change.head<3>()) * pose.rotation).normalized();
-      moved.translation = pose.translation + change.tail<3>();
+      const Rigid moved = MovedInPlace(pose, change);
       const NormalEquations there = NormalAt(moved, matches);
       if (!(there.sum < normal.sum)) {
         damping *= 10;
@@ -169,7 +167,7 @@ class PhotoRays {
     return pose;
   }
 
-  // Of a turn about the axes of `cam`, and a shift along them.
+  // Of a turn about the axes of `cam`, where it stands, and a shift along them.
   struct NormalEquations {
     Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
@@ -179,7 +177,7 @@ class PhotoRays {
     NormalEquations normal;
     const Eigen::Matrix3d turn = pose.rotation.toRotationMatrix();
     for (const int i : matches) {
-      const Eigen::Vector3d turned = turn * places_[i], x = turned + pose.translation;
+      const Eigen::Vector3d x = turn * places_[i] + pose.translation;
       if (!(x.z() > kLeastDepth)) {
         normal.sum = std::numeric_limits<double>::infinity();
         return normal;
@@ -189,7 +187,7 @@ class PhotoRays {
       by_x << 1, 0, -at.x(), 0, 1, -at.y();
       by_x /= x.z();
       Eigen::Matrix<double, 2, 6> jacobian;
-      jacobian << by_x * -CrossMatrix(turned), by_x;
+      jacobian << by_x * -CrossMatrix(x), by_x;
       normal.matrix.noalias() += jacobian.transpose() * jacobian;
       normal.gradient.noalias() += jacobian.transpose() * residual;
       normal.sum += residual.squaredNorm();

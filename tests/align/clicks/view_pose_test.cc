@@ -8,11 +8,11 @@
 namespace roomtex {
 namespace {
 
-// (w, dt) of found = exp(w) * true, dt in the camera's frame: the unknowns of ViewPose::covariance.
+// (w, dt) of found = exp(w) true + dt, in the camera's frame: the unknowns of ViewPose::covariance.
 Eigen::Matrix<double, 6, 1> PoseError(const Rigid& found, const Rigid& truth) {
   const Eigen::AngleAxisd turn(found.rotation * truth.rotation.conjugate());
   Eigen::Matrix<double, 6, 1> error;
-  error << turn.angle() * turn.axis(), found.translation - truth.translation;
+  error << turn.angle() * turn.axis(), found.translation - turn * truth.translation;
   return error;
 }
 
@@ -89,6 +89,25 @@ TEST(ViewPose, ErrorsOfNoisyPicksAgreeWithTheCovariance) {
   EXPECT_NEAR(sum / kSeeds, 1.0, 0.17);
   // sigma_px^2 is an unbiased estimate; its standard deviation over the mean of 200 is 3.2 %.
   EXPECT_NEAR(variance_sum / kSeeds, kNoise * kNoise, 0.13 * kNoise * kNoise);
+}
+
+// Scans in map grids, and about the middle of the Earth.
+TEST(ViewPose, IsTheSameWhereverTheOriginOfTheScanLies) {
+  const Eigen::Vector3d offset(4.1e6, -5.6e5, 4.8e6);
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    PickMaker maker(500 + seed);
+    const PointPairs near = maker.WithNoise(maker.General(6), 1.5);
+    PointPairs far = near;
+    far.x_in_scan.colwise() += offset;
+    const auto here = SolveViewPoses(maker.projection, near);
+    const auto there = SolveViewPoses(maker.projection, far);
+    ASSERT_FALSE(here.empty() || there.empty()) << seed;
+    Rigid moved = there[0].cam_from_scan;
+    moved.translation += moved.rotation * offset;
+    EXPECT_THAT(moved, IsNearRigid(here[0].cam_from_scan, 1e-5, 1e-5)) << seed;
+    EXPECT_NEAR(there[0].sum_px2, here[0].sum_px2, 1e-4 * here[0].sum_px2) << seed;
+    EXPECT_NEAR(there[0].PositionSigma(), here[0].PositionSigma(), 0.01 * here[0].PositionSigma());
+  }
 }
 
 TEST(ViewPose, PositionSigmaIsThatOfTheCameraCentre) {
