@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <map>
 #include <sstream>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -40,6 +41,20 @@ ColoredScan ColorByCell(const Scan& scan) {
     }
   }
   return colored;
+}
+
+// A mesh without a texture: its colours stand at its vertices.
+std::pair<Scan, ColoredScan> OneTriangle() {
+  Scan mesh;
+  mesh.organised = false;
+  mesh.num_columns = 3;
+  mesh.num_rows = 1;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.up = Eigen::Vector3d::UnitZ();
+  ColoredScan colored;
+  colored.triangles = {{0, 1, 2}};
+  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  return {mesh, colored};
 }
 
 Scan WallWithHole() {
@@ -295,14 +310,7 @@ TEST(DecimateParts, LeavesAsManyAsWantedWithoutGapsAndColoursInPlace) {
 
 TEST(DecimateParts, ASmallMeshBesideALargeScanStaysAsItIs) {
   const LargeWall wall;
-  Scan mesh;
-  mesh.organised = false;
-  mesh.num_columns = 3;
-  mesh.num_rows = 1;
-  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  ColoredScan colored;
-  colored.triangles = {{0, 1, 2}};
-  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  const auto& [mesh, colored] = OneTriangle();
   std::vector<std::vector<TexturedPart>> parts =
       MakeMeshParts({wall.scan, mesh}, {wall.colored, colored}, 256);
   DecimateParts({wall.scan, mesh}, 5000, 2, &parts);
@@ -449,15 +457,7 @@ TEST(WriteColoredObj, CornersFindTheirColorsAndTheMeshIsTheSame) {
 
 TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
   const TempFolder folder;
-  Scan mesh;
-  mesh.organised = false;
-  mesh.num_columns = 3;
-  mesh.num_rows = 1;
-  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  mesh.up = Eigen::Vector3d::UnitZ();
-  ColoredScan colored;
-  colored.triangles = {{0, 1, 2}};
-  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  const auto& [mesh, colored] = OneTriangle();
   WriteColoredObj({mesh, mesh}, {colored, colored},
                   MakeMeshParts({mesh, mesh}, {colored, colored}, 4096), false,
                   [&](const std::string& name) { return folder / name; });
@@ -471,14 +471,7 @@ TEST(WriteColoredObj, MeshesWithoutATextureHaveTheirColorsAtTheVertices) {
 TEST(WriteColoredObj, AMeshBehindATexturedScanDoesNotTakeItsMaterial) {
   const TempFolder folder;
   const LargeWall wall;
-  Scan mesh;
-  mesh.organised = false;
-  mesh.num_columns = 3;
-  mesh.num_rows = 1;
-  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  ColoredScan colored;
-  colored.triangles = {{0, 1, 2}};
-  colored.samples = {3, 1, {{255, 0, 51}, {0, 0, 0}, {1, 1, 1}}, {1, 1, 1}};
+  const auto& [mesh, colored] = OneTriangle();
   Scan cloud = mesh;
   ColoredScan points = colored;
   points.triangles.clear();
