@@ -360,26 +360,6 @@ TEST_F(MapperCommand, PhotosThatAreToldTheSameShareALens) {
   }
 }
 
-// COLMAP refines all cameras or none.
-TEST_F(MapperCommand, ACalibratedCameraIsHeldBesideOneThatIsNot) {
-  views_ = SimulateViews(RoomOptions(8));
-  const Camera told = views_.cameras.at(1);
-  Camera& guessed = views_.cameras[2] = told;
-  guessed.camera_id = 2;
-  guessed.params[0] *= 1.05;
-  guessed.has_prior_focal_length = false;
-  views_.cameras.at(1).has_prior_focal_length = true;
-  for (auto& [image_id, image] : views_.images) image.camera_id = image_id % 2 == 0 ? 2 : 1;
-  WriteSimulatedDatabase(views_, folder_.path());
-  const CommandResult result = Run();
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_TRUE(Report()["refined_intrinsics"]);
-  const SparseModel model = ReadSparseModel(folder_ / "sparse/0");
-  EXPECT_EQ(model.cameras.at(1).params, told.params);
-  EXPECT_NEAR(model.cameras.at(2).MeanFocalLength(), told.MeanFocalLength(),
-              0.005 * told.MeanFocalLength());
-}
-
 TEST_F(MapperCommand, GivesTheSameTwice) {
   Simulate(RoomOptions(5));
   ASSERT_EQ(Run("--num_threads 1").exit_code, 0);

@@ -64,6 +64,17 @@ class MapperLenses : public MapperCommand {
   Camera told_;  // camera 1, right
 };
 
+// COLMAP refines all cameras or none.
+TEST_F(MapperLenses, OfACalibratedCameraIsHeldBesideOneThatIsNot) {
+  SimulateTwoCameras();
+  const CommandResult result = Run();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(Report()["refined_intrinsics"]);
+  EXPECT_EQ(LensOfModel(1).params, told_.params);
+  EXPECT_NEAR(LensOfModel(2).MeanFocalLength(), told_.MeanFocalLength(),
+              0.005 * told_.MeanFocalLength());
+}
+
 TEST_F(MapperLenses, OfACalibratedCameraIsHeldAlsoBesideTheFramesOfColmap4) {
   SimulateTwoCameras();
   const CommandResult result = Run(ColmapWithFrames(Bytes<uint64_t>(0)));

@@ -28,11 +28,11 @@ TEST(FileName, IsTheLastOneHoweverThePathEnds) {
 class PathNamesTest : public testing::Test {
  protected:
   void SetUp() override {
-    fs::create_directories(folder_ / "work/photos");
-    fs::create_directories(folder_ / "work/result/sparse");
-    WriteBytes(folder_ / "work/room.e57", "");
-    fs::create_directory_symlink(folder_ / "work/photos", folder_ / "link");
-    fs::current_path(folder_ / "work");
+    fs::create_directories(folder_ / "site/photos");
+    fs::create_directories(folder_ / "site/result/sparse");
+    WriteBytes(folder_ / "site/room.e57", "");
+    fs::create_directory_symlink(folder_ / "site/photos", folder_ / "link");
+    fs::current_path(folder_ / "site");
   }
   void TearDown() override { fs::current_path(before_); }
 
@@ -43,13 +43,13 @@ class PathNamesTest : public testing::Test {
 TEST_F(PathNamesTest, AreTheSameForEverySpelling) {
   const PathNames names("result");
   const std::string photos = fs::canonical("photos");
-  for (const char* path : {"photos", "photos/", "./photos", "../work/photos", "../link"}) {
+  for (const char* path : {"photos", "photos/", "./photos", "../site/photos", "../link"}) {
     EXPECT_EQ(names.Of(path), photos) << path;
   }
   EXPECT_EQ(names.Of(photos), photos);
   EXPECT_EQ(names.Of("room.e57#hall"), fs::canonical("room.e57").string() + "#hall");
   EXPECT_EQ(names.Of("result/sparse/0"), "{result}/sparse/0");
-  EXPECT_EQ(names.Of(folder_ / "work/result/sparse/"), "{result}/sparse");
+  EXPECT_EQ(names.Of(folder_ / "site/result/sparse/"), "{result}/sparse");
   EXPECT_EQ(names.Of("results"), fs::current_path().string() + "/results");
   EXPECT_EQ(names.Of("{result}/sparse/0"), "{result}/sparse/0");
   EXPECT_EQ(PathNames("elsewhere").PlaceOf("{result}/sparse/0"), "elsewhere/sparse/0");
@@ -65,9 +65,9 @@ MadeFrom From(const PathNames& names, const std::string& photos, const std::stri
 
 TEST_F(PathNamesTest, OnlyWhatIsMeantOtherwiseIsAChange) {
   const MadeFrom before = From(PathNames("result"), "photos", "result");
-  const PathNames names("../work/result");
-  EXPECT_THAT(names.Changes(before, From(names, "../link/", "../work/result")), IsEmpty());
-  EXPECT_THAT(names.Changes(before, From(names, "..", "../work/result", "9")),
+  const PathNames names("../site/result");
+  EXPECT_THAT(names.Changes(before, From(names, "../link/", "../site/result")), IsEmpty());
+  EXPECT_THAT(names.Changes(before, From(names, "..", "../site/result", "9")),
               ElementsAre("options (--Mapper.min_num_matches, --image_path)"));
 }
 
@@ -76,9 +76,9 @@ TEST_F(PathNamesTest, AFolderOfPathsAsTheyWereTypedGoesOn) {
   const MadeFrom typed = {
       {"options", "roomtex-mapper --image_path photos --database_path result/database.db"},
       {"photos", "abc"}};
-  EXPECT_THAT(names.Changes(typed, From(names, folder_ / "work/photos", "result")), IsEmpty());
+  EXPECT_THAT(names.Changes(typed, From(names, folder_ / "site/photos", "result")), IsEmpty());
   EXPECT_THAT(names.Changes({{".", "abc"}, {"../link/a", "1"}},
-                            {{"work", "abc"}, {folder_ / "work/photos/a", "1"}}),
+                            {{"site", "abc"}, {folder_ / "site/photos/a", "1"}}),
               IsEmpty());
 }
 
@@ -87,7 +87,7 @@ TEST_F(PathNamesTest, APickDoesNotCutAVideoAnew) {
   const PathNames names("result");
   const MadeFrom before = {
       {"options", names.Essential({"roomtex-auto", "--video_path", "a.mp4", "--only", "frames"})}};
-  CommandLine line = {"roomtex-auto", "--video_path", "../work/a.mp4", "--picks_path",
+  CommandLine line = {"roomtex-auto", "--video_path", "../site/a.mp4", "--picks_path",
                       "p.csv",        "--only",       "frames"};
   EXPECT_THAT(names.Changes(before, {{"options", names.Essential(line)}}), IsEmpty());
   line.insert(line.end(), {"--video_frames", "30"});
