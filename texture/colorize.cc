@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include <fmt/core.h>
@@ -219,13 +220,22 @@ std::vector<float> Disagreements(const GridOfSamples& grid, const PhotoPassInput
   return result;
 }
 
+// One that is everywhere the same says nothing: many meshes and clouds have none.
+bool HasIntensity(const Scan& scan) {
+  std::optional<float> first;
+  for (size_t i = 0; i < scan.intensity.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i)) || !std::isfinite(scan.intensity[i])) continue;
+    if (!first) first = scan.intensity[i];
+    if (scan.intensity[i] != *first) return true;
+  }
+  return false;
+}
+
 std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) {
   std::vector<Rgb> colors;
   if (options.unseen != "intensity") return colors;
-  const auto [low, high] = std::minmax_element(scan.intensity.begin(), scan.intensity.end());
-  // A mesh or cloud that has none: neither black nor white.
-  constexpr uint8_t kMiddle = 128;
-  if (low == scan.intensity.end() || *low == *high) {
+  if (!HasIntensity(scan)) {
+    constexpr uint8_t kMiddle = 128;  // neither black nor white
     colors.assign(scan.points.size(), {kMiddle, kMiddle, kMiddle});
     return colors;
   }
@@ -236,16 +246,6 @@ std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) 
 // Texels of the atlas of a mesh, per pixel of all photos: more of them show nothing more, except on
 // surface that no photo sees.
 constexpr double kMaxTexelsPerPixel = 4;
-
-double AreaOf(const std::vector<Eigen::Vector3d>& points, const std::vector<Triangle>& triangles) {
-  double area = 0;
-  for (const Triangle& t : triangles) {
-    const Eigen::Vector3d& a = points[t[0]];
-    const double doubled = (points[t[1]] - a).cross(points[t[2]] - a).norm();
-    if (std::isfinite(doubled)) area += doubled / 2;
-  }
-  return area;
-}
 
 // Atlases of the meshes without a grid, which share the texels by their areas. Probes on their
 // surfaces are added to what the photos are asked about: few vertices would say little about
@@ -268,7 +268,7 @@ std::vector<MeshAtlas> PlanAtlases(const std::vector<Scan>& scans,
   };
   std::vector<double> areas(scans.size(), 0);
   for (size_t s = 0; s < scans.size(); ++s) {
-    if (has_atlas(s)) areas[s] = AreaOf(scans[s].points, surfaces[s].triangles);
+    if (has_atlas(s)) areas[s] = SurfaceArea(scans[s].points, surfaces[s].triangles);
   }
   const double all_area = std::accumulate(areas.begin(), areas.end(), 0.0);
   std::vector<MeshAtlas> atlases(scans.size());

@@ -214,6 +214,26 @@ TEST_F(Colorize, TextureOfALargerScaleShowsThePatternBetweenTheSamples) {
   }
 }
 
+TEST_F(Colorize, WhatNoPhotoSeesIsGreyAlsoWithoutIntensity) {
+  photos_.resize(1);
+  Scan scan = scene_.MakeScan(200, 150);
+  scan.intensity.assign(scan.points.size(), 0.0f);
+  scan.points[scan.Index(7, 7)] = Scan::MissingPoint();
+  for (const float intensity : {0.0f, 0.5f}) {
+    for (size_t i = 0; i < scan.points.size(); ++i) {
+      scan.intensity[i] = scan.IsMissing(static_cast<int>(i)) ? 0 : intensity;
+    }
+    const ColorGrid grid = Run({scan}).scans[0].samples;
+    size_t num_unseen = 0;
+    for (size_t i = 0; i < grid.rgb.size(); ++i) {
+      if (grid.views[i] > 0 || scan.IsMissing(static_cast<int>(i))) continue;
+      ++num_unseen;
+      ASSERT_EQ(grid.rgb[i], (Rgb{128, 128, 128}));
+    }
+    EXPECT_GT(num_unseen, 100u);
+  }
+}
+
 TEST_F(Colorize, NamesThePhotoThatCannotBeRead) {
   const Scan scan = scene_.MakeScan(30, 30);
   WriteBytes(photos_[1].path, "not a photo");

@@ -258,13 +258,19 @@ double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>&
   return Median(&finest);
 }
 
+double SurfaceArea(const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) area += TriangleArea(points, t);
+  return area;
+}
+
 MeshAtlas LayOutAtlas(const std::vector<Eigen::Vector3d>& points,
                       const std::vector<Triangle>& triangles, double pixel_on_surface,
                       double max_texels, const AtlasOptions& options) {
   MeshAtlas atlas;
   if (options.mode == "0") return atlas;
-  double area = 0;
-  for (const Triangle& t : triangles) area += TriangleArea(points, t);
+  const double area = SurfaceArea(points, triangles);
   double texel = options.texel_mm > 0 ? options.texel_mm / 1000 : pixel_on_surface;
   if (!(texel > 0) || !(area > 0) || !std::isfinite(area)) return atlas;
   texel = std::max(texel, std::sqrt(area / max_texels));

@@ -61,6 +61,10 @@ struct AtlasOptions {
 // What a pixel of the nearest photo that looks at a probe covers there, metres: median. 0 = none.
 double PixelOnSurface(const SurfaceProbes& probes, const std::vector<PhotoView>& photos);
 
+// Square metres of all triangles.
+double SurfaceArea(const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<Triangle>& triangles);
+
 // Charts laid out on pages, at most max_texels in all (three times that with the gutters around
 // them); empty if the options or the mesh want none, or if it falls into too many charts.
 // A triangle that would not fit on a page gets larger texels than the others.
