@@ -126,7 +126,7 @@ Alignment FitAndJudge(const AlignmentInput& input, const LensCheck& lenses,
     if (lens.used) result.warnings.push_back(lens.Sentence());
   }
   result.reprojection_rms_px = ReprojectionRms(input.model);
-  const double sigma_px = KeypointSigma(result.reprojection_rms_px);
+  const double sigma_px = KeypointSigma(input.model);
   result.fit = FitAlignment(input, start, sigma_px, options);
   result.scan_from_sparse = result.fit.scan_from_sparse;
   result.refined_pick_px = result.fit.pick_px;
@@ -231,8 +231,7 @@ double ShapeDifference(const AlignmentInput& input, const AlignmentOptions& opti
   try {
     std::vector<std::string> ignored;  // comes again for the lenses that are chosen
     const AlignmentStart start = FindStart(input, options, progress, &ignored);
-    const AlignmentFit fit =
-        FitAlignment(input, start, KeypointSigma(ReprojectionRms(input.model)), options);
+    const AlignmentFit fit = FitAlignment(input, start, KeypointSigma(input.model), options);
     return fit.ShapeDifference();
   } catch (const InputError&) {
     return kNowhere;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/photo_bundle.h"
 #include "core/camera_formulas.h"
 
 namespace roomtex {
@@ -24,17 +25,18 @@ double PickBend(const AlignmentInput& input, const ShapeDisagreement& disagreeme
 
 }  // namespace
 
-double KeypointSigma(double reprojection_rms_px) {
+double KeypointSigma(const SparseModel& model) {
   // Pixels; keypoints are not exacter than that, even where a small model fits them.
   constexpr double kLeastKeypointNoise = 0.3;
-  return std::max(kLeastKeypointNoise, reprojection_rms_px / std::sqrt(2.0));
+  return std::max(kLeastKeypointNoise, KeypointNoise(model));
 }
 
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,
                           const AlignmentOptions& options) {
   AlignmentFit fit;
   fit.scan_from_sparse = start.scan_from_sparse;
-  fit.points = FindSurfacePoints(input.model, options.fit.min_track, sigma_px);
+  fit.points =
+      FindSurfacePoints(input.model, TrackThatCounts(input.model, options.fit.min_track), sigma_px);
   const double gate = std::clamp(5 * start.position_sigma, 0.1, options.fit.max_gate);
   fit.surface = FitToSurface(input.model, fit.points, input.surveyed.patches(), input.picks,
                              start.UsedPicks(), start.pick_sigma_px, gate, start.scan_from_sparse,

@@ -35,7 +35,7 @@ struct AlignmentFit {
 };
 
 // Standard deviation of an observation's coordinate, pixels.
-double KeypointSigma(double reprojection_rms_px);
+double KeypointSigma(const SparseModel& model);
 
 // sigma_px: of an observation of the sparse model, per coordinate (KeypointSigma()).
 AlignmentFit FitAlignment(const AlignmentInput& input, const AlignmentStart& start, double sigma_px,

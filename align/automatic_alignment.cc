@@ -58,7 +58,10 @@ Alignment AlignFromStart(const AlignmentInput& input, const AutomaticAlignment& 
   }
   if (corners.empty()) return alignment;
   const double sigma_px = CornerSigma(corners, input.model, best);
-  if (!NeedsCorners(alignment, corners, sigma_px, input.model)) return alignment;
+  const SparseModel& as_aligned = alignment.rolling_shutter ? alignment.rolling_shutter->model
+                                  : alignment.lenses.mended ? *alignment.lenses.mended
+                                                            : input.model;
+  if (!NeedsCorners(alignment, corners, sigma_px, as_aligned)) return alignment;
   // As picks that are as exact as they turn out to be.
   std::vector<Pick> picks = input.picks;
   for (Pick& corner : corners) {

@@ -120,10 +120,8 @@ RollingShutter WithStillRows(const AlignmentInput& input, const AlignmentFit& fi
 // AlignmentFit::ShapeDifference() of what the photos then show.
 double ShapeDifference(const AlignmentInput& input, const AlignmentStart& start,
                        const RollingShutter& rolling, const AlignmentOptions& options) {
-  SparseModel still = rolling.model;
-  const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&still).rms_px);
-  const AlignmentFit fit =
-      FitAlignment(input.With(still, input.surveyed, rolling.picks), start, sigma_px, options);
+  const AlignmentFit fit = FitAlignment(input.With(rolling.model, input.surveyed, rolling.picks),
+                                        start, KeypointSigma(rolling.model), options);
   return fit.ShapeDifference();
 }
 

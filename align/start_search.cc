@@ -130,8 +130,7 @@ Eigen::Vector3d PhotosMiddle(const StartSearch& search, int start) {
 StartSearch SearchStarts(const AlignmentInput& input, const std::vector<NearHint>& near,
                          const AlignmentOptions& options, const StartSearchOptions& search) {
   StartSearch found;
-  SparseModel copy = input.model;
-  const double sigma_px = KeypointSigma(UpdateReprojectionErrors(&copy).rms_px);
+  const double sigma_px = KeypointSigma(input.model);
   found.cloud = MakeSearchCloud(input.model, sigma_px, kCloudPoints);
   const SearchCloud mirror_image = Mirrored(found.cloud);
   const UpDirections ups = FindModelUps(found.cloud);

@@ -269,7 +269,7 @@ DuplicatesAside SetDuplicatesAside(const MapperVerdict& verdict, const std::vect
 std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
     const AlignCommandOptions& a, const Database* database, const SparseModel& aligned,
     const std::vector<Pick>& picks, const std::set<uint32_t>& ran_away,
-    const SurveyedScans& surveyed, double rms_px, const Command::Context& context) {
+    const SurveyedScans& surveyed, const Command::Context& context) {
   constexpr double kMostDoubtful = 0.34;
   context.progress.Stage("single photos");
   std::map<uint32_t, double> support;
@@ -287,7 +287,7 @@ std::map<uint32_t, PhotoVerdict> JudgeSinglePhotos(
   }
   auto photos = JudgePhotos(aligned, surveyed.patches(), surveyed.free_space(),
                             SurfaceTolerance(a.alignment.trust, surveyed.patches()),
-                            KeypointSigma(rms_px), support, picked);
+                            KeypointSigma(aligned), support, picked);
   for (const uint32_t id : ran_away) {
     if (!photos.at(id).doubt.empty()) continue;
     photos.at(id).doubt =
@@ -435,7 +435,7 @@ std::optional<AlignedModel> AlignOne(ModelToAlign one, const Database* database,
   context.report["cameras"] = CamerasToJson(alignment);
   auto photos =
       JudgeSinglePhotos(a, database, model, one.picks, alignment.adjustment.bundle.ran_away,
-                        *reading->surveyed, after.rms_px, context);
+                        *reading->surveyed, context);
   context.report["planes"] = ScanPlanesToJson(planes, model);
   SetNumPointsOfPlanes(alignment, &context.report["planes"]);
   if (alignment.rolling_shutter) aligned.row_motions = alignment.rolling_shutter->motions;

@@ -136,7 +136,8 @@ void RemovePointsInCameras(SparseModel* model) {
 }
 
 // Photos that took no part get the pose of the similarity between input and adjusted model, and
-// points that did not follow it, too.
+// points that did not follow it, too; also those that an earlier round moved before their photos
+// ran away.
 void MoveIdle(const PlaneBundleInput& input, PlaneBundle* result) {
   const Similarity& moved = result->adjusted_from_input;
   for (const uint32_t id : result->idle_images) {
@@ -145,7 +146,11 @@ void MoveIdle(const PlaneBundleInput& input, PlaneBundle* result) {
   }
   for (auto& [id, point] : result->model.points) {
     const Eigen::Vector3d& before = input.model.points.at(id).x_in_model;
-    if (point.x_in_model == before || !point.x_in_model.allFinite()) {
+    const auto num_seen =
+        std::count_if(point.track.begin(), point.track.end(), [&](const TrackElement& element) {
+          return result->idle_images.count(element.image_id) == 0;
+        });
+    if (num_seen < 2 || point.x_in_model == before || !point.x_in_model.allFinite()) {
       point.x_in_model = moved * before;
     }
   }
@@ -278,7 +283,8 @@ std::vector<SurfaceConstraint> FindConstraints(const PlaneBundleInput& input, in
                                                const PlaneAssociationOptions& association,
                                                const PlaneBundle& state) {
   std::vector<SurfacePoint> points =
-      FindSurfacePoints(state.model, min_track, state.sigma_px, std::numeric_limits<size_t>::max());
+      FindSurfacePoints(state.model, TrackThatCounts(state.model, min_track), state.sigma_px,
+                        std::numeric_limits<size_t>::max());
   for (SurfacePoint& point : points) point.x_in_sparse = input.bend.Bend(point.x_in_sparse);
   return AssociateWithSurface(points, input.planes, input.patches, association);
 }
@@ -389,7 +395,9 @@ void PlaneBundleOptions::Declare(OptionFields* fields) {
       .Positive();
   fields
       ->Int("PlaneBA.min_track", &min_track,
-            "Observations that a sparse point needs to be held on a surface.")
+            "Observations that a sparse point needs to be held on a surface. A model with fewer "
+            "than " +
+                std::to_string(kFewPoints) + " such points uses those of two, too.")
       .AtLeast(2);
   fields->Bool("PlaneBA.fix_clicked_view", &fix_clicked_view,
                "The photo of the picks keeps the pose that they give, as in the thesis (and no "

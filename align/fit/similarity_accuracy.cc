@@ -38,8 +38,10 @@ double CommonVariance(const std::vector<SurfaceMatch>& matches, const SurfaceCel
   std::vector<double> excess;
   for (auto& [cell, values] : distances) {
     const auto n = static_cast<double>(values.size());
-    // The variance of a median is pi / 2 times that of a mean.
-    excess.push_back(std::pow(Median(values), 2) - kPi / 2 * Median(variances[cell]) / n);
+    // The variance of a median is pi / 2 times that of a mean; a median of squares has so much less
+    // than the variance, and the noise's share of it likewise.
+    excess.push_back(std::pow(Median(values), 2) -
+                     kMedianSquarePerVariance * kPi / 2 * Median(variances[cell]) / n);
   }
   return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / kMedianSquarePerVariance);
 }

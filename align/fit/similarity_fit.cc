@@ -94,7 +94,8 @@ void SimilarityFitOptions::Declare(OptionFields* fields) {
   fields
       ->Int("Fit.min_track", &min_track,
             "Observations that a sparse point needs to take part in the fit to the surface; larger "
-            "= fewer, better points.")
+            "= fewer, better points. A model with fewer than " +
+                std::to_string(kFewPoints) + " such points uses those of two observations, too.")
       .AtLeast(2);
   fields
       ->Number("Fit.max_gate", &max_gate,
@@ -118,6 +119,13 @@ void SimilarityFitOptions::Declare(OptionFields* fields) {
 }
 
 std::vector<std::string> SimilarityFitOptions::Problems() const { return ProblemsOf(*this); }
+
+int TrackThatCounts(const SparseModel& model, int min_track) {
+  const auto num_points = std::count_if(
+      model.points.begin(), model.points.end(),
+      [&](const auto& of_id) { return static_cast<int>(of_id.second.track.size()) >= min_track; });
+  return num_points < kFewPoints ? std::min(min_track, 2) : min_track;
+}
 
 std::vector<SurfacePoint> FindSurfacePoints(const SparseModel& model, int min_track,
                                             double sigma_px, size_t max_points) {

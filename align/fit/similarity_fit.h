@@ -42,6 +42,11 @@ struct SurfacePoint {
   uint64_t point3d_id = kInvalidPoint3dId;
 };
 
+// min_track; 2 in a model that has fewer than kFewPoints points of so many observations, as one of
+// two photos has.
+inline constexpr int kFewPoints = 100;
+int TrackThatCounts(const SparseModel& model, int min_track);
+
 // Points with at least min_track observations; covariance = inverse normal matrix of the
 // triangulation with the poses held, times the residual variance sigma_px^2 of a coordinate. Points
 // that their rays do not fix are left out; of more than max_points every k-th is taken.

@@ -74,13 +74,13 @@ ShapeDisagreement FindDisagreement(const SparseModel& model,
   for (int cell = 0; cell < cells.NumCells(); ++cell) {
     const auto n = static_cast<double>(of_cell[cell].size());
     if (n < kMinPointsOfCell) continue;
-    // The variance of a median is pi / 2 times that of a mean.
-    excess[cell] = 3 * std::max(0.0, std::pow(Median(of_cell[cell]), 2) -
-                                         kPi / 2 * Median(variances[cell]) / n);
+    // The variance of a median is pi / 2 times that of a mean. Below 0 counts, too: cut off cell by
+    // cell, half of mere noise would stay.
+    excess[cell] = 3 * (std::pow(Median(of_cell[cell]), 2) - kPi / 2 * Median(variances[cell]) / n);
     sum += excess[cell];
     ++result.num_cells;
   }
-  result.rms = result.num_cells > 0 ? std::sqrt(sum / result.num_cells) : 0;
+  result.rms = result.num_cells > 0 ? std::sqrt(std::max(0.0, sum) / result.num_cells) : 0;
 
   struct Sum {
     double shift2 = 0, turn2 = 0;
@@ -103,8 +103,8 @@ ShapeDisagreement FindDisagreement(const SparseModel& model,
     }
   }
   for (const auto& [id, photo] : sums) {
-    result.photos[id] = {std::sqrt(photo.shift2 / photo.count),
-                         std::sqrt(photo.turn2 / photo.count)};
+    result.photos[id] = {std::sqrt(std::max(0.0, photo.shift2) / photo.count),
+                         std::sqrt(std::max(0.0, photo.turn2) / photo.count)};
   }
   return result;
 }

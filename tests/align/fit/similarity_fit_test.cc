@@ -88,6 +88,32 @@ TEST(SurfaceWeights, AllOfARoundSurfaceCounts) {
   EXPECT_GT(num_counted, 0.8 * static_cast<double>(matches.size()));
 }
 
+// Also where the points' own noise leaves the median of a cell as open.
+TEST(SurfaceWeights, KnowHowFarSurfacesAreOffAsAWhole) {
+  const ScanPatches surface(MakeCase().scans, ScanPatchOptions());
+  std::vector<SurfaceMatch> matches;
+  std::vector<Eigen::Vector3d> places, normals;
+  for (size_t i = 0; i < surface.patches().size(); i += 5) {
+    matches.push_back({0, static_cast<int>(i)});
+    places.push_back(surface.patches()[i].point);
+    normals.push_back(surface.patches()[i].normal);
+  }
+  const SurfaceCells cells(places, normals);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  for (const double off : {0.002, 0.004}) {
+    std::vector<double> off_of_cell(cells.NumCells());
+    for (double& cell : off_of_cell) cell = off * normal(random);
+    for (size_t i = 0; i < matches.size(); ++i) {
+      // 2 mm of the median of a cell, whatever its number of points.
+      const double noise = 0.002 * std::sqrt(cells.NumPoints(cells.Cell(i)) / (kPi / 2));
+      matches[i].sigma = std::hypot(noise, kSurfaceNoise);
+      matches[i].distance = off_of_cell[cells.Cell(i)] + noise * normal(random);
+    }
+    EXPECT_NEAR(SurfaceWeights(matches, surface).CommonSigma(), off, 0.25 * off);
+  }
+}
+
 TEST(SimilarityFit, GivesUpWhereThereIsNoSurface) {
   const SimulatedCase& one = MakeCase();
   const ScanPatches surface(one.scans, ScanPatchOptions());

@@ -1,6 +1,7 @@
 #include "align/trust/disagreement.h"
 
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -39,6 +40,30 @@ TEST(Disagreement, IsSmallWhereModelAndScanAreRight) {
   EXPECT_LT(found.rms, 0.004);
   EXPECT_EQ(found.photos.size(), MakeCase().model.images.size());
   for (const auto& [id, photo] : found.photos) EXPECT_LT(photo.shift, 0.005) << id;
+}
+
+// Points as far off as their own noise lets them be say nothing of the shape.
+TEST(Disagreement, IsNotNoise) {
+  constexpr double kNoise = 0.01;
+  const SimulatedCase& one = MakeCase();
+  const ScanPatches surface(one.scans, ScanPatchOptions());
+  const Similarity scan_from_sparse = one.room->ScanFromSparse();
+  const Similarity sparse_from_scan = scan_from_sparse.Inverse();
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<SurfacePoint> points;
+  for (SurfacePoint point : FindSurfacePoints(one.model, 3, 0.7)) {
+    const auto on = surface.FindNearest(scan_from_sparse * point.x_in_sparse, 0.02);
+    if (!on) continue;
+    const ScanPatch& patch = surface.patches()[on->patch];
+    point.x_in_sparse = sparse_from_scan * (patch.point + kNoise * normal(random) * patch.normal);
+    point.covariance = std::pow(sparse_from_scan.scale * kNoise, 2) * Eigen::Matrix3d::Identity();
+    points.push_back(point);
+  }
+  const auto found = FindDisagreement(one.model, points, surface, scan_from_sparse, ScanBend());
+  EXPECT_GT(found.num_cells, 20);
+  // With what is below 0 cut off cell by cell 0.38 of the noise would stay.
+  EXPECT_LT(found.rms, 0.1 * kNoise);
 }
 
 // A wave of this amplitude has a root mean square length of sqrt(3 / 2) times it.
