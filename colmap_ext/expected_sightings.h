@@ -49,6 +49,9 @@ struct SightSummary {
 SightSummary SummarizeSightings(const std::vector<ExpectedSighting>& expected,
                                 const Camera& camera);
 
+// Of fewer common points two photos say nothing of each other.
+inline constexpr int kMinExpectedOfPair = 20;
+
 // Of what one of two photos saw the other ought to show so many, and shows so many.
 struct CommonSightings {
   int num_expected = 0, num_found = 0;

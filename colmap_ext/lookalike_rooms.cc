@@ -11,7 +11,6 @@
 namespace roomtex {
 namespace {
 
-constexpr int kMinExpectedOfPair = 20;
 constexpr size_t kMinPhotos = 4;  // of a room
 // A split is believed whose photos find less than this share of what those of their own side find,
 // with no more than so many pairs on the wrong side of the middle, and less evenly over the picture

@@ -4,6 +4,7 @@
 
 #include "core/frames.h"
 #include "core/json_text.h"
+#include "core/result_names.h"
 
 namespace roomtex {
 namespace {

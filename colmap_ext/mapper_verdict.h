@@ -12,7 +12,6 @@
 namespace roomtex {
 
 // In the model's folder.
-inline constexpr char kMapperReportName[] = "roomtex-mapper.json";
 
 struct MapperVerdict {
   bool refined = false;  // the lenses are what the mapper made of them, not what was told

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/mapping.h"
+#include "colmap_ext/mapping_pass.h"
 #include "core/report.h"
 
 namespace roomtex {

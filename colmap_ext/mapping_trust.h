@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "colmap_ext/known_photos.h"
-#include "colmap_ext/mapping.h"
+#include "colmap_ext/mapping_pass.h"
 #include "core/command_line.h"
 #include "core/report.h"
 

@@ -7,6 +7,7 @@
 #include "colmap_ext/mapper_verdict.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/result_names.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;

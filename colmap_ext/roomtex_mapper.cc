@@ -23,6 +23,7 @@
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/result_names.h"
 #include "core/text.h"
 
 namespace roomtex {

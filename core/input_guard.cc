@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/partial_path.h"
+#include "core/result_names.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -74,7 +75,7 @@ bool LooksLikeInput(const std::string& path) {
                                                ".ppm", ".pgm",  ".webp", ".jp2", ".exr",  ".hdr"};
   const std::string stem = fs::path(path).stem().string();
   static const std::set<std::string> models = {"cameras", "images", "points3D", "rigs", "frames"};
-  return photos.count(extension) > 0 || fs::path(path).filename() == "alignment.json" ||
+  return photos.count(extension) > 0 || fs::path(path).filename() == kAlignReportName ||
          ((extension == ".bin" || extension == ".txt") && models.count(stem) > 0);
 }
 

@@ -61,6 +61,12 @@ Bounds FindBounds(const Scan& scan) {
   return bounds;
 }
 
+bool NeedsDouble(const Scan& scan) {
+  const Bounds bounds = FindBounds(scan);
+  if (!(bounds.min.x() <= bounds.max.x())) return false;
+  return bounds.min.cwiseAbs().cwiseMax(bounds.max.cwiseAbs()).maxCoeff() > kLargeCoordinate;
+}
+
 uint8_t GreyScale::operator()(float intensity) const {
   const float range = high > low ? high - low : 1.0f;
   return static_cast<uint8_t>(std::lround(255 * std::clamp((intensity - low) / range, 0.0f, 1.0f)));

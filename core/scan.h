@@ -89,6 +89,12 @@ struct Bounds {
 };
 Bounds FindBounds(const Scan& scan);
 
+// Metres from the origin from which on files have double coordinates: up to there a float is exact
+// to 0.06 mm.
+inline constexpr double kLargeCoordinate = 1000;
+// Whether the scan measured a point beyond it.
+bool NeedsDouble(const Scan& scan);
+
 // Where a point (`scan`) is if the scan is read with the other sense of its azimuths: across the
 // station's plane of y and z.
 Eigen::Vector3d MirroredAt(const Rigid& scan_from_station, const Eigen::Vector3d& x_in_scan);

@@ -39,10 +39,12 @@ std::optional<double> ParseNumber(std::string_view text) {
   return value;
 }
 
-std::string Trimmed(const std::string& text) {
+std::string Trimmed(const std::string& text) { return std::string(TrimmedView(text)); }
+
+std::string_view TrimmedView(std::string_view text) {
   const char* const blanks = " \t\r\n\v\f";
   const size_t begin = text.find_first_not_of(blanks);
-  if (begin == std::string::npos) return "";
+  if (begin == std::string_view::npos) return {};
   return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 

@@ -26,7 +26,8 @@ std::optional<double> ParseNumber(std::string_view text);
 
 // Without blanks and control characters for spacing at both ends.
 std::string Trimmed(const std::string& text);
-std::string LowerCase(std::string text);  // ASCII
+std::string_view TrimmedView(std::string_view text);  // the same, of the same characters
+std::string LowerCase(std::string text);              // ASCII
 bool BeginsWith(std::string_view text, std::string_view start);
 // Text of a file as it may stand in a message: in double quotes, at most 40 bytes of it, `?` for
 // control characters and for bytes that are not UTF-8.

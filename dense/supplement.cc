@@ -5,15 +5,16 @@
 #include <cmath>
 #include <unordered_map>
 
-#include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
 #include "core/cell_key.h"
+#include "core/frames.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
+#include "importers/ply.h"
 
 namespace roomtex {
 namespace {
@@ -97,8 +98,9 @@ void SupplementOptions::Declare(OptionFields* fields) {
       .Within(0, 1);
   fields
       ->Int("Fusion.min_support", &min_support,
-            "Photos that a place must be found from. Larger = stricter.")
-      .Within(2, 50, "photos");
+            "Photos that a place must be found from, from places 2 degrees apart as it sees them: "
+            "copies count once. Larger = stricter.")
+      .Within(2, kMaxConfirming + 1, "photos");
   fields
       ->Number("Fusion.min_pair_correlation", &min_pair_correlation,
                "Normalised cross-correlation with which two photos are enough, 0 to 1 (1 = never). "
@@ -142,8 +144,10 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
     scan_from_others.push_back(other.view->cam_from_scan.Inverse());
   }
   const double focal = view.camera.params[0];
+  const double same_place = std::cos(RadFromDeg(kSamePlace_deg));
   ParallelFor(num_threads, 0, size.height, [&](int y) {
     std::vector<double> depths;
+    std::vector<Eigen::Vector3d> counted;  // directions from the place to the photos that found it
     for (int x = 0; x < size.width; ++x) {
       const float depth = estimate.depth(y, x);
       if (!(depth > 0)) continue;
@@ -151,6 +155,7 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
       const Eigen::Vector3d ray = *projection.RayFromImg(at);
       const Eigen::Vector3d place = scan_from_cam * (ray * depth);
       depths.assign(1, depth);
+      counted.assign(1, (scan_from_cam.translation - place).normalized());
       double baselines2 = 0;
       bool is_seen_through = false;
       for (size_t k = 0; k < others.size(); ++k) {
@@ -174,6 +179,14 @@ ConfirmedDepth ConfirmDepth(const StereoView& view, const DepthEstimate& estimat
         const Eigen::Vector3d back = view.cam_from_scan * its_place;
         const auto here = projection.ImgFromCam(back);
         if (!here || (*here - at).norm() > kMaxReprojection_px) continue;
+        // A photo from where another one was taken, a copy or one of a burst, is no second witness.
+        const Eigen::Vector3d towards = (scan_from_others[k].translation - place).normalized();
+        if (std::any_of(counted.begin(), counted.end(), [&](const Eigen::Vector3d& direction) {
+              return direction.dot(towards) > same_place;
+            })) {
+          continue;
+        }
+        counted.push_back(towards);
         // What is nearer or farther there is so here, to first order: the views look alike.
         depths.push_back(depth + (seen - in_other.z()));
         const Eigen::Vector3d baseline =
@@ -330,18 +343,15 @@ void WriteSupplement(const Supplement& supplement, const Scan& scan, const std::
   for (const SupplementVertex& vertex : supplement.vertices) {
     largest = std::max(largest, vertex.x_in_scan.cwiseAbs().maxCoeff());
   }
-  constexpr double kFloatLimit = 1000;  // metres, as in roomtex-texture
-  const bool as_double = largest > kFloatLimit;
+  const bool as_double = largest > kLargeCoordinate;
   const char* const type = as_double ? "double" : "float";
   OutputFile file(path);
   std::ostream& stream = file.stream();
   stream
       << "ply\nformat binary_little_endian 1.0\ncomment roomtex-dense: surface from photos, scan "
          "frame, metres; support = photos, confidence = correlation 0..1, uncertainty = standard "
-         "deviation, metres\n"
-      << fmt::format("comment roomtex up {:.17g} {:.17g} {:.17g}\n", scan.up[0], scan.up[1],
-                     scan.up[2])
-      << "element vertex " << supplement.vertices.size() << "\n";
+         "deviation of the matching (without the photos' poses), metres\n"
+      << PlyUpComment(scan) << "element vertex " << supplement.vertices.size() << "\n";
   for (const char* name : {"x", "y", "z"}) stream << "property " << type << " " << name << "\n";
   for (const char* name : {"nx", "ny", "nz"}) stream << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue", "support"}) {

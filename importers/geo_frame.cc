@@ -67,7 +67,9 @@ std::string GridPosition::ZoneName() const {
 }
 
 int GridPosition::EpsgCode() const {
-  return (north ? 32600 : 32700) + (zone == UTMUPS::UPS ? 61 : zone);
+  // Of UPS the codes of easting before northing: 32661 and 32761 count northing first.
+  if (zone == UTMUPS::UPS) return north ? 5041 : 5042;
+  return (north ? 32600 : 32700) + zone;
 }
 
 GeoFrame::GeoFrame(const GeoPosition& origin) : origin_(origin) {

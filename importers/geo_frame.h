@@ -45,7 +45,7 @@ struct GridPosition {
   double scale = 1;                  // grid metres per metre on the ellipsoid
 
   std::string ZoneName() const;  // "48N", "33S", "UPS N", "UPS S"
-  int EpsgCode() const;          // of the WGS84 grid: 32648 ...
+  int EpsgCode() const;          // of the WGS84 grid, easting first: 32648 ...
 };
 
 // The `enu` frame about an origin: x east, y north, z up along the ellipsoid's normal there.

@@ -1,6 +1,7 @@
 #include "importers/las_unit.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -8,6 +9,7 @@
 #include <limits>
 #include <string_view>
 
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/length_unit.h"
 
@@ -68,7 +70,9 @@ std::string UnitOfSystem(std::string_view wkt, size_t at) {
     if (!(depth == 1 || (depth == 2 && in_axis)) || wkt.substr(i, 6) != "UNIT[\"") continue;
     const size_t comma = wkt.find("\",", i + 6);
     if (comma == std::string_view::npos) return "";
-    const double meters = std::strtod(std::string(wkt.substr(comma + 2, 32)).c_str(), nullptr);
+    const std::string_view number = TrimmedView(wkt.substr(comma + 2));
+    double meters = 0;
+    std::from_chars(number.data(), number.data() + number.size(), meters);
     for (const std::string& name : LengthUnitNames()) {
       if (std::abs(meters / *MetersPerUnit(name) - 1) < 1e-7) return name;
     }

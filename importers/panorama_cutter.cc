@@ -4,16 +4,17 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
-#include <sstream>
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/camera_text.h"
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/parallel.h"
 #include "core/photo.h"
 #include "core/photo_files.h"
+#include "core/result_names.h"
 #include "core/stays_inside.h"
 #include "core/text.h"
 
@@ -76,14 +77,8 @@ void WriteFaces(const fs::path& path, const CutPanorama& panorama, const fs::pat
 }
 
 void WriteCameraOptions(const Camera& camera, const std::string& path) {
-  std::ostringstream params;
-  params.precision(17);
-  for (size_t i = 0; i < camera.params.size(); ++i)
-    params << (i > 0 ? "," : "") << camera.params[i];
   OutputFile file(path);
-  file.stream() << "--ImageReader.single_camera 1 --ImageReader.camera_model "
-                << CameraModelName(camera.model) << " --ImageReader.camera_params " << params.str()
-                << "\n";
+  file.stream() << FeatureExtractorOptions(camera) << "\n";
   file.Commit();
 }
 
@@ -95,7 +90,7 @@ void RemoveOlderFaces(const std::string& folder, const std::vector<CutPanorama>&
   for (const CutPanorama& panorama : panoramas) {
     for (const CutPanorama::Face& face : panorama.faces) names.insert(face.name);
   }
-  const std::string set = folder + "/panoramas.json";
+  const std::string set = folder + "/" + kPanoramaSetName;
   if (!fs::exists(set)) return;
   try {
     for (const CutPanorama& panorama : ReadPanoramaSet(set)) {
@@ -142,12 +137,12 @@ std::vector<CutPanorama> CutPanoramas(const std::string& input_path,
   });
   const fs::path folder = outputs.aside();
   if (is_one) {
-    WriteCameraOptions(camera, (folder / "camera_options.txt").string());
+    WriteCameraOptions(camera, (folder / kCameraOptionsName).string());
   } else {
-    outputs.Remove("camera_options.txt");
+    outputs.Remove(kCameraOptionsName);
   }
   RemoveOlderFaces(output_folder, panoramas, &outputs);
-  WritePanoramaSet(panoramas, (folder / "panoramas.json").string());
+  WritePanoramaSet(panoramas, (folder / kPanoramaSetName).string());
   outputs.Commit();
   return panoramas;
 }

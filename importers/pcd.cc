@@ -457,12 +457,6 @@ Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* da
   return scan;
 }
 
-bool NeedsDouble(const Scan& scan) {
-  const Bounds bounds = FindBounds(scan);
-  return bounds.min.cwiseAbs().maxCoeff() > kLargeCoordinate ||
-         bounds.max.cwiseAbs().maxCoeff() > kLargeCoordinate;
-}
-
 void WritePcd(const Scan& scan, const std::string& path) {
   const size_t count = scan.organised ? scan.points.size()
                                       : scan.points.size() - static_cast<size_t>(scan.NumMissing());

@@ -24,13 +24,7 @@ struct PcdOptions {
 Scan ReadPcd(const std::string& path, const PcdOptions& options, std::string* data_kind = nullptr);
 
 // Binary x, y, z, intensity and, if the scan has colours, rgb as PCL packs them; without a grid
-// only what is measured, HEIGHT 1; x, y, z as double when a coordinate exceeds 10 000
-// (kLargeCoordinate).
+// only what is measured, HEIGHT 1; x, y, z as double where one exceeds kLargeCoordinate.
 void WritePcd(const Scan& scan, const std::string& path);
-
-// Beyond this many metres a float is coarser than a millimetre.
-inline constexpr double kLargeCoordinate = 1e4;
-// Whether x, y, z of the scan must be written as double.
-bool NeedsDouble(const Scan& scan);
 
 }  // namespace roomtex

@@ -21,11 +21,18 @@
 #include "core/text.h"
 #include "importers/file_reader.h"
 #include "importers/mesh_scan.h"
-#include "importers/pcd.h"
 #include "importers/ply_header.h"
 
 namespace roomtex {
 namespace {
+
+// Words of the comments in which our writers say more of a scan than PLY has properties for.
+constexpr char kCommentOwner[] = "roomtex", kUpComment[] = "up", kStationComment[] = "station";
+
+std::string VectorComment(const char* what, const Eigen::Vector3d& v) {
+  return std::string("comment ") + kCommentOwner + " " + what + " " + Exact(v[0]) + " " +
+         Exact(v[1]) + " " + Exact(v[2]) + "\n";
+}
 
 // The values of the body one after the other.
 class ValueSource {
@@ -251,19 +258,19 @@ class PlyParser {
     }
   }
 
-  // What our own writer says about the scan.
+  // What our own writers say about the scan: VectorComment().
   void ReadComments() {
     for (const std::string& comment : header_.comments) {
       std::istringstream words(comment);
       std::string who, what;
       Eigen::Vector3d v;
-      if (!(words >> who >> what >> v[0] >> v[1] >> v[2]) || who != "roomtex" || !v.allFinite())
+      if (!(words >> who >> what >> v[0] >> v[1] >> v[2]) || who != kCommentOwner || !v.allFinite())
         continue;
-      if (what == "up" && v.norm() > 0.5) {
+      if (what == kUpComment && v.norm() > 0.5) {
         facts_.up = v.normalized();
         facts_.up_is_assumed = false;
       }
-      if (what == "station") {
+      if (what == kStationComment) {
         facts_.station = options_.meters_per_unit * v;
         facts_.station_is_assumed = false;
       }
@@ -529,6 +536,11 @@ void VisitPly(const std::string& path, const PlyOptions& options, PlyVisitor* vi
   PlyParser(file, header, options, nullptr, visitor).Parse();
 }
 
+std::string PlyUpComment(const Scan& scan) { return VectorComment(kUpComment, scan.up); }
+std::string PlyStationComment(const Scan& scan) {
+  return VectorComment(kStationComment, scan.Station());
+}
+
 void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {
   size_t num_vertices = 0, num_faces = 0;
   bool as_double = false, has_colors = false;
@@ -544,11 +556,8 @@ void WritePly(const std::vector<PlyPart>& parts, const std::string& path) {
   stream << "ply\nformat binary_little_endian 1.0\n";
   if (!parts.empty()) {
     const Scan& scan = *parts.front().scan;
-    stream << "comment roomtex up " << scan.up[0] << ' ' << scan.up[1] << ' ' << scan.up[2] << '\n';
-    if (!scan.station_is_assumed) {
-      stream << "comment roomtex station " << scan.Station()[0] << ' ' << scan.Station()[1] << ' '
-             << scan.Station()[2] << '\n';
-    }
+    stream << PlyUpComment(scan);
+    if (!scan.station_is_assumed) stream << PlyStationComment(scan);
   }
   const char* const type = as_double ? "double" : "float";
   stream << "element vertex " << num_vertices << '\n';

@@ -60,7 +60,11 @@ class PlyVisitor {
 };
 void VisitPly(const std::string& path, const PlyOptions& options, PlyVisitor* visitor);
 
-// Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate, pcd.h), intensity
+// What ReadPly wants to know of a scan, as lines of a header: "comment roomtex up 0 0 1\n".
+std::string PlyUpComment(const Scan& scan);
+std::string PlyStationComment(const Scan& scan);
+
+// Binary little-endian: vertex x, y, z (float; double beyond kLargeCoordinate), intensity
 // float, red, green, blue uchar where a scan has colours; faces. triangles index scan.points;
 // missing samples are left out. Several scans become one mesh.
 struct PlyPart {

@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/resource_limits.h"
+#include "core/result_names.h"
 #include "core/scan_mesh.h"
 #include "importers/content_hash.h"
 #include "importers/e57_images.h"
@@ -251,7 +252,7 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   context.report["num_panoramas"] = panoramas.size();
   context.report["faces_per_panorama"] = panoramas[0].faces.size();
   context.report["face_size_px"] = panoramas[0].face_camera.width;
-  std::cout << (fs::path(folder) / "panoramas.json").string() << "\n";
+  std::cout << (fs::path(folder) / kPanoramaSetName).string() << "\n";
 }
 
 // Photos that only have the same name as one of the E57 stay: they may be somebody's originals.

@@ -15,20 +15,10 @@ constexpr char kMagic[] = "RTPI_version_";
 constexpr char kMagic2[] = "RTPIv2";
 constexpr int64_t kLongestRtpiHeader = 1 << 20;  // bytes; the manual's has below one thousand
 
-std::string_view Trimmed(std::string_view text) {
-  const size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-bool LineBegins(std::string_view text, std::string_view start) {
-  return text.substr(0, start.size()) == start;
-}
-
 // The line without its "#" and the blanks around.
 std::string_view Content(std::string_view line) {
-  line = Trimmed(line);
-  if (LineBegins(line, "#")) line = Trimmed(line.substr(1));
+  line = TrimmedView(line);
+  if (BeginsWith(line, "#")) line = TrimmedView(line.substr(1));
   return line;
 }
 
@@ -36,15 +26,15 @@ std::string_view Content(std::string_view line) {
 void SplitItem(std::string_view content, std::string_view* key, std::string_view* value) {
   const size_t end = content.find_first_of(": \t");
   *key = content.substr(0, end);
-  *value = end == std::string_view::npos ? std::string_view() : Trimmed(content.substr(end));
-  if (LineBegins(*value, ":")) *value = Trimmed(value->substr(1));
+  *value = end == std::string_view::npos ? std::string_view() : TrimmedView(content.substr(end));
+  if (BeginsWith(*value, ":")) *value = TrimmedView(value->substr(1));
 }
 
 // En dash (UTF-8 and Windows-1252) and the typographic minus as '-'.
 std::string WithPlainMinus(std::string_view text) {
   std::string plain;
   for (size_t i = 0; i < text.size(); ++i) {
-    if (LineBegins(text.substr(i), "\xE2\x80\x93") || LineBegins(text.substr(i), "\xE2\x88\x92")) {
+    if (BeginsWith(text.substr(i), "\xE2\x80\x93") || BeginsWith(text.substr(i), "\xE2\x88\x92")) {
       plain += '-';
       i += 2;
     } else {
@@ -106,18 +96,18 @@ class HeaderParser {
   RtpiLayout Parse() {
     std::string_view line;
     if (!NextLine(&line)) throw NotRtpi();
-    while (LineBegins(Trimmed(line), "#")) {
+    while (BeginsWith(TrimmedView(line), "#")) {
       layout_.header.comments.emplace_back(line);  // version 2 begins with free lines
       if (!NextLine(&line)) throw NotRtpi();
     }
-    if (LineBegins(line, "P9 ")) {
+    if (BeginsWith(line, "P9 ")) {
       throw InputError(path_, LinePosition(lines_.line_number()), "is RTPI version 1 (\"P9\")",
                        "Version 1 is not supported: convert the file to version 3.0 with the "
                        "scanner's software");
     }
-    if (LineBegins(line, kMagic2)) {
+    if (BeginsWith(line, kMagic2)) {
       ParseVersion2(line);
-    } else if (LineBegins(line, kMagic)) {
+    } else if (BeginsWith(line, kMagic)) {
       ParseVersion3(line);
     } else {
       throw NotRtpi();
@@ -144,17 +134,17 @@ class HeaderParser {
 
   void ParseVersion2(std::string_view line) {
     layout_.header.version = 2;
-    const std::string_view rest = Trimmed(line.substr(std::string_view(kMagic2).size()));
+    const std::string_view rest = TrimmedView(line.substr(std::string_view(kMagic2).size()));
     const size_t end = std::min(rest.find_first_of(" \t"), rest.size());
     const long number = lines_.line_number();
     layout_.num_columns_line = number;
     layout_.num_columns = ParseCount(path_, number, "the number of columns", rest.substr(0, end));
     layout_.header.max_samples_per_column =
-        ParseCount(path_, number, "the largest number of samples", Trimmed(rest.substr(end)));
+        ParseCount(path_, number, "the largest number of samples", TrimmedView(rest.substr(end)));
   }
 
   void ParseVersion3(std::string_view magic) {
-    if (!LineBegins(magic.substr(std::string_view(kMagic).size()), "3")) {
+    if (!BeginsWith(magic.substr(std::string_view(kMagic).size()), "3")) {
       throw InputError(path_, LinePosition(lines_.line_number()),
                        "is " + Quoted(magic) + ", expected \"RTPI_version_3.0\"",
                        "Only the versions 2 and 3.0 are supported");
@@ -164,14 +154,14 @@ class HeaderParser {
     for (bool have_line = Take(&line);; have_line = Take(&line)) {
       if (!have_line) throw NoEnd();
       const std::string_view content = Content(line);
-      if (LineBegins(content, "--end_header--")) break;
+      if (BeginsWith(content, "--end_header--")) break;
       if (in_comments) {
         layout_.header.comments.push_back(line);
-      } else if (LineBegins(content, "--begin_comments--")) {
+      } else if (BeginsWith(content, "--begin_comments--")) {
         in_comments = true;
-      } else if (LineBegins(content, "--begin_scan_parameters--")) {
+      } else if (BeginsWith(content, "--begin_scan_parameters--")) {
         in_parameters = true;
-      } else if (!LineBegins(content, "--begin_header--")) {
+      } else if (!BeginsWith(content, "--begin_header--")) {
         if (!ParseItem(line, &has_num_columns)) {
           (in_parameters ? layout_.header.parameters : layout_.header.device).push_back(line);
         }
@@ -268,12 +258,12 @@ std::string NumberText(double number) {
 
 bool LooksLikeRtpi(const std::string& first_bytes) {
   std::string_view rest = first_bytes;
-  while (LineBegins(rest, "#")) {
+  while (BeginsWith(rest, "#")) {
     const size_t newline = rest.find('\n');
     if (newline == std::string_view::npos) return false;
     rest = rest.substr(newline + 1);
   }
-  return LineBegins(rest, kMagic) || LineBegins(rest, kMagic2) || LineBegins(rest, "P9 ");
+  return BeginsWith(rest, kMagic) || BeginsWith(rest, kMagic2) || BeginsWith(rest, "P9 ");
 }
 
 RtpiLayout ReadRtpiHeader(const FileReader& file) { return HeaderParser(file).Parse(); }

@@ -44,9 +44,8 @@ std::optional<Rigid> PoseFromQuaternion(const std::vector<double>& v) {
 }
 
 std::optional<double> NumberFrom(const std::string& word) {
-  char* end = nullptr;
-  const double number = std::strtod(word.c_str(), &end);
-  if (end == word.c_str() || *end != '\0' || !std::isfinite(number)) return std::nullopt;
+  double number = 0;
+  if (!ParseReal(word, &number) || !std::isfinite(number)) return std::nullopt;
   return number;
 }
 

@@ -211,7 +211,9 @@ void NoteDoubtfulUnit(const ScanReaderOptions& options, const Scan& scan, ScanFi
                         "), give --units " + unit);
 }
 
-// Rec. 709, of sRGB values as they are.
+// Rec. 709, of sRGB values as they are; GreyOf (mesh_scan.h), of colours without an intensity
+// beside them, is Rec. 601. Both stay: a scan that is read again has the intensity that it was
+// aligned by.
 float LumaOf(const std::array<uint8_t, 3>& color) {
   return 0.2126f * color[0] + 0.7152f * color[1] + 0.0722f * color[2];
 }

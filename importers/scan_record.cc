@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/json_text.h"
+#include "core/result_names.h"
 #include "core/text.h"
 #include "importers/content_hash.h"
 #include "importers/length_unit.h"
@@ -317,9 +318,18 @@ Json ToJson(const std::vector<ScanRecord>& records) {
 AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
   AlignmentRecord record;
   record.folder = model_folder;
-  record.path = (fs::path(model_folder) / "alignment.json").string();
+  record.path = (fs::path(model_folder) / kAlignReportName).string();
   std::error_code error;
-  if (!fs::is_regular_file(record.path, error)) return record;
+  if (!fs::is_regular_file(record.path, error)) {
+    // The same model about a place on the Earth, of roomtex-align --geo_origin, lies in another
+    // frame than the scans: its trust alone goes along.
+    const Json geo = ReadJsonIfAny((fs::path(model_folder) / "geo.json").string());
+    if (!geo.is_object()) return record;
+    record.trusted = geo.value("trusted", Json(true)) != Json(false);
+    const Json reason = geo.value("reason", Json());
+    if (reason.is_string()) record.reason = reason.get<std::string>();
+    return record;
+  }
   const Json json = ReadJsonIfAny(record.path);
   try {
     if (!json.is_object()) throw InputError(record.path, "", "", "");
@@ -355,7 +365,7 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
 
 void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder) {
   std::error_code error;
-  if (!paths.empty() || fs::exists(fs::path(model_folder) / "alignment.json", error)) return;
+  if (!paths.empty() || fs::exists(fs::path(model_folder) / kAlignReportName, error)) return;
   throw UsageError("--scan_path is required: " +
                    (model_folder.empty()
                         ? "only a single model of roomtex-align remembers its scans"

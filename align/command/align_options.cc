@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/photo_fit.h"
 #include "core/resource_limits.h"
+#include "core/result_names.h"
 
 namespace roomtex {
 

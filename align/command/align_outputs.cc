@@ -17,6 +17,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/photo_fit.h"
+#include "core/result_names.h"
 #include "importers/scan_record.h"
 
 namespace roomtex {
@@ -36,7 +37,9 @@ void WriteGeo(const AlignCommandOptions& a, const SparseModel& aligned, const Pl
     context.Warn(folder + " is from an earlier run: without --geo_origin it is not written anew");
   }
   if (!geo) return;
-  if (!a.geo_origin.empty()) WriteGeoModel(aligned, *geo, outputs.aside() + "/" + kGeoFolder);
+  if (!a.geo_origin.empty()) {
+    WriteGeoModel(aligned, *geo, outputs.aside() + "/" + kGeoFolder, context.report.reason());
+  }
   const GpsCheck gps = CheckGps(aligned, *geo, a.image_path);
   context.report["geo"] = GeoToJson(*geo, placed, gps);
   for (const std::string& warning : GeoWarnings(aligned, *geo, gps)) context.Warn(warning);

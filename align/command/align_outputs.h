@@ -15,7 +15,6 @@
 
 namespace roomtex {
 
-inline constexpr char kAlignReportName[] = "alignment.json";
 // Those that are written into --output_path where there is a model.
 std::vector<std::string> FilesOfAlignedModel();
 

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/resource_limits.h"
+#include "core/result_names.h"
 #include "core/text.h"
 
 namespace roomtex {
@@ -82,8 +83,9 @@ double ShareDone(int stages_done, const Stages& stages) {
 std::string FolderOfRun(const std::string& aligned_path) {
   std::error_code error, other_error;
   const std::string aside = aligned_path + ".untrusted";
-  const auto time = std::filesystem::last_write_time(aligned_path + "/alignment.json", error);
-  const auto aside_time = std::filesystem::last_write_time(aside + "/alignment.json", other_error);
+  const auto time = std::filesystem::last_write_time(aligned_path + "/" + kAlignReportName, error);
+  const auto aside_time =
+      std::filesystem::last_write_time(aside + "/" + kAlignReportName, other_error);
   if (other_error) return aligned_path;
   return error || aside_time > time ? aside : aligned_path;
 }
@@ -159,7 +161,7 @@ void AlignJob::Finish(int exit_code) {
   // Only these two write a report: another one is of an earlier run.
   const bool has_report = exit_code == kExitDone || exit_code == kExitUntrusted;
   const std::string written = has_report ? FolderOfRun(aligned_path_) : aligned_path_;
-  const Json report = has_report ? ReadJsonIfAny(written + "/alignment.json") : Json();
+  const Json report = has_report ? ReadJsonIfAny(written + "/" + kAlignReportName) : Json();
   const std::string sentence =
       has_report && !cancelled_ ? take_report_(written, report) : std::string();
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -13,7 +13,6 @@
 namespace roomtex {
 namespace {
 
-constexpr double kLargestFloat = 1000;  // metres; beyond it a float has less than 0.1 mm
 constexpr uint8_t kGrey = 128;
 
 using Rgb = std::array<uint8_t, 3>;
@@ -85,7 +84,7 @@ void WriteScanPlanes(const std::string& path, const std::vector<Scan>& scans,
   if (!scans.empty()) {
     const Bounds bounds = FindBounds(scans[0]);
     const Eigen::Vector3d middle = (bounds.min + bounds.max) / 2;
-    if (middle.cwiseAbs().maxCoeff() > kLargestFloat) shift = middle.array().round();
+    if (middle.cwiseAbs().maxCoeff() > kLargeCoordinate) shift = middle.array().round();
   }
   for (const Scan& scan : scans) {
     rows.emplace_back(scan.num_rows);

@@ -18,6 +18,7 @@ constexpr int kNumNeighbours = 26;
 
 using Cube = Eigen::Vector3i;
 
+// Cubes themselves are the keys: unlike with CellKey() (core/cell_key.h) no two are taken for one.
 struct HashOfCube {
   size_t operator()(const Cube& c) const {
     uint64_t key = 0;

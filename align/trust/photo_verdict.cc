@@ -37,7 +37,6 @@ constexpr double kRareShare = 0.3, kRareSigmas = 2.5, kUnevenOfRare = 1.5;
 // the photos), 0.75 with 4.1 (blurred), 0.59 with 3.2 (desk).
 constexpr double kShareOfPart = 0.6, kUnevenOfPart = 5;
 constexpr size_t kMinExpected = 60;
-constexpr int kMinExpectedOfPair = 20;  // of two photos
 // What a surface share rests on. It says something of the photo, but no doubt follows from it: a
 // right photo that looks past what was scanned (desk) has 0.07.
 constexpr double kMinJudgedOfPhoto = 10;

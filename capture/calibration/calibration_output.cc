@@ -3,14 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "core/camera_text.h"
 #include "core/output_file.h"
 #include "core/text.h"
 
 namespace roomtex {
 namespace {
-
-// Ten digits: 1e-6 of a pixel of a focal length, 1e-9 of a distortion.
-std::string Digits(double value) { return Significant(value, 10); }
 
 Json Numbers(const std::vector<double>& values) {
   Json json = Json::array();
@@ -59,7 +57,9 @@ Json ModelToJson(const ModelComparison& model) {
 
 Camera RoundedCamera(const Camera& camera) {
   Camera rounded = camera;
-  for (double& param : rounded.params) param = std::strtod(Digits(param).c_str(), nullptr);
+  for (double& param : rounded.params) {
+    param = std::strtod(Significant(param, kLensDigits).c_str(), nullptr);
+  }
   return rounded;
 }
 
@@ -68,20 +68,8 @@ void WriteCamerasText(const std::string& path, const Camera& camera) {
   file.stream() << "# Camera list with one line of data per camera:\n"
                 << "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
                 << "# Number of cameras: 1\n"
-                << camera.camera_id << " " << CameraModelName(camera.model) << " " << camera.width
-                << " " << camera.height;
-  for (const double param : camera.params) file.stream() << " " << Digits(param);
-  file.stream() << "\n";
+                << CamerasTextLine(camera, kLensDigits);
   file.Commit();
-}
-
-std::string FeatureExtractorOptions(const Camera& camera) {
-  std::string options = std::string("--ImageReader.single_camera 1 --ImageReader.camera_model ") +
-                        CameraModelName(camera.model) + " --ImageReader.camera_params ";
-  for (size_t i = 0; i < camera.params.size(); ++i) {
-    options += (i > 0 ? "," : "") + Digits(camera.params[i]);
-  }
-  return options;
 }
 
 std::string FocalLengthLine(const Calibration& calibration) {
@@ -107,6 +95,10 @@ void FillReport(const Calibration& calibration, const Board& board, Report* repo
   r["held_out_rms_px"] = NumberOrNull(calibration.held_out_rms_px);
   r["corner_noise_px"] = NumberOrNull(calibration.sigma_px);
   r["photo_scatter"] = NumberOrNull(calibration.photo_scatter);
+  r["board_bow_mm"] = NumberOrNull(1000 * calibration.bow.height);
+  r["board_bow_sigma_mm"] = NumberOrNull(1000 * calibration.bow.sigma);
+  r["board_bow_focal_percent"] = calibration.bow.focal_percent;
+  r["board_bow_used"] = calibration.bow.used;
   r["board"] = board.Name();
   r["num_photos"] = calibration.photos.size();
   r["num_used"] = calibration.NumUsed();

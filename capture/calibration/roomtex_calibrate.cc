@@ -14,6 +14,7 @@
 #include "capture/calibration/calibration_database.h"
 #include "capture/calibration/calibration_output.h"
 #include "capture/calibration/calibration_picture.h"
+#include "core/camera_text.h"
 #include "core/command_line.h"
 #include "core/commit_together.h"
 #include "core/error.h"
@@ -146,7 +147,7 @@ void Run(Arguments* a, const Command::Context& context) {
   if (!a->coverage_path.empty()) WritePictureFile(a->coverage_path, DrawCalibration(calibration));
   Apply(*a, calibration.camera, context);
   context.progress.Note(FocalLengthLine(calibration));
-  std::printf("%s\n", FeatureExtractorOptions(calibration.camera).c_str());
+  std::printf("%s\n", FeatureExtractorOptions(calibration.camera, kLensDigits).c_str());
 }
 
 }  // namespace

@@ -12,12 +12,14 @@
 #include "capture/simulation/simulated_projector.h"
 #include "capture/simulation/true_colors.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/camera_text.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/frames.h"
 #include "core/output_file.h"
 #include "core/partial_path.h"
 #include "core/photo.h"
+#include "core/result_names.h"
 #include "core/text.h"
 #include "core/twist.h"
 #include "importers/rtpi.h"
@@ -162,24 +164,10 @@ void WritePicks(const SimulatedRoom& room, int station, const std::string& path,
   WriteText(path, text);
 }
 
-std::string CameraParams(const Camera& camera) {
-  std::string params;
-  for (const double param : camera.params) params += (params.empty() ? "" : ",") + Exact(param);
-  return params;
-}
-
-void WriteCamera(const SimulatedRoom& room, const std::string& folder) {
-  const Camera& camera = room.camera();
-  const std::string params = CameraParams(camera);
-  std::string spaced = params;
-  std::replace(spaced.begin(), spaced.end(), ',', ' ');
-  WriteText(
-      folder + "/cameras.txt",
-      fmt::format("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{} {} {} {} {}\n", camera.camera_id,
-                  CameraModelName(camera.model), camera.width, camera.height, spaced));
-  WriteText(folder + "/camera_options.txt",
-            std::string("--ImageReader.single_camera 1 --ImageReader.camera_model ") +
-                CameraModelName(camera.model) + " --ImageReader.camera_params " + params + "\n");
+void WriteCamera(const Camera& camera, const std::string& folder) {
+  WriteText(folder + "/cameras.txt",
+            "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n" + CamerasTextLine(camera));
+  WriteText(folder + "/" + kCameraOptionsName, FeatureExtractorOptions(camera) + "\n");
 }
 
 // What roomtex-associate has to find, and what the projectors throw from where.
@@ -374,7 +362,7 @@ CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool r
   MakeFolder(photo_folder);
   MakeFolder(folder + "/truth");
   CaptureSummary summary;
-  WriteCamera(room, folder);
+  WriteCamera(room.camera(), folder);
   WriteTruth(room, folder + "/truth");
   WritePicks(room, 0, folder + "/picks.csv", &summary);
   if (room.options().second_room) {

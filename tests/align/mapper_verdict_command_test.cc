@@ -7,6 +7,7 @@
 
 #include "colmap_ext/mapper_verdict.h"
 #include "core/report.h"
+#include "core/result_names.h"
 #include "tests/align/case_folder.h"
 #include "tests/align/photographed_room.h"
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "colmap_ext/mapper_verdict.h"
+#include "core/result_names.h"
 #include "tests/support/temp_folder.h"
 
 namespace roomtex {

@@ -392,6 +392,15 @@ TEST(Scan, BoundsAndMissingSamples) {
   EXPECT_GT(FindBounds(Scan()).min.x(), FindBounds(Scan()).max.x());
 }
 
+TEST(Scan, NeedsDoubleBeyondAKilometre) {
+  Scan scan;
+  EXPECT_FALSE(NeedsDouble(scan));
+  scan.points = {Scan::MissingPoint(), {0, 999.9, -999.9}};
+  EXPECT_FALSE(NeedsDouble(scan));
+  scan.points.push_back({0, 0, -1000.1});
+  EXPECT_TRUE(NeedsDouble(scan));
+}
+
 TEST(IntensityAsGrey, StretchesMeasuredSamplesAndLeavesMissingOnesBlack) {
   Scan scan;
   scan.num_columns = 1001;

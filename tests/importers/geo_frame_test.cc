@@ -49,9 +49,9 @@ const Place kPlaces[] = {
     {"DateLineFromWest", {-16.5, 179.9999, 5}, "60S", 32760},
     {"DateLineFromEast", {-16.5, -179.9999, 5}, "1S", 32701},
     {"DateLine", {-16.5, 180, 5}, "1S", 32701},
-    {"NearNorthPole", {89.9999, 30, 2}, "UPS N", 32661},
-    {"NorthPole", {90, 0, 2}, "UPS N", 32661},
-    {"SouthPole", {-90, 0, 2835}, "UPS S", 32761},
+    {"NearNorthPole", {89.9999, 30, 2}, "UPS N", 5041},
+    {"NorthPole", {90, 0, 2}, "UPS N", 5041},
+    {"SouthPole", {-90, 0, 2835}, "UPS S", 5042},
     {"LastOfUtm", {83.9999, 20, 2}, "33N", 32633},
 };
 

@@ -135,6 +135,8 @@ TEST_F(ScanPosesFile, BadStationsAreToldWithTheirLine) {
       {"a geo geo 47 8 500 0\n", "which is no surveyed station"},
       {"a 47 8 500 0\n", "which is no pose"},
       {"a geo nan 8 500 0\n", "which is no surveyed station"},
+      {"a geo 0x10 8 500 0\n", "which is no surveyed station"},
+      {"a 1 0 0 0 0x10 0 0\n", "which is no pose"},
       {"a geo inf 8 500 0\n", "which is no surveyed station"},
       {"a geo 103.8 1.3 15 0\n", "latitude and longitude exchanged?"},
       {"a geo 47 400 15 0\n", "longitude must lie within"},

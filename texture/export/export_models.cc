@@ -9,6 +9,7 @@
 #include "core/decompositions.h"
 #include "core/output_file.h"
 #include "core/report.h"
+#include "core/scan.h"
 #include "texture/export/export_photos.h"
 
 namespace roomtex {
@@ -87,10 +88,9 @@ Json ToJsonRows(const Eigen::Matrix4d& matrix, int num_rows = 4) {
 // Of nerfstudio's world in `scan`, whole metres: points and poses become floats there, which far
 // from the origin are too coarse.
 Eigen::Vector3d WorldOrigin(const ExportScene& scene) {
-  constexpr double kFar = 1000;  // metres; floats are exact to 0.06 mm there
   Eigen::AlignedBox3d box;
   for (const ExportScene::Point& point : scene.points) box.extend(point.x_in_scan);
-  if (box.isEmpty() || box.center().norm() < kFar) return Eigen::Vector3d::Zero();
+  if (box.isEmpty() || box.center().norm() < kLargeCoordinate) return Eigen::Vector3d::Zero();
   return box.center().array().round();
 }
 

@@ -8,6 +8,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/cell_key.h"
 #include "core/error.h"
 #include "importers/ply.h"
 
@@ -21,15 +22,6 @@ struct Candidate {
   int slot;
 };
 
-// Cells 2^21 apart share a key: too far to matter.
-uint64_t CellKey(const Eigen::Vector3d& cell) {
-  uint64_t key = 0;
-  for (int k = 0; k < 3; ++k) {
-    key = key << 21 | (static_cast<uint64_t>(static_cast<int64_t>(cell[k])) & 0x1fffff);
-  }
-  return key;
-}
-
 // The candidate nearest to the middle of each cell, in the order of the candidates.
 std::vector<int> OnePerCell(const std::vector<Candidate>& candidates, double cell) {
   struct Nearest {
@@ -40,7 +32,7 @@ std::vector<int> OnePerCell(const std::vector<Candidate>& candidates, double cel
   for (size_t i = 0; i < candidates.size(); ++i) {
     const Eigen::Vector3d position = candidates[i].x_in_scan / cell;
     const Eigen::Vector3d low = position.array().floor();
-    const uint64_t key = CellKey(low);
+    const uint64_t key = CellKey(low.array());
     const double distance2 = (position - low - Eigen::Vector3d::Constant(0.5)).squaredNorm();
     const auto [found, is_new] = nearest.try_emplace(key, Nearest{static_cast<int>(i), distance2});
     if (!is_new && distance2 < found->second.distance2) {
@@ -91,8 +83,7 @@ class PointLattice {
   PointLattice(const std::vector<Eigen::Vector3d>& points, double edge)
       : points_(points), edge_(edge) {
     for (size_t i = 0; i < points.size(); ++i) {
-      if (points[i].allFinite())
-        of_cell_[CellKey(CellOf(points[i]))].push_back(static_cast<int>(i));
+      if (points[i].allFinite()) of_cell_[CellKey(points[i], edge_)].push_back(static_cast<int>(i));
     }
   }
 
@@ -108,7 +99,7 @@ class PointLattice {
         for (int y = -ring; y <= ring; ++y) {
           const bool is_side = std::max(std::abs(x), std::abs(y)) == ring;
           for (int z = -ring; z <= ring; z += is_side || ring == 0 ? 1 : 2 * ring) {
-            const auto found = of_cell_.find(CellKey(middle + Eigen::Vector3d(x, y, z)));
+            const auto found = of_cell_.find(CellKey(middle.array() + Eigen::Array3d(x, y, z)));
             if (found == of_cell_.end()) continue;
             for (const int i : found->second) {
               const double distance = (points_[i] - place).norm();

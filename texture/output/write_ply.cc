@@ -1,17 +1,15 @@
 #include "texture/output/write_ply.h"
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
-#include <fmt/core.h>
-
 #include "core/output_file.h"
 #include "core/scan_mesh.h"
+#include "importers/ply.h"
 
 namespace roomtex {
 namespace {
-
-constexpr double kFloatLimit = 1000;  // metres
 
 // Gathers bytes and hands them on in large pieces.
 class ByteSink {
@@ -38,26 +36,14 @@ class ByteSink {
   std::vector<char> bytes_;
 };
 
-// What the importers' reader wants to know of a mesh (importers/ply.h).
 std::string CommentsOf(const std::vector<Scan>& scans) {
-  if (scans.empty()) return "";
-  std::string comments;
-  for (const auto& [name, v] :
-       {std::pair{"up", scans[0].up}, std::pair{"station", scans[0].Station()}}) {
-    comments += fmt::format("comment roomtex {} {:.17g} {:.17g} {:.17g}\n", name, v[0], v[1], v[2]);
-  }
-  return comments;
+  return scans.empty() ? "" : PlyUpComment(scans[0]) + PlyStationComment(scans[0]);
 }
 
 }  // namespace
 
 bool NeedsDoubleCoordinates(const std::vector<Scan>& scans) {
-  for (const Scan& scan : scans) {
-    const Bounds bounds = FindBounds(scan);
-    if (!(bounds.min.x() <= bounds.max.x())) continue;
-    if (bounds.min.cwiseAbs().cwiseMax(bounds.max.cwiseAbs()).maxCoeff() > kFloatLimit) return true;
-  }
-  return false;
+  return std::any_of(scans.begin(), scans.end(), NeedsDouble);
 }
 
 void WriteColoredPly(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,

@@ -19,7 +19,6 @@ namespace {
 
 using json = Json;
 
-const char kDamaged[] = "The file is damaged: write it again";
 const char kNotOurs[] = "Give a file of roomtex-texture, or save it without this";
 constexpr int kMaxDepth = 32;           // of nodes
 constexpr size_t kMaxJson = 256 << 20;  // bytes; ours have some thousand

@@ -18,7 +18,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from take_pairs_out import take_pairs_out  # noqa: E402
-from trust_table import multiply, read_truth  # noqa: E402
+from trust_table import read_truth  # noqa: E402
 
 MODELS = {"SIMPLE_RADIAL": 2, "PINHOLE": 1, "OPENCV": 4}
 SIFT = ["--SiftExtraction.use_gpu", "0"]

@@ -16,6 +16,7 @@
 #include "capture/calibration/calibration_output.h"
 #include "colmap_ext/database.h"
 #include "colmap_ext/sparse_model.h"
+#include "core/camera_text.h"
 #include "core/error.h"
 #include "tests/capture/calibration/calibration_boards.h"
 #include "tests/colmap_ext/database_maker.h"
@@ -87,7 +88,7 @@ TEST_F(CalibrateCommand, WritesTheCameraTheOptionsThePictureAndTheReport) {
   EXPECT_EQ(report["params"].get<std::vector<double>>(), camera.params);
   const auto sigmas = report["params_sigma"].get<std::vector<double>>();
   for (int i = 0; i < 8; ++i) EXPECT_NEAR(camera.params[i], Truth().params[i], 4 * sigmas[i]) << i;
-  EXPECT_EQ(result.out, FeatureExtractorOptions(camera) + "\n");
+  EXPECT_EQ(result.out, FeatureExtractorOptions(camera, kLensDigits) + "\n");
   EXPECT_NE(result.err.find("focal length "), std::string::npos) << result.err;
   EXPECT_NE(result.err.find(" +- "), std::string::npos) << result.err;
   EXPECT_EQ(result.out.rfind("--ImageReader.single_camera 1 --ImageReader.camera_model OPENCV "
