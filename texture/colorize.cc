@@ -150,8 +150,10 @@ Scene MakeSamples(const std::vector<Scan>& scans, const std::vector<PhotoView>& 
 }  // namespace
 
 void ColorizeOptions::Declare(OptionFields* fields) {
-  fields->Choice("Texture.unseen", &unseen, {"intensity", "black"},
-                 "Colour of samples that no photo sees: their scan intensity as grey, or black.");
+  fields->Choice("Texture.unseen", &unseen, {"intensity", "scan", "black"},
+                 "Colour of samples that no photo sees: their scan intensity as grey; scan: the "
+                 "colour that the scan's file has there, of a scan without colours its intensity; "
+                 "or black.");
   fields
       ->Int("Texture.scale", &texture_scale,
             "Texels per sample and direction of texture.png and model.glb, 1 to " +
@@ -233,7 +235,8 @@ bool HasIntensity(const Scan& scan) {
 
 std::vector<Rgb> UnseenColors(const Scan& scan, const ColorizeOptions& options) {
   std::vector<Rgb> colors;
-  if (options.unseen != "intensity") return colors;
+  if (options.unseen == "black") return colors;
+  if (options.unseen == "scan" && !scan.colors.empty()) return scan.colors;
   if (!HasIntensity(scan)) {
     constexpr uint8_t kMiddle = 128;  // neither black nor white
     colors.assign(scan.points.size(), {kMiddle, kMiddle, kMiddle});

@@ -34,7 +34,8 @@ struct ColorizeOptions {
   RegistrationOptions registration;
   BlendOptions blend;
   DetailOptions detail;
-  // Colour of samples that no photo sees: "intensity" (grey) or "black".
+  // Colour of samples that no photo sees: "intensity" (grey), "scan" (Scan::colors, where there are
+  // none intensity), or "black".
   std::string unseen = "intensity";
   // Texels per sample and direction of the texture image. 1 = one texel a sample; more colour the
   // surface between the samples as well. 0 = by the photos' resolution, see ChooseTextureScale.

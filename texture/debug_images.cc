@@ -78,9 +78,9 @@ void WriteScanImages(const DebugInput& input, size_t scan, const std::string& fo
   cv::Mat1f views(SizeOf(grid), -1.0f), disagreement(SizeOf(grid), -1.0f);
   ForEachSample(input, grid, [&](size_t slot, int cell) {
     const Observation* const seen = input.store.Begin(slot);
-    const int count = input.store.Count(slot);
+    const int count = NumThatCount(seen, input.store.Count(slot), input.gains);
     const int row = cell / grid.num_columns, column = cell % grid.num_columns;
-    views(row, column) = static_cast<float>(input.store.NumViews(slot));
+    views(row, column) = count > 0 ? static_cast<float>(input.store.NumViews(slot)) : 0.0f;
     const BlendedSample sample = BlendSample(seen, count, input.gains, input.blend.outlier);
     if (sample.dominant_photo >= 0) dominant(row, column) = ColorOfPhoto(sample.dominant_photo);
     float sum = 0;

@@ -18,6 +18,7 @@
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "texture/colorize.h"
+#include "texture/earlier_results.h"
 #include "texture/output/decimate_parts.h"
 #include "texture/output/evidence.h"
 #include "texture/output/write_e57.h"
@@ -68,7 +69,9 @@ void AddPathOptions(TextureOptions* o, Command* command) {
                         "supplement.ply of roomtex-dense: what the photos saw and the scan did not "
                         "is coloured as one more mesh, behind the scans.",
                         Command::Kind::kOptional);
-  command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool(
+      "accept_untrusted", &o->accept_untrusted,
+      std::string(kAcceptUntrustedHelp) + " The same of a supplement that is not trusted.");
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddBool("use_doubtful", &o->sources.use_doubtful, kUseDoubtfulHelp);
   command->AddOutputPath("output_path", &o->output_path,
@@ -154,37 +157,67 @@ void WriteRtpiCopy(const Scan& scan, const ColoredScan& colored, const std::stri
 
 std::string StationFolder(size_t number) { return "station_" + std::to_string(number); }
 
-// The names that WriteAll may write, before the work that leads to them.
+const char kReportName[] = "report.json", kResponseName[] = "response.txt";
+
+// What a run writes into one folder.
+struct OutputNames {
+  std::string ply = "model.ply", glb = "model.glb";
+  std::string evidence, web, obj, e57;      // "" = not wanted
+  std::vector<std::string> textures, rtpi;  // one per scan; "" = it has none
+
+  // in_full: the scans are whole, not thinned.
+  OutputNames(const TextureOptions& options, const std::vector<Scan>& scans, bool in_full) {
+    if (options.output_evidence) evidence = "evidence.ply";
+    if (options.output_web) web = "model_web.glb";
+    if (options.output_obj) obj = "model.obj";
+    if (options.output_e57 || options.e57_images) e57 = "model.e57";
+    for (size_t s = 0; s < scans.size(); ++s) {
+      const std::string number = s == 0 ? "" : "_" + std::to_string(s);
+      textures.push_back(scans[s].organised ? "texture" + number + ".png" : "");
+      rtpi.push_back(scans[s].is_rtpi && in_full ? "model" + number + ".rtpi" : "");
+    }
+  }
+
+  // Of an OBJ also the files beside it; how many texture images there are is known in the end.
+  std::vector<std::string> All() const {
+    std::vector<std::string> names = {ply, glb, evidence, web, obj, e57};
+    if (!obj.empty()) names.insert(names.end(), {"model.mtl", "model_0.png", "model_0.jpg"});
+    names.insert(names.end(), textures.begin(), textures.end());
+    names.insert(names.end(), rtpi.begin(), rtpi.end());
+    names.erase(std::remove(names.begin(), names.end(), ""), names.end());
+    return names;
+  }
+};
+
+// Before the work that leads to them.
 void ProtectInputs(const TextureOptions& options, const std::vector<Scan>& scans, bool by_station) {
-  std::vector<std::string> names = {"model.ply", "model.glb", "report.json", "response.txt"};
-  if (options.output_evidence) names.emplace_back("evidence.ply");
-  if (options.output_web) names.emplace_back("model_web.glb");
-  if (options.output_obj) names.insert(names.end(), {"model.obj", "model.mtl"});
-  if (options.output_e57 || options.e57_images) names.emplace_back("model.e57");
-  const size_t num_shared = names.size();
-  for (size_t s = 0; s < scans.size(); ++s) {
-    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
-    if (scans[s].organised) names.push_back("texture" + number + ".png");
-    if (scans[s].is_rtpi && !by_station) names.push_back("model" + number + ".rtpi");
-    if (!by_station) continue;
-    const std::string folder = StationFolder(s) + "/";
-    for (size_t i = 0; i < num_shared; ++i) names.push_back(folder + names[i]);
-    if (scans[s].organised) names.push_back(folder + "texture.png");
-    if (scans[s].is_rtpi) names.push_back(folder + "model.rtpi");
+  std::vector<std::string> names = OutputNames(options, scans, !by_station).All();
+  names.insert(names.end(), {kReportName, kResponseName});
+  for (size_t s = 0; by_station && s < scans.size(); ++s) {
+    Scan alike;  // without the samples
+    alike.organised = scans[s].organised;
+    alike.is_rtpi = scans[s].is_rtpi;
+    for (const std::string& name : OutputNames(options, {alike}, true).All()) {
+      names.push_back(StationFolder(s) + "/" + name);
+    }
   }
   for (const std::string& name : names) RequireReplaceable(options.output_path + "/" + name);
 }
 
 // Files of an earlier run that this one does not write would be taken for its own.
-void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& folder,
+void WarnOfOlderFiles(const std::vector<std::string>& written, TextureOptions options,
                       const Command::Context& context) {
+  options.output_evidence = options.output_web = options.output_obj = options.output_e57 = true;
+  Scan scan;
+  scan.organised = scan.is_rtpi = true;
+  std::vector<std::string> names = OutputNames(options, {scan, scan}, true).All();
+  names.insert(names.end(), {kResponseName, StationFolder(0)});
+  const std::string& folder = options.output_path;
   std::string older;
-  for (const char* name :
-       {"texture.png", "texture_1.png", "model.rtpi", "model_1.rtpi", "model_web.glb", "model.obj",
-        "model.mtl", "model_0.png", "model_0.jpg", "model.e57", "evidence.ply", "station_0"}) {
-    const bool written = std::find(names.begin(), names.end(), name) != names.end();
-    if (written || !std::filesystem::exists(folder + "/" + name)) continue;
-    older += (older.empty() ? "" : ", ") + std::string(name);
+  for (const std::string& name : names) {
+    const bool is_written = std::find(written.begin(), written.end(), name) != written.end();
+    if (is_written || !std::filesystem::exists(folder + "/" + name)) continue;
+    older += (older.empty() ? "" : ", ") + name;
   }
   if (!older.empty()) {
     context.Warn(folder + " also holds what this run did not write: " + older);
@@ -193,15 +226,16 @@ void WarnOfOlderFiles(const std::vector<std::string>& names, const std::string& 
 
 // Files with fewer triangles: for the web, for modelling programs.
 void WriteDecimated(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                    const TextureOptions& options, int num_threads, OutputSet* set, Json* report) {
+                    const TextureOptions& options, const OutputNames& names, int num_threads,
+                    OutputSet* set, Json* report) {
   std::vector<std::vector<TexturedPart>> parts =
       MakeMeshParts(scans, colored, options.glb.max_texture_size);
   DecimateParts(scans, options.web.max_triangles, num_threads, &parts);
   (*report)["web_triangles"] = CountTriangles(parts);
-  if (options.output_web) {
-    WriteWebGlb(scans, colored, parts, set->Path("model_web.glb"), options.web);
+  if (!names.web.empty()) {
+    WriteWebGlb(scans, colored, parts, set->Path(names.web), options.web);
   }
-  if (options.output_obj) {
+  if (!names.obj.empty()) {
     WriteColoredObj(scans, colored, parts, options.image_format == "jpeg",
                     [set](const std::string& name) { return set->Path(name); });
   }
@@ -214,25 +248,23 @@ struct FileWriter {
 };
 using FileWriters = std::vector<FileWriter>;
 
-// in_full: the scans are whole, not thinned.
 FileWriters GridWriters(const std::vector<Scan>& scans, const std::vector<ColoredScan>& colored,
-                        bool in_full, OutputSet* set) {
+                        const OutputNames& names, OutputSet* set) {
   FileWriters files;
   for (size_t s = 0; s < scans.size(); ++s) {
-    const std::string number = s == 0 ? "" : "_" + std::to_string(s);
     const Scan& scan = scans[s];
     const ColoredScan& colors = colored[s];
-    if (scan.organised) {
-      files.push_back({1, [&colors, set, number] {
+    const std::string &texture = names.textures[s], &rtpi = names.rtpi[s];
+    if (!texture.empty()) {
+      files.push_back({1, [&colors, set, texture] {
                          const ColorGrid& grid =
                              colors.texture.num_columns > 0 ? colors.texture : colors.samples;
-                         WritePng(ImageOfGrid(grid), set->Path("texture" + number + ".png"));
+                         WritePng(ImageOfGrid(grid), set->Path(texture));
                        }});
     }
-    if (scan.is_rtpi && in_full) {
-      files.push_back({1, [&scan, &colors, set, number] {
-                         WriteRtpiCopy(scan, colors, set->Path("model" + number + ".rtpi"));
-                       }});
+    if (!rtpi.empty()) {
+      files.push_back(
+          {1, [&scan, &colors, set, rtpi] { WriteRtpiCopy(scan, colors, set->Path(rtpi)); }});
     }
   }
   return files;
@@ -243,26 +275,27 @@ void WriteAll(const std::vector<Scan>& scans, const std::vector<ColoredScan>& co
               const std::vector<PhotoView>& photos, const TextureOptions& options, bool in_full,
               const Command::Context& context, OutputSet* set, Json* report) {
   const CpuTimer timer(CpuStage::kWrite, CpuTimer::Scope::kProcess);
+  const OutputNames names(options, scans, in_full);
   GlbOptions glb = options.glb;
   glb.jpeg = options.image_format == "jpeg";
   FileWriters files = {
-      {4, [&] { WriteColoredPly(scans, colored, set->Path("model.ply"), options.output_normals); }},
-      {4, [&] { WriteColoredGlb(scans, colored, set->Path("model.glb"), glb); }},
+      {4, [&] { WriteColoredPly(scans, colored, set->Path(names.ply), options.output_normals); }},
+      {4, [&] { WriteColoredGlb(scans, colored, set->Path(names.glb), glb); }},
   };
-  if (options.output_evidence) {
-    files.push_back({1, [&] { WriteEvidence(scans, colored, set->Path("evidence.ply")); }});
+  if (!names.evidence.empty()) {
+    files.push_back({1, [&] { WriteEvidence(scans, colored, set->Path(names.evidence)); }});
   }
-  for (auto& file : GridWriters(scans, colored, in_full, set)) files.push_back(std::move(file));
-  if (options.output_web || options.output_obj) {
+  for (auto& file : GridWriters(scans, colored, names, set)) files.push_back(std::move(file));
+  if (!names.web.empty() || !names.obj.empty()) {
     files.push_back({30, [&] {
-                       WriteDecimated(scans, colored, options, context.options.num_threads, set,
-                                      report);
+                       WriteDecimated(scans, colored, options, names, context.options.num_threads,
+                                      set, report);
                      }});
   }
-  if (options.output_e57 || options.e57_images) {
+  if (!names.e57.empty()) {
     files.push_back({4, [&] {
                        WriteColoredE57(scans, colored, options.e57_images ? &photos : nullptr,
-                                       set->Path("model.e57"));
+                                       set->Path(names.e57));
                      }});
   }
   int num_steps = 0;
@@ -304,15 +337,36 @@ void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& inde
   });
 }
 
+// What the record of an aligned model does not ask for: the colours that the files themselves have,
+// from now on.
+void ReadOwnColors(PlacedScans* placed) {
+  for (PlacedScans::File& file : placed->files) file.options.colors = true;
+  ForEachFullScan(*placed, [placed](size_t number, Scan scan) {
+    CellColors colors =
+        placed->stride == 1 ? std::move(scan.colors) : Thinned(scan, placed->stride).colors;
+    if (colors.size() != placed->scans[number].points.size()) return;  // it has none
+    placed->scans[number].colors = std::move(colors);
+  });
+}
+
 // Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of
 // model.glb.
-void AddSupplement(const std::string& path, PlacedScans* placed) {
-  Scan supplement = ReadScan(path, {});
+void AddSupplement(const std::string& path, bool with_colors, PlacedScans* placed) {
+  ScanReaderOptions reader;
+  reader.colors = with_colors;
+  Scan supplement = ReadScan(path, reader);
   if (supplement.kind() != Scan::Kind::kMesh) {
     throw InputError(path, "", "is no triangle mesh",
                      "Give the supplement.ply that roomtex-dense wrote");
   }
   placed->scans.push_back(std::move(supplement));
+}
+
+void WarnOfScansWithoutColors(const std::vector<Scan>& scans, const Command::Context& context) {
+  for (const Scan& scan : scans) {
+    if (!scan.colors.empty()) continue;
+    context.Warn(scan.path + " has no colours of its own: what no photo sees of it is grey");
+  }
 }
 
 void Texture(const TextureOptions& options, const Command::Context& context) {
@@ -331,10 +385,14 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   RequireScans(options.scan_paths, options.input_path);
 
   context.progress.Stage("read model");
-  const SparseModel model = ReadSparseModel(options.input_path);
+  const SparseModel model = ReadAlignedModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
   PhotoList list = ListPhotosOf(model, alignment, options.sources, options.strict, context);
   TakeOverTrust(alignment, options.accept_untrusted, context);
+  if (!options.supplement_path.empty()) {
+    TakeOverTrustOfResult(options.supplement_path, "roomtex-dense", options.accept_untrusted,
+                          context);
+  }
 
   context.progress.Stage("read scan");
   const double max_samples = options.bound.max_samples;
@@ -350,7 +408,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
         std::to_string(placed.stride) +
         " columns and rows, then each station is coloured in full.");
   }
-  if (!options.supplement_path.empty()) AddSupplement(options.supplement_path, &placed);
+  const bool own_colors = colorize.unseen == "scan";
+  if (own_colors) ReadOwnColors(&placed);
+  if (!options.supplement_path.empty()) {
+    AddSupplement(options.supplement_path, own_colors, &placed);
+  }
+  if (own_colors) WarnOfScansWithoutColors(placed.scans, context);
   TurnMeshesToPhotos(list.photos, context, &placed.scans);
   // The files appear together, or none of them.
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
@@ -389,7 +452,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
                  "Decimate or smooth the mesh.");
   }
   if (result.exposure.response == "bracket" || result.exposure.response == "estimate") {
-    result.exposure.tones[0]->response.Write(outputs->Path("response.txt"));
+    result.exposure.tones[0]->response.Write(outputs->Path(kResponseName));
   }
 
   WriteAll(scans, result.scans, result.photos, options, !by_station, context, outputs.get(),
@@ -397,15 +460,15 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   if (by_station) {
     // Of the thinned scans no more is needed than where they stand, and what they hide.
     result.scans.clear();
-    for (Scan& scan : placed.scans) FreeVectors(&scan.points, &scan.intensity);
+    for (Scan& scan : placed.scans) FreeVectors(&scan.points, &scan.intensity, &scan.colors);
     colorize.debug_path.clear();
     ColorizeStations(placed, index_of, options, colorize, &result, context);
   }
   context.report["files"] = outputs->names();
   std::vector<std::string> written = outputs->names();
   if (by_station) written.push_back(StationFolder(0));
-  WarnOfOlderFiles(written, options.output_path, context);
-  CommitWithReport("report.json", outputs);
+  WarnOfOlderFiles(written, options, context);
+  CommitWithReport(kReportName, outputs);
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
   context.report["cpu_seconds"] = cpu;

@@ -26,7 +26,8 @@ void FillToneReport(const std::vector<PhotoView>& photos, const ExposureSolution
     corners[photos[i].name] = std::round(1e4 * corner) / 1e4;
   }
   (*report)["corner_light"] = corners;
-  if (exposure.exif_scatter) (*report)["exif_scatter_ev"] = *exposure.exif_scatter / std::log(2.0);
+  (*report)["exif_scatter_ev"] =
+      exposure.exif_scatter ? Json(*exposure.exif_scatter / std::log(2.0)) : Json(nullptr);
 }
 
 // How far each photo was off, and what was done about it.

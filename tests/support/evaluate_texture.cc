@@ -1,6 +1,7 @@
 // roomtex-evaluate-texture: texture.png of a simulated room against the true colours between the
 // samples, texel by texel. Not installed. The room is simulated again from its seed.
-// Prints JSON on stdout; --output_path writes a cut-out, truth on the left.
+// Prints JSON on stdout, which is in the report, too; --output_path writes a cut-out, truth on the
+// left.
 
 #include <algorithm>
 #include <cmath>
@@ -64,7 +65,7 @@ void Compare(const cv::Mat3f& truth, const cv::Mat3f& texture, float* gain, doub
   *wrong = num_wrong / count;
 }
 
-void Evaluate(EvaluateOptions options) {
+void Evaluate(EvaluateOptions options, const Command::Context& context) {
   const cv::Mat3b image = ReadPhoto(options.texture_path);
   const int base = options.room.scan_columns;
   if (image.cols % base != 0) throw UsageError("--scan_columns does not fit the texture");
@@ -81,8 +82,12 @@ void Evaluate(EvaluateOptions options) {
   float gain;
   double psnr, wrong;
   Compare(truth, texture, &gain, &psnr, &wrong);
-  std::printf("{\"scale\": %d, \"gain\": %.4f, \"psnr_db\": %.3f, \"share_wrong\": %.5f}\n",
-              image.cols / base, gain, psnr, wrong);
+  Json& report = context.report.keys();
+  report["scale"] = image.cols / base;
+  report["gain"] = std::round(1e4 * gain) / 1e4;
+  report["psnr_db"] = std::round(1e3 * psnr) / 1e3;
+  report["share_wrong"] = std::round(1e5 * wrong) / 1e5;
+  std::printf("%s\n", report.dump().c_str());
   if (options.output_path.empty()) return;
   cv::Rect crop(0, 0, image.cols, image.rows);
   if (!options.crop.empty() && std::sscanf(options.crop.c_str(), "%d,%d,%d,%d", &crop.x, &crop.y,
@@ -121,5 +126,5 @@ int main(int argc, char** argv) {
   command.AddString("crop", &o.crop, "x,y,width,height of the cut-out, texels");
   command.AddOutputPath("output_path", &o.output_path, "picture: truth beside texture",
                         Command::Kind::kOptional);
-  return command.Run(argc, argv, [&o](const Command::Context&) { Evaluate(o); });
+  return command.Run(argc, argv, [&o](const Command::Context& context) { Evaluate(o, context); });
 }

@@ -133,6 +133,7 @@ TEST_F(Colorize, KeepsFinePatternsAtFullContrast) {
   };
   for (PhotoView& photo : photos_) scene_.Shoot(&photo, 1, folder_.path(), 0.01);
   const Scan scan = scene_.MakeScan(240, 100);
+  std::vector<Rgb> pictures[2];
   for (bool detail : {true, false}) {
     ColorizeOptions options;
     options.blend.detail = detail;
@@ -152,7 +153,9 @@ TEST_F(Colorize, KeepsFinePatternsAtFullContrast) {
       aa += truth * truth;
     }
     EXPECT_NEAR(ab / aa, 1, 0.04) << detail;
+    pictures[detail] = grid.rgb;
   }
+  EXPECT_NE(pictures[0], pictures[1]);  // what `detail` says is done
 }
 
 TEST_F(Colorize, HidesOneScanBehindTheOther) {

@@ -90,10 +90,10 @@ class TextureCommand : public testing::Test {
   }
   static std::string Path(const std::string& name) { return *folder_ / name; }
   // The true model with what roomtex-align would leave beside it.
-  static std::string Aligned(const std::string& name, bool trusted,
-                             const ScanReaderOptions& options = {}) {
+  static std::string Aligned(const std::string& name, bool trusted, const std::string& scan = "") {
     fs::copy(Capture() + "/truth", Path(name));
-    const PlacedScans placed = ReadPlacedScans({Capture() + "/scan.rtpi"}, "", options);
+    const PlacedScans placed =
+        ReadPlacedScans({scan.empty() ? Capture() + "/scan.rtpi" : scan}, "", {});
     Json report;
     report["trusted"] = trusted;
     report["reason"] = trusted ? "" : "Too few points lie on the surface.";

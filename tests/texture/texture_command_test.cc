@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "importers/scan_writer.h"
 #include "texture/output/evidence.h"
 #include "texture/sampling/blend.h"
 
@@ -22,6 +23,7 @@ TEST_F(TextureCommand, WritesTheFilesAndTheReportOfTheContract) {
   EXPECT_EQ(report["exposure_gain"].size(), 12u);
   EXPECT_LT(report["disagreement"]["after"], report["disagreement"]["before"]);
   EXPECT_TRUE(report["trusted"]);
+  EXPECT_GT(report.at("exif_scatter_ev"), 0);
   const cv::Mat texture = cv::imread(Path("textured/texture.png"));
   EXPECT_EQ(texture.cols, 500);
   EXPECT_EQ(texture.rows, 190);
@@ -97,6 +99,37 @@ TEST_F(TextureCommand, APhotoThatShowsSomethingElseIsNamedAndGivesNoColour) {
   EXPECT_NE(strict.err.find("photo_003.jpg"), std::string::npos) << strict.err;
 }
 
+// In a cloud that does not show where its scanner stood a photo may look at the backs of things:
+// one that contradicts the others is named only.
+TEST_F(TextureCommand, WithoutShadowsAPhotoThatShowsSomethingElseStays) {
+  fs::copy(Capture() + "/photos", Path("foreign_of_cloud"));
+  fs::copy_file(Path("foreign_of_cloud/photo_009.jpg"), Path("foreign_of_cloud/photo_003.jpg"),
+                fs::copy_options::overwrite_existing);
+  for (const bool is_known : {true, false}) {
+    Scan cloud = ReadCaptureScan();
+    cloud.up = Eigen::Vector3d::UnitZ();               // about it the angles show no grid
+    cloud.scan_from_station.translation = {50, 0, 0};  // the station has to be found
+    for (size_t i = 0; !is_known && i < cloud.points.size(); ++i) {
+      if (i % 5 != 0) cloud.points[i] = Scan::MissingPoint();  // so few points do not show it
+    }
+    WriteScan(cloud, {}, Path("foreign_cloud.ply"));
+    const CommandResult result =
+        RunCommandLine("roomtex-texture --quiet --Texture.scale 1 --input_path " + Capture() +
+                       "/truth --image_path " + Path("foreign_of_cloud") + " --scan_path " +
+                       Path("foreign_cloud.ply") + " --output_path " + Path("of_foreign_cloud"));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json report = ReadJson(Path("of_foreign_cloud/report.json"));
+    EXPECT_EQ(report["photos_left_out"].size(), is_known ? 1u : 0u);
+    EXPECT_EQ(report["exposure_gain"].contains("photo_003.jpg"), !is_known);
+    const std::string warnings = report["warnings"].dump();
+    const size_t at = warnings.find("is not what the others show at the same places");
+    EXPECT_EQ(at != std::string::npos, !is_known) << warnings;
+    EXPECT_EQ(warnings.find("photo_003.jpg", std::min(at, warnings.size())) != std::string::npos,
+              !is_known)
+        << warnings;
+  }
+}
+
 // As two projectors that throw one pattern fold a room: half of the photos stand together where
 // they would be if the room was turned by half a circle.
 TEST_F(TextureCommand, AGroupOfPhotosInTheWrongPlaceIsNotTrusted) {
@@ -149,6 +182,9 @@ TEST_F(TextureCommand, WhoStoodBeforeTheWallIsNamedAndGivesNoColour) {
     EXPECT_EQ(without["photo_agreement"][name]["moving"], 0);
   }
   EXPECT_GT(with["num_colored"], 0.99 * without["num_colored"].get<double>());
+  // Who is left out is no photo that sees the wall, and differs from none.
+  EXPECT_LT(with["views_mean"], without["views_mean"]);
+  EXPECT_LT(with["disagreement"]["after"], 0.8 * without["disagreement"]["after"].get<double>());
   const PlyVertices truth = ReadPly(Path("visited/truth/true_colors.ply"));
   EXPECT_GT(Psnr(ReadPly(Path("left_out/model.ply")), truth),
             Psnr(ReadPly(Path("kept/model.ply")), truth) + 0.7);
@@ -168,6 +204,7 @@ TEST_F(TextureCommand, ColoursAreTheTrueOnes) {
   // Exposures differ by up to an EV either way: without unification the colours are far off.
   ASSERT_EQ(Texture("plain", "--Exposure.mode none").exit_code, 0);
   EXPECT_GT(psnr, Psnr(ReadPly(Path("plain/model.ply")), truth) + 3);
+  EXPECT_TRUE(ReadJson(Path("plain/report.json")).at("exif_scatter_ev").is_null());
   // EXIF alone, as in the thesis, does nearly as well as matching.
   ASSERT_EQ(Texture("exif", "--Exposure.mode exif").exit_code, 0);
   EXPECT_GT(Psnr(ReadPly(Path("exif/model.ply")), truth), psnr - 1.5);
@@ -242,6 +279,20 @@ TEST_F(TextureCommand, ALargerScaleShowsTheRoomBetweenTheSamples) {
   EXPECT_GT(psnr, TexturePsnr(enlarged, RoomOptions()) + 3);
   // The vertices are the same ones.
   EXPECT_EQ(ReadBytes(Path("fine/model.ply")), ReadBytes(Path("coarse/model.ply")));
+}
+
+TEST_F(TextureCommand, IsEvaluatedBetweenTheSamples) {
+  ASSERT_EQ(Texture("evaluated", "--Texture.scale 2 --Texture.unseen black").exit_code, 0);
+  const CommandResult result = RunCommandLine(
+      "roomtex-evaluate-texture --quiet --texture_path " + Path("evaluated/texture.png") +
+      " --seed 5 --scan_columns 500 --report_path " + Path("evaluation.json"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json said = json::parse(result.out), report = ReadJson(Path("evaluation.json"));
+  for (const char* name : {"scale", "gain", "psnr_db", "share_wrong"}) {
+    EXPECT_EQ(report.at(name), said.at(name)) << name;
+  }
+  EXPECT_EQ(report["scale"], 2);
+  EXPECT_GT(report["psnr_db"], 21);  // 22.0 measured
 }
 
 TEST_F(TextureCommand, ChoosesTheScaleByThePhotosAndTheMemory) {

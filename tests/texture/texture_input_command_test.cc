@@ -1,5 +1,9 @@
 // What roomtex-texture takes, refuses and leaves out.
 
+#include <gmock/gmock.h>
+
+#include "importers/rtpi.h"
+#include "importers/scan_writer.h"
 #include "tests/texture/texture_command.h"
 
 namespace roomtex {
@@ -79,6 +83,130 @@ TEST_F(TextureCommand, DoubtsOfTheAlignmentAreThoseOfTheColours) {
             std::string::npos);
   EXPECT_EQ(TextureAligned(model, "--accept_untrusted 1").exit_code, 0);
   EXPECT_EQ(ReadJson(Path("textured_aligned/report.json"))["warnings"].size(), 1u);
+}
+
+TEST_F(TextureCommand, DoubtsOfTheSupplementAreThoseOfTheColours) {
+  Scan triangle;
+  triangle.organised = false;
+  triangle.points = {{0.1, 0.1, 1}, {0.3, 0.1, 1}, {0.1, 0.3, 1}};
+  triangle.num_columns = 3;
+  triangle.num_rows = 1;
+  triangle.intensity = {1, 2, 3};
+  fs::create_directories(Path("dense"));
+  WriteScan(triangle, {{0, 1, 2}}, Path("dense/supplement.ply"));
+  const std::string more = "--supplement_path " + Path("dense/supplement.ply");
+  const auto report = [] { return ReadJson(Path("supplemented/report.json")); };
+  const CommandResult unknown = Texture("supplemented", more);
+  ASSERT_EQ(unknown.exit_code, 0) << unknown.err;
+  EXPECT_EQ(report()["supplement"]["num_vertices"], 3);
+  const auto say = [](const std::string& command, bool trusted) {
+    WriteJson(Path("dense/report.json"),
+              {{"command", command},
+               {"trusted", trusted},
+               {"reason", trusted ? "" : "The photos stand elsewhere."}});
+  };
+  say("roomtex-dense", true);
+  EXPECT_EQ(Texture("supplemented", more).exit_code, 0);
+  say("roomtex-import", false);  // of something else
+  EXPECT_EQ(Texture("supplemented", more).exit_code, 0);
+  say("roomtex-dense", false);
+  EXPECT_EQ(Texture("supplemented", more).exit_code, 4);
+  EXPECT_EQ(report()["trusted"], false);
+  EXPECT_THAT(report()["reason"].get<std::string>(),
+              testing::HasSubstr("is not to be trusted: The photos stand elsewhere."));
+  EXPECT_EQ(Texture("supplemented", more + " --accept_untrusted 1").exit_code, 0);
+  EXPECT_THAT(report()["warnings"].dump(), testing::HasSubstr("The photos stand elsewhere."));
+}
+
+TEST_F(TextureCommand, SaysWhyTheAlignmentWasRefused) {
+  fs::create_directories(Path("refused"));
+  const auto refuse = [](const std::string& reason) {
+    WriteJson(Path("refused/alignment.json"),
+              {{"command", "roomtex-align"}, {"trusted", false}, {"reason", reason}});
+    const CommandResult result = TextureAligned(Path("refused"), "");
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_THAT(result.err, testing::HasSubstr("refused to align"));
+    EXPECT_THAT(result.err, testing::HasSubstr("lign anew"));
+    return result.err;
+  };
+  EXPECT_THAT(refuse("The picks lie on a line."), testing::HasSubstr("The picks lie on a line."));
+  refuse("");
+}
+
+// Where no photo sees, the colours of the scan's file stand, also where the model remembers which
+// file that was and of stations one by one; a scan that has none stays grey.
+TEST_F(TextureCommand, UnseenSamplesHaveTheScansOwnColoursAsAsked) {
+  const Scan scan = ReadCaptureScan();
+  std::vector<Eigen::Matrix<uint8_t, 3, 1>> own;
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    own.emplace_back(static_cast<uint8_t>(1 + i % 250), 20, static_cast<uint8_t>(i / 500));
+  }
+  WriteColoredRtpi(Capture() + "/scan.rtpi", own, Path("own_colors.rtpi"));
+  // Of every stride-th column and row.
+  const auto expect_own = [&](const std::string& folder, int stride) {
+    const PlyVertices model = ReadPly(Path(folder + "/model.ply"));
+    size_t vertex = 0, num_unseen = 0;
+    for (int row = 0; row < scan.num_rows; row += stride) {
+      for (int column = 0; column < scan.num_columns; column += stride) {
+        const int i = scan.Index(column, row);
+        if (scan.IsMissing(i)) continue;
+        ASSERT_LT(vertex, model.points.size());
+        if (model.views[vertex] == 0) {
+          ++num_unseen;
+          for (int k = 0; k < 3; ++k) ASSERT_EQ(model.colors[vertex][k], own[i][k]) << i;
+        }
+        ++vertex;
+      }
+    }
+    EXPECT_GT(num_unseen, 100u) << folder;
+  };
+  const std::string unseen = " --Texture.unseen scan ";
+  const CommandResult given = Texture("own_given", unseen, Path("own_colors.rtpi"));
+  ASSERT_EQ(given.exit_code, 0) << given.err;
+  expect_own("own_given", 1);
+  const PlyVertices model = ReadPly(Path("own_given/model.ply")),
+                    grey = ReadPly(Path("textured/model.ply"));
+  ASSERT_EQ(model.views, grey.views);
+  for (size_t i = 0; i < model.views.size(); ++i) {
+    if (model.views[i] > 0) {
+      ASSERT_EQ(model.colors[i], grey.colors[i]);
+    }
+  }
+
+  const std::string aligned = Aligned("own_aligned", true, Path("own_colors.rtpi"));
+  ASSERT_EQ(TextureAligned(aligned, unseen).exit_code, 0);
+  expect_own("textured_aligned", 1);
+
+  fs::copy(Path("own_colors.rtpi"), Path("own_again.rtpi"));
+  WriteBytes(Path("own_poses.txt"),
+             "own_colors.rtpi 1 0 0 0 0 0 0\nown_again.rtpi 1 0 0 0 0 0 0\n");
+  const CommandResult stations =
+      Texture("own_stations",
+              unseen + "--max_samples 100000 --scan_path " + Path("own_again.rtpi") +
+                  " --scan_poses " + Path("own_poses.txt"),
+              Path("own_colors.rtpi"));
+  ASSERT_EQ(stations.exit_code, 0) << stations.err;
+  EXPECT_EQ(ReadJson(Path("own_stations/report.json"))["sample_stride"], 2);
+  expect_own("own_stations", 2);
+  expect_own("own_stations/station_1", 1);
+
+  ASSERT_EQ(Texture("own_none", unseen).exit_code, 0);
+  EXPECT_EQ(ReadBytes(Path("own_none/model.ply")), ReadBytes(Path("textured/model.ply")));
+  EXPECT_THAT(ReadJson(Path("own_none/report.json"))["warnings"].dump(),
+              testing::HasSubstr("has no colours of its own"));
+}
+
+TEST_F(TextureCommand, NamesFilesOfAnEarlierRunThatItDoesNotWrite) {
+  ASSERT_EQ(Texture("older", "--output_obj 1").exit_code, 0);
+  ASSERT_EQ(Texture("older", "--output_web 0 --output_evidence 0").exit_code, 0);
+  const std::string warnings = ReadJson(Path("older/report.json"))["warnings"].dump();
+  for (const char* name :
+       {"evidence.ply", "model_web.glb", "model.obj", "model.mtl", "model_0.png"}) {
+    EXPECT_THAT(warnings, testing::HasSubstr(name));
+  }
+  for (const char* name : {"model.ply", "texture.png", "model.rtpi", "report.json"}) {
+    EXPECT_THAT(warnings, testing::Not(testing::HasSubstr(name)));
+  }
 }
 
 // One photo is gone, one ends before its picture does; the others colour.

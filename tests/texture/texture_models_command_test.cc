@@ -32,9 +32,13 @@ TEST_F(TextureCommand, GlbLoadsInAStandardReader) {
   const tinygltf::Accessor& positions = model.accessors.at(primitive.attributes.at("POSITION"));
   ASSERT_EQ(positions.minValues.size(), 3u);
   const Bounds bounds = FindBounds(ReadCaptureScan());
+  // The positions lie about the node's place.
+  ASSERT_EQ(root.children.size(), 1u);
+  const std::vector<double>& place = model.nodes.at(root.children[0]).translation;
+  ASSERT_EQ(place.size(), 3u);
   for (int k = 0; k < 3; ++k) {
-    EXPECT_NEAR(positions.maxValues[k] - positions.minValues[k], bounds.max[k] - bounds.min[k],
-                0.05);
+    EXPECT_NEAR(place[k] + positions.minValues[k], bounds.min[k], 1e-5);
+    EXPECT_NEAR(place[k] + positions.maxValues[k], bounds.max[k], 1e-5);
   }
   EXPECT_EQ(primitive.attributes.count("TEXCOORD_0"), 1u);
 }

@@ -23,9 +23,11 @@ namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
 constexpr float kMaxMillimetres = 65535;
-constexpr int kMaxPairs = 1000000;   // per photo, for the mask
-constexpr int kMinViewsToAgree = 3;  // fewer photos cannot outvote one
-constexpr int kNormalRadius = 2;     // pixels
+constexpr int kMaxPairs = 1000000;  // per photo, for the mask
+// Photos that give the colour: with the one in which something moved, which mostly is none of them,
+// three, since fewer cannot outvote one.
+constexpr int kMinViewsToAgree = 2;
+constexpr int kNormalRadius = 2;  // pixels
 
 void WriteImageFile(const std::string& path, const cv::Mat& picture) {
   std::vector<uchar> bytes;

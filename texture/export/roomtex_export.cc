@@ -12,6 +12,7 @@
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
 #include "texture/colorize.h"
+#include "texture/earlier_results.h"
 #include "texture/export/export_photos.h"
 #include "texture/export/export_scene.h"
 #include "texture/output/write_e57.h"
@@ -63,7 +64,8 @@ void AddOptions(ExportCommandOptions* o, Command* command) {
                         "patterned photo takes its place.",
                         Command::Kind::kOptional);
   command->Add(FieldsOf(&o->exporting));
-  command->AddBool("accept_untrusted", &o->accept_untrusted, kAcceptUntrustedHelp);
+  command->AddBool("accept_untrusted", &o->accept_untrusted,
+                   std::string(kAcceptUntrustedHelp) + " The same of colours of --colors_path.");
   command->AddBool("strict", &o->strict, kStrictHelp);
   command->AddBool("use_doubtful", &o->sources.use_doubtful, kUseDoubtfulHelp);
   command->AddInputPath("scan_poses", &o->scan_poses, ScanPosesHelp(), Command::Kind::kOptional);
@@ -182,10 +184,14 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   outputs->ReplaceAllOf("roomtex-export");
 
   context.progress.Stage("read model");
-  const SparseModel model = ReadSparseModel(options.input_path);
+  const SparseModel model = ReadAlignedModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
   PhotoList list = ListPhotosOf(model, alignment, options.sources, options.strict, context);
   TakeOverTrust(alignment, options.accept_untrusted, context);
+  if (!options.colors_path.empty()) {
+    TakeOverTrustOfResult(options.colors_path, "roomtex-texture", options.accept_untrusted,
+                          context);
+  }
 
   context.progress.Stage("read scan");
   const SampleWork work("exporting", kExportBytesPerSample);

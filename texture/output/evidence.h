@@ -16,7 +16,7 @@ struct Evidence {
   std::vector<Eigen::Vector3d> points;  // `scan` frame
   // One per point.
   std::vector<float> intensity;     // of the scan, in its unit
-  std::vector<uint8_t> views;       // photos that see it, at most 255
+  std::vector<uint8_t> views;       // as ColorGrid::views
   std::vector<float> disagreement;  // ColoredScan::disagreement, 0-255; NaN = fewer than two photos
 };
 

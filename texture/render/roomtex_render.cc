@@ -73,6 +73,7 @@ void RenderOne(const RenderOptions& options, const SparseModel& model, const Col
     picture = Beside(ReadPhotoOf(options.image_path, image->name, camera), picture);
   }
   WritePictureFile(options.output_path, picture);
+  std::printf("%s\n", options.output_path.c_str());
 }
 
 // The axis of the scan frame that is up: what the mesh says, else the way photos are held.

@@ -34,11 +34,16 @@ Eigen::Vector3f Root(const Eigen::Vector3f& linear) { return linear.cwiseMax(0).
 
 // Two photos that look from different places give the same colour only if they see the surface
 // itself and not something in front of it.
-bool TwoAgree(const Eigen::Vector3f* roots, int count) {
+bool TwoAgree(const Observation* observations, int count,
+              const std::vector<Eigen::Vector3f>& gains) {
   constexpr float kAlike = 0.05f;
+  const auto root = [&](int i) {
+    return Root(UnpackColor(observations[i].color).cwiseProduct(gains[observations[i].photo]));
+  };
   for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3f here = root(i);
     for (int j = i + 1; j < count; ++j) {
-      if ((roots[i] - roots[j]).norm() < kAlike) return true;
+      if ((here - root(j)).norm() < kAlike) return true;
     }
   }
   return false;
@@ -241,18 +246,22 @@ void CastVotes(const Observation* observations, int count,
   if (2 * num_agree <= count) std::fill(votes, votes + count, Vote::kOpen);
 }
 
+int NumThatCount(const Observation* observations, int count,
+                 const std::vector<Eigen::Vector3f>& gains) {
+  if (count <= 0) return 0;
+  if (observations[0].in_doubt != 0) return TwoAgree(observations, count, gains) ? count : 0;
+  while (observations[count - 1].in_doubt != 0) --count;  // they come last
+  return count;
+}
+
 BlendedSample BlendSample(const Observation* observations, int count,
                           const std::vector<Eigen::Vector3f>& gains, double outlier,
                           float* shares) {
   BlendedSample result;
   if (shares != nullptr) std::fill(shares, shares + std::max(count, 0), 0.0f);
-  if (count <= 0) return result;
-  // What is in doubt comes last and counts only where there is nothing else.
-  if (observations[0].in_doubt == 0) {
-    while (observations[count - 1].in_doubt != 0) --count;
-  }
+  count = NumThatCount(observations, count, gains);
+  if (count == 0) return result;
   SampleViews views = UnpackViews(observations, count, gains);
-  if (observations[0].in_doubt != 0 && !TwoAgree(views.roots.data(), views.count)) return result;
   // S by the geometry alone: it changes where the best photo changes, not from sample to sample.
   result.dominant = views.colors[0];
   result.dominant_photo = observations[0].photo;

@@ -97,9 +97,13 @@ struct BlendedSample {
   int dominant_photo = -1;                             // S; -1 = no photo sees the sample
   bool dominant_fits = false;  // it does not contradict the blend, so that it may give detail
 };
-// gains: linear, one 3-vector (r, g, b) per photo. A sample whose observations are all in doubt has
-// a colour only if two of them agree. shares (if given): room for `count` numbers, what each
-// observation has of the blend; they sum to 1, or are all 0 without a colour.
+// How many of a sample's observations give it its colour, the first ones: what is in doubt counts
+// only where there is nothing else, and then only if two of them agree; 0 = no colour. gains:
+// linear, one 3-vector (r, g, b) per photo.
+int NumThatCount(const Observation* observations, int count,
+                 const std::vector<Eigen::Vector3f>& gains);
+// gains: as above. shares (if given): room for `count` numbers, what each observation has of the
+// blend; they sum to 1, or are all 0 without a colour.
 BlendedSample BlendSample(const Observation* observations, int count,
                           const std::vector<Eigen::Vector3f>& gains, double outlier,
                           float* shares = nullptr);

@@ -20,8 +20,9 @@ using Rgb = std::array<uint8_t, 3>;  // sRGB
 // Colours on a grid, row by row.
 struct ColorGrid {
   int num_columns = 0, num_rows = 0;
-  std::vector<Rgb> rgb;        // {0, 0, 0} where there is no sample
-  std::vector<uint8_t> views;  // photos that see the sample, at most 255
+  std::vector<Rgb> rgb;  // {0, 0, 0} where there is no sample
+  // Photos that give the colour (ObservationStore::NumViews), 0 = unseen.
+  std::vector<uint8_t> views;
 };
 
 // Where the samples of one grid stand among all that the photos are asked about.

@@ -54,15 +54,18 @@ static_assert(sizeof(Observation) == 8, "memory per sample is counted on this");
 
 // The best observations of every sample: of more than `capacity` photos those with the largest
 // weights (of equal weights the photo that comes first), so that memory is bounded by the scan.
+// What is in doubt comes last.
 class ObservationStore {
  public:
   ObservationStore(size_t num_samples, int capacity)
-      : capacity_(capacity), kept_(num_samples * capacity), num_views_(num_samples, 0) {}
+      : capacity_(capacity), kept_(num_samples * capacity), counts_(num_samples) {}
 
   // Not for the same sample from two threads; the order of adding does not change the set that is
   // kept.
   void Add(size_t sample, const Observation& observation) {
-    if (num_views_[sample] < UINT16_MAX) ++num_views_[sample];
+    Counts& counts = counts_[sample];
+    uint8_t& count = observation.in_doubt != 0 ? counts.in_doubt : counts.clear;
+    if (count < UINT8_MAX) ++count;
     Observation* const first = &kept_[sample * capacity_];
     // Kept in order, best first.
     int place = capacity_;
@@ -76,10 +79,15 @@ class ObservationStore {
   Observation* MutableBegin(size_t sample) { return &kept_[sample * capacity_]; }
   // Best first; Count() of them.
   const Observation* Begin(size_t sample) const { return &kept_[sample * capacity_]; }
-  int Count(size_t sample) const { return std::min<int>(num_views_[sample], capacity_); }
-  // All photos that see the sample, also those that were not kept.
-  int NumViews(size_t sample) const { return num_views_[sample]; }
-  size_t num_samples() const { return num_views_.size(); }
+  int Count(size_t sample) const {
+    return std::min(counts_[sample].clear + counts_[sample].in_doubt, capacity_);
+  }
+  // The photos that see the sample, also those that were not kept, at most 255: those in doubt only
+  // where all are.
+  int NumViews(size_t sample) const {
+    return counts_[sample].clear > 0 ? counts_[sample].clear : counts_[sample].in_doubt;
+  }
+  size_t num_samples() const { return counts_.size(); }
 
  private:
   static bool IsBetter(const Observation& a, const Observation& b) {
@@ -88,9 +96,13 @@ class ObservationStore {
     return a.weight != b.weight ? a.weight > b.weight : a.photo < b.photo;
   }
 
-  int capacity_;
+  struct Counts {
+    uint8_t clear = 0, in_doubt = 0;
+  };
+
+  int capacity_;  // at most 255, which is all that is counted
   std::vector<Observation> kept_;
-  std::vector<uint16_t> num_views_;
+  std::vector<Counts> counts_;
 };
 
 }  // namespace roomtex

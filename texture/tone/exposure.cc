@@ -290,7 +290,7 @@ Disagreement MeasureDisagreement(const ObservationStore& store,
   std::vector<Bytes> before, after;
   for (size_t sample = 0; sample < store.num_samples(); sample += stride) {
     const Observation* o = store.Begin(sample);
-    const int count = store.Count(sample);
+    const int count = NumThatCount(o, store.Count(sample), gains);
     if (count < 2) continue;
     before.clear();
     after.clear();
@@ -323,6 +323,7 @@ Disagreement MeasureDisagreement(const ObservationStore& store,
 
 float SampleDisagreement(const Observation* observations, int count,
                          const std::vector<Eigen::Vector3f>& gains) {
+  count = NumThatCount(observations, count, gains);
   if (count < 2) return std::numeric_limits<float>::quiet_NaN();
   std::vector<Bytes> after;
   after.reserve(static_cast<size_t>(count));

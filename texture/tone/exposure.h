@@ -72,7 +72,8 @@ ExposureSolution SolveExposure(const std::vector<ExposureData>& exposures,
 // out lights.
 float OutputScale(const ObservationStore& store, const std::vector<Eigen::Vector3f>& gains);
 
-// Mean absolute colour difference between the photos that see the same sample, 0-255 in sRGB.
+// Mean absolute colour difference between the photos that give the same sample its colour
+// (NumThatCount), 0-255 in sRGB.
 struct Disagreement {
   double before = 0, after = 0;  // with gains of 1, with the given gains
   double at_random = 0;          // after, between photos at two samples that have nothing in common
@@ -80,8 +81,8 @@ struct Disagreement {
 };
 Disagreement MeasureDisagreement(const ObservationStore& store,
                                  const std::vector<Eigen::Vector3f>& gains);
-// The same of one sample, with the given gains: mean over all pairs of its observations and over
-// the channels. NaN with fewer than two.
+// The same of one sample, with the given gains: mean over all pairs of the observations that count
+// and over the channels. NaN with fewer than two.
 float SampleDisagreement(const Observation* observations, int count,
                          const std::vector<Eigen::Vector3f>& gains);
 

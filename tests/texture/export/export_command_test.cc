@@ -155,6 +155,48 @@ TEST_F(ExportCommand, TakesTheColoursOfACloud) {
   EXPECT_LT(Median(&differences), 6);
 }
 
+TEST_F(ExportCommand, DoubtsOfTheColoursAreThoseOfTheExport) {
+  fs::copy(Path("model"), Path("doubtful"));
+  WriteJson(Path("doubtful/alignment.json"),
+            {{"trusted", false}, {"reason", "Too few points lie on the surface."}});
+  // Many stations as well: their report lies one folder above.
+  const std::string input = " --image_path " + Capture() + "/photos --scan_path " + Capture() +
+                            "/scan.rtpi --Texture.scale 1 --output_web 0 --output_path " +
+                            Path("doubtful_colors");
+  ASSERT_EQ(
+      RunCommandLine("roomtex-texture --quiet --input_path " + Path("doubtful") + input).exit_code,
+      4);
+  fs::create_directory(Path("doubtful_colors/station_0"));
+  fs::copy(Path("doubtful_colors/model.ply"), Path("doubtful_colors/station_0/model.ply"));
+  for (const char* name : {"model.ply", "station_0/model.ply"}) {
+    const std::string more =
+        "--max_points 500 --colors_path " + Path(std::string("doubtful_colors/") + name);
+    const CommandResult result = Export("of_doubtful", more);
+    EXPECT_EQ(result.exit_code, 4) << result.err;
+    json report = json::parse(ReadBytes(Path("of_doubtful/report.json")));
+    EXPECT_EQ(report["trusted"], false);
+    EXPECT_NE(report["reason"].get<std::string>().find("Too few points lie on the surface"),
+              std::string::npos);
+    EXPECT_EQ(Export("of_doubtful", more + " --accept_untrusted 1").exit_code, 0);
+    report = json::parse(ReadBytes(Path("of_doubtful/report.json")));
+    EXPECT_NE(report["warnings"].dump().find("Too few points"), std::string::npos);
+  }
+  // Colours that somebody keeps elsewhere, without a report, are taken as they are.
+  fs::copy(Path("doubtful_colors/model.ply"), Path("kept_colors.ply"));
+  EXPECT_EQ(
+      Export("of_kept", "--max_points 500 --colors_path " + Path("kept_colors.ply")).exit_code, 0);
+}
+
+TEST_F(ExportCommand, SaysWhyTheAlignmentWasRefused) {
+  fs::create_directory(Path("refused"));
+  WriteJson(Path("refused/alignment.json"),
+            {{"trusted", false}, {"reason", "The picks lie on a line."}});
+  const CommandResult result = Export("of_refused", "", "refused");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("refused to align: The picks lie on a line."), std::string::npos)
+      << result.err;
+}
+
 TEST_F(ExportCommand, SomebodyWhoWalkedThroughAPhotoIsMasked) {
   ASSERT_EQ(Export("masked", "--format nerfstudio").exit_code, 0);
   const json report = json::parse(ReadBytes(Path("masked/report.json")));

@@ -9,6 +9,7 @@
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
 #include "tests/support/folders.h"
+#include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 #include "texture/render/mesh_renderer.h"
 
@@ -55,6 +56,34 @@ TEST(RenderScript, MakesPicturesOfACapture) {
   const cv::Mat a = cv::Mat(photo) - cv::mean(cv::Mat(photo));
   const cv::Mat b = cv::Mat(scan) - cv::mean(cv::Mat(scan));
   EXPECT_GT(a.dot(b) / (cv::norm(a) * cv::norm(b)), 0.7);
+}
+
+TEST(RenderCommand, PrintsWhereThePictureIs) {
+  const TempFolder folder;
+  SimulatedRoomOptions options;
+  options.num_photos = 2;
+  options.photo_width = 96;
+  options.photo_height = 64;
+  options.scan_columns = 120;
+  options.scan_rows = 50;
+  Progress quiet(true);
+  WriteCapture(SimulatedRoom(options), folder / "capture", &quiet);
+  WriteBytes(folder / "box.ply",
+             "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+             "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+             "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+             "-3 -1 -3 200 0 0\n3 -1 -3 0 200 0\n0 -1 3 0 0 200\n0 2 0 200 200 200\n"
+             "3 0 1 2\n3 0 1 3\n3 1 2 3\n3 0 2 3\n");
+  const std::string line = "roomtex-render --quiet --ply_path " + (folder / "box.ply") +
+                           " --input_path " + (folder / "capture/truth");
+  const CommandResult one = RunCommandLine(line + " --output_path " + (folder / "one.png"));
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_EQ(one.out, folder / "one.png" + "\n");
+  EXPECT_EQ(cv::imread(folder / "one.png").cols, 96);
+  const CommandResult set =
+      RunCommandLine(line + " --num_ring 1 --width 90 --folder_path " + (folder / "set"));
+  ASSERT_EQ(set.exit_code, 0) << set.err;
+  EXPECT_EQ(set.out, folder / "set/contact_sheet.png" + "\n");
 }
 
 TEST(RenderScript, SaysWhatIsMissing) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/photo.h"
+#include "texture/tone/exposure.h"
 
 namespace roomtex {
 namespace {
@@ -77,6 +78,37 @@ TEST(ObservationStore, KeepsTheBestInAnyOrderOfAdding) {
     EXPECT_EQ(forward.Begin(0)[i].photo, expected[i]);
     EXPECT_EQ(backward.Begin(0)[i].photo, expected[i]);
   }
+}
+
+// What is in doubt counts only where there is nothing else.
+TEST(ObservationStore, CountsThePhotosThatGiveTheColour) {
+  ObservationStore store(2, 2);
+  for (int photo = 0; photo < 5; ++photo) {
+    Observation seen = Seen(0.2f, 0.2f, 0.2f, 0.5f, photo);
+    seen.in_doubt = 1;
+    store.Add(1, seen);
+    seen.in_doubt = photo < 2;
+    store.Add(0, seen);
+  }
+  EXPECT_EQ(store.NumViews(0), 3);
+  EXPECT_EQ(store.NumViews(1), 5);
+  EXPECT_EQ(store.Count(0), 2);
+  EXPECT_EQ(store.Begin(0)[1].photo, 3);
+}
+
+TEST(BlendSample, SaysWhatCounts) {
+  Observation seen[3] = {Seen(0.2f, 0.2f, 0.2f, 0.5f, 0), Seen(0.8f, 0.8f, 0.8f, 0.9f, 1),
+                         Seen(0.21f, 0.2f, 0.2f, 0.8f, 2)};
+  EXPECT_EQ(NumThatCount(seen, 0, kUnitGains), 0);
+  EXPECT_EQ(NumThatCount(seen, 3, kUnitGains), 3);
+  seen[1].in_doubt = seen[2].in_doubt = 1;
+  EXPECT_EQ(NumThatCount(seen, 3, kUnitGains), 1);
+  EXPECT_TRUE(std::isnan(SampleDisagreement(seen, 3, kUnitGains)));
+  seen[0].in_doubt = 1;
+  EXPECT_EQ(NumThatCount(seen, 3, kUnitGains), 3);  // the first and the last agree
+  EXPECT_FALSE(std::isnan(SampleDisagreement(seen, 3, kUnitGains)));
+  EXPECT_EQ(NumThatCount(seen, 2, kUnitGains), 0);
+  EXPECT_TRUE(std::isnan(SampleDisagreement(seen, 2, kUnitGains)));
 }
 
 TEST(BlendSample, IsTheWeightedMeanOfLinearLight) {

@@ -96,11 +96,15 @@ TEST_F(PhotoChoiceTest, NeitherThreadsNorBandsShow) {
 
 TEST_F(PhotoChoiceTest, OnePhotoOrOneThatSeesNothingIsNoProblem) {
   Shoot({0});
-  EXPECT_EQ(Run("select").scans[0].samples.rgb, Run("average").scans[0].samples.rgb);
+  const ColorizeResult selected = Run("select");
+  EXPECT_GT(selected.num_colored, 10000u);
+  EXPECT_EQ(selected.scans[0].samples.rgb, Run("average").scans[0].samples.rgb);
   photos_[0].cam_from_scan.rotation =
       Eigen::Quaterniond(0, 0, 0, 1) * photos_[0].cam_from_scan.rotation;
   photos_[0].cam_from_scan.translation = Eigen::Vector3d(0, 0, -100);
-  EXPECT_EQ(Run("select").num_colored, 0u);
+  const ColorizeResult blind = Run("select");
+  EXPECT_EQ(blind.num_colored, 0u);
+  EXPECT_EQ(blind.num_vertices, selected.num_vertices);
 }
 
 TEST_F(PhotoChoiceTest, DetailOfTheDominantPhotoGoesWithout) {
@@ -112,7 +116,12 @@ TEST_F(PhotoChoiceTest, DetailOfTheDominantPhotoGoesWithout) {
   const ColorizeResult thesis = ColorizeScans({scan_}, photos_, options, 2, &progress);
   options.blend.mode = "select";
   const ColorizeResult both = ColorizeScans({scan_}, photos_, options, 2, &progress);
+  EXPECT_GT(both.num_colored, 10000u);
   EXPECT_EQ(thesis.scans[0].samples.rgb, both.scans[0].samples.rgb);
+  // Either of the two alone changes the colours.
+  const ColorGrid average = Run("average").scans[0].samples;
+  EXPECT_NE(thesis.scans[0].samples.rgb, average.rgb);
+  EXPECT_NE(Run("select").scans[0].samples.rgb, average.rgb);
 }
 
 }  // namespace

@@ -17,24 +17,32 @@
 namespace roomtex {
 namespace {
 
-// Linear light of a level 0..1 for a camera with a gamma of 1.8, a toe and a shoulder.
-double FilmLight(double level) {
+constexpr double kGamma = 1.8;
+// Of red, green and blue: what mixes them up shows.
+constexpr double kGammas[3] = {1.5, kGamma, 2.2};
+
+// Linear light of a level 0..1 for a camera with a gamma, a toe and a shoulder.
+double FilmLight(double level, double gamma) {
   double low = 0, high = 1;
   for (int i = 0; i < 50; ++i) {
     const double p = (low + high) / 2;
     (p - 0.3 * std::sin(2 * kPi * p) / (2 * kPi) < level ? low : high) = p;
   }
-  return std::pow(low, 1.8);
+  return std::pow(low, gamma);
 }
+double FilmLight(double level) { return FilmLight(level, kGamma); }
 double FilmLevel(double light) {
-  const double p = std::pow(std::clamp(light, 0.0, 1.0), 1 / 1.8);
+  const double p = std::pow(std::clamp(light, 0.0, 1.0), 1 / kGamma);
   return p - 0.3 * std::sin(2 * kPi * p) / (2 * kPi);
 }
 
+// One curve per colour.
 ResponseCurve FilmCurve() {
   ResponseCurve::Table table{};
   for (int level = 0; level < 256; ++level) {
-    table[level].fill(static_cast<float>(FilmLight(level / 255.0)));
+    for (int k = 0; k < 3; ++k) {
+      table[level][k] = static_cast<float>(FilmLight(level / 255.0, kGammas[k]));
+    }
   }
   return ResponseCurve(table);
 }
@@ -119,8 +127,8 @@ TEST(ResponseCurve, RoundTripsThroughItsFile) {
   EXPECT_FALSE(read.is_srgb());
   for (int level = 0; level < 256; ++level) {
     for (int k = 0; k < 3; ++k) {
-      EXPECT_NEAR(read.Linear(static_cast<float>(level), k),
-                  curve.Linear(static_cast<float>(level), k), 1e-5);
+      EXPECT_NEAR(read.Linear(static_cast<float>(level), k), FilmLight(level / 255.0, kGammas[k]),
+                  1e-5);
     }
   }
 }
@@ -165,8 +173,10 @@ TEST(ResponseCurve, TurnsPhotosIntoSrgb) {
   cv::Mat converted = photo.clone();
   FilmCurve().ToSrgb(&converted);
   for (int level = 0; level < 256; ++level) {
-    EXPECT_NEAR(converted.at<cv::Vec3b>(0, level)[1] / 255.0,
-                SrgbFromLinear(FilmLight(level / 255.0)), 0.51 / 255);
+    for (int k = 0; k < 3; ++k) {  // a photo's bytes are blue, green, red
+      EXPECT_NEAR(converted.at<cv::Vec3b>(0, level)[2 - k] / 255.0,
+                  SrgbFromLinear(FilmLight(level / 255.0, kGammas[k])), 0.51 / 255);
+    }
   }
   EXPECT_EQ(converted.at<cv::Vec3b>(0, 255), cv::Vec3b::all(255));
 }
