@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include <fmt/core.h>
@@ -33,7 +34,17 @@ const char* SurfaceName(FaceKind kind) {
   }
 }
 
-// What GIS programs show of a building. height: of the outline's origin in what is written.
+// Of the outline's level 0 above the ellipsoid, at the building: the Earth falls away below the
+// plane that the outline lies in. 0 where it lies on no Earth.
+double HeightOfLevel(const Outline& outline, const OutlineBuilding& building) {
+  if (!outline.geo) return 0;
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : building.footprint) box.extend(corner);
+  const Eigen::Vector2d centre = box.center();
+  return outline.geo->GeoFromEnu({centre.x(), centre.y(), 0}).height;
+}
+
+// What GIS programs show of a building. height: of the outline's level 0 in what is written.
 Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid, double height) {
   const auto [eaves, ridge] = solid.RoofHeights();
   Json json;
@@ -49,8 +60,7 @@ Json AttributesOf(const OutlineBuilding& building, const BuildingSolid& solid, d
 
 // Where GIS programs want the vertices, and what that is called.
 struct MapFrame {
-  int epsg = 0;              // 0 = the outline's own coordinates
-  double origin_height = 0;  // of the outline's origin, metres above the ellipsoid
+  int epsg = 0;  // 0 = the outline's own coordinates
   std::function<Eigen::Vector3d(const Eigen::Vector3d&)> from_outline;
 };
 
@@ -60,7 +70,6 @@ MapFrame MapFrameOf(const Outline& outline) {
   if (!outline.geo || !outline.geo->GridFromEnu(Eigen::Vector3d::Zero())) return frame;
   const GeoFrame& geo = *outline.geo;
   frame.epsg = geo.GridOfOrigin().EpsgCode();
-  frame.origin_height = geo.origin().height;
   frame.from_outline = [geo](const Eigen::Vector3d& x) -> Eigen::Vector3d {
     const auto grid = geo.GridFromEnu(x);
     if (!grid) {
@@ -82,11 +91,19 @@ std::vector<MappedBuilding> OnTheMap(const Outline& outline, const MapFrame& map
   std::vector<MappedBuilding> buildings;
   for (const OutlineBuilding& building : outline.buildings) {
     BuildingSolid solid = ExtrudeBuilding(building);
-    const Json attributes = AttributesOf(building, solid, map.origin_height);
+    const double height = map.epsg == 0 ? 0 : HeightOfLevel(outline, building);
+    const Json attributes = AttributesOf(building, solid, height);
     for (Eigen::Vector3d& vertex : solid.vertices) vertex = map.from_outline(vertex);
     buildings.push_back({&building, attributes, std::move(solid)});
   }
   return buildings;
+}
+// The last digit that is written: a millimetre, and less of small things, which keep their digits.
+double UnitFor(const Eigen::AlignedBox3d& box) {
+  constexpr double kMillimetre = 0.001;
+  const double size = box.isEmpty() ? 0 : box.diagonal().norm();
+  return size > 0 ? std::min(kMillimetre, std::pow(10, std::floor(std::log10(size / 1e5))))
+                  : kMillimetre;
 }
 Eigen::AlignedBox3d BoxOf(const std::vector<MappedBuilding>& buildings) {
   Eigen::AlignedBox3d box;
@@ -106,11 +123,13 @@ void WriteBuildingsObj(const std::string& path, const Outline& outline) {
   stream << "# roomtex-outline: buildings in the frame of the points that they were made from\n"
          << fmt::format("# up {} {} {}\n", Exact(up.x()), Exact(up.y()), Exact(up.z()));
   int first = 1;
+  std::set<std::string> names;
   for (const OutlineBuilding& building : outline.buildings) {
     const BuildingSolid solid = ExtrudeBuilding(building);
     std::string name = building.name;
     std::replace_if(
         name.begin(), name.end(), [](unsigned char c) { return c <= ' '; }, '_');
+    while (!names.insert(name).second) name += '_';  // "a b" beside "a_b"
     stream << "o building_" << name << "\n";
     for (const Eigen::Vector3d& vertex : solid.vertices) {
       const Eigen::Vector3d x = input_from_outline * vertex;
@@ -252,7 +271,6 @@ class BuildingGlb {
 
 void WriteCityJson(const std::string& path, const Outline& outline) {
   const MapFrame map = MapFrameOf(outline);
-  constexpr double kUnit = 0.001;  // millimetres
   Json json;
   json["type"] = "CityJSON";
   json["version"] = "2.0";
@@ -267,9 +285,7 @@ void WriteCityJson(const std::string& path, const Outline& outline) {
   const Eigen::AlignedBox3d box = BoxOf(buildings);
   const Eigen::Vector3d origin =
       box.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(box.min().array().floor());
-  // Small things in units of their own keep their digits.
-  const double unit =
-      outline.metric || box.isEmpty() ? kUnit : std::min(kUnit, box.diagonal().norm() / 1e6);
+  const double unit = UnitFor(box);
   json["transform"] = {{"scale", {unit, unit, unit}},
                        {"translate", {origin.x(), origin.y(), origin.z()}}};
   std::map<std::tuple<int64_t, int64_t, int64_t>, int> index;
@@ -400,8 +416,8 @@ void AppendSurfaces(const BuildingSolid& solid, const std::string& id, int digit
 
 void WriteCityGml(const std::string& path, const Outline& outline) {
   const MapFrame map = MapFrameOf(outline);
-  const int digits = outline.metric ? 4 : 7;
   const std::vector<MappedBuilding> buildings = OnTheMap(outline, map);
+  const int digits = 1 - static_cast<int>(std::lround(std::log10(UnitFor(BoxOf(buildings)))));
   pugi::xml_document document;
   pugi::xml_node city = AppendCity(&document);
   AppendEnvelope(BoxOf(buildings), map.epsg, digits, &city);
@@ -427,6 +443,56 @@ void WriteCityGml(const std::string& path, const Outline& outline) {
 
 // --- GeoJSON
 
+using Ring = std::vector<Eigen::Vector2d>;  // longitude and latitude, or x and y
+
+// What of it lies where sign * (x - limit) <= 0 (Sutherland, Hodgman 1974).
+Ring CutAt(const Ring& ring, double limit, double sign) {
+  Ring kept;
+  for (size_t i = 0; i < ring.size(); ++i) {
+    const Eigen::Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];
+    const double da = sign * (a.x() - limit), db = sign * (b.x() - limit);
+    if (da <= 0) kept.push_back(a);
+    if (da * db < 0) kept.emplace_back(limit, a.y() + da / (da - db) * (b.y() - a.y()));
+  }
+  return kept;
+}
+
+Json RingToJson(const Ring& ring) {
+  Json json = Json::array();
+  for (size_t i = 0; i <= ring.size(); ++i) {
+    const Eigen::Vector2d& x = ring[i % ring.size()];
+    json.push_back({x.x(), x.y()});
+  }
+  return json;
+}
+
+Json FootprintToGeoJson(const Outline& outline, const OutlineBuilding& building) {
+  Ring ring = building.footprint;
+  double low = 0, high = 0;
+  if (outline.geo) {
+    for (Eigen::Vector2d& corner : ring) {
+      const GeoPosition position =
+          outline.geo->GeoFromEnu({corner.x(), corner.y(), building.ground});
+      // A tenth of a millimetre.
+      const auto rounded = [](double degrees) { return std::round(degrees * 1e9) / 1e9; };
+      corner = {rounded(position.longitude_deg), rounded(position.latitude_deg)};
+      low = std::min(low, corner.x()), high = std::max(high, corner.x());
+    }
+  }
+  if (high - low <= 180) {
+    return {{"type", "Polygon"}, {"coordinates", Json::array({RingToJson(ring)})}};
+  }
+  // Across the antimeridian: cut there, else it would go around the Earth (RFC 7946, 3.1.9).
+  for (Eigen::Vector2d& corner : ring) corner.x() += corner.x() < 0 ? 360 : 0;
+  Ring east = CutAt(ring, 180, 1), west = CutAt(ring, 180, -1);
+  for (Eigen::Vector2d& corner : west) corner.x() -= 360;
+  Json parts = Json::array();
+  for (const Ring& part : {east, west}) {
+    if (part.size() >= 3) parts.push_back(Json::array({RingToJson(part)}));
+  }
+  return {{"type", "MultiPolygon"}, {"coordinates", parts}};
+}
+
 void WriteGeoJson(const std::string& path, const Outline& outline) {
   Json json;
   json["type"] = "FeatureCollection";
@@ -438,27 +504,14 @@ void WriteGeoJson(const std::string& path, const Outline& outline) {
   }
   json["features"] = Json::array();
   for (const OutlineBuilding& building : outline.buildings) {
-    Json ring = Json::array();
-    for (size_t i = 0; i <= building.footprint.size(); ++i) {
-      const Eigen::Vector2d& corner = building.footprint[i % building.footprint.size()];
-      if (outline.geo) {
-        const GeoPosition position =
-            outline.geo->GeoFromEnu({corner.x(), corner.y(), building.ground});
-        // A tenth of a millimetre.
-        const auto rounded = [](double degrees) { return std::round(degrees * 1e9) / 1e9; };
-        ring.push_back({rounded(position.longitude_deg), rounded(position.latitude_deg)});
-      } else {
-        ring.push_back({corner.x(), corner.y()});
-      }
-    }
     Json named;
     named["name"] = building.name;
-    named.update(AttributesOf(building, ExtrudeBuilding(building),
-                              outline.geo ? outline.geo->origin().height : 0));
+    named.update(
+        AttributesOf(building, ExtrudeBuilding(building), HeightOfLevel(outline, building)));
     Json feature;
     feature["type"] = "Feature";
     feature["properties"] = named;
-    feature["geometry"] = {{"type", "Polygon"}, {"coordinates", Json::array({ring})}};
+    feature["geometry"] = FootprintToGeoJson(outline, building);
     json["features"].push_back(feature);
   }
   WriteJson(path, json);

@@ -23,6 +23,45 @@ double TwiceArea(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
+// Pairs of roof planes that meet anywhere in the box: of most pairs of many planes the line where
+// they cross lies above a third one, and would only cut the cells into more.
+std::set<std::pair<size_t, size_t>> MeetingPlanes(const std::vector<RoofPlane>& roof,
+                                                  const Eigen::AlignedBox2d& box) {
+  // Planes that are hardly above the others meet them, too.
+  const double slack = 1e-6 * box.diagonal().norm();
+  constexpr size_t kBorder = std::numeric_limits<size_t>::max();
+  struct Corner {
+    Eigen::Vector2d x;
+    size_t plane;  // on the other side of the edge that begins here
+  };
+  std::set<std::pair<size_t, size_t>> pairs;
+  for (size_t i = 0; i < roof.size(); ++i) {
+    // Where it is the lowest: a convex polygon, cut off by one plane after the other.
+    std::vector<Corner> where = {{box.min(), kBorder},
+                                 {{box.max().x(), box.min().y()}, kBorder},
+                                 {box.max(), kBorder},
+                                 {{box.min().x(), box.max().y()}, kBorder}};
+    for (size_t j = 0; j < roof.size(); ++j) {
+      if (i == j) continue;
+      std::vector<Corner> kept;
+      for (size_t k = 0; k < where.size(); ++k) {
+        const Corner &a = where[k], &b = where[(k + 1) % where.size()];
+        const double above_a = roof[i].HeightAt(a.x) - roof[j].HeightAt(a.x) - slack;
+        const double above_b = roof[i].HeightAt(b.x) - roof[j].HeightAt(b.x) - slack;
+        if (above_a <= 0) kept.push_back({a.x, above_a == 0 && above_b > 0 ? j : a.plane});
+        if (above_a * above_b >= 0) continue;
+        const Eigen::Vector2d crossing = a.x + above_a / (above_a - above_b) * (b.x - a.x);
+        kept.push_back({crossing, above_a < 0 ? j : a.plane});
+      }
+      where = std::move(kept);
+    }
+    for (const Corner& corner : where) {
+      if (corner.plane != kBorder) pairs.insert(std::minmax(i, corner.plane));
+    }
+  }
+  return pairs;
+}
+
 class SolidBuilder {
  public:
   explicit SolidBuilder(const OutlineBuilding& building) : building_(building) {}
@@ -44,24 +83,23 @@ class SolidBuilder {
     size_ = box.diagonal().norm();
     epsilon_ = 1e-9 * size_;
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.1 * size_);
+    const Eigen::AlignedBox2d wide(box.min() - margin, box.max() + margin);
     std::vector<Line2> lines;
     const std::vector<Eigen::Vector2d>& footprint = building_.footprint;
     for (size_t i = 0; i < footprint.size(); ++i) {
       lines.push_back(Line2::Through(footprint[i], footprint[(i + 1) % footprint.size()]));
     }
-    for (size_t i = 0; i < building_.roof.size(); ++i) {
-      for (size_t j = i + 1; j < building_.roof.size(); ++j) {
-        const RoofPlane &a = building_.roof[i], &b = building_.roof[j];
-        const Eigen::Vector2d gradient = a.Gradient() - b.Gradient();
-        if (gradient.norm() < 1e-9) continue;
-        Line2 line;
-        line.normal = gradient.normalized();
-        line.offset = line.normal.dot(box.min()) +
-                      (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
-        lines.push_back(line);
-      }
+    for (const auto& [i, j] : MeetingPlanes(building_.roof, wide)) {
+      const RoofPlane &a = building_.roof[i], &b = building_.roof[j];
+      const Eigen::Vector2d gradient = a.Gradient() - b.Gradient();
+      if (gradient.norm() < 1e-9) continue;
+      Line2 line;
+      line.normal = gradient.normalized();
+      line.offset = line.normal.dot(box.min()) +
+                    (b.HeightAt(box.min()) - a.HeightAt(box.min())) / gradient.norm();
+      lines.push_back(line);
     }
-    cells_ = ArrangeCells({box.min() - margin, box.max() + margin}, lines, epsilon_);
+    cells_ = ArrangeCells(wide, lines, epsilon_);
     for (size_t cell = 0; cell < cells_.cells.size(); ++cell) {
       const Eigen::Vector2d centre = cells_.CentreOf(static_cast<int>(cell));
       int label = -1;

@@ -468,6 +468,7 @@ class FootprintFinder {
       region.walls.push_back(line < 0 ? WallLine() : walls_[static_cast<size_t>(line)]);
     }
     MendCorners(&region);
+    MergeCorners(&region);
     return region;
   }
 
@@ -491,6 +492,19 @@ class FootprintFinder {
         continue;
       }
       region->polygon[after] = corner;
+      region->polygon.erase(region->polygon.begin() + static_cast<std::ptrdiff_t>(i));
+      region->walls.erase(region->walls.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+
+  // Walls that are hardly longer than nothing, where three lines nearly meet.
+  void MergeCorners(FootprintRegion* region) const {
+    for (size_t i = 0; i < region->walls.size() && region->walls.size() > 3;) {
+      const size_t after = (i + 1) % region->walls.size();
+      if ((region->polygon[after] - region->polygon[i]).norm() > 1e-3 * cloud_.step) {
+        ++i;
+        continue;
+      }
       region->polygon.erase(region->polygon.begin() + static_cast<std::ptrdiff_t>(i));
       region->walls.erase(region->walls.begin() + static_cast<std::ptrdiff_t>(i));
     }

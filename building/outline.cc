@@ -105,6 +105,11 @@ OutlineBuilding ParseBuilding(const OutlineParser& parser, const Json& json, siz
     parser.Fail(where + " name", "must be a text that is not empty");
   }
   building.name = name.get<std::string>();
+  // No XML can hold them, no table shows them.
+  if (std::any_of(building.name.begin(), building.name.end(),
+                  [](unsigned char c) { return c < ' ' || c == 0x7f; })) {
+    parser.Fail(where + " name", "holds a control character");
+  }
   where += " (" + Quoted(building.name) + ")";
   building.ground = parser.Number(json, "ground", where);
   const Json& footprint = parser.List(json, "footprint", where, kMaxCorners);
@@ -235,6 +240,19 @@ Outline ParseOutline(const std::string& path, const Json& json) {
     if (!position.Problems().empty()) parser.Fail("geo_origin", position.Problems()[0]);
     outline.geo.emplace(position);
   }
+  if (json.contains("alignment") && !json["alignment"].is_null()) {
+    const Json& alignment = json["alignment"];
+    const auto flag = [&](const char* key) {
+      const Json& value = parser.At(alignment, key, "alignment");
+      if (!value.is_boolean()) {
+        parser.Fail(std::string("alignment ") + key, "must be true or false");
+      }
+      return value.get<bool>();
+    };
+    const Json& reason = parser.At(alignment, "reason", "alignment");
+    if (!reason.is_string()) parser.Fail("alignment reason", "must be a text");
+    outline.alignment = {flag("trusted"), reason.get<std::string>(), flag("north_assumed")};
+  }
   const Json& buildings = parser.List(json, "buildings", "", kMaxBuildings);
   std::set<std::string> names;
   for (size_t i = 0; i < buildings.size(); ++i) {
@@ -266,6 +284,11 @@ Json OutlineToJson(const Outline& outline) {
                           {"longitude", origin.longitude_deg},
                           {"height", origin.height}};
   }
+  if (outline.alignment) {
+    json["alignment"] = {{"trusted", outline.alignment->trusted},
+                         {"reason", outline.alignment->reason},
+                         {"north_assumed", outline.alignment->north_assumed}};
+  }
   json["buildings"] = Json::array();
   for (const OutlineBuilding& building : outline.buildings) {
     Json one;
@@ -288,14 +311,77 @@ Json OutlineToJson(const Outline& outline) {
   return json;
 }
 
+OutlineBuilding AsWritten(OutlineBuilding building) {
+  building.ground = Rounded(building.ground);
+  for (Eigen::Vector2d& corner : building.footprint) corner = corner.unaryExpr(&Rounded);
+  for (RoofPlane& plane : building.roof) {
+    plane.point = plane.point.unaryExpr(&Rounded);
+    plane.slope_deg = Rounded(plane.slope_deg);
+    plane.downhill_deg = Rounded(plane.downhill_deg);
+  }
+  return building;
+}
+
+void MoveBuildings(const Similarity& target_from_outline, std::vector<OutlineBuilding>* buildings) {
+  const auto moved = [&](const Eigen::Vector2d& x, double z) {
+    return target_from_outline * Eigen::Vector3d(x.x(), x.y(), z);
+  };
+  const Eigen::Vector3d east = target_from_outline.rotation * Eigen::Vector3d::UnitX();
+  const double turn_deg = DegFromRad(std::atan2(east.y(), east.x()));
+  for (OutlineBuilding& building : *buildings) {
+    const double rise = moved(building.footprint[0], building.ground).z() - building.ground;
+    for (RoofPlane& plane : building.roof) {
+      plane.point.head<2>() = moved(plane.point.head<2>(), building.ground).head<2>();
+      plane.point.z() += rise;
+      plane.downhill_deg += turn_deg;
+    }
+    for (Eigen::Vector2d& corner : building.footprint) {
+      corner = moved(corner, building.ground).head<2>();
+    }
+    building.ground += rise;
+  }
+}
+
+void PlaceOnEarth(const GeoPosition& origin, const std::string& path, Outline* outline) {
+  if (outline->geo) {
+    const GeoPosition& own = outline->geo->origin();
+    constexpr double kSameDeg = 1e-9, kSameHeight = 1e-4;  // a tenth of a millimetre
+    const bool is_same = std::abs(own.latitude_deg - origin.latitude_deg) < kSameDeg &&
+                         std::abs(own.longitude_deg - origin.longitude_deg) < kSameDeg &&
+                         std::abs(own.height - origin.height) < kSameHeight;
+    if (is_same) return;
+    throw UsageError("--geo_origin is another place than that of " + path +
+                     " (geo_origin): leave it out, or change it there");
+  }
+  const Similarity input_from_outline = outline->outline_from_input.Inverse();
+  if (!outline->metric || std::abs(input_from_outline.scale - 1) > 1e-9) {
+    throw UsageError("--geo_origin is for an input in metres: the points that " + path +
+                     " was made from were not");
+  }
+  // Walls and ground turn what is upright by less; a frame that was not is none of the Earth.
+  constexpr double kMostTiltDeg = 3;
+  const Eigen::Vector3d up = input_from_outline.rotation * Eigen::Vector3d::UnitZ();
+  if (up.z() < std::cos(RadFromDeg(kMostTiltDeg))) {
+    throw UsageError("--geo_origin says that z was up in the points that " + path +
+                     " was made from, but its outline_from_input turns them upright");
+  }
+  MoveBuildings(input_from_outline, &outline->buildings);
+  outline->outline_from_input = Similarity();
+  outline->geo.emplace(origin);
+}
+
 void WriteOutline(const std::string& path, const Outline& outline, bool proposed) {
   Json json = OutlineToJson(outline);
   if (proposed) json["proposal_seal"] = SealOf(json);
   WriteJson(path, json);
 }
 
-bool HoldsSameOutline(const std::string& path, const std::string& other) {
-  return OutlineToJson(ReadOutline(path)) == OutlineToJson(ReadOutline(other));
+bool HoldsSameOutline(const std::string& path, const Outline& outline) {
+  const auto essence = [](Outline one) {
+    one.alignment.reset();  // of whoever wrote it last
+    return OutlineToJson(one);
+  };
+  return essence(ReadOutline(path)) == essence(outline);
 }
 
 bool WasEdited(const std::string& path) {

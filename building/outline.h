@@ -42,12 +42,20 @@ struct OutlineBuilding {
   std::vector<std::string> Problems() const;
 };
 
+// What the aligned model that the points are from says of itself: the buildings are worth no more.
+struct OutlineAlignment {
+  bool trusted = true;
+  std::string reason;          // why not
+  bool north_assumed = false;  // on the Earth, but nobody has said which way it is turned there
+};
+
 struct Outline {
   // Frame of the buildings. `input` is the frame of the points (a model's: `sparse` or `scan`).
   Similarity outline_from_input;
   bool metric = false;          // lengths are metres, else units of the input
   std::optional<GeoFrame> geo;  // the frame is `enu` about this place
   std::vector<OutlineBuilding> buildings;
+  std::optional<OutlineAlignment> alignment;  // none: of no model of roomtex-align
 
   const char* Unit() const { return metric ? "metres" : "units of the input"; }
 };
@@ -58,6 +66,16 @@ Outline ReadOutline(const std::string& path);
 // From a JSON text that is named `path` in messages.
 Outline ParseOutline(const std::string& path, const Json& json);
 Json OutlineToJson(const Outline& outline);
+// With its numbers as the file holds them.
+OutlineBuilding AsWritten(OutlineBuilding building);
+
+// Gives an outline that has no place on the Earth this one: the frame `input` is east-north-up
+// about it, as --geo_origin says, and the buildings move into that. Throws UsageError, which names
+// `path`, for lengths that are no metres, a frame that does not stand upright, and a place that
+// contradicts the outline's own.
+void PlaceOnEarth(const GeoPosition& origin, const std::string& path, Outline* outline);
+// Floors, footprints and roofs go along with the corners they stand at; walls stay upright.
+void MoveBuildings(const Similarity& target_from_outline, std::vector<OutlineBuilding>* buildings);
 
 // proposed: nobody has changed it yet. The file then holds a seal, so that it is known later
 // whether a hand or the page did (WasEdited).
@@ -65,7 +83,7 @@ void WriteOutline(const std::string& path, const Outline& outline, bool proposed
 // The file is there and not as WriteOutline(proposed) wrote it: somebody's work. A file that is no
 // outline at all is somebody's work, too.
 bool WasEdited(const std::string& path);
-// Throws InputError as ReadOutline() does.
-bool HoldsSameOutline(const std::string& path, const std::string& other);
+// The same buildings in the same place. Throws InputError as ReadOutline() does.
+bool HoldsSameOutline(const std::string& path, const Outline& outline);
 
 }  // namespace roomtex

@@ -16,8 +16,10 @@
 #include "core/option_fields.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
+#include "core/result_names.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace {
@@ -116,19 +118,21 @@ struct ModelPlace {
   bool aligned = false;  // metres
   std::optional<GeoFrame> geo;
   Rigid enu_from_model;
+  bool north_assumed = false;
 };
 
 ModelPlace PlaceOfModel(const std::string& folder) {
   ModelPlace place;
-  for (const char* name : {"alignment.json", "geo.json"}) {
+  for (const char* name : {kAlignReportName, "geo.json"}) {
     const std::string path = (std::filesystem::path(folder) / name).string();
     const Json json = ReadJsonIfAny(path);
     if (!json.is_object()) continue;
-    const bool is_alignment = std::string(name) == "alignment.json";
+    const bool is_alignment = std::string(name) == kAlignReportName;
     place.aligned = true;
     const Json geo = is_alignment ? (json.contains("geo") ? json["geo"] : Json()) : json;
     if (!geo.is_object()) continue;
     try {
+      place.north_assumed = geo.value("heading_assumed", false);
       const Json& origin = geo.at("origin");
       const GeoPosition position{origin.at("latitude").get<double>(),
                                  origin.at("longitude").get<double>(),
@@ -279,6 +283,10 @@ void RequireNoOtherFrame(const OutlineInputOptions& options, bool is_on_earth) {
   if (options.scale != 0 && options.scale != 1) {
     throw UsageError(options.input_path + has_place + "in metres: leave --scale out");
   }
+  if (!options.geo_origin.empty()) {
+    throw UsageError(options.input_path + has_place +
+                     "and how it is turned there: leave --geo_origin out");
+  }
 }
 
 }  // namespace
@@ -321,6 +329,10 @@ std::vector<std::string> OutlineInputOptions::Problems() const {
     problems.push_back("--geo_origin is for an input in metres: leave --scale out");
   }
   return problems;
+}
+
+std::optional<GeoPosition> OutlineInputOptions::GeoOrigin() const {
+  return GivenOrigin(geo_origin);
 }
 
 Eigen::Vector3d MiddleOf(const std::vector<Eigen::Vector3d>& points) {
@@ -383,6 +395,10 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
   if (!model_folder.empty()) {
     model = ReadSparseModel(model_folder);
     place = PlaceOfModel(model_folder);
+    const AlignmentRecord record = ReadAlignmentRecord(model_folder);
+    if (place.aligned) {
+      cloud.frame.alignment = {record.trusted, record.reason, place.north_assumed};
+    }
     for (const auto& [id, image] : model.images) {
       cloud.cameras.push_back(image.cam_from_model.TargetOriginInSource());
     }
@@ -404,6 +420,9 @@ OutlineCloud ReadOutlineCloud(const OutlineInputOptions& options, int num_thread
                      "Give a model or cloud with more points");
   }
   RequireNoOtherFrame(options, place.geo || LooksEarthCentred(cloud.points));
+  if (place.aligned && options.scale != 0 && options.scale != 1) {
+    throw UsageError(model_folder + " is a model of roomtex-align, in metres: leave --scale out");
+  }
   // A model beside a cloud is that of its points; alone, a cloud is in metres as all scans are.
   cloud.frame.metric = place.aligned || options.scale > 0 || !options.geo_origin.empty() ||
                        (!is_model && model_folder.empty());

@@ -27,6 +27,7 @@ struct OutlineInputOptions {
 
   void Declare(OptionFields* fields);
   std::vector<std::string> Problems() const;
+  std::optional<GeoPosition> GeoOrigin() const;  // none for "" and what is no place
 };
 
 struct OutlineCloud {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numeric>
 #include <set>
@@ -25,12 +26,12 @@ class SegmentGroups {
       : parents_(segments.size()) {
     std::iota(parents_.begin(), parents_.end(), 0);
     const double cell = 0.8 * cloud.step;
-    std::map<std::pair<int, int>, std::set<int>> cells;
+    std::map<std::pair<int64_t, int64_t>, std::set<int>> cells;  // a map grid may be in mm
     for (const int s : members) {
       for (const int i : segments[static_cast<size_t>(s)].points) {
         const Eigen::Vector3d& x = cloud.points[static_cast<size_t>(i)];
-        cells[{static_cast<int>(std::floor(x.x() / cell)),
-               static_cast<int>(std::floor(x.y() / cell))}]
+        cells[{static_cast<int64_t>(std::floor(x.x() / cell)),
+               static_cast<int64_t>(std::floor(x.y() / cell))}]
             .insert(s);
       }
     }
@@ -170,6 +171,8 @@ OutlineProposal ProposeOutline(const OutlineCloud& cloud, const std::vector<Plan
     AddWallEvidence(cloud, ground, region.walls, building, &evidence);
     AddExplained(cloud, ground, building, &evidence);
     evidence.doubts = FindDoubts(cloud, evidence);
+    // What is proposed must be what the file can hold: two corners may become one there.
+    building = AsWritten(building);
     if (!building.Problems().empty()) continue;
     proposal.outline.buildings.push_back(building);
     proposal.evidence.push_back(evidence);

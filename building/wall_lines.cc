@@ -112,12 +112,16 @@ bool SameLine(const OutlineCloud& cloud, const WallLine& a, const WallLine& b) {
 }
 
 double OverlapOf(const WallLine& a, const WallLine& b) {
-  const double sign = a.line.Direction().dot(b.line.Direction()) < 0 ? -1 : 1;
+  // Each counts its stretches along its own direction, from a foot of its own: far from the origin
+  // of the coordinates, lines that are hardly turned count from feet that lie metres apart.
+  const Eigen::Vector2d foot = b.line.normal * b.line.offset;
+  const auto along_a = [&](double along_b) {
+    return a.line.Direction().dot(foot + along_b * b.line.Direction());
+  };
   double overlap = 0;
   for (const auto& [low, high] : a.stretches) {
     for (const auto& [first, second] : b.stretches) {
-      const double from = std::min(sign * first, sign * second);
-      const double to = std::max(sign * first, sign * second);
+      const auto [from, to] = std::minmax({along_a(first), along_a(second)});
       overlap += std::max(0.0, std::min(high, to) - std::max(low, from));
     }
   }

@@ -13,6 +13,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/random_stream.h"
+#include "core/text.h"
 #include "dense/stereo_views.h"
 
 namespace roomtex {
@@ -21,10 +22,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kJpegQuality = 95;
-constexpr int kMaxNeighbours = 12;  // photos that may confirm a depth, or deny it
-constexpr int kAsked = 8;           // photos whose depth is tried in another
-constexpr int kSmallestSide = 32;   // pixels of a picture: smaller ones hold no window
-constexpr int kPointColumns = 48;   // of the raster of a photo's points
+// Bytes on the disk, per pixel of all pictures, at the peak: .first and .new, or .new, .depth and
+// .estimate (floats), the grey picture and the JPEG.
+constexpr double kDiskBytesPerPixel = 42;
+constexpr int kAsked = 8;          // photos whose depth is tried in another
+constexpr int kSmallestSide = 32;  // pixels of a picture: smaller ones hold no window
+constexpr int kPointColumns = 48;  // of the raster of a photo's points
 
 class DenseRun {
  public:
@@ -91,7 +94,7 @@ class DenseRun {
   DenseResult Run(const std::vector<Scan>& scans) {
     progress_->Stage("space");
     const ScanSpace space(scans, num_threads_);
-    FindNeighbours(space, kMaxNeighbours, &views_);
+    FindNeighbours(space, options_.MaxNeighbours(), &views_);
     DenseResult result;
     progress_->Stage("depth", static_cast<int>(views_.size()));
     for (size_t i = 0; i < views_.size(); ++i) {
@@ -103,6 +106,7 @@ class DenseRun {
       Refine(i, space);
       progress_->Tick();
     }
+    for (int i = 0; i < static_cast<int>(views_.size()); ++i) RemoveAside(i, ".new");
     progress_->Stage("fusion", static_cast<int>(views_.size()));
     SupplementBuilder builder(options_.fusion);
     for (size_t i = 0; i < views_.size(); ++i) {
@@ -120,6 +124,10 @@ class DenseRun {
  private:
   std::string Aside(int view, const std::string& what) const {
     return aside_ + "/" + std::to_string(view) + what;
+  }
+  void RemoveAside(int view, const std::string& what) const {
+    std::error_code ignored;
+    fs::remove(Aside(view, what), ignored);
   }
   std::string GreyPath(const std::string& name) const {
     return PathInside(aside_ + "/grey", name + ".pgm");
@@ -181,6 +189,7 @@ class DenseRun {
     const StereoPicture reference = Load(i);
     const OpenSpace open(space, reference, options_.fusion.distance_to_scan, num_threads_);
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".first"));
+    RemoveAside(i, ".first");
     cv::Mat1i compared;
     arrays[5].convertTo(compared, CV_32S);
     const DepthEstimate first{arrays[0], {arrays[2], arrays[3], arrays[4]}, arrays[1], compared, 0};
@@ -212,6 +221,7 @@ class DenseRun {
   double Confirm(int i, const ScanSpace& space, SupplementBuilder* builder) {
     const StereoView& view = views_[i];
     const std::vector<cv::Mat1f> arrays = ReadDenseArray(Aside(i, ".estimate"));
+    RemoveAside(i, ".estimate");
     const cv::Mat1f depth = ReadDenseArray(Aside(i, ".depth"))[0];
     const cv::Mat1b is_open = arrays[0] > 0;
     DepthEstimate estimate{depth.clone(), {arrays[2], arrays[3], arrays[4]}, arrays[1], {}, 0};
@@ -301,13 +311,38 @@ class DenseRun {
   SparseModel model_;  // image k + 1 is view k
 };
 
+// Throws InputError if the disk has not the space for what lies there while depth is found.
+void RequireDisk(const std::vector<DensePhoto>& photos, const PinholeOptions& options,
+                 const std::string& folder) {
+  double num_pixels = 0;
+  for (const DensePhoto& photo : photos) {
+    const auto pinhole = PinholeCamera(photo.camera, options);
+    if (pinhole) num_pixels += static_cast<double>(pinhole->width) * pinhole->height;
+  }
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  const double needed = kDiskBytesPerPixel * num_pixels;
+  if (error || needed <= static_cast<double>(space.available)) return;
+  const auto gigabytes = [](double bytes) { return Number(bytes / 1e9, 1) + " GB"; };
+  throw InputError(folder, "",
+                   "finding depth in " + std::to_string(photos.size()) + " photos takes " +
+                       gigabytes(needed) + " of the disk, and " +
+                       gigabytes(static_cast<double>(space.available)) + " are free",
+                   "Give a smaller --max_image_size, or an --output_path on another disk");
+}
+
 }  // namespace
+
+int DenseOptions::MaxNeighbours() const {
+  return std::max(SupplementOptions::kMaxConfirming, patch_match.num_sources);
+}
 
 void DenseOptions::Declare(OptionFields* fields) {
   fields
       ->Int("max_image_size", &pinhole.max_image_size,
             "Longest side of the pictures that depth is found in, pixels; 0 = as fine as the "
-            "photos. Time grows with its square.")
+            "photos. Time and disk grow with its square: 42 bytes a pixel and photo while it runs, "
+            "16 of them stay.")
       .Within(64, 100000, "pixels")
       .Or(0);
   fields
@@ -326,6 +361,7 @@ std::vector<std::string> DenseOptions::Problems() const {
 DenseResult MakeDense(const std::vector<Scan>& scans, const std::vector<DensePhoto>& photos,
                       const DenseOptions& options, const std::string& folder, uint64_t seed,
                       int num_threads, Progress* progress, std::vector<PhotoLeftOut>* left_out) {
+  RequireDisk(photos, options.pinhole, folder);
   progress->Stage("undistort", static_cast<int>(photos.size()));
   DenseRun run(options, folder, seed, num_threads, progress);
   run.Undistort(photos, left_out);

@@ -21,6 +21,8 @@ struct DenseOptions {
   PatchMatchOptions patch_match;
   SupplementOptions fusion;
   DenseOptions() { pinhole.max_image_size = 2000; }
+  // Photos that are compared with one, or confirm or deny its depth.
+  int MaxNeighbours() const;
 
   void Declare(OptionFields* fields);  // its own, not those of the structs in it
   std::vector<std::string> Problems() const;
@@ -46,8 +48,9 @@ struct DenseResult {
 };
 
 // Writes into `folder` COLMAP's dense workspace (images, sparse, stereo) and supplement.ply. Memory
-// is that of the scans and of some ten pictures, whatever the number of photos. Photos that cannot
-// be undistorted or read go to left_out. Does not depend on num_threads.
+// is that of the scans and of some ten pictures, whatever the number of photos; the disk's is
+// compared with what is free before anything is done (InputError). Photos that cannot be
+// undistorted or read go to left_out. Does not depend on num_threads.
 DenseResult MakeDense(const std::vector<Scan>& scans, const std::vector<DensePhoto>& photos,
                       const DenseOptions& options, const std::string& folder, uint64_t seed,
                       int num_threads, Progress* progress, std::vector<PhotoLeftOut>* left_out);

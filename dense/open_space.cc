@@ -27,7 +27,8 @@ OpenSpace::OpenSpace(const ScanSpace& space, const StereoPicture& picture, doubl
   const Eigen::Vector3d middle = 0.5 * (space.bounds().max + space.bounds().min);
   const double farthest = (centre - middle).norm() + 0.5 * size.norm() + kBeyondRoom;
   first_ = static_cast<float>(1 / farthest);
-  last_ = static_cast<float>(1 / kNearest);
+  // Of things smaller than a room all depths are nearer than kNearest.
+  last_ = std::max(static_cast<float>(1 / kNearest), 2 * first_);
   const CameraProjection projection(picture.camera);
   const Rigid scan_from_cam = picture.cam_from_scan.Inverse();
   std::vector<uint64_t> raw(static_cast<size_t>(columns_) * rows_, 0);

@@ -138,8 +138,9 @@ void Dense(const DenseCommandOptions& options, const Command::Context& context) 
   outputs->ReplaceAllOf("roomtex-dense");
 
   context.progress.Stage("read model");
-  const SparseModel model = ReadSparseModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  RequireAlignedModel(alignment);
+  const SparseModel model = ReadSparseModel(options.input_path);
   std::vector<PhotoLeftOut> left_out;
   const std::map<std::string, std::string> none;
   const std::vector<DensePhoto> photos =

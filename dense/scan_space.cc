@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
@@ -40,6 +41,10 @@ ScanSpace::ScanSpace(const std::vector<Scan>& scans, int num_threads)
     bounds_.min = bounds_.min.cwiseMin(bounds.min);
     bounds_.max = bounds_.max.cwiseMax(bounds.max);
     if (!scan.organised) continue;
+    // What this station saw: where it has no echo, another scan's wall farther off says nothing of
+    // what stands before it. Another scan's surface before its own is taken for there.
+    std::unique_ptr<const RayCaster> own;
+    if (scans.size() > 1) own = std::make_unique<RayCaster>(scan.points, BuildScanMesh(scan, {}));
     Station station;
     station.place = scan.Station();
     station.station_from_scan =
@@ -53,8 +58,9 @@ ScanSpace::ScanSpace(const std::vector<Scan>& scans, int num_threads)
         const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
                                         std::cos(elevation) * std::sin(azimuth),
                                         std::sin(elevation));
-        const auto hit = surface_.Cast(
-            station.place, station.station_from_scan.transpose() * direction, kNearDepth);
+        const Eigen::Vector3d along = station.station_from_scan.transpose() * direction;
+        if (own && !own->Cast(station.place, along, kNearDepth)) continue;
+        const auto hit = surface_.Cast(station.place, along, kNearDepth);
         if (hit) range(row, column) = static_cast<float>(hit->distance);
       }
     });

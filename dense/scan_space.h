@@ -26,7 +26,7 @@ class ScanSpace {
   const Bounds& bounds() const { return bounds_; }
 
  private:
-  // Ranges from a station on a raster of azimuth and elevation, metres; 0 = no echo.
+  // Ranges from a station on a raster of azimuth and elevation, metres; 0 = no echo of its own.
   struct Station {
     Eigen::Vector3d place;
     Eigen::Matrix3d station_from_scan;  // z up

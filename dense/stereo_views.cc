@@ -10,13 +10,24 @@ namespace {
 
 constexpr int kProbeColumns = 32, kProbeRows = 24;
 constexpr double kSameSight = 0.1;  // share
-constexpr double kTooNear_deg = 2, kGood_deg = 8, kStillGood_deg = 25, kTooFar_deg = 50;
+constexpr double kTooNear_deg = kSamePlace_deg, kGood_deg = 8, kStillGood_deg = 25,
+                 kTooFar_deg = 50;
 
 double WeightOfAngle(double angle) {
   const double deg = DegFromRad(angle);
   if (deg < kTooNear_deg || deg > kTooFar_deg) return 0;
   if (deg < kGood_deg) return (deg - kTooNear_deg) / (kGood_deg - kTooNear_deg);
   return deg < kStillGood_deg ? 1 : (kTooFar_deg - deg) / (kTooFar_deg - kStillGood_deg);
+}
+
+// Whether the two were taken from one place, as most of these places see it.
+bool IsSamePlace(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                 const std::vector<Eigen::Vector3d>& places) {
+  const double same = RadFromDeg(kSamePlace_deg);
+  const auto num_same = std::count_if(
+      places.begin(), places.end(),
+      [&](const Eigen::Vector3d& place) { return AngleBetween(a - place, b - place) < same; });
+  return 2 * static_cast<size_t>(num_same) > places.size();
 }
 
 }  // namespace
@@ -62,8 +73,14 @@ void FindNeighbours(const ScanSpace& space, int max_neighbours, std::vector<Ster
       if (score > 0) scores.emplace_back(-score, static_cast<int>(j));
     }
     std::sort(scores.begin(), scores.end());
-    for (size_t k = 0; k < scores.size() && static_cast<int>(k) < max_neighbours; ++k) {
-      (*views)[i].neighbours.push_back(scores[k].second);
+    std::vector<int>& neighbours = (*views)[i].neighbours;
+    for (const auto& [score, j] : scores) {
+      if (static_cast<int>(neighbours.size()) == max_neighbours) break;
+      const Eigen::Vector3d centre = (*views)[j].Centre();
+      const bool is_copy = std::any_of(neighbours.begin(), neighbours.end(), [&](int better) {
+        return IsSamePlace((*views)[better].Centre(), centre, places[i]);
+      });
+      if (!is_copy) neighbours.push_back(j);
     }
   }
 }

@@ -19,8 +19,12 @@ struct StereoView {
   Eigen::Vector3d Centre() const { return cam_from_scan.TargetOriginInSource(); }
 };
 
+// Places of photos that differ by less, as what they see has it, are one place: copies, bursts.
+inline constexpr double kSamePlace_deg = 2;
+
 // Fills `neighbours`, at most max_neighbours: by how much of the scan's surface two photos share,
-// at what angle. Too small an angle says little about depth, too large a one looks different.
+// at what angle. Too small an angle says little about depth, too large a one looks different. Of
+// photos from one place the best is taken.
 void FindNeighbours(const ScanSpace& space, int max_neighbours, std::vector<StereoView>* views);
 
 }  // namespace roomtex

@@ -22,8 +22,10 @@ struct SupplementOptions {
   // Normalised cross-correlation with the best two sources below which a depth counts for nothing.
   // Larger = stricter.
   double min_correlation = 0.7;
-  // Photos that a place must be found from, the one itself included. Larger = stricter.
+  // Photos that a place must be found from, from places 2 degrees apart as it sees them, the one
+  // itself included. Larger = stricter.
   int min_support = 3;
+  static constexpr int kMaxConfirming = 12;  // others that are asked
   // With this correlation two photos are enough; 1 = never. 0.85 finds more, and in some rooms
   // an island that is wrong (docs/dense.md). Larger = stricter.
   double min_pair_correlation = 1;
@@ -43,9 +45,9 @@ struct SupplementVertex {
   Eigen::Vector3d x_in_scan;
   Eigen::Vector3f normal;      // unit, towards the photo
   std::array<uint8_t, 3> rgb;  // of the photo
-  int support;                 // photos that it was found from
+  int support;                 // photos that it was found from, from different places
   float confidence;            // correlation, 0..1
-  float uncertainty;           // metres, standard deviation along the line of sight
+  float uncertainty;           // metres, standard deviation of the matching along the line of sight
 };
 
 struct Supplement {

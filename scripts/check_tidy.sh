@@ -29,6 +29,8 @@ changed_sources() {
   done <<<"$changed"
 }
 
+# What it finds goes to stdout; its stderr, which is counts and warnings of the build's flags, is thrown away below.
+command -v clang-tidy >/dev/null || { echo "check_tidy: clang-tidy is not there: scripts/setup.sh" >&2; exit 1; }
 cmake --preset tidy >/dev/null
 mapfile -t sources < <(sed -nE 's/^ *"file": "(.*)",?$/\1/p' build-tidy/compile_commands.json |
   grep -v '/tests/\|_page[.]cc$\|precompiled[.]cc$')

@@ -16,6 +16,8 @@ packages=(
   libcpp-httplib-dev libfmt-dev libpugixml-dev
   libmeshoptimizer-dev
   libboost-dev libgtest-dev libgmock-dev libbenchmark-dev
+  clang-format clang-tidy  # the gate: .ci/run
+  xdg-utils                # opens pages in the browser
   chromium
   opencv-doc  # its sample photos of a calibration board, for a test
 )

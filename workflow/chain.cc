@@ -6,6 +6,7 @@
 #include "core/child_program.h"
 #include "core/json_text.h"
 #include "core/report.h"
+#include "core/result_names.h"
 #include "core/text.h"
 #include "workflow/scanner_photos.h"
 
@@ -65,6 +66,12 @@ std::string Chain::ColorFolder() const {
   return KnownPath().empty() ? PhotoFolder() : LinkFolder();
 }
 
+bool Chain::IsPhotoFolder(const std::string& path) const {
+  return !path.empty() &&
+         (path == options_.image_path || path == options_.panoramas_path || path == PhotoFolder() ||
+          path == ColmapFolder() || path == ColorFolder());
+}
+
 bool Chain::OnlyScanner() const { return !HasPhotoSource(options_); }
 
 std::string Chain::ScannerFolder() const {
@@ -93,12 +100,18 @@ std::string Chain::PicksPath() const {
 
 std::string Chain::AlignedPath() const {
   if (OnlyScanner()) return ScannerFolder() + "/sparse";
-  std::error_code none, none_aside;
   const std::string aside = At("aligned.untrusted");
-  const auto time = fs::last_write_time(At("aligned/alignment.json"), none);
-  const auto aside_time = fs::last_write_time(aside + "/images.bin", none_aside);
-  if (!options_.accept_untrusted || none_aside) return At("aligned");
-  return none || aside_time > time ? aside : At("aligned");
+  if (!options_.accept_untrusted || !IsThere(aside + "/images.bin")) return At("aligned");
+  // A result that is not trusted lies aside where there is one that is. Which one is the last, its
+  // report says: the times of files do not outlive a copy, and a later trusted run leaves it there.
+  const auto is_trusted = [](const std::string& path, bool otherwise) {
+    const Json report = ReadJsonFile(path);
+    const Json trusted = report.is_object() ? report.value("trusted", Json()) : Json();
+    return trusted.is_boolean() ? trusted.get<bool>() : otherwise;
+  };
+  const bool last_is_trusted = is_trusted(ReportOf("align"), true);
+  const bool has_trusted = is_trusted(At(std::string("aligned/") + kAlignReportName), true);
+  return !last_is_trusted && has_trusted ? aside : At("aligned");
 }
 
 const std::vector<PhotoFacts>& Chain::Photos(const std::string& folder) {
@@ -126,7 +139,7 @@ std::vector<std::string> Chain::SparseModels() const {
   std::vector<std::string> models = {At("sparse/0")};
   for (int number = 1;; ++number) {
     const std::string model = At("sparse/" + std::to_string(number));
-    const Json report = ReadJsonFile(model + "/roomtex-mapper.json");
+    const Json report = ReadJsonFile(model + "/" + kMapperReportName);
     if (!report.is_object() || report.value("model", Json()) != number) break;
     models.push_back(model);
   }
@@ -140,7 +153,7 @@ CommandLine Chain::PickCommand() const {
   }
   AddOption("--image_path", ColorFolder(), &line);
   if (!options_.panoramas_path.empty()) {
-    AddOption("--panoramas_path", At("faces/panoramas.json"), &line);
+    AddOption("--panoramas_path", At(std::string("faces/") + kPanoramaSetName), &line);
   }
   for (const std::string& path : options_.scan_paths) AddOption("--scan_path", path, &line);
   AddScanReading(options_, &line);

@@ -32,7 +32,8 @@ class Chain {
   // own photos, links to the user's and theirs.
   std::string ColmapFolder() const;
   std::string ColorFolder() const;
-  bool IsAssociated() const;  // patterned and plain photos were told apart
+  bool IsAssociated() const;                          // patterned and plain photos were told apart
+  bool IsPhotoFolder(const std::string& path) const;  // one of these, or the user's
   // The scanner's own photos, in an E57. OnlyScanner: the user has none.
   bool OnlyScanner() const;
   bool UsesScanner() const { return !scanner_scan_.empty() && !IsAssociated(); }

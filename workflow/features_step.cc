@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/input_guard.h"
 #include "core/photo_files.h"
+#include "core/result_names.h"
 #include "core/text.h"
 #include "workflow/step_lines.h"
 
@@ -197,7 +198,7 @@ Step MakeFeatures(Chain* chain) {
   step.outputs = {chain->At(kPartialDatabase)};
   if (!options.cameras_path.empty()) step.inputs.push_back(options.cameras_path);
   const std::string of_faces =
-      HasPanoramas(chain) ? ReadText(chain->At("faces/camera_options.txt")) : "";
+      HasPanoramas(chain) ? ReadText(chain->At(std::string("faces/") + kCameraOptionsName)) : "";
   if (!of_faces.empty()) {
     CommandLine line = start;
     const std::vector<std::string> words = Words(of_faces);

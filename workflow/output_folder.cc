@@ -84,9 +84,7 @@ bool HoldsSomething(const std::string& path) {
 void RequireInputsApart(Chain* chain) {
   const AutoOptions& options = chain->options();
   for (const std::string& photos : {options.image_path, options.panoramas_path}) {
-    if (photos.empty() || !LiesIn(options.output_path, photos)) continue;
-    throw UsageError("--output_path " + options.output_path +
-                     " lies in the folder of the photos, " + photos + ": give one outside of it");
+    RequireOutsidePhotos(options.output_path, photos);
   }
   for (const Result& result : kResults) {
     const std::string made = chain->At(result.name);

@@ -8,6 +8,9 @@
 
 #include "core/json_text.h"
 #include "core/output_file.h"
+#include "core/photo_files.h"
+#include "core/result_names.h"
+#include "core/text.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
@@ -81,7 +84,22 @@ std::string HashText(const std::string& text) {
   return hash.Text();
 }
 
-std::string Signature(const std::string& path) {
+namespace {
+
+// What programs that show a folder leave in it (.DS_Store, Thumbs.db): nobody reads it, and to look
+// at photos must not make everything anew.
+bool IsLeftByLooking(const fs::path& below_folder) {
+  const auto is_hidden = [](const fs::path& part) {
+    const std::string name = part.string();
+    return name.size() > 1 && name[0] == '.' && name != "..";
+  };
+  const std::string name = LowerCase(below_folder.filename().string());
+  return name == "thumbs.db" || name == "desktop.ini" ||
+         std::any_of(below_folder.begin(), below_folder.end(), is_hidden);
+}
+
+template <typename Counts>
+std::string SignatureOf(const std::string& path, const Counts& counts) {
   std::error_code error;
   Hash hash;
   if (fs::is_regular_file(path, error)) {
@@ -94,7 +112,8 @@ std::string Signature(const std::string& path) {
                                          error);
   for (; !error && entry != fs::end(entry); entry.increment(error)) {
     std::error_code unknown;
-    if (entry->is_regular_file(unknown)) files.push_back(entry->path());
+    const fs::path name = entry->path().lexically_relative(path);
+    if (counts(name) && entry->is_regular_file(unknown)) files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());
   for (const fs::path& file : files) {
@@ -102,6 +121,19 @@ std::string Signature(const std::string& path) {
     AddFile(file, &hash);
   }
   return hash.Text();
+}
+
+}  // namespace
+
+std::string Signature(const std::string& path) {
+  return SignatureOf(path, [](const fs::path& name) { return !IsLeftByLooking(name); });
+}
+
+std::string SignatureOfPhotos(const std::string& folder) {
+  return SignatureOf(folder, [](const fs::path& name) {
+    const bool is_read = IsPhotoName(name.string()) || name == kPanoramaSetName;
+    return is_read && !IsLeftByLooking(name);
+  });
 }
 
 std::vector<std::string> Differences(const MadeFrom& before, const MadeFrom& now) {

@@ -10,9 +10,12 @@
 
 namespace roomtex {
 
-// A file by its size and content, a large one by size and time; a folder by all files in it. "" =
-// not there.
+// A file by its size and content, a large one by size and time; a folder by all files in it, but
+// for those that are hidden or that programs which show folders leave there. "" = not there.
 std::string Signature(const std::string& path);
+// A folder of photos by these alone (IsPhotoName(), and the list of faces of panoramas): notes
+// beside them change nothing. "" = not there.
+std::string SignatureOfPhotos(const std::string& folder);
 std::string HashText(const std::string& text);
 
 // What a step was made from: name ("room.e57", "roomtex") and signature or text of it.

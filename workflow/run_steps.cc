@@ -159,7 +159,8 @@ class StepRunner {
     }
     if (uses_colmap) from["COLMAP"] = chain_.Colmap().version();
     for (const std::string& path : step.inputs) {
-      const std::string signature = Signature(path);
+      const std::string signature =
+          chain_.IsPhotoFolder(path) ? SignatureOfPhotos(path) : Signature(path);
       if (signature.empty()) {
         throw InputError(path, "", "does not exist, and the step " + step.name + " needs it",
                          "Check the path");

@@ -65,27 +65,42 @@ class RoomMaker {
         return Set("unfinished", "The step " + step + " runs still, or was killed", {});
       }
     }
+    if (WasRefused()) return SayRefusal();
     try {
       const Json& verdict = report_.at("verdict");
       Set(verdict.at("state"), verdict.at("headline"), verdict.at("sentences").get<Texts>(),
           report_.at("remedies").get<Texts>());
     } catch (const Json::exception&) {
-      const std::string said = LastWords();
-      Set(said.empty() ? "unfinished" : "failed",
-          said.empty() ? "Not begun" : "It could not be started",
-          said.empty() ? Texts() : Texts{said});
+      SayRefusal();
     }
   }
 
+  // The last start ended before it could write anything: the report is of an earlier one.
+  bool WasRefused() const {
+    std::error_code none, no_report;
+    const auto time = fs::last_write_time(folder_ + kRefused, none);
+    const auto report_time = fs::last_write_time(folder_ + "/report.json", no_report);
+    return !none && (no_report || time >= report_time);
+  }
+  void SayRefusal() {
+    const std::string said =
+        LastWords(IsThere(folder_ + kRefused) ? kRefused : "/log/features.run.log");
+    const bool refused = !said.empty() || WasRefused();
+    Set(refused ? "failed" : "unfinished", refused ? "It could not be started" : "Not begun",
+        said.empty() ? Texts() : Texts{said});
+  }
+
   // What roomtex-auto said last before it could write anything.
-  std::string LastWords() const {
-    std::ifstream stream(folder_ + "/log/features.run.log");
+  std::string LastWords(const std::string& log) const {
+    std::ifstream stream(folder_ + log);
     std::string line, last;
     while (std::getline(stream, line)) {
       if (BeginsWith(line, "roomtex-auto: ")) last = line.substr(14);
     }
     return last;
   }
+
+  static constexpr char kRefused[] = "/log/refused";  // of run_step.sh
 
   void Photos() {
     if (!report_.is_object() || !report_.contains("photos") || !report_["photos"].is_array() ||

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/result_names.h"
 #include "core/text.h"
 #include "workflow/step_lines.h"
 #include "workflow/video_frames.h"
@@ -231,7 +232,8 @@ Step MakeAlign(Chain* chain) {
     step.inputs.push_back(picks);
   }
   AddOption("--image_path", chain->ColorFolder(), &line);
-  if (HasPanoramas(chain)) AddOption("--panoramas_path", chain->At("faces/panoramas.json"), &line);
+  if (HasPanoramas(chain))
+    AddOption("--panoramas_path", chain->At(std::string("faces/") + kPanoramaSetName), &line);
   AddOption("--output_path", chain->At("aligned"), &line);
   AddOption("--overlays", kNumOverlays, &line);
   AddOption("--report_path", chain->ReportOf("align"), &line);

@@ -82,6 +82,8 @@ Json FrameToJson(const GeoReference& geo) {
   json["ecef_from_enu_matrix"] = matrix;
   json["proj_utm_from_enu"] = ProjPipeline(geo.frame);
   json["enu_from_scan"] = RigidToJson(geo.enu_from_scan);
+  json["surveyed"] = geo.surveyed;
+  json["heading_assumed"] = geo.heading_assumed;
   return json;
 }
 
@@ -200,11 +202,15 @@ std::optional<GeoReference> FindGeoReference(const PlacedScans& placed,
                       !origin->heading_deg};
 }
 
-void WriteGeoModel(const SparseModel& aligned, const GeoReference& geo, const std::string& folder) {
+void WriteGeoModel(const SparseModel& aligned, const GeoReference& geo, const std::string& folder,
+                   const std::string& doubt) {
   SparseModel model = aligned;
   TransformModel({1, geo.enu_from_scan.rotation, geo.enu_from_scan.translation}, &model);
   WriteSparseModel(model, folder);
-  WriteJson(folder + "/geo.json", FrameToJson(geo));
+  Json json = FrameToJson(geo);
+  json["trusted"] = doubt.empty();
+  json["reason"] = doubt;
+  WriteJson(folder + "/geo.json", json);
   WriteCameras(aligned, geo, folder + "/cameras.csv");
 }
 
@@ -237,7 +243,6 @@ GpsCheck CheckGps(const SparseModel& aligned, const GeoReference& geo,
 
 Json GeoToJson(const GeoReference& geo, const PlacedScans& placed, const GpsCheck& gps) {
   Json json = FrameToJson(geo);
-  json["surveyed"] = geo.surveyed;
   json["stations"] = Json::array();
   for (size_t i = 0; i < placed.stations.size(); ++i) {
     const SurveyedStation& station = placed.stations[i];

@@ -39,7 +39,9 @@ std::optional<GeoReference> FindGeoReference(const PlacedScans& placed,
 // .bin; frame `enu`), geo.json (the way on to ECEF and the grid) and cameras.csv (image_name,
 // latitude, longitude, height, ecef_x, ecef_y, ecef_z, utm_zone, utm_easting, utm_northing; the
 // grid of the origin's zone; empty where the grid does not reach). aligned: in the `scan` frame.
-void WriteGeoModel(const SparseModel& aligned, const GeoReference& geo, const std::string& folder);
+// doubt: why the alignment is not to be trusted, "" = it is; geo.json takes it along.
+void WriteGeoModel(const SparseModel& aligned, const GeoReference& geo, const std::string& folder,
+                   const std::string& doubt = "");
 
 // Horizontal distances between the photos' EXIF GPS and their places in the aligned model, metres.
 struct GpsCheck {

@@ -19,10 +19,9 @@ Json BuildingJson(const OutlineBuilding& building) {
   return OutlineToJson(outline)["buildings"][0];
 }
 
-Json SolidJson(const OutlineBuilding& building) {
+Json SolidJson(const BuildingSolid& solid) {
   static const char* const kKinds[] = {"ground", "roof", "wall"};
   Json faces = Json::array();
-  const BuildingSolid solid = ExtrudeBuilding(building);
   for (const SolidFace& face : solid.faces) {
     Json corners = Json::array();
     for (const Eigen::Vector3d& x : solid.CornersOf(face)) corners.push_back({x.x(), x.y(), x.z()});
@@ -41,7 +40,11 @@ OutlineSession::OutlineSession(const OutlineWindowInput& input, OutlineCloud clo
       segments_(std::move(segments)) {
   const bool goes_on = std::filesystem::exists(input_.output_path);
   if (goes_on || !input_.outline_path.empty()) {
-    outline_ = ReadOutline(goes_on ? input_.output_path : input_.outline_path);
+    const std::string& path = goes_on ? input_.output_path : input_.outline_path;
+    outline_ = ReadOutline(path);
+    if (input_.geo_origin) PlaceOnEarth(*input_.geo_origin, path, &outline_);
+    // The model that is there now says how far it may be believed.
+    if (cloud_.frame.alignment) outline_.alignment = cloud_.frame.alignment;
     AdoptFrame(outline_, &cloud_, &segments_);
   } else {
     outline_ = ProposeOutline(cloud_, segments_, input_.proposal).outline;
@@ -62,11 +65,12 @@ Json OutlineSession::Buildings() {
     const BuildingEvidence& evidence = judged.evidence[i];
     Json one = BuildingJson(building);
     one["shape"] = building.RoofShape();
-    one["faces"] = SolidJson(building);
+    const BuildingSolid solid = ExtrudeBuilding(building);
+    one["faces"] = SolidJson(solid);
     one["doubts"] = evidence.doubts;
     one["explained"] = evidence.explained;
     one["corner_sigma"] = evidence.corner_sigma;
-    one["volume"] = ExtrudeBuilding(building).Volume();
+    one["volume"] = solid.Volume();
     json["buildings"].push_back(one);
   }
   return json;
@@ -193,22 +197,7 @@ Json OutlineSession::SetUp(const Json& request) {
   const Similarity before = outline_.outline_from_input;
   Level(&cloud_, &segments_);
   outline_.outline_from_input = cloud_.frame.outline_from_input;
-  const Similarity now_from_before = outline_.outline_from_input * before.Inverse();
-  const auto turned = [&](const Eigen::Vector2d& x, double z) {
-    return now_from_before * Eigen::Vector3d(x.x(), x.y(), z);
-  };
-  // Footprints go along with the floor they stand on; heights stay above the first corner.
-  for (OutlineBuilding& building : outline_.buildings) {
-    const double rise = turned(building.footprint[0], building.ground).z() - building.ground;
-    for (RoofPlane& plane : building.roof) {
-      plane.point.head<2>() = turned(plane.point.head<2>(), building.ground).head<2>();
-      plane.point.z() += rise;
-    }
-    for (Eigen::Vector2d& corner : building.footprint) {
-      corner = turned(corner, building.ground).head<2>();
-    }
-    building.ground += rise;
-  }
+  MoveBuildings(outline_.outline_from_input * before.Inverse(), &outline_.buildings);
   ++revision_;
   ++points_revision_;
   Save(false);

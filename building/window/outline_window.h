@@ -2,6 +2,7 @@
 // The page of roomtex-outline: contours drawn and changed over the points, in a browser
 // (thesis 9.3, steps 1 to 5). The paths that it serves: building/README.md.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct OutlineWindowInput {
   // What to begin with: output_path if it is there, else outline_path, else a proposal.
   std::string outline_path, output_path;
   std::vector<std::string> model_paths;
+  std::optional<GeoPosition> geo_origin;  // --geo_origin, for what is read (PlaceOnEarth())
 };
 
 // Serves until it is stopped; every change is saved to output_path, the file that was there is kept

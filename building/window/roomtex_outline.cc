@@ -65,6 +65,49 @@ void AddOutlineOptions(OutlineArguments* a, Command* command) {
 #endif
 }
 
+// Options that were given and that nothing asks for.
+std::vector<std::string> IdleOptions(const OutlineArguments& a, bool window) {
+  std::vector<std::string> idle;
+  if (a.outline_path.empty() || window) return idle;
+  const auto add = [&idle](bool given, const char* option) {
+    if (given) idle.emplace_back(option);
+  };
+  const OutlineInputOptions input;
+  const ProposalOptions proposal;
+  if (a.input.input_path.empty()) {
+    add(a.input.sparse_path != input.sparse_path, "--sparse_path");
+    add(a.input.up != input.up, "--up");
+    add(a.input.scale != input.scale, "--scale");
+  }
+  add(a.proposal.area != proposal.area, "--area");
+  add(a.proposal.min_area != proposal.min_area, "--min_area");
+  add(a.proposal.right_angles != proposal.right_angles, "--right_angles");
+  return idle;
+}
+
+// --outline_path, on the Earth if --geo_origin says where.
+Outline ReadGivenOutline(const OutlineArguments& a) {
+  Outline outline = ReadOutline(a.outline_path);
+  if (const auto origin = a.input.GeoOrigin()) PlaceOnEarth(*origin, a.outline_path, &outline);
+  return outline;
+}
+
+// What the buildings' model says of itself holds of them, too.
+void TakeOverAlignment(const Outline& outline, const std::string& path, bool accept,
+                       const Command::Context& context) {
+  if (!outline.alignment) return;
+  AlignmentRecord record;
+  record.folder = path;
+  record.trusted = outline.alignment->trusted;
+  record.reason = outline.alignment->reason;
+  TakeOverTrust(record, accept, context);
+  if (outline.geo && outline.alignment->north_assumed) {
+    context.Warn(
+        "which way is north was assumed, not measured: roomtex-align had no surveyed station and "
+        "no heading in --geo_origin. The buildings may be turned about their place by any angle");
+  }
+}
+
 void CheckOutlineArguments(const OutlineArguments& a) {
   std::vector<std::string> problems = a.input.Problems();
   AppendProblems(a.proposal.Problems(), &problems);
@@ -84,13 +127,19 @@ void CheckOutlineArguments(const OutlineArguments& a) {
   if (a.input.input_path.empty() && window) {
     problems.push_back("--window needs the points: give --input_path");
   }
+  for (const std::string& option : IdleOptions(a, window)) {
+    problems.push_back(option + " says nothing here: with --outline_path " +
+                       (a.input.input_path.empty() ? "and without --input_path there are no points "
+                                                     "to read"
+                                                   : "nothing is proposed"));
+  }
   ThrowIfProblems(problems);
   if (fs::is_directory(a.output_path)) {
     throw InputError(a.output_path, "", "is a folder", "Name a file for the outline: outline.json");
   }
   // What is extruded or judged is written as it was read: the same line a second time.
   const auto is_copy = [&] {
-    return !a.outline_path.empty() && HoldsSameOutline(a.output_path, a.outline_path);
+    return !a.outline_path.empty() && HoldsSameOutline(a.output_path, ReadGivenOutline(a));
   };
   if (!window && WasEdited(a.output_path) && !is_copy()) {
     throw InputError(a.output_path, "",
@@ -193,7 +242,8 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   if (a.input.input_path.empty()) {
     // A person's buildings, without points to compare them with.
     OutlineProposal drawn;
-    drawn.outline = ReadOutline(a.outline_path);
+    drawn.outline = ReadGivenOutline(a);
+    TakeOverAlignment(drawn.outline, a.outline_path, a.accept_untrusted, context);
     CommitFilesAtEnd();
     ReportOutline(drawn, false, context);
     WriteModels(a, drawn.outline);
@@ -206,9 +256,7 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
   const int threads = context.options.num_threads;
   context.progress.Stage("read points");
   OutlineCloud cloud = ReadOutlineCloud(a.input, threads);
-  if (!model_folder.empty()) {
-    TakeOverTrust(ReadAlignmentRecord(model_folder), a.accept_untrusted, context);
-  }
+  TakeOverAlignment(cloud.frame, model_folder, a.accept_untrusted, context);
   context.progress.Stage("find planes");
   std::vector<PlaneSegment> segments =
       FindPlaneSegments(cloud, static_cast<uint64_t>(context.options.random_seed), threads);
@@ -231,10 +279,15 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
       context.Warn("--outline_path is not used: " + a.output_path +
                    " is there already, and the window goes on with it");
     }
-    const OutlineWindowInput window{a.proposal,     a.server,      kOutlinePage,
-                                    a.outline_path, a.output_path, a.model_paths};
+    const OutlineWindowInput window{a.proposal,         a.server,      kOutlinePage,
+                                    a.outline_path,     a.output_path, a.model_paths,
+                                    a.input.GeoOrigin()};
+    const bool model_says = cloud.frame.alignment.has_value();
     const OutlineProposal drawn =
         RunOutlineWindow(window, std::move(cloud), std::move(segments), context);
+    if (!model_says) {
+      TakeOverAlignment(drawn.outline, a.output_path, a.accept_untrusted, context);
+    }
     WriteModels(a, drawn.outline);
     ReportOutline(drawn, true, context);
     return;
@@ -246,7 +299,12 @@ void MakeOutline(const OutlineArguments& a, const Command::Context& context) {
     proposal = ProposeOutline(cloud, segments, a.proposal);
   } else {
     context.progress.Stage("compare with points");
-    const Outline outline = ReadOutline(a.outline_path);
+    Outline outline = ReadGivenOutline(a);
+    if (cloud.frame.alignment) {
+      outline.alignment = cloud.frame.alignment;  // as it is now
+    } else {
+      TakeOverAlignment(outline, a.outline_path, a.accept_untrusted, context);
+    }
     AdoptFrame(outline, &cloud, &segments);
     proposal = JudgeOutline(cloud, segments, outline);
   }

@@ -99,6 +99,7 @@ class Finder {
     Search();
     Measure();
     FollowSameLight();
+    ComparePartners();
     return Collect();
   }
 
@@ -317,12 +318,86 @@ class Finder {
     Measure();
   }
 
+  // Two photos that share a partner show one place, too, whatever small pictures say: with both
+  // projectors, with one and with none, each is compared with each.
+  void ComparePartners() {
+    while (true) {
+      std::map<int, std::set<int>> partners;
+      std::set<std::pair<int, int>> known;
+      for (const Candidate& c : candidates_) {
+        known.insert({c.first, c.second});
+        if (!IsUnmoved(c)) continue;
+        partners[c.first].insert(c.second);
+        partners[c.second].insert(c.first);
+      }
+      const size_t num_before = candidates_.size();
+      for (const auto& [photo, others] : partners) {
+        for (const int a : others) {
+          for (const int b : others) {
+            if (a >= b || !known.insert({a, b}).second) continue;
+            Candidate c;
+            c.first = a;
+            c.second = b;
+            c.found_by = "search";
+            c.place.same_place = true;
+            c.light = CompareLight(photos_[a], photos_[b], c.place.shift);
+            candidates_.push_back(std::move(c));
+          }
+        }
+      }
+      if (candidates_.size() == num_before) return;
+      Measure();
+    }
+  }
+
+  static bool HasClearDetail(const Candidate& c) {
+    return c.light.detail_ratio > kClearDetail || c.light.detail_ratio < 1 / kClearDetail;
+  }
+
+  // Photos with a pattern: those that have more detail than another one of their place. Photos
+  // that share part of a pattern lie on each other best of all, so that this comes before offsets.
+  void FindPatterned() {
+    std::set<int> plain;
+    for (const Candidate& c : candidates_) {
+      if (!IsUnmoved(c) || !HasClearDetail(c)) continue;
+      has_pattern_.insert(c.patterned());
+      plain.insert(c.plain());
+    }
+    for (const int photo : plain) {
+      if (has_pattern_.count(photo) == 0) is_plain_.insert(photo);
+    }
+  }
+  // An unmoved pair of a photo with a pattern and one without.
+  bool IsPair(const Candidate& c) const {
+    return IsUnmoved(c) && has_pattern_.count(c.plain()) == 0 &&
+           is_plain_.count(c.patterned()) == 0;
+  }
+
+  // A better plain photo for the same patterned one: what has least of the pattern, and, where
+  // exposures tell, of its light; among equals, the one that lies on it best.
+  static bool IsBetter(const Candidate& a, const Candidate& b) {
+    constexpr double kEqual = 1.15;
+    const double share = a.light.changed_share / b.light.changed_share;
+    if (share > kEqual || share < 1 / kEqual) return share > 1;
+    if (a.light.exif_brightness && b.light.exif_brightness) {
+      const double ratio = BrightnessRatio(a) / BrightnessRatio(b);
+      if (ratio > kEqual || ratio < 1 / kEqual) return ratio > 1;
+    }
+    return a.camera.offset_px < b.camera.offset_px;
+  }
+  // Patterned over plain.
+  static double BrightnessRatio(const Candidate& c) {
+    return c.second_is_patterned ? c.light.brightness_ratio
+                                 : 1 / std::max(c.light.brightness_ratio, 1e-9);
+  }
+
   Associations Collect() {
+    FindPatterned();
     std::map<int, const Candidate*> best_of_patterned;
     for (const Candidate& c : candidates_) {
-      if (!IsUnmoved(c)) continue;
+      if (!IsPair(c)) continue;
       const Candidate*& best = best_of_patterned[c.patterned()];
-      if (best == nullptr || c.camera.offset_px < best->camera.offset_px) best = &c;
+      if (best == nullptr || IsBetter(c, *best)) best = &c;
     }
     std::map<int, const Candidate*> best_of_plain;
     for (const auto& [patterned, c] : best_of_patterned) {
@@ -349,15 +424,28 @@ class Finder {
     pair.shift = c.camera.shift;
     pair.offset_px = c.camera.offset_px;
     pair.offset_error_px = c.camera.error_px;
-    pair.brightness_ratio = c.second_is_patterned ? c.light.brightness_ratio
-                                                  : 1 / std::max(c.light.brightness_ratio, 1e-9);
+    pair.brightness_ratio = BrightnessRatio(c);
     pair.exif_brightness = c.light.exif_brightness;
     if (c.keypoints) pair.num_common_keypoints = c.keypoints->num_common;
     pair.found_by = c.found_by;
     pair.by_keypoints = c.by_keypoints;
     pair.is_spare = is_spare;
     if (pair.brightness_ratio < kEqualBrightness) not_brighter_.push_back(pair);
+    WarnOfKeypoints(c);
     return pair;
+  }
+
+  // Keypoints that contradict the edges.
+  void WarnOfKeypoints(const Candidate& c) {
+    if (c.by_keypoints || !c.keypoints || c.keypoints->num_common == 0) return;
+    const double difference = (c.keypoints->shift - c.camera.shift).norm();
+    const double errors = c.keypoints->error_px + c.camera.error_px;
+    if (!(difference > options_.max_offset + 2 * errors)) return;
+    result_.warnings.push_back(fmt::format(
+        "{} and {}: their edges say that the camera moved by {:.2f} pixels, {} keypoints of the "
+        "database that both have say {:.2f}: look at the two before they are used",
+        photos_[c.patterned()].name, photos_[c.plain()].name, c.camera.offset_px,
+        c.keypoints->num_common, c.keypoints->shift.norm()));
   }
 
   void CollectMoved() {
@@ -389,12 +477,15 @@ class Finder {
   std::string WhySingle(int i) const {
     if (!IsUsable(i)) return "it cannot be read: " + photos_[i].unreadable;
     const Candidate *moved = nullptr, *unclear = nullptr, *spare = nullptr, *same = nullptr;
+    const Candidate* of_pattern = nullptr;
     for (const Candidate& c : candidates_) {
       if (c.first != i && c.second != i) continue;
       if (c.light.same_light) {
         same = &c;
-      } else if (IsUnmoved(c)) {
+      } else if (IsPair(c)) {
         spare = &c;
+      } else if (IsUnmoved(c)) {
+        of_pattern = &c;
       } else if (!IsKnown(c)) {
         unclear = &c;
       } else if (moved == nullptr || c.camera.offset_px < moved->camera.offset_px) {
@@ -405,6 +496,14 @@ class Finder {
       return photos_[c->first == i ? c->second : c->first].name;
     };
     if (spare != nullptr) return "a further plain photo of the place of " + other(spare);
+    if (of_pattern != nullptr && is_plain_.count(i) == 0) {
+      return other(of_pattern) +
+             " of its place has a pattern itself, and no photo without any was found there that "
+             "the camera did not move for";
+    }
+    if (of_pattern != nullptr) {
+      return "a further plain photo, in other light, of the place of " + other(of_pattern);
+    }
     if (moved != nullptr) {
       return fmt::format("the camera moved by {:.2f} pixels against {}", moved->camera.offset_px,
                          other(moved));
@@ -440,6 +539,7 @@ class Finder {
   std::vector<Candidate> candidates_;
   std::map<int, int> other_size_;
   std::vector<AssociatedPair> not_brighter_;
+  std::set<int> has_pattern_, is_plain_;  // by their detail
   Associations result_;
 };
 

@@ -119,7 +119,8 @@ int main(int argc, char** argv) {
                   "--output_path associations.csv --links_path links");
   command.AddInputPath("database_path", &arguments.options.database_path,
                        "COLMAP's database, opened read-only; its keypoints, if there are any, "
-                       "confirm that the camera did not move",
+                       "tell how far the camera moved where edges are too few, and it is said "
+                       "where they contradict the edges",
                        Command::Kind::kOptional);
   command.AddInputPath("image_path", &arguments.options.image_path,
                        "folder with all photos, patterned and plain; subfolders are searched");

@@ -2,7 +2,7 @@
 // The calibration board (thesis 5.2): which corners it has and where they lie on it.
 //
 // Frame `board`: metres, origin in the first inner corner, x along a row of corners, y along a
-// column, z = 0 on the board.
+// column, z = 0 on a flat board (calibration_fit.h: one that is not).
 
 #include <string>
 #include <vector>

@@ -37,12 +37,35 @@ double RobustSigma(const Eigen::Matrix2Xd& residuals, double unknowns) {
   return std::sqrt(Median(squares) / (2 * std::log(2.0)) * coordinates / left);
 }
 
+// Highest less lowest corner, and whether that has to be taken into account: a bow that is
+// certain, and moves the focal length.
+BoardBow DescribeBow(const Board& board, const BentFit& bent, const Camera& without) {
+  constexpr double kCertain = 5, kMoves = 2;  // standard deviations
+  constexpr double kNoticeable = 0.1;         // percent of the focal length
+  BoardBow bow;
+  if (!bent.found) return bow;
+  Eigen::Matrix2Xd corners(2, board.NumCorners());
+  for (int id = 0; id < board.NumCorners(); ++id) corners.col(id) = board.CornerOnBoard(id);
+  const Eigen::Matrix3Xd shapes = BendShapes(board, corners);
+  const Eigen::VectorXd heights = shapes.transpose() * bent.bend;
+  Eigen::Index highest = 0, lowest = 0;
+  bow.height = heights.maxCoeff(&highest) - heights.minCoeff(&lowest);
+  const Eigen::Vector3d difference = shapes.col(highest) - shapes.col(lowest);
+  bow.sigma = std::sqrt(difference.dot(bent.bend_covariance * difference));
+  const double focal = bent.fit.camera.MeanFocalLength();
+  bow.focal_percent = 100 * (without.MeanFocalLength() / focal - 1);
+  const double focal_sigma = 100 * std::sqrt(bent.fit.covariance(0, 0)) / focal;
+  bow.used = bow.height > kCertain * bow.sigma &&
+             std::abs(bow.focal_percent) > std::max(kNoticeable, kMoves * focal_sigma);
+  return bow;
+}
+
 // The photos that take part, and what became of their corners.
 class PhotoSelection {
  public:
   PhotoSelection(const std::vector<BoardPhoto>& photos, const Board& board,
                  const CalibrationOptions& options)
-      : photos_(photos), options_(options) {
+      : photos_(photos), board_(board), options_(options) {
     for (size_t i = 0; i < photos.size(); ++i) {
       if (!photos[i].reason.empty()) continue;
       if (photos[i].NumCorners() < kMinCorners) continue;
@@ -56,20 +79,19 @@ class PhotoSelection {
   void Select() {
     const BoardPhoto& first = photos_[index_.front()];
     fit_ = RoughFit(views_, first.width, first.height);
+    SelectWithBend();
+    if (!TakeBend()) return;
+    // Corners and photos were judged by a flat board.
+    SelectWithBend();
+    TakeBend();
     Fit();
-    while (true) {
-      const int worst = WorstPhoto();
-      if (worst < 0) break;
-      Drop(worst);
-      Fit();
-    }
-    if (TakeBack()) Fit();
   }
 
   const std::vector<size_t>& index() const { return index_; }
   const std::vector<BoardView>& views() const { return views_; }
   const CameraFit& fit() const { return fit_; }
   double sigma() const { return sigma_; }
+  const BoardBow& bow() const { return bow_; }
 
   struct Dropped {
     size_t index;
@@ -80,6 +102,31 @@ class PhotoSelection {
   const std::vector<Dropped>& dropped() const { return dropped_; }
 
  private:
+  void SelectWithBend() {
+    Fit();
+    while (true) {
+      const int worst = WorstPhoto();
+      if (worst < 0) break;
+      Drop(worst);
+      Fit();
+    }
+    if (TakeBack()) Fit();
+  }
+
+  // Whether the board is bent, and whether that matters: true if it is taken into account.
+  bool TakeBend() {
+    for (BoardView& view : views_) view.bend.setZero();
+    const double huber_px = kHuberSigmas * sigma_;
+    const CameraFit without = FitCamera(views_, fit_.lens, fit_, huber_px);
+    const BentFit bent = FitBend(views_, without, huber_px);
+    bow_ = DescribeBow(board_, bent, without.camera);
+    const Eigen::Vector3d bend = bow_.used ? bent.bend : Eigen::Vector3d::Zero();
+    for (BoardView& view : views_) view.bend = bend;
+    for (Dropped& one : dropped_) one.view.bend = bend;
+    if (bow_.used) fit_ = bent.fit;
+    return bow_.used;
+  }
+
   // The richest lens that so few photos can bear: what it cannot explain is not the lens.
   LensModel JudgingLens() const { return LensModels()[views_.size() < 6 ? 2 : 3]; }
 
@@ -184,6 +231,7 @@ class PhotoSelection {
   }
 
   const std::vector<BoardPhoto>& photos_;
+  const Board& board_;
   const CalibrationOptions& options_;
   std::vector<size_t> index_;  // into photos_, per view
   std::vector<BoardView> views_;
@@ -191,6 +239,7 @@ class PhotoSelection {
   CameraFit fit_;
   std::vector<double> sigmas_;
   double sigma_ = 0;
+  BoardBow bow_;
 };
 
 // Why a photo was left out.
@@ -324,6 +373,11 @@ void CalibrationOptions::Declare(OptionFields* fields) {
       ->Number("Trust.max_sigma_px", &max_sigma_px,
                "Pixels; largest standard deviation of the whole picture (root mean square).")
       .Positive();
+  fields
+      ->Number("Trust.max_photo_scatter", &max_photo_scatter,
+               "Photos may disagree at most this many times as much as the noise of their corners "
+               "lets expect; larger = more tolerant.")
+      .AtLeast(1);
 }
 
 std::vector<std::string> CalibrationOptions::Problems() const { return ProblemsOf(*this); }
@@ -352,6 +406,7 @@ Calibration Calibrate(const std::vector<BoardPhoto>& photos, const Board& board,
   result.camera = RoundedCamera(fit.camera);
   result.lens = fit.lens;
   result.sigma_px = fit.sigma_px;
+  result.bow = selection.bow();
   if (!fit.converged) {
     result.reasons.emplace_back(
         "the adjustment came to no rest: what the photos show leaves the camera open, or fits no "

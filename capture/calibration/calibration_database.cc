@@ -1,6 +1,7 @@
 #include "capture/calibration/calibration_database.h"
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 
 #include "colmap_ext/database.h"
@@ -44,6 +45,37 @@ Camera ScaledCamera(const Camera& camera, int width, int height) {
   return scaled;
 }
 
+void RequireNoLog(const std::string& output_path) {
+  for (const char* ending : {"-wal", "-journal"}) {
+    const std::string log = output_path + ending;
+    std::error_code error;
+    const auto size = std::filesystem::file_size(log, error);
+    if (error) continue;
+    if (size > 0) {
+      throw InputError(log, "",
+                       "is a log of changes to a database of this name: it is in use, or a program "
+                       "that worked on it was killed",
+                       "End the program, or remove the database and its log, or give another "
+                       "--apply_output");
+    }
+    std::filesystem::remove(log, error);
+  }
+}
+
+void RequireNothingNew(const std::string& output_path, const std::string& database_path) {
+  if (!std::filesystem::exists(output_path)) return;
+  const Database copy(output_path), database(database_path);
+  const bool same_images = copy.ReadImages().size() == database.ReadImages().size();
+  if (same_images && copy.CountKeypoints() == database.CountKeypoints() &&
+      copy.CountPairs() <= database.CountPairs()) {
+    return;
+  }
+  throw InputError(output_path, "",
+                   "is there and has other photos, features or pairs than " + database_path +
+                       ": something was made in it since",
+                   "To replace it, name it with --apply_output; or give that another name");
+}
+
 AppliedCameras ApplyToDatabase(const Camera& calibrated, const std::string& database_path,
                                const std::string& output_path) {
   const Database database(database_path);
@@ -78,6 +110,7 @@ AppliedCameras ApplyToDatabase(const Camera& calibrated, const std::string& data
   }
   if (cameras.empty()) RefuseSize(database_path, calibrated, old_cameras.begin()->second);
   applied.has_pairs = database.CountPairs() > 0;
+  RequireNoLog(output_path);
   OutputFile file(output_path);
   database.CopyWithCameras(file.partial_path(), cameras);
   file.Commit();

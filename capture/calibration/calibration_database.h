@@ -23,6 +23,13 @@ struct AppliedCameras {
 AppliedCameras ApplyToDatabase(const Camera& calibrated, const std::string& database_path,
                                const std::string& output_path);
 
+// Before the work, and before the rename: throws InputError where a log of SQLite (-wal, -journal)
+// lies beside output_path, which would be played into the new file. Empty ones are removed.
+void RequireNoLog(const std::string& output_path);
+// Throws InputError where output_path, which nobody named, is a copy of the database in which
+// something has been made since: photos, features or pairs.
+void RequireNothingNew(const std::string& output_path, const std::string& database_path);
+
 // The camera of photos enlarged to width x height, which must have exactly the same shape.
 Camera ScaledCamera(const Camera& camera, int width, int height);
 

@@ -25,21 +25,26 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 constexpr int kMaxIterations = 100;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Projection of one corner and its derivatives: by the first kParams parameters of the camera, and
-// by a turn (about the board's origin, in `cam`) and a shift of the board.
+// What all views share, in this order: the bend of the board, the parameters of the camera.
+constexpr int kBends = 3;
+template <int kParams>
+constexpr int kShared = kParams > 0 ? kBends + kParams : 0;
+
+// Projection of one corner and its derivatives: by what views share (with the first kParams
+// parameters of the camera), and by a turn (about the board's origin, in `cam`) and a shift of the
+// board.
 template <int kParams>
 struct Projected {
   Eigen::Vector2d x_in_img;
-  Eigen::Matrix<double, 2, kParams> by_params;
+  Eigen::Matrix<double, 2, kShared<kParams>> by_shared;
   Eigen::Matrix<double, 2, 6> by_pose;
 };
 
 // kParams: 0 or kMaxCameraParams (parameters that the model lacks have zero derivatives).
 template <int kParams>
 std::optional<Projected<kParams>> ProjectCorner(const Camera& camera, const Rigid& cam_from_board,
-                                                const Eigen::Vector2d& x_on_board) {
-  const Eigen::Vector3d turned =
-      cam_from_board.rotation * Eigen::Vector3d(x_on_board.x(), x_on_board.y(), 0);
+                                                const BoardView& view, int corner) {
+  const Eigen::Vector3d turned = cam_from_board.rotation * view.CornerOnBoard(corner);
   const Eigen::Vector3d x = turned + cam_from_board.translation;
   if (!(x.z() > 1e-9)) return std::nullopt;
   const double u = x.x() / x.z(), v = x.y() / x.z();
@@ -48,22 +53,28 @@ std::optional<Projected<kParams>> ProjectCorner(const Camera& camera, const Rigi
   if (!seen.x_in_img.allFinite()) return std::nullopt;
   Projected<kParams> result;
   result.x_in_img = seen.x_in_img;
-  result.by_params = seen.by_params;
   // As in align's ReprojectionCost, which divides by z in another order and has a pose of another
   // form: to unite them would change both results in the last bits.
   Eigen::Matrix<double, 2, 3> uv_by_x;
   uv_by_x << 1 / x.z(), 0, -u / x.z(), 0, 1 / x.z(), -v / x.z();
   const Eigen::Matrix<double, 2, 3> by_x = seen.by_ray * uv_by_x;
+  if constexpr (kParams > 0) {
+    const Eigen::Vector3d up = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
+    result.by_shared << by_x * up * view.shapes.col(corner).transpose(), seen.by_params;
+  }
   result.by_pose << -by_x * CrossMatrix(turned), by_x;
   return result;
 }
 
-// The normal equations of one photo: camera (A), both (B), pose (C); right-hand sides a and b.
+// The normal equations of one photo: what is shared (A), both (B), pose (C); right-hand sides a and
+// b.
 template <int kParams>
 struct Equations {
-  Eigen::Matrix<double, kParams, kParams> A = Eigen::Matrix<double, kParams, kParams>::Zero();
-  Eigen::Matrix<double, kParams, 6> B = Eigen::Matrix<double, kParams, 6>::Zero();
-  Eigen::Matrix<double, kParams, 1> a = Eigen::Matrix<double, kParams, 1>::Zero();
+  template <int kColumns>
+  using Rows = Eigen::Matrix<double, kShared<kParams>, kColumns>;
+  Rows<kShared<kParams>> A = Rows<kShared<kParams>>::Zero();
+  Rows<6> B = Rows<6>::Zero();
+  Rows<1> a = Rows<1>::Zero();
   Matrix6 C = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
   double cost = 0;  // infinite when a corner has no projection
@@ -78,7 +89,7 @@ Equations<kParams> MakeEquations(const BoardView& view, const Camera& camera,
   const double limit = huber_px > 0 ? huber_px / std::sqrt(view.weight) : kInfinity;
   for (int i = 0; i < view.x_on_board.cols(); ++i) {
     if (!view.used[i]) continue;
-    const auto projected = ProjectCorner<kParams>(camera, cam_from_board, view.x_on_board.col(i));
+    const auto projected = ProjectCorner<kParams>(camera, cam_from_board, view, i);
     if (!projected) {
       block.cost = kInfinity;
       return block;
@@ -88,9 +99,9 @@ Equations<kParams> MakeEquations(const BoardView& view, const Camera& camera,
     const double weight = view.weight * HuberWeight(length, limit);
     block.cost += view.weight * HuberCost(length, limit);
     if constexpr (kParams > 0) {
-      block.A.noalias() += weight * projected->by_params.transpose() * projected->by_params;
-      block.B.noalias() += weight * projected->by_params.transpose() * projected->by_pose;
-      block.a.noalias() += weight * projected->by_params.transpose() * residual;
+      block.A.noalias() += weight * projected->by_shared.transpose() * projected->by_shared;
+      block.B.noalias() += weight * projected->by_shared.transpose() * projected->by_pose;
+      block.a.noalias() += weight * projected->by_shared.transpose() * residual;
     }
     block.C.noalias() += weight * projected->by_pose.transpose() * projected->by_pose;
     block.b.noalias() += weight * projected->by_pose.transpose() * residual;
@@ -106,18 +117,38 @@ Matrix Damped(Matrix matrix, double damping) {
   return matrix;
 }
 
-// The camera's normal equations with the poses eliminated (Schur complement).
+// Which of the shared unknowns are free.
+struct Unknowns {
+  int first = 0, count = 0;
+};
+Unknowns UnknownsOf(const LensModel& lens, bool with_bend) {
+  return with_bend ? Unknowns{0, kBends + lens.num_free} : Unknowns{kBends, lens.num_free};
+}
+bool HasBend(const std::vector<BoardView>& views) { return !views.front().bend.isZero(0); }
+
+// The normal equations of what is shared, with the poses eliminated (Schur complement).
 struct ReducedBlock {
   Eigen::MatrixXd S;
   Eigen::VectorXd g;
 };
 
-ReducedBlock Reduce(const Block& block, int num_free, double damping) {
+ReducedBlock Reduce(const Block& block, const Unknowns& free, double damping) {
   const Eigen::LDLT<Matrix6> C(Damped(block.C, damping));
-  const Eigen::MatrixXd A = block.A.topLeftCorner(num_free, num_free);
-  const Eigen::MatrixXd B = block.B.topRows(num_free);
+  const Eigen::MatrixXd A = block.A.block(free.first, free.first, free.count, free.count);
+  const Eigen::MatrixXd B = block.B.middleRows(free.first, free.count);
   return {Damped(A, damping) - B * C.solve(B.transpose()),
-          block.a.head(num_free) - B * C.solve(block.b)};
+          block.a.segment(free.first, free.count) - B * C.solve(block.b)};
+}
+
+ReducedBlock SumReduced(const std::vector<Block>& blocks, const Unknowns& free, double damping) {
+  ReducedBlock sum{Eigen::MatrixXd::Zero(free.count, free.count),
+                   Eigen::VectorXd::Zero(free.count)};
+  for (const Block& block : blocks) {
+    const ReducedBlock reduced = Reduce(block, free, damping);
+    sum.S += reduced.S;
+    sum.g += reduced.g;
+  }
+  return sum;
 }
 
 // Inverse of a positive definite matrix whose rows differ by many orders of magnitude; none if it
@@ -165,13 +196,8 @@ double SumOfCosts(const std::vector<Block>& blocks) {
 
 // One damped step of all unknowns; unchanged if the equations cannot be solved.
 CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double damping) {
-  const int n = fit.lens.num_free;
-  ReducedBlock sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  for (const Block& block : blocks) {
-    const ReducedBlock reduced = Reduce(block, n, damping);
-    sum.S += reduced.S;
-    sum.g += reduced.g;
-  }
+  const Unknowns free = UnknownsOf(fit.lens, false);
+  const ReducedBlock sum = SumReduced(blocks, free, damping);
   const Eigen::VectorXd scale = sum.S.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * sum.S * scale.asDiagonal();
   const Eigen::VectorXd step =
@@ -181,7 +207,8 @@ CameraFit Stepped(const CameraFit& fit, const std::vector<Block>& blocks, double
   stepped.camera = WithStep(fit.camera, step);
   for (size_t i = 0; i < blocks.size(); ++i) {
     const Vector6 pose_step = SolveSymmetric(
-        Damped(blocks[i].C, damping), blocks[i].b - blocks[i].B.topRows(n).transpose() * step);
+        Damped(blocks[i].C, damping),
+        blocks[i].b - blocks[i].B.middleRows(free.first, free.count).transpose() * step);
     if (pose_step.allFinite()) stepped.cam_from_board[i] = Moved(fit.cam_from_board[i], pose_step);
   }
   return stepped;
@@ -225,22 +252,21 @@ Rigid RoughPose(const BoardView& view, const Camera& camera) {
 void HoldOut(const std::vector<BoardView>& views, const std::vector<Block>& blocks,
              CameraFit* fit) {
   const int n = fit->lens.num_free;
-  ReducedBlock sum{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  std::vector<ReducedBlock> parts;
-  for (const Block& block : blocks) {
-    parts.push_back(Reduce(block, n, 0));
-    sum.S += parts.back().S;
-    sum.g += parts.back().g;
-  }
+  const Unknowns free = UnknownsOf(fit->lens, HasBend(views));
+  const ReducedBlock sum = SumReduced(blocks, free, 0);
   fit->held_out_rms_px.assign(views.size(), kInfinity);
   fit->without_view.assign(views.size(), fit->camera);
   for (size_t i = 0; i < views.size(); ++i) {
-    const auto inverse = ScaledInverse(sum.S - parts[i].S);
+    const ReducedBlock own = Reduce(blocks[i], free, 0);
+    const auto inverse = ScaledInverse(sum.S - own.S);
     if (!inverse) continue;
-    const Camera camera = WithStep(fit->camera, *inverse * (sum.g - parts[i].g));
+    const Eigen::VectorXd step = *inverse * (sum.g - own.g);
+    const Camera camera = WithStep(fit->camera, step.tail(n));
     if (!IsPossible(camera)) continue;
-    const Rigid pose = FitPose(views[i], camera, fit->cam_from_board[i], 0);
-    const double rms = RmsLength(views[i], Residuals(views[i], camera, pose));
+    BoardView view = views[i];
+    if (free.count > n) view.bend += step.head<kBends>();
+    const Rigid pose = FitPose(view, camera, fit->cam_from_board[i], 0);
+    const double rms = RmsLength(view, Residuals(view, camera, pose));
     fit->without_view[i] = camera;
     if (std::isfinite(rms)) fit->held_out_rms_px[i] = rms;
   }
@@ -273,6 +299,17 @@ Camera InRicherModel(const Camera& camera, CameraModel model) {
   return richer;
 }
 
+Eigen::Matrix3Xd BendShapes(const Board& board, const Eigen::Matrix2Xd& x_on_board) {
+  const Eigen::Vector2d middle = board.CornerOnBoard(board.NumCorners() - 1) / 2;
+  const double half = middle.norm();
+  Eigen::Matrix3Xd shapes(3, x_on_board.cols());
+  for (int i = 0; i < shapes.cols(); ++i) {
+    const Eigen::Vector2d at = (x_on_board.col(i) - middle) / half;
+    shapes.col(i) = half * Eigen::Vector3d(at.x() * at.x(), at.x() * at.y(), at.y() * at.y());
+  }
+  return shapes;
+}
+
 BoardView MakeBoardView(const BoardPhoto& photo, const Board& board) {
   BoardView view;
   view.x_in_img = photo.x_in_img;
@@ -280,6 +317,7 @@ BoardView MakeBoardView(const BoardPhoto& photo, const Board& board) {
   for (int i = 0; i < photo.NumCorners(); ++i) {
     view.x_on_board.col(i) = board.CornerOnBoard(photo.corner_ids[i]);
   }
+  view.shapes = BendShapes(board, view.x_on_board);
   view.used.assign(photo.NumCorners(), true);
   return view;
 }
@@ -288,7 +326,7 @@ Eigen::Matrix2Xd Residuals(const BoardView& view, const Camera& camera,
                            const Rigid& cam_from_board) {
   Eigen::Matrix2Xd residuals(2, view.x_on_board.cols());
   for (int i = 0; i < residuals.cols(); ++i) {
-    const auto projected = ProjectCorner<0>(camera, cam_from_board, view.x_on_board.col(i));
+    const auto projected = ProjectCorner<0>(camera, cam_from_board, view, i);
     residuals.col(i) =
         projected ? Eigen::Vector2d(view.x_in_img.col(i) - projected->x_in_img)
                   : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()).eval();
@@ -394,9 +432,8 @@ void Finish(const std::vector<BoardView>& views, CameraFit* fit) {
   const int n = fit->lens.num_free;
   const auto num_params = static_cast<Eigen::Index>(fit->camera.params.size());
   const std::vector<Block> blocks = MakeBlocks(views, *fit, 0);
+  const Unknowns free = UnknownsOf(fit->lens, HasBend(views));
   int num_coordinates = 0;
-  double sum = 0;
-  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n, n);
   fit->residuals.clear();
   fit->view_rms_px.clear();
   for (size_t i = 0; i < views.size(); ++i) {
@@ -404,19 +441,45 @@ void Finish(const std::vector<BoardView>& views, CameraFit* fit) {
     fit->view_rms_px.push_back(RmsLength(views[i], fit->residuals[i]));
     num_coordinates +=
         2 * static_cast<int>(std::count(views[i].used.begin(), views[i].used.end(), true));
-    sum += blocks[i].cost;
-    S += Reduce(blocks[i], n, 0).S;
   }
-  fit->redundancy = num_coordinates - n - 6 * static_cast<int>(views.size());
+  const double sum = SumOfCosts(blocks);
+  fit->redundancy = num_coordinates - free.count - 6 * static_cast<int>(views.size());
   fit->sigma_px = fit->redundancy > 0 ? std::sqrt(sum / fit->redundancy) : kInfinity;
   fit->covariance = Eigen::MatrixXd::Zero(num_params, num_params);
-  const auto inverse = ScaledInverse(S);
+  const auto inverse = ScaledInverse(SumReduced(blocks, free, 0).S);
   if (inverse && fit->redundancy > 0) {
-    fit->covariance.topLeftCorner(n, n) = fit->sigma_px * fit->sigma_px * *inverse;
+    fit->covariance.topLeftCorner(n, n) =
+        fit->sigma_px * fit->sigma_px * inverse->bottomRightCorner(n, n);
   } else {
     fit->covariance.topLeftCorner(n, n).diagonal().setConstant(kInfinity);
   }
   HoldOut(views, blocks, fit);
+}
+
+// Gauss-Newton on all unknowns, the bend aside from the descent of the others: what it moves them
+// by is found anew.
+BentFit FitBend(std::vector<BoardView> views, const CameraFit& start, double huber_px) {
+  constexpr int kRounds = 8;
+  constexpr double kLargestBend = 0.3;  // half a diagonal is raised by as much: no board
+  BentFit bent;
+  bent.fit = start;
+  const Unknowns free = UnknownsOf(start.lens, true);
+  for (int round = 0; round < kRounds; ++round) {
+    const ReducedBlock sum = SumReduced(MakeBlocks(views, bent.fit, huber_px), free, 0);
+    const auto inverse = ScaledInverse(sum.S);
+    if (!inverse) return bent;
+    const Eigen::Vector3d step = (*inverse * sum.g).head<kBends>();
+    bent.bend += step;
+    if (!(bent.bend.norm() < kLargestBend)) return bent;
+    for (BoardView& view : views) view.bend = bent.bend;
+    bent.fit = FitCamera(views, start.lens, bent.fit, huber_px);
+    bent.bend_covariance = inverse->topLeftCorner<kBends, kBends>();
+    if (step.norm() < 1e-7) break;
+  }
+  Finish(views, &bent.fit);
+  bent.bend_covariance *= bent.fit.sigma_px * bent.fit.sigma_px;
+  bent.found = std::isfinite(bent.fit.sigma_px);
+  return bent;
 }
 
 }  // namespace roomtex

@@ -41,7 +41,16 @@ struct BoardView {
   Eigen::Matrix2Xd x_in_img;    // seen there
   std::vector<bool> used;       // corners that take part
   double weight = 1;            // of its squared residuals; less than 1 for a photo with more noise
+  // A board that is not flat: height of corner i = shapes.col(i).dot(bend), towards +z of `board`.
+  // shapes: metres, u^2, u v, v^2 from the middle, times half the board's diagonal; u and v in
+  // halves of the diagonal. The same bend in all views; zero = flat.
+  Eigen::Matrix3Xd shapes;
+  Eigen::Vector3d bend = Eigen::Vector3d::Zero();
+  Eigen::Vector3d CornerOnBoard(int i) const {
+    return {x_on_board(0, i), x_on_board(1, i), shapes.col(i).dot(bend)};
+  }
 };
+Eigen::Matrix3Xd BendShapes(const Board& board, const Eigen::Matrix2Xd& x_on_board);
 BoardView MakeBoardView(const BoardPhoto& photo, const Board& board);
 
 struct CameraFit {
@@ -73,8 +82,18 @@ CameraFit RoughFit(const std::vector<BoardView>& views, int width, int height);
 CameraFit FitCamera(const std::vector<BoardView>& views, const LensModel& lens,
                     const CameraFit& start, double huber_px);
 
-// Residuals, noise, covariance and held-out errors at the optimum.
+// Residuals, noise, covariance and held-out errors at the optimum. Where the views have a bend,
+// what is not known of it is in the covariance.
 void Finish(const std::vector<BoardView>& views, CameraFit* fit);
+
+// Camera, poses and bend together, from a fit of the views, whose lens it keeps.
+struct BentFit {
+  bool found = false;  // the views determine it
+  Eigen::Vector3d bend = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d bend_covariance = Eigen::Matrix3d::Zero();
+  CameraFit fit;  // finished
+};
+BentFit FitBend(std::vector<BoardView> views, const CameraFit& start, double huber_px);
 
 // The pose of the board for a given camera; start: near it.
 Rigid FitPose(const BoardView& view, const Camera& camera, const Rigid& start, double huber_px);

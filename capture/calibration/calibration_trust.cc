@@ -19,6 +19,7 @@ constexpr double kWantedShare = 0.6;  // of the cells; below it is a warning
 constexpr int kWantedCorners = 3;     // of the picture
 constexpr double kWantedCornerSigma = 0.5;  // pixels
 constexpr int kMaxPlaces = 150;             // where cameras are compared
+constexpr double kWantedScatter = 2;
 constexpr double kManyDropped = 1.0 / 3;
 
 double Rms(const std::vector<double>& values) {
@@ -102,6 +103,32 @@ void JudgeUncertainty(const CalibrationOptions& options, Calibration* result) {
         "there; photograph the board near the corners, or give a simpler --camera_model");
     return;
   }
+}
+
+void JudgeScatter(const CalibrationOptions& options, Calibration* result) {
+  if (!(result->photo_scatter > std::min(kWantedScatter, options.max_photo_scatter))) return;
+  const std::string finding = "photos disagree " + Number(result->photo_scatter, 1) +
+                              " times as much as the noise of their corners lets expect (a touched "
+                              "focus or zoom, motion, a board that moved in itself?)";
+  if (result->photo_scatter > options.max_photo_scatter) {
+    result->reasons.push_back(finding +
+                              ": no one camera describes them; tape focus and zoom, and "
+                              "take the photos again");
+  } else {
+    result->warnings.push_back(finding + "; the standard deviations are enlarged by that");
+  }
+}
+
+void WarnOfBow(Calibration* result) {
+  const BoardBow& bow = result->bow;
+  if (!bow.used) return;
+  result->warnings.push_back(
+      "the board is not flat: over its corners it is bowed by " + Number(1000 * bow.height, 2) +
+      " mm (give or take " + Number(1000 * bow.sigma, 2) +
+      ", if --square is right); that is taken into account, a flat board would have made the focal "
+      "length " +
+      Number(std::abs(bow.focal_percent), 1) + " % too " +
+      (bow.focal_percent > 0 ? "long" : "short") + "; glue it to glass or a stiff plate");
 }
 
 }  // namespace
@@ -219,12 +246,8 @@ void JudgeCalibration(const CalibrationOptions& options, Calibration* result) {
   }
   WarnOfCoverage(options, result);
   JudgeUncertainty(options, result);
-  if (result->photo_scatter > 2) {
-    result->warnings.push_back(
-        "photos disagree " + Number(result->photo_scatter, 1) +
-        " times as much as the noise of their corners lets expect (a bent board, motion, a touched "
-        "focus?); the standard deviations are enlarged by that");
-  }
+  JudgeScatter(options, result);
+  WarnOfBow(result);
 }
 
 }  // namespace roomtex

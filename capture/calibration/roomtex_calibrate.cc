@@ -57,7 +57,8 @@ void AddOptions(Arguments* a, Command* command) {
                         "database itself is not changed).",
                         Command::Kind::kOptional);
   command->AddOutputPath("apply_output", &a->database_output_path,
-                         "The copy; default: beside the database, NAME_calibrated.db.",
+                         "The copy; default: beside the database, NAME_calibrated.db, which is not "
+                         "replaced where photos, features or pairs were made in it.",
                          Command::Kind::kOptional);
   command->Add(calibration.Without({"camera_model"}));
 }
@@ -86,7 +87,9 @@ void CheckArguments(Arguments* a) {
   if (a->database_output_path.empty()) {
     a->database_output_path =
         (database.parent_path() / (database.stem().string() + "_calibrated.db")).string();
+    RequireNothingNew(a->database_output_path, a->database_path);
   }
+  RequireNoLog(a->database_output_path);
 }
 
 void Apply(const Arguments& a, const Camera& camera, const Command::Context& context) {

@@ -33,6 +33,7 @@ struct Arguments {
 double Rounded(double value) { return std::round(1e4 * value) / 1e4; }
 
 cv::Mat ReadDetailedPhoto(const Arguments& arguments, const Command::Context& context) {
+  RequireFile(arguments.input_path, "Check --input_path, or leave it out for the built-in image");
   const cv::Mat photo = ReadPhoto(arguments.input_path);
   const std::string size = std::to_string(photo.cols) + " x " + std::to_string(photo.rows);
   if (std::min(photo.cols, photo.rows) < kLeastPhoto) {
@@ -185,6 +186,9 @@ void Run(const Arguments& arguments, const Command::Context& context) {
   context.progress.Stage("pattern");
   const cv::Mat photo =
       arguments.input_path.empty() ? cv::Mat() : ReadDetailedPhoto(arguments, context);
+  if (!arguments.evaluate_path.empty()) {
+    RequireFile(arguments.evaluate_path, "Check --evaluate_path: a photo of the projected pattern");
+  }
   // Read before anything is written: a photo that is none shall not leave a pattern behind.
   const cv::Mat wall =
       arguments.evaluate_path.empty() ? cv::Mat() : ReadPhoto(arguments.evaluate_path);

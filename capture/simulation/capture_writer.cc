@@ -66,8 +66,10 @@ std::string DateTime(const SimulatedRoom& room, int photo) {
   const bool paired = !room.Projectors().empty();
   const int place = room.PlaceOf(photo);
   const int seconds = paired ? 60 * place + (room.IsPatterned(photo) ? 0 : 7) : 20 * place;
-  return fmt::format("2008:05:01 {:02}:{:02}:{:02}", 12 + seconds / 3600, seconds / 60 % 60,
-                     seconds % 60);
+  // From noon on; the days of May are enough for all that can be simulated.
+  const int hours = 12 + seconds / 3600;
+  return fmt::format("2008:05:{:02} {:02}:{:02}:{:02}", 1 + hours / 24, hours % 24,
+                     seconds / 60 % 60, seconds % 60);
 }
 
 void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
@@ -345,6 +347,37 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
   WriteText(folder + "/README.txt", text.str());
 }
 
+// Files of an earlier capture in the folder that this one does not have: stale truth, further
+// scans.
+void RemoveEarlier(OutputSet* outputs) {
+  std::vector<std::string> names = {"scan_poses.txt", "second_room_picks.csv"};
+  for (const char* name : {"associations.csv", "projectors.txt", "rolling_shutter.csv"}) {
+    names.push_back(std::string("truth/") + name);
+  }
+  const auto add_numbered = [&](const std::string& folder, const std::string& begin,
+                                const std::string& end) {
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(outputs->folder() + "/" + folder, ignored)) {
+      const std::string name = entry.path().filename().string();
+      if (name.size() <= begin.size() + end.size() || !BeginsWith(name, begin) ||
+          name.substr(name.size() - end.size()) != end) {
+        continue;
+      }
+      const std::string number = name.substr(begin.size(), name.size() - begin.size() - end.size());
+      if (number.find_first_not_of("0123456789") == std::string::npos) {
+        names.push_back(folder + name);
+      }
+    }
+  };
+  add_numbered("", "scan_", ".rtpi");
+  add_numbered("truth/", "pattern_", ".png");
+  for (const std::string& name : names) {
+    const bool is_earlier =
+        fs::exists(outputs->folder() + "/" + name) && !fs::exists(outputs->aside() + "/" + name);
+    if (is_earlier) outputs->Remove(name);
+  }
+}
+
 }  // namespace
 
 CaptureSummary WriteCapture(const SimulatedRoom& room, const std::string& folder,
@@ -377,6 +410,7 @@ CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool r
   }
   WriteSimilarRoom(room, photo_folder, progress);
   WriteTrueColors(room, photo_folder, reachable, folder + "/truth", progress);
+  RemoveEarlier(outputs);
   progress->Finish();
   return summary;
 }

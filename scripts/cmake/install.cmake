@@ -38,6 +38,9 @@ function(roomtex_install_package)
                 ${PROJECT_SOURCE_DIR}/scripts/cmake/geographiclib.cmake
           DESTINATION ${roomtex_package_dir} COMPONENT development)
   install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT commands)
+  # What README and messages name as docs/NAME.md; pictures are for who reads them in the source.
+  install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT commands FILES_MATCHING PATTERN "*.md"
+          PATTERN images EXCLUDE PATTERN examples EXCLUDE)
   # Where Debian looks for the licence of a package.
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/roomtex RENAME copyright COMPONENT commands)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/roomtex-dev RENAME copyright

@@ -1,5 +1,7 @@
 #include "building/building_solid.h"
 
+#include <chrono>
+#include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
@@ -92,6 +94,34 @@ TEST(BuildingSolid, IsClosedAndHasTheVolumeOfTheBuilding) {
       ExtrudeBuilding(Building(ell, {Plane(0, 0, 5, rise, -90), Plane(0, 10, 5, rise, 90)}));
   ExpectSolid(Building(ell, {Plane(0, 0, 5, rise, -90), Plane(0, 10, 5, rise, 90)}),
               over_ell.Volume(), "gable over L");
+}
+
+// A dome of as many planes as a roof may have; with a line for each of the 1225 pairs it took two
+// minutes.
+TEST(BuildingSolid, OfManyRoofPlanesIsMadeAtOnce) {
+  const std::vector<Eigen::Vector2d> box = {{-10, -10}, {10, -10}, {10, 10}, {-10, 10}};
+  std::vector<RoofPlane> dome;
+  for (int i = 0; i < 50; ++i) {
+    // Tangents of a paraboloid, at places in a spiral.
+    const double angle = 2.4 * i, r = 9.5 * std::sqrt((i + 0.5) / 50);
+    const Eigen::Vector2d at(r * std::cos(angle), r * std::sin(angle));
+    dome.push_back(
+        RoofPlane::FromGradient({at.x(), at.y(), 15 - 0.05 * at.squaredNorm()}, -0.1 * at));
+  }
+  const OutlineBuilding building = Building(box, dome);
+  const auto start = std::chrono::steady_clock::now();
+  const BuildingSolid solid = ExtrudeBuilding(building);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  constexpr int kSteps = 1000;
+  double volume = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int k = 0; k < kSteps; ++k) {
+      const Eigen::Vector2d x(-10 + 20 * (i + 0.5) / kSteps, -10 + 20 * (k + 0.5) / kSteps);
+      volume += (building.RoofHeightAt(x) - building.ground) * 400 / (kSteps * kSteps);
+    }
+  }
+  EXPECT_NEAR(solid.Volume(), volume, 1e-4 * volume);
+  ExpectSolid(building, solid.Volume(), "dome");
 }
 
 TEST(BuildingSolid, IsTheSameWhereverTheBuildingStands) {

@@ -13,6 +13,7 @@
 #include "building/outline_cloud.h"
 #include "building/outline_proposal.h"
 #include "core/error.h"
+#include "core/output_file.h"
 #include "tests/building/simulated_street.h"
 #include "tests/support/option_check.h"
 #include "tests/support/run_command.h"
@@ -289,12 +290,21 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   check();
 
-  for (const char* frame : {" --up 0,0,1", " --scale 2"}) {
+  for (const char* frame : {" --up 0,0,1", " --scale 2", " --geo_origin 48.1,11.6,560"}) {
     result =
         RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + frame + common);
     EXPECT_EQ(result.exit_code, 2) << result.err;
     EXPECT_NE(result.err.find("place on the Earth by itself"), std::string::npos) << result.err;
   }
+
+  // Metres, without a place, too.
+  MakeFolder(folder / "metres");
+  WriteSparseModel(street.model, folder / "metres");
+  WriteBytes(folder / "metres/alignment.json", R"({"trusted": true, "reason": ""})");
+  result =
+      RunCommandLine("roomtex-outline --input_path " + (folder / "metres") + " --scale 2" + common);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("in metres: leave --scale out"), std::string::npos) << result.err;
 
   // As COLMAP's model_aligner makes it: about the middle of the Earth.
   SparseModel earth = street.model;
@@ -311,6 +321,195 @@ TEST(OutlineCommand, PutsBuildingsOnTheEarth) {
   WriteBytes(folder / "aligned/alignment.json", alignment.dump());
   result = RunCommandLine("roomtex-outline --input_path " + (folder / "aligned") + common);
   EXPECT_EQ(result.exit_code, 4);
+  // Nor is it by way of its outline.
+  const std::string again = "roomtex-outline --outline_path " + (folder / "outline.json") +
+                            " --output_path " + (folder / "again.json") + " --model_path " +
+                            (folder / "again.gml");
+  result = RunCommandLine(again);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("six picks contradict"), std::string::npos) << result.err;
+  result = RunCommandLine(again + " --accept_untrusted 1");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "again.gml"));
+
+  // Nor is the model about the place, which roomtex-align writes into geo/, without a record of the
+  // scans. North that nobody has said is told.
+  WriteSparseModel(street.model, folder / "aligned/geo");
+  Json geo;
+  geo["origin"] = alignment["geo"]["origin"];
+  geo["heading_assumed"] = true;
+  geo["trusted"] = false;
+  geo["reason"] = "six picks contradict each other";
+  WriteBytes(folder / "aligned/geo/geo.json", geo.dump());
+  const std::string of_geo = "roomtex-outline --input_path " + (folder / "aligned/geo") +
+                             " --output_path " + (folder / "geo.json") + " --model_path " +
+                             (folder / "geo.gml");
+  result = RunCommandLine(of_geo);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("which way is north was assumed"), std::string::npos) << result.err;
+  geo["trusted"] = true;
+  geo["reason"] = "";
+  WriteBytes(folder / "aligned/geo/geo.json", geo.dump());
+  result = RunCommandLine(of_geo);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  result =
+      RunCommandLine("roomtex-outline --outline_path " + (folder / "geo.json") + " --output_path " +
+                     (folder / "copy.json") + " --report_path " + (folder / "report.json"));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(ReadJson(folder / "report.json")["warnings"].size(), 1u) << result.err;
+}
+
+// A house with a flat roof, 8 by 10 metres and 5 high.
+OutlineBuilding FlatHouse(const std::string& name, const Eigen::Vector2d& at) {
+  OutlineBuilding house;
+  house.name = name;
+  for (const Eigen::Vector2d& x : {Eigen::Vector2d(0, 0), Eigen::Vector2d(10, 0),
+                                   Eigen::Vector2d(10, 8), Eigen::Vector2d(0, 8)}) {
+    house.footprint.push_back(at + x);
+  }
+  house.roof = {{{at.x(), at.y(), 5}, 0, 0}};
+  return house;
+}
+
+// Away from the origin the Earth falls away below the outline's plane: heights follow it.
+TEST(OutlineCommand, GivesTheHeightsThatTheCornersHave) {
+  const TempFolder folder;
+  Outline outline;
+  outline.metric = true;
+  outline.geo.emplace(GeoPosition{48.1, 11.6, 500});
+  outline.buildings = {FlatHouse("far", {3000, 0})};
+  WriteOutline(folder / "o.json", outline, false);
+  const CommandResult result = RunCommandLine(
+      "roomtex-outline --outline_path " + (folder / "o.json") + " --output_path " +
+      (folder / "p.json") + " --model_path " + (folder / "b.city.json") + " --model_path " +
+      (folder / "b.gml") + " --model_path " + (folder / "b.geojson"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json city = ReadJson(folder / "b.city.json");
+  const double ground = FloorOf(city, "far").at(0).z();
+  EXPECT_NEAR(ground, 500.706, 0.01);
+  for (const Json& attributes : {city["CityObjects"]["building_far"]["attributes"],
+                                 ReadJson(folder / "b.geojson")["features"][0]["properties"]}) {
+    EXPECT_NEAR(attributes["ground_height"].get<double>(), ground, 0.01);
+    EXPECT_NEAR(attributes["eaves_height"].get<double>(), ground + 5, 0.01);
+    EXPECT_NEAR(attributes["ridge_height"].get<double>(), ground + 5, 0.01);
+    EXPECT_NEAR(attributes["measured_height"].get<double>(), 5, 1e-6);
+  }
+  pugi::xml_document gml;
+  ASSERT_TRUE(gml.load_file((folder / "b.gml").c_str()));
+  const char* const kGround = "//gen:doubleAttribute[@name='ground_height']/gen:value";
+  EXPECT_NEAR(gml.select_node(kGround).node().text().as_double(), ground, 0.01);
+}
+
+TEST(OutlineCommand, CutsFootprintsAtTheAntimeridian) {
+  const TempFolder folder;
+  Outline outline;
+  outline.metric = true;
+  outline.geo.emplace(GeoPosition{-17, 180, 5});
+  outline.buildings = {FlatHouse("both", {-4, 0}), FlatHouse("east", {30, 0})};
+  WriteOutline(folder / "o.json", outline, false);
+  const CommandResult result =
+      RunCommandLine("roomtex-outline --outline_path " + (folder / "o.json") + " --output_path " +
+                     (folder / "p.json") + " --model_path " + (folder / "b.geojson"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json features = ReadJson(folder / "b.geojson")["features"];
+  EXPECT_EQ(features[1]["geometry"]["type"], "Polygon");
+  ASSERT_EQ(features[0]["geometry"]["type"], "MultiPolygon");
+  const GeoFrame frame(outline.geo->origin());
+  double area = 0;
+  for (const Json& part : features[0]["geometry"]["coordinates"]) {
+    std::vector<Eigen::Vector2d> polygon;
+    double low = 360, high = -360;
+    for (const Json& x : part[0]) {
+      low = std::min(low, x[0].get<double>()), high = std::max(high, x[0].get<double>());
+      polygon.push_back(frame.EnuFromGeo({x[1], x[0], 5}).head<2>());
+    }
+    EXPECT_LT(high - low, 0.001);
+    polygon.pop_back();
+    EXPECT_GT(PolygonArea(polygon), 0);
+    area += PolygonArea(polygon);
+  }
+  EXPECT_NEAR(area, 80, 0.05);
+}
+
+// An outline that was made without a place gets it later, as the note of its GeoJSON says.
+TEST(OutlineCommand, GivesAnOutlineItsPlaceOnTheEarth) {
+  const TempFolder folder;
+  Outline outline;
+  outline.metric = true;
+  // Upright by the walls' word, moved.
+  outline.outline_from_input = {
+      1, Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX())), {100, -20, 3}};
+  outline.buildings = {FlatHouse("1", {0, 0})};
+  WriteOutline(folder / "o.json", outline, false);
+  const std::string line = "roomtex-outline --outline_path " + (folder / "o.json") +
+                           " --output_path " + (folder / "p.json") + " --model_path " +
+                           (folder / "b.geojson") + " --model_path " + (folder / "b.obj");
+  for (int time = 0; time < 2; ++time) {
+    const CommandResult result = RunCommandLine(line + " --geo_origin 48.1,11.5,500");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  const Json house = ReadJson(folder / "b.geojson")["features"][0];
+  const Json& corner = house["geometry"]["coordinates"][0][0];
+  const Eigen::Vector3d expected = outline.outline_from_input.Inverse() * Eigen::Vector3d(0, 0, 0);
+  const Eigen::Vector3d x = GeoFrame({48.1, 11.5, 500})
+                                .EnuFromGeo({corner[1].get<double>(), corner[0].get<double>(),
+                                             house["properties"]["ground_height"].get<double>()});
+  EXPECT_LT((x - expected).norm(), 0.01);
+  const Outline placed = ReadOutline(folder / "p.json");
+  ASSERT_TRUE(placed.geo);
+  EXPECT_EQ(placed.geo->origin().height, 500);
+
+  const auto expect_refused = [&](const std::string& more, const std::string& finding) {
+    const CommandResult result = RunCommandLine(line + more);
+    EXPECT_EQ(result.exit_code, 2) << more << "\n" << result.err;
+    EXPECT_NE(result.err.find(finding), std::string::npos) << more << "\n" << result.err;
+  };
+  for (const char* idle :
+       {"--up 0,0,1", "--scale 2", "--area 0,0,1,1", "--min_area 3", "--right_angles 0"}) {
+    expect_refused(std::string(" ") + idle, "says nothing here");
+  }
+  outline.metric = false;
+  WriteOutline(folder / "o.json", outline, false);
+  expect_refused(" --geo_origin 48.1,11.5,500", "metres");
+  outline.metric = true;
+  outline.outline_from_input.rotation =
+      Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitX());  // a frame with y up
+  WriteOutline(folder / "o.json", outline, false);
+  expect_refused(" --geo_origin 48.1,11.5,500", "upright");
+  outline.geo.emplace(GeoPosition{48.2, 11.5, 500});
+  WriteOutline(folder / "o.json", outline, false);
+  expect_refused(" --geo_origin 48.1,11.5,500", "another place");
+}
+
+// Millimetres would be coarse for a model on a table.
+TEST(OutlineCommand, KeepsTheDigitsOfSmallThings) {
+  const TempFolder folder;
+  Outline outline;
+  outline.metric = true;
+  OutlineBuilding box = FlatHouse("a b", {0, 0});
+  for (Eigen::Vector2d& x : box.footprint) x = 0.03456 * x;
+  box.roof[0].point.z() = 0.12345;
+  OutlineBuilding other = box;
+  other.name = "a_b";
+  for (Eigen::Vector2d& x : other.footprint) x.x() += 0.5;
+  outline.buildings = {box, other};
+  WriteOutline(folder / "o.json", outline, false);
+  const CommandResult result =
+      RunCommandLine("roomtex-outline --outline_path " + (folder / "o.json") + " --output_path " +
+                     (folder / "p.json") + " --model_path " + (folder / "b.city.json") +
+                     " --model_path " + (folder / "b.gml") + " --model_path " + (folder / "b.obj"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  pugi::xml_document gml;
+  ASSERT_TRUE(gml.load_file((folder / "b.gml").c_str()));
+  for (const auto& floor :
+       {FloorOf(ReadJson(folder / "b.city.json"), "a b"), FloorOf(gml, "a b")}) {
+    double right = 0;
+    for (const Eigen::Vector3d& x : floor) right = std::max(right, x.x());
+    EXPECT_NEAR(right, 0.3456, 1e-5);
+  }
+  const std::string obj = ReadBytes(folder / "b.obj");
+  EXPECT_NE(obj.find("o building_a_b\n"), std::string::npos);
+  EXPECT_NE(obj.find("o building_a_b_\n"), std::string::npos);
 }
 
 TEST(OutlineCommand, SaysWhatIsWrong) {
@@ -363,6 +562,11 @@ TEST(OutlineCommand, SaysWhatIsWrong) {
   bad = good;
   bad["buildings"][2]["name"] = "1";
   expect_broken(bad.dump(), "has the name of another one");
+  bad["buildings"][2]["name"] = "a\x01";
+  expect_broken(bad.dump(), "control character");
+  bad = good;
+  bad["alignment"] = {{"trusted", "no"}};
+  expect_broken(bad.dump(), "alignment: lacks \"reason\"");
 }
 
 TEST(OutlineCommand, ListsAndChecksItsOptions) {

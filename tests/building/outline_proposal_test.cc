@@ -151,6 +151,60 @@ TEST(OutlineProposal, FindsTheStreetInADenseCloud) {
   ExpectExact(result, 0.05, 0.05);
 }
 
+// Nor on where its origin lies, not even for the windows in its walls.
+TEST(OutlineProposal, IsTheSameFarFromTheOrigin) {
+  const TempFolder folder;
+  WriteCloud(MakeDenseStreet({}, 120000), folder / "dense.ply");
+  OutlineInputOptions input;
+  input.input_path = folder / "dense.ply";
+  const OutlineCloud cloud = ReadOutlineCloud(input, -1);
+  const auto footprints_at = [&](const Eigen::Vector3d& place) {
+    OutlineCloud moved = cloud;
+    for (Eigen::Vector3d& x : moved.points) x += place;
+    std::vector<PlaneSegment> segments = FindPlaneSegments(moved, 0, -1);
+    Level(&moved, &segments);
+    std::vector<std::vector<Eigen::Vector2d>> footprints;
+    for (const OutlineBuilding& building : ProposeOutline(moved, segments, {}).outline.buildings) {
+      footprints.push_back(building.footprint);
+      for (Eigen::Vector2d& x : footprints.back()) x -= place.head<2>();
+    }
+    return footprints;
+  };
+  const auto here = footprints_at({0, 0, 0});
+  ASSERT_EQ(here.size(), 4u);
+  for (const Eigen::Vector3d& place :
+       {Eigen::Vector3d(3000, 4000, 0), Eigen::Vector3d(686000, 5330000, 500)}) {
+    const auto there = footprints_at(place);
+    ASSERT_EQ(there.size(), here.size());
+    for (size_t i = 0; i < here.size(); ++i) {
+      ASSERT_EQ(there[i].size(), here[i].size()) << "building " << i + 1;
+      for (size_t k = 0; k < here[i].size(); ++k) {
+        EXPECT_LT((there[i][k] - here[i][k]).norm(), 0.02) << "building " << i + 1;
+      }
+    }
+  }
+}
+
+// Doubtful buildings are those that are edited: what is proposed of a street that lies on its side
+// can be read, too.
+TEST(OutlineProposal, CanAlwaysBeReadAgain) {
+  const TempFolder folder;
+  StreetOptions options;
+  options.seed = 2;  // two corners of its second building are less than a micrometre apart
+  std::vector<Eigen::Vector3d> points = MakeDenseStreet(options, 120000);
+  for (Eigen::Vector3d& x : points) x = Eigen::Vector3d(x.x(), -x.z(), x.y());
+  WriteCloud(points, folder / "side.ply");
+  OutlineInputOptions input;
+  input.input_path = folder / "side.ply";
+  OutlineCloud cloud = ReadOutlineCloud(input, -1);
+  std::vector<PlaneSegment> segments = FindPlaneSegments(cloud, 0, -1);
+  Level(&cloud, &segments);
+  const Outline outline = ProposeOutline(cloud, segments, {}).outline;
+  EXPECT_GT(outline.buildings.size(), 0u);
+  WriteOutline(folder / "outline.json", outline, true);
+  EXPECT_EQ(OutlineToJson(ReadOutline(folder / "outline.json")), OutlineToJson(outline));
+}
+
 // In a map grid, millions of metres from its origin, walls that correct what is up lift nothing.
 TEST(OutlineProposal, LevellingLeavesACloudWhereItLies) {
   const TempFolder folder;

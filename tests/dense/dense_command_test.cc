@@ -142,6 +142,20 @@ TEST_F(DenseCommand, SameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(ReadBytes(Path("one/supplement.ply")), ReadBytes(Path("three/supplement.ply")));
 }
 
+TEST_F(DenseCommand, SaysWhyTheAlignmentWasRefused) {
+  fs::create_directory(Path("refused"));
+  WriteBytes(
+      Path("refused/alignment.json"),
+      R"({"command": "roomtex-align", "trusted": false, "reason": "The picks lie on a line."})");
+  const CommandResult result =
+      RunCommandLine("roomtex-dense --quiet --input_path " + Path("refused") + " --image_path " +
+                     Path("capture/photos") + " --scan_path " + Path("capture/scan.rtpi") +
+                     " --output_path " + Path("none"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("refused to align: The picks lie on a line."), std::string::npos)
+      << result.err;
+}
+
 TEST_F(DenseCommand, RefusesAForeignFolderAndChecksItsOptions) {
   fs::create_directory(Path("precious"));
   WriteBytes(Path("precious/thesis.txt"), "years of work");

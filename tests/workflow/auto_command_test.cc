@@ -340,6 +340,10 @@ TEST_F(AutoCommand, TellsWhatTheColoursShowedOfEachPhoto) {
 }
 
 TEST_F(AutoCommand, DoesNothingTwice) {
+  // Nor because somebody has looked at the photos, or written notes beside them.
+  for (const char* name : {".DS_Store", "Thumbs.db", "notes.txt"}) {
+    WriteBytes(*folder_ / (std::string("capture/photos/") + name), "x");
+  }
   const auto model = TimeOf("textured/model.ply"), database = TimeOf("database.db");
   const CommandResult result = RunCommandLine(Arguments());
   EXPECT_EQ(result.exit_code, 0) << result.err;

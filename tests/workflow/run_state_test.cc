@@ -46,6 +46,41 @@ TEST(Signature, OfAFolderIsThatOfAllItsFiles) {
   EXPECT_NE(one, "");
 }
 
+// A folder that somebody has looked at, or written a note into, is the same folder.
+TEST(Signature, OfAFolderPassesOverWhatNobodyReads) {
+  const TempFolder folder;
+  fs::create_directories(folder / "photos/more");
+  fs::create_directories(folder / "photos/.thumbnails");
+  WriteBytes(folder / "photos/a.jpg", "one");
+  WriteBytes(folder / "photos/more/b.JPG", "two");
+  const std::string all = Signature(folder / "photos");
+  const std::string photos = SignatureOfPhotos(folder / "photos");
+  EXPECT_EQ(all, photos);
+  for (const char* name :
+       {".DS_Store", "more/._b.jpg", ".thumbnails/a.jpg", "Thumbs.db", "more/desktop.ini"}) {
+    WriteBytes(folder / (std::string("photos/") + name), "x");
+  }
+  EXPECT_EQ(Signature(folder / "photos"), all);
+  WriteBytes(folder / "photos/notes.txt", "the hall");
+  EXPECT_NE(Signature(folder / "photos"), all);
+  EXPECT_EQ(SignatureOfPhotos(folder / "photos"), photos);
+
+  WriteBytes(folder / "photos/c.png", "three");
+  const std::string more = SignatureOfPhotos(folder / "photos");
+  EXPECT_NE(more, photos);
+  WriteBytes(folder / "photos/c.png", "four");
+  EXPECT_NE(SignatureOfPhotos(folder / "photos"), more);
+  fs::remove(folder / "photos/c.png");
+  EXPECT_EQ(SignatureOfPhotos(folder / "photos"), photos);
+  fs::remove(folder / "photos/a.jpg");
+  EXPECT_NE(SignatureOfPhotos(folder / "photos"), photos);
+  WriteBytes(folder / "photos/panoramas.json", "{}");  // beside the faces of panoramas
+  const std::string faces = SignatureOfPhotos(folder / "photos");
+  WriteBytes(folder / "photos/panoramas.json", "[]");
+  EXPECT_NE(SignatureOfPhotos(folder / "photos"), faces);
+  EXPECT_EQ(SignatureOfPhotos("no/such/folder"), "");
+}
+
 TEST(Signature, OfWhatIsNotThereIsEmpty) { EXPECT_EQ(Signature("no/such/file"), ""); }
 
 TEST(Differences, NamesWhatChangedCameAndWent) {

@@ -1,5 +1,7 @@
 // roomtex-site as users call it, on rooms whose reports are written here.
 
+#include <chrono>
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -107,6 +109,49 @@ TEST_F(SiteCommand, SaysOfEveryRoomWhatItsOwnReportsSay) {
   }
 }
 
+// A start that was refused, as after an edit of site.csv, leaves the report of the run before.
+TEST_F(SiteCommand, SaysOfARoomThatItsLastStartWasRefused) {
+  AddStep("hall", "align", StepState::kDone);
+  AddReport("hall", "trusted");
+  const std::string step =
+      "bash " ROOMTEX_SITE_FOLDER "/run_step.sh " + (folder_ / "hall/log/features.state");
+  MakeFolder(folder_ / "bin");
+  const auto start = [&](int exit_code, const std::string& words) {
+    WriteBytes(folder_ / "bin/roomtex-auto",
+               "#!/bin/sh\necho 'roomtex-auto: " + words + "'\nexit " + std::to_string(exit_code));
+    WriteBytes(folder_ / "start.sh", "chmod +x " + (folder_ / "bin/roomtex-auto") +
+                                         "\nPATH=" + (folder_ / "bin") + ":$PATH " + step +
+                                         " roomtex-auto --until features >" +
+                                         (folder_ / "hall/log/features.run.log") + " 2>&1\n");
+    EXPECT_EQ(RunProgram("bash " + (folder_ / "start.sh")).exit_code,
+              exit_code == 4 ? 0 : exit_code);
+  };
+  start(0, "all is well");
+  EXPECT_EQ(Run().exit_code, 0);
+  start(3, "gone.rtpi: does not exist");
+  const CommandResult result = Run();
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_EQ(Site()["rooms"][0]["state"], "failed");
+  EXPECT_EQ(Site()["rooms"][0]["headline"], "It could not be started");
+  EXPECT_THAT(Page(), HasSubstr("gone.rtpi: does not exist"));
+  // Whatever ends with an answer, also one of somebody's own start, takes it back.
+  start(0, "all is well");
+  EXPECT_EQ(Run().exit_code, 0);
+  start(2, "--quality lowest");
+  EXPECT_EQ(Run().exit_code, 4);
+  std::filesystem::last_write_time(
+      folder_ / "hall/report.json",
+      std::filesystem::file_time_type::clock::now() + std::chrono::seconds(1));
+  EXPECT_EQ(Run().exit_code, 0);
+
+  // Of a room whose first step is another one.
+  MakeFolder(folder_ / "attic/log");
+  WriteBytes(folder_ / "attic/log/refused", "roomtex-auto: a.e57: is no E57\n");
+  WriteBytes(folder_ / "site.csv", "room\nattic\n");
+  EXPECT_EQ(Run(" --rooms_path " + (folder_ / "site.csv")).exit_code, 4);
+  EXPECT_EQ(Site()["rooms"][0]["sentences"][0], "a.e57: is no E57");
+}
+
 TEST_F(SiteCommand, TrustsASiteOfWhichEveryRoomIsTrusted) {
   for (const char* room : {"b", "a"}) {
     AddStep(room, "align", StepState::kDone);
@@ -177,6 +222,21 @@ TEST_F(SiteCommand, ShowsTheRoomsInOnePlanAndWhatLinksThem) {
   WriteBytes(folder_ / "joined/joined.json", "[]");
   EXPECT_EQ(Run().exit_code, 0);
   EXPECT_TRUE(Site()["joined"].is_null());
+}
+
+// As the Snakefile writes it where the room in whose frame all should stand is not there.
+TEST_F(SiteCommand, SaysWhyRoomsAreNotJoined) {
+  for (const char* room : {"a", "b"}) {
+    AddStep(room, "align", StepState::kDone);
+    AddReport(room, "trusted");
+  }
+  MakeFolder(folder_ / "joined");
+  WriteBytes(folder_ / "joined/joined.json",
+             R"({"trusted": false, "reason": "The reference c is not aligned.", "reference": "c",
+                 "rooms": [], "links": [], "loops": [], "scene": null})");
+  EXPECT_EQ(Run().exit_code, 4);
+  EXPECT_EQ(Site()["verdict"]["state"], "untrusted");
+  EXPECT_THAT(Page(), HasSubstr("The reference c is not aligned."));
 }
 
 // Three rooms with plans of which roomtex-join linked none: each is drawn by itself, all to one

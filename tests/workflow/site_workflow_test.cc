@@ -3,6 +3,7 @@
 // photos. Label `slow`.
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -254,6 +255,40 @@ TEST_F(SiteWorkflow, AsksForTwiceTheMemoryAndTimeWithEveryTry) {
   }
 }
 
+// What is named in the options is an input, too; what lies beside photos is none.
+TEST_F(SiteWorkflow, SeesWhatHasChangedAmongTheOptions) {
+  for (const char* folder : {"p", "pano"}) fs::create_directories(folder_ / folder);
+  for (const char* file : {"p/a.jpg", "pano/b.jpg", "s.ptx", "poses.csv"}) {
+    WriteBytes(folder_ / file, "1\n");
+  }
+  WriteBytes(folder_ / "site.csv",
+             "room,photos,scans,options\na,p,s.ptx,--scan_poses=poses.csv\n"
+             "b,,s.ptx,--panoramas_path pano\n");
+  // As if all had been done.
+  const std::vector<const char*> steps = {"features", "matches", "mapper",
+                                          "align",    "texture", "pictures"};
+  for (const char* room : {"a", "b"}) {
+    for (const char* step : steps) {
+      const std::string log = std::string(room) + "/log/";
+      fs::create_directories(At(log));
+      WriteBytes(At(log + step + ".state"), "done\n");
+    }
+  }
+  const auto reasons = [this] { return RunSite("-n --rerun-triggers mtime").err; };
+  EXPECT_THAT(reasons(), HasSubstr("Nothing to be done"));
+  const auto touch = [this](const char* file) {
+    WriteBytes(folder_ / file, "2\n");
+    fs::last_write_time(folder_ / file, fs::file_time_type::clock::now() + std::chrono::hours(1));
+  };
+  touch("p/.DS_Store");
+  touch("pano/notes.txt");
+  EXPECT_THAT(reasons(), HasSubstr("Nothing to be done"));
+  touch("poses.csv");
+  EXPECT_THAT(reasons(), HasSubstr("Updated input files: poses.csv"));
+  touch("pano/b.jpg");
+  EXPECT_THAT(reasons(), HasSubstr("Updated input files: pano/b.jpg"));
+}
+
 TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
   EXPECT_THAT(RunSite("-n").err, HasSubstr("is no site"));
   fs::create_directories(folder_ / "p");
@@ -263,7 +298,12 @@ TEST_F(SiteWorkflow, SaysWhatIsWrongWithTheTable) {
            {"room,photos,scans,colour\n", "column \"colour\" is not known"},
            {"room,photos,scans\na,p,s.ptx\na,p,s.ptx\n", "line 3: room \"a\" is there already"},
            {"room,photos,scans\n../a,p,s.ptx\n", "becomes the name of a folder"},
-           {"room,photos,scans\njoined,p,s.ptx\n", "is the folder of the joined rooms"},
+           {"room,photos,scans\njoined,p,s.ptx\n", "is the name of the folder of the joined rooms"},
+           {"room,photos,scans\nsite.html,p,s.ptx\n", "is the name of the site's page"},
+           {"room,photos,scans,options\na,p,s.ptx,--scan_path=t.ptx\n",
+            "--scan_path cannot be one"},
+           {"room,photos,scans,options\na,p,s.ptx,--scan_poses t.csv\n",
+            "--scan_poses \"t.csv\" does not exist"},
            {"room,photos,scans\na,q,s.ptx\n", "folder of photos \"q\" does not exist"},
            {"room,photos,scans\na,p,t.ptx;s.ptx\n", "scan \"t.ptx\" does not exist"},
            {"room,photos,scans\na,p,\n", "no scan is named"},

@@ -1,6 +1,7 @@
 // The command lines that roomtex-auto chooses, with programs of several versions in COLMAP's place.
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -13,6 +14,7 @@
 #include "core/child_program.h"
 #include "core/error.h"
 #include "core/photo.h"
+#include "tests/support/run_command.h"
 #include "tests/support/temp_folder.h"
 #include "workflow/output_folder.h"
 #include "workflow/scanner_photos.h"
@@ -57,6 +59,16 @@ class StepTableTest : public testing::Test {
     options_.patterned = "0";
   }
 
+  // What roomtex-align left: a model, with its report beside it and in the log.
+  void AddAligned(const std::string& name, bool trusted) {
+    const std::string report = trusted ? R"({"trusted": true})" : R"({"trusted": false})";
+    fs::create_directories(folder_ / ("result/" + name));
+    fs::create_directories(folder_ / "result/log");
+    WriteBytes(folder_ / ("result/" + name + "/images.bin"), "a model");
+    WriteBytes(folder_ / ("result/" + name + "/alignment.json"), report);
+    WriteBytes(folder_ / "result/log/align.json", report);
+  }
+
   void AddPhotos(const std::string& name, int count, int width) {
     for (int i = 0; i < count; ++i) {
       cv::imwrite(folder_ / ("photos/" + name + std::to_string(100 + i) + ".jpg"),
@@ -88,6 +100,54 @@ class StepTableTest : public testing::Test {
   TempFolder folder_;
   AutoOptions options_;
 };
+
+// Features take hours: they are not made anew since somebody has looked at the photos, or written
+// notes beside them.
+TEST_F(StepTableTest, OnlyPhotosInTheFolderOfPhotosCount) {
+  WriteBytes(folder_ / "colmap", std::string(kColmap38) +
+                                     "for word; do [ \"$last\" = --database_path ] && echo >$word; "
+                                     "last=$word; done\ntrue\n");
+  AddPhotos("a", 3, 64);
+  WriteBytes(folder_ / "room.ptx", "1\n");
+  const auto start = [this] {
+    const CommandResult result =
+        RunCommandLine("roomtex-auto --until features --image_path " + options_.image_path +
+                       " --scan_path " + (folder_ / "room.ptx") + " --output_path " +
+                       options_.output_path + " --colmap " + options_.colmap);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  EXPECT_THAT(start(), Not(HasSubstr("features: ")));  // for the first time
+  for (const char* name : {".DS_Store", "Thumbs.db", "notes.txt"}) {
+    WriteBytes(folder_ / (std::string("photos/") + name), "x");
+  }
+  EXPECT_THAT(start(), HasSubstr("features: done before, nothing has changed"));
+  AddPhotos("b", 1, 64);
+  EXPECT_THAT(start(), HasSubstr("features: once more, changed: photos"));
+}
+
+// Which of two alignments is the last is no question of the times of files, which a copy turns
+// about.
+TEST_F(StepTableTest, ColoursFromTheLastAlignment) {
+  const auto chosen = [this] { return Chain(options_).AlignedPath(); };
+  const std::string aligned = folder_ / "result/aligned", aside = aligned + ".untrusted";
+  options_.accept_untrusted = true;
+  AddAligned("aligned", false);
+  EXPECT_EQ(chosen(), aligned);
+  AddAligned("aligned", true);
+  AddAligned("aligned.untrusted", false);
+  EXPECT_EQ(chosen(), aside);
+  options_.accept_untrusted = false;
+  EXPECT_EQ(chosen(), aligned);
+  options_.accept_untrusted = true;
+  AddAligned("aligned", true);  // a later run, which leaves the one aside there
+  const auto later = fs::file_time_type::clock::now() + std::chrono::hours(1);
+  fs::last_write_time(aside + "/images.bin", later);
+  EXPECT_EQ(chosen(), aligned);
+  AddAligned("aligned.untrusted", false);
+  fs::last_write_time(aligned + "/alignment.json", later);
+  EXPECT_EQ(chosen(), aside);
+}
 
 TEST_F(StepTableTest, HasEachNameOnceAndInTheOrderOfTheWork) {
   const std::vector<std::string> names = StepNames();

@@ -64,7 +64,10 @@ def match(list_path, part, parts, copy, auto):
     part_list = copy + ".txt"
     with open(part_list, "w", encoding="utf-8") as file:
         file.writelines(pairs)
-    shutil.copyfile(value_of(command, "--database_path"), copy)
+    database = value_of(command, "--database_path")
+    for ending in ("", "-wal"):  # of a COLMAP that was killed: what it wrote last
+        if os.path.exists(database + ending):
+            shutil.copyfile(database + ending, copy + ending)
     run(with_value(with_value(command, "--database_path", copy), "--match_list_path", part_list))
     os.remove(part_list)
 
@@ -77,6 +80,10 @@ def merge(before, state, folder, copies):
         for copy in copies:
             command += ["--copy_path", copy]
         run(command)
+        # What a COLMAP that was killed left belongs to the file that goes: SQLite would take it for the new one's.
+        for ending in ("-wal", "-shm"):
+            if os.path.exists(database + ending):
+                os.remove(database + ending)
         os.replace(merged, database)
     shutil.copyfile(before, state)
 

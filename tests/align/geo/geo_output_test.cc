@@ -140,6 +140,7 @@ TEST_P(EveryOrigin, TheWrittenModelAndItsCamerasAreOnePlaceToAMicrometre) {
   const Json json = Json::parse(ReadBytes(folder / "aligned/geo/geo.json"));
   EXPECT_EQ(json["utm"]["zone"], frame.GridOfOrigin().ZoneName());
   EXPECT_EQ(json["origin"]["latitude"], origin.position.latitude_deg);
+  EXPECT_EQ(json["trusted"], true);
   Eigen::Matrix<double, 3, 4> ecef_from_enu;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
@@ -188,6 +189,15 @@ TEST(GeoReference, WithoutStationsTheScanFrameStandsAtTheOrigin) {
   const std::optional<GeoReference> north =
       FindGeoReference(OneScan(std::nullopt), ParseGeoOrigin("47,8,500"));
   EXPECT_THAT(GeoWarnings(SiteModel(), *north, {}), ElementsAre(HasSubstr("to face north")));
+  // Who goes on from the written model hears of both.
+  const TempFolder folder;
+  WriteGeoModel(SiteModel(), *north, folder / "geo", "picks contradict");
+  const Json json = Json::parse(ReadBytes(folder / "geo/geo.json"));
+  EXPECT_EQ(json["heading_assumed"], true);
+  EXPECT_EQ(json["surveyed"], false);
+  EXPECT_EQ(json["trusted"], false);
+  EXPECT_EQ(json["reason"], "picks contradict");
+  EXPECT_EQ(GeoToJson(*geo, OneScan(std::nullopt), {})["heading_assumed"], false);
   // A z-up scan that is east-north-up already keeps its axes.
   PlacedScans z_up = OneScan(std::nullopt);
   z_up.scans[0].up = Eigen::Vector3d::UnitZ();

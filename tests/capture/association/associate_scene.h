@@ -23,6 +23,7 @@ namespace roomtex {
 
 struct Take {
   bool patterned = false;
+  bool second_projector = false;    // throws its pattern as well
   double shift_x = 0, shift_y = 0;  // pixels by which the picture has moved
   double roll_deg = 0;              // about the middle
   double ev = 0;
@@ -33,6 +34,7 @@ struct Take {
 class AssociateScene {
  public:
   static constexpr int kWidth = 720, kHeight = 480;
+  static constexpr double kRoomLight = 0.45;
 
   // furnished = false: only edges of walls and floor.
   explicit AssociateScene(int num_places, bool furnished = true) {
@@ -52,13 +54,17 @@ class AssociateScene {
     const SimulatedRoom room(options);
     for (int place = 0; place < num_places; ++place) {
       const cv::Mat3f room_light = Linear(room.RenderPhoto(place));
-      plain_.push_back(0.45 * room_light);
+      plain_.push_back(kRoomLight * room_light);
       patterned_.push_back(plain_.back() + 1.6 * room_light.mul(ProjectedAt(place)));
     }
   }
 
   cv::Mat TakePhoto(int place, const Take& take) const {
-    const cv::Mat3f& light = (take.patterned ? patterned_ : plain_)[place];
+    cv::Mat3f light = (take.patterned ? patterned_ : plain_)[place];
+    if (take.second_projector) {
+      const cv::Mat3f more = plain_[place].mul(ProjectedAt(1000 + place));
+      light = cv::Mat3f(light + 1.6 / kRoomLight * more);
+    }
     cv::Mat3f moved, small;
     if (take.shift_x != 0 || take.shift_y != 0 || take.roll_deg != 0) {
       const double c = std::cos(RadFromDeg(take.roll_deg)), s = std::sin(RadFromDeg(take.roll_deg));
@@ -96,8 +102,9 @@ class AssociateScene {
  private:
   // The photo's file. Most tests want the same photos.
   const std::string& Encoded(const std::string& extension, int place, const Take& take) const {
-    std::string& bytes = encoded_[{extension, place, take.patterned, take.shift_x, take.shift_y,
-                                   take.roll_deg, take.ev, take.noise, take.seed}];
+    std::string& bytes =
+        encoded_[{extension, place, take.patterned, take.second_projector, take.shift_x,
+                  take.shift_y, take.roll_deg, take.ev, take.noise, take.seed}];
     if (bytes.empty()) {
       std::vector<uchar> buffer;
       cv::imencode(extension, TakePhoto(place, take), buffer, {cv::IMWRITE_JPEG_QUALITY, 93});
@@ -145,7 +152,7 @@ class AssociateScene {
   // Light of the room, and with the pattern, per place; twice as fine as the photos.
   std::vector<cv::Mat3f> plain_, patterned_;
   using TakeKey =
-      std::tuple<std::string, int, bool, double, double, double, double, double, uint64_t>;
+      std::tuple<std::string, int, bool, bool, double, double, double, double, double, uint64_t>;
   mutable std::map<TakeKey, std::string> encoded_;
 };
 

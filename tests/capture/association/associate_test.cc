@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <map>
 
 #include <gmock/gmock.h>
 #include <opencv2/features2d.hpp>
@@ -210,6 +211,54 @@ TEST_F(Associate, GivesTwoPatternedPhotosTheSamePlainOne) {
   EXPECT_FALSE(fs::exists(folder_ / "links/plain/a.jpg"));
 }
 
+Take BothProjectors() {
+  Take take = Patterned();
+  take.second_projector = true;
+  take.ev = -0.5;
+  take.seed = 3;
+  return take;
+}
+
+// Both projectors, one, none: what shares part of a pattern lies on each other best of all.
+TEST_F(Associate, TakesNoPhotoWithAPatternForAPlainOne) {
+  const std::string names[3][3] = {{"p0_a_both.jpg", "p0_b_one.jpg", "p0_c_plain.jpg"},
+                                   {"p1_b_both.jpg", "p1_a_one.jpg", "p1_c_plain.jpg"},
+                                   {"p2_b_both.jpg", "p2_c_one.jpg", "p2_a_plain.jpg"}};
+  for (int place = 0; place < 3; ++place) {
+    Save(names[place][0], place, BothProjectors());
+    Save(names[place][1], place, Patterned());
+    Take plain = Plain();
+    plain.shift_x = 0.15;
+    Save(names[place][2], place, plain);
+  }
+  const std::string line = "roomtex-associate --quiet --image_path " + Images() +
+                           " --output_path " + (folder_ / "pairs.csv");
+  const CommandResult result = RunCommandLine(line + " --links_path " + (folder_ / "links"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err.find("further plain"), std::string::npos) << result.err;
+  for (const auto& [both, one, plain] : names) {
+    const std::string table = ReadBytes(folder_ / "pairs.csv");
+    EXPECT_THAT(table, HasSubstr(both + "," + plain + ","));
+    EXPECT_THAT(table, HasSubstr(one + "," + plain + ","));
+    EXPECT_THAT(table, ::testing::Not(HasSubstr(both + "," + one)));
+  }
+  for (const auto& entry : fs::directory_iterator(folder_ / "links/plain")) {
+    EXPECT_THAT(fs::canonical(entry).filename().string(), HasSubstr("_plain"));
+  }
+}
+
+// The plain one was taken after the camera had been touched.
+TEST_F(Associate, LeavesAPhotoWithoutACleanPlainOneAlone) {
+  Save("a.jpg", 0, BothProjectors());
+  Save("b.jpg", 0, Patterned(0.45, 0));
+  Take plain = Plain();
+  plain.shift_x = 0.9;
+  Save("c.jpg", 0, plain);
+  const Associations found = Find();
+  EXPECT_THAT(Names(found), ElementsAre(Pair("b.jpg", "c.jpg")));
+  EXPECT_THAT(ReasonOf(found, "a.jpg"), HasSubstr("b.jpg of its place has a pattern itself"));
+}
+
 TEST_F(Associate, NamesASecondPlainPhoto) {
   Save("a.jpg", 0, Plain());
   Save("b.jpg", 0, Patterned());
@@ -283,7 +332,8 @@ TEST_F(Associate, WantsTwoPhotos) {
 
 // A database with SIFT keypoints of the photos, as COLMAP numbers them.
 void WriteDatabase(const std::string& path, const std::string& images,
-                   const std::vector<std::string>& names, bool with_keypoints) {
+                   const std::vector<std::string>& names, bool with_keypoints,
+                   const std::map<std::string, std::string>& files = {}) {
   DatabaseMaker database(path, DatabaseMaker::Schema::k38);
   Camera camera;
   camera.camera_id = 1;
@@ -296,7 +346,8 @@ void WriteDatabase(const std::string& path, const std::string& images,
     database.AddImage(++id, name, 1);
     if (!with_keypoints) continue;
     std::vector<cv::KeyPoint> keypoints;
-    cv::SIFT::create(0, 3, 0.02)->detect(cv::imread(images + "/" + name, 0), keypoints);
+    const std::string& file = files.count(name) > 0 ? files.at(name) : name;
+    cv::SIFT::create(0, 3, 0.02)->detect(cv::imread(images + "/" + file, 0), keypoints);
     std::vector<Eigen::Vector2d> x_in_img;
     for (const cv::KeyPoint& keypoint : keypoints) {
       x_in_img.emplace_back(keypoint.pt.x + 0.5, keypoint.pt.y + 0.5);
@@ -320,6 +371,21 @@ TEST_F(Associate, CountsTheKeypointsInCommon) {
   EXPECT_FALSE(found.pairs[1].num_common_keypoints.has_value());  // d.jpg is not in the database
   EXPECT_EQ(ReadBytes(options_.database_path), before);
   EXPECT_FALSE(fs::exists(options_.database_path + "-wal"));
+}
+
+TEST_F(Associate, SaysWhereKeypointsContradictTheEdges) {
+  Save("a.jpg", 0, Patterned());
+  Save("b.jpg", 0, Plain());
+  Save("a_moved.jpg", 0, Patterned(2.5, 0));
+  options_.database_path = folder_ / "database.db";
+  // Of another photo under its name.
+  WriteDatabase(options_.database_path, Images(), {"a.jpg", "b.jpg"}, true,
+                {{"a.jpg", "a_moved.jpg"}});
+  fs::remove(Image("a_moved.jpg"));
+  const Associations found = Find();
+  ASSERT_THAT(Names(found), ElementsAre(Pair("a.jpg", "b.jpg")));
+  ASSERT_EQ(found.warnings.size(), 1u);
+  EXPECT_THAT(found.warnings[0], HasSubstr("that both have say 2."));
 }
 
 TEST_F(Associate, WorksWithADatabaseOfNamesOnly) {

@@ -133,6 +133,50 @@ TEST_F(CalibrateCommand, EndsWithFourWhenPhotosDoNotDetermineTheCamera) {
   EXPECT_EQ(ReadBack(folder_ / "camera.txt").model, CameraModel::kSimpleRadial);
 }
 
+// One millimetre over 20 cm, as paper on cardboard has it: 2 % of the focal length if taken for
+// flat.
+TEST_F(CalibrateCommand, TakesABowedBoardIntoAccount) {
+  BoardSetOptions set;
+  set.num_photos = 12;
+  const Board board = Checkerboard(9, 6);
+  BoardPhotoOptions photo;
+  photo.bow = 0.001;
+  const TempFolder photos;
+  WriteBoardPhotos(photos.path(), Truth(), board, MakeBoardPoses(Truth(), board, set), photo);
+  const CommandResult result = RunCommandLine(
+      "roomtex-calibrate --board 9x6 --image_path " + photos.path() + " --output_path " +
+      (folder_ / "camera.txt") + " --report_path " + (folder_ / "report.json"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("the board is not flat"), std::string::npos) << result.err;
+  const nlohmann::json report = Report();
+  EXPECT_NEAR(report["board_bow_mm"].get<double>(), 1, 0.1);
+  EXPECT_TRUE(report["board_bow_used"].get<bool>());
+  EXPECT_GT(std::abs(report["board_bow_focal_percent"].get<double>()), 0.5);
+  EXPECT_EQ(report["camera_model"], "OPENCV");
+  const auto params = report["params"].get<std::vector<double>>();
+  const auto sigmas = report["params_sigma"].get<std::vector<double>>();
+  for (int i = 0; i < 8; ++i) EXPECT_NEAR(params[i], Truth().params[i], 4 * sigmas[i]) << i;
+  EXPECT_LT(sigmas[0], 0.002 * params[0]);
+}
+
+TEST_F(CalibrateCommand, EndsWithFourWhereTheFocusWasTouched) {
+  BoardSetOptions set;
+  set.num_photos = 14;
+  const Board board = Checkerboard(9, 6);
+  const std::vector<Rigid> poses = MakeBoardPoses(Truth(), board, set);
+  Camera touched = Truth();
+  for (const int i : {0, 1}) touched.params[i] *= 1.01;
+  const TempFolder photos;
+  WriteBoardPhotos(photos.path(), Truth(), board, {poses.begin(), poses.begin() + 7}, {});
+  WriteBoardPhotos(photos / "later", touched, board, {poses.begin() + 7, poses.end()}, {});
+  const CommandResult result = RunCommandLine(
+      "roomtex-calibrate --board 9x6 --image_path " + photos.path() + " --output_path " +
+      (folder_ / "camera.txt") + " --report_path " + (folder_ / "report.json"));
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(Report()["reason"].get<std::string>().find("touched focus"), std::string::npos)
+      << Report()["reason"] << Report()["photo_scatter"];
+}
+
 TEST_F(CalibrateCommand, SaysWhatIsWrongInSentences) {
   const std::string start = "roomtex-calibrate --output_path " + (folder_ / "camera.txt") + " ";
   const auto expect = [&](const std::string& options, int exit_code, const std::string& text) {
@@ -293,6 +337,45 @@ TEST_F(ApplyToDatabaseTest, CopiesWhatStandsInTheWalToo) {
   EXPECT_EQ(ReadBytes(path + "-wal"), wal);
   EXPECT_EQ(Database(folder_ / "copy.db").ReadCameras().at(1).params, Truth().params);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "copy.db-wal"));
+}
+
+// SQLite would play a log that a killed program left into the new file.
+TEST_F(ApplyToDatabaseTest, RefusesACopyWithALogBesideIt) {
+  MakeDatabase({Guess(1, kWidth, kHeight)});
+  const std::string apply = "--apply " + (folder_ / "database.db");
+  WriteBytes(folder_ / "database_calibrated.db-wal", std::string(64, 'x'));
+  CommandResult result = Run(apply);
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("database_calibrated.db-wal"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "database_calibrated.db"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "camera.txt"));
+  // An empty one says nothing.
+  WriteBytes(folder_ / "database_calibrated.db-wal", "");
+  result = Run(apply);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "database_calibrated.db-wal"));
+  EXPECT_EQ(Database(folder_ / "database_calibrated.db").ReadCameras().at(1).params,
+            ReadBack(folder_ / "camera.txt").params);
+}
+
+TEST_F(ApplyToDatabaseTest, KeepsWhatWasMadeInAnEarlierCopy) {
+  MakeDatabase({Guess(1, kWidth, kHeight), Guess(2, kWidth, kHeight)});
+  const std::string copy = folder_ / "database_calibrated.db";
+  const std::string apply = "--apply " + (folder_ / "database.db");
+  EXPECT_EQ(Run(apply).exit_code, 0);
+  EXPECT_EQ(Run(apply).exit_code, 0) << "nothing was made in it";
+  SQLite::Database(copy, SQLite::OPEN_READWRITE)
+      .exec(
+          "CREATE TEMP TABLE more AS SELECT * FROM two_view_geometries;"
+          "UPDATE more SET pair_id = pair_id + 1;"
+          "INSERT INTO two_view_geometries SELECT * FROM more;");
+  const std::string before = ReadBytes(copy);
+  const CommandResult result = Run(apply);
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("--apply_output"), std::string::npos) << result.err;
+  EXPECT_EQ(ReadBytes(copy), before);
+  EXPECT_EQ(Run(apply + " --apply_output " + copy).exit_code, 0);
+  EXPECT_EQ(Database(copy).CountPairs(), 1u);
 }
 
 TEST_F(ApplyToDatabaseTest, RefusesPhotosOfAnotherShape) {

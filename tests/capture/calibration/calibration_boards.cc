@@ -171,9 +171,14 @@ std::vector<Rigid> MakeBoardPoses(const Camera& camera, const Board& board,
   return poses;
 }
 
+double BowedHeight(const Board& board, const Eigen::Vector2d& x_on_board, double bow, int power) {
+  const double half = (board.columns - 1) * board.square / 2;
+  return bow * (1 - std::pow(x_on_board.x() / half - 1, power));
+}
+
 std::vector<BoardPhoto> ObserveBoards(const Camera& camera, const Board& board,
                                       const std::vector<Rigid>& cam_from_board, double noise_px,
-                                      uint64_t seed) {
+                                      uint64_t seed, double bow, int power) {
   const CameraProjection projection(camera);
   std::vector<BoardPhoto> photos;
   for (size_t i = 0; i < cam_from_board.size(); ++i) {
@@ -185,7 +190,9 @@ std::vector<BoardPhoto> ObserveBoards(const Camera& camera, const Board& board,
     photo.x_in_img.resize(2, board.NumCorners());
     for (int id = 0; id < board.NumCorners(); ++id) {
       const Eigen::Vector2d x = board.CornerOnBoard(id);
-      const auto seen = projection.ImgFromCam(cam_from_board[i] * Eigen::Vector3d(x.x(), x.y(), 0));
+      const double height = BowedHeight(board, x, bow, power);
+      const auto seen =
+          projection.ImgFromCam(cam_from_board[i] * Eigen::Vector3d(x.x(), x.y(), -height));
       const Eigen::Vector2d noise(random.Gaussian(), random.Gaussian());
       if (!seen || !projection.InImage(*seen)) continue;
       photo.x_in_img.col(photo.NumCorners()) = *seen + noise_px * noise;
@@ -226,9 +233,20 @@ cv::Mat BoardRenderer::Render(const Board& board, const Rigid& cam_from_board,
   ray_from_board << cam_from_board.rotation.toRotationMatrix().leftCols<2>() * board.square,
       cam_from_board.translation;
   const Eigen::Matrix3d board_from_ray = ray_from_board.inverse();
+  const Rigid board_from_cam = cam_from_board.Inverse();
   const auto light_at = [&](double x, double y) {
-    const Eigen::Vector3d at = board_from_ray * RayAt(x, y).homogeneous();
-    return pattern.Light(at.x() / at.z(), at.y() / at.z());
+    const Eigen::Vector3d ray = RayAt(x, y).homogeneous();
+    const Eigen::Vector3d at = board_from_ray * ray;
+    if (options.bow == 0) return pattern.Light(at.x() / at.z(), at.y() / at.z());
+    // Where the ray meets the bowed board: from the plane on, as often as its height changes.
+    const Eigen::Vector3d from = board_from_cam * Eigen::Vector3d::Zero();
+    const Eigen::Vector3d along = board_from_cam.rotation * ray;
+    Eigen::Vector2d place = board.square * at.hnormalized();
+    for (int round = 0; round < 5; ++round) {
+      const double height = -BowedHeight(board, place, options.bow);
+      place = (from + (height - from.z()) / along.z() * along).head<2>();
+    }
+    return pattern.Light(place.x() / board.square, place.y() / board.square);
   };
   const int width = camera_.width, height = camera_.height;
   cv::Mat at_corners(height + 1, width + 1, CV_32F);  // of the pixels

@@ -29,15 +29,21 @@ struct BoardSetOptions {
 std::vector<Rigid> MakeBoardPoses(const Camera& camera, const Board& board,
                                   const BoardSetOptions& options);
 
+// Height of a place of a board that is bowed about its middle column, metres towards the camera:
+// as a sheet (power 2), or by edges that curl up (4).
+double BowedHeight(const Board& board, const Eigen::Vector2d& x_on_board, double bow,
+                   int power = 2);
+
 // The corners as a perfect detection with Gaussian noise would give them.
 std::vector<BoardPhoto> ObserveBoards(const Camera& camera, const Board& board,
                                       const std::vector<Rigid>& cam_from_board, double noise_px,
-                                      uint64_t seed);
+                                      uint64_t seed, double bow = 0, int power = 2);
 
 struct BoardPhotoOptions {
   double blur_px = 0.8;  // Gaussian sigma
   double noise = 2;      // grey levels
   double stretch = 1;    // the board's columns are this much too wide: another board
+  double bow = 0;  // metres: its middle column lies so much nearer than its first and last one
   uint64_t seed = 1;
   bool upper_left_is_black = true;
 };

@@ -75,6 +75,8 @@ TEST(Calibration, FindsTheTrueCameraWithinItsStandardDeviations) {
       EXPECT_EQ(found.camera.model, truth.model) << found.why_model;
       if (found.camera.model != truth.model) continue;
       EXPECT_TRUE(found.reasons.empty()) << found.reasons[0];
+      EXPECT_FALSE(found.bow.used) << found.bow.height << " " << found.bow.focal_percent;
+      EXPECT_LT(found.photo_scatter, 2);
       EXPECT_EQ(found.NumUsed(), set.num_photos);
       EXPECT_LT(CoveredRms(truth, found), 0.1);
       for (int k = 0; k < found.lens.num_free; ++k) {
@@ -194,6 +196,62 @@ TEST(Calibration, WeighsPhotosByTheirNoise) {
   EXPECT_EQ(after.NumUsed(), 17);
   EXPECT_NEAR(after.sigma_px, 0.05, 0.004);
   EXPECT_LT(after.params_sigma[0], 1.05 * before.params_sigma[0]);
+}
+
+std::vector<BoardPhoto> ObserveBowed(const Camera& camera, const BoardSetOptions& options,
+                                     double bow, int power = 2) {
+  const Board board = Checkerboard(9, 6);
+  return ObserveBoards(camera, board, MakeBoardPoses(camera, board, options), kDetectionNoise,
+                       options.seed, bow, power);
+}
+
+// A bow is the same in all photos: no scatter tells of it, and taken for flat it lengthens the
+// focal length by many of its standard deviations.
+TEST(Calibration, TakesTheBowOfABoardIntoAccount) {
+  for (const uint64_t seed : {1, 2}) {
+    const Camera truth = LensThatCallsFor(CameraModel::kOpenCv, 1500, 1000);
+    BoardSetOptions set;
+    set.seed = seed;
+    for (const double bow : {-0.002, 0.0005, 0.001, 0.003}) {
+      const Calibration found = CalibrateCorners(ObserveBowed(truth, set, bow));
+      EXPECT_TRUE(found.bow.used) << bow;
+      EXPECT_NEAR(found.bow.height, std::abs(bow), 0.05 * std::abs(bow) + 3e-5);
+      EXPECT_GT(std::abs(found.bow.focal_percent), 0.2);
+      EXPECT_EQ(found.camera.model, truth.model);
+      EXPECT_TRUE(found.reasons.empty()) << found.reasons[0];
+      EXPECT_TRUE(AnyHolds(found.warnings, "the board is not flat"));
+      for (int k = 0; k < found.lens.num_free; ++k) {
+        EXPECT_NEAR(found.camera.params[k], truth.params[k], 4 * found.params_sigma[k]) << k;
+      }
+      // Edges that curl up are described less well, and near enough.
+      const Calibration curled = CalibrateCorners(ObserveBowed(truth, set, bow, 4));
+      EXPECT_TRUE(curled.bow.used);
+      for (int k : {0, 1}) {
+        const double focal = curled.camera.params[curled.lens.num_free > 5 ? k : 0];
+        EXPECT_NEAR(focal, truth.params[k], 0.003 * truth.params[k]);
+      }
+    }
+  }
+}
+
+// Focus touched half way through.
+TEST(Calibration, DoesNotTrustTwoFocalLengths) {
+  BoardSetOptions set;
+  const Camera truth = LensThatCallsFor(CameraModel::kOpenCv, 1500, 1000);
+  Camera touched = truth;
+  for (const double change : {1.003, 1.01}) {
+    for (int k : {0, 1}) touched.params[k] = change * truth.params[k];
+    std::vector<BoardPhoto> photos = Observe(truth, set, kDetectionNoise);
+    const std::vector<BoardPhoto> others = Observe(touched, set, kDetectionNoise);
+    std::copy(others.begin() + 7, others.end(), photos.begin() + 7);
+    const Calibration found = CalibrateCorners(photos);
+    EXPECT_TRUE(AnyHolds(found.reasons, "photos disagree")) << found.photo_scatter;
+    CalibrationOptions tolerant;
+    tolerant.max_photo_scatter = 1000;
+    const Calibration warned = CalibrateCorners(photos, tolerant);
+    EXPECT_FALSE(AnyHolds(warned.reasons, "photos disagree"));
+    EXPECT_TRUE(AnyHolds(warned.warnings, "photos disagree"));
+  }
 }
 
 TEST(Calibration, DoesNotTrustBoardsThatAreAllFrontal) {

@@ -92,7 +92,11 @@ TEST_F(PatternCommand, SaysWhenAPhotoIsSmallPlainOrNone) {
   EXPECT_NE(result.err.find("is plain"), std::string::npos) << result.err;
   WriteBytes(folder_ / "text.jpg", "no picture");
   EXPECT_EQ(Run("--input_path " + (folder_ / "text.jpg")).exit_code, 3);
-  EXPECT_EQ(Run("--input_path " + (folder_ / "none.jpg")).exit_code, 3);
+  for (const char* option : {"--input_path", "--evaluate_path"}) {
+    result = Run(std::string(option) + " " + (folder_ / "none.jpg"));
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.err.find(std::string("Check ") + option), std::string::npos) << result.err;
+  }
   EXPECT_EQ(Run("--blocks 0 --brightness 2").exit_code, 2);
   result = RunCommandLine("roomtex-pattern --output_path " + (folder_ / "pattern.gif"));
   EXPECT_EQ(result.exit_code, 2);

@@ -35,6 +35,27 @@ std::vector<std::string> FilesBelow(const std::string& folder) {
   return names;
 }
 
+TEST(CaptureFolder, HoldsNothingOfAnEarlierCapture) {
+  const TempFolder folder;
+  const std::string line = "roomtex-simulate --quiet --output_path " + (folder / "capture") +
+                           " --num_photos 1 --photo_width 120 --photo_height 80 "
+                           "--scan_columns 120 --scan_rows 60 --shading 0 ";
+  ASSERT_EQ(RunCommandLine(line + "--num_stations 3").exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "capture/scan_2.rtpi"));
+  WriteBytes(folder / "capture/truth/associations.csv", "of an earlier capture");
+  WriteBytes(folder / "capture/truth/pattern_1.png", "of an earlier capture");
+  WriteBytes(folder / "capture/scan_mine.rtpi", "mine");
+  ASSERT_EQ(RunCommandLine(line + "--num_stations 2").exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "capture/scan_1.rtpi"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "capture/scan_2.rtpi"));
+  ASSERT_EQ(RunCommandLine(line).exit_code, 0);
+  for (const char* name :
+       {"scan_1.rtpi", "scan_poses.txt", "truth/associations.csv", "truth/pattern_1.png"}) {
+    EXPECT_FALSE(std::filesystem::exists((folder / "capture/") + name)) << name;
+  }
+  EXPECT_EQ(ReadBytes(folder / "capture/scan_mine.rtpi"), "mine");
+}
+
 TEST(CaptureFolder, HoldsWhatTheRoomIs) {
   const TempFolder folder;
   SimulatedRoomOptions options = SmallRoom();
