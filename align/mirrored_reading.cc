@@ -42,14 +42,28 @@ bool FitEitherWay(const AlignmentInput& input, const PickReviewOptions& options)
   return true;
 }
 
+// Points that say that another room was scanned: in the open and behind the surface alike, as a
+// share of those judged.
+double ShareOfAnotherRoom(const AlignmentAttempt& attempt) {
+  return attempt.alignment->placement.ChangedShare();
+}
+
+// Of a coarse scan many points are off the surface either way; how many look like another room,
+// where nobody believes the scan as it is, tells the two apart.
 bool IsBelieved(const AlignmentAttempt& mirrored, const AlignmentAttempt& as_read) {
-  return mirrored.trusted() && ShareOff(mirrored) < 0.5 * ShareOff(as_read);
+  if (!mirrored.trusted()) return false;
+  if (ShareOff(mirrored) < 0.5 * ShareOff(as_read)) return true;
+  return !as_read.trusted() && as_read.alignment &&
+         ShareOfAnotherRoom(mirrored) < 0.5 * ShareOfAnotherRoom(as_read);
 }
 
 std::string Evidence(const AlignmentAttempt& mirrored, const AlignmentAttempt& as_read) {
   const std::string there = Percent(1 - ShareOff(mirrored)) + " of the sparse points lie on it";
   if (ShareOff(as_read) == 1) return "reflected, " + there;
-  return "reflected, " + there + ", as it is " + Percent(1 - ShareOff(as_read));
+  const std::string here = "reflected, " + there + ", as it is " + Percent(1 - ShareOff(as_read));
+  if (!as_read.alignment || ShareOff(mirrored) < 0.5 * ShareOff(as_read)) return here;
+  return here + "; " + Percent(ShareOfAnotherRoom(mirrored)) +
+         " lie as in another room, as it is " + Percent(ShareOfAnotherRoom(as_read));
 }
 
 }  // namespace

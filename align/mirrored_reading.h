@@ -46,7 +46,8 @@ struct MirroredReading {
 // After an attempt that is not trusted, or of picks that lie on the mirror image of the scan as
 // well, or fit it as well (on one wall): the same with the scan mirrored, then, with one scan, with
 // the picks mirrored, too. Believed where that is trusted and leaves at most half as many sparse
-// points off the surface, or where the picks lie on the mirror image only.
+// points off the surface (or, where it is not trusted as it is read, where another room would have
+// them), or where the picks lie on the mirror image only.
 MirroredReading FindMirroredReading(const AlignmentInput& input, const AlignmentAttempt& attempt,
                                     const AlignmentOptions& options, Progress* progress);
 

@@ -46,43 +46,6 @@ double CommonVariance(const std::vector<SurfaceMatch>& matches, const SurfaceCel
   return std::max(std::pow(kSurfaceNoise, 2), Median(excess) / kMedianSquarePerVariance);
 }
 
-// Covariance by leaving out the parts one by one; zero with too few of them. One step from the
-// solution, where all parts together have their minimum.
-Matrix7d JackknifeCovariance(const SimilarityNormal& all,
-                             const std::vector<SimilarityNormal>& parts) {
-  std::vector<Vector7d> steps;
-  Vector7d mean = Vector7d::Zero();
-  for (const SimilarityNormal& part : parts) {
-    if (part.matrix.isZero(0)) continue;
-    SimilarityNormal rest = all;
-    rest.matrix -= part.matrix;
-    rest.gradient -= part.gradient;
-    Vector7d step;
-    Matrix7d inverse;
-    if (!rest.SolveStep(&step, &inverse)) continue;
-    steps.push_back(step);
-    mean += step;
-  }
-  Matrix7d covariance = Matrix7d::Zero();
-  if (static_cast<int>(steps.size()) < kMinParts) return covariance;
-  const auto n = static_cast<double>(steps.size());
-  mean /= n;
-  for (const Vector7d& step : steps) {
-    covariance += (n - 1) / n * (step - mean) * (step - mean).transpose();
-  }
-  return covariance;
-}
-
-// The smallest covariance that is not below either, direction by direction of a.
-Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
-  const Eigen::SelfAdjointEigenSolver<Matrix7d> of_a(a);
-  const Matrix7d root = of_a.operatorSqrt(), inverse_root = of_a.operatorInverseSqrt();
-  if (!inverse_root.allFinite()) return a;
-  const SymmetricEigen relative(inverse_root * b * inverse_root);
-  const Vector7d larger = relative.values.cwiseMax(1);
-  return root * relative.vectors * larger.asDiagonal() * relative.vectors.transpose() * root;
-}
-
 // The distances at the solution of a fit, all together and part by part; facing: mean of n n^T.
 struct SurfaceSums {
   SurfaceSums(const std::vector<SurfaceMatch>& matches, const std::vector<SurfacePoint>& points,
@@ -108,6 +71,41 @@ struct SurfaceSums {
 };
 
 }  // namespace
+
+// One step from the solution, where all parts together have their minimum.
+Matrix7d JackknifeCovariance(const SimilarityNormal& all,
+                             const std::vector<SimilarityNormal>& parts) {
+  std::vector<Vector7d> steps;
+  Vector7d mean = Vector7d::Zero();
+  for (const SimilarityNormal& part : parts) {
+    if (part.matrix.isZero(0)) continue;
+    SimilarityNormal rest = all;
+    rest.matrix -= part.matrix;
+    rest.gradient -= part.gradient;
+    Vector7d step;
+    Matrix7d inverse;
+    if (!rest.SolveStep(&step, &inverse)) continue;
+    steps.push_back(step);
+    mean += step;
+  }
+  Matrix7d covariance = Matrix7d::Zero();
+  if (static_cast<int>(steps.size()) < kMinParts) return covariance;
+  const auto n = static_cast<double>(steps.size());
+  mean /= n;
+  for (const Vector7d& step : steps) {
+    covariance += (n - 1) / n * (step - mean) * (step - mean).transpose();
+  }
+  return covariance;
+}
+
+Matrix7d Larger(const Matrix7d& a, const Matrix7d& b) {
+  const Eigen::SelfAdjointEigenSolver<Matrix7d> of_a(a);
+  const Matrix7d root = of_a.operatorSqrt(), inverse_root = of_a.operatorInverseSqrt();
+  if (!inverse_root.allFinite()) return a;
+  const SymmetricEigen relative(inverse_root * b * inverse_root);
+  const Vector7d larger = relative.values.cwiseMax(1);
+  return root * relative.vectors * larger.asDiagonal() * relative.vectors.transpose() * root;
+}
 
 SurfaceWeights::SurfaceWeights(const std::vector<SurfaceMatch>& matches, const ScanPatches& surface,
                                double cell_size) {

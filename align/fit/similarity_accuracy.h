@@ -44,6 +44,14 @@ class SurfaceWeights {
   double common_sigma_ = 0;
 };
 
+// Covariance by leaving out the parts one by one (delete-a-group jackknife, Quenouille 1956; Kunsch
+// 1989 for dependent data), at the solution of all of them; zero with too few of them.
+Matrix7d JackknifeCovariance(const SimilarityNormal& all,
+                             const std::vector<SimilarityNormal>& parts);
+
+// The smallest covariance that is not below either, direction by direction of a.
+Matrix7d Larger(const Matrix7d& a, const Matrix7d& b);
+
 // Fills covariance, surface_information and facing of a fit at its solution. The covariance is the
 // larger, direction by direction, of what the noise leaves open and what parts of the room say when
 // they are left out one by one (delete-a-group jackknife, Quenouille 1956; Kunsch 1989 for

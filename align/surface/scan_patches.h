@@ -30,8 +30,10 @@ void VisitSurface(const Scan& scan, double spacing,
                   const std::function<void(const Eigen::Vector3d& x_in_scan)>& visit);
 
 struct ScanPatchOptions {
-  double cell_size = 0.06;  // metres; edge of the cubes whose samples make one patch
-  int min_samples = 6;      // a cube with fewer samples makes no patch
+  // Metres; edge of the cubes whose samples make one patch. Larger for scans that are so coarse
+  // that most samples would lie in cubes of too few.
+  double cell_size = 0.06;
+  int min_samples = 6;  // a cube with fewer samples makes no patch
   // A cube makes a patch only if its samples are flat: thickness below this share of their second
   // extent.
   double max_thickness_share = 0.25;
@@ -46,7 +48,7 @@ class ScanPatches {
   ScanPatches(const std::vector<Scan>& scans, const ScanPatchOptions& options);
 
   const std::vector<ScanPatch>& patches() const { return patches_; }
-  double cell_size() const { return cell_size_; }
+  double cell_size() const { return cell_size_; }  // metres; no less than the options'
   // Median thickness of the patches: the noise of the scan, metres; 0 without patches.
   double TypicalThickness() const;
 

@@ -39,6 +39,25 @@ TEST(SimilarityFit, FindsTheSurfaceFromSeveralCentimetresAway) {
   }
 }
 
+// Samples 5 cm apart on the walls.
+TEST(SimilarityFit, FindsTheSurfaceOfACoarseScan) {
+  SimulatedRoomOptions options = CaseOptions(1);
+  options.scan_columns = 300;
+  options.scan_rows = 150;
+  const SimulatedRoom room(options);
+  const SparseModel model = room.MakeSparseModel(2000, 0.7);
+  const ScanPatches surface({room.MakeScan(0)}, ScanPatchOptions());
+  EXPECT_GT(surface.cell_size(), ScanPatchOptions().cell_size);
+  EXPECT_EQ(ScanPatches(MakeCase().scans, ScanPatchOptions()).cell_size(),
+            ScanPatchOptions().cell_size);
+  const SimilarityFit fit =
+      FitToSurface(model, FindSurfacePoints(model, 3, 0.7), surface, {}, {}, 1.5, 0.2,
+                   Disturbed(room.ScanFromSparse(), 0.5, 0.03, 0.005), SimilarityFitOptions());
+  ASSERT_TRUE(fit.converged);
+  EXPECT_GT(fit.num_points, 800);
+  EXPECT_LT(WorstPoseErrors(room, model, fit.scan_from_sparse).position, 0.0015);
+}
+
 TEST(SimilarityFit, PicksHoldWhatOneWallLeavesOpen) {
   // Only one wall of the scan: the surface says nothing about sliding along it.
   const SimulatedCase& one = MakeCase();

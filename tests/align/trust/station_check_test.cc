@@ -86,6 +86,25 @@ TEST(StationCheck, ScansOfDifferentRoomsSayNothing) {
 
 // Three rooms a hundred metres from each other (1700 cells of the patches): what is compared in
 // each is what it is alone.
+TEST(StationCheck, ScansOfOneFileAreCalledByTheirNumber) {
+  std::vector<Scan> scans(3);
+  for (int i = 0; i < 3; ++i) {
+    scans[i].path = i < 2 ? "room.ptx" : "hall.ptx";
+    scans[i].number_in_file = i < 2 ? i + 2 : 1;
+  }
+  StationCheck check;
+  StationPair pair;
+  pair.second = 1;
+  pair.num_patches = 1000;
+  pair.offset = 0.5;
+  check.pairs = {pair};
+  check.wrong = {0, 1, 2};
+  const std::string sentence = check.Sentence(scans);
+  EXPECT_NE(sentence.find("room.ptx#2 and room.ptx#3 are 500 mm"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("neighbours: room.ptx#2, room.ptx#3, hall.ptx."), std::string::npos)
+      << sentence;
+}
+
 TEST(StationCheck, RoomsFarFromEachOtherAreComparedEachByItself) {
   const StationCheck alone = CheckStations(Stations(2));
   std::vector<Scan> scans;
@@ -104,6 +123,23 @@ TEST(StationCheck, RoomsFarFromEachOtherAreComparedEachByItself) {
     EXPECT_NEAR(pair.offset, alone.pairs[0].offset, 0.001);
     EXPECT_NEAR(pair.num_patches, alone.pairs[0].num_patches, 0.1 * alone.pairs[0].num_patches);
   }
+}
+
+// Samples 4 cm apart on the walls: of cubes of 6 cm only those near the stations have enough.
+TEST(StationCheck, StationsOfCoarseScansThatStandRightAgree) {
+  SimulatedRoomOptions options = CaseOptions(1);
+  options.num_stations = 3;
+  options.scan_columns = 400;
+  options.scan_rows = 200;
+  const SimulatedRoom room(options);
+  std::vector<Scan> scans;
+  for (int station = 0; station < 3; ++station) scans.push_back(room.MakeScan(station));
+  const StationCheck right = CheckStations(scans);
+  EXPECT_EQ(right.pairs.size(), 3u);
+  for (const StationPair& pair : right.pairs) EXPECT_LT(pair.offset, 0.002) << pair.first;
+  EXPECT_THAT(right.wrong, IsEmpty());
+  Displace({0.02, -0.02, 0.01}, 0, &scans[2]);
+  EXPECT_THAT(CheckStations(scans).wrong, ElementsAre(2));
 }
 
 }  // namespace
