@@ -12,6 +12,7 @@
 #include <ceres/rotation.h>
 #include <ceres/solver.h>
 
+#include "colmap_ext/solver_log.h"
 #include "core/camera_formulas.h"
 #include "core/error.h"
 #include "core/frames.h"
@@ -217,6 +218,7 @@ void Adjust(SparseModel* model) {
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
+  SilenceCeres();
   ceres::Solve(options, &problem, &summary);
   size_t next = 0;
   for (auto& [id, point] : model->points) point.x_in_model = points[next++];

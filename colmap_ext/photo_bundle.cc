@@ -17,6 +17,7 @@
 #include "colmap_ext/lens_prior.h"
 #include "colmap_ext/reduced_normal.h"
 #include "colmap_ext/reprojection_cost.h"
+#include "colmap_ext/solver_log.h"
 #include "core/projections.h"
 #include "core/robust_kernel.h"
 #include "core/similarity.h"
@@ -153,6 +154,7 @@ class PhotoProblem {
     for (PoseParameters& pose : poses_) order(pose.values, 1);
     for (auto& params : params_) order(params.data(), 2);
     ceres::Solver::Summary summary;
+    SilenceCeres();
     ceres::Solve(o, problem_.get(), &summary);
     return summary.IsSolutionUsable();
   }

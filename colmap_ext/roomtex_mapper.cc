@@ -19,6 +19,7 @@
 #include "colmap_ext/model_output.h"
 #include "core/command_line.h"
 #include "core/error.h"
+#include "core/input_guard.h"
 #include "core/json_text.h"
 #include "core/option_fields.h"
 #include "core/output_file.h"
@@ -314,6 +315,7 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   AppendProblems(options.chain.Problems(), &problems);
   ThrowIfProblems(problems);
   RequireFolder(options.image_path, "Check --image_path: the folder of the photos");
+  RequireOutsidePhotos(options.output_path, options.image_path);
   context.progress.Stage("read database");
   const Database database(options.database_path);
   const MatchedImages images(database);
@@ -326,8 +328,9 @@ void MapPhotos(const MappingOptions& options, const Command::Context& context) {
   RequireReplaceableModel(options.output_path + "/init");
   const SignalGuard signals;
   const ScratchFolder scratch(options.output_path);
-  std::ofstream(options.output_path + "/roomtex-mapper.log", std::ios::trunc)
-      << "roomtex-mapper " << Version() << "\n";
+  const std::string log_path = options.output_path + "/roomtex-mapper.log";
+  std::ofstream(log_path, std::ios::trunc) << "roomtex-mapper " << Version() << "\n";
+  NoteLog(log_path);
   const std::vector<std::string>& passed = options.mapper.mapper_arguments;
   for (size_t i = 0; i < passed.size(); i += 2) {
     if (!BeginsWith(passed[i], "--Mapper.init_")) continue;

@@ -5,7 +5,8 @@
 #include <memory>
 
 #include <ceres/ceres.h>
-#include <glog/logging.h>
+
+#include "colmap_ext/solver_log.h"
 
 namespace roomtex {
 namespace {
@@ -52,15 +53,6 @@ ceres::LossFunction* MakeLoss(const SeedBundleOptions& options) {
 
 ceres::CostFunction* MakeViewCost(const Ray& ray) {
   return new ceres::AutoDiffCostFunction<ViewError, 2, 4, 3, 3>(new ViewError(ray));
-}
-
-// Ceres tells of steps it had to retry through glog, on stderr; its result says what matters.
-void SilenceCeres() {
-  static const bool once = [] {
-    FLAGS_minloglevel = google::GLOG_FATAL;
-    return true;
-  }();
-  (void)once;
 }
 
 ceres::Solver::Options SolverOptions(const SeedBundleOptions& options) {

@@ -18,6 +18,15 @@ std::string Field(const std::string& text) {
   return quoted + "\"";
 }
 
+// Where the `#` is, from `at` on, that blanks part from what stands before it; the line's end if
+// there is none.
+size_t CommentIn(const std::string& line, size_t at) {
+  for (at = line.find('#', at); at != std::string::npos; at = line.find('#', at + 1)) {
+    if (at > 0 && (line[at - 1] == ' ' || line[at - 1] == '\t')) return at;
+  }
+  return line.size();
+}
+
 }  // namespace
 
 CsvReader::CsvReader(const std::string& path, const std::string& remedy,
@@ -87,11 +96,12 @@ std::optional<std::vector<std::string>> CsvReader::Fields() const {
       }
       ++at;
     }
-    const size_t comma = std::min(line_.find(',', at), line_.size());
+    const size_t comment = fields.size() >= comments_from_ ? CommentIn(line_, at) : line_.size();
+    const size_t comma = std::min(line_.find(',', at), comment);
     const std::string rest = Trimmed(line_.substr(at, comma - at));
     if (quoted && !rest.empty()) return std::nullopt;
     fields.push_back(quoted ? field : rest);
-    if (comma == line_.size()) return fields;
+    if (comma == comment) return fields;
     at = comma;
   }
 }

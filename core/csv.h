@@ -6,6 +6,7 @@
 
 #include <deque>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,10 @@ class CsvReader {
   // when the file cannot be read on.
   bool Next();
 
+  // Blanks and `#` behind a field begin a comment to the line's end, from this field on (0 = the
+  // first): names of photos may have a # of their own. Not asked for, none does.
+  void CommentsFrom(size_t field) { comments_from_ = field; }
+
   long line_number() const { return line_number_; }        // its first line, from 1
   const std::string& line() const { return line_; }        // without blanks at its ends
   std::optional<std::vector<std::string>> Fields() const;  // none if a quote is not closed
@@ -43,6 +48,7 @@ class CsvReader {
   std::ifstream stream_;
   bool NextLine(std::string* line);
 
+  size_t comments_from_ = std::numeric_limits<size_t>::max();
   std::string line_;
   long line_number_ = 0, lines_read_ = 0;
   std::deque<std::string> ahead_;  // read already, but not part of this record

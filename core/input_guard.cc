@@ -33,7 +33,7 @@ struct Guard {
   bool active = false;
   GuardedPaths paths;
   std::map<std::string, std::string> inputs;  // place of a file, what names it
-  std::vector<std::string> written;
+  std::vector<std::string> written, logs;
 };
 
 Guard& TheGuard() {
@@ -139,6 +139,7 @@ InputGuard::InputGuard(GuardedPaths paths) {
   const std::lock_guard<std::mutex> lock(guard.mutex);
   guard.active = true;
   guard.written.clear();
+  guard.logs.clear();
   guard.inputs.clear();
   for (const auto& [name, path] : paths.inputs) {
     std::error_code error;
@@ -154,6 +155,15 @@ InputGuard::~InputGuard() {
   guard.active = false;
   guard.inputs.clear();
   guard.paths = {};
+}
+
+void RequireOutsidePhotos(const std::string& output_path, const std::string& photos) {
+  std::error_code error;
+  if (!fs::is_directory(photos, error)) return;
+  const std::string place = Place(output_path), folder = Place(photos);
+  if (place.empty() || folder.empty() || (place != folder && !IsBelow(place, folder))) return;
+  throw UsageError("--output_path " + output_path + " lies in the folder of the photos, " + photos +
+                   ": give one outside of it");
 }
 
 void NoteInput(const std::string& path) {
@@ -212,6 +222,18 @@ std::vector<std::string> OutputsSoFar() {
   Guard& guard = TheGuard();
   const std::lock_guard<std::mutex> lock(guard.mutex);
   return guard.written;
+}
+
+void NoteLog(const std::string& path) {
+  Guard& guard = TheGuard();
+  const std::lock_guard<std::mutex> lock(guard.mutex);
+  if (guard.active) guard.logs.push_back(path);
+}
+
+std::vector<std::string> LogsSoFar() {
+  Guard& guard = TheGuard();
+  const std::lock_guard<std::mutex> lock(guard.mutex);
+  return guard.logs;
 }
 
 }  // namespace roomtex

@@ -31,6 +31,11 @@ class InputGuard {
   InputGuard& operator=(const InputGuard&) = delete;
 };
 
+// Throws UsageError if --output_path is the folder of the photos or lies below it: COLMAP, which
+// looks for photos in all of its folders, would take pictures that are written there for some.
+// Photos that are not there, "" among them, are for others to say.
+void RequireOutsidePhotos(const std::string& output_path, const std::string& photos);
+
 // This file is read as an input: one below a path of an input option.
 void NoteInput(const std::string& path);
 // The same for a file that no option names, e.g. the scan that an aligned model remembers.
@@ -45,5 +50,9 @@ void RequireReplaceable(const std::string& path);
 // What has been written to its place so far, in order.
 void NoteOutput(const std::string& path);
 std::vector<std::string> OutputsSoFar();
+
+// A log that is written while the command runs, and stays whatever becomes of it.
+void NoteLog(const std::string& path);
+std::vector<std::string> LogsSoFar();
 
 }  // namespace roomtex

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <numeric>
 #include <set>
 
 #include <CLI/App.hpp>
@@ -36,22 +35,6 @@ double Number(const std::string& text) {
   double value = 0;
   const auto [stop, error] = std::from_chars(begin, end, value);
   return error == std::errc() && stop == end && begin != end ? value : std::nan("");
-}
-
-// Number of letters to insert, delete or change (Levenshtein).
-size_t Distance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 0; i < a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (size_t j = 0; j < b.size(); ++j) {
-      const size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
 }
 
 }  // namespace
@@ -103,7 +86,7 @@ std::string OptionList::Unknown(const std::string& argument) const {
   const Option* nearest = nullptr;
   size_t nearest_distance = 3;  // more different names are no slips of the finger
   for (const Option& option : options_) {
-    const size_t distance = Distance(name, option.name);
+    const size_t distance = EditDistance(name, option.name);
     if (distance < nearest_distance) {
       nearest = &option;
       nearest_distance = distance;

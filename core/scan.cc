@@ -15,6 +15,13 @@ int Scan::NumMissing() const {
   return count;
 }
 
+std::string ScanName(const std::vector<Scan>& scans, size_t index) {
+  const Scan& scan = scans[index];
+  const auto num_of_file = std::count_if(
+      scans.begin(), scans.end(), [&scan](const Scan& other) { return other.path == scan.path; });
+  return num_of_file == 1 ? scan.path : scan.path + "#" + std::to_string(scan.number_in_file);
+}
+
 Scan Thinned(const Scan& scan, int stride) {
   if (stride == 1 || scan.kind() == Scan::Kind::kMesh) return scan;
   Scan thin;
@@ -28,6 +35,7 @@ Scan Thinned(const Scan& scan, int stride) {
   thin.up_is_assumed = scan.up_is_assumed;
   thin.is_rtpi = scan.is_rtpi;
   thin.number_in_file = scan.number_in_file;
+  thin.num_left_out = scan.num_left_out;
   const int column_stride = scan.organised ? stride : stride * stride;
   thin.num_columns = (scan.num_columns + column_stride - 1) / column_stride;
   thin.num_rows = (scan.num_rows + stride - 1) / stride;

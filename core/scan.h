@@ -61,6 +61,8 @@ struct Scan {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   bool up_is_assumed = false;  // the file does not say it
   bool is_rtpi = false;
+  // Of an E57 without a grid: its records that hold no measured point, and none of `points`.
+  int64_t num_left_out = 0;
   // Among the scans of its file, from 1; those that are left out because they are empty count.
   int number_in_file = 1;
 
@@ -73,6 +75,10 @@ struct Scan {
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
 };
+
+// How messages call scans[index]: by its path, and of a file with several among these by FILE#k, as
+// --scan_poses takes it.
+std::string ScanName(const std::vector<Scan>& scans, size_t index);
 
 // Called for every scan of a file as soon as it is read, the last one of `of_file`. Those there may
 // be changed before the next one is read, so that not all have to be held in full.

@@ -43,6 +43,7 @@ void StopBySignal(const std::string& command, int signal) {
   std::string kept = written.empty() ? "nothing was written, and what was there is unchanged"
                                      : "written to its end before that:";
   for (const std::string& path : written) kept += " " + path;
+  for (const std::string& path : LogsSoFar()) kept += ", but for the log " + path;
   const char* name = "a signal";
   for (const TidySignal& one : tidy_signals) {
     if (one.number == signal) name = one.name;

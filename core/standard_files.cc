@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -11,6 +12,18 @@
 #include "core/error.h"
 
 namespace roomtex {
+namespace {
+
+std::string& TheAnswer() {
+  static std::string answer;
+  return answer;
+}
+
+}  // namespace
+
+void AnswerAtEnd(const std::string& text) { TheAnswer() += text; }
+
+std::string TakeAnswer() { return std::exchange(TheAnswer(), ""); }
 
 void OpenStandardFiles() {
   int file = 0;

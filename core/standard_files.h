@@ -11,6 +11,12 @@ namespace roomtex {
 // what is told would be written into it.
 void OpenStandardFiles();
 
+// Told on standard output by Command::Run() once all that the command made is in its place: who
+// reads a path there finds it. Nothing is told if the command fails before.
+void AnswerAtEnd(const std::string& text);
+// For Command::Run(): what is to be told.
+std::string TakeAnswer();
+
 // Whether all that was told on standard output arrived; if not, says so on standard error.
 bool FlushAnswer(const std::string& command);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 
 #include <fmt/core.h>
 
@@ -119,6 +120,37 @@ std::string Base64(const void* bytes, size_t count) {
     }
   }
   return text;
+}
+
+size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string NearestName(const std::vector<std::string>& names, const std::string& name) {
+  constexpr size_t kMostLetters = 256;  // compared: the effort grows with their square
+  const auto as_compared = [](const std::string& text) {
+    return LowerCase(text.substr(0, kMostLetters));
+  };
+  std::string nearest;
+  size_t nearest_distance = std::numeric_limits<size_t>::max();
+  for (const std::string& one : names) {
+    const size_t distance = EditDistance(as_compared(one), as_compared(name));
+    if (distance >= nearest_distance) continue;
+    nearest = one;
+    nearest_distance = distance;
+  }
+  return nearest;
 }
 
 }  // namespace roomtex

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace roomtex {
 
@@ -35,6 +36,12 @@ std::string Quoted(const std::string& text);
 
 // A path as it may stand in a link: "my%20room/report.html" (RFC 3986).
 std::string UrlPath(const std::string& path);
+
+// Number of letters to insert, delete or change (Levenshtein).
+size_t EditDistance(const std::string& a, const std::string& b);
+// The one that it takes the fewest changes of letters to make `name` of, whatever the case; "" of
+// none. What a mistyped name may have meant.
+std::string NearestName(const std::vector<std::string>& names, const std::string& name);
 
 // RFC 4648, with padding.
 std::string Base64(const void* bytes, size_t count);

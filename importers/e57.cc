@@ -137,7 +137,10 @@ class E57ScanReader {
     while (const int64_t count = reader_.Next()) {
       for (int64_t i = 0; i < count; ++i) {
         const Eigen::Vector3d point = PointInScan(i);
-        if (!(point.x() == point.x())) continue;
+        if (!(point.x() == point.x())) {
+          ++scan_.num_left_out;
+          continue;
+        }
         scan_.points.push_back(point);
         scan_.intensity.push_back(reader_.Intensity(i));
         if (HasColors()) scan_.colors.push_back(scale_.Bytes(reader_.Color(i), &scan_.colors));

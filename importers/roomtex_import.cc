@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <utility>
 
@@ -15,6 +14,7 @@
 #include "core/resource_limits.h"
 #include "core/result_names.h"
 #include "core/scan_mesh.h"
+#include "core/standard_files.h"
 #include "importers/content_hash.h"
 #include "importers/e57_images.h"
 #include "importers/e57_writer.h"
@@ -110,7 +110,7 @@ class Importer {
       context_.progress.Tick();
     }
     context_.progress.Finish();
-    std::cout << answer;
+    AnswerAtEnd(answer);
   }
 
  private:
@@ -180,7 +180,7 @@ class Importer {
     json["num_columns"] = scan.num_columns;
     json["num_rows"] = scan.num_rows;
     json["num_samples"] = static_cast<int>(scan.points.size()) - num_missing;
-    json["num_missing"] = num_missing;
+    json["num_missing"] = num_missing + scan.num_left_out;
     json["num_triangles"] = num_triangles;
     return json;
   }
@@ -231,6 +231,10 @@ class Importer {
   std::vector<std::vector<Triangle>> meshes_;
 };
 
+// Keys of the report that say nothing where no scan is converted: there, and null.
+constexpr const char* kScanKeys[] = {"num_columns",   "num_rows",   "num_samples", "num_missing",
+                                     "num_triangles", "byte_order", "bounds"};
+
 void CutPanoramasOf(const ImportOptions& options, const Command::Context& context) {
   if (options.output_paths.size() != 1) {
     throw UsageError("Of panoramas one --output_path is made: the folder for their faces.");
@@ -252,7 +256,7 @@ void CutPanoramasOf(const ImportOptions& options, const Command::Context& contex
   context.report["num_panoramas"] = panoramas.size();
   context.report["faces_per_panorama"] = panoramas[0].faces.size();
   context.report["face_size_px"] = panoramas[0].face_camera.width;
-  std::cout << (fs::path(folder) / kPanoramaSetName).string() << "\n";
+  AnswerAtEnd((fs::path(folder) / kPanoramaSetName).string() + "\n");
 }
 
 // Photos that only have the same name as one of the E57 stay: they may be somebody's originals.
@@ -325,8 +329,8 @@ void WriteImages(const ImportOptions& options, const Command::Context& context) 
   }
   context.report["images"] = json;
   context.report["cameras"] = CamerasOf(photos.posed);
-  std::cout << options.images_path << ": " << photos.photos.size() << " photos, "
-            << photos.posed.size() << " with a pose\n";
+  AnswerAtEnd(options.images_path + ": " + std::to_string(photos.photos.size()) + " photos, " +
+              std::to_string(photos.posed.size()) + " with a pose\n");
 }
 
 void RunImport(const ImportOptions& options, const Command::Context& context) {
@@ -338,6 +342,7 @@ void RunImport(const ImportOptions& options, const Command::Context& context) {
     throw UsageError(std::string(options.image_picks ? "--E57.picks" : "--E57.cut_panoramas") +
                      " is for the photos of an E57: give --images_path, the folder for them.");
   }
+  for (const char* key : kScanKeys) context.report[key] = nullptr;
   if (IsPanoramaInput(options.input_path)) {
     CutPanoramasOf(options, context);
     return;
@@ -370,7 +375,8 @@ int main(int argc, char** argv) {
           roomtex::BytesPerSampleHelp(roomtex::kImportBytesPerSample));
   command.AddOutputPaths(
       "output_path", &options.output_paths,
-      "What to write: .ply triangle mesh, .pcd organised cloud, .png intensity "
+      "Required, unless --images_path is given. What to write: .ply triangle mesh, .pcd organised "
+      "cloud, .png intensity "
       "image, .rtpi (RTPI 3.0), .ptx, .e57, or points: .las, .xyz, .pts, .csv. Colours of the scan "
       "itself go where the format holds them (all but .png and .rtpi). Of panoramas: the folder "
       "for their "

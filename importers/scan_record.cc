@@ -238,6 +238,7 @@ ScanRecord RecordFromJson(const Json& json) {
 
 ScanReaderOptions OptionsOf(const ScanRecord& record, const ScanReaderOptions& given) {
   ScanReaderOptions options;
+  options.colors = given.colors;
   options.colors_as_intensity = given.colors_as_intensity;
   options.e57_check = given.e57_check;
   if (!record.azimuth.empty()) options.azimuth = record.azimuth;
@@ -363,6 +364,20 @@ AlignmentRecord ReadAlignmentRecord(const std::string& model_folder) {
   return record;
 }
 
+void RequireAlignedModel(const AlignmentRecord& record) {
+  if (!record.found || record.trusted) return;
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    for (const char* extension : {".bin", ".txt"}) {
+      std::error_code error;
+      if (fs::exists(fs::path(record.folder) / (std::string(name) + extension), error)) return;
+    }
+  }
+  throw InputError(record.folder, "",
+                   "holds no model, only the report of roomtex-align, which refused to align: " +
+                       (record.reason.empty() ? "it does not say why." : record.reason),
+                   "Align anew; what stands in the way is in alignment.json there");
+}
+
 void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder) {
   std::error_code error;
   if (!paths.empty() || fs::exists(fs::path(model_folder) / kAlignReportName, error)) return;
@@ -415,9 +430,11 @@ PlacedScans ReadScansOfModel(const AlignmentRecord& record, const ScanRequest& r
                              const Command::Context& context) {
   PlacedScans placed = ReadScansOfModel(record, request);
   for (const std::string& note : placed.notes) context.Warn(note);
-  for (const Scan& scan : placed.scans) {
+  for (size_t i = 0; i < placed.scans.size(); ++i) {
+    const Scan& scan = placed.scans[i];
     if (scan.NumMissing() < static_cast<int>(scan.points.size())) continue;
-    throw InputError(scan.path, "", "holds no measured sample", "Check the scan and --max_range");
+    throw InputError(ScanName(placed.scans, i), "", "holds no measured sample",
+                     "Check the scan and --max_range");
   }
   return placed;
 }

@@ -64,6 +64,10 @@ struct AlignmentRecord {
 // Throws InputError for a file that is there and cannot be understood.
 AlignmentRecord ReadAlignmentRecord(const std::string& model_folder);
 
+// Throws InputError where roomtex-align refused, and left its report without a model: that, and
+// why. Before the model is read, which would only be found missing.
+void RequireAlignedModel(const AlignmentRecord& record);
+
 // What a command was given about scans; paths may be empty where a model remembers them.
 struct ScanRequest {
   const std::vector<std::string>& paths;

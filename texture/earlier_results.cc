@@ -2,36 +2,10 @@
 
 #include <filesystem>
 
-#include "core/error.h"
 #include "core/json_text.h"
-#include "importers/scan_record.h"
 
 namespace roomtex {
 namespace fs = std::filesystem;
-namespace {
-
-bool HoldsModelFiles(const std::string& folder) {
-  for (const char* name : kSparseModelFiles) {
-    for (const char* extension : {".bin", ".txt"}) {
-      std::error_code error;
-      if (fs::exists((fs::path(folder) / name).replace_extension(extension), error)) return true;
-    }
-  }
-  return false;
-}
-
-}  // namespace
-
-SparseModel ReadAlignedModel(const std::string& folder) {
-  const AlignmentRecord alignment = ReadAlignmentRecord(folder);
-  if (alignment.found && !alignment.trusted && !HoldsModelFiles(folder)) {
-    throw InputError(folder, "",
-                     "holds no model, only the report of roomtex-align, which refused to align: " +
-                         (alignment.reason.empty() ? "it does not say why." : alignment.reason),
-                     "Align anew; what stands in the way is in alignment.json there");
-  }
-  return ReadSparseModel(folder);
-}
 
 void TakeOverTrustOfResult(const std::string& path, const std::string& command, bool accept,
                            const Command::Context& context) {

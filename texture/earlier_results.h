@@ -3,14 +3,9 @@
 
 #include <string>
 
-#include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 
 namespace roomtex {
-
-// The aligned model in a folder. Throws InputError as ReadSparseModel() does; where roomtex-align
-// refused, and left its report alone, that and why.
-SparseModel ReadAlignedModel(const std::string& folder);
 
 // The doubts that `command` (roomtex-dense) had about its result at `path`, by the report.json
 // beside it, are those of what is built on it: exit 4, or a warning if accept. Of one station of

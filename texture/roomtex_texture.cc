@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 
+#include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 #include "core/cpu_stages.h"
 #include "core/error.h"
@@ -14,6 +15,7 @@
 #include "core/output_file.h"
 #include "core/output_set.h"
 #include "core/resource_limits.h"
+#include "core/standard_files.h"
 #include "importers/rtpi.h"
 #include "importers/scan_reader.h"
 #include "importers/scan_record.h"
@@ -337,18 +339,6 @@ void ColorizeStations(const PlacedScans& placed, const std::vector<size_t>& inde
   });
 }
 
-// What the record of an aligned model does not ask for: the colours that the files themselves have,
-// from now on.
-void ReadOwnColors(PlacedScans* placed) {
-  for (PlacedScans::File& file : placed->files) file.options.colors = true;
-  ForEachFullScan(*placed, [placed](size_t number, Scan scan) {
-    CellColors colors =
-        placed->stride == 1 ? std::move(scan.colors) : Thinned(scan, placed->stride).colors;
-    if (colors.size() != placed->scans[number].points.size()) return;  // it has none
-    placed->scans[number].colors = std::move(colors);
-  });
-}
-
 // Behind the scans: its vertices are the last ones of model.ply, its mesh the last node of
 // model.glb.
 void AddSupplement(const std::string& path, bool with_colors, PlacedScans* placed) {
@@ -363,9 +353,10 @@ void AddSupplement(const std::string& path, bool with_colors, PlacedScans* place
 }
 
 void WarnOfScansWithoutColors(const std::vector<Scan>& scans, const Command::Context& context) {
-  for (const Scan& scan : scans) {
-    if (!scan.colors.empty()) continue;
-    context.Warn(scan.path + " has no colours of its own: what no photo sees of it is grey");
+  for (size_t i = 0; i < scans.size(); ++i) {
+    if (!scans[i].colors.empty()) continue;
+    context.Warn(ScanName(scans, i) +
+                 " has no colours of its own: what no photo sees of it is grey");
   }
 }
 
@@ -383,10 +374,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   AppendProblems(options.web.Problems(), &problems);
   ThrowIfProblems(problems);
   RequireScans(options.scan_paths, options.input_path);
+  RequireOutsidePhotos(options.output_path, options.sources.image_path);
 
   context.progress.Stage("read model");
-  const SparseModel model = ReadAlignedModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  RequireAlignedModel(alignment);
+  const SparseModel model = ReadSparseModel(options.input_path);
   PhotoList list = ListPhotosOf(model, alignment, options.sources, options.strict, context);
   TakeOverTrust(alignment, options.accept_untrusted, context);
   if (!options.supplement_path.empty()) {
@@ -396,10 +389,12 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
 
   context.progress.Stage("read scan");
   const double max_samples = options.bound.max_samples;
+  const bool own_colors = colorize.unseen == "scan";
+  ScanReaderOptions reader = options.scan_reader;
+  reader.colors = own_colors;
   const SampleWork work("colouring", kTextureBytesPerSample, max_samples, kTextureBytesPerSample);
   PlacedScans placed = ReadScansOfModel(
-      alignment, {options.scan_paths, options.scan_poses, options.scan_reader, max_samples},
-      context);
+      alignment, {options.scan_paths, options.scan_poses, reader, max_samples}, context);
   const bool by_station = placed.stride > 1;
   context.report["sample_stride"] = placed.stride;
   if (by_station) {
@@ -408,8 +403,6 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
         std::to_string(placed.stride) +
         " columns and rows, then each station is coloured in full.");
   }
-  const bool own_colors = colorize.unseen == "scan";
-  if (own_colors) ReadOwnColors(&placed);
   if (!options.supplement_path.empty()) {
     AddSupplement(options.supplement_path, own_colors, &placed);
   }
@@ -440,14 +433,14 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   const bool wants_detail = colorize.blend.mode == "select" || colorize.blend.detail;
   for (size_t i = 0; i < scans.size(); ++i) {
     if (wants_detail && scans[i].kind() != Scan::Kind::kGrid && result.scans[i].atlas.empty()) {
-      context.Warn(scans[i].path +
+      context.Warn(ScanName(scans, i) +
                    " has no grid, and detail needs neighbours: --Blend.mode and --Blend.detail "
                    "change nothing there");
     }
     if (scans[i].kind() != Scan::Kind::kMesh || colorize.atlas.mode != "1" ||
         !result.scans[i].atlas.empty())
       continue;
-    context.Warn(scans[i].path +
+    context.Warn(ScanName(scans, i) +
                  " got no atlas: no photo looks at it, or it falls into too many small charts. "
                  "Decimate or smooth the mesh.");
   }
@@ -472,7 +465,7 @@ void Texture(const TextureOptions& options, const Command::Context& context) {
   Json cpu = Json::object();
   for (const auto& [stage, seconds] : CpuSecondsByStage()) cpu[stage] = seconds;
   context.report["cpu_seconds"] = cpu;
-  std::printf("%s\n", (options.output_path + "/model.ply").c_str());
+  AnswerAtEnd(options.output_path + "/model.ply\n");
 }
 
 }  // namespace

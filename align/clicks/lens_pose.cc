@@ -7,6 +7,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include "colmap_ext/solver_log.h"
 #include "core/balanced_inverse.h"
 #include "core/camera_formulas.h"
 #include "core/text.h"
@@ -174,6 +175,7 @@ std::optional<ViewPose> LensPoseSolver::Refine(const PointPairs& pairs,
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   ceres::Solver::Summary summary;
+  SilenceCeres();
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) return std::nullopt;
 

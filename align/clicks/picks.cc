@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -124,36 +123,6 @@ void RefuseDuplicates(const std::string& path, const std::vector<Pick>& picks) {
   }
 }
 
-int EditDistance(const std::string& a, const std::string& b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const int substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row.back();
-}
-
-std::string NearestName(const std::vector<const SparseModel*>& models, const std::string& name) {
-  std::string nearest;
-  int nearest_distance = -1;
-  for (const SparseModel* model : models) {
-    for (const auto& [id, image] : model->images) {
-      const int distance =
-          EditDistance(LowerCase(image.name.substr(0, 256)), LowerCase(name.substr(0, 256)));
-      if (nearest_distance >= 0 && distance >= nearest_distance) continue;
-      nearest = image.name;
-      nearest_distance = distance;
-    }
-  }
-  return nearest;
-}
-
 // The first that has a photo of this name; null if none has.
 const SparseModel* ModelWithPhoto(const std::vector<const SparseModel*>& models,
                                   const std::string& name) {
@@ -172,6 +141,7 @@ std::string LineOf(const Pick& pick) {
 std::vector<Pick> ReadPicks(const std::string& path) {
   CsvReader table(path, "Check --picks_path",
                   std::string("Expected a CSV file with the header ") + kHeader);
+  table.CommentsFrom(1);  // behind the photo's name
   std::vector<Pick> picks;
   Columns columns;  // none = the header is still to come
   while (table.Next()) {
@@ -232,7 +202,7 @@ void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
     if (model == nullptr) {
       throw InputError(path, LinePosition(pick.line),
                        fmt::format("the photo {} is not {} (nearest name: {})", pick.image_name,
-                                   among, NearestName(models, pick.image_name)),
+                                   among, NearestName(PhotoNames(models), pick.image_name)),
                        "Correct the name, or pick in a photo that COLMAP has registered");
     }
     const Camera& camera = model->cameras.at(model->FindImage(pick.image_name)->camera_id);
@@ -245,6 +215,23 @@ void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
                        "Give x and y in pixels of the photo as taken");
     }
   }
+}
+
+std::vector<std::string> PhotoNames(const std::vector<const SparseModel*>& models) {
+  std::vector<std::string> names;
+  for (const SparseModel* model : models) {
+    for (const auto& [id, image] : model->images) names.push_back(image.name);
+  }
+  return names;
+}
+
+void CheckPhotoName(const std::string& option, const std::string& name,
+                    const std::vector<std::string>& names, const std::string& among) {
+  if (std::find(names.begin(), names.end(), name) != names.end()) return;
+  throw InputError(option, "",
+                   fmt::format("names the photo {}, which is not {} (nearest name: {})", name,
+                               among, NearestName(names, name)),
+                   "Correct the name, or leave the option out");
 }
 
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,

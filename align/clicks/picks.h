@@ -53,7 +53,12 @@ void NamePicksAsInModels(const std::vector<const SparseModel*>& models, std::vec
 void CheckPickNames(const std::string& path, const std::vector<Pick>& picks,
                     const std::vector<const SparseModel*>& models,
                     const std::string& among = "in the sparse model");
-// The same, and for fewer than kMinPicksPerPhoto picks that count, over all photos.
+// Names of the photos of all models.
+std::vector<std::string> PhotoNames(const std::vector<const SparseModel*>& models);
+// Throws the same InputError for a name that an option gives: none of `names`, which are `among`.
+void CheckPhotoName(const std::string& option, const std::string& name,
+                    const std::vector<std::string>& names, const std::string& among);
+// As CheckPickNames(), and for fewer than kMinPicksPerPhoto picks that count, over all photos.
 void CheckPicksAgainstModel(const std::string& path, const std::vector<Pick>& picks,
                             const SparseModel& model);
 

@@ -9,6 +9,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include "colmap_ext/solver_log.h"
 #include "core/balanced_inverse.h"
 #include "core/camera_formulas.h"
 #include "core/decompositions.h"
@@ -227,6 +228,7 @@ class PoseProblem {
     options.logging_type = ceres::SILENT;
     options.num_threads = 1;
     ceres::Solver::Summary summary;
+    SilenceCeres();
     ceres::Solve(options, &problem_, &summary);
     return summary.IsSolutionUsable();
   }

@@ -38,7 +38,7 @@ struct Attempt {
 };
 
 // Picks belong to the models that hold their photo, and so does a hint. Throws InputError for a
-// pick whose photo no model holds, or several under other names, and UsageError for such a hint.
+// pick whose photo no model holds, or several under other names, and for such a hint.
 void GiveOut(const AlignCommandOptions& a, std::vector<ModelToAlign>* models) {
   std::vector<Pick> picks = a.picks_path.empty() ? std::vector<Pick>() : ReadPicks(a.picks_path);
   std::vector<const SparseModel*> all;
@@ -57,14 +57,10 @@ void GiveOut(const AlignCommandOptions& a, std::vector<ModelToAlign>* models) {
   }
   if (a.near.empty()) return;
   const NearHint near = ParseNearHint(a.near);
-  bool is_known = false;
+  CheckPhotoName("--near", near.image_name, PhotoNames(all), "in any of the sparse models");
   for (ModelToAlign& one : *models) {
-    const bool is_here = one.model.FindImage(near.image_name) != nullptr;
-    if (!is_here) one.options.near.clear();
-    is_known |= is_here;
+    if (one.model.FindImage(near.image_name) == nullptr) one.options.near.clear();
   }
-  if (is_known) return;
-  throw UsageError("--near names " + near.image_name + ", which is in none of the sparse models");
 }
 
 std::vector<ModelToAlign> ReadModels(const AlignCommandOptions& a,

@@ -1,5 +1,6 @@
 #include "align/command/align_outputs.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -18,6 +19,7 @@
 #include "core/output_set.h"
 #include "core/photo_fit.h"
 #include "core/result_names.h"
+#include "core/standard_files.h"
 #include "importers/scan_record.h"
 
 namespace roomtex {
@@ -86,6 +88,20 @@ void WarnOfUntrusted(const AlignCommandOptions& a, const Command::Context& conte
   if (!ReadAlignmentRecord(aside).found) return;
   context.Warn(aside + " is of an earlier run, which was not to be trusted: this one is in " +
                a.output_path + ". Remove " + aside + " if nothing needs it");
+}
+
+// Cut into faces, or placed without a model, panoramas need no COLMAP that knows them: the user's
+// may be an older one, which ends with a stack trace on what is written here.
+void WarnOfPanoramas(const AlignCommandOptions& a, const SparseModel& model,
+                     const std::string& output_path, const Command::Context& context) {
+  if (!a.input_path.empty() && a.panoramas_path.empty()) return;
+  const bool has_some = std::any_of(model.cameras.begin(), model.cameras.end(),
+                                    [](const auto& camera) { return camera.second.IsPanorama(); });
+  if (!has_some) return;
+  context.Warn("The model in " + output_path +
+               " has panoramas (EQUIRECTANGULAR), which COLMAP reads from 4.1 on: older ones end "
+               "with an error. For those look at it with roomtex-texture and roomtex-view, which "
+               "read it as it is");
 }
 
 // Where the result goes: a trusted one that is there is kept.
@@ -189,6 +205,7 @@ void WriteRefusal(const AlignCommandOptions& a, const std::string& refusal,
     for (const char* name : {kOverlayFolder, kGeoFolder}) outputs->ReplaceFolder(name);
   }
   CommitWithReport(kAlignReportName, outputs);
+  AnswerAtEnd(output_path + "\n");
 }
 
 void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMotions& row_motions,
@@ -197,6 +214,7 @@ void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMoti
   const std::string output_path = ChooseOutput(a, context);
   if (context.report.trusted()) WarnOfUntrusted(a, context);
   RequireNoRigs(output_path);
+  WarnOfPanoramas(a, model, output_path, context);
   const auto outputs = std::make_shared<OutputSet>(output_path);
   WriteOverlayPictures(a, {model, a.image_path, row_motions}, *reading->surveyed, told,
                        outputs.get(), context);
@@ -218,6 +236,7 @@ void WriteAligned(const AlignCommandOptions& a, SparseModel model, const RowMoti
   WriteGeo(a, model, reading->placed, reading->geo, *outputs, context);
   context.report["scans"] = ToJson(RecordScans(reading->placed, output_path));
   CommitWithReport(kAlignReportName, outputs);
+  AnswerAtEnd(output_path + "\n");
 }
 
 }  // namespace roomtex

@@ -163,10 +163,8 @@ void AlignFoundPhotosAlone(const AlignCommandOptions& a, const Command::Context&
   PhotoHints hints;
   if (!a.near.empty()) {
     hints.near.push_back(ParseNearHint(a.near));
-    const std::string& name = hints.near[0].image_name;
-    if (photos.model.FindImage(name) == nullptr) {
-      throw UsageError("--near names " + name + ", which is none of the photos");
-    }
+    CheckPhotoName("--near", hints.near[0].image_name, PhotoNames({&photos.model}),
+                   "among those of --image_path");
   }
   AlignFoundPhotosOnly(a, photos, std::move(hints), context);
 }

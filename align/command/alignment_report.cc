@@ -227,8 +227,8 @@ Json StationsToJson(const StationCheck& check, const std::vector<Scan>& scans) {
   Json json = Json::array();
   for (const StationPair& pair : check.pairs) {
     Json one;
-    one["first"] = scans[pair.first].path;
-    one["second"] = scans[pair.second].path;
+    one["first"] = ScanName(scans, pair.first);
+    one["second"] = ScanName(scans, pair.second);
     one["num_patches"] = pair.num_patches;
     one["offset_mm"] = 1000 * pair.offset;
     one["offset_sigma_mm"] = 1000 * pair.sigma;

@@ -350,9 +350,7 @@ std::vector<NearHint> ReadHints(const AlignCommandOptions& a, const std::vector<
   }
   if (a.near.empty()) return {};
   const NearHint near = ParseNearHint(a.near);
-  if (model.FindImage(near.image_name) == nullptr) {
-    throw UsageError("--near names " + near.image_name + ", which is not in the sparse model");
-  }
+  CheckPhotoName("--near", near.image_name, PhotoNames({&model}), "in the sparse model");
   if (!AreHints(picks)) {
     context.Warn("--near is not used: six picks place the model without a search");
     return {};

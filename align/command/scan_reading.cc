@@ -34,7 +34,7 @@ void CompareStations(const AlignCommandOptions& a, PlacedScans* placed,
   context.progress.Stage("stations");
   if (a.register_stations) {
     for (const int moved : RegisterStations(scans)) {
-      context.Warn((*scans)[moved].path + " was moved onto the other scans");
+      context.Warn(ScanName(*scans, moved) + " was moved onto the other scans");
       int scan = 0;
       for (PlacedScans::File& file : placed->files) {
         for (size_t k = 0; k < file.placed.size(); ++k, ++scan) {

@@ -9,6 +9,7 @@
 #include <ceres/solver.h>
 
 #include "align/fit/plane_bundle_costs.h"
+#include "colmap_ext/solver_log.h"
 
 namespace roomtex {
 namespace {
@@ -56,6 +57,7 @@ Rigid BentPose(const SparseModel& straight, const std::vector<uint32_t>& frame,
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
+  SilenceCeres();
   ceres::Solve(options, &problem, &summary);
   return summary.IsSolutionUsable() ? pose.CamFromScan() : first;
 }

@@ -17,6 +17,7 @@
 
 #include "align/fit/plane_bundle_costs.h"
 #include "colmap_ext/lens_prior.h"
+#include "colmap_ext/solver_log.h"
 #include "core/statistics.h"
 
 namespace roomtex {
@@ -106,6 +107,7 @@ class RoundProblem {
     o.callbacks.push_back(&stop);
     o.update_state_every_iteration = true;
     ceres::Solver::Summary summary;
+    SilenceCeres();
     ceres::Solve(o, problem_.get(), &summary);
     return summary.IsSolutionUsable();
   }

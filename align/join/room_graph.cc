@@ -14,6 +14,7 @@
 #include <ceres/rotation.h>
 #include <ceres/solver.h>
 
+#include "colmap_ext/solver_log.h"
 #include "core/frames.h"
 #include "core/text.h"
 
@@ -459,6 +460,7 @@ void Joiner::Solve(int frame, const std::vector<int>& members, const Allowed& us
   options.function_tolerance = 1e-12;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
+  SilenceCeres();
   ceres::Solve(options, &problem, &summary);
   for (const int room : members) graph_.places[room].frame_from_room.rotation.normalize();
 }

@@ -87,6 +87,7 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
     throw InputError(model_folder, "", "is no model of roomtex-align: it has no alignment.json",
                      "Give the folder that roomtex-align wrote, e.g. result/hall/aligned");
   }
+  RequireAlignedModel(room.alignment);
   room.up = UpOf(room.alignment);
   const Json report = ReadJsonIfAny(room.alignment.path);
   std::map<std::string, Sigmas> sigmas;
@@ -104,10 +105,13 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
   }
   const Rigid scan_from_room = room.RoomFromScan().Inverse();
   bool is_missing = false;
-  size_t num_doubtful = 0;
+  size_t num_doubtful = 0, num_without_error = 0;
   for (const auto& [id, image] : model.images) {
     const auto at = sigmas.find(image.name);
-    if (at == sigmas.end()) continue;
+    if (at == sigmas.end()) {
+      ++num_without_error;
+      continue;
+    }
     if (room.alignment.doubtful_photos.count(image.name) > 0) {
       ++num_doubtful;
       continue;
@@ -131,6 +135,11 @@ RoomRecord ReadRoom(const std::string& model_folder, const std::string& image_pa
     context.Warn(fmt::format("photos of {} that are doubtful link it to no other room: {}, e.g. {}",
                              room.name, num_doubtful,
                              room.alignment.doubtful_photos.begin()->first));
+  }
+  if (num_without_error > 0) {
+    context.Warn(fmt::format(
+        "photos of {} of which {} does not say how exactly they stand link it to no other room: {}",
+        room.name, room.alignment.path, num_without_error));
   }
   if (folder.empty()) {
     context.Warn(room.alignment.path +

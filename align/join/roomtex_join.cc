@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "align/join/joined_scene.h"
 #include "align/join/room_graph.h"
@@ -14,8 +15,10 @@
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/frames.h"
+#include "core/json_text.h"
 #include "core/output_file.h"
 #include "core/output_set.h"
+#include "core/stays_inside.h"
 
 namespace roomtex {
 namespace {
@@ -28,7 +31,7 @@ struct JoinOptions {
   bool registered = false, accept_untrusted = false;
 };
 
-constexpr char kSceneName[] = "site.gltf";
+constexpr char kSceneName[] = "site.gltf", kReportName[] = "joined.json";
 
 std::vector<RoomRecord> ReadRooms(const JoinOptions& options, const Command::Context& context) {
   std::vector<std::string> problems;
@@ -81,7 +84,18 @@ Json MatrixToJson(const Rigid& rigid) {
   return rows;
 }
 
-Json RoomToJson(const std::vector<RoomRecord>& rooms, size_t room, const RoomPlace& place) {
+// Whether anything says where a room stands to the first one; of scans that are registered, whether
+// anything was compared with that.
+bool IsPlaced(size_t room, const std::vector<RoomLink>& links, const RoomPlace& place,
+              bool registered) {
+  if (!registered) return room == 0 || place.frame != static_cast<int>(room);
+  return std::any_of(links.begin(), links.end(), [&](const RoomLink& link) {
+    return link.first == static_cast<int>(room) || link.second == static_cast<int>(room);
+  });
+}
+
+Json RoomToJson(const std::vector<RoomRecord>& rooms, size_t room, const RoomPlace& place,
+                bool is_placed) {
   const RoomRecord& frame = rooms[place.frame];
   const Rigid site_from_room = FrameFromScan(frame, rooms[room], place);
   Json json;
@@ -93,8 +107,8 @@ Json RoomToJson(const std::vector<RoomRecord>& rooms, size_t room, const RoomPla
   json["rotation_wxyz"] = ToJson(WxyzFromQuaternion(site_from_room.rotation));
   json["translation"] = ToJson(site_from_room.translation);
   json["centre"] = ToJson(site_from_room * rooms[room].origin);
-  json["position_sigma_mm"] = MillimetresOrNull(place.position_sigma);
-  json["rotation_sigma_deg"] = DegFromRad(place.rotation_sigma);
+  json["position_sigma_mm"] = is_placed ? MillimetresOrNull(place.position_sigma) : Json(nullptr);
+  json["rotation_sigma_deg"] = is_placed ? Json(DegFromRad(place.rotation_sigma)) : Json(nullptr);
   return json;
 }
 
@@ -136,15 +150,19 @@ Json LoopToJson(const std::vector<RoomRecord>& rooms, const RoomLoop& loop) {
 }
 
 void FillReport(const std::vector<RoomRecord>& rooms, const std::vector<RoomLink>& links,
-                const RoomGraph& graph, const Command::Context& context) {
+                const RoomGraph& graph, bool registered, const Command::Context& context) {
   Report& report = context.report;
   report["reference"] = rooms[0].name;
   report["rooms"] = report["links"] = report["loops"] = Json::array();
-  std::string alone;
+  std::string alone, not_compared;
   for (size_t i = 0; i < rooms.size(); ++i) {
     const RoomPlace& place = graph.places[i];
-    report["rooms"].push_back(RoomToJson(rooms, i, place));
+    const bool is_placed = IsPlaced(i, links, place, registered);
+    report["rooms"].push_back(RoomToJson(rooms, i, place, is_placed));
     if (place.frame != 0) alone += (alone.empty() ? "" : ", ") + rooms[i].name;
+    if (!is_placed && registered) {
+      not_compared += (not_compared.empty() ? "" : ", ") + rooms[i].name;
+    }
   }
   for (size_t i = 0; i < links.size(); ++i) {
     const LinkVerdict& verdict = graph.verdicts[i];
@@ -157,6 +175,46 @@ void FillReport(const std::vector<RoomRecord>& rooms, const std::vector<RoomLink
     context.Warn("No photo and no scan links these rooms to " + rooms[0].name +
                  ", so that they are not in its frame: " + alone +
                  ". Let two or three photos of each doorway be in the folders of both rooms.");
+  }
+  if (!not_compared.empty() && rooms.size() > 1) {
+    context.Warn(
+        "With these rooms no other shares a photo or a scan, so that nothing was compared "
+        "with the frame that --registered 1 takes them to lie in: " +
+        not_compared);
+  }
+}
+
+// The rooms of the report that lies in the folder.
+std::vector<std::string> RoomsOfEarlierRun(const std::string& folder) {
+  const Json report = ReadJsonIfAny((fs::path(folder) / kReportName).string());
+  std::vector<std::string> names;
+  if (!report.is_object() || report.value("command", Json()) != "roomtex-join") return names;
+  for (const Json& room : report.value("rooms", Json::array())) {
+    const Json name = room.is_object() ? room.value("name", Json()) : Json();
+    if (name.is_string() && StaysInside(name.get<std::string>())) names.push_back(name);
+  }
+  return names;
+}
+
+// ROOM.txt of the rooms in the first one's frame. One of a room that is in none, or no longer
+// there, would be taken for its place.
+void WriteMatrices(const std::vector<RoomRecord>& rooms, const RoomGraph& graph,
+                   const std::string& folder, OutputSet* outputs) {
+  const auto file_of = [](const std::string& room) { return room + ".txt"; };
+  std::set<std::string> written;
+  for (size_t i = 0; i < rooms.size(); ++i) {
+    const RoomPlace& place = graph.places[i];
+    if (place.frame != 0) {
+      outputs->Remove(file_of(rooms[i].name));
+      continue;
+    }
+    const Rigid moved = FrameFromScan(rooms[0], rooms[i], place);
+    WriteSimilarityMatrix(outputs->Path(file_of(rooms[i].name)),
+                          {1, moved.rotation, moved.translation});
+    written.insert(rooms[i].name);
+  }
+  for (const std::string& name : RoomsOfEarlierRun(folder)) {
+    if (written.count(name) == 0) outputs->Remove(file_of(name));
   }
 }
 
@@ -190,21 +248,16 @@ void Join(const JoinOptions& options, const Command::Context& context) {
   for (const std::string& problem : problems) context.report.SetUntrusted(problem);
   context.progress.Stage("place rooms");
   const RoomGraph graph = PlaceRooms(rooms, links, options.registered);
-  FillReport(rooms, links, graph, context);
+  FillReport(rooms, links, graph, options.registered, context);
 
   context.progress.Stage("write");
   const auto outputs = std::make_shared<OutputSet>(options.output_path);
-  int num_joined = 0;
-  for (size_t i = 0; i < rooms.size(); ++i) {
-    const RoomPlace& place = graph.places[i];
-    num_joined += place.frame == 0;
-    const Rigid moved = FrameFromScan(rooms[place.frame], rooms[i], place);
-    WriteSimilarityMatrix(outputs->Path(rooms[i].name + ".txt"),
-                          {1, moved.rotation, moved.translation});
-  }
+  const auto num_joined = std::count_if(graph.places.begin(), graph.places.end(),
+                                        [](const RoomPlace& place) { return place.frame == 0; });
+  WriteMatrices(rooms, graph, options.output_path, outputs.get());
   WriteScene(rooms, graph, options.output_path, outputs.get(), context);
-  CommitWithReport("joined.json", outputs);
-  std::printf("%d of %zu rooms in the frame of %s, %zu links\n%s\n", num_joined, rooms.size(),
+  CommitWithReport(kReportName, outputs);
+  std::printf("%td of %zu rooms in the frame of %s, %zu links\n%s\n", num_joined, rooms.size(),
               rooms[0].name.c_str(), links.size(), options.output_path.c_str());
 }
 
@@ -230,7 +283,8 @@ int main(int argc, char** argv) {
                         Command::Kind::kOptional);
   command.AddOutputPath("output_path", &options.output_path,
                         "Folder for joined.json (the report), ROOM.txt (4x4 matrix from the room's "
-                        "scan frame to the common one, e.g. for CloudCompare), and site.gltf, the "
+                        "scan frame to the common one, e.g. for CloudCompare; none of a room that "
+                        "is not in it), and site.gltf, the "
                         "rooms of that frame coloured, where two or more of them have "
                         "../textured/model.glb beside their models, whose files it refers to.");
   command.AddBool("registered", &options.registered,

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "align/clicks/picks.h"
 #include "align/pick/mirror_picks.h"
 #include "align/pick/pick_scene.h"
 #include "align/pick/pick_server.h"
@@ -17,6 +18,7 @@
 #include "core/error.h"
 #include "core/local_server_key.h"
 #include "core/option_fields.h"
+#include "core/output_file.h"
 #include "importers/rtpi_header.h"
 #include "importers/scan_record.h"
 #include "pick_page.h"
@@ -84,6 +86,8 @@ void CheckArguments(Arguments* a) {
     throw InputError(folder.string(), "", "there is no such folder",
                      "Make it, or correct --output_path");
   }
+  // One that cannot be written is better known before six clicks.
+  const OutputFile probe(a->output_path);
 }
 
 void WarnOfMissingPhotos(const PickScene& scene, const Command::Context& context) {
@@ -109,8 +113,10 @@ std::optional<std::vector<SessionPick>> ServeScans(
     const std::optional<std::vector<SessionPick>>& picks, Arguments* a,
     std::unique_ptr<OpenBrowser>* browser, const Command::Context& context) {
   PickScene scene(a->scene, &context.progress);
-  if (!a->image_name.empty() && scene.FindPhoto(a->image_name) == nullptr) {
-    throw UsageError("--image_name " + a->image_name + " is not among the photos");
+  if (!a->image_name.empty()) {
+    std::vector<std::string> names;
+    for (const PickPhoto& photo : scene.photos()) names.push_back(photo.name());
+    CheckPhotoName("--image_name", a->image_name, names, "among the photos");
   }
   const bool is_first = !picks;
   for (const std::string& note : scene.notes()) {

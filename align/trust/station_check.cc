@@ -30,6 +30,8 @@ constexpr double kMinCommonShare = 0.1;
 // Metres: how far off a station is looked for, and the gate of the last steps.
 constexpr double kFirstGate = 0.2, kLastGate = 0.02;
 constexpr double kGateShrink = 0.8;
+// Times as much surface as where the poses put a station must lie on the other's elsewhere.
+constexpr double kMoreElsewhere = 1.05;
 constexpr int kMaxSteps = 40, kNumRegisterings = 3;
 constexpr double kSettled = 1e-5;  // metres and radians of a step at the last gate
 // What is known without any surface: keeps open directions where they are (metres, radians).
@@ -55,9 +57,18 @@ std::vector<SurfacePoint> PatchesAsPoints(const ScanPatches& patches) {
 
 struct Solution {
   Similarity moved;  // scale 1
-  Matrix7d covariance = Matrix7d::Zero();
   std::vector<SurfaceMatch> matches;
+  // Of the last step; by parts of the room, for the jackknife.
+  SimilarityNormal normal;
+  std::vector<SimilarityNormal> parts;
+  Matrix7d inverse = Matrix7d::Zero();
 };
+
+void HoldScale(SimilarityNormal* normal) {
+  normal->matrix.row(6).setZero();
+  normal->matrix.col(6).setZero();
+  normal->gradient[6] = 0;
+}
 
 // Returns the length of the step, metres and radians; infinite without overlap.
 double Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface, double gate,
@@ -66,25 +77,27 @@ double Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
   solution->matches = FindMatches(points, surface, solution->moved, gate, gate);
   if (static_cast<int>(solution->matches.size()) < kMinCommon) return kNone;
   const SurfaceWeights weights(solution->matches, surface);
-  SimilarityNormal normal;
+  SimilarityNormal& normal = solution->normal;
+  normal = SimilarityNormal();
+  solution->parts.assign(weights.num_parts(), SimilarityNormal());
   for (size_t k = 0; k < solution->matches.size(); ++k) {
     if (!weights.Counts(k)) continue;
     const SurfaceMatch& match = solution->matches[k];
     const double root = TukeyRootWeight(match.distance, gate);
-    normal.AddDistance(match.distance, solution->moved * points[match.point].x_in_sparse,
+    for (SimilarityNormal* one : {&normal, &solution->parts[weights.Part(k)]}) {
+      one->AddDistance(match.distance, solution->moved * points[match.point].x_in_sparse,
                        weights.Normal(k), pivot, root * root / weights.Variance(k));
+    }
   }
   for (int k = 0; k < 6; ++k) {
     const double prior = k < 3 ? kPriorStationMove : kPriorStationTurn;
     normal.matrix(k, k) += 1 / (prior * prior);
   }
-  normal.matrix.row(6).setZero();
-  normal.matrix.col(6).setZero();
+  HoldScale(&normal);
+  for (SimilarityNormal& part : solution->parts) HoldScale(&part);
   normal.matrix(6, 6) = 1;
-  normal.gradient[6] = 0;
   Vector7d step;
-  if (!normal.SolveStep(&step, &solution->covariance)) return kNone;
-  solution->covariance(6, 6) = 0;
+  if (!normal.SolveStep(&step, &solution->inverse)) return kNone;
   step[6] = 0;
   solution->moved = Moved(solution->moved, pivot, step);
   return step.norm();
@@ -93,6 +106,12 @@ double Step(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
 // How far the common surface moves across itself, and how well that is known.
 void MeasureOffset(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
                    const Eigen::Vector3d& pivot, const Solution& solution, StationPair* pair) {
+  // What the noise leaves open, or what single parts of the surface draw: where few patches have
+  // samples enough, chance matches of one part can.
+  Matrix7d covariance =
+      Larger(solution.inverse, JackknifeCovariance(solution.normal, solution.parts));
+  covariance.row(6).setZero();
+  covariance.col(6).setZero();
   double sum = 0, variance = 0;
   for (const SurfaceMatch& match : solution.matches) {
     const Eigen::Vector3d& n = surface.patches()[match.patch].normal;
@@ -101,7 +120,7 @@ void MeasureOffset(const std::vector<SurfacePoint>& points, const ScanPatches& s
     sum += std::pow(n.dot(solution.moved * x - x), 2);
     Vector7d jacobian;
     jacobian << n, arm.cross(n), 0;
-    variance += jacobian.dot(solution.covariance * jacobian);
+    variance += jacobian.dot(covariance * jacobian);
   }
   const auto count = static_cast<double>(solution.matches.size());
   pair->offset = std::sqrt(sum / count);
@@ -166,6 +185,33 @@ class StationCells {
   double reach_ = 0;
 };
 
+// How many points lie on the surface, those near it whole.
+double OnSurface(const Solution& solution) {
+  double sum = 0;
+  for (const SurfaceMatch& match : solution.matches) {
+    const double root = TukeyRootWeight(match.distance, kLastGate);
+    sum += root * root;
+  }
+  return sum;
+}
+
+// From where the poses put the two; its matches are none where they do not overlap.
+Solution Settled(const std::vector<SurfacePoint>& points, const ScanPatches& surface,
+                 double first_gate, const Eigen::Vector3d& pivot) {
+  Solution solution;
+  double gate = first_gate;
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const double length = Step(points, surface, gate, pivot, &solution);
+    if (!std::isfinite(length)) {
+      solution.matches.clear();
+      return solution;
+    }
+    if (gate == kLastGate && length < kSettled) break;
+    gate = std::max(kLastGate, kGateShrink * gate);
+  }
+  return solution;
+}
+
 // points: PatchesAsPoints() of the second.
 StationPair ComparePair(const ScanPatches& first, const std::vector<SurfacePoint>& points) {
   StationPair pair;
@@ -176,13 +222,12 @@ StationPair ComparePair(const ScanPatches& first, const std::vector<SurfacePoint
   for (const SurfaceMatch& match : solution.matches) {
     pivot += points[match.point].x_in_sparse / static_cast<double>(solution.matches.size());
   }
-  double gate = kFirstGate;
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const double length = Step(points, first, gate, pivot, &solution);
-    if (!std::isfinite(length)) return pair;
-    if (gate == kLastGate && length < kSettled) break;
-    gate = std::max(kLastGate, kGateShrink * gate);
-  }
+  // Where few patches have samples enough, chance matches draw a station away: it is elsewhere only
+  // where that puts more of its surface onto the other's.
+  const Solution near = Settled(points, first, kLastGate, pivot);
+  solution = Settled(points, first, kFirstGate, pivot);
+  if (kMoreElsewhere * OnSurface(near) > OnSurface(solution)) solution = near;
+  if (solution.matches.empty()) return pair;
   pair.num_patches = static_cast<int>(solution.matches.size());
   pair.first_from_second = {solution.moved.rotation, solution.moved.translation};
   pair.turn = RotationAngle(solution.moved.rotation, Eigen::Quaterniond::Identity());
@@ -253,9 +298,9 @@ std::string StationCheck::Sentence(const std::vector<Scan>& scans) const {
     if (pair.Disagrees() && (worst == nullptr || pair.offset > worst->offset)) worst = &pair;
   }
   std::string names;
-  for (const int scan : wrong) names += (names.empty() ? "" : ", ") + scans[scan].path;
-  return "The scans do not fit together: " + scans[worst->first].path + " and " +
-         scans[worst->second].path + " are " + Number(1000 * worst->offset, 0) + " mm and " +
+  for (const int scan : wrong) names += (names.empty() ? "" : ", ") + ScanName(scans, scan);
+  return "The scans do not fit together: " + ScanName(scans, worst->first) + " and " +
+         ScanName(scans, worst->second) + " are " + Number(1000 * worst->offset, 0) + " mm and " +
          Number(DegFromRad(worst->turn), 2) +
          " degrees off where they show the same surface; contradicted by most of its neighbours: " +
          names +

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/frames.h"
 #include "core/report.h"
@@ -44,6 +45,7 @@ TEST(AlignCommand, WritesTheAlignedModelTheReportAndTheSimilarity) {
   const CommandResult result = files.Align("--report_path " + (files.folder / "report.json"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.out, files.output_path + "\n");
   const Json report = Json::parse(ReadBytes(files.folder / "aligned/alignment.json"));
   EXPECT_EQ(report, Json::parse(ReadBytes(files.folder / "report.json")));
   EXPECT_EQ(report["command"], "roomtex-align");
@@ -453,6 +455,7 @@ TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   WritePicks(files.picks_path, one.picks);
   const CommandResult refused = files.Align();
   EXPECT_EQ(refused.exit_code, 4);
+  EXPECT_EQ(refused.out, files.output_path + ".untrusted\n");
   EXPECT_THAT(ReadBytes(files.folder / "aligned.untrusted/alignment.json"),
               HasSubstr("is kept; this one is in"));
   EXPECT_FALSE(std::filesystem::exists(files.folder / "aligned.untrusted/images.bin"));
@@ -474,6 +477,42 @@ TEST(AlignCommand, KeepsATrustedResultWhenTheNewOneIsNot) {
   EXPECT_EQ(files.Align().exit_code, 0);
   EXPECT_THAT(ReadBytes(files.folder / "aligned/alignment.json"),
               HasSubstr("aligned.untrusted is of an earlier run, which was not to be trusted"));
+}
+
+TEST(AlignCommand, TakesPicksWithCommentsBehindThem) {
+  const CaseFolder files(MakeCase());
+  std::string commented;
+  for (const char c : ReadBytes(files.picks_path)) {
+    commented += c == '\n' ? " # left, by hand\n" : std::string(1, c);
+  }
+  WriteBytes(files.picks_path, commented);
+  const CommandResult result = files.Align();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+TEST(AlignCommand, SaysWhichColmapReadsPanoramas) {
+  SimulatedRoomOptions options = CaseOptions(0);
+  options.camera_model = "EQUIRECTANGULAR";
+  options.photo_width = 2048;
+  options.photo_height = 1024;
+  const SimulatedCase one = MakeCase(options, 6);
+  const CaseFolder files(one);
+  const auto warnings = [&files](const std::string& name) {
+    return Json::parse(ReadBytes(files.folder / name + "/alignment.json"))["warnings"].dump();
+  };
+  // A COLMAP that maps panoramas made this model.
+  ASSERT_EQ(files.Align().exit_code, 0);
+  EXPECT_THAT(warnings("aligned"), testing::Not(HasSubstr("EQUIRECTANGULAR")));
+  // None made this one.
+  MakeFolder(files.folder / "photos");
+  cv::imwrite(files.folder / "photos/" + one.picks[0].image_name,
+              cv::Mat(options.photo_height, options.photo_width, CV_8UC1, cv::Scalar(90)));
+  const CommandResult alone = RunCommandLine(
+      "roomtex-align --quiet --image_path " + (files.folder / "photos") +
+      " --camera_model EQUIRECTANGULAR --camera_params 2048,1024 --scan_path " + files.scan_path +
+      " --picks_path " + files.picks_path + " --output_path " + (files.folder / "alone"));
+  ASSERT_TRUE(alone.exit_code == 0 || alone.exit_code == 4) << alone.err;
+  EXPECT_THAT(warnings("alone"), HasSubstr("which COLMAP reads from 4.1 on"));
 }
 
 TEST(AlignCommand, RefusesExchangedPicks) {

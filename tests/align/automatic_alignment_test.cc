@@ -419,8 +419,9 @@ TEST(AutomaticAlignCommand, TheNearHintIsChecked) {
   const CommandResult unknown =
       folder.Align(" --scan_path " + folder.files.scan_path +
                    " --near nobody.jpg,1,2,3 --output_path " + folder.files.output_path);
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.err, HasSubstr("not in the sparse model"));
+  EXPECT_EQ(unknown.exit_code, 3);
+  EXPECT_THAT(unknown.err, HasSubstr("--near: names the photo nobody.jpg, which is not in the "
+                                     "sparse model (nearest name: photo_"));
 }
 
 TEST(AutomaticAlignCommand, SixPicksNeedNoHint) {

@@ -169,7 +169,9 @@ TEST(PhotosAloneCommand, PlacesPhotosWithoutPicksAndNamesThoseThatItCannot) {
   EXPECT_THAT(none.err, HasSubstr("None of the photos could be placed"));
   EXPECT_THAT(none.err, HasSubstr("roomtex-pick"));
   EXPECT_EQ(ReadSparseModel(output).images.size(), 2u);
-  EXPECT_EQ(RunCommandLine(command + " --near nobody.png,1,1,1").exit_code, 2);
+  const CommandResult nobody = RunCommandLine(command + " --near nobody.png,1,1,1");
+  EXPECT_EQ(nobody.exit_code, 3);
+  EXPECT_THAT(nobody.err, HasSubstr("not among those of --image_path (nearest name: "));
 }
 
 TEST(PhotosAloneCommand, SaysInASentenceWhatIsMissing) {

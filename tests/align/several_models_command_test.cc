@@ -154,8 +154,8 @@ TEST_F(SeveralModels, APickInNoneOfThemGetsASentence) {
   EXPECT_THAT(result.err, HasSubstr("photo_0l3.jpg is not in any of the sparse models"));
   WritePicks(files_.picks_path, PicksOf(first_));
   const CommandResult hint = files_.Align("--near nobody.jpg,1,2,3");
-  EXPECT_EQ(hint.exit_code, 2);
-  EXPECT_THAT(hint.err, HasSubstr("nobody.jpg, which is in none of the sparse models"));
+  EXPECT_EQ(hint.exit_code, 3);
+  EXPECT_THAT(hint.err, HasSubstr("nobody.jpg, which is not in any of the sparse models (nearest"));
   EXPECT_FALSE(std::filesystem::exists(files_.output_path));
 }
 

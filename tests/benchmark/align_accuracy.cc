@@ -67,6 +67,15 @@ SimulatedCase WithPicksThatFitSimilarRoom(int seed) {
   return one;
 }
 
+// 45 000 samples, 5 cm apart on the walls.
+SimulatedCase Coarse(SimulatedCase one, int seed_of_scan) {
+  SimulatedRoomOptions options = CaseOptions(seed_of_scan);
+  options.scan_columns = 300;
+  options.scan_rows = 150;
+  one.scans = MakeCase(options, 6).scans;
+  return one;
+}
+
 // The picks of a photo under the name of another.
 SimulatedCase WithAnotherPhoto(int seed) {
   SimulatedCase one = RoomWithPicks(seed, 6);
@@ -132,6 +141,11 @@ const Row kRows[] = {
     {"mirrored scan", WithMirroredScan, false},
     {"scan of a similar room", WithScanOfSimilarRoom, false},
     {"similar room, picks on what is the same", WithPicksThatFitSimilarRoom, false},
+    {"coarse scan", [](int seed) { return Coarse(RoomWithPicks(seed, 6), seed); }, true},
+    {"coarse scan of a similar room",
+     [](int seed) { return Coarse(RoomWithPicks(seed, 6), seed + 1); }, false},
+    {"coarse scan of a similar room, picks on what is the same",
+     [](int seed) { return Coarse(WithPicksThatFitSimilarRoom(seed), seed + 1); }, false},
     {"large room, 800 x 340 samples", [](int seed) { return WithCoarseScan(seed, false, 0); },
      true},
     {"large room, 800 x 340 samples, clicks off by 10 pixels",

@@ -444,6 +444,11 @@ TEST_F(MapperCommand, SaysThatAnInitialPhotoIsUnknownOrAPairTooThin) {
 
 TEST_F(MapperCommand, RefusesAnOutputThatCannotBeWritten) {
   Simulate(RoomOptions(3));
+  const CommandResult among = RunCommandLine(
+      "roomtex-mapper --database_path " + (folder_ / "database.db") + " --image_path " +
+      (folder_ / "photos") + " --output_path " + (folder_ / "photos/sparse"));
+  EXPECT_EQ(among.exit_code, 2);
+  EXPECT_NE(among.err.find("lies in the folder of the photos"), std::string::npos) << among.err;
   WriteBytes(folder_ / "sparse", "a file");
   const CommandResult result = Run();
   EXPECT_EQ(result.exit_code, 3);
@@ -503,7 +508,7 @@ TEST_F(MapperCommand, KillsColmapAndTidiesUpWhenStopped) {
       ::signal(SIGINT, SIG_DFL);  // ignored when the tests run in the background
       const std::string line = "exec " + BinFolder() + "/" + Arguments() +
                                "--quiet --Init.max_third_views 1 --colmap " +
-                               (folder_ / "colmap-slow");
+                               (folder_ / "colmap-slow") + " 2>" + (folder_ / "said");
       execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
       _exit(127);
     }
@@ -517,6 +522,10 @@ TEST_F(MapperCommand, KillsColmapAndTidiesUpWhenStopped) {
     EXPECT_EQ(WTERMSIG(status), signal);
     EXPECT_TRUE(WaitFor([&] { return !ProcessLives(sleeper); }));
     EXPECT_FALSE(fs::exists(folder_ / "sparse/0"));
+    const std::string said = ReadBytes(folder_ / "said");
+    EXPECT_NE(said.find("unchanged, but for the log " + (folder_ / "sparse/roomtex-mapper.log")),
+              std::string::npos)
+        << said;
     ExpectNoScratch();
   }
 }

@@ -3,8 +3,10 @@
 #include <map>
 #include <numeric>
 
+#include <glog/logging.h>
 #include <gtest/gtest.h>
 
+#include "colmap_ext/solver_log.h"
 #include "colmap_ext/two_view_geometry.h"
 #include "colmap_ext/two_view_hypotheses.h"
 #include "tests/colmap_ext/simulated_views.h"
@@ -58,6 +60,15 @@ SeedGeometry Disturbed(const SeedGeometry& geometry, double angle) {
     start.points[i].z() *= i % 2 == 0 ? 1.1 : 0.93;
   }
   return start;
+}
+
+// What Ceres says of a step that it retries comes by this way.
+TEST(SolverLog, CeresSaysNothingOnStandardError) {
+  SilenceCeres();
+  testing::internal::CaptureStderr();
+  LOG(WARNING) << "Linear solver failure.";
+  LOG(ERROR) << "Residual and Jacobian evaluation failed.";
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(SeedBundle, ErrorsAreZeroAtTheTruthOfExactKeypoints) {

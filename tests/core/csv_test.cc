@@ -45,6 +45,22 @@ TEST(Csv, QuotesHoldCommasBlanksAndQuotes) {
   EXPECT_THAT(rows[1].fields, ElementsAre("#g", "", ""));
 }
 
+TEST(Csv, CommentsMayStandBehindFieldsFromTheOneAskedFor) {
+  const TempFolder folder;
+  WriteBytes(folder / "table.csv",
+             "name,x,label # the columns\n"
+             "a #1.jpg,2,corner\t# left, \"upper\" one\n"
+             "\"b\",3,\"# no comment\"  # one, two\n"
+             "c#d,4#5, # nothing\n");
+  CsvReader table(folder / "table.csv", "Make it", "Expected a table");
+  table.CommentsFrom(1);
+  std::vector<std::vector<std::string>> rows;
+  while (table.Next()) rows.push_back(table.Fields().value_or(std::vector<std::string>()));
+  EXPECT_THAT(rows,
+              ElementsAre(ElementsAre("name", "x", "label"), ElementsAre("a #1.jpg", "2", "corner"),
+                          ElementsAre("b", "3", "# no comment"), ElementsAre("c#d", "4#5", "")));
+}
+
 TEST(Csv, WhatIsWrittenIsReadBack) {
   const std::vector<std::string> fields = {"a.jpg", "b, c", "#d", "e\"f", " g ", "", "h#"};
   const auto rows = ReadTable(CsvLine(fields) + CsvLine({"", ""}));

@@ -73,6 +73,18 @@ TEST_F(InputGuardTest, KnowsPhotosInAFolderAndLeavesTheRest) {
   EXPECT_EQ(Refusal(photos + "/new.png", photos), "");
 }
 
+TEST_F(InputGuardTest, ResultsLieOutsideOfThePhotos) {
+  fs::create_directory_symlink("photos", folder / "linked");
+  for (const char* name : {"photos", "photos/", "photos/new/deep", "linked", "linked/new"}) {
+    EXPECT_THROW(RequireOutsidePhotos(folder / name, photos), UsageError) << name;
+  }
+  for (const char* name : {"photos_2", "new", "."}) {
+    EXPECT_NO_THROW(RequireOutsidePhotos(folder / name, photos)) << name;
+  }
+  EXPECT_NO_THROW(RequireOutsidePhotos(photos, ""));
+  EXPECT_NO_THROW(RequireOutsidePhotos("none", "none"));
+}
+
 TEST_F(InputGuardTest, OutputsAreNotEachOther) {
   EXPECT_THAT(
       Refusal(folder / "out", scan, folder / "photos/../out"),

@@ -81,6 +81,13 @@ TEST(Text, QuotesWhatMayStandInAMessage) {
   EXPECT_EQ(Quoted(std::string(39, 'x') + "\xc3\xbc"), "\"" + std::string(39, 'x') + "...\"");
 }
 
+TEST(Text, NamesTheNearestOfSome) {
+  EXPECT_EQ(NearestName({"photo_001.jpg", "photo_010.jpg", "wall.png"}, "PHOTO_0l0.jpg"),
+            "photo_010.jpg");
+  EXPECT_EQ(NearestName({}, "photo"), "");
+  EXPECT_EQ(EditDistance("kitten", "sitting"), 3u);
+}
+
 TEST(Text, TrimsBothEnds) {
   EXPECT_EQ(Trimmed(" \ta b\r\n"), "a b");
   EXPECT_EQ(Trimmed(" \t"), "");

@@ -78,6 +78,7 @@ TEST_F(E57Data, OddFilesAreRead) {
   // Every other one of its 360 points is marked as invalid.
   const Scan spherical = Read("tiny_spherical")[0];
   ASSERT_THAT(spherical.points, SizeIs(180));
+  EXPECT_EQ(spherical.num_left_out, 180);
   for (const Eigen::Vector3d& point : spherical.points) EXPECT_NEAR(point.norm(), 1, 1e-12);
 }
 

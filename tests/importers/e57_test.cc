@@ -5,6 +5,7 @@
 
 #include "core/frames.h"
 #include "tests/importers/e57_fixture.h"
+#include "tests/support/run_command.h"
 
 namespace roomtex {
 namespace {
@@ -141,6 +142,12 @@ TEST_F(E57, InvalidPointsAreLeftOutHoweverTheyAreMarked) {
     ASSERT_THAT(scan.points, SizeIs(2));
     EXPECT_EQ(scan.points[0].x(), 1);
     EXPECT_EQ(scan.points[1].x(), 6);
+    EXPECT_EQ(scan.num_left_out, 4);
+    const CommandResult import = RunCommandLine(
+        "roomtex-import --quiet --input_path " + (folder_ / "site.e57") + " --output_path " +
+        (folder_ / "site.ply") + " --report_path " + (folder_ / "report.json"));
+    ASSERT_EQ(import.exit_code, 0) << import.err;
+    EXPECT_THAT(ReadBytes(folder_ / "report.json"), HasSubstr("\"num_missing\": 4"));
   }
 }
 

@@ -52,8 +52,15 @@ TEST_F(ImportCommand, CutsPanoramasIntoFaces) {
                 cv::Mat(128, 256, CV_8UC3, cv::Scalar(40, 90, 160)));
   }
   const CommandResult result =
-      RunOn("panoramas", "--quiet --Faces.around 4 --Faces.poles 1" + Output("faces"));
+      RunOn("panoramas", "--quiet --Faces.around 4 --Faces.poles 1 --report_path " +
+                             (folder_ / "report.json") + Output("faces"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  EXPECT_EQ(report["num_panoramas"], 2);
+  for (const char* key : {"num_columns", "num_rows", "num_samples", "num_missing", "num_triangles",
+                          "byte_order", "bounds"}) {
+    EXPECT_TRUE(report.contains(key) && report[key].is_null()) << key;
+  }
   EXPECT_THAT(result.out, HasSubstr("panoramas.json"));
   const auto json = nlohmann::json::parse(ReadBytes(folder_ / "faces/panoramas.json"));
   ASSERT_EQ(json["panoramas"].size(), 2u);
@@ -274,6 +281,13 @@ TEST_F(ImportCommand, WrongUsageIsToldBeforeTheInputIsRead) {
     EXPECT_THAT(result.err, HasSubstr(text));
     EXPECT_THAT(result.out, IsEmpty());
   }
+}
+
+TEST_F(ImportCommand, NamesNoFileThatDoesNotAppear) {
+  const CommandResult result = RunOn("room.rtpi", "--report_path /sys/r.json" + Output("a.ply"));
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_EQ(result.out, "");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.ply"));
 }
 
 TEST_F(ImportCommand, TheInputIsNeverOverwritten) {

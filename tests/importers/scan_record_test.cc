@@ -96,6 +96,19 @@ TEST_F(ScanRecords, TheScanIsReadAgainAsItWas) {
   }
 }
 
+TEST_F(ScanRecords, ColoursAreReadWhereTheyAreAskedFor) {
+  Align({Write("scans/a.ptx",
+               "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+               "1 2 3 0.5 10 20 30\n")});
+  EXPECT_TRUE(Read().scans[0].colors.empty());
+  ScanReaderOptions options;
+  options.colors = true;
+  const PlacedScans placed = Read({}, options);
+  ASSERT_EQ(placed.scans[0].colors.size(), 1u);
+  EXPECT_EQ(placed.scans[0].colors[0][1], 20);
+  EXPECT_TRUE(placed.files[0].options.colors) << "in full, too";
+}
+
 TEST_F(ScanRecords, AModelThatIsAlignedAgainRemembersTheSame) {
   ScanReaderOptions options;
   options.azimuth = "counterclockwise";

@@ -48,6 +48,9 @@ TEST_F(TextureCommand, BadInputGetsASentence) {
   expect(model + " --image_path " + photos + rest, 2, "--scan_path is required");
   const std::string all = model + " --image_path " + photos + " --scan_path " + scan;
   expect(all + " --output_path " + scan, 2, "inputs are never changed");
+  for (const char* below : {"", "/textured"}) {
+    expect(all + " --output_path " + photos + below, 2, "lies in the folder of the photos");
+  }
   expect(all + rest + " --Texture.scale -1", 2, "Texture.scale must be 1 to 16");
   expect(all + rest + " --Texture.scale fine", 2, "Texture.scale");
   expect(all + rest + " --Texture.max_memory_mb 1", 2, "Texture.max_memory_mb");

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "colmap_ext/sparse_model.h"
 #include "core/command_line.h"
 #include "core/error.h"
 #include "core/option_fields.h"
@@ -184,8 +185,9 @@ void Export(const ExportCommandOptions& options, const Command::Context& context
   outputs->ReplaceAllOf("roomtex-export");
 
   context.progress.Stage("read model");
-  const SparseModel model = ReadAlignedModel(options.input_path);
   const AlignmentRecord alignment = ReadAlignmentRecord(options.input_path);
+  RequireAlignedModel(alignment);
+  const SparseModel model = ReadSparseModel(options.input_path);
   PhotoList list = ListPhotosOf(model, alignment, options.sources, options.strict, context);
   TakeOverTrust(alignment, options.accept_untrusted, context);
   if (!options.colors_path.empty()) {

@@ -69,6 +69,21 @@ TEST(Picks, ReadsCommentsBlankLinesCarriageReturnsAndByteOrderMark) {
   EXPECT_EQ(picks[1].line, 6);
 }
 
+TEST(Picks, CommentsMayStandBehindThem) {
+  const std::vector<Pick> picks = ReadText(
+      "image_name,x,y,scan_x,scan_y,scan_z,weight,label # by hand\n"
+      "hall #2.jpg,1,2,3,4,5,2,door # left, lower\n"
+      "b.jpg,1,2,3,4,6,0.5,\"corner #3\" # \"sure\"\n");
+  ASSERT_EQ(picks.size(), 2u);
+  EXPECT_EQ(picks[0].image_name, "hall #2.jpg");
+  EXPECT_EQ(picks[0].weight, 2);
+  EXPECT_EQ(picks[0].label, "door");
+  EXPECT_EQ(picks[1].label, "corner #3");
+  const std::vector<Pick> plain = ReadText(std::string(kHeader) + "a.jpg,1,2,3,4,5 # six fields\n");
+  ASSERT_EQ(plain.size(), 1u);
+  EXPECT_EQ(plain[0].x_in_scan.z(), 5);
+}
+
 TEST(Picks, ReadsQuotedNamesWithCommasAndQuotes) {
   const std::vector<Pick> picks =
       ReadText(std::string(kHeader) + "\"hall, \"\"north\"\".jpg\" ,1,2,3,4,5\n");

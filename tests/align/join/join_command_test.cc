@@ -123,7 +123,8 @@ class JoinCommand : public testing::Test {
     SparseModel model;
     std::vector<ScanRecord> scans;
     bool trusted = true;
-    std::string doubtful;  // a photo that roomtex-align doubts
+    std::string doubtful;       // a photo that roomtex-align doubts
+    std::string without_error;  // one of which it does not say how exactly it stands
   };
   TempFolder folder_;
   std::map<std::string, Room> rooms_;
@@ -160,6 +161,10 @@ class JoinCommand : public testing::Test {
            {"position_sigma_mm", 1000 * std::sqrt(3) * kPositionSigma},
            {"rotation_sigma_deg", DegFromRad(std::sqrt(3) * kRotationSigma)},
            {"doubt", image.name == room.doubtful ? Json("It is alone.") : Json()}});
+      if (image.name == room.without_error) {
+        json["images"].back().erase("position_sigma_mm");
+        json["images"].back().erase("rotation_sigma_deg");
+      }
     }
     WriteBytes(aligned + "/alignment.json", json.dump());
   }
@@ -413,6 +418,53 @@ TEST_F(JoinCommand, MakesNoSceneWhereNothingLinksTheRooms) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "joined/site.gltf"));
 }
 
+// A matrix of a room that is in no common frame would lay it over the first one.
+TEST_F(JoinCommand, WritesNoPlaceOfARoomThatIsNowhere) {
+  AddRoom("hall", Rigid());
+  AddRoom("library", Turned(90, {5, 5, 0}));
+  AddDoor("hall", "library", 3, {1, 2, 1});
+  AddRoom("attic", Rigid());
+  EXPECT_EQ(Join().exit_code, 0);
+  const auto is_there = [&](const char* name) {
+    return std::filesystem::exists(folder_ / (std::string("joined/") + name));
+  };
+  EXPECT_TRUE(is_there("hall.txt"));
+  EXPECT_TRUE(is_there("library.txt"));
+  EXPECT_FALSE(is_there("attic.txt"));
+  EXPECT_EQ(RoomOf("attic")["frame"], "attic");
+  EXPECT_TRUE(RoomOf("attic")["position_sigma_mm"].is_null());
+  EXPECT_TRUE(RoomOf("attic")["rotation_sigma_deg"].is_null());
+  EXPECT_EQ(RoomOf("hall")["position_sigma_mm"], 0);
+  EXPECT_GT(RoomOf("library")["position_sigma_mm"], 0);
+
+  // Scans that are said to be registered: there is a place, and nothing to compare it with.
+  const CommandResult registered = Join("--registered 1");
+  EXPECT_EQ(registered.exit_code, 4);  // hall and library do not lie in one frame
+  EXPECT_TRUE(is_there("attic.txt"));
+  EXPECT_TRUE(RoomOf("attic")["position_sigma_mm"].is_null());
+  EXPECT_THAT(report_["warnings"].dump(), HasSubstr("nothing was compared"));
+  EXPECT_THAT(report_["warnings"].dump(), HasSubstr(": attic"));
+
+  // Nor does one of an earlier run stay; a file of somebody's does.
+  WriteBytes(folder_ / "joined/mine.txt", "notes");
+  names_ = {"hall", "attic"};
+  EXPECT_EQ(Join().exit_code, 0);
+  EXPECT_FALSE(is_there("library.txt"));
+  EXPECT_FALSE(is_there("attic.txt"));
+  EXPECT_TRUE(is_there("hall.txt"));
+  EXPECT_TRUE(is_there("mine.txt"));
+}
+
+TEST_F(JoinCommand, SaysWhichPhotosHaveNoExpectedError) {
+  AddRoom("hall", Rigid());
+  AddRoom("library", Turned(90, {5, 5, 0}));
+  AddDoor("hall", "library", 3, {1, 2, 1});
+  rooms_["hall"].without_error = "hall-library0.jpg";
+  Join();
+  EXPECT_EQ(LinkOf("hall", "library")["num_photos"], 2);
+  EXPECT_THAT(report_["warnings"].dump(), HasSubstr("how exactly they stand"));
+}
+
 TEST_F(JoinCommand, SaysWhatCannotBeUsed) {
   AddRoom("hall", Rigid());
   EXPECT_EQ(Join().exit_code, 0) << "one room is its own site";
@@ -428,6 +480,14 @@ TEST_F(JoinCommand, SaysWhatCannotBeUsed) {
     EXPECT_EQ(broken.exit_code, 3) << text << broken.err;
     EXPECT_THAT(broken.err, HasSubstr("alignment.json")) << text;
   }
+  std::filesystem::create_directory(folder_ / "refused");
+  WriteBytes(
+      folder_ / "refused/alignment.json",
+      R"({"command": "roomtex-align", "trusted": false, "reason": "The picks lie on a line."})");
+  const CommandResult refused = RunCommandLine(
+      "roomtex-join --input_path " + (folder_ / "refused") + " --output_path " + (folder_ / "j"));
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("refused to align: The picks lie on a line."));
   std::filesystem::remove(aligned + "/alignment.json");
   EXPECT_EQ(
       RunCommandLine("roomtex-join --input_path " + aligned + " --output_path " + (folder_ / "j"))

@@ -151,10 +151,12 @@ TEST(PickCommand, RefusesWhatCannotBeServed) {
   };
   expect(good + " --host 0.0.0.0", 2, "--allow_remote");
   expect(good + " --port 70000", 2, "--port");
-  expect(good + " --image_name nothing.jpg", 2, "--image_name");
+  expect(good + " --image_name photo_0000.jpg", 3, "(nearest name: photo_000.jpg)");
   expect(good + " --azimuth up", 2, "azimuth");
   expect(Options(folder / "no/picks.csv"), 3, "no such folder");
   expect(Options(folder.path()), 3, "is a folder");
+  // Said before anybody picks: no file can be made there, not even by root.
+  expect(Options("/sys/picks.csv"), 3, "/sys/picks.csv: cannot be written");
   WriteBytes(folder / "broken.csv", "image_name,x\n");
   expect(Options(folder / "broken.csv"), 3, "line 1");
   EXPECT_EQ(ReadBytes(folder / "broken.csv"), "image_name,x\n");
