@@ -1,7 +1,10 @@
 #include "align/alignment.h"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
+#include <set>
 
 #include <gmock/gmock.h>
 
@@ -423,6 +426,38 @@ TEST(Alignment, WithoutPicksTheAnswerDoesNotDependOnWhereTheScanLies) {
   for (const auto& [id, image] : one.model.images) {
     EXPECT_THAT(CamFromScan(image.cam_from_model, back),
                 IsNearRigid(CamFromScan(image.cam_from_model, before), RadFromDeg(0.001), 2e-5));
+  }
+}
+
+// No point has three observations.
+TEST(Alignment, AModelOfTwoPhotosIsPlaced) {
+  SimulatedCase one = MakeCase();
+  const uint32_t picked = one.model.FindImage(one.picks[0].image_name)->image_id;
+  std::map<uint32_t, int> shared;  // by the other photo
+  for (const auto& [id, point] : one.model.points) {
+    std::set<uint32_t> seen;
+    for (const TrackElement& element : point.track) seen.insert(element.image_id);
+    if (seen.count(picked) == 0) continue;
+    for (const uint32_t other : seen) shared[other] += other != picked;
+  }
+  const uint32_t other =
+      std::max_element(shared.begin(), shared.end(), [](const auto& a, const auto& b) {
+        return a.second < b.second;
+      })->first;
+  std::set<uint32_t> others;
+  for (const auto& [id, image] : one.model.images) {
+    if (id != picked && id != other) others.insert(id);
+  }
+  one.model = WithoutPhotos(one.model, others);
+  const Alignment alignment = AlignCase(one);
+  EXPECT_GT(alignment.fit.points.size(), 50u);
+  EXPECT_THAT(alignment.reasons, IsEmpty()) << Reasons(alignment);
+  for (int photo = 0; photo < one.room->NumPhotos(); ++photo) {
+    const SparseImage* image =
+        alignment.adjustment.bundle.model.FindImage(one.room->PhotoName(photo));
+    if (image == nullptr) continue;
+    EXPECT_THAT(image->cam_from_model,
+                IsNearRigid(one.room->CamFromScan(photo), RadFromDeg(0.3), 0.01));
   }
 }
 

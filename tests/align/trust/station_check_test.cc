@@ -13,21 +13,24 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// Scans of one room from three stations, all in one frame; the first `count` of them.
+// Scans of one room from three stations, all in one frame.
+std::vector<Scan> MakeStations(int seed, int num_columns) {
+  SimulatedRoomOptions options = CaseOptions(seed);
+  options.num_stations = 3;
+  options.scan_columns = num_columns;
+  options.scan_rows = num_columns / 2;
+  const SimulatedRoom room(options);
+  std::vector<Scan> scans;
+  for (int station = 0; station < 3; ++station) {
+    scans.push_back(room.MakeScan(station));
+    scans.back().path = "station_" + std::to_string(station) + ".rtpi";
+  }
+  return scans;
+}
+
+// The first `count` of them.
 std::vector<Scan> Stations(int count) {
-  static const std::vector<Scan> all = [] {
-    SimulatedRoomOptions options = CaseOptions(3);
-    options.num_stations = 3;
-    options.scan_columns = 500;
-    options.scan_rows = 250;
-    const SimulatedRoom room(options);
-    std::vector<Scan> scans;
-    for (int station = 0; station < 3; ++station) {
-      scans.push_back(room.MakeScan(station));
-      scans.back().path = "station_" + std::to_string(station) + ".rtpi";
-    }
-    return scans;
-  }();
+  static const std::vector<Scan> all = MakeStations(3, 500);
   return {all.begin(), all.begin() + count};
 }
 
@@ -127,13 +130,7 @@ TEST(StationCheck, RoomsFarFromEachOtherAreComparedEachByItself) {
 
 // Samples 4 cm apart on the walls: of cubes of 6 cm only those near the stations have enough.
 TEST(StationCheck, StationsOfCoarseScansThatStandRightAgree) {
-  SimulatedRoomOptions options = CaseOptions(1);
-  options.num_stations = 3;
-  options.scan_columns = 400;
-  options.scan_rows = 200;
-  const SimulatedRoom room(options);
-  std::vector<Scan> scans;
-  for (int station = 0; station < 3; ++station) scans.push_back(room.MakeScan(station));
+  std::vector<Scan> scans = MakeStations(1, 400);
   const StationCheck right = CheckStations(scans);
   EXPECT_EQ(right.pairs.size(), 3u);
   for (const StationPair& pair : right.pairs) EXPECT_LT(pair.offset, 0.002) << pair.first;

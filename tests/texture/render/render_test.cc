@@ -22,16 +22,20 @@ int RunScript(const std::string& arguments) {
   return status < 0 ? -1 : status >> 8;
 }
 
+void MakeCapture(const std::string& folder, int num_photos, int photo_width, int num_columns) {
+  SimulatedRoomOptions options;
+  options.num_photos = num_photos;
+  options.photo_width = photo_width;
+  options.photo_height = photo_width * 2 / 3;
+  options.scan_columns = num_columns;
+  options.scan_rows = num_columns * 2 / 5;
+  Progress quiet(true);
+  WriteCapture(SimulatedRoom(options), folder, &quiet);
+}
+
 TEST(RenderScript, MakesPicturesOfACapture) {
   const TempFolder folder;
-  SimulatedRoomOptions options;
-  options.num_photos = 6;
-  options.photo_width = 420;
-  options.photo_height = 280;
-  options.scan_columns = 500;
-  options.scan_rows = 200;
-  Progress quiet(true);
-  WriteCapture(SimulatedRoom(options), folder / "capture", &quiet);
+  MakeCapture(folder / "capture", 6, 420, 500);
   ASSERT_EQ(RunScript(folder / "capture" + " " + (folder / "pictures") +
                       " -- --num_photos 2 --num_ring 2 --width 240"),
             0);
@@ -60,14 +64,7 @@ TEST(RenderScript, MakesPicturesOfACapture) {
 
 TEST(RenderCommand, PrintsWhereThePictureIs) {
   const TempFolder folder;
-  SimulatedRoomOptions options;
-  options.num_photos = 2;
-  options.photo_width = 96;
-  options.photo_height = 64;
-  options.scan_columns = 120;
-  options.scan_rows = 50;
-  Progress quiet(true);
-  WriteCapture(SimulatedRoom(options), folder / "capture", &quiet);
+  MakeCapture(folder / "capture", 2, 96, 120);
   WriteBytes(folder / "box.ply",
              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
              "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
