@@ -372,10 +372,12 @@ void RequireAlignedModel(const AlignmentRecord& record) {
       if (fs::exists(fs::path(record.folder) / (std::string(name) + extension), error)) return;
     }
   }
-  throw InputError(record.folder, "",
-                   "holds no model, only the report of roomtex-align, which refused to align: " +
-                       (record.reason.empty() ? "it does not say why." : record.reason),
-                   "Align anew; what stands in the way is in alignment.json there");
+  std::string why = record.reason.empty() ? "it does not say why" : record.reason;
+  if (why.back() == '.') why.pop_back();  // the sentence gets its own
+  throw InputError(
+      record.folder, "",
+      "holds no model, only the report of roomtex-align, which refused to align: " + why,
+      "Align anew; what stands in the way is in alignment.json there");
 }
 
 void RequireScans(const std::vector<std::string>& paths, const std::string& model_folder) {

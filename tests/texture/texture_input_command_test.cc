@@ -132,7 +132,8 @@ TEST_F(TextureCommand, SaysWhyTheAlignmentWasRefused) {
     EXPECT_THAT(result.err, testing::HasSubstr("lign anew"));
     return result.err;
   };
-  EXPECT_THAT(refuse("The picks lie on a line."), testing::HasSubstr("The picks lie on a line."));
+  EXPECT_THAT(refuse("The picks lie on a line."),
+              testing::HasSubstr("The picks lie on a line. Align anew"));
   refuse("");
 }
 
