@@ -1,6 +1,5 @@
 // roomtex-simulate: a simulated capture with known truth. Parses, calls, reports.
 
-#include <cstdio>
 #include <memory>
 
 #include "capture/pattern/pattern.h"
@@ -10,6 +9,7 @@
 #include "core/error.h"
 #include "core/option_fields.h"
 #include "core/output_set.h"
+#include "core/standard_files.h"
 
 namespace {
 
@@ -67,8 +67,9 @@ int main(int argc, char** argv) {
                     "projectors");
   command.AddBool("reachable", &reachable,
                   "write truth/reachable.ply too: the mean of the photos with true places, "
-                  "visibility and exposure");
+                  "visibility, exposure, white balance, vignetting and response");
   return command.Run(argc, argv, [&](const Command::Context& context) {
+    if (seed < -1) throw UsageError("--seed must be -1 (that of --random_seed), 0 or more");
     options.random_seed = seed >= 0 ? seed : context.options.random_seed;
     options.bare = bare == "1" || (bare == "auto" && options.projectors > 0);
     options.num_threads = context.options.num_threads;
@@ -83,6 +84,6 @@ int main(int argc, char** argv) {
     if (options.num_picks > 0 && summary.num_picks < options.num_picks) {
       context.Warn("only " + std::to_string(summary.num_picks) + " places to click were found");
     }
-    std::printf("%s\n", output_path.c_str());
+    AnswerAtEnd(output_path + "\n");
   });
 }

@@ -26,6 +26,20 @@ double ResponseTable::Encode(const std::string& name, double linear) {
   return power - kBend * std::sin(2 * kPi * power) / (2 * kPi);
 }
 
+std::array<float, 256> ResponseTable::LinearFromByte(const std::string& name) {
+  if (name != "film") return LinearFromSrgbByte();
+  std::array<float, 256> table{};
+  for (size_t byte = 0; byte < table.size(); ++byte) {
+    double low = 0, high = 1;  // the curve grows all along: halved to the last bit
+    for (int i = 0; i < 50; ++i) {
+      const double middle = (low + high) / 2;
+      (255 * Encode(name, middle) < static_cast<double>(byte) ? low : high) = middle;
+    }
+    table[byte] = static_cast<float>(high);
+  }
+  return table;
+}
+
 // Over the square root, where such curves are nearly straight.
 ResponseTable::ResponseTable(const std::string& name) {
   for (int i = 0; i < kNodes + 2; ++i) {

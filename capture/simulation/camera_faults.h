@@ -2,6 +2,7 @@
 // What keeps a photo from being sRGB of the light that falls in: response curve, vignetting, white
 // balance.
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ class ResponseTable {
   static const std::vector<std::string>& Names();
   // The curve itself: linear light 0..1 to 0..1.
   static double Encode(const std::string& name, double linear);
+
+  // The linear light of every byte value.
+  static std::array<float, 256> LinearFromByte(const std::string& name);
 
   explicit ResponseTable(const std::string& name);
   float Grey(float linear) const;

@@ -61,18 +61,25 @@ void RequireNoOtherPhotos(const SimulatedRoom& room, const std::string& photo_fo
   }
 }
 
-// A place every 20 seconds; with projectors every minute, its plain photo 7 seconds later.
-std::string DateTime(const SimulatedRoom& room, int photo) {
-  const bool paired = !room.Projectors().empty();
+constexpr int kSecondsPerPlace = 20;
+
+// Seconds from the first photo on. With projectors a place every minute, its plain photo 7 seconds
+// later.
+int TimeOf(const SimulatedRoom& room, int photo) {
   const int place = room.PlaceOf(photo);
-  const int seconds = paired ? 60 * place + (room.IsPatterned(photo) ? 0 : 7) : 20 * place;
-  // From noon on; the days of May are enough for all that can be simulated.
+  if (room.Projectors().empty()) return kSecondsPerPlace * place;
+  return 60 * place + (room.IsPatterned(photo) ? 0 : 7);
+}
+
+// From noon on; the days of May are enough for all that can be simulated.
+std::string DateTime(int seconds) {
   const int hours = 12 + seconds / 3600;
   return fmt::format("2008:05:{:02} {:02}:{:02}:{:02}", 1 + hours / 24, hours % 24,
                      seconds / 60 % 60, seconds % 60);
 }
 
-void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
+// seconds: TimeOf() the photo.
+void WritePhoto(const SimulatedRoom& room, int photo, int seconds, const std::string& path) {
   const cv::Mat image = room.RenderPhoto(photo);
   std::vector<uchar> bytes;
   cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
@@ -86,14 +93,14 @@ void WritePhoto(const SimulatedRoom& room, int photo, const std::string& path) {
     exposure.f_number = kAperture;
     exposure.iso = kIso;
     exposure.camera = "roomtex simulated camera";
-    exposure.date_time = DateTime(room, photo);
+    exposure.date_time = DateTime(seconds);
     WriteExposureData(file.partial_path(), exposure);
   }
   file.Commit();
 }
 
-// Photos of another room among those of the first (SimulatedRoomOptions::similar_room), as if taken
-// after them.
+// Photos of another room in the folder of the first (SimulatedRoomOptions::similar_room), taken
+// after its own.
 void WriteSimilarRoom(const SimulatedRoom& room, const std::string& photo_folder,
                       Progress* progress) {
   const int count = room.options().similar_room;
@@ -107,7 +114,8 @@ void WriteSimilarRoom(const SimulatedRoom& room, const std::string& photo_folder
   for (int i = 0; i < count; ++i) {
     // Spread over the places: each looks somewhere else.
     const int photo = (2 * i + 1) * other.NumPhotos() / (2 * count);
-    WritePhoto(other, photo, photo_folder + "/" + SimilarRoomPhotoName(room, i));
+    WritePhoto(other, photo, kSecondsPerPlace * (room.NumPhotos() + i),
+               photo_folder + "/" + SimilarRoomPhotoName(room, i));
     progress->Tick();
   }
 }
@@ -215,13 +223,13 @@ void WriteMotion(const SimulatedRoom& room, const std::string& folder) {
 
 void WriteTruth(const SimulatedRoom& room, const std::string& folder) {
   SparseModel model;
-  model.cameras[1] = room.camera();
   std::string exposures =
       CsvLine({"image_name", "exposure_ev", "exposure_time", "red_gain", "blue_gain"});
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
     SparseImage& image = model.images[photo + 1];
     image.image_id = photo + 1;
-    image.camera_id = 1;
+    image.camera_id = room.TrueCamera(photo).camera_id;
+    model.cameras[image.camera_id] = room.TrueCamera(photo);
     image.name = room.PhotoName(photo);
     image.cam_from_model = room.CamFromScan(photo);
     exposures +=
@@ -305,7 +313,8 @@ void WriteReadme(const SimulatedRoom& room, const std::string& folder) {
                     "through the\n                    door, there and back\n",
                     room.PhotoName(options.num_photos), room.PhotoName(2 * options.num_photos))
               : "")
-      << (options.zoomed > 0 ? "                    some taken at 1.3 times the focal length told\n"
+      << (options.zoomed > 0 ? "                    some taken at 1.3 times the focal length told: "
+                               "camera 2 in truth/\n"
                              : "")
       << (paired ? "                    every place twice, the camera unmoved: in the light of the "
                    "projectors,\n"
@@ -405,7 +414,7 @@ CaptureSummary MakeCapture(const SimulatedRoom& room, Progress* progress, bool r
   WriteScans(room, folder, &summary, progress);
   progress->Stage("photos", room.NumPhotos() + room.options().similar_room);
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
-    WritePhoto(room, photo, photo_folder + "/" + room.PhotoName(photo));
+    WritePhoto(room, photo, TimeOf(room, photo), photo_folder + "/" + room.PhotoName(photo));
     progress->Tick();
   }
   WriteSimilarRoom(room, photo_folder, progress);

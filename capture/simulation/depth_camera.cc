@@ -19,7 +19,7 @@ namespace {
 constexpr double kFarthest = 6;         // metres
 constexpr double kFlattest = 0.2;       // cosine of the flattest incidence that is seen
 constexpr float kDarkest = 0.07f;       // reflectance below which nothing comes back
-constexpr double kStep = 0.0015;        // metres at 1 m: steps of the range
+constexpr double kStep = 0.0015;        // 1 / metres: steps of 1 / range; metres at 1 m
 constexpr double kFootprint = 0.009;    // radians to the corners of what one sample averages
 constexpr double kSameSurface = 0.03;   // metres across a surface
 constexpr double kShareOfHoles = 0.35;  // of samples on an edge in depth; as many are mixed
@@ -101,8 +101,8 @@ std::optional<DepthCamera::Echo> DepthCamera::Look(const Eigen::Vector3d& origin
   const double square = echo.range * echo.range;
   const double sigma = options_.range_noise * square / std::sqrt(2.0);
   echo.range += sigma * (random->Gaussian() + std::sqrt(2.0) * Field(1, theta, phi, kBlobs));
-  const double step = kStep * square;
-  echo.range = step * std::round(echo.range / step);
+  // The camera measures 1 / range, in whole steps: it shows a slanted wall as terraces.
+  echo.range = 1 / (kStep * std::round(1 / (kStep * std::max(echo.range, 0.01))));
   return echo;
 }
 

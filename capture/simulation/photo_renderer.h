@@ -54,7 +54,9 @@ class PhotoRenderer {
   const RoomScene& scene_;
   int width_, height_;
   Eigen::Vector2d principal_point_;
-  // RayFromImg() through a lattice of kStep pixels, linear between: exact to 0.001 px.
+  // RayFromImg() through a lattice of kStep pixels, linear between. Off by at most 0.001 px in
+  // photos of 1200 pixels by an ordinary lens of 65 degrees, by 0.01 px in small photos and those
+  // of wide lenses, but for the last pixels that a distorted fisheye reaches.
   static constexpr int kStep = 4;
   int lattice_columns_;
   std::vector<Eigen::Vector3d> lattice_;

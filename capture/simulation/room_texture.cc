@@ -309,21 +309,22 @@ class Plaid : public RoomTexture {
   };
   static constexpr float kLength = 16;  // metres before the stripes repeat
 
+  // The mean over `band`: of all the stripes that lie in it, the first and the last one in part.
   LinearRgb Stripe(int way, float position, float band) const {
     float x = std::fmod(position, kLength);
     if (x < 0) x += kLength;
     const auto& stripes = stripes_[way];
-    const auto found = std::upper_bound(stripes.begin(), stripes.end(), x,
+    float from = x - band / 2;
+    const float to = x + band / 2;
+    const auto found = std::upper_bound(stripes.begin(), stripes.end(), from,
                                         [](float a, const StripeEnd& b) { return a < b.end; });
-    const size_t i = std::min<size_t>(found - stripes.begin(), stripes.size() - 1);
-    const float to_end = stripes[i].end - x, from_begin = i > 0 ? x - stripes[i - 1].end : x;
-    LinearRgb color = stripes[i].color;
-    if (to_end < band / 2 && i + 1 < stripes.size()) {
-      color = Mix(color, stripes[i + 1].color, 0.5f - to_end / band);
-    } else if (from_begin < band / 2 && i > 0) {
-      color = Mix(color, stripes[i - 1].color, 0.5f - from_begin / band);
+    size_t i = std::min<size_t>(found - stripes.begin(), stripes.size() - 1);
+    LinearRgb sum = LinearRgb::Zero();
+    for (; i + 1 < stripes.size() && stripes[i].end < to; ++i) {
+      sum += (stripes[i].end - from) * stripes[i].color;
+      from = stripes[i].end;
     }
-    return color;
+    return (sum + (to - from) * stripes[i].color) / band;
   }
 
   uint32_t seed_;

@@ -32,6 +32,7 @@ double NominalExposureTime(const SimulatedRoomOptions& options) {
 }
 
 Camera Zoomed(Camera camera) {
+  camera.camera_id = 2;
   if (camera.IsPanorama()) return camera;
   const int num_focal = camera_formulas::HasOneFocalLength(camera.model) ? 1 : 2;
   for (int k = 0; k < num_focal; ++k) camera.params[static_cast<size_t>(k)] *= kZoom;
@@ -108,6 +109,9 @@ SimulatedRoom::~SimulatedRoom() = default;
 
 const SimulatedRoomOptions& SimulatedRoom::options() const { return impl_->options; }
 const Camera& SimulatedRoom::camera() const { return impl_->camera; }
+const Camera& SimulatedRoom::TrueCamera(int photo) const {
+  return impl_->Photos().CameraOf(PlaceOf(photo)).camera();
+}
 int SimulatedRoom::NumPhotos() const {
   return static_cast<int>(impl_->cam_from_room.size()) * (impl_->projected ? 2 : 1);
 }
@@ -142,7 +146,9 @@ double SimulatedRoom::ExposureTime(int photo) const {
 double SimulatedRoom::NotedTime(int photo) const {
   const std::string& wrong = impl_->options.wrong_exif;
   if (wrong == "all") return NominalExposureTime(impl_->options);
-  return ExposureTime(photo) * (wrong == "one" && photo == NumPhotos() / 2 ? 0.25 : 1);
+  const int middle_place = static_cast<int>(impl_->cam_from_room.size()) / 2;
+  const bool is_middle = PlaceOf(photo) == middle_place && !IsPatterned(photo);
+  return ExposureTime(photo) * (wrong == "one" && is_middle ? 0.25 : 1);
 }
 Eigen::Vector3f SimulatedRoom::WhiteBalance(int photo) const {
   return WhiteBalanceOf(photo, impl_->options.random_seed, impl_->options.white_balance_ev);
@@ -174,10 +180,13 @@ cv::Mat SimulatedRoom::RenderPhoto(int photo) const {
   return image;
 }
 
-bool SimulatedRoom::IsBlurred(int photo) const { return IsOfShare(photo, impl_->options.blurred); }
+// Both photos of a place or none: a share of one half would else be all plain ones.
+bool SimulatedRoom::IsBlurred(int photo) const {
+  return IsOfShare(PlaceOf(photo), impl_->options.blurred);
+}
 
 bool SimulatedRoom::HasStranger(int photo) const {
-  return IsOfShare(photo, impl_->options.strangers);
+  return IsOfShare(PlaceOf(photo), impl_->options.strangers);
 }
 
 Scan SimulatedRoom::MakeScan(int station) const {
@@ -235,17 +244,20 @@ TrueSamples SimulatedRoom::MakeTrueSamples(int station) const {
       if (sample.missing) continue;
       const SceneHit& hit = sample.hit;
       const Eigen::Vector3d normal = impl_->scene.patches()[hit.patch].Normal();
-      const auto side = [&](int next_column, int next_row) {
+      const auto offset = [&](int at_column, int at_row) {
         const Eigen::Vector3d direction =
             room_from_station.rotation *
-            ScanGrid::Direction(grid.Theta(next_column), grid.Phi(next_row));
+            ScanGrid::Direction(grid.Theta(at_column), grid.Phi(at_row));
         return OffsetOnPlane(origin, direction, hit.point, normal);
       };
+      // Where the grid's own ray meets the surface: a depth camera that drifts shows what lies
+      // beside it.
+      const Eigen::Vector3d here = offset(column, row);
       samples.points[index] = hit.point;
       const double facing = normal.dot(origin - hit.point) < 0 ? -1 : 1;
       samples.normals[index] = (facing * normal).cast<float>();
       samples.cell_colors[index] =
-          impl_->scene.Color(hit, side(column + 1, row), side(column, row + 1))
+          impl_->scene.Color(hit, offset(column + 1, row) - here, offset(column, row + 1) - here)
               .cwiseMax(0)
               .cwiseMin(1);
     }

@@ -41,7 +41,9 @@ class SimulatedRoom {
   ~SimulatedRoom();
 
   const SimulatedRoomOptions& options() const;
-  const Camera& camera() const;  // one for all photos, camera_id 1
+  const Camera& camera() const;  // as told, one for all photos: camera_id 1
+  // The same but for photos that are zoomed: of those camera_id is 2.
+  const Camera& TrueCamera(int photo) const;
 
   int NumPhotos() const;  // of all rooms; twice the places if there are projectors
   int NumStations() const;

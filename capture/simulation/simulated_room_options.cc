@@ -85,7 +85,9 @@ void SimulatedRoomOptions::DeclareCamera(OptionFields* fields) {
   fields->Int("photo_height", &photo_height, "pixels").Within(64, 20000, "pixels");
   fields
       ->Number("field_of_view_deg", &field_of_view_deg,
-               "horizontal, degrees; beyond 100 for fisheyes; a panorama has 360 whatever this is")
+               "horizontal, degrees, of the lens without its distortion (65 are 66.5 with that of "
+               "OPENCV); beyond 100 for fisheyes, which leave dark what their distortion does not "
+               "reach; a panorama has 360 whatever this is")
       .Within(20, 240);
   fields->Number("roll_deg", &roll_deg, "photos lean to either side by up to this, degrees")
       .Within(0, 180);
@@ -118,7 +120,10 @@ void SimulatedRoomOptions::DeclareLight(OptionFields* fields) {
                "motion blur: so many pixels does the camera move while it is exposed, in another "
                "direction for each photo")
       .Within(0, 100);
-  fields->Number("blurred", &blurred, "share of the photos that --blur_px and --motion_px are for")
+  fields
+      ->Number("blurred", &blurred,
+               "share of the photos that --blur_px and --motion_px are for, both of a place with "
+               "projectors")
       .Within(0, 1, "(a share of the photos)");
   fields->Choice("response", &response, ResponseTable::Names(),
                  "how the camera turns light into bytes: sRGB, or a gamma of 1.8 with toe and "
@@ -129,9 +134,10 @@ void SimulatedRoomOptions::DeclareLight(OptionFields* fields) {
       ->Number("white_balance_ev", &white_balance_ev,
                "red and blue vary from photo to photo by up to plus or minus this, EV")
       .Within(0, 2);
-  fields->Choice("wrong_exif", &wrong_exif, {"none", "one", "all"},
-                 "one: the middle photo notes a quarter of its exposure time; all: every photo "
-                 "notes the same");
+  fields->Choice(
+      "wrong_exif", &wrong_exif, {"none", "one", "all"},
+      "one: the middle (plain) photo notes a quarter of its exposure time; all: every photo "
+      "notes the same");
 }
 
 void SimulatedRoomOptions::DeclareMotion(OptionFields* fields) {

@@ -64,8 +64,8 @@ struct SimulatedRoomOptions {
   std::string response = "srgb";   // or "film", see camera_faults.h
   double vignetting = 0;           // share of the light lost in the corners
   double white_balance_ev = 0;     // red and blue vary by up to +- this from photo to photo
-  // "one": the middle photo's EXIF notes a quarter of the time; "all": every photo's notes the same
-  // time.
+  // "one": the EXIF of the middle (plain) photo notes a quarter of the time; "all": that of every
+  // photo notes the same time.
   std::string wrong_exif = "none";
   // Time from reading the first row to the last one, in which the hand moves the camera on at these
   // speeds, each photo another way; 0 = all rows at once.

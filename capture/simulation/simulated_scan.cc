@@ -50,10 +50,12 @@ ScanSample RoomScanner::Measure(int index) const {
   const auto hit = scene_.Cast(room_from_station_.translation, direction);
   if (!hit) return sample;
   sample.hit = *hit;
+  // Drawn whether it counts or not, so that what follows is the same either way.
+  const bool is_lost = random.Uniform() < kShareLost;
   const double cosine = std::abs(direction.dot(scene_.patches()[hit->patch].Normal()));
   if (options_.missing_samples) {
     if (scene_.SurfaceOf(hit->patch).kind != Surface::Kind::kOpaque) return sample;
-    if (random.Uniform() < kShareLost || cosine < kFlattestEcho) return sample;
+    if (is_lost || cosine < kFlattestEcho) return sample;
   }
   sample.missing = false;
   const double range = hit->distance;

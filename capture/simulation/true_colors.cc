@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "capture/simulation/camera_faults.h"
 #include "core/output_file.h"
 #include "core/photo.h"
 
@@ -22,10 +23,34 @@ struct PhotoPixel {
   bool clipped;
 };
 
+// What the camera made of the light, to be taken back.
+class PhotoTone {
+ public:
+  PhotoTone(const SimulatedRoom& room, int photo)
+      : gain_(static_cast<float>(std::exp2(room.ExposureEv(photo))) * room.WhiteBalance(photo)),
+        vignetting_(room.options().vignetting) {
+    const Camera& camera = room.TrueCamera(photo);
+    const Eigen::Vector2d size(camera.width, camera.height);
+    centre_ = CameraProjection(camera).ImgFromCam(Eigen::Vector3d::UnitZ()).value_or(0.5 * size);
+    half_diagonal2_ = size.squaredNorm() / 4;
+  }
+  // Factors on the light at a position in `img`.
+  Eigen::Vector3f GainAt(const Eigen::Vector2f& position) const {
+    const double radius2 = (position.cast<double>() - centre_).squaredNorm() / half_diagonal2_;
+    return static_cast<float>(VignettingAt(radius2, vignetting_)) * gain_;
+  }
+
+ private:
+  Eigen::Vector3f gain_;
+  double vignetting_;
+  Eigen::Vector2d centre_;
+  double half_diagonal2_;
+};
+
 // Bilinear in linear light; position in `img`.
-PhotoPixel LookUp(const cv::Mat& photo, const Eigen::Vector2f& position) {
+PhotoPixel LookUp(const cv::Mat& photo, const Eigen::Vector2f& position,
+                  const std::array<float, 256>& linear) {
   constexpr int kClipped = 252;  // JPEG smears 255 a little
-  const std::array<float, 256>& linear = LinearFromSrgbByte();
   const float x = std::clamp(position.x() - 0.5f, 0.0f, static_cast<float>(photo.cols - 1));
   const float y = std::clamp(position.y() - 0.5f, 0.0f, static_cast<float>(photo.rows - 1));
   const int column = static_cast<int>(x), row = static_cast<int>(y);
@@ -56,23 +81,24 @@ Sightings CollectSightings(const SimulatedRoom& room, const TrueSamples& samples
   Sightings result;
   result.views.assign(count, 0);
   std::vector<Eigen::Vector4f> sums(reachable ? count : 0, Eigen::Vector4f::Zero());
+  const auto linear = ResponseTable::LinearFromByte(room.options().response);
   for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    progress->Tick();
     // The colours are the plain photos' business.
     if (room.IsPatterned(photo)) continue;
     const std::vector<Eigen::Vector2f> positions = room.TrueSightings(samples, photo);
     cv::Mat image;
     if (reachable) image = ReadPhoto(photo_folder + "/" + room.PhotoName(photo));
-    const auto gain = static_cast<float>(std::exp2(-room.ExposureEv(photo)));
+    const PhotoTone tone(room, photo);
     for (size_t i = 0; i < count; ++i) {
       if (!(positions[i].x() == positions[i].x())) continue;
       if (result.views[i] < 255) ++result.views[i];
       if (!reachable) continue;
-      const PhotoPixel pixel = LookUp(image, positions[i]);
+      const PhotoPixel pixel = LookUp(image, positions[i], linear);
       const float weight = pixel.clipped ? kHardlyAnything : 1;
-      sums[i].head<3>() += weight * gain * pixel.linear;
+      sums[i].head<3>() += weight * pixel.linear.cwiseQuotient(tone.GainAt(positions[i]));
       sums[i][3] += weight;
     }
-    progress->Tick();
   }
   for (const Eigen::Vector4f& sum : sums) {
     result.means.push_back(sum[3] > 0 ? Eigen::Vector3f(sum.head<3>() / sum[3])
@@ -125,8 +151,8 @@ void WriteTrueColors(const SimulatedRoom& room, const std::string& photo_folder,
   std::optional<PlyFile> means;
   if (reachable) {
     means.emplace(folder + "/reachable.ply",
-                  "plain mean of the photos with true places, visibility and exposure",
-                  num_vertices, false);
+                  "plain mean of the photos with true places, visibility and tone", num_vertices,
+                  false);
   }
   for (int station = 0; station < num_stations; ++station) {
     const Scan& scan = scans[station];

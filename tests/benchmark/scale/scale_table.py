@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """What every step costs against the number of photos and of samples: CPU seconds and peak memory of the programs, as
-Markdown tables (docs/scale.md), with the slope between neighbouring columns and over all (1 = linear, 2 = square).
+Markdown tables (docs/scale.md), with the slope from the first column to the last one (1 = linear, 2 = square).
 
   tests/benchmark/scale/scale_table.py --bin build/bin FOLDER --photos 20 40 80 --samples 1 4 10
 

@@ -49,6 +49,7 @@ def draw(seed):
         options.update(depth_camera=1, num_stations=1, scan_columns=800, scan_rows=340, range_noise=0.002)
     elif kind < 0.4:
         options.update(bend=0.003, azimuth_drift_deg=0.2)
+    # The EXIF of a simulated photo says nothing of the lens: "exif" and "nothing" differ by the exposures alone.
     told = draws.choice(["lens", "exif", "nothing"])
     if told == "exif":
         options["exif"] = 1
@@ -103,11 +104,12 @@ def measure(folder, tools, seed, until):
     seconds = time.time() - start
     drawn = "%d photos %dx%d %s, %s, %s, %s" % (
         options["num_photos"], options["photo_width"], options["photo_height"], options["camera_model"],
-        "told" if told == "lens" else told, "clicks" if clicks else "no clicks",
+        "told" if told == "lens" else "not told", "clicks" if clicks else "no clicks",
         "depth camera" if "depth_camera" in options else "laser x %d" % options["num_stations"])
     drawn += "".join(", " + word for word in ("bend", "bare_walls", "rolling_shutter_ms", "motion_px") if word in options)
     drawn += ", strangers" if options["strangers"] else ""
-    drawn += ", " + extension[1:]
+    drawn += ", EXIF" if options["exif"] else ""
+    drawn += ", " + os.path.splitext(scans[0])[1][1:]
     aligned = os.path.join(result, "aligned")
     off, said, color = "–", "–", "–"
     model = os.path.join(result, "textured", "model.ply")

@@ -19,7 +19,7 @@ import os
 import re
 import subprocess
 
-from trust_sets import make_picks
+from trust_sets import full_opencv, make_picks
 from trust_table import align, multiply, read_poses_text, rotation_of
 
 
@@ -44,7 +44,7 @@ def picks_on(sets, tools, case, other, path):
                         "--output_path", ply], check=True, stdout=subprocess.DEVNULL)
     photo = next(line for line in open(case["picks"]) if line.startswith("photo")).split(",")[0]
     words = next(line for line in open(capture + "/cameras.txt") if not line.startswith("#")).split()
-    size, camera = [int(word) for word in words[2:4]], [float(word) for word in words[4:12]]
+    size, camera = [int(word) for word in words[2:4]], full_opencv(words[1], [float(word) for word in words[4:]])
     own_from_other = multiply(read_rigid(capture + "/truth/scan_from_room.txt"),
                               inverse(read_rigid(there + "/truth/scan_from_room.txt")))
     pose = multiply(read_poses_text(case["truth"])[photo], own_from_other)

@@ -243,13 +243,22 @@ def read_ply_points(path):
         yield [struct.unpack_from(kind, data, base + at[k][0])[0] for k in "xyz"]
 
 
+def full_opencv(model, params):
+    """The parameters of one of the ordinary lenses as those of FULL_OPENCV."""
+    if model in ("SIMPLE_RADIAL", "RADIAL"):
+        params = [params[0], *params]
+    if model not in ("PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"):
+        sys.exit("no picks are made by a camera of the model " + model)
+    return params + (12 - len(params)) * [0]
+
+
 def project(camera, x, y):
-    """camera: fx, fy, cx, cy, k1, k2, p1, p2 (OPENCV)."""
-    fx, fy, cx, cy, k1, k2, p1, p2 = camera
+    """camera: fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 (FULL_OPENCV)."""
+    fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 = camera
     r2 = x * x + y * y
-    radial = k1 * r2 + k2 * r2 * r2
-    return (fx * (x + x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
-            fy * (y + y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)) + cy)
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    return (fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
+            fy * (y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)) + cy)
 
 
 def make_picks(path, scan_ply, pose, photo, camera, size, seed, noise=1.5, count=6):
@@ -299,11 +308,7 @@ def make_real(sets, tools, data, name, photos, model, params, size, options, rig
         run(os.path.join(tools, "roomtex-import"), "--input_path", scan, "--azimuth", "counterclockwise",
             "--output_path", "scan.ply")
     truth = read_truth(common)
-    numbers = [float(x) for x in params.split(",")]
-    camera = numbers + 4 * [0]
-    if model == "SIMPLE_RADIAL":
-        camera = [numbers[0], numbers[0], *numbers[1:], 0, 0, 0]
-    camera = camera[:8]
+    camera = full_opencv(model, [float(x) for x in params.split(",")])
     for k, photo in enumerate(clicked):
         picks = "picks_%d.csv" % k
         if not os.path.exists(picks):

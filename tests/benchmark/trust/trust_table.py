@@ -155,13 +155,16 @@ def main():
     cases = [c for c in cases if not args.names or any(c["name"].startswith(n) for n in args.names)]
     print("| case | registered | off, median / worst, mm | degrees | expected, mm | exit | right | < 1, 2, 3 x | why |")
     print("|---|---|---|---|---|---|---|---|---|")
-    below, photos, wrong = [0, 0, 0], 0, 0
+    below, photos, wrong, judged = [0, 0, 0], 0, 0, 0
     for case in cases:
         row = score(case, args)
         told = row.get("photos", [])
         off = median([p[1] for p in told])
+        # Any other exit is no verdict: a file that is missing, photos that are not in the model.
+        is_judged = bool(told) and row["exit"] in (0, 4)
         is_right = (off <= row["limit"]) == (row["exit"] == 0)
-        wrong += not is_right
+        judged += is_judged
+        wrong += is_judged and not is_right
         shares = [sum(p[3] is not None and p[1] < k * p[3] for p in told) for k in (1, 2, 3)]
         if row["exit"] == 0:
             below = [b + s for b, s in zip(below, shares)]
@@ -170,15 +173,16 @@ def main():
         print("| {} | {} | {:.1f} / {:.1f} | {:.2f} | {} | {} | {} | {} of {} | {} |".format(
             row["name"], row.get("registered", 0), off, max([p[1] for p in told], default=float("nan")),
             median([p[2] for p in told]), "-" if said is None else round(said, 1), row["exit"],
-            "yes" if is_right else "**NO**", ", ".join(map(str, shares)), len(told),
+            ("yes" if is_right else "**NO**") if is_judged else "-", ", ".join(map(str, shares)), len(told),
             (row["reason"] or "; ".join(row["warnings"])).replace("\n", " ")[:400]))
         if args.photos:
             for p in row.get("photos", []):
                 print("  {} {:.1f} mm {:.2f} deg, expected {}".format(*p))
         sys.stdout.flush()
     if photos:
-        print("\nTrusted photos: {}; below 1, 2, 3 times the expected error: {} %. Wrong verdicts: {} of {}.".format(
-            photos, ", ".join(str(round(100 * b / photos)) for b in below), wrong, len(cases)))
+        print("\nTrusted photos: {}; below 1, 2, 3 times the expected error: {} %.".format(
+            photos, ", ".join(str(round(100 * b / photos)) for b in below)))
+    print("\nWrong verdicts: {} of {}; cases without one: {}.".format(wrong, judged, len(cases) - judged))
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def main():
     if not args.captures and not args.sets:
         parser.error("a folder is needed: that of trust_sets.py, or --captures FOLDER")
     args.without_picks, args.option = True, []
-    num, trusted = 0, 0
+    num, trusted, unasked = 0, 0, 0
     for title, case, scans, options in pairs_of(args):
         out = os.path.join(args.out, title.replace(" ", "_"))
         os.makedirs(out, exist_ok=True)
@@ -120,9 +120,11 @@ def main():
         search = report.get("search") or {}
         num += 1
         trusted += code == 0
+        unasked += code not in (0, 4)
         print(f"{title}: exit {code}, {search.get('verdict', message)}, {search.get('ratio', 0):.2f} times the next",
               flush=True)
-    print(f"{num} wrong rooms, {trusted} trusted")
+    # Not refused but not asked: a file that is missing, an option that is gone.
+    print(f"{num} wrong rooms, {trusted} trusted, {unasked} without a verdict (exit neither 0 nor 4)")
 
 
 if __name__ == "__main__":

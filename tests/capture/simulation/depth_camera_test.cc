@@ -1,6 +1,7 @@
 #include "capture/simulation/depth_camera.h"
 
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -63,6 +64,52 @@ TEST(DepthCamera, HasHolesAndMixedSamplesOnEdgesOnly) {
   const double share = num_mixed / static_cast<double>(scan.points.size());
   EXPECT_GT(share, 0.005);
   EXPECT_LT(share, 0.08);
+}
+
+// Bare walls and no noise: all that is left is the disparity in whole steps.
+TEST(DepthCamera, MeasuresInSteps) {
+  SimulatedRoomOptions options = DepthCameraRoom();
+  options.furnished = false;
+  options.bare_walls = true;
+  options.range_noise = 0;
+  const SimulatedRoom room(options);
+  const Scan scan = room.MakeScan();
+  const TrueSamples truth = room.MakeTrueSamples();
+  std::set<long> steps;
+  std::vector<double> off;  // in steps
+  for (size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.IsMissing(static_cast<int>(i))) continue;
+    const double disparity = 1 / (0.0015 * scan.points[i].norm());
+    ASSERT_NEAR(disparity, std::round(disparity), 1e-6);
+    steps.insert(std::lround(disparity));
+    const double range = (room.ScanFromRoom() * truth.points[i]).norm();
+    off.push_back(std::abs(1 / (0.0015 * range) - disparity));
+  }
+  ASSERT_GT(off.size(), 50000u);
+  EXPECT_LT(steps.size(), 500u);
+  EXPECT_NEAR(Median(&off), 0.25, 0.02);  // even between two steps
+}
+
+// Of neighbouring samples, rms.
+double DifferenceOfCells(const SimulatedRoomOptions& options) {
+  const TrueSamples truth = SimulatedRoom(options).MakeTrueSamples();
+  double squares = 0, count = 0;
+  for (size_t i = 1; i < truth.points.size(); ++i) {
+    if (!((truth.points[i] - truth.points[i - 1]).norm() < 0.05)) continue;
+    squares += (truth.cell_colors[i] - truth.cell_colors[i - 1]).squaredNorm();
+    ++count;
+  }
+  return std::sqrt(squares / count);
+}
+
+// The drift shows another place of the surface, not a larger one.
+TEST(DepthCamera, ColorsOfCellsAreAsDetailedWhereItDrifts) {
+  SimulatedRoomOptions options = DepthCameraRoom();
+  options.scan_columns = 800;
+  options.scan_rows = 340;
+  const double straight = DifferenceOfCells(options);
+  options.depth_drift = 0.05;
+  EXPECT_NEAR(DifferenceOfCells(options) / straight, 1, 0.04);
 }
 
 TEST(DepthCamera, DriftsAsFarAsAskedOnItsGrid) {

@@ -278,6 +278,27 @@ TEST(ProjectedRoom, HoldsFeaturesInThePatternedPhotosOnly) {
   }
 }
 
+// A share of the photos is of the places: else one half would be all plain photos and no other.
+TEST(ProjectedRoom, IsBlurredAndVisitedPlaceByPlace) {
+  SimulatedRoomOptions options = SmallProjectedRoom();
+  options.num_photos = 6;
+  options.blurred = 0.5;
+  options.strangers = 0.5;
+  options.wrong_exif = "one";
+  const SimulatedRoom room(options);
+  int num_blurred = 0, num_wrong = 0;
+  for (int photo = 0; photo < room.NumPhotos(); ++photo) {
+    num_blurred += room.IsBlurred(photo);
+    EXPECT_EQ(room.IsBlurred(photo), room.PlaceOf(photo) % 2 == 1) << photo;
+    EXPECT_EQ(room.HasStranger(photo), room.PlaceOf(photo) % 2 == 1) << photo;
+    if (room.NotedTime(photo) == room.ExposureTime(photo)) continue;
+    ++num_wrong;
+    EXPECT_FALSE(room.IsPatterned(photo)) << "gives no colours";
+  }
+  EXPECT_EQ(num_blurred, 6);
+  EXPECT_EQ(num_wrong, 1);
+}
+
 TEST(ProjectedRoom, IsScannedWithoutThePattern) {
   SimulatedRoomOptions options = SmallProjectedRoom();
   const Scan bright = SimulatedRoom(options).MakeScan();

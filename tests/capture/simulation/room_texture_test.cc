@@ -88,6 +88,28 @@ TEST(RoomTexture, FootprintIsTheMeanOverIt) {
   }
 }
 
+// Also of several stripes that lie in it.
+TEST(RoomTexture, FootprintOfClothIsTheMeanOfItsStripes) {
+  constexpr int kSide = 24, kPlaces = 200;
+  const TexturePtr cloth = MakePlaid(
+      {RgbFromSrgb(230, 228, 220), RgbFromSrgb(40, 80, 150), RgbFromSrgb(180, 70, 60)}, 0.014f, 6);
+  for (const float footprint : {0.008f, 0.02f, 0.06f}) {
+    RandomStream random(3);
+    double squares = 0;
+    for (int i = 0; i < kPlaces; ++i) {
+      const Eigen::Vector2f uv = RandomPlace(&random);
+      LinearRgb mean = LinearRgb::Zero();
+      for (int k = 0; k < kSide * kSide; ++k) {
+        const Eigen::Vector2f offset((k % kSide + 0.5f) / kSide - 0.5f,
+                                     (k / kSide + 0.5f) / kSide - 0.5f);
+        mean += cloth->Albedo(uv + footprint * offset, 0) / (kSide * kSide);
+      }
+      squares += (cloth->Albedo(uv, footprint) - mean).squaredNorm() / 3;
+    }
+    EXPECT_LT(std::sqrt(squares / kPlaces), 0.015) << footprint;
+  }
+}
+
 TEST(RoomTexture, DiffersForAnotherSeed) {
   const TexturePtr first = MakeWood(RgbFromSrgb(190, 140, 90), 1),
                    second = MakeWood(RgbFromSrgb(190, 140, 90), 2);

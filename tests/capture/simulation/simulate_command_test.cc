@@ -178,11 +178,12 @@ TEST(SimulateCommand, TruthAgainstItselfIsPerfect) {
   EXPECT_EQ(answer["color"]["gain"].get<double>(), 1);
 }
 
-TEST(SimulateCommand, MeanOfPhotosWithTrueVisibilityIsNearTheTruth) {
+// tone: options of the photos' tone.
+void ExpectMeanOfPhotosNearTheTruth(const std::string& tone) {
   const TempFolder folder;
   ASSERT_EQ(RunCommandLine("roomtex-simulate --reachable 1 --num_photos 6 --photo_width 480 "
-                           "--photo_height 320 --scan_columns 480 --scan_rows 240 --output_path " +
-                           (folder / "a"))
+                           "--photo_height 320 --scan_columns 480 --scan_rows 240 " +
+                           tone + " --output_path " + (folder / "a"))
                 .exit_code,
             0);
   const CommandResult result = RunCommandLine(
@@ -201,6 +202,14 @@ TEST(SimulateCommand, MeanOfPhotosWithTrueVisibilityIsNearTheTruth) {
   // Photos of few pixels see about the mean over a sample's cell.
   EXPECT_GT(cells["psnr_db"].get<double>(), points["psnr_db"].get<double>());
   EXPECT_GT(cells["psnr_db"].get<double>(), 26);
+}
+
+TEST(SimulateCommand, MeanOfPhotosWithTrueVisibilityIsNearTheTruth) {
+  ExpectMeanOfPhotosNearTheTruth("");
+}
+
+TEST(SimulateCommand, MeanOfPhotosWithTrueToneIsNearTheTruth) {
+  ExpectMeanOfPhotosNearTheTruth("--response film --vignetting 0.4 --white_balance_ev 0.2");
 }
 
 TEST(SimulateCommand, WritesPatternedAndPlainPhotosAsAPhotographerTakesThem) {
@@ -254,11 +263,28 @@ TEST(SimulateCommand, MixesInPhotosOfASimilarRoomWithoutTruth) {
   const std::string out = " --quiet --output_path " + (folder / "capture") + kSmall;
   ASSERT_EQ(RunCommandLine("roomtex-simulate" + out + " --similar_room 2").exit_code, 0);
   const SparseModel truth = ReadSparseModel(folder / "capture/truth");
-  size_t num_photos = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "capture/photos")) {
-    num_photos += entry.path().extension() == ".jpg";
+  const std::vector<std::string> photos = FilesBelow(folder / "capture/photos");
+  EXPECT_EQ(photos.size(), truth.images.size() + 2);
+  std::string last_time;  // taken one after the other, those of the other room last
+  for (const std::string& photo : photos) {
+    const std::string time = ReadExposureData(folder / ("capture/photos/" + photo)).date_time;
+    EXPECT_LT(last_time, time) << photo;
+    last_time = time;
   }
-  EXPECT_EQ(num_photos, truth.images.size() + 2);
+}
+
+TEST(SimulateCommand, TheTruthHasACameraOfItsOwnForZoomedPhotos) {
+  const TempFolder folder;
+  const std::string out = " --quiet --output_path " + (folder / "capture") + kSmall;
+  ASSERT_EQ(RunCommandLine("roomtex-simulate" + out + " --zoomed 0.34").exit_code, 0);
+  const SparseModel truth = ReadSparseModel(folder / "capture/truth");
+  ASSERT_EQ(truth.cameras.size(), 2u);
+  int num_zoomed = 0;
+  for (const auto& [id, image] : truth.images) num_zoomed += image.camera_id == 2;
+  EXPECT_EQ(num_zoomed, 1);
+  EXPECT_NEAR(truth.cameras.at(2).params[0] / truth.cameras.at(1).params[0], 1.3, 1e-12);
+  const std::string told = ReadBytes(folder / "capture/cameras.txt");
+  EXPECT_EQ(told.find("\n2 "), std::string::npos) << "nobody tells";
 }
 
 TEST(SimulateCommand, WritesASecondRoomWithPicksOfItsOwn) {
@@ -292,6 +318,7 @@ TEST(SimulateCommand, SaysWhatIsWrong) {
   expect(out + "--num_photos 0 --camera_model OPENVC", 2, "num_photos");
   expect(out + "--num_photos 0 --camera_model OPENVC", 2, "OPENVC");
   expect(out + "--num_photos three", 2, "three");
+  expect(out + "--seed -2", 2, "--seed must be -1");
   expect(out + "--projectors 9", 2, "projectors must be 0 to 8");
   expect(out + "--projectors 1 --projector_focus 0", 2, "projector_focus");
   expect(out + "--bare perhaps", 2, "bare");

@@ -174,7 +174,14 @@ TEST(SimulatedScan, MissesWindowAndMirrorAndAFewOthers) {
   EXPECT_NEAR(static_cast<double>(bare.NumMissing()) / static_cast<double>(bare.points.size()),
               0.002, 0.0006);
   options.missing_samples = false;
-  EXPECT_EQ(SimulatedRoom(options).MakeScan().NumMissing(), 0);
+  const Scan whole = SimulatedRoom(options).MakeScan();
+  EXPECT_EQ(whole.NumMissing(), 0);
+  // The samples that are there are the same.
+  for (size_t i = 0; i < bare.points.size(); ++i) {
+    if (bare.IsMissing(static_cast<int>(i))) continue;
+    ASSERT_EQ(whole.points[i], bare.points[i]);
+    ASSERT_EQ(whole.intensity[i], bare.intensity[i]);
+  }
 }
 
 TEST(SimulatedScan, BendsAndDriftsAsAsked) {
@@ -423,6 +430,7 @@ TEST(SimulatedRoom, ZoomedPhotosShowAThirdMore) {
   const Eigen::Vector2f centre = Eigen::Vector2d(params[2], params[3]).cast<float>();
   for (const int photo : {3, 4}) {  // every fifth
     const double zoom = photo == 4 ? 1.3 : 1;
+    EXPECT_NEAR(zoomed.TrueCamera(photo).params[0], zoom * zoomed.camera().params[0], 1e-9);
     const auto before = usual.TrueSightings(samples, photo);
     const auto after = zoomed.TrueSightings(samples, photo);
     int num_seen = 0;
