@@ -236,6 +236,55 @@ test('a photo says how far it is off the others, and where', async () => {
   await page.close();
 });
 
+test('nothing over the picture lies over something else, nor beyond a small window', async () => {
+  for (const size of [{width: 390, height: 844}, {width: 1280, height: 800}]) {
+    const {page, errors} = await openView(server.url, size);
+    const boxes = () => page.evaluate(() => {
+      const shown = ['#toolbar', '#hint', '#legend', '#standing', '#scale-bar', '#leave', '#keys'];
+      const found = {};
+      for (const name of shown) {
+        const box = document.querySelector(name).getBoundingClientRect();
+        if (box.width > 0) found[name] = [box.left, box.top, box.right, box.bottom];
+      }
+      return found;
+    });
+    const check = (found, expected) => {
+      const inside = new Set(['#leave', '#keys']), names = Object.keys(found);
+      for (const name of expected) assert.ok(names.includes(name), `${name} at ${size.width}`);
+      for (const [i, name] of names.entries()) {
+        const [left, top, right, bottom] = found[name];
+        assert.ok(left >= 0 && top >= 0 && right <= size.width && bottom <= size.height, name);
+        if (inside.has(name)) continue;
+        for (const other of names.slice(i + 1).filter((one) => !inside.has(one))) {
+          const [l, t, r, b] = found[other];
+          const apart = r <= left || l >= right || b <= top || t >= bottom;
+          assert.ok(apart, `${other} over ${name} at ${size.width}`);
+        }
+      }
+    };
+    await page.keyboard.press('3');
+    await page.waitForFunction(() => document.querySelector('#legend').textContent !== '');
+    await page.keyboard.press('m');
+    check(await boxes(), ['#toolbar', '#hint', '#legend']);
+    await page.keyboard.press('Escape');
+    await page.keyboard.press('t');
+    await settle(page);
+    check(await boxes(), ['#legend', '#scale-bar']);
+    await page.evaluate(() => roomtexView.standIn(roomtexView.cameras.list[0]));
+    await page.waitForFunction(() => roomtexView.cameras.photoShown);
+    check(await boxes(), ['#legend', '#standing', '#leave']);
+    await page.keyboard.press('?');
+    const [wide, room] = await page.evaluate(() => {
+      const dialog = document.querySelector('#help');
+      return [dialog.scrollWidth, dialog.clientWidth];
+    });
+    assert.ok(wide <= room, `the keys are ${wide} px wide in ${room}`);
+    await screenshot(page, `view-small-${size.width}`);
+    assert.deepEqual(errors(), []);
+    await page.close();
+  }
+});
+
 test('a photo lies on the room to the pixel where it was taken', async () => {
   const {page, errors} = await openView();
   await page.keyboard.press('f');  // no frusta in between

@@ -95,7 +95,7 @@ class PhotoExporter {
                          {},
                          0,
                          0};
-    const auto [picture, shown] = UndistortPhoto(taken, photo_.camera, result.camera);
+    const auto [picture, shown] = Undistorted(taken, result.camera);
     const std::string path = PathInside(folder_ + "/images", photo_.name);
     if (picture.data == taken.data && photo_.pixels == PhotoPixels::kAsStored) {
       fs::copy_file(photo_.path, path);  // already as it should be: no second JPEG
@@ -125,6 +125,17 @@ class PhotoExporter {
   }
 
  private:
+  // What is transparent in the photo shows nothing, as what lies beyond its borders.
+  UndistortedPhoto Undistorted(const cv::Mat& taken, const Camera& pinhole) const {
+    UndistortedPhoto result = UndistortPhoto(taken, photo_.camera, pinhole);
+    if (!photo_.transparent) return result;
+    const cv::Mat1b transparent = ReadTransparency(photo_.path, photo_.pixels);
+    if (transparent.size() != taken.size()) return result;  // another file by now
+    const cv::Mat there = UndistortPhoto(transparent, photo_.camera, pinhole).picture;
+    result.shown.setTo(0, there > 0);
+    return result;
+  }
+
   void WriteDepth(const Camera& camera, const cv::Mat1f& depth) const {
     if (format_ == ExportFormat::kNerfstudio) {
       WriteImageFile(PathInside(folder_ + "/depths", photo_.name + ".png"), InMillimetres(depth));

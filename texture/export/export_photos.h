@@ -44,10 +44,11 @@ struct ExportedPhoto {
 
 enum class ExportFormat { kColmap, kNerfstudio };
 
-// Files below `folder`, each named as its photo: images/NAME; masks/NAME.png (0 = moved, or blank)
-// and scan_masks/NAME.png (0 = the scan has nothing there); stereo/depth_maps and normal_maps of
-// kColmap, depths/NAME.png of kNerfstudio. Photos that cannot be undistorted (panoramas) or read go
-// to left_out. Several photos at a time; the result does not depend on num_threads.
+// Files below `folder`, each named as its photo: images/NAME; masks/NAME.png (0 = moved, blank or
+// transparent) and scan_masks/NAME.png (0 = the scan has nothing there); stereo/depth_maps and
+// normal_maps of kColmap, depths/NAME.png of kNerfstudio. Photos that cannot be undistorted
+// (panoramas) or read go to left_out. Several photos at a time; the result does not depend on
+// num_threads.
 std::vector<ExportedPhoto> ExportPhotos(const ExportScene& scene,
                                         const std::vector<PhotoView>& photos, ExportFormat format,
                                         const ExportOptions& options, const std::string& folder,

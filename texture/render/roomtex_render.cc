@@ -110,6 +110,8 @@ Camera PlainCamera(int width, int height, double field_of_view_deg) {
 
 // The pictures of one contact sheet.
 class PictureSet {
+  static constexpr int kCellWidth = 480, kCellHeight = 320, kCaption = 26;
+
  public:
   PictureSet(const RenderOptions& options, const Command::Context& context)
       : options_(options), context_(context), outputs_(options.folder_path) {
@@ -216,26 +218,12 @@ class PictureSet {
   }
 
   void Finish() {  // with a contact sheet
-    constexpr int kWidth = 480, kHeight = 320, kCaption = 26, kColumns = 4;
-    std::vector<cv::Mat> cells;
-    for (const auto& [caption, picture] : pictures_) {
-      const double scale = std::min(static_cast<double>(kWidth) / picture.cols,
-                                    static_cast<double>(kHeight) / picture.rows);
-      cv::Mat small, cell(kHeight + kCaption, kWidth, CV_8UC3, cv::Scalar::all(24));
-      cv::resize(picture, small, {}, scale, scale, cv::INTER_AREA);
-      small.copyTo(cell(
-          cv::Rect((kWidth - small.cols) / 2, (kHeight - small.rows) / 2, small.cols, small.rows)));
-      cv::putText(cell, caption, {8, kHeight + 18}, cv::FONT_HERSHEY_SIMPLEX, 0.5,
-                  cv::Scalar::all(220), 1, cv::LINE_AA);
-      cells.push_back(cell);
-    }
-    while (cells.size() % kColumns != 0) {
-      cells.emplace_back(kHeight + kCaption, kWidth, CV_8UC3, cv::Scalar::all(24));
-    }
+    constexpr int kColumns = 4;
+    while (cells_.size() % kColumns != 0) cells_.push_back(EmptyCell());
     std::vector<cv::Mat> rows;
-    for (size_t i = 0; i < cells.size(); i += kColumns) {
+    for (size_t i = 0; i < cells_.size(); i += kColumns) {
       cv::Mat row;
-      cv::hconcat(&cells[i], kColumns, row);
+      cv::hconcat(&cells_[i], kColumns, row);
       rows.push_back(row);
     }
     cv::Mat sheet;
@@ -265,15 +253,30 @@ class PictureSet {
       return true;
     }
     const cv::Mat both = Beside(photo, picture);
-    pictures_.emplace_back(image.name, both.colRange(0, picture.cols));
+    AddCell(image.name, both.colRange(0, picture.cols));
     Write(file, image.name, both);
-    pictures_.emplace_back("the scan from there", picture);
+    AddCell("the scan from there", picture);
     return true;
   }
 
   void Add(const std::string& file, const std::string& caption, const cv::Mat& picture) {
     Write(file, caption, picture);
-    pictures_.emplace_back(caption, picture);
+    AddCell(caption, picture);
+  }
+  static cv::Mat EmptyCell() {
+    return cv::Mat(kCellHeight + kCaption, kCellWidth, CV_8UC3, cv::Scalar::all(24));
+  }
+  // Of the contact sheet: small at once, so that pictures need no memory once they are written.
+  void AddCell(const std::string& caption, const cv::Mat& picture) {
+    const double scale = std::min(static_cast<double>(kCellWidth) / picture.cols,
+                                  static_cast<double>(kCellHeight) / picture.rows);
+    cv::Mat small, cell = EmptyCell();
+    cv::resize(picture, small, {}, scale, scale, cv::INTER_AREA);
+    small.copyTo(cell(cv::Rect((kCellWidth - small.cols) / 2, (kCellHeight - small.rows) / 2,
+                               small.cols, small.rows)));
+    cv::putText(cell, caption, {8, kCellHeight + 18}, cv::FONT_HERSHEY_SIMPLEX, 0.5,
+                cv::Scalar::all(220), 1, cv::LINE_AA);
+    cells_.push_back(cell);
   }
   void Write(const std::string& file, const std::string& caption, const cv::Mat& picture) {
     WritePictureFile(outputs_.Path(file + ".png"), picture);
@@ -285,7 +288,7 @@ class PictureSet {
   const Command::Context& context_;
   OutputSet outputs_;  // all pictures appear together
   RenderSettings settings_;
-  std::vector<std::pair<std::string, cv::Mat>> pictures_;
+  std::vector<cv::Mat> cells_;
   std::vector<PhotoLeftOut> left_out_;
 };
 

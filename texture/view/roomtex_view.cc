@@ -101,12 +101,17 @@ std::optional<std::string> FrameProblem(const ViewModel& model, const ViewCamera
 // A look does not end with exit 4, but says what the model and its colours are built on.
 void WarnOfDoubts(const ViewOptions& options, const Command::Context& context,
                   std::vector<std::string>* warnings) {
-  for (const fs::path& path : {fs::path(options.aligned) / "alignment.json",
-                               fs::path(options.input_path) / "report.json"}) {
+  std::error_code error;
+  const fs::path input(options.input_path);
+  const fs::path folder = fs::is_directory(input, error) ? input : input.parent_path();
+  std::vector<fs::path> reports = {folder / "report.json", folder / "joined.json"};
+  if (!options.aligned.empty()) reports.push_back(fs::path(options.aligned) / "alignment.json");
+  for (const fs::path& path : reports) {
     const Json json = ReadJsonIfAny(path.string());
     if (!json.is_object() || !json.contains("trusted") || json["trusted"] != false) continue;
     const std::string reason = FromReport(path, {"reason"});
-    warnings->push_back(path.parent_path().string() + " is not to be trusted. " + reason);
+    const fs::path what = path.has_parent_path() ? path.parent_path() : path;
+    warnings->push_back(what.string() + " is not to be trusted. " + reason);
     context.Warn(warnings->back());
   }
 }
@@ -138,6 +143,8 @@ ViewContent ReadContent(const ViewOptions& options, const Command::Context& cont
   std::error_code error;
   if (fs::is_regular_file(evidence, error)) {
     content.evidence_path = evidence.string();
+  } else if (fs::path(content.model.path).extension() == ".gltf") {
+    content.no_evidence_reason = "Of joined rooms each has its evidence in its own folder.";
   } else {
     content.no_evidence_reason =
         "There is no evidence.ply beside the model, as roomtex-texture writes it unless it is told "
@@ -185,8 +192,10 @@ int Main(int argc, char** argv) {
   Command command("roomtex-view",
                   "Shows the coloured scan, its cameras and photos in a browser; measures in it.",
                   "roomtex-view --input_path textured --aligned aligned --open 1");
-  command.AddInputPath("input_path", &options.input_path,
-                       "Folder that roomtex-texture wrote; or a .glb or .ply file.");
+  command.AddInputPath(
+      "input_path", &options.input_path,
+      "Folder that roomtex-texture or roomtex-join wrote; or a .glb, .gltf or .ply "
+      "file.");
   command.AddInputPath(
       "aligned", &options.aligned,
       "Folder that roomtex-align wrote, or any COLMAP model in the scan frame: its "

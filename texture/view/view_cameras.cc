@@ -225,6 +225,16 @@ std::shared_ptr<const std::string> ViewCameras::PinholePhoto(int id, int max_siz
   return result;
 }
 
+cv::Mat1b ViewCameras::PinholeTransparency(int id, int max_size) const {
+  const std::optional<Camera> pinhole = Pinhole(id, max_size);
+  if (!pinhole) return {};
+  cv::Mat1b transparent = ReadTransparency(paths_[id], fits_[id].pixels);
+  if (transparent.empty()) return {};
+  const Camera& camera = model_.cameras.at(Image(id).camera_id);
+  cv::resize(transparent, transparent, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return UndistortPhoto(transparent, camera, *pinhole).picture > 0;
+}
+
 std::string ViewCameras::EncodePoints(const Eigen::Vector3d& origin) const {
   std::string bytes;
   bytes.reserve(16 * model_.points.size());

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <opencv2/core/mat.hpp>
+
 #include "colmap_ext/sparse_model.h"
 #include "core/photo_fit.h"
 #include "core/report.h"
@@ -58,6 +60,9 @@ class ViewCameras {
   // null = sRGB. Throws InputError if it cannot be read.
   std::shared_ptr<const std::string> PinholePhoto(int id, int max_size,
                                                   const ResponseCurve* response) const;
+  // Other than 0 where that camera sees what is transparent in the photo, in the size of
+  // Pinhole(id, max_size); empty where nothing is. Throws likewise.
+  cv::Mat1b PinholeTransparency(int id, int max_size) const;
   // Throws UsageError for a camera that is not there.
   const SparseImage& Image(int id) const;
   // Points of the sparse model: float x y z (relative to `origin`), bytes r g b 255; without far

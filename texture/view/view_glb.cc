@@ -2,8 +2,12 @@
 // is compared with the bytes of the binary part, images stay encoded for the browser, and numbers
 // are read in blocks, so that what lies in memory is the model alone.
 
+#include <cctype>
 #include <cstring>
+#include <filesystem>
 #include <limits>
+#include <map>
+#include <memory>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -11,6 +15,7 @@
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/photo.h"
+#include "core/text.h"
 #include "importers/file_reader.h"
 #include "texture/view/view_model.h"
 
@@ -68,6 +73,18 @@ struct Elements {
   }
 };
 
+// The path that a link names (RFC 3986): "my%20room/model.glb" is "my room/model.glb".
+std::string PathOfLink(const std::string& link) {
+  std::string path;
+  for (size_t i = 0; i < link.size(); ++i) {
+    const bool is_code = link[i] == '%' && i + 2 < link.size() &&
+                         std::isxdigit(link[i + 1] & 255) && std::isxdigit(link[i + 2] & 255);
+    path += is_code ? static_cast<char>(std::stoi(link.substr(i + 1, 2), nullptr, 16)) : link[i];
+    if (is_code) i += 2;
+  }
+  return path;
+}
+
 // Triangles, where they stand.
 struct Primitive {
   const json* triangles;
@@ -76,7 +93,14 @@ struct Primitive {
 
 class GlbReader {
  public:
-  explicit GlbReader(const std::string& path) : path_(path), file_(path) { ReadChunks(); }
+  explicit GlbReader(const std::string& path) : path_(path), file_(path) {
+    is_text_ = LowerCase(std::filesystem::path(path).extension().string()) == ".gltf";
+    if (is_text_) {
+      ParseRoot(0, file_.size());
+    } else {
+      ReadChunks();
+    }
+  }
 
   ViewModel Read(bool has_supplement) {
     model_.path = path_;
@@ -84,7 +108,9 @@ class GlbReader {
     ReadImages();
     const json scene = Object("scenes", Number(root_, "scene", 0));
     const json& roots = List(scene, "nodes");
-    const bool ours = Text(Member(root_, "asset"), "generator") == "roomtex-texture";
+    const std::string generator = Text(Member(root_, "asset"), "generator");
+    is_joined_ = generator == "roomtex-join";
+    const bool ours = generator == "roomtex-texture" || is_joined_;
     // Ours: what the root node turns is the scan frame.
     Eigen::Affine3d scan_from_gltf = Eigen::Affine3d::Identity();
     if (ours && roots.size() == 1) {
@@ -103,6 +129,13 @@ class GlbReader {
     throw InputError(path_, "", finding, remedy);
   }
 
+  void ParseRoot(int64_t begin, int64_t size) {
+    if (size > static_cast<int64_t>(kMaxJson)) Fail("is too long for a text of glTF", kNotOurs);
+    root_ = ParseJson(file_.ReadSome(begin, size), path_, kDamaged);
+    if (root_.is_object()) return;
+    throw InputError(path_, BytePosition(begin), "the JSON part cannot be read", kDamaged);
+  }
+
   void ReadChunks() {
     const auto word = [this](int64_t at) {
       uint32_t value;
@@ -119,10 +152,7 @@ class GlbReader {
       throw InputError(path_, BytePosition(12), "the JSON part does not fit into the file",
                        kDamaged);
     }
-    root_ = ParseJson(file_.ReadSome(20, json_size), path_, kDamaged);
-    if (!root_.is_object()) {
-      throw InputError(path_, BytePosition(20), "the JSON part cannot be read", kDamaged);
-    }
+    ParseRoot(20, json_size);
     const int64_t at = 20 + static_cast<int64_t>(json_size);
     if (at + 8 > file_.size()) return;  // without a binary part
     const uint32_t size = word(at);
@@ -182,26 +212,51 @@ class GlbReader {
     }
   }
 
-  // Offset and size in the binary part.
-  std::pair<size_t, size_t> View(int64_t number) const {
+  struct Bytes {
+    const FileReader* file;
+    int64_t begin;
+    size_t size;
+  };
+  // The binary part of a GLB; of a .gltf a file beside it, which roomtex-join leaves as it is.
+  Bytes Buffer(int64_t number) const {
+    const json& buffer = Object("buffers", number);
+    const json& link = Member(buffer, "uri");
+    if (!is_text_) {
+      if (number != 0 || !link.is_null()) Fail("keeps data in another file", kNotOurs);
+      return {&file_, binary_begin_, binary_size_};
+    }
+    if (!link.is_string() || link.get<std::string>().find(':') != std::string::npos) {
+      Fail("keeps data elsewhere than in files beside it", kNotOurs);
+    }
+    std::unique_ptr<const FileReader>& file = others_[number];
+    if (!file) {
+      const auto folder = std::filesystem::path(path_).parent_path();
+      file = std::make_unique<FileReader>((folder / PathOfLink(link)).string());
+    }
+    const int64_t said = Number(buffer, "byteLength", std::nullopt);
+    if (file->size() < said || (is_joined_ && file->size() != said)) {
+      Fail("was made with another " + file->path() + ", of " + std::to_string(said) + " bytes",
+           "Run roomtex-join again");
+    }
+    return {file.get(), 0, static_cast<size_t>(said)};
+  }
+
+  Bytes View(int64_t number) const {
     const json& view = Object("bufferViews", number);
     const auto offset = static_cast<size_t>(Number(view, "byteOffset", 0));
     const auto size = static_cast<size_t>(Number(view, "byteLength", std::nullopt));
-    if (Number(view, "buffer", std::nullopt) != 0 ||
-        !Member(Object("buffers", 0), "uri").is_null()) {
-      Fail("keeps data in another file", kNotOurs);
-    }
-    if (offset > binary_size_ || size > binary_size_ - offset) {
+    const Bytes all = Buffer(Number(view, "buffer", std::nullopt));
+    if (offset > all.size || size > all.size - offset) {
       Fail("says it holds " + std::to_string(offset + size) + " bytes of data, but has " +
-           std::to_string(binary_size_));
+           std::to_string(all.size));
     }
-    return {offset, size};
+    return {all.file, all.begin + static_cast<int64_t>(offset), size};
   }
 
   Elements ElementsOf(int64_t number) const {
     const json& accessor = Object("accessors", number);
     if (!Member(accessor, "sparse").is_null()) Fail("has sparse accessors", kNotOurs);
-    const auto [view_offset, view_size] = View(Number(accessor, "bufferView", std::nullopt));
+    const Bytes of_view = View(Number(accessor, "bufferView", std::nullopt));
     Elements elements;
     elements.count = static_cast<size_t>(Number(accessor, "count", std::nullopt));
     elements.type = static_cast<int>(Number(accessor, "componentType", std::nullopt));
@@ -219,16 +274,16 @@ class GlbReader {
     if (elements.stride == 0) elements.stride = element;
     const auto offset = static_cast<size_t>(Number(accessor, "byteOffset", 0));
     const bool fits = elements.stride >= element && elements.stride < (1u << 20) &&
-                      offset <= view_size &&
+                      offset <= of_view.size &&
                       (elements.count == 0 ||
-                       (element <= view_size - offset &&
-                        elements.count - 1 <= (view_size - offset - element) / elements.stride));
+                       (element <= of_view.size - offset &&
+                        elements.count - 1 <= (of_view.size - offset - element) / elements.stride));
     if (!fits) {
       Fail("says that a list has " + std::to_string(elements.count) +
            " items, more than its bytes can hold");
     }
-    elements.file = &file_;
-    elements.begin = binary_begin_ + static_cast<int64_t>(view_offset + offset);
+    elements.file = of_view.file;
+    elements.begin = of_view.begin + static_cast<int64_t>(offset);
     elements.size = element;
     return elements;
   }
@@ -236,10 +291,10 @@ class GlbReader {
   void ReadImages() {
     for (const json& image : List(root_, "images")) {
       if (!Member(image, "uri").is_null()) Fail("keeps its images in other files", kNotOurs);
-      const auto [offset, size] = View(Number(image, "bufferView", std::nullopt));
+      const Bytes encoded = View(Number(image, "bufferView", std::nullopt));
       ViewImage result;
       result.bytes = std::make_shared<const std::string>(
-          file_.ReadSome(binary_begin_ + static_cast<int64_t>(offset), static_cast<int64_t>(size)));
+          encoded.file->ReadSome(encoded.begin, static_cast<int64_t>(encoded.size)));
       const auto [width, height] = EncodedImageSize(*result.bytes);
       if (model_.images.size() >= static_cast<size_t>(std::numeric_limits<int16_t>::max())) {
         Fail("has more images than can be read", kNotOurs);
@@ -440,6 +495,9 @@ class GlbReader {
 
   std::string path_;
   FileReader file_;
+  bool is_text_ = false;                                                 // .gltf
+  bool is_joined_ = false;                                               // of roomtex-join
+  mutable std::map<int64_t, std::unique_ptr<const FileReader>> others_;  // by buffer
   int64_t binary_begin_ = 0;
   size_t binary_size_ = 0;
   json root_;

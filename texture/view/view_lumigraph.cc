@@ -37,6 +37,9 @@ std::optional<ResponseCurve> ReadResponse(const Json& report, const std::string&
 // Of a plane 1/depth is linear over the picture; where it is not, one thing ends before another.
 constexpr float kJump = 0.02f;  // of 1/depth: 6 cm at 3 m
 
+// 1/depth of what lies before everything else: a photo does not show what is there.
+constexpr float kRightBefore = 1000;
+
 // Draws a triangle, in `cam` of the pinhole camera, as far as it lies before it.
 void DrawInCamera(const Camera& pinhole, const std::array<Eigen::Vector3f, 3>& corners,
                   cv::Mat1f* inverse) {
@@ -188,8 +191,11 @@ std::string ViewLumigraph::Depths(int id, const ViewChunks& chunks, const Eigen:
     std::transform(drawn.begin(), drawn.end(), inverse.begin(), inverse.begin(),
                    [](float a, float b) { return std::max(a, b); });
   });
+  cv::Mat1f widened = WidenNearer(inverse);
+  const cv::Mat1b transparent = cameras_.PinholeTransparency(id, kDepthSize);
+  if (!transparent.empty()) widened.setTo(kRightBefore, transparent);
   cv::Mat half;
-  WidenNearer(inverse).convertTo(half, CV_16F);
+  widened.convertTo(half, CV_16F);
   const uint32_t header[4] = {0x31445452, static_cast<uint32_t>(half.cols),
                               static_cast<uint32_t>(half.rows), 0};
   std::string bytes(reinterpret_cast<const char*>(header), sizeof header);

@@ -120,23 +120,25 @@ ViewModel ReadViewModel(const std::string& path) {
   if (fs::is_directory(path, error)) {
     file = (fs::path(path) / "model.glb").string();
     const std::string ply = (fs::path(path) / "model.ply").string();
+    const std::string site = (fs::path(path) / "site.gltf").string();
     if (!fs::exists(file, error) || (fs::exists(ply, error) && IsCloud(ply))) file = ply;
+    if (!fs::exists(file, error)) file = site;
     if (!fs::exists(file, error)) {
-      throw InputError(path, "", "holds neither model.glb nor model.ply",
-                       "Give the folder that roomtex-texture wrote");
+      throw InputError(path, "", "holds neither model.glb nor model.ply, nor site.gltf",
+                       "Give the folder that roomtex-texture or roomtex-join wrote");
     }
   }
   const std::string extension = LowerCase(fs::path(file).extension().string());
   RequireFile(file, "Give what roomtex-texture wrote");
-  if (extension == ".glb" || extension == ".ply") {
+  if (extension == ".glb" || extension == ".gltf" || extension == ".ply") {
     const std::optional<size_t> supplement = FirstSupplementVertex(file);
     ViewModel model =
-        extension == ".glb" ? ReadViewGlb(file, supplement.has_value()) : ReadViewPly(file);
+        extension == ".ply" ? ReadViewPly(file) : ReadViewGlb(file, supplement.has_value());
     if (extension == ".ply" && supplement && !model.is_cloud) MarkSupplement(*supplement, &model);
     if (!model.is_cloud) model.normals = SmoothNormals(model);
     return model;
   }
-  throw InputError(path, "", "is neither a folder nor a .glb or .ply file",
+  throw InputError(path, "", "is neither a folder nor a .glb, .gltf or .ply file",
                    "Give the folder that roomtex-texture wrote");
 }
 

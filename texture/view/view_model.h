@@ -51,13 +51,15 @@ struct ViewModel {
 // averaged over the neighbours `passes` times.
 std::vector<Eigen::Vector3f> SmoothNormals(const ViewModel& model, int passes = 5);
 // A folder that roomtex-texture wrote (model.glb; model.ply if there is no GLB, or the model is a
-// cloud), a .glb or a .ply; the report.json beside it says whether it has a supplement. Throws
-// InputError: nothing there, damaged, no triangles, things of glTF that we do not read.
+// cloud) or roomtex-join (site.gltf), a .glb, .gltf or .ply; the report.json beside it says whether
+// it has a supplement. Throws InputError: nothing there, damaged, no triangles, things of glTF that
+// we do not read.
 ViewModel ReadViewModel(const std::string& path);
 
-// Binary glTF 2.0: triangles with one texture image or vertex colours each; nodes with their
-// transforms. The scan frame is that below the root node of roomtex-texture's files, and glTF's own
-// for any other file. Numbers are checked against the bytes that are there.
+// glTF 2.0, binary or a .gltf with buffers in files beside it: triangles with one texture image or
+// vertex colours each; nodes with their transforms. The scan frame is that below the root node of
+// roomtex-texture's files, the site's below that of roomtex-join's, and glTF's own for any other
+// file. Numbers are checked against the bytes that are there.
 // has_supplement: what is below the root's last node is the supplement.
 ViewModel ReadViewGlb(const std::string& path, bool has_supplement = false);
 // A triangle mesh or a cloud of points; colours by red, green, blue if it has them, otherwise the

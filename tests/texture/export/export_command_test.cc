@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "capture/simulation/capture_writer.h"
 #include "capture/simulation/simulated_room.h"
@@ -104,6 +105,31 @@ TEST_F(ExportCommand, WorkspaceOfColmapReprojects) {
   EXPECT_LT(Reproject("colmap", "workspace").max_px, 0.01);
   EXPECT_EQ(cv::imread(Path("workspace/images/photo_001.jpg")).cols, 240);
   EXPECT_FALSE(fs::exists(Path("workspace/masks")));
+}
+
+TEST_F(ExportCommand, WhatIsTransparentIsMaskedAndNoPointIsSeenThere) {
+  fs::copy(Capture() + "/photos", Path("cut"), fs::copy_options::recursive);
+  const cv::Mat photo = cv::imread(Path("cut/photo_001.jpg"));
+  cv::Mat cut;
+  cv::cvtColor(photo, cut, cv::COLOR_BGR2BGRA);
+  cut.colRange(0, photo.cols / 2).setTo(cv::Scalar::all(0));
+  std::vector<uchar> png;
+  ASSERT_TRUE(cv::imencode(".png", cut, png));
+  WriteBytes(Path("cut/photo_001.jpg"), std::string(png.begin(), png.end()));
+  const CommandResult result =
+      RunCommandLine("roomtex-export --quiet --input_path " + Path("model") + " --image_path " +
+                     Path("cut") + " --scan_path " + Capture() +
+                     "/scan.rtpi --max_points 5000 --output_path " + Path("cut_out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const cv::Mat mask = cv::imread(Path("cut_out/masks/photo_001.jpg.png"), cv::IMREAD_GRAYSCALE);
+  const int middle = mask.cols / 2;
+  EXPECT_EQ(cv::countNonZero(mask.colRange(0, middle - 4)), 0);
+  EXPECT_GT(cv::countNonZero(mask.colRange(middle + 4, mask.cols)), mask.rows * mask.cols / 4);
+  for (const auto& [id, image] : ReadSparseModel(Path("cut_out/sparse")).images) {
+    if (image.name != "photo_001.jpg") continue;
+    EXPECT_GT(image.points2d.size(), 50u);
+    for (const Eigen::Vector2d& at : image.points2d) EXPECT_GT(at.x(), middle - 4);
+  }
 }
 
 TEST_F(ExportCommand, TransformsOfNerfstudioReproject) {

@@ -90,6 +90,27 @@ TEST_F(ViewCommand, WritesAFolderToGiveAway) {
   EXPECT_THAT(full.err, HasSubstr("Set TMPDIR"));
 }
 
+// Of what is shown, and of nothing that lies where the command is called.
+TEST_F(ViewCommand, WarnsOfDoubtsInWhatItShows) {
+  const TempFolder elsewhere;
+  const auto warnings = [&](const std::string& model) {
+    const CommandResult result =
+        RunProgram("cd " + elsewhere.path() + " && " + BinFolder() + "/roomtex-view --input_path " +
+                   model + " --output_path " + (elsewhere / "given"));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  WriteBytes(elsewhere / "alignment.json", R"({"trusted": false, "reason": "of another room"})");
+  EXPECT_THAT(warnings(folder_.path()), testing::Not(HasSubstr("not to be trusted")));
+  for (const char* name : {"report.json", "joined.json"}) {
+    WriteBytes(folder_ / name, R"({"trusted": false, "reason": "The loops do not close."})");
+    for (const std::string& model : {folder_.path(), folder_ / "model.glb"}) {
+      EXPECT_THAT(warnings(model), HasSubstr("not to be trusted. The loops do not close.")) << name;
+    }
+    std::filesystem::remove(folder_ / name);
+  }
+}
+
 TEST_F(ViewCommand, WritesNothingWhereTheReportCannotBeWritten) {
   const std::string out = folder_ / "given";
   const auto refused = [&](const std::string& report_path, int code) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 #include "core/scan_mesh.h"
@@ -90,6 +91,41 @@ TEST_F(LumigraphOfTwoWalls, DepthsAreThoseOfTheMeshAndTheNearerSurfaceIsWider) {
   EXPECT_NEAR(at({0, -1, -4}), 0.25, 1e-3);
   EXPECT_NEAR(at({0, -1, -8}), 0.125, 1e-3);
   EXPECT_EQ(at({0, 1, -4}), 0);
+}
+
+// What programs that cut things out make transparent is black below, mostly.
+TEST_F(LumigraphOfTwoWalls, WhatIsTransparentInAPhotoIsHiddenFromIt) {
+  const cv::Mat photo = cv::imread(folder_ / "a.jpg");
+  cv::Mat seen;
+  cv::cvtColor(photo, seen, cv::COLOR_BGR2BGRA);
+  seen.colRange(0, photo.cols / 2).setTo(cv::Scalar::all(0));
+  std::vector<uchar> png;
+  ASSERT_TRUE(cv::imencode(".png", seen, png));
+  WriteBytes(folder_ / "a.jpg", std::string(png.begin(), png.end()));
+  ViewModel wall;
+  wall.points = {{-50, -50, -4}, {50, -50, -4}, {0, 50, -4}};
+  wall.colors.resize(3);
+  wall.triangles = {{0, 1, 2}};
+  wall.page_of_triangle = {-1};
+  wall.normals = SmoothNormals(wall);
+  const ViewChunks chunks(std::move(wall));
+  const ViewLumigraph lumigraph(cameras_, {});
+  for (const int id : {0, 1}) {
+    const std::string bytes = lumigraph.Depths(id, chunks, Eigen::Vector3d::Zero(), 1);
+    const Camera pinhole = *cameras_.Pinhole(id, ViewLumigraph::kDepthSize);
+    cv::Mat inverse;
+    cv::Mat(pinhole.height, pinhole.width, CV_16F, const_cast<char*>(bytes.data()) + 16)
+        .convertTo(inverse, CV_32F);
+    for (const double u : {0.1, 0.3, 0.48, 0.52, 0.9}) {
+      const int x = static_cast<int>(u * pinhole.width);
+      const float found = inverse.at<float>(pinhole.height / 2, x);
+      if (id == 0 && u < 0.5) {
+        EXPECT_GT(found, 100) << u;
+      } else {
+        EXPECT_NEAR(found, 0.25, 1e-3) << id << " " << u;
+      }
+    }
+  }
 }
 
 TEST_F(LumigraphOfTwoWalls, TakesThePhotosThatColouredTheModelWithTheirGains) {

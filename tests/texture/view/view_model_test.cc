@@ -1,5 +1,6 @@
 #include "texture/view/view_model.h"
 
+#include <cstring>
 #include <fstream>
 #include <random>
 
@@ -7,6 +8,8 @@
 #include <gmock/gmock.h>
 
 #include "core/error.h"
+#include "core/json_text.h"
+#include "core/output_file.h"
 #include "tests/support/temp_folder.h"
 #include "tests/texture/view/view_scene.h"
 #include "texture/view/view_chunks.h"
@@ -42,6 +45,41 @@ TEST(ViewModel, GlbComesBackInTheScanFrame) {
     EXPECT_NEAR(model.images[0].height, 40, 1);
     for (const int page : model.page_of_triangle) ASSERT_EQ(page, 0);
   }
+}
+
+// The scene of roomtex-join: a room's file, whose bytes stay where they are.
+TEST(ViewModel, JoinedRoomsComeFromTheirOwnFiles) {
+  const TempFolder folder;
+  const Scan scan = TwoWallsScan(60, 40);
+  MakeFolder(folder / "my room");
+  WriteViewFolder(scan, folder / "my room");
+  const std::string glb = ReadBytes(folder / "my room/model.glb");
+  uint32_t json_size = 0;
+  std::memcpy(&json_size, &glb[12], 4);
+  Json scene = Json::parse(glb.substr(20, json_size));
+  scene["asset"]["generator"] = "roomtex-join";
+  scene["buffers"] = {{{"uri", "../my%20room/model.glb"}, {"byteLength", glb.size()}}};
+  for (Json& view : scene["bufferViews"]) {
+    view["byteOffset"] = view.value("byteOffset", 0) + 20 + json_size + 8;
+  }
+  MakeFolder(folder / "joined");
+  const auto write = [&] { WriteBytes(folder / "joined/site.gltf", scene.dump()); };
+  write();
+  const ViewModel model = ReadViewModel(folder / "joined");
+  EXPECT_LT(FarthestFromScan(model, scan), 1e-5);
+  EXPECT_EQ(model.triangles.size(), ColorForView(scan).triangles.size());
+  ASSERT_EQ(model.images.size(), 1u);
+  EXPECT_NEAR(model.images[0].width, 60, 1);
+  WriteBytes(folder / "my room/model.glb", glb + "coloured anew");
+  EXPECT_INPUT_ERROR(ReadViewModel(folder / "joined"), "Run roomtex-join again");
+  for (const char* elsewhere : {"https://example.org/model.glb", "data:,"}) {
+    scene["buffers"][0]["uri"] = elsewhere;
+    write();
+    EXPECT_INPUT_ERROR(ReadViewModel(folder / "joined"), "elsewhere than in files beside it");
+  }
+  scene["buffers"][0]["uri"] = "gone.glb";
+  write();
+  EXPECT_INPUT_ERROR(ReadViewModel(folder / "joined"), "gone.glb");
 }
 
 TEST(ViewModel, TheSupplementOfTheReportIsToldApartInItsChunksToo) {

@@ -17,9 +17,6 @@ export class Frames {
     return point.clone().applyQuaternion(this.scanFromPage).add(this.origin);
   }
   // Directions.
-  turnToPage(direction) {
-    return direction.clone().applyQuaternion(this.pageFromScan);
-  }
   turnToScan(direction) {
     return direction.clone().applyQuaternion(this.scanFromPage);
   }

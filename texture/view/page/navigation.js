@@ -504,7 +504,3 @@ export function yawPitch(quaternion) {
 export function rotationOf(yaw, pitch) {
   return new THREE.Quaternion().setFromEuler(new THREE.Euler(pitch, yaw, 0, 'YXZ'));
 }
-export function lookRotation(direction) {
-  const d = direction.clone().normalize();
-  return rotationOf(Math.atan2(-d.x, -d.z), Math.asin(THREE.MathUtils.clamp(d.y, -1, 1)));
-}

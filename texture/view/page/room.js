@@ -64,7 +64,7 @@ function meet(origin, direction, positions, a, b, c) {
   return distance > 1e-4 ? distance : Infinity;
 }
 
-// Whether who looks along `direction` sees the front, as the shader and the server decide it.
+// Whether who looks along `direction` sees the front, as the shader decides it.
 function showsFront(normals, a, b, c, direction) {
   let x = 0, y = 0, z = 0;
   for (const i of [a, b, c]) {
